@@ -1,0 +1,94 @@
+"""How kernels are compiled: one plain Python source for a single step, a long record, many lanes and the closed loop.
+
+`compiled` is `numba.njit` with a disk cache that follows the *content* of the whole project. Numba's own cache looks
+only at the file of the function it is about to load, so editing a callee in another file would silently leave the
+old arithmetic in place; here every edit gets a fresh cache folder. With `NUMBA_DISABLE_JIT=1` the same functions
+run as ordinary Python.
+
+`by_type` is the one place where a kernel picks its variant: a function with several bodies, chosen by the type of its
+first argument, at compile time inside compiled code. A variant that a run does not use is not in its machine code.
+"""
+
+import functools
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numba
+from numba.core import config
+from numba.extending import overload
+
+
+def build_dir() -> Path:
+    """Return where generated files go: `$HARDWALL_BUILD`, else `build/` of the source tree, else a folder of the user.
+
+    The last serves an installed copy, whose own folder may not be writable.
+    """
+    if chosen := os.environ.get("HARDWALL_BUILD"):
+        return Path(chosen).absolute()
+    root = Path(__file__).absolute().parent.parent
+    if (root / "pyproject.toml").exists():
+        return root / "build"
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "hardwall"
+
+
+@functools.cache
+def source_digest() -> str:
+    """Return a hex digest of every Python and C++ source of the installed project."""
+    digest = hashlib.sha256()
+    here = Path(__file__).absolute().parent
+    for room in ("hdl", "model", "sim"):
+        for path in sorted((here.parent / room).glob("*.[cp][py]*")):
+            digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def compiled(function: Callable) -> Callable:
+    """Compile `function` with Numba, cached on disk by the content of the project's sources."""
+    saved = config.CACHE_DIR
+    config.CACHE_DIR = str(build_dir() / "numba" / source_digest())
+    try:
+        return numba.njit(cache=True, error_model="numpy")(function)
+    finally:
+        config.CACHE_DIR = saved
+
+
+def by_type(declaration: Callable) -> Callable:
+    """Return a function that calls the variant registered for the class of its first argument.
+
+    `declaration` gives the name and the docstring; its body is never run. Variants are added with
+    `@name.register(ClassOfFirstArgument)`, above `@compiled`.
+
+    Raises:
+        TypeError: on a call with a class nobody registered.
+    """
+    variants: dict[type, Callable] = {}
+
+    @functools.wraps(declaration)
+    def call(first, *rest):
+        variant = variants.get(type(first))
+        if variant is None:
+            raise TypeError(f"{declaration.__name__} has no variant for {type(first).__name__}")
+        return variant(first, *rest)
+
+    @overload(call)
+    def choose(first, *rest):
+        variant = variants.get(getattr(first, "instance_class", None))
+        if variant is None:
+            return None
+
+        def body(first, *rest):
+            return variant(first, *rest)
+
+        return body
+
+    def register(kind: type) -> Callable:
+        def add(variant: Callable) -> Callable:
+            variants[kind] = variant
+            return variant
+
+        return add
+
+    call.register = register
+    return call

