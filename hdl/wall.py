@@ -1,0 +1,132 @@
+"""The virtual wall: a unilateral spring and damper."""
+
+from amaranth.hdl import Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from hardwall.model.wall import Design
+
+from .fixed import saturate, shape, shift_floor, shift_round_half_up
+
+
+class Wall(wiring.Component):
+    """The force of a unilateral spring and damper on the handle.
+
+    Equation, with side = +1 where the wall fills greater positions, else -1:
+
+        depth = side (count - wall_position)
+        push  = wall_stiffness depth + wall_damping side velocity     for depth > 0, else 0
+        force = -side push
+
+    `wall_forbid_pull` holds push at 0 or more.
+
+    Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier serves
+    both products in turn.
+
+    Rounding and overflow: low bits of the velocity beyond `design.coarse` are dropped; the exact sum of the products
+    rounds once, half up, to a force LSB, then saturates at the force format.
+
+    Parameters
+    ----------
+    design : hardwall.model.wall.Design
+        Formats; its module derives them.
+
+    Members
+    -------
+    strobe : In(1)
+        Takes a sample.
+    count : In(signed)
+        Position, counts; may wrap.
+    velocity : In(SQ)
+        Counts a sample.
+    wall_stiffness, wall_damping : In(UQ)
+        Force LSB a count, and a count/sample.
+    wall_position : In(signed)
+        Surface, counts.
+    wall_left : In(1)
+        1: side is -1.
+    wall_forbid_pull : In(1)
+        1: the wall only pushes.
+    force : Out(SQ)
+        On the handle, force LSB; valid from `valid` until the next.
+    valid : Out(1)
+        High for one clock.
+
+    Raises
+    ------
+    TypeError
+        If `design` is not of that class.
+
+    Source: Chawda, Celik, O'Malley, World Haptics 2011, the virtual wall.
+    """
+
+    def __init__(self, design: Design):
+        if not isinstance(design, Design):
+            raise TypeError(f"design must be a wall.Design, not {design!r}")
+        self._design = design
+        super().__init__(
+            {
+                "strobe": In(1),
+                "count": In(signed(design.count_width)),
+                "velocity": In(shape(design.velocity)),
+                **{word.name: In(shape(word.format)) for word in design.words},
+                "force": Out(shape(design.force)),
+                "valid": Out(1),
+            }
+        )
+
+    @property
+    def design(self) -> Design:
+        return self._design
+
+    @property
+    def latency(self) -> int:
+        """Clocks from `strobe` to `valid`."""
+        return self._design.latency
+
+    def elaborate(self, platform):
+        m = Module()
+        design = self._design
+
+        depth = Signal(signed(design.count_width))
+        inward = Signal(signed(design.coarse.width + 1))
+        gain = Signal(max(design.stiffness.width, design.damping.width))
+        operand = Signal(signed(max(len(depth), len(inward))))
+        product = Signal(signed(len(gain) + len(operand)))
+        spring_shift = design.push - design.stiffness.f
+        damper_shift = design.push - design.damping.f - design.coarse.f
+        spring = Signal(signed(len(product) + spring_shift))
+        total = Signal(signed(max(len(spring), len(product) + damper_shift) + 1))
+
+        m.d.sync += self.valid.eq(0)
+        with m.FSM():
+            with m.State("DEPTH"), m.If(self.strobe):
+                offset = Mux(self.wall_left, self.wall_position - self.count, self.count - self.wall_position)
+                coarse = shift_floor(self.velocity, design.velocity.f - design.coarse.f)
+                m.d.sync += [
+                    depth.eq(offset[: len(depth)].as_signed()),
+                    inward.eq(Mux(self.wall_left, -coarse, coarse)),
+                ]
+                m.next = "SPRING"
+            with m.State("SPRING"):
+                m.d.sync += [gain.eq(self.wall_stiffness), operand.eq(depth)]
+                m.next = "DAMPER"
+            with m.State("DAMPER"):
+                m.d.sync += [gain.eq(self.wall_damping), operand.eq(inward)]
+                m.next = "SUM"
+            with m.State("SUM"):
+                m.d.sync += spring.eq(product << spring_shift)
+                m.next = "PUSH"
+            with m.State("PUSH"):
+                m.d.sync += total.eq(spring + (product << damper_shift))
+                m.next = "FORCE"
+            with m.State("FORCE"):
+                least = Mux(self.wall_forbid_pull, 0, -design.force.max)
+                rounded = shift_round_half_up(total, design.push)
+                push = Mux(rounded < least, least, saturate(rounded, -design.force.max, design.force.max))
+                held = Mux(depth > 0, push, 0)
+                m.d.sync += [self.force.eq(Mux(self.wall_left, held, -held)), self.valid.eq(1)]
+                m.next = "DEPTH"
+        # The multiplier, registered on both sides: its result is there two clocks after its operands are chosen.
+        m.d.sync += product.eq(gain * operand)
+        return m

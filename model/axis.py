@@ -1,0 +1,216 @@
+"""One axis, from counts to drive: estimator, wall and output stage, wired as the hardware wires them.
+
+For one's own studies, `Axis` takes and gives numpy arrays and SI units:
+
+    axis = Axis(spec, wall_stiffness=20e3, wall_damping=30.0)
+    record = axis.run(counts)
+    record.velocity_m_per_s, record.drive_n
+
+The kernels below it (`step` for a sample, `run` for records) are what the closed loop compiles into itself.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from . import output, wall
+from .compiled import compiled
+from .estimators import estimate
+from .fixed import UQ
+from .spec import AxisSpec
+from .words import Word
+
+ENCODER_FLAGS = ("encoder_illegal", "encoder_overspeed")
+
+
+class Params(NamedTuple):
+    """Parameters of the three blocks, all integer words or all float64; and where their flags stand."""
+
+    estimator: tuple
+    wall: tuple
+    output: tuple
+    estimator_bit: int
+    output_bit: int
+
+
+class State(NamedTuple):
+    """States of the blocks, and the sticky flags (bits as `Design.flags`, after the encoder's)."""
+
+    estimator: tuple
+    output: tuple
+    flags: int
+
+
+class Design:
+    """Formats, run-time words and latencies of an axis, derived from its `AxisSpec`.
+
+    Attributes:
+        estimator, wall, output: the blocks' designs.
+        words: every run-time word, in the order of the hardware's ports.
+        flags: names of the sticky flags, bit 0 first.
+        latency_to_drive: clocks from the sample strobe to the changed drive.
+    """
+
+    def __init__(self, spec: AxisSpec):
+        gains = spec.gains if spec.gains is not None else spec.model.Gains.default(spec.acceleration_max_m_per_s2)
+        self.spec = spec
+        self.gains = gains
+        self.estimator = spec.model.Design(spec, gains)
+        self.wall = wall.Design(spec, self.estimator.velocity)
+        self.output = output.Design(spec)
+        self.words = (
+            Word("encoder_glitch_clocks", UQ(4, 0), 1.0, "", 0, "longest pulse that the glitch filter rejects, clocks"),
+            Word("encoder_invert", UQ(1, 0), 1.0, "", 0, "1: count the other way"),
+            *self.estimator.words,
+            *self.wall.words,
+            *self.output.words,
+        )
+        self.flags = (*ENCODER_FLAGS, *self.estimator.flags, *self.output.flags)
+        self._flag_bits = len(ENCODER_FLAGS), len(ENCODER_FLAGS) + len(self.estimator.flags)
+        self.latency_to_drive = self.estimator.latency + self.wall.latency + self.output.latency
+
+    def encode(self, **si: float) -> dict[str, int]:
+        """Return every run-time word by name: from SI where given, else as after reset.
+
+        Raises:
+            ValueError: for a name that is not a word, or a value that does not fit; with what is accepted.
+        """
+        known = {word.name: word for word in self.words}
+        for name in si:
+            if name not in known:
+                raise ValueError(f"parameter must be one of {', '.join(known)}, not {name!r}")
+        return {name: word.from_si(si[name]) if name in si else word.reset for name, word in known.items()}
+
+    def params(self, words: dict[str, int]) -> Params:
+        """Return the integer kernel's parameters."""
+        blocks = self.estimator.params(words), self.wall.params(words), self.output.params(words)
+        return Params(*blocks, *self._flag_bits)
+
+    def float_params(self, words: dict[str, int], stiffness_n_per_m: float, damping_n_s_per_m: float) -> Params:
+        """Return the float64 kernel's parameters: gains as given, not as rounded to words."""
+        outputs = self.spec.model.OUTPUTS
+        selected = outputs[words.get(f"{self.spec.estimator}_output", 0)]
+        return Params(
+            self.estimator.float_params(self.gains, selected),
+            self.wall.float_params(stiffness_n_per_m, damping_n_s_per_m, words),
+            self.output.float_params(words),
+            *self._flag_bits,
+        )
+
+    def start(self, floating: bool = False) -> State:
+        """Return the state before the first sample."""
+        if floating:
+            return State(self.spec.model.FLOAT_START, output.FLOAT_START, 0)
+        return State(self.spec.model.START, output.START, 0)
+
+    def flag_names(self, flags: int) -> list[str]:
+        """Return the names of the flags raised in `flags`."""
+        return [name for bit, name in enumerate(self.flags) if flags >> bit & 1]
+
+
+@compiled
+def step(params, state, count, restart, fault, enable):
+    """Take one sample: return (state, velocity, force); the drive is `state.output.drive`.
+
+    Args:
+        params, state: of `Design.params` and `Design.start`, or their float64 counterparts.
+        count: position, counts, as a signed word that may have wrapped.
+        restart: true where the count was preloaded since the last sample; the estimator starts afresh.
+        fault: the encoder's two sticky flags; any of them forces the drive to zero.
+        enable: false forces the drive to zero.
+    """
+    estimator, velocity, estimator_flags = estimate(params.estimator, state.estimator, count, restart)
+    force = wall.render(params.wall, count, velocity)
+    driven, output_flags = output.step(params.output, state.output, force, enable and not fault)
+    flags = state.flags | fault | estimator_flags << params.estimator_bit | output_flags << params.output_bit
+    return State(estimator, driven, flags), velocity, force
+
+
+@compiled
+def run(params, state, counts, velocity, force, drive, flags):
+    """Take a record of `counts` sample by sample; fill the other arrays, of the same length; return the state."""
+    for k in range(len(counts)):
+        state, velocity[k], force[k] = step(params, state, counts[k], 0, 0, 1)
+        drive[k] = state.output.drive
+        flags[k] = state.flags
+    return state
+
+
+@dataclass(frozen=True)
+class Record:
+    """What an axis made of a record of counts; arrays of the shape of the counts.
+
+    Attributes:
+        velocity: words of `design.estimator.velocity`; float64 axis: counts a sample.
+        force, drive: force LSB on the handle, before and after the output stage.
+        flags: sticky flags after each sample, bits as `design.flags`.
+    """
+
+    design: Design
+    velocity: np.ndarray
+    force: np.ndarray
+    drive: np.ndarray
+    flags: np.ndarray
+
+    @property
+    def velocity_m_per_s(self) -> np.ndarray:
+        lsb = 1.0 if self.velocity.dtype == np.float64 else self.design.estimator.velocity.lsb
+        return self.velocity * (lsb * self.design.spec.velocity_unit_m_per_s)
+
+    @property
+    def force_n(self) -> np.ndarray:
+        return self.force * self.design.spec.force_resolution_n
+
+    @property
+    def drive_n(self) -> np.ndarray:
+        return self.drive * self.design.spec.force_resolution_n
+
+
+class Axis:
+    """An axis with its run-time parameters set, in SI units by port name; see `Design.words`.
+
+    Args:
+        spec: the axis.
+        floating: true for the same algorithms in float64, gains unrounded and estimator unsaturated.
+        si: run-time parameters, e.g. `wall_stiffness=20e3` (N/m); the rest stay as after reset (the wall off).
+
+    Raises:
+        ValueError: for an unknown name or a value out of range.
+    """
+
+    def __init__(self, spec: AxisSpec, floating: bool = False, **si: float):
+        self.design = spec.design
+        words = self.design.encode(**si)
+        self._floating = floating
+        if floating:
+            self._params = self.design.float_params(words, si.get("wall_stiffness", 0.0), si.get("wall_damping", 0.0))
+        else:
+            self._params = self.design.params(words)
+
+    def run(self, counts: np.ndarray) -> Record:
+        """Run records of counts from the start state.
+
+        Args:
+            counts: integers, shape (samples,), or (lanes, samples) for independent axes side by side. A count may
+                exceed the count's width: it wraps, as the hardware's does.
+
+        Raises:
+            TypeError: if the counts are not integers.
+            ValueError: if they have not one or two dimensions.
+        """
+        counts = np.asarray(counts)
+        if not np.issubdtype(counts.dtype, np.integer):
+            raise TypeError(f"counts must be integers, not {counts.dtype!r}")
+        if counts.ndim not in (1, 2):
+            raise ValueError(f"counts must have 1 or 2 dimensions, not {counts.ndim!r}")
+        half = 1 << (self.design.spec.count_width - 1)
+        lanes = np.atleast_2d(((counts.astype(np.int64) + half) & (2 * half - 1)) - half)
+        number = np.float64 if self._floating else np.int64
+        velocity, force, drive = (np.zeros(lanes.shape, number) for _ in range(3))
+        flags = np.zeros(lanes.shape, np.int64)
+        for lane in range(len(lanes)):
+            start = self.design.start(self._floating)
+            run(self._params, start, lanes[lane], velocity[lane], force[lane], drive[lane], flags[lane])
+        shape = counts.shape
+        return Record(self.design, *(array.reshape(shape) for array in (velocity, force, drive, flags)))

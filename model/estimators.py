@@ -1,0 +1,54 @@
+"""The velocity estimators, by the name used in scenes and on the command line.
+
+To add one: `hdl/NAME.py`, `model/NAME.py`, `tests/test_NAME.py`, and one line in `ESTIMATORS`.
+
+An estimator's module in `hardwall.model` provides
+
+- `OUTPUTS`: the names of its selectable outputs, the default first;
+- `Gains`: a frozen dataclass of SI gains; `Gains.default(acceleration_max_m_per_s2)` gives those for a scene that
+  names none;
+- `Design(axis, gains)`: formats, run-time words and latency derived from a `spec.AxisSpec`, with attributes `velocity`
+  (a `fixed.SQ`, counts a sample), `words` (tuple of `words.Word`), `flags` (names of its saturation flags, bit 0
+  first), `latency` (clocks from strobe to valid), and methods `params(words)` and `float_params(gains, output)`;
+- `START` and `FLOAT_START`: the states before the first sample;
+- kernels registered with `estimate` for its `Params` and its `FloatParams`.
+
+The module of the same name in `hardwall.hdl` provides `Estimator`, the component, constructed from a `Design`.
+"""
+
+import importlib
+from types import ModuleType
+
+from .compiled import by_type
+
+ESTIMATORS = {
+    "fdm": "finite_difference",
+    "levant": "levant",
+}
+
+
+def load(name: str, package: str = __package__) -> ModuleType:
+    """Return the module of estimator `name` in `package` (this one, or `hardwall.hdl`).
+
+    Raises:
+        ValueError: if no estimator has that name.
+    """
+    if name not in ESTIMATORS:
+        raise ValueError(f"estimator must be one of {', '.join(ESTIMATORS)}, not {name!r}")
+    return importlib.import_module(f"{package}.{ESTIMATORS[name]}")
+
+
+@by_type
+def estimate(params, state, count, restart):
+    """Take one sample: return (state, velocity, flags).
+
+    Args:
+        params: an estimator's `Params` (integer words) or `FloatParams` (the same algorithm in float64).
+        state: its state, from `START` or `FLOAT_START` or the previous call.
+        count: position, counts, as a signed word that may have wrapped.
+        restart: true to forget the past: this sample counts as the first.
+
+    Returns:
+        The new state; the velocity in words of the design's `velocity` format (float: counts a sample); and the
+        flags that this sample raised, one bit each.
+    """

@@ -1,0 +1,78 @@
+"""Velocity as the difference of successive counts: the baseline that every estimator is held against."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from .compiled import compiled
+from .estimators import estimate
+from .fixed import SQ, bits_for, saturate, wrap
+
+OUTPUTS = ("u",)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """A finite difference has no gains."""
+
+    @classmethod
+    def default(cls, acceleration_max_m_per_s2: float) -> "Gains":
+        return cls()
+
+
+class Params(NamedTuple):
+    count_width: int
+    velocity_max: int
+
+
+class State(NamedTuple):
+    running: int
+    count: int
+
+
+class FloatParams(NamedTuple):
+    count_width: int
+
+
+START = State(0, 0)
+FLOAT_START = START
+
+
+class Design:
+    """Formats of the finite difference for an axis.
+
+    The velocity is a whole number of counts a sample; its range is twice the axis's largest speed, so that a loop that
+    overshoots still reads true. It saturates beyond, with the flag `velocity_saturated`.
+    """
+
+    flags = ("velocity_saturated",)
+    words = ()
+    latency = 2
+
+    def __init__(self, axis, gains: Gains):
+        self.count_width = axis.count_width
+        self.velocity = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), 0)
+
+    def params(self, words: dict[str, int]) -> Params:
+        return Params(self.count_width, self.velocity.max)
+
+    def float_params(self, gains: Gains, output: str) -> FloatParams:
+        return FloatParams(self.count_width)
+
+
+@compiled
+def _difference(width, state, count, restart):
+    return wrap(count - state.count, width) if state.running and not restart else 0
+
+
+@estimate.register(Params)
+@compiled
+def step(params, state, count, restart):
+    difference = _difference(params.count_width, state, count, restart)
+    velocity = saturate(difference, -params.velocity_max - 1, params.velocity_max)
+    return State(1, count), velocity, int(velocity != difference)
+
+
+@estimate.register(FloatParams)
+@compiled
+def float_step(params, state, count, restart):
+    return State(1, count), float(_difference(params.count_width, state, count, restart)), 0

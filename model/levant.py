@@ -1,0 +1,239 @@
+"""Levant's first-order sliding-mode differentiator, explicit Euler, in fixed point.
+
+Per sample, with f the count, x its tracked value, u1 the integral state, all in counts and sample periods:
+
+    e  = x - f
+    u  = u1 - lambda sqrt(|e|) sign(e)
+    x  <- x + u
+    u1 <- u1 - alpha sign(e)                 sign(0) = 0
+
+The tracked x is held as its distance to the last count, `lead = x - f`, so that the count may wrap: e = lead - (new
+count - last count). Selectable outputs: `u`, the paper's, and `u1`, the integral state after this sample's update.
+
+Source: Chawda, Celik, O'Malley, World Haptics 2011, equations of the first-order differentiator; Levant 1998.
+
+Formats, derived. Let lam = lambda tau / sqrt(q) and alp = alpha tau^2 / q be the gains per sample.
+
+- `velocity` SQ(i, f): i holds twice the largest speed, since u swings about the true velocity.
+- f, the fraction bits of e, u and u1 alike (x + u and u1 - alpha are then exact): alpha's word is at least
+  2**ALPHA_BITS, so it is off by at most 2**-(ALPHA_BITS+1); and rounding u to f bits costs no more position than below.
+- `root`, the format of sqrt(|e|), and f. The integer root rounds down, so half of its LSB is added back (a constant
+  bit below it): no bias, and an error of at most half an LSB. With half an LSB of u, rounding moves u by at most
+  delta = lam 2**-(root.f+1) + 2**-(f+1). The same u follows exactly from an e smaller or larger by
+  eta <= 2 sqrt(|e|) delta / lam + (delta / lam)^2: *the fixed-point estimator is the exact one on a position perturbed
+  by eta*. At |e| = 1 count, where quantisation keeps it, each of the two parts is held to POSITION_BUDGET / 2 counts.
+- `error` SQ(i, f): lam sqrt(e_max) is at least twice the largest speed, so a velocity step from end to end is still
+  caught; but never more than the count can tell. Beyond, e saturates (flag `error_saturated`), which drags x along.
+- `lambda` UQ, GAIN_BITS wide, with two bits of headroom above the designed gain for changes at run time;
+  `alpha` likewise.
+
+Both states saturate at the velocity format (flag `velocity_saturated`).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from .compiled import compiled
+from .estimators import estimate
+from .fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
+from .sqrt import isqrt
+from .sqrt import latency as sqrt_latency
+from .words import GAIN_BITS, Word
+
+OUTPUTS = ("u", "u1")
+ALPHA_BITS = 9
+"""The designed alpha's word has at least this many bits below its top one: it is off by 0.1 % at most."""
+POSITION_BUDGET = 2.0**-5
+"""How far, in counts, all rounding may displace the position at |e| = 1 count."""
+HEADROOM_BITS = 2
+"""A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
+STEPS = 7
+"""Clocks of the sequence besides the root: see `hardwall.hdl.levant`."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains in SI units: lambda in m^(1/2)/s, alpha in m/s^2.
+
+    Raises:
+        ValueError: if either is not finite and more than 0.
+    """
+
+    lambda_sqrt_m_per_s: float
+    alpha_m_per_s2: float
+
+    def __post_init__(self):
+        for name, value in vars(self).items():
+            if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
+
+    @classmethod
+    def default(cls, acceleration_max_m_per_s2: float) -> "Gains":
+        """Return the paper's proposed gains for |f''| <= C: lambda = sqrt(C), alpha = 1.1 C."""
+        return cls(math.sqrt(acceleration_max_m_per_s2), 1.1 * acceleration_max_m_per_s2)
+
+
+class Params(NamedTuple):
+    """Words and shifts of the integer kernel; see `Design` for the formats."""
+
+    lambda_: int
+    alpha: int
+    output: int
+    count_width: int
+    fraction: int
+    radicand_shift: int
+    product_shift: int
+    error_max: int
+    velocity_max: int
+
+
+class State(NamedTuple):
+    """`lead` and `u1` have the fraction bits of the velocity format (float: counts); `count` is the last one."""
+
+    running: int
+    count: int
+    lead: float
+    u1: float
+
+
+class FloatParams(NamedTuple):
+    lambda_: float
+    alpha: float
+    output: int
+    count_width: int
+
+
+START = State(0, 0, 0, 0)
+FLOAT_START = State(0, 0, 0.0, 0.0)
+
+
+class Design:
+    """Formats, run-time words and latency of the differentiator for an axis: the module says how they follow.
+
+    Attributes:
+        velocity, error, root, radicand: formats of u and u1, e, sqrt(|e|) and its integer radicand.
+        product: fraction bits of lambda times twice the root.
+        words: `levant_lambda`, `levant_alpha`, `levant_output`.
+
+    Raises:
+        ValueError: if the gains do not fit any format that int64 can hold, with the accepted range.
+    """
+
+    flags = ("error_saturated", "velocity_saturated")
+
+    def __init__(self, axis, gains: Gains):
+        tau, q = 1 / axis.sample_hz, axis.count_m
+        lam = gains.lambda_sqrt_m_per_s * tau / math.sqrt(q)
+        alpha = gains.alpha_m_per_s2 * tau**2 / q
+        speed = axis.speed_max_counts_per_sample
+
+        self.count_width = axis.count_width
+        i = 1 + bits_for(max(2 * speed, 2.0))
+        # A gain that moves u across its whole range in a sample is no gain; one too small needs more than int64.
+        f_max = 60 - max(axis.count_width, i)
+        largest = 2.0 ** (i - 1)
+        _check(gains.lambda_sqrt_m_per_s, "lambda_sqrt_m_per_s", 2 / (2.0**f_max * POSITION_BUDGET), largest, lam)
+        _check(gains.alpha_m_per_s2, "alpha_m_per_s2", 2.0 ** (ALPHA_BITS - f_max), largest, alpha)
+        f = max(ALPHA_BITS - math.floor(math.log2(alpha)), bits_for(2 / (lam * POSITION_BUDGET)), 0)
+        self.velocity = SQ(i, f)
+        catch = max(bits_for((2 * speed / lam) ** 2), 1)
+        self.error = SQ(1 + min(catch, axis.count_width - 1), f)
+        root_f = bits_for(2 / POSITION_BUDGET)
+        self.radicand = UQ(self.error.i - 1, 2 * root_f)
+        self.root = UQ((self.radicand.width + 1) // 2 - root_f, root_f)
+
+        lam_i = HEADROOM_BITS + bits_for(lam)
+        self.lambda_ = UQ(lam_i, GAIN_BITS - lam_i)
+        self.alpha = UQ(HEADROOM_BITS + bits_for(alpha), f)
+        self.product = self.lambda_.f + self.root.f + 1
+        self.words = (
+            Word(
+                "levant_lambda",
+                self.lambda_,
+                math.sqrt(q) / tau,
+                "m^(1/2)/s",
+                self.lambda_.from_real(lam),
+                "gain of the square-root term",
+            ),
+            Word("levant_alpha", self.alpha, q / tau**2, "m/s^2", self.alpha.from_real(alpha), "gain of the sign term"),
+            Word("levant_output", UQ(1, 0), 1.0, "", 0, "velocity output: 0 for u, 1 for u1"),
+        )
+
+    @property
+    def latency(self) -> int:
+        """Clocks from strobe to valid."""
+        return STEPS + sqrt_latency(self.radicand.width)
+
+    def params(self, words: dict[str, int]) -> Params:
+        """Return the kernel's parameters for the given run-time words."""
+        return Params(
+            lambda_=words["levant_lambda"],
+            alpha=words["levant_alpha"],
+            output=words["levant_output"],
+            count_width=self.count_width,
+            fraction=self.velocity.f,
+            radicand_shift=self.velocity.f - self.radicand.f,
+            product_shift=self.product - self.velocity.f,
+            error_max=self.error.max,
+            velocity_max=self.velocity.max,
+        )
+
+    def float_params(self, gains: Gains, output: str) -> FloatParams:
+        """Return the float64 algorithm's parameters, gains unrounded, per sample."""
+        lam, alpha, _ = self.words
+        return FloatParams(
+            gains.lambda_sqrt_m_per_s / lam.si_per_unit,
+            gains.alpha_m_per_s2 / alpha.si_per_unit,
+            OUTPUTS.index(output),
+            self.count_width,
+        )
+
+
+def _check(value: float, name: str, low: float, high: float, scaled: float) -> None:
+    """Raise ValueError, in the units of `value`, unless `scaled` (the gain per sample) is within `low` to `high`."""
+    if not low <= scaled <= high:
+        unit = value / scaled
+        raise ValueError(f"{name} must be {low * unit:g} to {high * unit:g} at these rates, not {value!r}")
+
+
+@compiled
+def _sign(value):
+    return (value > 0) - (value < 0)
+
+
+@estimate.register(Params)
+@compiled
+def step(params, state, count, restart):
+    fresh = restart or not state.running
+    moved = 0 if fresh else wrap(count - state.count, params.count_width)
+    lead = 0 if fresh else state.lead
+    u1 = 0 if fresh else state.u1
+
+    distance = lead - (moved << params.fraction)
+    error = saturate(distance, -params.error_max, params.error_max)
+    sign = _sign(error)
+    root = isqrt(shift_floor(abs(error), params.radicand_shift))
+    far_u = u1 - sign * shift_round_half_up(params.lambda_ * (2 * root + 1), params.product_shift)
+    u = saturate(far_u, -params.velocity_max, params.velocity_max)
+    far_u1 = u1 - sign * params.alpha
+    u1 = saturate(far_u1, -params.velocity_max, params.velocity_max)
+
+    flags = int(error != distance) | int(u != far_u or u1 != far_u1) << 1
+    return State(1, count, error + u, u1), u1 if params.output else u, flags
+
+
+@estimate.register(FloatParams)
+@compiled
+def float_step(params, state, count, restart):
+    """The paper's algorithm in float64, unsaturated: the reference for what fixed point costs."""
+    fresh = restart or not state.running
+    moved = 0 if fresh else wrap(count - state.count, params.count_width)
+    lead = 0.0 if fresh else state.lead
+    u1 = 0.0 if fresh else state.u1
+
+    error = lead - moved
+    sign = _sign(error)
+    u = u1 - params.lambda_ * math.sqrt(abs(error)) * sign
+    u1 = u1 - params.alpha * sign
+    return State(1, count, error + u, u1), u1 if params.output else u, 0

@@ -1,0 +1,88 @@
+"""From the wall's force to the drive: decimation, slew limit, force limit, and the conditions that force zero.
+
+Every `samples_per_actuation` samples the drive follows the force:
+
+    drive <- limit(slew(force)):   first |change| <= slew_limit, then |drive| <= force_limit, last
+
+Between, it holds. Without `enable`, or with a fault, the drive is zero at every sample; the slew limit then starts
+again from zero. The force limit is the last thing done to it.
+"""
+
+from typing import NamedTuple
+
+from .compiled import compiled
+from .fixed import UQ, saturate
+from .words import Word
+
+FLAGS = ("slew_limited", "force_limited")
+LATENCY = 3
+"""Clocks from strobe to the changed drive: see `hardwall.hdl.output`."""
+
+
+class Params(NamedTuple):
+    """Limits in force LSB: integer words, or floats for the float64 axis."""
+
+    force_limit: float
+    slew_limit: float
+    decimation: int
+
+
+class State(NamedTuple):
+    """`phase` counts samples since the last actuation; the drive follows the force at phase 0."""
+
+    phase: int
+    drive: float
+
+
+START = State(0, 0)
+FLOAT_START = State(0, 0.0)
+
+
+class Design:
+    """Formats and run-time words of the output stage for an axis.
+
+    `output_slew_limit` has one bit more than the largest change of the drive, so that its largest word limits nothing.
+    """
+
+    latency = LATENCY
+    flags = FLAGS
+
+    def __init__(self, axis):
+        self.decimation = axis.samples_per_actuation
+        self.force = axis.force
+        self.slew = UQ(axis.force.width, 0)
+        limit = UQ(axis.force.width - 2, 0)
+        r = axis.force_resolution_n
+        self.words = (
+            Word("output_force_limit", limit, r, "N", axis.force_limit_word, "largest drive, either way"),
+            Word("output_slew_limit", self.slew, r * axis.actuation_hz, "N/s", self.slew.max, "fastest drive change"),
+        )
+
+    def params(self, words: dict[str, int]) -> Params:
+        """Return the kernel's parameters for the given run-time words."""
+        return Params(words["output_force_limit"], words["output_slew_limit"], self.decimation)
+
+    def float_params(self, words: dict[str, int]) -> Params:
+        """Return the same limits as floats."""
+        return Params(float(words["output_force_limit"]), float(words["output_slew_limit"]), self.decimation)
+
+
+@compiled
+def step(params, state, force, enable):
+    """Take one sample's force: return (state, flags); the drive is `state.drive`.
+
+    Args:
+        params: `Params`, of the number type of the force.
+        state: `START`, `FLOAT_START`, or from the previous call.
+        force: the wall's force on the handle, force LSB.
+        enable: false forces zero.
+    """
+    zero = 0 * force
+    phase = state.phase + 1 if state.phase + 1 < params.decimation else 0
+    if not enable:
+        return State(phase, zero), 0
+    if state.phase:
+        return State(phase, state.drive), 0
+    slewed = saturate(force, state.drive - params.slew_limit, state.drive + params.slew_limit)
+    limited = saturate(slewed, -params.force_limit, params.force_limit)
+    return State(phase, limited), int(slewed != force) | int(limited != slewed) << 1

@@ -1,0 +1,168 @@
+"""The virtual wall: a unilateral spring and damper.
+
+    depth = side (count - wall)            side = +1: the wall fills position > wall; -1: position < wall
+    push  = K depth + B side velocity      for depth > 0, else 0
+    force = -side push                     on the handle
+
+With `forbid_pull`, push is never negative: a damper that holds the leaving handle back would make the wall sticky.
+
+Formats, derived, with the force LSB r, the count q and the sample period tau:
+
+- `stiffness` and `damping` are gain words in force LSB a count and a count/sample.
+- The velocity enters with no more fraction bits than move the push by half a force LSB at the largest damping; the
+  rest is dropped (floor).
+- The two products are added exactly and rounded once, half up, to a force LSB; then push saturates at the largest
+  magnitude of the force format.
+
+Together: fixed point differs from the exact equation on the same words by at most one force LSB.
+"""
+
+from typing import NamedTuple
+
+from .compiled import by_type, compiled
+from .fixed import SQ, UQ, saturate, shift_floor, shift_round_half_up, wrap
+from .words import Word, gain_format
+
+LATENCY = 6
+"""Clocks from strobe to valid: see `hardwall.hdl.wall`."""
+
+
+class Params(NamedTuple):
+    """Words and shifts of the integer kernel; see `Design` for the formats."""
+
+    stiffness: int
+    damping: int
+    position: int
+    left: int
+    forbid_pull: int
+    count_width: int
+    velocity_shift: int
+    spring_shift: int
+    damper_shift: int
+    push_shift: int
+    force_max: int
+
+
+class FloatParams(NamedTuple):
+    """Stiffness in force LSB a count, damping in force LSB a count/sample; both unrounded."""
+
+    stiffness: float
+    damping: float
+    position: int
+    left: int
+    forbid_pull: int
+    count_width: int
+
+
+class Design:
+    """Formats and run-time words of the wall for an axis, with a velocity of format `velocity`.
+
+    Attributes:
+        stiffness, damping: gain formats.
+        coarse: the velocity as the damper takes it.
+        push: fraction bits in which the two products are added.
+        words: `wall_stiffness`, `wall_damping`, `wall_position`, `wall_left`, `wall_forbid_pull`.
+
+    Raises:
+        ValueError: if the sum would not fit the model's int64.
+    """
+
+    latency = LATENCY
+
+    def __init__(self, axis, velocity: SQ):
+        q, r, tau = axis.count_m, axis.force_resolution_n, 1 / axis.sample_hz
+        self.count_width = axis.count_width
+        self.force = axis.force
+        self.velocity = velocity
+        self.stiffness = gain_format(axis.stiffness_max_n_per_m * q / r)
+        self.damping = gain_format(axis.damping_max_n_s_per_m * q / tau / r)
+        needed = 1 + self.damping.i
+        self.coarse = SQ(velocity.i, max(min(velocity.f, needed), 1 - velocity.i))
+        self.push = max(self.stiffness.f, self.damping.f + self.coarse.f, 0)
+        spring_bits = 16 + axis.count_width + self.push - self.stiffness.f
+        damper_bits = 16 + self.coarse.width + self.push - self.damping.f - self.coarse.f
+        if max(spring_bits, damper_bits) > 61:
+            raise ValueError(
+                f"stiffness_max_n_per_m and damping_max_n_s_per_m must be within a factor that 61 bits hold, "
+                f"not {axis.stiffness_max_n_per_m!r} and {axis.damping_max_n_s_per_m!r}"
+            )
+        self.words = (
+            Word("wall_stiffness", self.stiffness, r / q, "N/m", 0, "spring of the wall"),
+            Word("wall_damping", self.damping, r * tau / q, "N s/m", 0, "damper of the wall"),
+            Word("wall_position", SQ(axis.count_width, 0), q, "m", 0, "surface of the wall"),
+            Word("wall_left", UQ(1, 0), 1.0, "", 0, "0: the wall fills greater positions; 1: smaller ones"),
+            Word("wall_forbid_pull", UQ(1, 0), 1.0, "", 1, "1: the wall never pulls the handle in"),
+        )
+
+    def params(self, words: dict[str, int]) -> Params:
+        """Return the kernel's parameters for the given run-time words."""
+        return Params(
+            stiffness=words["wall_stiffness"],
+            damping=words["wall_damping"],
+            position=words["wall_position"],
+            left=words["wall_left"],
+            forbid_pull=words["wall_forbid_pull"],
+            count_width=self.count_width,
+            velocity_shift=self.velocity.f - self.coarse.f,
+            spring_shift=self.push - self.stiffness.f,
+            damper_shift=self.push - self.damping.f - self.coarse.f,
+            push_shift=self.push,
+            force_max=self.force.max,
+        )
+
+    def float_params(self, stiffness_n_per_m: float, damping_n_s_per_m: float, words: dict[str, int]) -> FloatParams:
+        """Return the float64 wall's parameters, gains unrounded."""
+        stiffness, damping = self.words[:2]
+        return FloatParams(
+            stiffness_n_per_m / stiffness.si_per_unit,
+            damping_n_s_per_m / damping.si_per_unit,
+            words["wall_position"],
+            words["wall_left"],
+            words["wall_forbid_pull"],
+            self.count_width,
+        )
+
+
+@by_type
+def render(params, count, velocity):
+    """Return the wall's force on the handle, in force LSB.
+
+    Args:
+        params: `Params` (integer words) or `FloatParams` (float64).
+        count: position, counts, as a signed word that may have wrapped.
+        velocity: in words of the estimator's velocity format (float: counts a sample).
+    """
+
+
+@compiled
+def _depth(params, count):
+    offset = params.position - count if params.left else count - params.position
+    return wrap(offset, params.count_width)
+
+
+@render.register(Params)
+@compiled
+def step(params, count, velocity):
+    depth = _depth(params, count)
+    if depth <= 0:
+        return 0
+    coarse = shift_floor(velocity, params.velocity_shift)
+    inward = -coarse if params.left else coarse
+    spring = (params.stiffness * depth) << params.spring_shift
+    damper = (params.damping * inward) << params.damper_shift
+    push = shift_round_half_up(spring + damper, params.push_shift)
+    push = saturate(push, 0 if params.forbid_pull else -params.force_max, params.force_max)
+    return push if params.left else -push
+
+
+@render.register(FloatParams)
+@compiled
+def float_step(params, count, velocity):
+    depth = _depth(params, count)
+    if depth <= 0:
+        return 0.0
+    inward = -velocity if params.left else velocity
+    push = params.stiffness * depth + params.damping * inward
+    if params.forbid_pull:
+        push = max(push, 0.0)
+    return push if params.left else -push

@@ -1,0 +1,67 @@
+"""Run-time parameters of the hardware: a word on a port, and what it means in SI units."""
+
+from dataclasses import dataclass
+
+from .fixed import UQ, Format, bits_for
+
+GAIN_BITS = 16
+"""Bits of a gain word: the part of a multiplier's operand that iCE40UP (16 x 16) and ECP5 (18 x 18) both have."""
+
+
+def gain_format(largest: float) -> UQ:
+    """Return the `GAIN_BITS`-bit format that holds `largest` and resolves best."""
+    i = bits_for(largest)
+    fmt = UQ(i, GAIN_BITS - i)
+    # A largest value just under a power of two may round up to it.
+    return fmt if largest <= fmt.to_real(fmt.max) else UQ(i + 1, GAIN_BITS - i - 1)
+
+
+@dataclass(frozen=True)
+class Word:
+    """A parameter that the host may change while the axis runs.
+
+    Attributes:
+        name: port name, in the field's words.
+        format: fixed-point format of the word.
+        si_per_unit: SI value of the format's 1.0.
+        unit: SI unit, as text; empty for choices and plain numbers.
+        reset: the word after reset.
+        doc: one line for the port table.
+    """
+
+    name: str
+    format: Format
+    si_per_unit: float
+    unit: str
+    reset: int
+    doc: str
+
+    def __post_init__(self):
+        if not self.format.min <= self.reset <= self.format.max:
+            raise ValueError(f"{self.name} must fit {self.format}, not {self.reset!r}")
+
+    @property
+    def si_min(self) -> float:
+        """Smallest value, SI."""
+        return self.to_si(self.format.min)
+
+    @property
+    def si_max(self) -> float:
+        """Largest value, SI."""
+        return self.to_si(self.format.max)
+
+    def to_si(self, word: int) -> float:
+        """Return what `word` stands for, SI."""
+        return self.format.to_real(word) * self.si_per_unit
+
+    def from_si(self, value: float) -> int:
+        """Return the word nearest to `value` (SI).
+
+        Raises:
+            ValueError: if it does not fit, with the accepted range in SI units.
+        """
+        try:
+            return self.format.from_real(value / self.si_per_unit)
+        except ValueError:
+            unit = f" {self.unit}" if self.unit else ""
+            raise ValueError(f"{self.name} must be {self.si_min:g} to {self.si_max:g}{unit}, not {value!r}") from None

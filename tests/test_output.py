@@ -1,0 +1,128 @@
+"""The output stage: RTL against model, and its promises about limits and zero."""
+
+import cocotb
+import numpy as np
+import pytest
+from cocotb.triggers import ClockCycles, RisingEdge
+from specs import spec
+
+from bench import SAMPLES, Bench, check, parameters, rng, simulate
+from hardwall.hdl.output import Output
+from hardwall.model import output
+
+NAMES = ("output_force_limit", "output_slew_limit")
+
+
+def design(name: str) -> output.Design:
+    return spec(name).design.output
+
+
+def make(name: str) -> Output:
+    return Output(design(name))
+
+
+def stimulus(d: output.Design, samples: int):
+    """Yield (force, fault, force limit, slew limit): extremes in long and short runs, then random ones."""
+    top, limits = d.force.max, [word.format.max for word in d.words]
+    for limit in (0, 1, limits[0]):
+        for slew in (0, 1, limits[1] // 3, limits[1]):
+            for force in (d.force.min, top, -1, 0, 1, top, d.force.min):
+                for _ in range(2 * d.decimation):
+                    yield force, 0, limit, slew
+    random, words, force = rng(), limits, 0
+    for k in range(samples):
+        if k % 50 == 0:
+            words = [int(m * 2.0 ** -random.integers(0, 16)) for m in limits]
+        force = int(random.integers(d.force.min, top + 1) * 2.0 ** -random.integers(0, 16))
+        yield force, int(random.random() < 0.02), *words
+
+
+def model(d: output.Design, rows) -> dict[str, np.ndarray]:
+    """Return drive, flags and actuation for rows of `stimulus`."""
+    state, out = output.START, []
+    for force, fault, *words in rows:
+        actuated = state.phase == 0
+        state, flags = output.step(d.params(dict(zip(NAMES, words, strict=True))), state, force, not fault)
+        out.append((state.drive, flags, actuated))
+    return dict(zip(("drive", "limited", "actuated"), np.array(out).T, strict=True))
+
+
+@cocotb.test()
+async def follows_model(dut):
+    component = make(**parameters())
+    bench = Bench(dut, component)
+    await bench.reset()
+    bench.drive(enable=1)
+    inputs = bench.monitor("strobe", "force", "fault", *NAMES)
+    outputs = bench.monitor("valid", "drive", "limited", "actuated")
+    for force, fault, *words in stimulus(component.design, SAMPLES):
+        await bench.transact("strobe", "valid", force=force, fault=fault, **dict(zip(NAMES, words, strict=True)))
+    expected = model(component.design, inputs.rows)
+    assert set(expected["limited"].tolist()) == {0, 1, 2, 3}
+    check(inputs, outputs, expected, component.latency)
+
+
+@cocotb.test()
+async def enable_low_is_zero_at_the_next_clock(dut):
+    d = design(**parameters())
+    bench = Bench(dut, make(**parameters()))
+    await bench.reset()
+    words = {word.name: word.reset for word in d.words}
+    drive = bench.reader("drive")
+    for clock in range(output.LATENCY + 2):
+        bench.drive(enable=1)
+        # Actuate until the drive is there, then let one strobe go into the pipeline and pull enable beneath it.
+        for _ in range(d.decimation):
+            await bench.transact("strobe", "valid", force=5, **words)
+        assert drive() == 5
+        bench.drive(strobe=1)
+        for _ in range(clock):
+            await RisingEdge(dut.clk)
+            bench.drive(strobe=0)
+        bench.drive(enable=0)
+        await RisingEdge(dut.clk)
+        bench.drive(enable=1, strobe=0)
+        for _ in range(output.LATENCY + 3):
+            await RisingEdge(dut.clk)
+            # The actuation that enable was pulled beneath does not bring the old force back.
+            assert drive() == 0
+        bench.drive(enable=0)
+        await ClockCycles(dut.clk, 2)
+        # Get back to phase 0, with enable low throughout.
+        while True:
+            await bench.transact("strobe", "valid", force=5, **words)
+            assert drive() == 0
+            if int(dut.actuated.value) and d.decimation == 1:
+                break
+            if d.decimation > 1 and int(dut.actuated.value):
+                for _ in range(d.decimation - 1):
+                    await bench.transact("strobe", "valid", force=5, **words)
+                break
+
+
+@pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
+def test_rtl(name):
+    simulate(__file__, make, name=name)
+
+
+@pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
+def test_the_drive_never_exceeds_its_limits(name):
+    d = design(name)
+    rows = list(stimulus(d, 20_000))
+    drive = model(d, rows)["drive"].tolist()
+    before = 0
+    for k, (value, (_force, fault, limit, slew)) in enumerate(zip(drive, rows, strict=True)):
+        if fault:
+            assert value == 0
+        elif k % d.decimation:
+            assert value == before
+        else:
+            assert abs(value) <= limit
+            # The slew limit holds unless the force limit, which comes last, was drawn in beneath the drive.
+            assert abs(value - before) <= slew or abs(value) == limit
+        before = value
+
+
+def test_wrong_design_is_refused():
+    with pytest.raises(TypeError, match=r"not 3$"):
+        Output(3)

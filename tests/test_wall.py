@@ -1,0 +1,135 @@
+"""The virtual wall: RTL against model, model against exact rationals, and what a wall must never do."""
+
+import math
+from fractions import Fraction
+
+import cocotb
+import numpy as np
+import pytest
+from specs import spec
+
+from bench import SAMPLES, Bench, check, parameters, rng, simulate
+from hardwall.hdl.wall import Wall
+from hardwall.model import wall
+
+NAMES = ("wall_stiffness", "wall_damping", "wall_position", "wall_left", "wall_forbid_pull")
+
+
+def design(name: str, estimator: str = "levant") -> wall.Design:
+    return spec(name, estimator).design.wall
+
+
+def make(name: str, estimator: str = "levant") -> Wall:
+    return Wall(design(name, estimator))
+
+
+def stimulus(d: wall.Design, samples: int):
+    """Yield (count, velocity, *words): every combination of extremes, rounding ties, then random ones near and far."""
+    half = 1 << (d.count_width - 1)
+    gains = d.stiffness.max, d.damping.max
+    for k in (0, 1, gains[0]):
+        for b in (0, 1, gains[1]):
+            for position in (-half, 0, half - 1):
+                for depth in (-half, -1, 0, 1, 2, half - 1):
+                    for velocity in (d.velocity.min, -1, 0, 1, d.velocity.max):
+                        for sides in range(4):
+                            yield (
+                                (position + depth + half) % (2 * half) - half,
+                                velocity,
+                                k,
+                                b,
+                                position,
+                                *divmod(sides, 2),
+                            )
+    # Ties: a spring alone, with half a force LSB left over.
+    tie = 1 << max(d.stiffness.f - 1, 0)
+    for odd in (1, 3, 5):
+        for left in (0, 1):
+            yield (-odd if left else odd), 0, tie, 0, 0, left, 0
+    random = rng()
+    for _ in range(samples):
+        k, b = (int(random.integers(0, int(m * 2.0 ** -random.integers(0, 16)) + 1)) for m in gains)
+        depth = int(random.integers(-half, half) * 2.0 ** -random.integers(0, d.count_width))
+        velocity = int(
+            random.integers(d.velocity.min, d.velocity.max + 1) * 2.0 ** -random.integers(0, d.velocity.width)
+        )
+        position = int(random.integers(-half, half))
+        count = (position + depth + half) % (2 * half) - half
+        yield count, velocity, k, b, position, *random.integers(0, 2, 2).tolist()
+
+
+def model(d: wall.Design, rows) -> list[int]:
+    return [wall.render(d.params(dict(zip(NAMES, words, strict=True))), c, v) for c, v, *words in rows]
+
+
+@cocotb.test()
+async def follows_model(dut):
+    component = make(**parameters())
+    bench = Bench(dut, component)
+    await bench.reset()
+    inputs = bench.monitor("strobe", "count", "velocity", *NAMES)
+    outputs = bench.monitor("valid", "force")
+    for count, velocity, *words in stimulus(component.design, SAMPLES):
+        drive = dict(zip(NAMES, words, strict=True))
+        await bench.transact("strobe", "valid", count=count, velocity=velocity, **drive)
+    expected = model(component.design, inputs.rows)
+    top = component.design.force.max
+    assert {-top, 0, top} <= set(expected)
+    check(inputs, outputs, {"force": np.array(expected)}, component.latency)
+
+
+@pytest.mark.parametrize(("name", "estimator"), [("paper", "fdm"), ("mhz", "levant"), ("narrow", "levant")])
+def test_rtl(name, estimator):
+    simulate(__file__, make, name=name, estimator=estimator)
+
+
+def oracle(d: wall.Design, row) -> int:
+    """The module's equations in exact rationals, rounded only where it says so."""
+    count, velocity, k, b, position, left, forbid_pull = row
+    side, half = (-1 if left else 1), 1 << (d.count_width - 1)
+    depth = (side * (count - position) + half) % (2 * half) - half
+    if depth <= 0:
+        return 0
+    coarse = math.floor(Fraction(velocity) / 2 ** (d.velocity.f - d.coarse.f)) * Fraction(2) ** -d.coarse.f
+    push = k * Fraction(2) ** -d.stiffness.f * depth + b * Fraction(2) ** -d.damping.f * side * coarse
+    push = math.floor(push + Fraction(1, 2))
+    if forbid_pull:
+        push = max(push, 0)
+    return -side * max(-d.force.max, min(d.force.max, push))
+
+
+@pytest.mark.parametrize(
+    ("name", "estimator"), [("paper", "fdm"), ("proposed", "levant"), ("mhz", "levant"), ("wide", "levant")]
+)
+def test_model_is_the_exact_equation_rounded_as_documented(name, estimator):
+    d = design(name, estimator)
+    rows = list(stimulus(d, 20_000))
+    assert model(d, rows) == [oracle(d, row) for row in rows]
+
+
+@pytest.mark.parametrize("name", ["paper", "mhz", "wide"])
+def test_fixed_point_is_within_a_force_lsb_of_float(name):
+    """The promise of the module's docstring, on the same words, wherever neither saturates."""
+    d, compared = design(name), 0
+    for count, velocity, *words in stimulus(d, 20_000):
+        named = dict(zip(NAMES, words, strict=True))
+        si = [word.to_si(named[word.name]) for word in d.words[:2]]
+        exact = wall.render(d.float_params(*si, named), count, velocity * d.velocity.lsb)
+        fixed = wall.render(d.params(named), count, velocity)
+        if abs(exact) < d.force.max - 1:
+            compared += 1
+            assert abs(fixed - exact) <= 1 + 1e-9
+    assert compared > 10_000
+
+
+def test_a_wall_that_may_not_pull_never_pulls():
+    d = design("paper")
+    for count, velocity, k, b, position, left, _ in stimulus(d, 5_000):
+        words = dict(zip(NAMES, (k, b, position, left, 1), strict=True))
+        force = wall.render(d.params(words), count, velocity)
+        assert force >= 0 if left else force <= 0
+
+
+def test_wrong_design_is_refused():
+    with pytest.raises(TypeError, match=r"not 3$"):
+        Wall(3)
