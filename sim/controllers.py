@@ -1,0 +1,125 @@
+"""The three controllers that can close the loop: pins and a sample strobe in, drive out.
+
+`float` and `fixed` are the models of decoder and axis, in float64 or in the hardware's integers; `rtl` is the
+Verilated hardware behind function pointers. All take the same clock-stamped edges, sample at the same clock, and
+change the drive the same number of clocks later. Their states share the fields `drive`, `velocity` and `flags`.
+"""
+
+from typing import NamedTuple
+
+from ..model import axis, quadrature
+from ..model.compiled import by_type, compiled
+from .pointer import call
+
+
+class Model(NamedTuple):
+    """Parameters of decoder and axis; integer words make `fixed`, float64 ones `float`."""
+
+    decoder: quadrature.Params
+    glitch_clocks: int
+    invert: int
+    axis: axis.Params
+
+
+class ModelState(NamedTuple):
+    drive: float  # force LSB
+    velocity: float  # words of the estimator's format; float: counts a sample
+    flags: int
+    decoder: quadrature.State
+    axis: axis.State
+    clock: int  # to which the decoder has been advanced
+    level: int  # of the pins, a | b << 1
+
+
+class Rtl(NamedTuple):
+    """Addresses: of the two functions of `sim/rtl.cpp`, and of the context that holds the Verilated axis."""
+
+    advance: int
+    read: int
+    context: int
+
+
+class RtlState(NamedTuple):
+    """What was read of the hardware after the last sample; its registers live in its context."""
+
+    drive: int
+    velocity: int
+    flags: int
+
+
+@by_type
+def sample(controller, state, edge_clocks, edge_levels, n_edges, strobe, until):
+    """Take one sample: return (state, taken), `taken` being the number of edges used up.
+
+    Args:
+        controller: `Model` or `Rtl`.
+        state: `ModelState` or `RtlState`.
+        edge_clocks, edge_levels: int64 arrays; from which clock on the pins show which level, a | b << 1.
+        n_edges: edges in them: those that the last call did not take, and those since.
+        strobe: number of the clock at which the count is sampled.
+        until: number of the clock at which the drive has changed; edges from it on are for the next call.
+    """
+
+
+@by_type
+def sample_quietly(controller, state, strobe, until):
+    """Take one sample with no edges: return the state. Passing no array makes it much the cheaper call."""
+
+
+@compiled
+def _decode(controller, decoder, level, clocks):
+    return quadrature.advance(
+        controller.decoder, decoder, level & 1, level >> 1, 0, clocks, controller.glitch_clocks, controller.invert
+    )
+
+
+@sample_quietly.register(Model)
+@compiled
+def _model_sample_quietly(controller, state, strobe, until):
+    decoder = _decode(controller, state.decoder, state.level, strobe - state.clock)
+    fault = decoder.illegal | decoder.overspeed << 1
+    after, velocity, _ = axis.step(controller.axis, state.axis, decoder.count, 0, fault, 1)
+    return ModelState(after.output.drive, velocity, after.flags, decoder, after, strobe, state.level)
+
+
+@sample.register(Model)
+@compiled
+def _model_sample(controller, state, edge_clocks, edge_levels, n_edges, strobe, until):
+    decoder, clock, level, taken = state.decoder, state.clock, state.level, 0
+    # The strobe sees registers loaded by the clocks before it: an edge at the strobe's own clock is for the next.
+    while taken < n_edges and edge_clocks[taken] < strobe:
+        if edge_clocks[taken] > clock:
+            decoder = _decode(controller, decoder, level, edge_clocks[taken] - clock)
+            clock = edge_clocks[taken]
+        level = edge_levels[taken]
+        taken += 1
+    state = ModelState(state.drive, state.velocity, state.flags, decoder, state.axis, clock, level)
+    return _model_sample_quietly(controller, state, strobe, until), taken
+
+
+# What `read` of sim/rtl.cpp answers.
+READ_DRIVE, READ_VELOCITY, READ_FLAGS = 0, 1, 2
+
+
+@compiled
+def _read(controller):
+    return RtlState(
+        call(controller.read, controller.context, READ_DRIVE, 0, 0, 0),
+        call(controller.read, controller.context, READ_VELOCITY, 0, 0, 0),
+        call(controller.read, controller.context, READ_FLAGS, 0, 0, 0),
+    )
+
+
+@sample_quietly.register(Rtl)
+@compiled
+def _rtl_sample_quietly(controller, state, strobe, until):
+    call(controller.advance, controller.context, 0, 0, 0, until)
+    return _read(controller)
+
+
+@sample.register(Rtl)
+@compiled
+def _rtl_sample(controller, state, edge_clocks, edge_levels, n_edges, strobe, until):
+    edges = edge_clocks.ctypes.data, edge_levels.ctypes.data
+    taken = call(controller.advance, controller.context, edges[0], edges[1], n_edges, until)
+    return _read(controller), taken

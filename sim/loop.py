@@ -1,0 +1,151 @@
+"""The closed loop: plant and encoder, a controller, and the force that goes back to the plant.
+
+Time is the FPGA's clock. Sample k is taken at the strobe, clock (k + 1) D - 1, at time k / sample_hz; the drive that
+follows from it changes `latency` clocks later, on every backend. The plant is advanced exactly over the two intervals
+between those instants, under a constant force in each.
+
+What a scene lacks is None here (`coulomb`, `delay`, `record`), and is not in the machine code.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..model.compiled import compiled
+from .controllers import sample, sample_quietly
+from .encoder import Cell, Encoder, advance, advance_quietly
+from .plant import Coulomb, Handle, Motion, Span
+
+EDGE_CAPACITY = 1 << 14
+"""Edges that one sample may bring before the loop gives up: with any decoder, far beyond its limit."""
+
+
+class World(NamedTuple):
+    """What the controller is connected to, and when.
+
+    `before` and `after` are the spans from a changed drive to the next strobe, and from the strobe to the changed drive.
+    """
+
+    handle: Handle
+    coulomb: Coulomb | None
+    encoder: Encoder
+    push_n: float  # of the motor, besides the wall
+    force_lsb_n: float
+    clocks_per_sample: int
+    latency: int  # clocks
+    before: Span
+    after: Span
+
+
+class Delay(NamedTuple):
+    """An amplifier that passes on the drive some samples late: the last `len(drives)` ones, by sample number."""
+
+    drives: np.ndarray
+
+
+class Record(NamedTuple):
+    """Where samples are kept, from when the handle first passes `trigger_m` on, every `stride`-th, until it is full."""
+
+    trigger_m: float
+    stride: int
+    sample: np.ndarray  # int64
+    position_m: np.ndarray
+    velocity_m_per_s: np.ndarray
+    estimate: np.ndarray  # words, or float counts a sample
+    force_n: np.ndarray  # on the handle, by the wall, after the sample
+
+
+class Progress(NamedTuple):
+    """Where the loop stands: between the drive's change after sample `sample - 1`, and the strobe of `sample`."""
+
+    sample: int
+    motion: Motion
+    cell: Cell
+    force_n: float
+    n_edges: int  # not yet taken by the controller; negative: edges were lost
+    recorded: int  # samples kept
+    since: int  # sample at which keeping began; -1: not yet
+
+
+@compiled
+def _delayed(delay, k, drive):
+    if delay is None:
+        return drive
+    slot = k % len(delay.drives)
+    late = delay.drives[slot]
+    delay.drives[slot] = drive
+    return late
+
+
+@compiled
+def _keep(record, world, at, k, state, recorded, since):
+    """Keep sample k if it is due; return (recorded, since)."""
+    if record is None:
+        return recorded, since
+    if since < 0 and at.position_m >= record.trigger_m:
+        since = k
+    if since >= 0 and (k - since) % record.stride == 0 and recorded < len(record.sample):
+        record.sample[recorded] = k
+        record.position_m[recorded] = at.position_m
+        record.velocity_m_per_s[recorded] = at.velocity_m_per_s
+        record.estimate[recorded] = state.velocity
+        record.force_n[recorded] = state.drive * world.force_lsb_n
+        recorded += 1
+    return recorded, since
+
+
+@compiled
+def run(world, controller, state, progress, delay, record, edges, positions, drives, until):
+    """Run the loop up to sample `until`; return (state, progress).
+
+    Args:
+        world: a `World`.
+        controller, state: of `sim.controllers`.
+        progress: a `Progress`.
+        delay, record: a `Delay` and a `Record`, or None.
+        edges: a pair of int64 arrays, the encoder's edges on their way to the controller.
+        positions: float64 array that takes the position (m) at each sample of this call.
+        drives: array that takes the drive (force LSB) after each.
+        until: number of the first sample not to take, within what the arrays hold. Stops early if edges were lost.
+    """
+    edge_clocks, edge_levels = edges
+    first, motion, cell, force_n, n_edges, recorded, since = progress
+    k = first
+    before_clocks = world.clocks_per_sample - world.latency
+    while k < until and n_edges >= 0:
+        strobe = (k + 1) * world.clocks_per_sample - 1
+        at = motion
+        positions[k - first] = motion.position_m
+
+        # From the strobe until the drive changes, the old force acts.
+        moved, quiet = advance_quietly(world.coulomb, motion, cell, force_n, world.after)
+        if quiet:
+            motion = moved
+        else:
+            motion, cell, n_edges = advance(
+                world.handle, world.coulomb, world.encoder, motion, cell, force_n, world.after,
+                strobe, world.latency, edge_clocks, edge_levels, n_edges,
+            )  # fmt: skip
+
+        if n_edges > 0:
+            state, taken = sample(controller, state, edge_clocks, edge_levels, n_edges, strobe, strobe + world.latency)
+            n_edges -= taken
+            for i in range(n_edges):
+                edge_clocks[i] = edge_clocks[taken + i]
+                edge_levels[i] = edge_levels[taken + i]
+        else:
+            state = sample_quietly(controller, state, strobe, strobe + world.latency)
+        drives[k - first] = state.drive
+        force_n = world.push_n + world.force_lsb_n * _delayed(delay, k, state.drive)
+        recorded, since = _keep(record, world, at, k, state, recorded, since)
+
+        moved, quiet = advance_quietly(world.coulomb, motion, cell, force_n, world.before)
+        if quiet:
+            motion = moved
+        elif n_edges >= 0:
+            motion, cell, n_edges = advance(
+                world.handle, world.coulomb, world.encoder, motion, cell, force_n, world.before,
+                strobe + world.latency, before_clocks, edge_clocks, edge_levels, n_edges,
+            )  # fmt: skip
+        k += 1
+    return state, Progress(k, motion, cell, force_n, n_edges, recorded, since)

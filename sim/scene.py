@@ -1,0 +1,298 @@
+"""Scenes: TOML files that say what is modelled. A section or key that is absent is not modelled.
+
+Units are in the keys. Every error is one line that names the file, the key and what is accepted.
+"""
+
+import difflib
+import math
+import tomllib
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+
+from ..model import estimators, quadrature
+from ..model.spec import AxisSpec
+from .encoder import offsets
+
+FOLDER = Path(__file__).with_name("scenes")
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Rate = Annotated[int, Field(gt=0, le=10**9)]
+
+
+class SceneError(ValueError):
+    """A scene that cannot be: one line, naming the file, the key and what is accepted."""
+
+
+class Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class HandleSection(Section):
+    """The moving mass; without `coulomb_n` it has no dry friction."""
+
+    mass_kg: Positive
+    viscous_n_s_per_m: NotNegative = 0.0
+    coulomb_n: NotNegative | None = None
+
+
+class EncoderSection(Section):
+    """The scale; without errors its edges are where they should be."""
+
+    count_m: Positive
+    phase_error_counts: Finite | Annotated[list[Finite], Field(min_length=4, max_length=4)] = 0.0
+    duty_error_counts: Finite = 0.0
+
+    @cached_property
+    def offsets(self) -> tuple[float, float, float, float]:
+        """Where the edges of the four kinds are, counts from their ideal places."""
+        return offsets(self.phase_error_counts, self.duty_error_counts)
+
+
+def _gains_section(name: str) -> type[Section]:
+    """Return a section with the fields of an estimator's gains."""
+    fields = dict.fromkeys(estimators.load(name).Gains.__annotations__, (Positive, ...))
+    return create_model(f"{name.title()}Section", __base__=Section, **fields)
+
+
+GainsSection = create_model(
+    "GainsSection",
+    __base__=Section,
+    **{name: (_gains_section(name) | None, None) for name in estimators.ESTIMATORS},
+)
+
+
+class ControllerSection(Section):
+    """The axis: see `hardwall.model.spec.AxisSpec`. Gains go by estimator, `[controller.gains.levant]`."""
+
+    clock_hz: Rate
+    sample_hz: Rate
+    actuation_hz: Rate
+    travel_m: Positive
+    speed_max_m_per_s: Positive
+    acceleration_max_m_per_s2: Positive
+    force_max_n: Positive
+    force_resolution_n: Positive
+    stiffness_max_n_per_m: Positive
+    damping_max_n_s_per_m: Positive
+    estimator: Literal[tuple(estimators.ESTIMATORS)] = "levant"
+    output: str | None = None
+    glitch_clocks: Annotated[int, Field(ge=0, le=15)] = 0
+    slew_limit_n_per_s: Positive | None = None
+    gains: GainsSection = GainsSection()
+
+
+class WallSection(Section):
+    """The wall, its surface at position 0; without `forbid_pull` its damper may hold the leaving handle back."""
+
+    stiffness_n_per_m: NotNegative
+    damping_n_s_per_m: NotNegative
+    forbid_pull: bool = False
+
+
+class AmplifierSection(Section):
+    """Without it the drive acts on the handle when it leaves the FPGA."""
+
+    delay_s: NotNegative
+
+
+class ProtocolSection(Section):
+    """A hit: from rest at `start_m`, pushed towards the wall; the mean over `mean_s` before `settle_s` is held against
+    the `measure_s` after it. A wall whose RMS is under the threshold is stable."""
+
+    start_m: Annotated[float, Field(lt=0, allow_inf_nan=False)]
+    push_n: Positive
+    settle_s: Positive
+    mean_s: Positive
+    measure_s: Positive
+    threshold_mm: Positive
+
+
+class Scene(Section):
+    """One scene; `load` reads it, and checks what the sections cannot check alone."""
+
+    name: str
+    handle: HandleSection
+    encoder: EncoderSection
+    controller: ControllerSection
+    wall: WallSection
+    amplifier: AmplifierSection | None = None
+    protocol: ProtocolSection
+
+    @cached_property
+    def spec(self) -> AxisSpec:
+        """The axis."""
+        fields = self.controller.model_dump(
+            include=set(AxisSpec.__annotations__) - {"count_m", "gains"}, exclude_unset=False
+        )
+        gains = getattr(self.controller.gains, self.controller.estimator)
+        if gains is not None:
+            gains = estimators.load(self.controller.estimator).Gains(**gains.model_dump())
+        return AxisSpec(count_m=self.encoder.count_m, gains=gains, **fields)
+
+    @property
+    def output(self) -> str:
+        """The estimator's output that the wall uses."""
+        return self.controller.output or self.spec.model.OUTPUTS[0]
+
+    @cached_property
+    def words(self) -> dict[str, int]:
+        """Run-time words; the count is 0 at the start, so the wall's position is its distance from there."""
+        si = {
+            "encoder_glitch_clocks": self.controller.glitch_clocks,
+            "wall_stiffness": self.wall.stiffness_n_per_m,
+            "wall_damping": self.wall.damping_n_s_per_m,
+            "wall_position": -self.protocol.start_m,
+            "wall_forbid_pull": self.wall.forbid_pull,
+        }
+        if len(self.spec.model.OUTPUTS) > 1:
+            si[f"{self.controller.estimator}_output"] = self.spec.model.OUTPUTS.index(self.output)
+        if self.controller.slew_limit_n_per_s is not None:
+            si["output_slew_limit"] = self.controller.slew_limit_n_per_s
+        return self.spec.design.encode(**si)
+
+    @property
+    def delay_samples(self) -> int:
+        """Samples by which the amplifier is late."""
+        return 0 if self.amplifier is None else round(self.amplifier.delay_s * self.controller.sample_hz)
+
+    @property
+    def samples(self) -> int:
+        """Samples of the protocol."""
+        return round((self.protocol.settle_s + self.protocol.measure_s) * self.controller.sample_hz)
+
+
+# Which scene key a message of the model speaks of, where the names differ.
+KEYS = {
+    "wall_stiffness": "wall.stiffness_n_per_m",
+    "wall_damping": "wall.damping_n_s_per_m",
+    "wall_position": "protocol.start_m",
+    "output_slew_limit": "controller.slew_limit_n_per_s",
+    "count_m": "encoder.count_m",
+    "phase_error_counts": "encoder.phase_error_counts",
+}
+
+
+def _key_of(message: str, estimator: str) -> str:
+    """Return the message with its leading field name as a scene key."""
+    name, _, rest = message.partition(" ")
+    if name in KEYS:
+        return f"{KEYS[name]} {rest}"
+    if name in ControllerSection.model_fields:
+        return f"controller.{message}"
+    return f"controller.gains.{estimator}.{message}"
+
+
+def _check(scene: Scene) -> None:
+    """Raise ValueError for what the sections cannot see alone; the message begins with the key."""
+    try:
+        spec = scene.spec
+        if scene.output not in spec.model.OUTPUTS:
+            raise ValueError(f"output must be one of {', '.join(spec.model.OUTPUTS)}, not {scene.output!r}")
+        _ = scene.words, scene.encoder.offsets
+    except (TypeError, ValueError) as error:
+        raise ValueError(_key_of(str(error), scene.controller.estimator)) from None
+
+    error_counts = max(map(abs, scene.encoder.offsets))
+    fastest = spec.count_m * quadrature.max_edge_rate(spec.clock_hz, scene.controller.glitch_clocks, error_counts)
+    if spec.speed_max_m_per_s > fastest:
+        raise ValueError(
+            f"controller.speed_max_m_per_s must be at most {fastest:g}, the decoder's limit at this clock, count size, "
+            f"glitch_clocks and edge error, not {spec.speed_max_m_per_s!r}"
+        )
+    if scene.amplifier is not None:
+        exact = scene.amplifier.delay_s * spec.sample_hz
+        if not math.isclose(exact, scene.delay_samples, abs_tol=1e-6):
+            raise ValueError(
+                f"amplifier.delay_s must be a whole number of samples of {1 / spec.sample_hz:g} s, "
+                f"not {scene.amplifier.delay_s!r}"
+            )
+    protocol = scene.protocol
+    if -protocol.start_m > spec.travel_m:
+        raise ValueError(f"protocol.start_m must be {-spec.travel_m:g} to 0, within travel_m, not {protocol.start_m!r}")
+    if protocol.mean_s > protocol.settle_s:
+        raise ValueError(f"protocol.mean_s must be at most settle_s {protocol.settle_s:g}, not {protocol.mean_s!r}")
+    for key in ("mean_s", "measure_s"):
+        if getattr(protocol, key) * spec.sample_hz < 1:
+            raise ValueError(
+                f"protocol.{key} must be at least a sample of {1 / spec.sample_hz:g} s, not {getattr(protocol, key)!r}"
+            )
+
+
+def _sentence(error: dict[str, Any]) -> str:
+    """Return one pydantic error as 'key must ..., not value'."""
+    key = ".".join(
+        str(part) for part in error["loc"] if not str(part).startswith(("function-", "constrained", "list[", "float"))
+    )
+    limits = error.get("ctx", {})
+    if error["type"] == "missing":
+        return f"{key} is missing"
+    if error["type"] == "extra_forbidden":
+        return f"{key} is not a key of a scene{_suggestion(error['loc'])}"
+    relations = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
+    wanted = " and ".join(f"{words} {limits[short]:g}" for short, words in relations.items() if short in limits)
+    if not wanted:
+        wanted = (
+            error["msg"]
+            .removeprefix("Input should be ")
+            .replace("a valid ", "a ")
+            .replace("a integer", "a whole number")
+        )
+    return f"{key} must be {wanted}, not {error['input']!r}"
+
+
+def _suggestion(location: tuple) -> str:
+    """Return which keys the section of a misspelt one has, and the nearest first."""
+    section: Any = Scene
+    for part in location[:-1]:
+        kinds = [section.model_fields[part].annotation, *getattr(section.model_fields[part].annotation, "__args__", ())]
+        section = next(kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Section))
+    keys = [key for key in section.model_fields if key != "name"]
+    near = difflib.get_close_matches(str(location[-1]), keys, 1)
+    return f"; did you mean {near[0]}?" if near else f"; its section has {', '.join(keys)}"
+
+
+def names() -> list[str]:
+    """Return the names of the scenes that come with the project."""
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+def load(scene: str, changes: dict[str, Any] | None = None) -> Scene:
+    """Return the scene of that name, or in that file, with some keys changed.
+
+    Args:
+        scene: one of `names()`, or the path of a TOML file.
+        changes: values by dotted key, e.g. `{"handle.mass_kg": 0.5}`; a value of None takes the key out.
+
+    Raises:
+        SceneError: in one line, what is wrong, where, and what is accepted.
+    """
+    path = Path(scene) if scene.endswith(".toml") else FOLDER / f"{scene}.toml"
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise SceneError(f"scene must be one of {', '.join(names())}, or a .toml file, not {scene!r}") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise SceneError(f"{scene}: not a readable TOML file: {str(error).splitlines()[0]}") from None
+    for key, value in (changes or {}).items():
+        *sections, last = key.split(".")
+        place = content
+        for section in sections:
+            place = place.setdefault(section, {})
+            if not isinstance(place, dict):
+                raise SceneError(f"{scene}: {key} is not a key of a scene")
+        place.pop(last, None)
+        if value is not None:
+            place[last] = value
+    try:
+        result = Scene(name=path.stem, **{key: value for key, value in content.items() if key != "name"})
+        _check(result)
+    except ValidationError as error:
+        raise SceneError(f"{scene}: {_sentence(error.errors()[0])}") from None
+    except ValueError as error:
+        raise SceneError(f"{scene}: {error}") from None
+    return result
