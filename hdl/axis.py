@@ -57,7 +57,7 @@ class Axis(wiring.Component):
     count, velocity, force : Out(signed)
         Live count; the last sample's velocity and wall force.
     flags : Out
-        Sticky, bits as `spec.design.flags`.
+        Sticky, bits as `spec.design.flags`; the encoder's as the samples saw them.
     illegal_count : Out
         Illegal transitions since the last clear; saturates.
     index_count, index_armed, index_latched : Out
@@ -135,7 +135,9 @@ class Axis(wiring.Component):
         m.d.sync += divider.eq(Mux(strobe, 0, divider + 1))
 
         # Parameters wait at the inputs and take effect together, at a strobe.
-        active = {word.name: Signal(shape(word.format), init=word.reset, name=word.name) for word in design.words}
+        active = {
+            word.name: Signal(shape(word.format), init=word.reset, name=f"active_{word.name}") for word in design.words
+        }
         m.d.sync += self.commit_pending.eq(self.commit | (self.commit_pending & ~strobe))
         with m.If(strobe & self.commit_pending):
             m.d.sync += [signal.eq(getattr(self, name)) for name, signal in active.items()]
@@ -192,11 +194,13 @@ class Axis(wiring.Component):
             self.stamp_b_fall.eq(decoder.stamp_b_fall),
         ]
 
+        # A flag shows with the sample that raised it, and stays.
         raised = Cat(
+            Mux(strobe, Cat(decoder.illegal, decoder.overspeed), 0),
             Mux(estimator.valid, estimator.saturated, 0),
             Mux(output.valid, output.limited, 0),
         )
         sticky = Signal(len(raised))
         m.d.sync += sticky.eq(Mux(self.clear_flags, 0, sticky) | raised)
-        m.d.comb += self.flags.eq(Cat(decoder.illegal, decoder.overspeed, sticky))
+        m.d.comb += self.flags.eq(sticky | raised)
         return m

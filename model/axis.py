@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import output, wall
+from . import output, quadrature, wall
 from .compiled import compiled
 from .estimators import estimate
 from .fixed import UQ
@@ -134,6 +134,57 @@ def run(params, state, counts, velocity, force, drive, flags):
         state, velocity[k], force[k] = step(params, state, counts[k], 0, 0, 1)
         drive[k] = state.output.drive
         flags[k] = state.flags
+    return state
+
+
+class PinState(NamedTuple):
+    """State of the whole axis, decoder included; `restart` waits for the next sample after a preload."""
+
+    decoder: quadrature.State
+    axis: State
+    restart: int
+
+
+@compiled
+def run_pins(timing, decoder, settings, params, state, pins, first, until, out):
+    """Run clocks `first` to `until` (not included) on records of the pins; fill `out`; return the state.
+
+    Args:
+        timing: (clocks a sample, `Design.latency_to_drive`).
+        decoder: `quadrature.Params`.
+        settings: (glitch_clocks, invert), as the decoder has them.
+        params: of `step`.
+        state: a `PinState`.
+        pins: int64, shape (8, clocks): A, B, Z, drive_enable, preload, preload_count, index_arm, clear_flags.
+            `drive_enable` and `clear_flags` change between a changed drive and the next strobe only.
+        out: int64, shape (10, samples): drive, velocity, force, flags and actuated of each sample; and count,
+            illegal_count, index_count, index_latched, stamp_a_rise when its drive has changed.
+    """
+    per_sample, latency = timing
+    glitch_clocks, invert = settings
+    for n in range(first, until):
+        sample = (n + 1) // per_sample - 1
+        now, restart = state.axis, state.restart
+        if (n + 1) % per_sample == 0:
+            fault = state.decoder.illegal | state.decoder.overspeed << 1
+            out[4, sample] = now.output.phase == 0
+            now, out[1, sample], out[2, sample] = step(params, now, state.decoder.count, restart, fault, pins[3, n])
+            out[0, sample], out[3, sample] = now.output.drive, now.flags
+            restart = 0
+        elif (n + 1 - latency) % per_sample == 0 and n >= latency:
+            shown = (n + 1 - latency) // per_sample - 1
+            out[5, shown], out[6, shown] = state.decoder.count, state.decoder.illegal_count
+            out[7, shown], out[8, shown] = state.decoder.index_count, state.decoder.index_latched
+            out[9, shown] = state.decoder.stamp_a_rise
+        if pins[7, n]:
+            now = State(now.estimator, now.output, 0)
+        if not pins[3, n]:
+            now = State(now.estimator, output.State(now.output.phase, 0), now.flags)
+        decoded = quadrature.step(
+            decoder, state.decoder, pins[0, n], pins[1, n], pins[2, n],
+            glitch_clocks, invert, pins[4, n], pins[5, n], pins[6, n], pins[7, n],
+        )  # fmt: skip
+        state = PinState(decoded, now, restart | pins[4, n])
     return state
 
 

@@ -1,16 +1,18 @@
 """Hitting the wall: the founding paper's protocol on any scene and backend."""
 
 import hashlib
+import json
+import tempfile
 import time
-from collections.abc import Callable
-from contextlib import nullcontext
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ..model import quadrature
-from . import loop
+from . import loop, record
 from .controllers import Model, ModelState
 from .encoder import Encoder, level, locate
 from .plant import Coulomb, Handle, Motion, span
@@ -20,32 +22,23 @@ BACKENDS = ("float", "fixed", "rtl")
 CHUNK = 1 << 16
 """Samples between two looks at progress."""
 OVERVIEW_POINTS = 6000
-DETAIL_BEFORE_M = 0.3e-3
-DETAIL_POINTS = 200_000
-DETAIL_S = 0.12
-
-
-@dataclass
-class Trace:
-    """What a run kept of its samples; arrays of one length.
-
-    Attributes:
-        time_s: time of each sample.
-        position_m, velocity_m_per_s: of the handle, as they truly are.
-        estimate_m_per_s: the estimator's output.
-        force_n: of the wall on the handle, as it left the controller after the sample.
-    """
-
-    time_s: np.ndarray
-    position_m: np.ndarray
-    velocity_m_per_s: np.ndarray
-    estimate_m_per_s: np.ndarray
-    force_n: np.ndarray
+DETAIL_FROM_M = -0.2e-3
+DETAIL_S = 0.1
+WAVEFORM_CLOCKS = 60_000
+"""Length of a waveform; a fifth of it before the contact."""
 
 
 @dataclass
 class Hit:
-    """Result of a run; `report` is its summary."""
+    """Result of a run; `report` is its summary.
+
+    Attributes:
+        seconds: wall time of the loop, compiling and building apart.
+        mean_m: mean position before the settling mark, m; positive is inside the wall.
+        rms_m: RMS distance from it after the mark, m.
+        force_sha256: of the drive words of every actuation, little-endian int32; None for `float`.
+        overview, detail: if asked for, samples of the whole run, and every one of the contact.
+    """
 
     scene: Scene
     backend: str
@@ -56,14 +49,25 @@ class Hit:
     max_force_n: float
     flags: list[str]
     force_sha256: str | None
-    overview: Trace | None = None
-    detail: Trace | None = None
-    position_at_settle_m: float = field(default=0.0)
+    overview: record.Trace | None = None
+    detail: record.Trace | None = None
 
     @property
     def stable(self) -> bool:
         """Whether the RMS stays under the protocol's threshold."""
         return self.rms_m * 1e3 < self.scene.protocol.threshold_mm
+
+    @property
+    def contact_s(self) -> float:
+        """Time of the first sample inside the wall, of those that `detail` has; else of the end."""
+        inside = np.flatnonzero(self.detail.position_m > 0)
+        return float(self.detail.time_s[inside[0]]) if len(inside) else self.samples / self.scene.spec.sample_hz
+
+    def save(self, path: Path) -> None:
+        """Write the traces as an .npz: `overview_time_s`, `detail_force_n` and so on, and the report as JSON text."""
+        kept = {"overview": self.overview, "detail": self.detail}
+        arrays = {f"{name}_{key}": array for name, trace in kept.items() for key, array in vars(trace).items()}
+        np.savez_compressed(path, report=json.dumps(self.report()), **arrays)
 
     def report(self) -> dict:
         """Return the summary that the command line prints, units in the keys."""
@@ -115,25 +119,6 @@ def model_controller(scene: Scene, floating: bool, start_level: int) -> tuple[Mo
     state = design.start(floating)
     velocity = 0.0 if floating else 0
     return controller, ModelState(state.output.drive, velocity, 0, quadrature.START, state, 0, start_level)
-
-
-def _record(scene: Scene, floating: bool, trigger_m: float, stride: int, points: int) -> loop.Record:
-    estimate = np.zeros(points, np.float64 if floating else np.int64)
-    reals = (np.zeros(points) for _ in range(3))
-    position, velocity, force = reals
-    return loop.Record(trigger_m, stride, np.zeros(points, np.int64), position, velocity, estimate, force)
-
-
-def _trace(scene: Scene, record: loop.Record, recorded: int, floating: bool) -> Trace:
-    spec = scene.spec
-    lsb = 1.0 if floating else spec.design.estimator.velocity.lsb
-    return Trace(
-        time_s=record.sample[:recorded] / spec.sample_hz,
-        position_m=record.position_m[:recorded],
-        velocity_m_per_s=record.velocity_m_per_s[:recorded],
-        estimate_m_per_s=record.estimate[:recorded] * (lsb * spec.velocity_unit_m_per_s),
-        force_n=record.force_n[:recorded],
-    )
 
 
 class _Tally:
@@ -189,66 +174,90 @@ def run(
         backend: one of `BACKENDS`.
         traces: keep samples of the whole run and of the contact.
         progress: called with the number of samples done.
-        waveform: for `rtl`, a VCD file to write from just before the contact on.
+        waveform: for `rtl`, an FST file to write, of every signal around the contact.
 
     Raises:
         RuntimeError: if the handle outran every decoder's limit by far, or the RTL could not be built.
     """
-    floating = backend == "float"
-    world, spec = world_of(scene), scene.spec
+    floating, spec, world = backend == "float", scene.spec, world_of(scene)
     start = Motion(scene.protocol.start_m, 0.0)
     cell = locate(world.encoder, start.position_m)
     start_level = int(level(cell.number))
+    records = None, None
+    if traces:
+        stride = max(1, scene.samples // OVERVIEW_POINTS)
+        records = (
+            record.new(spec, floating, -np.inf, stride, scene.samples // stride + 1),
+            record.new(spec, floating, DETAIL_FROM_M, 1, round(DETAIL_S * spec.sample_hz)),
+        )
+    at = loop.Progress(0, start, cell, scene.protocol.push_n, 0)
+    if backend != "rtl":
+        controller, state = model_controller(scene, floating, start_level)
+        return _closed_loop(scene, backend, world, controller, state, at, records, progress, ())
 
-    if backend == "rtl":
-        from .rtl import Hardware  # noqa: PLC0415  (the other backends need neither Amaranth nor a compiler)
+    from .rtl import Hardware  # noqa: PLC0415  (the other backends need neither Amaranth nor a C++ compiler)
 
-        opened = Hardware(spec, scene.words, start_level)
-    else:
-        opened = nullcontext(None)
-    with opened as hardware:
-        if hardware is not None:
-            controller, state = hardware.controller, hardware.start
-        else:
-            controller, state = model_controller(scene, floating, start_level)
-        at = loop.Progress(0, start, cell, scene.protocol.push_n, 0, 0, -1)
-        return _run(scene, backend, world, controller, state, at, traces, progress)
+    with Hardware(spec, scene.words, start_level, traced=waveform is not None) as hardware, _vcd(waveform) as vcd:
+        # What the hardware will do is known before it runs: the contact is where the bit-accurate model has it.
+        marks = _waveform_marks(scene, hardware, vcd) if waveform else ()
+        return _closed_loop(scene, backend, world, hardware.controller, hardware.start, at, records, progress, marks)
 
 
-def _run(scene, backend, world, controller, state, at, traces, progress) -> Hit:
+@contextmanager
+def _vcd(waveform: Path | None) -> Iterator[Path | None]:
+    """Give a VCD file to write to; turn it into `waveform` at the end."""
+    if waveform is None:
+        yield None
+        return
+    from .waveform import vcd_to_fst  # noqa: PLC0415  (only waveforms need its library)
+
+    with tempfile.TemporaryDirectory() as folder:
+        vcd = Path(folder) / "axis.vcd"
+        yield vcd
+        vcd_to_fst(vcd, waveform)
+
+
+def _waveform_marks(scene: Scene, hardware, vcd: Path) -> list[tuple[int, Callable[[], None]]]:
+    """Return at which samples to do what for a waveform around the contact."""
+    length = max(1, WAVEFORM_CLOCKS // scene.spec.clocks_per_sample)
+    contact = round(run(scene, "fixed", traces=True).contact_s * scene.spec.sample_hz)
+    first = max(contact - length // 5, 0)
+    return [(first, lambda: hardware.trace(vcd)), (first + length, hardware.end_trace)]
+
+
+def _closed_loop(scene, backend, world, controller, state, at, records, progress, marks) -> Hit:
+    """Run the loop in chunks that end at the `marks` (sample, action), and tally it."""
     floating, total = backend == "float", scene.samples
     number = np.float64 if floating else np.int64
     delay = loop.Delay(np.zeros(scene.delay_samples, number)) if scene.delay_samples else None
-    overview = detail = None
-    if traces:
-        overview = _record(scene, floating, -np.inf, max(1, total // OVERVIEW_POINTS), OVERVIEW_POINTS + 1)
     edges = np.zeros(loop.EDGE_CAPACITY, np.int64), np.zeros(loop.EDGE_CAPACITY, np.int64)
     positions, drives = np.zeros(CHUNK), np.zeros(CHUNK, number)
-    tally = _Tally(scene, exact=not floating)
+    tally, actions = _Tally(scene, exact=not floating), dict(marks)
     # Compiling is not running: a call with nothing to do keeps it out of the time.
-    loop.run(world, controller, state, at, delay, overview, edges, positions, drives, 0)
+    loop.run(world, controller, state, at, delay, records, edges, positions, drives, 0)
     began = time.perf_counter()
     while at.sample < total:
         first = at.sample
-        until = min(first + CHUNK, total)
-        state, at = loop.run(world, controller, state, at, delay, overview, edges, positions, drives, until)
+        if first in actions:
+            actions.pop(first)()
+        until = min(first + CHUNK, total, *(sample for sample in actions if sample > first))
+        state, at = loop.run(world, controller, state, at, delay, records, edges, positions, drives, until)
         if at.n_edges < 0:
-            raise RuntimeError(
-                f"the handle passed more than {loop.EDGE_CAPACITY} edges in a sample, at {at.sample / scene.spec.sample_hz:g} s"
-            )
+            when = at.sample / scene.spec.sample_hz
+            raise RuntimeError(f"the handle passed more than {loop.EDGE_CAPACITY} edges in a sample, at {when:g} s")
         tally.add(first, positions[: until - first], drives[: until - first])
         if progress:
             progress(until)
-    seconds = time.perf_counter() - began
     return Hit(
-        scene,
-        backend,
-        total,
-        seconds,
-        tally.mean_m,
-        tally.rms_m,
-        tally.largest_drive * scene.spec.force_resolution_n,
-        scene.spec.design.flag_names(int(state.flags)),
-        tally.force_sha256,
-        overview and _trace(scene, overview, at.recorded, floating),
+        scene=scene,
+        backend=backend,
+        samples=total,
+        seconds=time.perf_counter() - began,
+        mean_m=tally.mean_m,
+        rms_m=tally.rms_m,
+        max_force_n=tally.largest_drive * scene.spec.force_resolution_n,
+        flags=scene.spec.design.flag_names(int(state.flags)),
+        force_sha256=tally.force_sha256,
+        overview=records[0] and record.trace_of(records[0], scene.spec),
+        detail=records[1] and record.trace_of(records[1], scene.spec),
     )

@@ -4,7 +4,7 @@ Time is the FPGA's clock. Sample k is taken at the strobe, clock (k + 1) D - 1, 
 follows from it changes `latency` clocks later, on every backend. The plant is advanced exactly over the two intervals
 between those instants, under a constant force in each.
 
-What a scene lacks is None here (`coulomb`, `delay`, `record`), and is not in the machine code.
+What a scene lacks is None here (`coulomb`, `delay`, a record), and is not in the machine code.
 """
 
 from typing import NamedTuple
@@ -15,6 +15,7 @@ from ..model.compiled import compiled
 from .controllers import sample, sample_quietly
 from .encoder import Cell, Encoder, advance, advance_quietly
 from .plant import Coulomb, Handle, Motion, Span
+from .record import keep
 
 EDGE_CAPACITY = 1 << 14
 """Edges that one sample may bring before the loop gives up: with any decoder, far beyond its limit."""
@@ -23,7 +24,7 @@ EDGE_CAPACITY = 1 << 14
 class World(NamedTuple):
     """What the controller is connected to, and when.
 
-    `before` and `after` are the spans from a changed drive to the next strobe, and from the strobe to the changed drive.
+    `before` is the span from a changed drive to the next strobe, `after` that from the strobe to the changed drive.
     """
 
     handle: Handle
@@ -43,18 +44,6 @@ class Delay(NamedTuple):
     drives: np.ndarray
 
 
-class Record(NamedTuple):
-    """Where samples are kept, from when the handle first passes `trigger_m` on, every `stride`-th, until it is full."""
-
-    trigger_m: float
-    stride: int
-    sample: np.ndarray  # int64
-    position_m: np.ndarray
-    velocity_m_per_s: np.ndarray
-    estimate: np.ndarray  # words, or float counts a sample
-    force_n: np.ndarray  # on the handle, by the wall, after the sample
-
-
 class Progress(NamedTuple):
     """Where the loop stands: between the drive's change after sample `sample - 1`, and the strobe of `sample`."""
 
@@ -63,8 +52,6 @@ class Progress(NamedTuple):
     cell: Cell
     force_n: float
     n_edges: int  # not yet taken by the controller; negative: edges were lost
-    recorded: int  # samples kept
-    since: int  # sample at which keeping began; -1: not yet
 
 
 @compiled
@@ -78,38 +65,22 @@ def _delayed(delay, k, drive):
 
 
 @compiled
-def _keep(record, world, at, k, state, recorded, since):
-    """Keep sample k if it is due; return (recorded, since)."""
-    if record is None:
-        return recorded, since
-    if since < 0 and at.position_m >= record.trigger_m:
-        since = k
-    if since >= 0 and (k - since) % record.stride == 0 and recorded < len(record.sample):
-        record.sample[recorded] = k
-        record.position_m[recorded] = at.position_m
-        record.velocity_m_per_s[recorded] = at.velocity_m_per_s
-        record.estimate[recorded] = state.velocity
-        record.force_n[recorded] = state.drive * world.force_lsb_n
-        recorded += 1
-    return recorded, since
-
-
-@compiled
-def run(world, controller, state, progress, delay, record, edges, positions, drives, until):
+def run(world, controller, state, progress, delay, records, edges, positions, drives, until):
     """Run the loop up to sample `until`; return (state, progress).
 
     Args:
         world: a `World`.
         controller, state: of `sim.controllers`.
         progress: a `Progress`.
-        delay, record: a `Delay` and a `Record`, or None.
+        delay: a `Delay`, or None.
+        records: a pair of `Record`s, or None for either.
         edges: a pair of int64 arrays, the encoder's edges on their way to the controller.
         positions: float64 array that takes the position (m) at each sample of this call.
         drives: array that takes the drive (force LSB) after each.
         until: number of the first sample not to take, within what the arrays hold. Stops early if edges were lost.
     """
     edge_clocks, edge_levels = edges
-    first, motion, cell, force_n, n_edges, recorded, since = progress
+    first, motion, cell, force_n, n_edges = progress
     k = first
     before_clocks = world.clocks_per_sample - world.latency
     while k < until and n_edges >= 0:
@@ -137,7 +108,8 @@ def run(world, controller, state, progress, delay, record, edges, positions, dri
             state = sample_quietly(controller, state, strobe, strobe + world.latency)
         drives[k - first] = state.drive
         force_n = world.push_n + world.force_lsb_n * _delayed(delay, k, state.drive)
-        recorded, since = _keep(record, world, at, k, state, recorded, since)
+        keep(records[0], k, at, state.velocity, state.drive)
+        keep(records[1], k, at, state.velocity, state.drive)
 
         moved, quiet = advance_quietly(world.coulomb, motion, cell, force_n, world.before)
         if quiet:
@@ -148,4 +120,4 @@ def run(world, controller, state, progress, delay, record, edges, positions, dri
                 strobe + world.latency, before_clocks, edge_clocks, edge_levels, n_edges,
             )  # fmt: skip
         k += 1
-    return state, Progress(k, motion, cell, force_n, n_edges, recorded, since)
+    return state, Progress(k, motion, cell, force_n, n_edges)

@@ -21,8 +21,10 @@ struct Context {
     Vaxis axis{&verilated, "axis"};
     int64_t clock = 0;
 #if VM_TRACE
-    std::unique_ptr<VerilatedVcdC> trace;
+    std::unique_ptr<VerilatedVcdC> trace;  // its destructor closes the file
     double period_ps = 0;
+
+    Context() { verilated.traceEverOn(true); }
 #endif
 
     void dump(bool rising) {
@@ -111,7 +113,7 @@ int64_t axis_read(int64_t context_address, int64_t what, int64_t, int64_t, int64
 }
 
 #if VM_TRACE
-// Record a waveform from here on, until closed.
+// Record a waveform from here on, until `axis_end_trace`.
 void axis_trace(void* address, const char* path, double clock_hz) {
     auto& context = *static_cast<Context*>(address);
     context.period_ps = 1e12 / clock_hz;
@@ -119,6 +121,8 @@ void axis_trace(void* address, const char* path, double clock_hz) {
     context.axis.trace(context.trace.get(), 99);
     context.trace->open(path);
 }
+
+void axis_end_trace(void* address) { static_cast<Context*>(address)->trace.reset(); }
 #endif
 
 }  // extern "C"

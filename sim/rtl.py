@@ -131,10 +131,14 @@ class Hardware:
         self._library.axis_close(ctypes.c_void_p(self._context))
 
     def trace(self, path: Path) -> None:
-        """Record a VCD waveform of every signal from here until the end."""
+        """Record a VCD waveform of every signal from here until `end_trace`."""
         self._library.axis_trace(
             ctypes.c_void_p(self._context), str(path).encode(), ctypes.c_double(self.spec.clock_hz)
         )
+
+    def end_trace(self) -> None:
+        """Close the waveform."""
+        self._library.axis_end_trace(ctypes.c_void_p(self._context))
 
     @property
     def controller(self) -> Rtl:

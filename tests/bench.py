@@ -7,11 +7,9 @@ resets the component, monitors record what its pins really carried, and `check` 
 Seeds: every run uses `HARDWALL_SEED` (default 1), logged by cocotb; `HARDWALL_SAMPLES` scales the random campaigns.
 """
 
-import hashlib
 import json
 import os
 from collections.abc import Callable
-from importlib.metadata import version
 from pathlib import Path
 
 import cocotb
@@ -20,12 +18,8 @@ from amaranth.hdl import Shape
 from cocotb.clock import Clock
 from cocotb.simtime import get_sim_time
 from cocotb.triggers import ClockCycles, RisingEdge
-from cocotb_tools.check_results import get_results
-from cocotb_tools.runner import get_runner
 
-from hardwall.hdl.export import to_verilog
-from hardwall.model.compiled import build_dir
-from hardwall.sim.verilator import LINT_OPTIONS, environment
+from hardwall.sim import cocotb_runner
 
 SEED = int(os.environ.get("HARDWALL_SEED", "1"))
 SAMPLES = int(os.environ.get("HARDWALL_SAMPLES", "100000"))
@@ -38,45 +32,10 @@ def simulate(test_file: str, make: Callable, *, checks: str | None = None, **par
     `parameters` must be JSON values: they reach the simulator's process in the environment, where `parameters()`
     returns them. `checks` is a regular expression of the names to run (default: all of the file).
     """
-
-    component = make(**parameters)
-    name = type(component).__module__.rsplit(".", 1)[-1]
-    text = to_verilog(component, name)
-    tools = version("cocotb") + version("verilator")
-    folder = build_dir() / "cocotb" / f"{name}-{hashlib.sha256((text + tools).encode()).hexdigest()[:16]}"
-    source = folder / f"{name}.v"
-    folder.mkdir(parents=True, exist_ok=True)
-    if not source.exists() or source.read_text() != text:
-        source.write_text(text)
-
-    os.environ.update(environment())
-    runner = get_runner("verilator")
-    runner.build(
-        sources=[source],
-        hdl_toplevel=name,
-        build_dir=folder,
-        build_args=[*LINT_OPTIONS, "-O3", "--x-assign", "fast"],
-        timescale=("1ns", "1ns"),
-        log_file=folder / "build.log",
+    file = Path(test_file)
+    cocotb_runner.simulate(
+        make(**parameters), file.stem, file.parent, {"HARDWALL_PARAMETERS": json.dumps(parameters)}, SEED, checks
     )
-    module = Path(test_file).stem
-    run = hashlib.sha256(json.dumps([module, checks, parameters]).encode()).hexdigest()[:8]
-    results = runner.test(
-        test_module=module,
-        hdl_toplevel=name,
-        build_dir=folder,
-        test_dir=Path(test_file).parent,
-        results_xml=str(folder / f"results-{run}.xml"),
-        test_filter=checks,
-        seed=SEED,
-        extra_env={
-            "HARDWALL_PARAMETERS": json.dumps(parameters),
-            "PYTHONPATH": os.pathsep.join([str(Path(test_file).parent), os.environ.get("PYTHONPATH", "")]),
-        },
-    )
-    passed, failed = get_results(results)
-    assert passed > 0, f"no cocotb test ran in {module}"
-    assert failed == 0, f"{failed} of {passed} cocotb tests of {module} failed"
 
 
 def parameters() -> dict:
@@ -121,6 +80,8 @@ class Monitor:
 
 class Bench:
     """A clocked, reset component under test. Signedness, lost in Verilog, is taken from the component's members."""
+
+    period_ns = PERIOD_NS
 
     def __init__(self, dut, component):
         self.dut = dut

@@ -1,0 +1,98 @@
+"""How fast the closed loop runs, and what each optional part of a scene costs; measured side by side in one run.
+
+Every figure is a median over rounds, and in each round every contestant runs once, so that a machine that slows down
+slows them all.
+"""
+
+import json
+import statistics
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from . import hit
+from .scene import Scene, load
+
+ROUNDS = 5
+SECONDS_OF_SCENE = {"float": 2.0, "fixed": 2.0, "rtl": 0.05}
+"""Simulated time a round, by backend: enough to last some tenths of a second."""
+COCOTB_SAMPLES = 2000
+PARTS = {
+    "bare": {"handle.coulomb_n": None, "amplifier.delay_s": 0.0},
+    "coulomb friction": {"amplifier.delay_s": 0.0},
+    "amplifier delay": {"handle.coulomb_n": None, "amplifier.delay_s": 1e-3},
+    "encoder phase error": {"handle.coulomb_n": None, "amplifier.delay_s": 0.0, "encoder.phase_error_counts": 0.25},
+}
+"""Scenes that differ by one optional part from the first."""
+
+
+def _scene(name: str, changes: dict, seconds: float) -> Scene:
+    """Return a scene that lasts `seconds`, halved between settling and measuring."""
+    half = {"protocol.settle_s": seconds / 2, "protocol.mean_s": seconds / 4, "protocol.measure_s": seconds / 2}
+    return load(name, changes | half)
+
+
+def _medians(contestants: dict[str, Callable[[], float]], progress: Callable[[str], None]) -> dict[str, float]:
+    """Return the median over the rounds of what each contestant gives, taken in turns."""
+    given: dict[str, list[float]] = {name: [] for name in contestants}
+    for number in range(ROUNDS):
+        for name, run in contestants.items():
+            progress(f"round {number + 1} of {ROUNDS}: {name}")
+            given[name].append(run())
+    return {name: statistics.median(values) for name, values in given.items()}
+
+
+def _hits(scene: Scene, backend: str) -> Callable[[], float]:
+    """Return a run of the closed loop, in samples a second."""
+
+    def run() -> float:
+        result = hit.run(scene, backend)
+        return result.samples / result.seconds
+
+    run()  # compiles and builds
+    return run
+
+
+def _cocotb(name: str) -> Callable[[], float]:
+    """Return a run of the same closed loop under cocotb, in samples a second; its force words must be the model's."""
+    from ..hdl.axis import Axis  # noqa: PLC0415  (cocotb comes with the regressions, and only this needs it)
+    from .cocotb_runner import simulate  # noqa: PLC0415
+
+    scene = load(name)
+    words = hit.run(_scene(name, {}, COCOTB_SAMPLES / scene.spec.sample_hz), "fixed").force_sha256
+
+    def run() -> float:
+        with tempfile.TemporaryDirectory() as folder:
+            report = Path(folder) / "report.json"
+            order = {"scene": name, "samples": COCOTB_SAMPLES, "report": str(report)}
+            environ = {"HARDWALL_LOOP": json.dumps(order), "COCOTB_LOG_LEVEL": "WARNING"}
+            simulate(Axis(scene.spec), "hardwall.sim.cocotb_loop", Path(folder), environ)
+            result = json.loads(report.read_text())
+        if result["force_sha256"] != words:
+            raise RuntimeError(f"the RTL under cocotb and the model differ in their first {COCOTB_SAMPLES} force words")
+        return COCOTB_SAMPLES / result["seconds"]
+
+    return run
+
+
+def bench(scene: str, progress: Callable[[str], None]) -> dict:
+    """Return the benchmark's report: samples a second by backend, and nanoseconds a sample by optional part.
+
+    Args:
+        scene: name of a scene.
+        progress: called with what is measured next.
+    """
+    progress("compiling and building")
+    speeds = {backend: _hits(_scene(scene, {}, seconds), backend) for backend, seconds in SECONDS_OF_SCENE.items()}
+    speeds["cocotb"] = _cocotb(scene)
+    parts = {name: _hits(_scene(scene, changes, SECONDS_OF_SCENE["fixed"]), "fixed") for name, changes in PARTS.items()}
+    samples_per_s = _medians(speeds, progress)
+    costs = {name: 1e9 / rate for name, rate in _medians(parts, progress).items()}
+    return {
+        "scene": scene,
+        "rounds": ROUNDS,
+        "samples_per_s": samples_per_s,
+        "rtl_over_cocotb": samples_per_s["rtl"] / samples_per_s["cocotb"],
+        "rtl_clocks_per_s": samples_per_s["rtl"] * load(scene).spec.clocks_per_sample,
+        "ns_per_sample_of_parts": costs,
+    }

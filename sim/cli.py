@@ -1,0 +1,237 @@
+"""The command line. Results go to stdout, everything else to stderr; exit codes: 0, 1 failed run, 2 bad input."""
+
+import json
+import sys
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from ..model import estimators
+from .scene import SceneError, load, names
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="A stiff virtual wall in hardware: encoder edges in, force out.",
+)
+log = Console(stderr=True, highlight=False)
+
+Estimator = Literal[tuple(estimators.ESTIMATORS)]
+Backend = Literal["float", "fixed", "rtl"]
+Device = Literal["ecp5-25k", "ice40-up5k"]
+
+SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help=f"{', '.join(names())}, or a .toml file")]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="change a key of the scene; an empty value takes it out"),
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="print one JSON object on stdout")]
+
+
+class BadInput(Exception):
+    """One line: what is wrong with what was given, and what is accepted."""
+
+
+def _changes(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
+    """Return scene changes from `--set` and from options of their own (None: not given)."""
+    changes = {}
+    for assignment in assignments or []:
+        key, equals, text = assignment.partition("=")
+        if not equals or not key:
+            raise BadInput(f"--set must be KEY=VALUE, not {assignment!r}")
+        try:
+            changes[key] = tomllib.loads(f"value = {text}")["value"] if text else None
+        except tomllib.TOMLDecodeError:
+            changes[key] = text
+    named = {key.replace("__", "."): value for key, value in options.items() if value is not None}
+    return changes | named
+
+
+def _output_file(path: Path | None, option: str, suffixes: tuple[str, ...]) -> Path | None:
+    """Return the path with its folder made; bad input if nothing could be written there."""
+    if path is None:
+        return None
+    if path.suffix not in suffixes:
+        raise BadInput(f"{option} must end in {' or '.join(suffixes)}, not {str(path)!r}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("ab"):
+            pass
+    except OSError as error:
+        raise BadInput(f"{option} {str(path)!r} cannot be written: {error.strerror}") from None
+    if path.stat().st_size == 0:
+        path.unlink()
+    return path
+
+
+def _show(report: dict[str, Any], as_json: bool) -> None:
+    """Print a report: one JSON object, or a table of its keys."""
+    if as_json:
+        print(json.dumps(report))
+        return
+    table = Table(box=None, show_header=False)
+    for key, value in report.items():
+        table.add_row(f"[bold]{key}", _text(value))
+    Console(highlight=False, soft_wrap=True).print(table)
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return ", ".join(map(_text, value)) if isinstance(value, list) else str(value)
+
+
+@app.command()
+def hit(
+    scene: SceneArgument = "seed-2011",
+    estimator: Annotated[Estimator | None, typer.Option(help="velocity estimator [default: the scene's]")] = None,
+    output: Annotated[str | None, typer.Option(help="its output, e.g. u or u1 [default: its first]")] = None,
+    backend: Annotated[
+        Backend, typer.Option(help="float64 algorithm, bit-accurate model, or the Verilated RTL")
+    ] = "fixed",
+    stiffness: Annotated[float | None, typer.Option(help="of the wall, N/m")] = None,
+    damping: Annotated[float | None, typer.Option(help="of the wall, N s/m")] = None,
+    set_: SetOption = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw the hit: .png, .svg or .pdf")] = None,
+    trace: Annotated[
+        Path | None, typer.Option(metavar="FILE", help=".npz: the samples; .fst: a waveform of the contact (rtl)")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Hit the wall: the founding paper's protocol, and whether the wall is stable."""
+    changes = _changes(
+        set_,
+        controller__estimator=estimator,
+        controller__output=output,
+        wall__stiffness_n_per_m=stiffness,
+        wall__damping_n_s_per_m=damping,
+    )
+    loaded = load(scene, changes)
+    from . import hit as hits  # noqa: PLC0415  (compiled kernels are loaded only where they run)
+    from .plot import SUFFIXES, plot_hit  # noqa: PLC0415
+
+    plot = _output_file(plot, "--plot", SUFFIXES)
+    trace = _output_file(trace, "--trace", (".fst", ".npz"))
+    waveform = trace if trace and trace.suffix == ".fst" else None
+    if waveform and backend != "rtl":
+        raise BadInput(f"--trace {waveform.name} needs --backend rtl: only hardware has waveforms")
+    with _progress(f"{loaded.name} {loaded.controller.estimator} {backend}", loaded.samples) as advance:
+        result = hits.run(loaded, backend, bool(plot or trace), advance, waveform)
+    _show(result.report(), as_json)
+    if plot:
+        plot_hit(result, plot)
+        log.print(f"picture: {plot}")
+    if trace and not waveform:
+        result.save(trace)
+    if trace:
+        log.print(f"trace: {trace}")
+
+
+class _progress:
+    """A progress bar on stderr while a run lasts; gives the function that moves it."""
+
+    def __init__(self, title: str, total: int):
+        columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+        self._bar = Progress(*columns, console=log, transient=True)
+        self._task = self._bar.add_task(title, total=total)
+
+    def __enter__(self):
+        self._bar.start()
+        return lambda done: self._bar.update(self._task, completed=done)
+
+    def __exit__(self, *_) -> None:
+        self._bar.stop()
+
+
+@app.command()
+def table(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="JSON reports of `hardwall hit --json`")],
+) -> None:
+    """Print reports of hits side by side."""
+    columns = {
+        "scene": "{scene}",
+        "estimator": "{estimator} {output}",
+        "backend": "{backend}",
+        "K (N/m)": "{stiffness_n_per_m:g}",
+        "B (N s/m)": "{damping_n_s_per_m:g}",
+        "wall": "{verdict}",
+        "RMS (mm)": "{rms_mm:.3g}",
+        "peak force (N)": "{max_force_n:.3f}",
+        "samples/s": "{samples_per_s:.3g}",
+        "force words": "{digest}",
+    }
+    rows = []
+    for file in files:
+        try:
+            report = json.loads(file.read_text())
+            verdict = "stable" if report["stable"] else "unstable"
+            fields = {**report, "verdict": verdict, "digest": (report["force_sha256"] or "")[:12]}
+            rows.append([form.format(**fields) for form in columns.values()])
+        except FileNotFoundError:
+            raise BadInput(f"{file}: no such file") from None
+        except (OSError, ValueError, KeyError, TypeError):
+            raise BadInput(f"{file}: not a JSON report of `hardwall hit --json`") from None
+    result = Table()
+    for name in columns:
+        result.add_column(name, justify="left" if name in ("scene", "estimator", "backend") else "right")
+    for row in rows:
+        result.add_row(*row)
+    Console(highlight=False, width=max(120, log.width)).print(result)
+
+
+@app.command()
+def bench(scene: SceneArgument = "mhz", as_json: JsonOption = False) -> None:
+    """Measure the closed loop's speed on every backend and under cocotb, and what optional parts cost."""
+    load(scene)
+    from .bench import bench as measure  # noqa: PLC0415
+
+    report = measure(scene, lambda what: log.print(what))
+    if as_json:
+        print(json.dumps(report))
+        return
+    costs = report.pop("ns_per_sample_of_parts")
+    speeds = {f"{name} (samples/s)": value for name, value in report.pop("samples_per_s").items()}
+    _show(report | speeds | {f"{name} (ns/sample)": value for name, value in costs.items()}, as_json)
+
+
+@app.command()
+def verilog(
+    scene: SceneArgument = "seed-2011",
+    folder: Annotated[Path, typer.Option("-o", "--output-folder", metavar="DIR", help="made if absent")] = Path("."),
+    estimator: Annotated[Estimator | None, typer.Option(help="velocity estimator [default: the scene's]")] = None,
+    set_: SetOption = None,
+) -> None:
+    """Write the axis of a scene as Verilog, with a table of its ports."""
+    spec = load(scene, _changes(set_, controller__estimator=estimator)).spec
+    from ..hdl.export import write  # noqa: PLC0415
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for path in write(spec, folder):
+            print(path)
+    except OSError as error:
+        raise BadInput(f"-o {str(folder)!r} cannot be written: {error.strerror}") from None
+
+
+def main() -> None:
+    """Run the command line; every failure is one line on stderr and an exit code."""
+    try:
+        app(standalone_mode=False)
+    except typer.TyperException as error:
+        code, message = 2, " ".join(error.format_message().split())
+    except (BadInput, SceneError) as error:
+        code, message = 2, str(error)
+    except (KeyboardInterrupt, typer.Abort):
+        code, message = 1, "interrupted"
+    except (RuntimeError, OSError) as error:
+        code, message = 1, str(error)
+    else:
+        return
+    print(f"hardwall: error: {message}", file=sys.stderr)
+    sys.exit(code)

@@ -1,0 +1,190 @@
+"""One axis, pins to force: RTL against the models of decoder and axis, with everything changing while it runs."""
+
+import cocotb
+import numpy as np
+import pytest
+from cocotb.triggers import RisingEdge, Timer, ValueChange
+from specs import ADJUSTED, MHZ, spec
+
+from bench import SAMPLES, Bench, parameters, rng, simulate
+from hardwall.hdl.axis import Axis
+from hardwall.model import axis, quadrature
+from hardwall.model.spec import AxisSpec
+
+PINS = (
+    "encoder_a", "encoder_b", "encoder_z", "drive_enable", "preload", "preload_count", "index_arm", "clear_flags",
+)  # fmt: skip
+OUTPUTS = (
+    "drive", "velocity", "force", "flags", "actuated",
+    "count", "illegal_count", "index_count", "index_latched", "stamp_a_rise",
+)  # fmt: skip
+SLACK = 12
+"""Clocks of each sample after the drive has changed, in which the host may act."""
+
+
+def busy(estimator: str) -> AxisSpec:
+    """Return an axis that samples nearly as fast as its latency allows."""
+    latency = spec("mhz", estimator).design.latency_to_drive
+    gains = ADJUSTED if estimator == "levant" else None
+    rates = {"clock_hz": 100_000 * (latency + SLACK), "sample_hz": 100_000, "actuation_hz": 50_000}
+    return AxisSpec(**{**MHZ, **rates, "speed_max_m_per_s": 0.5, "travel_m": 1e-3}, estimator=estimator, gains=gains)
+
+
+def make(estimator: str) -> Axis:
+    return Axis(busy(estimator))
+
+
+def random_words(design: axis.Design, random: np.random.Generator) -> dict[str, int]:
+    """Return words for a wall that is often hit, with gains from nothing to the most."""
+    words = {word.name: word.reset for word in design.words}
+    for name in ("wall_stiffness", "wall_damping", "output_force_limit", "output_slew_limit"):
+        top = next(word.format.max for word in design.words if word.name == name)
+        words[name] = int(top * 2.0 ** -random.integers(0, 16))
+    words["wall_position"] = int(random.integers(-30, 30))
+    words["wall_left"], words["wall_forbid_pull"] = random.integers(0, 2, 2).tolist()
+    words["encoder_glitch_clocks"] = int(random.choice([0, 1, 2, 5]))
+    words["encoder_invert"] = int(random.random() < 0.2)
+    if "levant_output" in words:
+        words["levant_output"] = int(random.integers(0, 2))
+    return words
+
+
+class Events:
+    """What the pins did, as the simulator saw it: (clock whose edge sees it first, row in PINS, value)."""
+
+    def __init__(self, bench: Bench):
+        self.rows: list[tuple[int, int, int]] = []
+        for row, name in enumerate(PINS):
+            cocotb.start_soon(self._watch(bench, row, bench.reader(name), getattr(bench.dut, name)))
+
+    async def _watch(self, bench: Bench, row: int, read, handle):
+        while True:
+            await ValueChange(handle)
+            # Set between two edges, it is seen by the second.
+            self.rows.append((bench.clock_number() + 1, row, read()))
+
+    def records(self, first_clock: int, clocks: int) -> np.ndarray:
+        """Return the level of every pin at every clock from `first_clock` on."""
+        pins = np.zeros((len(PINS), clocks), np.int64)
+        for clock, row, value in self.rows:
+            pins[row, max(clock - first_clock, 0) :] = value
+        return pins
+
+
+def reference(spec: AxisSpec, pins: np.ndarray, commits: list[tuple[int, dict[str, int]]], samples: int) -> np.ndarray:
+    """Return OUTPUTS of each sample, from the model; `commits` says at which strobe which words take effect."""
+    design = spec.design
+    words = {word.name: word.reset for word in design.words}
+    decoder = quadrature.Params(spec.count_width, spec.stamp_width, 8)
+    timing = spec.clocks_per_sample, design.latency_to_drive
+    state = axis.PinState(quadrature.START, design.start(), 0)
+    out = np.zeros((len(OUTPUTS), samples), np.int64)
+    clock = 0
+
+    def run_to(clocks: int, settings: dict[str, int], gains: dict[str, int]) -> None:
+        nonlocal state, clock
+        encoder = settings["encoder_glitch_clocks"], settings["encoder_invert"]
+        state = axis.run_pins(timing, decoder, encoder, design.params(gains), state, pins, clock, clocks, out)
+        clock = clocks
+
+    for strobe, new in commits:
+        run_to(strobe, words, words)
+        # The strobe's sample has the new words; the decoder has them from the next clock on.
+        run_to(strobe + 1, words, new)
+        words = new
+    run_to(pins.shape[1], words, words)
+    return out
+
+
+async def motion(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Generator) -> None:
+    """Move the encoder by one edge at a time: slowly, fast, back and forth, and sometimes too fast or glitching."""
+    quarter, period = 0, bench.period_ns
+    end = bench.clock_number() + samples * spec.clocks_per_sample
+    spacing, direction = 20.0, 1
+    while bench.clock_number() < end:
+        if random.random() < 0.02:
+            spacing = float(random.choice([4, 8, 15, 40, 200])) if random.random() < 0.98 else 1.0
+            direction = int(random.choice([-1, 1]))
+        quarter = (quarter + direction) % 4
+        a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[quarter]
+        bench.drive(encoder_a=a, encoder_b=b)
+        if random.random() < 0.01:
+            bench.drive(encoder_z=int(random.integers(0, 2)))
+        await Timer(max(1, int(random.exponential(spacing))) * period, "ns")
+
+
+async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Generator, commits: list) -> None:
+    """Act in the slack of the samples: commit words, preload, clear, arm, take the enable away and give it back."""
+    dut, sampled = bench.dut, bench.dut.sampled
+    half = 1 << (spec.count_width - 1)
+    for sample in range(samples - 1):
+        await RisingEdge(sampled)
+        act = random.random()
+        if act > 0.1:
+            continue
+        await RisingEdge(dut.clk)
+        await Timer(bench.period_ns // 2, "ns")
+        pulse = ""
+        if act < 0.02:
+            words, pulse = random_words(spec.design, random), "commit"
+            bench.drive(**words)
+            commits.append(((sample + 2) * spec.clocks_per_sample - 1, words))
+        elif act < 0.03:
+            pulse = "preload"
+            bench.drive(preload_count=int(random.integers(-half, half)))
+        elif act < 0.06:
+            pulse = "clear_flags"
+        elif act < 0.08:
+            pulse = "index_arm"
+        else:
+            bench.drive(drive_enable=int(random.random() < 0.8))
+        if pulse:
+            bench.drive(**{pulse: 1})
+            await Timer(bench.period_ns, "ns")
+            bench.drive(**{pulse: 0})
+
+
+@cocotb.test()
+async def follows_model(dut):
+    spec = busy(**parameters())
+    samples, random = SAMPLES, rng()
+    bench = Bench(dut, Axis(spec))
+    await bench.reset()
+    bench.drive(**dict.fromkeys(PINS, 0), commit=0)
+    await RisingEdge(dut.clk)
+    await Timer(bench.period_ns // 2, "ns")
+    bench.drive(rst=1)
+    await Timer(2 * bench.period_ns, "ns")
+    events, seen = Events(bench), bench.monitor("sampled", *OUTPUTS)
+    bench.drive(rst=0, drive_enable=1)
+    first_clock = bench.clock_number() + 1
+    commits: list[tuple[int, dict[str, int]]] = []
+    hosting = cocotb.start_soon(host(bench, spec, samples, random, commits))
+    await motion(bench, spec, samples, random)
+    await hosting
+    kept = len(seen.rows) - 1
+    assert kept >= samples - 2
+    assert len(commits) > samples // 100
+    pins = events.records(first_clock, (kept + 1) * spec.clocks_per_sample)
+    expected = reference(spec, pins, commits, kept + 1)
+    for row, name in enumerate(OUTPUTS):
+        found = seen.column(name)[:kept]
+        wrong = np.flatnonzero(found != expected[row, :kept])
+        assert not len(wrong), f"{name}: {len(wrong)} of {kept} differ, first at sample {wrong[:1]}"
+    # It was worth it: forces acted both ways, both faults of the encoder rose, and both limits acted.
+    assert (seen.column("drive") > 0).any()
+    assert (seen.column("drive") < 0).any()
+    rose = spec.design.flag_names(int(np.bitwise_or.reduce(seen.column("flags"))))
+    assert {"encoder_illegal", "encoder_overspeed", "slew_limited", "force_limited"} <= set(rose)
+    latency = spec.design.latency_to_drive
+    assert {(clock - first_clock - latency + 1) % spec.clocks_per_sample for clock in seen.clocks} == {0}
+
+
+@pytest.mark.parametrize("estimator", ["levant", "fdm"])
+def test_rtl(estimator):
+    simulate(__file__, make, estimator=estimator)
+
+
+def test_wrong_spec_is_refused():
+    with pytest.raises(TypeError, match=r"not 3$"):
+        Axis(3)

@@ -1,0 +1,132 @@
+"""The axis's specification: what follows from it, and what it refuses."""
+
+import math
+
+import numpy as np
+import pytest
+from specs import ADJUSTED, MHZ, PAPER, SPECS, spec
+
+from hardwall.model.axis import Axis
+from hardwall.model.spec import AxisSpec
+
+
+@pytest.mark.parametrize("name", SPECS)
+@pytest.mark.parametrize("estimator", ["levant", "fdm"])
+def test_every_extreme_value_of_the_axis_fits_its_format(name, estimator):
+    axis = spec(name, estimator)
+    design = axis.design
+    assert axis.travel_m / axis.count_m * 4 <= 2 ** (axis.count_width - 1)
+    assert axis.force_max_n / axis.force_resolution_n <= axis.force.max / 2 + 1
+    fastest = 2 * axis.speed_max_counts_per_sample
+    assert design.estimator.velocity.to_real(design.estimator.velocity.max + 1) >= fastest
+    words = {word.name: word for word in design.words}
+    for name_, si in (("wall_stiffness", axis.stiffness_max_n_per_m), ("wall_damping", axis.damping_max_n_s_per_m)):
+        assert words[name_].to_si(words[name_].from_si(si)) == pytest.approx(si, abs=words[name_].to_si(1))
+    # The largest damping on half a velocity LSB of the damper moves the force by half an LSB at most.
+    half = design.wall.coarse.lsb / 2 if design.wall.coarse.f < design.estimator.velocity.f else 0
+    assert axis.damping_max_n_s_per_m / words["wall_damping"].si_per_unit * half <= 0.5
+
+
+@pytest.mark.parametrize("name", ["paper", "proposed", "mhz", "wide"])
+def test_gain_words_are_as_close_as_promised(name):
+    axis = spec(name)
+    lam, alpha, _ = axis.design.estimator.words
+    gains = axis.design.gains
+    assert lam.to_si(lam.reset) == pytest.approx(gains.lambda_sqrt_m_per_s, rel=2.0**-14)
+    assert alpha.to_si(alpha.reset) == pytest.approx(gains.alpha_m_per_s2, rel=2.0**-10)
+    # Two bits of headroom.
+    assert lam.si_max >= 3.9 * gains.lambda_sqrt_m_per_s
+    assert alpha.si_max >= 3.9 * gains.alpha_m_per_s2
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"sample_hz": 7_000}, r"sample_hz must divide clock_hz 12000000, not 7000"),
+        ({"actuation_hz": 3_000}, r"actuation_hz must divide sample_hz 10000, not 3000"),
+        ({"clock_hz": -1}, r"clock_hz must be finite and more than 0, not -1"),
+        ({"count_m": math.nan}, r"count_m must be finite and more than 0, not nan"),
+        ({"travel_m": 1e-9}, r"travel_m must be at least one count of 1e-06 m, not 1e-09"),
+        ({"travel_m": 1e6}, r"travel_m must be at most 536.871 for a 32-bit count"),
+        ({"force_resolution_n": 1e-9}, r"force_resolution_n must be .* to 40"),
+        ({"force_resolution_n": 41.0}, r"force_resolution_n must be .* to 40"),
+        ({"sample_hz": 1_000_000}, r"sample_hz must leave 33 clocks for the force path, so at most 363636"),
+        ({"estimator": "kalman"}, r"estimator must be one of fdm, levant, not 'kalman'"),
+        ({"stiffness_max_n_per_m": 1e-30}, r"stiffness_max_n_per_m and damping_max_n_s_per_m must be"),
+    ],
+)
+def test_impossible_axes_are_refused(changes, message):
+    with pytest.raises(ValueError, match=message):
+        AxisSpec(**(PAPER | changes))
+
+
+@pytest.mark.parametrize("changes", [{"clock_hz": 12e6}, {"count_m": "1"}, {"travel_m": True}])
+def test_fields_of_the_wrong_kind_are_refused(changes):
+    with pytest.raises(TypeError, match="not "):
+        AxisSpec(**(PAPER | changes))
+
+
+def test_unknown_parameters_and_values_that_do_not_fit_are_refused():
+    with pytest.raises(ValueError, match=r"parameter must be one of .*wall_stiffness.*, not 'stiffness'"):
+        Axis(spec("paper"), stiffness=1.0)
+    with pytest.raises(ValueError, match=r"wall_stiffness must be 0 to 255996 N/m, not 1000000.0"):
+        Axis(spec("paper"), wall_stiffness=1e6)
+
+
+def test_counts_that_are_no_counts_are_refused():
+    axis = Axis(spec("paper"))
+    with pytest.raises(TypeError, match="counts must be integers"):
+        axis.run(np.array([0.5]))
+    with pytest.raises(ValueError, match="counts must have 1 or 2 dimensions, not 3"):
+        axis.run(np.zeros((1, 1, 1), np.int64))
+
+
+def test_lanes_are_independent_axes_side_by_side():
+    axis = Axis(spec("paper"), wall_stiffness=1e3, wall_damping=5.0)
+    counts = np.cumsum(np.random.default_rng(1).integers(-40, 41, (3, 500)), axis=1)
+    together = axis.run(counts)
+    for lane in range(3):
+        alone = axis.run(counts[lane])
+        for name in ("velocity", "force", "drive", "flags"):
+            assert (getattr(together, name)[lane] == getattr(alone, name)).all()
+
+
+def figure_2(estimator: str, floating: bool, **si: float) -> tuple[float, AxisSpec]:
+    """Return the RMS error (mm/s) of the founding paper's second figure at 10 kHz, from 1 s on."""
+    c = 1.6785  # m/s^2, the largest |f''| of the signal
+    axis = AxisSpec(**(PAPER | {"acceleration_max_m_per_s2": c, "speed_max_m_per_s": 0.5}), estimator=estimator)
+    t = np.arange(50_001) / axis.sample_hz
+    position = 50e-3 * np.exp(-t) * np.sin(2 * np.pi * t)
+    exact = 50e-3 * np.exp(-t) * (2 * np.pi * np.cos(2 * np.pi * t) - np.sin(2 * np.pi * t))
+    record = Axis(axis, floating, **si).run(np.floor(position / axis.count_m).astype(np.int64))
+    error = (record.velocity_m_per_s - exact)[t >= 1]
+    return 1e3 * math.sqrt(np.mean(error**2)), axis
+
+
+@pytest.mark.parametrize(("estimator", "published"), [("fdm", 4.13), ("levant", 0.626)])
+def test_float_gives_the_papers_second_figure(estimator, published):
+    assert figure_2(estimator, floating=True)[0] == pytest.approx(published, rel=0.005)
+
+
+def test_fixed_point_gives_the_same_finite_difference():
+    assert figure_2("fdm", floating=False)[0] == figure_2("fdm", floating=True)[0]
+
+
+def test_fixed_point_costs_levant_no_more_than_its_rounding_is_worth():
+    """The bound: Levant's error goes with the square root of the position's error [Levant 1998].
+
+    Quantisation errs by up to half a count about its mean, rounding by up to POSITION_BUDGET more at |e| = 1 count;
+    and the gains are off by up to 2**-10, to which the error is at most proportional.
+    """
+    from hardwall.model.levant import POSITION_BUDGET  # noqa: PLC0415
+
+    bound = math.sqrt(1 + POSITION_BUDGET / 0.5) * (1 + 2.0**-10) - 1
+    floating, fixed = (figure_2("levant", floating)[0] for floating in (True, False))
+    assert abs(fixed / floating - 1) <= bound
+    assert bound < 0.04
+
+
+def test_the_same_spec_at_two_rates_has_the_same_si_gains():
+    slow, fast = AxisSpec(**PAPER, gains=ADJUSTED), AxisSpec(**MHZ, gains=ADJUSTED)
+    for ours, theirs in zip(slow.design.estimator.words[:2], fast.design.estimator.words[:2], strict=True):
+        assert ours.to_si(ours.reset) == pytest.approx(theirs.to_si(theirs.reset), rel=2.0**-9)
