@@ -170,7 +170,7 @@ class Scene(Section):
 KEYS = {
     "wall_stiffness": "wall.stiffness_n_per_m",
     "wall_damping": "wall.damping_n_s_per_m",
-    "wall_position": "protocol.start_m",
+    "start_m": "protocol.start_m",
     "output_slew_limit": "controller.slew_limit_n_per_s",
     "count_m": "encoder.count_m",
     "phase_error_counts": "encoder.phase_error_counts",
@@ -193,6 +193,10 @@ def _check(scene: Scene) -> None:
         spec = scene.spec
         if scene.output not in spec.model.OUTPUTS:
             raise ValueError(f"output must be one of {', '.join(spec.model.OUTPUTS)}, not {scene.output!r}")
+        if -scene.protocol.start_m > spec.travel_m:
+            raise ValueError(
+                f"start_m must be {-spec.travel_m:g} to 0, within travel_m, not {scene.protocol.start_m!r}"
+            )
         _ = scene.words, scene.encoder.offsets
     except (TypeError, ValueError) as error:
         raise ValueError(_key_of(str(error), scene.controller.estimator)) from None
@@ -212,8 +216,6 @@ def _check(scene: Scene) -> None:
                 f"not {scene.amplifier.delay_s!r}"
             )
     protocol = scene.protocol
-    if -protocol.start_m > spec.travel_m:
-        raise ValueError(f"protocol.start_m must be {-spec.travel_m:g} to 0, within travel_m, not {protocol.start_m!r}")
     if protocol.mean_s > protocol.settle_s:
         raise ValueError(f"protocol.mean_s must be at most settle_s {protocol.settle_s:g}, not {protocol.mean_s!r}")
     for key in ("mean_s", "measure_s"):
@@ -233,6 +235,8 @@ def _sentence(error: dict[str, Any]) -> str:
         return f"{key} is missing"
     if error["type"] == "extra_forbidden":
         return f"{key} is not a key of a scene{_suggestion(error['loc'])}"
+    if error["type"] in ("model_type", "dict_type"):
+        return f"{key} must be a section, not {error['input']!r}"
     relations = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
     wanted = " and ".join(f"{words} {limits[short]:g}" for short, words in relations.items() if short in limits)
     if not wanted:
@@ -292,7 +296,9 @@ def load(scene: str, changes: dict[str, Any] | None = None) -> Scene:
         result = Scene(name=path.stem, **{key: value for key, value in content.items() if key != "name"})
         _check(result)
     except ValidationError as error:
-        raise SceneError(f"{scene}: {_sentence(error.errors()[0])}") from None
+        # A misspelt key is also a missing one: the misspelling says more.
+        worst = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+        raise SceneError(f"{scene}: {_sentence(worst)}") from None
     except ValueError as error:
         raise SceneError(f"{scene}: {error}") from None
     return result

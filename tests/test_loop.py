@@ -1,0 +1,127 @@
+"""The closed loop: the RTL, through its pins, gives the model's force words, every one of them."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from hardwall.sim import cli, hit
+from hardwall.sim.scene import load
+
+STABLE = {"wall.stiffness_n_per_m": 10e3, "wall.damping_n_s_per_m": 20.0}
+UNSTABLE = {"wall.stiffness_n_per_m": 100e3, "wall.damping_n_s_per_m": 20.0}
+ESTIMATORS = {
+    "levant u": {"controller.estimator": "levant", "controller.output": "u"},
+    "levant u1": {"controller.estimator": "levant", "controller.output": "u1"},
+    "fdm": {"controller.estimator": "fdm", "controller.output": None},
+}
+ONE_SECOND = {"protocol.settle_s": 0.7, "protocol.mean_s": 0.1, "protocol.measure_s": 0.3}
+
+
+def same_words(scene: str, changes: dict) -> hit.Hit:
+    """Run `fixed` and `rtl`, hold one against the other, and return the former."""
+    loaded = load(scene, changes)
+    fixed, rtl = hit.run(loaded, "fixed"), hit.run(loaded, "rtl")
+    assert fixed.force_sha256 == rtl.force_sha256
+    for name in ("samples", "mean_m", "rms_m", "max_force_n", "flags"):
+        assert getattr(fixed, name) == getattr(rtl, name), name
+    return fixed
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize(("wall", "stable"), [(STABLE, True), (UNSTABLE, False)], ids=["stable", "unstable"])
+def test_rtl_gives_the_models_force_words(estimator, wall, stable):
+    result = same_words("seed-2011", ESTIMATORS[estimator] | wall)
+    assert result.samples == 60_000
+    assert result.stable is stable
+    assert result.max_force_n > 1
+
+
+def test_rtl_gives_the_models_force_words_with_an_imperfect_encoder():
+    result = same_words("seed-2011", {"encoder.phase_error_counts": 0.25, "encoder.duty_error_counts": 0.1})
+    assert result.max_force_n > 1
+
+
+def test_rtl_gives_the_models_force_words_and_flags_when_the_encoder_is_too_fast():
+    # The motor makes it faster than promised: on a slow clock, no level lasts as long as the longest filter.
+    changes = {"protocol.push_n": 20.0, "encoder.phase_error_counts": 0.1, "controller.glitch_clocks": 15}
+    changes |= {"controller.clock_hz": 2_000_000, "controller.speed_max_m_per_s": 0.2}
+    result = same_words("seed-2011", changes | ONE_SECOND)
+    assert "encoder_overspeed" in result.flags
+    assert result.max_force_n == 0, "a position that is a guess drives nothing"
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_rtl_gives_the_models_force_words_at_a_megahertz(estimator):
+    result = same_words("mhz", ESTIMATORS[estimator] | ONE_SECOND)
+    assert result.samples == 1_000_000
+    assert result.max_force_n > 1
+
+
+def test_float_and_fixed_agree_on_what_the_wall_does():
+    for changes, stable in ((STABLE, True), (UNSTABLE, False)):
+        floating, fixed = (hit.run(load("seed-2011", changes), backend) for backend in ("float", "fixed"))
+        assert floating.stable is fixed.stable is stable
+        assert floating.max_force_n == pytest.approx(fixed.max_force_n, rel=0.02)
+
+
+def test_the_first_moments_are_those_of_the_undisturbed_handle():
+    """Until the wall, the handle is a mass under constant force: the loop must not have touched it."""
+    scene = load("seed-2011", ONE_SECOND)
+    trace = hit.run(scene, "float", traces=True).overview
+    free = trace.time_s < 0.5
+    m, b, force = scene.handle.mass_kg, scene.handle.viscous_n_s_per_m, scene.protocol.push_n - scene.handle.coulomb_n
+    t = trace.time_s[free]
+    exact = scene.protocol.start_m + force / b * (t - m / b * (1 - np.exp(-b * t / m)))
+    assert np.abs(trace.position_m[free] - exact).max() < 1e-12
+
+
+def test_a_late_amplifier_is_late_by_exactly_its_delay():
+    """With the delay the handle feels the wall so much later: its path leaves the prompt one's only then."""
+    late = load("seed-2011", ONE_SECOND | {"amplifier.delay_s": 5e-3})
+    prompt = load("seed-2011", ONE_SECOND | {"amplifier.delay_s": 0.0})
+    paths = [hit.run(scene, "fixed", traces=True).detail for scene in (late, prompt)]
+    apart = int(np.argmax(paths[0].position_m != paths[1].position_m))
+    first_force = int(np.argmax(paths[1].force_n != 0))
+    assert apart == first_force + 1
+    unchanged = paths[0].velocity_m_per_s[apart : apart + 49]
+    assert (np.diff(unchanged) > 0).all(), "the motor still pushes it on"
+
+
+def test_a_hit_can_be_repeated():
+    first, second = (hit.run(load("seed-2011"), "fixed") for _ in range(2))
+    assert (first.force_sha256, first.rms_m) == (second.force_sha256, second.rms_m)
+
+
+def test_pictures_traces_and_waveforms_are_written(tmp_path, capsys, monkeypatch):
+    picture, trace, wave = (tmp_path / name for name in ("hit.svg", "hit.npz", "hit.fst"))
+    short = [f"--set={key}={value}" for key, value in ONE_SECOND.items()]
+    for option, path, backend in (("--plot", picture, "fixed"), ("--trace", trace, "fixed"), ("--trace", wave, "rtl")):
+        monkeypatch.setattr("sys.argv", ["hardwall", "hit", "--backend", backend, option, str(path), "--json", *short])
+        cli.main()
+        report = json.loads(capsys.readouterr().out)
+        assert report["force_sha256"]
+    for text in ("position (mm)", "velocity (m/s)", "force (N)", "time (s)", "estimate (levant u)", "true"):
+        assert text in picture.read_text()
+    with np.load(trace) as arrays:
+        assert json.loads(str(arrays["report"]))["samples"] == 10_000
+        assert arrays["detail_force_n"].min() < -1
+        assert math.isclose(arrays["overview_time_s"][-1], 1.0, abs_tol=0.01)
+    names = fst_names(wave)
+    assert {"axis.encoder_a", "axis.drive[17:0]", "axis.axis.estimator.u1[19:0]"} <= names
+    assert not any("$auto" in name for name in names)
+
+
+def fst_names(path) -> set[str]:
+    """Return the full names of the signals of a waveform that changed in it."""
+    import pylibfst  # noqa: PLC0415
+
+    reader = pylibfst.lib.fstReaderOpen(str(path).encode())
+    assert reader != pylibfst.ffi.NULL
+    assert pylibfst.lib.fstReaderGetEndTime(reader) > pylibfst.lib.fstReaderGetStartTime(reader) > 0
+    assert pylibfst.lib.fstReaderGetValueChangeSectionCount(reader) > 0
+    _, signals = pylibfst.get_scopes_signals2(reader)
+    names = {name.replace(" ", "") for name in signals.by_name}
+    pylibfst.lib.fstReaderClose(reader)
+    return names
