@@ -199,7 +199,8 @@ def _check(value: float, name: str, low: float, high: float, scaled: float) -> N
 
 @compiled
 def _sign(value):
-    return (value > 0) - (value < 0)
+    # int() for plain Python on numpy scalars, whose truths do not subtract.
+    return int(value > 0) - int(value < 0)
 
 
 @estimate.register(Params)

@@ -54,7 +54,7 @@ def _changes(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
 
 
 def _output_file(path: Path | None, option: str, suffixes: tuple[str, ...]) -> Path | None:
-    """Return the path with its folder made; bad input if nothing could be written there."""
+    """Return the path, its folder made; bad input if nothing could be written there."""
     if path is None:
         return None
     if path.suffix not in suffixes:
@@ -138,7 +138,7 @@ class _progress:
 
     def __init__(self, title: str, total: int):
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-        self._bar = Progress(*columns, console=log, transient=True)
+        self._bar = Progress(*columns, console=log, transient=True, disable=not log.is_terminal)
         self._task = self._bar.add_task(title, total=total)
 
     def __enter__(self):
@@ -147,6 +147,46 @@ class _progress:
 
     def __exit__(self, *_) -> None:
         self._bar.stop()
+
+
+@app.command()
+def replay(
+    file: Annotated[Path, typer.Argument(metavar="FILE.csv", help="a recording, its first line the columns' names")],
+    column: Annotated[str, typer.Option(help="the column of encoder counts")],
+    rate: Annotated[float | None, typer.Option(metavar="HZ", help="sample rate [default: from column time_s]")] = None,
+    coarsen: Annotated[int | None, typer.Option(help="divide the counts, and judge against the full ones")] = None,
+    estimator: Annotated[Estimator, typer.Option(help="velocity estimator")] = "levant",
+    output: Annotated[str | None, typer.Option(help="its output, e.g. u or u1 [default: its first]")] = None,
+    backend: Annotated[Backend, typer.Option(help="float64 algorithm, bit-accurate model, or RTL")] = "fixed",
+    acceleration_max: Annotated[
+        float | None,
+        typer.Option(metavar="C", help="counts/s^2, sets the gains [default: the recording's]"),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="write the velocities")] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw them: .png, .svg or .pdf")] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Put recorded counts through an estimator; the RTL gets them through its pins."""
+    from .plot_replay import SUFFIXES, plot_replay  # noqa: PLC0415  (only replays need SciPy's filters)
+    from .recording import RecordingError  # noqa: PLC0415
+    from .recording import load as load_recording  # noqa: PLC0415
+    from .replay import ReplayError  # noqa: PLC0415
+    from .replay import replay as run  # noqa: PLC0415
+
+    out, plot = _output_file(out, "--out", (".csv",)), _output_file(plot, "--plot", SUFFIXES)
+    try:
+        recording = load_recording(file, column, rate)
+        with _progress(f"{file.name} {estimator} {backend}", len(recording.counts)) as advance:
+            result = run(recording, estimator, output, backend, coarsen, acceleration_max, progress=advance)
+    except (RecordingError, ReplayError) as error:
+        raise BadInput(str(error)) from None
+    _show(result.report(), as_json)
+    if out:
+        result.save(out)
+        log.print(f"velocities: {out}")
+    if plot:
+        plot_replay(result, plot)
+        log.print(f"picture: {plot}")
 
 
 @app.command()
@@ -191,7 +231,7 @@ def bench(scene: SceneArgument = "mhz", as_json: JsonOption = False) -> None:
     load(scene)
     from .bench import bench as measure  # noqa: PLC0415
 
-    report = measure(scene, lambda what: log.print(what))
+    report = measure(scene, log.print)
     if as_json:
         print(json.dumps(report))
         return

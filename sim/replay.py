@@ -1,0 +1,471 @@
+"""Recorded counts through a velocity estimator, on any backend, and held against a reference that is not causal.
+
+The axis of a replay has units of its own, which make one piece of hardware serve any recording: the metre of its
+`AxisSpec` is a *recorded count* and its second is a *sample period*. With `coarsen` = N the axis sees counts // N, so
+its count is N recorded counts, and everything that is reported is in recorded counts and true seconds, whatever N is.
+The floor puts coarse counts (N - 1) / 2 recorded counts too low on average: constant, so no velocity comes of it.
+
+What the axis must cover follows from the recording, each range rounded up to a power of two:
+
+- travel: the span of the recording (at most what a 32-bit count has; beyond, the count wraps, which is no fault);
+- speed: the largest change in a sample, and one count more;
+- clock, in periods a sample: enough for the force path, and for the fastest change through the decoder
+  (`quadrature.max_edge_rate`); what a clock of `CLOCK_MAX_HZ` does not let through is an error on `rtl`.
+
+The bound C on the acceleration, from which an estimator gets its gains, is the largest |second derivative| of the
+reference, after the first second, rounded up to two digits: knowledge that a designer would have of the motion, not
+something that was known to an estimator at the time. It can be given instead. A recording that hardly accelerates gets
+a C that moves one count over its whole length, which counts cannot tell from none, or the least that words hold beside
+its travel and speed (`ACCELERATION_RANGE`).
+
+The reference is the central difference of the recorded counts, through a Butterworth filter of 4th order forward and
+backward: no delay. Its cutoff is `REFERENCE_HZ`, or a quarter of the rate where that is less.
+
+`float` and `fixed` take the counts as they are. `rtl` gets them through its pins: the change from one sample to the
+next becomes edges that are spread evenly over the interval, each moved by the decoder's latency so that the count at
+every strobe is the recorded one. The first sample is where the decoder starts.
+"""
+
+import hashlib
+import math
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from scipy import signal
+
+from ..model import axis, estimators, quadrature
+from ..model.compiled import compiled
+from ..model.fixed import bits_for
+from ..model.spec import AxisSpec
+from .controllers import sample, sample_quietly
+from .encoder import level
+from .recording import Recording
+
+BACKENDS = ("float", "fixed", "rtl")
+TRAVEL_MAX = 2.0**29
+"""Of an axis with a 32-bit count."""
+CLOCK_MAX_HZ = 100e6
+"""Fastest clock of a replay: more counts a second are a fault of the recording, not a motion."""
+ACCELERATION_RANGE = 2.0**48
+"""The largest ratio of travel or speed to C, in counts and samples, at which no estimator's words exceed int64."""
+REFERENCE_HZ = 40.0
+REFERENCE_ORDER = 4
+SETTLE_S = 1.0
+"""Estimates are judged from then on: before, an estimator is still catching up with the start."""
+GLITCH_CLOCKS = 0
+DECODER_CLOCKS = quadrature.latency(GLITCH_CLOCKS)
+"""An edge this long before a strobe is the last that is counted at it."""
+CHUNK_CLOCKS = 1 << 20
+"""Clocks between two looks at progress."""
+
+
+class ReplayError(ValueError):
+    """A replay that cannot be: one line with what is wrong and what is accepted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """What an estimator made of a recording; arrays of the recording's length, in recorded counts and seconds.
+
+    Attributes:
+        coarsen: counts were floor-divided by this before the estimator saw them; None: not, and nothing is judged.
+        acceleration_max_counts_per_s2: the bound C that set the gains.
+        gains: by name, with their units.
+        clock_hz: of the axis; its pins' clock on `rtl`, and nothing to the other backends.
+        velocity_counts_per_s: the estimate.
+        difference_counts_per_s: the plain finite difference of the same counts.
+        reference_counts_per_s: the zero-phase derivative of the recorded counts.
+        flags: sticky flags that are up at the end.
+        velocity_sha256: of the velocity words of all samples, little-endian int64; None for `float`.
+        seconds: wall time of the estimator's run, compiling and building apart.
+    """
+
+    recording: Recording
+    coarsen: int | None
+    estimator: str
+    output: str
+    backend: str
+    spec: AxisSpec
+    acceleration_max_counts_per_s2: float
+    gains: dict[str, float]
+    reference_hz: float
+    velocity_counts_per_s: np.ndarray
+    difference_counts_per_s: np.ndarray
+    reference_counts_per_s: np.ndarray
+    flags: list[str]
+    velocity_sha256: str | None
+    seconds: float
+
+    @property
+    def clock_hz(self) -> float:
+        return self.spec.clocks_per_sample * self.recording.rate_hz
+
+    def _rms(self, velocity: np.ndarray) -> float | None:
+        if self.coarsen is None:
+            return None
+        error = (velocity - self.reference_counts_per_s)[judged_from(self.recording.rate_hz) :]
+        return float(np.sqrt(np.mean(error**2)))
+
+    @cached_property
+    def rms_counts_per_s(self) -> float | None:
+        """RMS of the estimate's error against the reference, after the first second; None without `coarsen`."""
+        return self._rms(self.velocity_counts_per_s)
+
+    @cached_property
+    def rms_fdm_counts_per_s(self) -> float | None:
+        """The same of the finite difference."""
+        return self._rms(self.difference_counts_per_s)
+
+    def report(self) -> dict:
+        """Return the summary that the command line prints, units in the keys; counts are recorded counts."""
+        samples = len(self.velocity_counts_per_s)
+        return {
+            "file": self.recording.file,
+            "column": self.recording.column,
+            "rate_hz": self.recording.rate_hz,
+            "samples": samples,
+            "coarsen": self.coarsen,
+            "estimator": self.estimator,
+            "output": self.output,
+            "backend": self.backend,
+            "acceleration_max_counts_per_s2": self.acceleration_max_counts_per_s2,
+            "gains": self.gains,
+            "clock_hz": self.clock_hz if self.backend == "rtl" else None,
+            "reference_hz": self.reference_hz,
+            "rms_counts_per_s": self.rms_counts_per_s,
+            "rms_fdm_counts_per_s": self.rms_fdm_counts_per_s,
+            "max_abs_counts_per_s": float(np.abs(self.velocity_counts_per_s).max()),
+            "flags": self.flags,
+            "velocity_sha256": self.velocity_sha256,
+            "seconds": self.seconds,
+            "samples_per_s": samples / self.seconds,
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write time, recorded count and velocity of each sample as CSV, and the reference if there is `coarsen`.
+
+        Raises:
+            ReplayError: if the file cannot be written.
+        """
+        columns = {
+            "time_s": (self.recording.time_s, "%.9f"),
+            "count": (self.recording.counts, "%d"),
+            "velocity_counts_per_s": (self.velocity_counts_per_s, "%.12g"),
+        }
+        if self.coarsen is not None:
+            columns["reference_counts_per_s"] = self.reference_counts_per_s, "%.12g"
+        line = ",".join(form for _, form in columns.values()) + "\n"
+        with whole_file(path) as part, part.open("w", encoding="utf-8", newline="") as file:
+            file.write(",".join(columns) + "\n")
+            file.writelines(
+                line % row for row in zip(*(values.tolist() for values, _ in columns.values()), strict=True)
+            )
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Give a file beside `path` to write to; put it in the place of `path` once it is whole.
+
+    Raises:
+        ReplayError: if that cannot be done.
+    """
+    part = Path(path).with_name(f".{Path(path).stem}-{os.getpid()}{Path(path).suffix}")
+    try:
+        yield part
+        part.replace(path)
+    except OSError as error:
+        raise ReplayError(f"{path}: cannot be written ({error.strerror or error})") from None
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def judged_from(rate_hz: float) -> int:
+    """Return the number of the first sample that is judged."""
+    return math.ceil(SETTLE_S * rate_hz)
+
+
+def zero_phase_velocity(counts: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
+    """Return the derivative of the counts, counts/s, low-passed forward and backward."""
+    sections = signal.butter(REFERENCE_ORDER, cutoff_hz, fs=rate_hz, output="sos")
+    derivative = np.gradient((counts - counts[0]).astype(np.float64)) * rate_hz
+    # The usual extension at the ends, three times the filter's length, where there are so many samples.
+    extension = min(3 * (2 * len(sections) + 1), len(counts) - 1)
+    return signal.sosfiltfilt(sections, derivative, padlen=extension)
+
+
+def acceleration_bound(velocity: np.ndarray, rate_hz: float) -> float:
+    """Return the largest |derivative| of a velocity after the first second, rounded up to two digits.
+
+    A record that is no longer counts from its start.
+    """
+    first = judged_from(rate_hz)
+    acceleration = np.gradient(velocity) * rate_hz
+    largest = float(np.abs(acceleration[first:] if len(velocity) > first else acceleration).max())
+    if largest == 0:
+        return 0.0
+    exponent = math.floor(math.log10(largest)) - 1
+    return float(f"{math.ceil(largest / 10.0**exponent)}e{exponent}")
+
+
+def _power_of_two(value: float) -> float:
+    """Return the least power of two that is no less than `value`."""
+    return 2.0 ** bits_for(value)
+
+
+def _ranges(counts: np.ndarray) -> tuple[float, float]:
+    """Return the travel, counts, and the speed, counts a sample, of the axis for a recording."""
+    span = int(counts.max()) - int(counts.min())
+    fastest = int(np.abs(np.diff(counts)).max())
+    return min(_power_of_two(max(span, 1)), TRAVEL_MAX), _power_of_two(fastest + 1)
+
+
+def _least_bound(counts: np.ndarray) -> float:
+    """Return the least C that is taken from a recording, counts a sample^2."""
+    return max(2 / len(counts) ** 2, max(_ranges(counts)) / ACCELERATION_RANGE)
+
+
+def axis_spec(counts: np.ndarray, count: int, acceleration_max: float, estimator: str) -> AxisSpec:
+    """Return the axis for a recording, in recorded counts and sample periods; the module says how it follows.
+
+    Args:
+        counts: as the axis sees them, each `count` recorded counts.
+        acceleration_max: C, recorded counts a sample^2.
+    """
+    fastest = int(np.abs(np.diff(counts)).max())
+    travel, speed = _ranges(counts)
+    # The wall and the output stage are there and do nothing: any ranges do.
+    spec = AxisSpec(
+        clock_hz=1 << 16,
+        sample_hz=1,
+        actuation_hz=1,
+        count_m=float(count),
+        travel_m=travel * count,
+        speed_max_m_per_s=speed * count,
+        acceleration_max_m_per_s2=acceleration_max,
+        force_max_n=1.0,
+        force_resolution_n=1.0,
+        stiffness_max_n_per_m=1.0 / count,
+        damping_max_n_s_per_m=1.0 / count,
+        estimator=estimator,
+    )
+    # The edges of an interval begin before its strobe, and must not reach into the force path of the one before.
+    path = spec.design.latency_to_drive + DECODER_CLOCKS
+    clocks = max(path, fastest / quadrature.max_edge_rate(1.0, GLITCH_CLOCKS))
+    return replace(spec, clock_hz=int(_power_of_two(clocks)))
+
+
+@compiled
+def _append_edges(count, next_count, start, clocks, edge_clocks, edge_levels, n_edges):
+    """Append the edges from one count to another, spread over clocks start + 1 to start + clocks; return how many."""
+    change = next_count - count
+    total, direction = abs(change), 1 if change > 0 else -1
+    for i in range(total):
+        count += direction
+        edge_clocks[n_edges] = start + 1 + (2 * i + 1) * clocks // (2 * total)
+        edge_levels[n_edges] = level(count)
+        n_edges += 1
+    return n_edges
+
+
+@compiled
+def through_pins(controller, state, counts, clocks, latency, edges, n_edges, velocity, first, until):
+    """Take samples `first` to `until` of a record through a controller's pins; return (state, edges left).
+
+    Args:
+        controller, state: of `sim.controllers`.
+        counts: int64 array; the pins begin at the level of count 0, so the first count is to be 0.
+        clocks: clocks a sample; at least the largest change, and `latency` and the decoder's latency together.
+        latency: clocks from the strobe to the changed drive.
+        edges: a pair of int64 arrays for twice the largest change: edges on their way to the controller.
+        n_edges: edges in them, not yet taken.
+        velocity: array that takes the velocity of every sample.
+    """
+    edge_clocks, edge_levels = edges
+    for k in range(first, until):
+        strobe = (k + 1) * clocks - 1
+        if k + 1 < len(counts):
+            start = strobe - DECODER_CLOCKS
+            n_edges = _append_edges(counts[k], counts[k + 1], start, clocks, edge_clocks, edge_levels, n_edges)
+        if n_edges > 0:
+            state, taken = sample(controller, state, edge_clocks, edge_levels, n_edges, strobe, strobe + latency)
+            n_edges -= taken
+            for i in range(n_edges):
+                edge_clocks[i] = edge_clocks[taken + i]
+                edge_levels[i] = edge_levels[taken + i]
+        else:
+            state = sample_quietly(controller, state, strobe, strobe + latency)
+        velocity[k] = state.velocity
+    return state, n_edges
+
+
+def run_pins(controller, state, spec: AxisSpec, counts: np.ndarray, progress: Callable[[int], None] | None = None):
+    """Take a whole record through a controller's pins: return (velocity words, flags, seconds)."""
+    relative = counts - counts[0]
+    velocity = np.zeros(len(counts), np.int64)
+    room = 2 * int(np.abs(np.diff(relative)).max()) + 1
+    edges = np.zeros(room, np.int64), np.zeros(room, np.int64)
+    fixed = spec.clocks_per_sample, spec.design.latency_to_drive, edges
+    # Compiling is not running: a call with nothing to do keeps it out of the time.
+    through_pins(controller, state, relative, *fixed, 0, velocity, 0, 0)
+    began, n_edges = time.perf_counter(), 0
+    chunk = max(1, CHUNK_CLOCKS // spec.clocks_per_sample)
+    for first in range(0, len(counts), chunk):
+        until = min(first + chunk, len(counts))
+        state, n_edges = through_pins(controller, state, relative, *fixed, n_edges, velocity, first, until)
+        if progress:
+            progress(until)
+    return velocity, int(state.flags), time.perf_counter() - began
+
+
+def run(
+    spec: AxisSpec,
+    counts: np.ndarray,
+    backend: str,
+    output: str,
+    progress: Callable[[int], None] | None = None,
+) -> tuple[np.ndarray, int, float]:
+    """Return what an axis makes of a record of counts: (velocity words, or float counts a sample; flags; seconds).
+
+    Args:
+        spec: the axis, with clocks enough in a sample for the largest change.
+        counts: int64, as the axis sees them.
+        backend: one of `BACKENDS`.
+        output: the estimator's output.
+        progress: called with the number of samples done.
+
+    Raises:
+        RuntimeError: if the RTL could not be built.
+    """
+    outputs = spec.model.OUTPUTS
+    choice = {f"{spec.estimator}_output": outputs.index(output)} if len(outputs) > 1 else {}
+    if backend == "rtl":
+        from .rtl import Hardware  # noqa: PLC0415  (the other backends need neither Amaranth nor a C++ compiler)
+
+        words = spec.design.encode(encoder_glitch_clocks=GLITCH_CLOCKS, **choice)
+        with Hardware(spec, words, int(level(0))) as hardware:
+            return run_pins(hardware.controller, hardware.start, spec, counts, progress)
+    model = axis.Axis(spec, floating=backend == "float", **choice)
+    model.run(counts[:0])  # compiles
+    began = time.perf_counter()
+    record = model.run(counts)
+    seconds = time.perf_counter() - began
+    if progress:
+        progress(len(counts))
+    return record.velocity, int(record.flags[-1]), seconds
+
+
+def _one_of(name: str, value: object, accepted: tuple[str, ...]) -> None:
+    if value not in accepted:
+        raise ReplayError(f"{name} must be one of {', '.join(accepted)}, not {value!r}")
+
+
+def _check_speed(recording: Recording, counts: np.ndarray, count: int) -> None:
+    """Raise ReplayError, with the sample, if a change is too fast for the pins."""
+    steps = np.abs(np.diff(counts))
+    most = quadrature.max_edge_rate(CLOCK_MAX_HZ, GLITCH_CLOCKS) / recording.rate_hz
+    if steps.max() > most:
+        k = int(np.argmax(steps > most)) + 1
+        coarse = "" if count == 1 else f" of {count}"
+        raise ReplayError(
+            f"{recording.file}, column {recording.column}: on rtl the count must change by at most {int(most)}{coarse} "
+            f"in a sample at {recording.rate_hz:g} Hz (a clock of {CLOCK_MAX_HZ / 1e6:g} MHz), "
+            f"not by {steps[k - 1]} at sample {k}, {recording.time_s[k]:g} s"
+        )
+
+
+def replay(
+    recording: Recording,
+    estimator: str = "levant",
+    output: str | None = None,
+    backend: str = "fixed",
+    coarsen: int | None = None,
+    acceleration_max_counts_per_s2: float | None = None,
+    reference_hz: float | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Replay:
+    """Put a recording through an estimator.
+
+    Args:
+        recording: from `recording.load`.
+        estimator: its name.
+        output: which of its outputs; None for its first.
+        backend: one of `BACKENDS`.
+        coarsen: floor-divide the counts by this first, and judge the estimate; 1 judges without coarser counts.
+        acceleration_max_counts_per_s2: the bound C that sets the gains; None to take it from the recording.
+        reference_hz: cutoff of the reference; None for the usual one.
+        progress: called with the number of samples done.
+
+    Raises:
+        ReplayError: in one line, what cannot be and what is accepted.
+        RuntimeError: if the RTL could not be built.
+    """
+    _one_of("estimator", estimator, tuple(estimators.ESTIMATORS))
+    outputs = estimators.load(estimator).OUTPUTS
+    output = outputs[0] if output is None else output
+    _one_of(f"output of {estimator}", output, outputs)
+    _one_of("backend", backend, BACKENDS)
+    if coarsen is not None and not (isinstance(coarsen, int) and 1 <= coarsen < 2**31):
+        raise ReplayError(f"coarsen must be a whole number of 1 to 2**31 - 1, not {coarsen!r}")
+    rate, samples = recording.rate_hz, len(recording.counts)
+    if coarsen is not None and samples <= judged_from(rate):
+        raise ReplayError(
+            f"{recording.file}: with coarsen a recording must be longer than {SETTLE_S:g} s, after which the estimate "
+            f"is judged, not {samples} samples at {rate:g} Hz"
+        )
+    cutoff = min(REFERENCE_HZ, rate / 4) if reference_hz is None else reference_hz
+    if not 0 < cutoff < rate / 2:
+        raise ReplayError(f"reference_hz must be more than 0 and less than {rate / 2:g}, half the rate, not {cutoff!r}")
+    bound = acceleration_max_counts_per_s2
+    if bound is not None and not (math.isfinite(bound) and bound > 0):
+        raise ReplayError(f"acceleration_max_counts_per_s2 must be finite and more than 0, not {bound!r}")
+
+    count = coarsen or 1
+    counts = recording.counts // count
+    if backend == "rtl":
+        _check_speed(recording, counts, count)
+    reference = zero_phase_velocity(recording.counts, rate, cutoff)
+    if bound is None:
+        bound = max(acceleration_bound(reference, rate), _least_bound(counts) * count * rate**2)
+    try:
+        spec = axis_spec(counts, count, bound / rate**2, estimator)
+    except ValueError as error:
+        raise ReplayError(
+            f"acceleration_max_counts_per_s2 must give gains that fit this recording (in counts and samples: {error}), "
+            f"not {bound!r}"
+        ) from None
+    velocity, flags, seconds = run(spec, counts, backend, output, progress)
+
+    exact = backend != "float"
+    lsb = spec.design.estimator.velocity.lsb if exact else 1.0
+    return Replay(
+        recording=recording,
+        coarsen=coarsen,
+        estimator=estimator,
+        output=output,
+        backend=backend,
+        spec=spec,
+        acceleration_max_counts_per_s2=float(bound),
+        gains=_gains(spec, rate),
+        reference_hz=float(cutoff),
+        velocity_counts_per_s=velocity * (lsb * count * rate),
+        difference_counts_per_s=np.diff(counts, prepend=counts[0]) * (count * rate),
+        reference_counts_per_s=reference,
+        flags=spec.design.flag_names(flags),
+        velocity_sha256=hashlib.sha256(velocity.astype("<i8").tobytes()).hexdigest() if exact else None,
+        seconds=seconds,
+    )
+
+
+def _gains(spec: AxisSpec, rate_hz: float) -> dict[str, float]:
+    """Return the gains of an axis by name, in counts and seconds: a metre is a count, and a second a sample."""
+    return {
+        name.replace("_m_", "_counts_"): value * rate_hz ** (2 if name.endswith("_s2") else 1)
+        for name, value in vars(spec.design.gains).items()
+    }
