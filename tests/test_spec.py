@@ -1,6 +1,10 @@
 """The axis's specification: what follows from it, and what it refuses."""
 
 import math
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -130,3 +134,24 @@ def test_the_same_spec_at_two_rates_has_the_same_si_gains():
     slow, fast = AxisSpec(**PAPER, gains=ADJUSTED), AxisSpec(**MHZ, gains=ADJUSTED)
     for ours, theirs in zip(slow.design.estimator.words[:2], fast.design.estimator.words[:2], strict=True):
         assert ours.to_si(ours.reset) == pytest.approx(theirs.to_si(theirs.reset), rel=2.0**-9)
+
+
+def test_plain_python_gives_the_same_words():
+    """With the JIT off, the same kernels run as ordinary Python, on numpy's scalars too."""
+    code = (
+        "import sys, numpy as np; sys.path.insert(0, sys.argv[1]); from specs import spec; "
+        "from hardwall.model.axis import Axis; "
+        "counts = np.cumsum(np.random.default_rng(1).integers(-300, 301, 400)); "
+        "r = Axis(spec('paper', sys.argv[2]), wall_stiffness=1e3, wall_damping=5.0).run(counts); "
+        "print([a.tolist() for a in (r.velocity, r.force, r.drive, r.flags)])"
+    )
+    for estimator in ("levant", "fdm"):
+        command = [sys.executable, "-W", "error", "-c", code, str(Path(__file__).parent), estimator]
+        plain, compiled = (
+            subprocess.run(
+                command, env=os.environ | {"NUMBA_DISABLE_JIT": off}, capture_output=True, text=True, check=True
+            )
+            for off in ("1", "0")
+        )
+        assert plain.stdout == compiled.stdout
+        assert plain.stdout.count(",") > 1000
