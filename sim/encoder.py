@@ -1,0 +1,167 @@
+"""An incremental encoder in quadrature: exact motion in, clock-stamped edges out.
+
+Edge n stands at (n + offset[n mod 4]) counts, and cell n is the half-open stretch from edge n to edge n + 1. Moving
+up, edge n raises A, raises B, lowers A, lowers B for n mod 4 = 0, 1, 2, 3, so the levels (A, B) go
+00 -> 10 -> 11 -> 01 -> 00 and each edge is one count of +1; a count's number is the number of its cell. The offsets
+are the errors of a real scale: B out of its quarter period (phase), and high longer than low (duty).
+
+An edge carries the number of the clock at which a register at the pin first holds the new level. At clock n the
+register sees the position at time n / clock_hz, so an edge passed at time t upwards is stamped ceil(t clock_hz), and
+downwards floor(t clock_hz) + 1: at the very edge the position belongs to the upper cell.
+"""
+
+import math
+from typing import NamedTuple
+
+from ..model.compiled import compiled
+from .plant import glide, net_force, reach, resume, sticks, turn, turned
+
+# Counts by which each edge must follow the one before: less, and the pair is a glitch rather than quadrature.
+MARGIN = 0.05
+
+
+class Encoder(NamedTuple):
+    """The scale and the clock that samples its outputs."""
+
+    count_m: float  # one edge to the next of an ideal scale, > 0
+    clock_hz: float  # > 0
+    offsets: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)  # counts: A rise, B rise, A fall, B fall
+
+
+class Cell(NamedTuple):
+    """Where the handle is on the scale: `lower_m` <= position < `upper_m`."""
+
+    number: int
+    lower_m: float
+    upper_m: float
+
+
+def offsets(phase_error_counts=0.0, duty_error_counts: float = 0.0) -> tuple[float, float, float, float]:
+    """Return the `Encoder.offsets` (counts) of a scale with these errors.
+
+    Args:
+        phase_error_counts: a number by which channel B is late against A in upward motion; or four, one for each edge
+            kind A rise, B rise, A fall, B fall.
+        duty_error_counts: by how much longer than 2 counts both channels are high; the rises come half of it earlier
+            and the falls half later.
+
+    Raises:
+        ValueError: if any edge would not follow the one before by at least 0.05 counts.
+    """
+    phase = phase_error_counts
+    late = (0.0, phase, 0.0, phase) if isinstance(phase, int | float) else tuple(phase)
+    if len(late) != 4:
+        raise ValueError(f"phase_error_counts must be one number or four, not {phase!r}")
+    half = duty_error_counts / 2
+    result = tuple(float(kind + error) for kind, error in zip(late, (-half, -half, half, half), strict=True))
+    gaps = [1 + result[(kind + 1) % 4] - result[kind] for kind in range(4)]
+    if not all(gap >= MARGIN for gap in gaps):  # `not all`, so that a NaN is refused
+        raise ValueError(
+            f"phase_error_counts and duty_error_counts must leave each edge at least {MARGIN} counts after the one "
+            f"before (a single phase error: {MARGIN - 1} to {1 - MARGIN} - |duty error|), "
+            f"not {(phase, duty_error_counts)!r}"
+        )
+    return result
+
+
+@compiled
+def edge(encoder, number):
+    """Return the position (m) of edge `number`."""
+    return (number + encoder.offsets[number & 3]) * encoder.count_m
+
+
+@compiled
+def locate(encoder, position_m):
+    """Return the `Cell` that holds a position."""
+    number = math.floor(position_m / encoder.count_m - encoder.offsets[0])
+    while position_m < edge(encoder, number):
+        number -= 1
+    while position_m >= edge(encoder, number + 1):
+        number += 1
+    return Cell(number, edge(encoder, number), edge(encoder, number + 1))
+
+
+@compiled
+def level(number):
+    """Return the pins in cell `number` as the word a | b << 1: the Gray code of number + 1."""
+    quarter = (number + 1) & 3
+    return quarter ^ (quarter >> 1)
+
+
+@compiled
+def advance_quietly(coulomb, motion, cell, force_n, interval):
+    """Return (motion, quiet): the same motion as `advance`, and whether it is certain that nothing happened meanwhile.
+
+    Where `quiet` is false (an edge or a turn is likely) the motion means nothing and the interval is for `advance`.
+    This is the path of nearly every interval of a closed loop, so it handles no array: merely to pass an array to
+    a compiled function costs more than to advance the handle.
+    """
+    if sticks(coulomb, motion, force_n):
+        return motion, True
+    end = glide(motion, net_force(coulomb, motion, force_n), interval)
+    quiet = cell.lower_m <= end.position_m < cell.upper_m
+    if motion.velocity_m_per_s * end.velocity_m_per_s > 0.0:
+        return end, quiet
+    if coulomb is None:
+        # A turn reaches no farther than the initial velocity would: most turns need not be looked for.
+        farthest_m = motion.position_m + motion.velocity_m_per_s * interval.seconds
+        return end, quiet and cell.lower_m <= farthest_m < cell.upper_m
+    return end, False
+
+
+@compiled
+def advance(
+    handle, coulomb, encoder, motion, cell, force_n, interval, clock, clocks, edge_clocks, edge_levels, n_edges
+):
+    """Advance handle and encoder together over one interval of constant applied force.
+
+    Args:
+        handle, coulomb, motion, force_n, interval: as for `plant.advance`, whose motion this returns.
+        encoder: an `Encoder`.
+        cell: the `Cell` that holds the position at the start; `locate` gives the first.
+        clock: number of the clock at which the interval starts.
+        clocks: its length, `interval.seconds * encoder.clock_hz`, at least 1.
+        edge_clocks: int64 array for the stamps, which never decrease: clock < stamp <= clock + clocks.
+        edge_levels: integer array for the pins after each edge, a | b << 1.
+        n_edges: edges that the arrays hold already; new ones are appended. Where several share one clock, the pins
+            show the last.
+
+    Returns:
+        (motion, cell, n_edges) at the end. Where the arrays are full n_edges is -1, and stays so: edges were lost, and
+        the cell is that of the last one kept.
+    """
+    if sticks(coulomb, motion, force_n):
+        return motion, cell, n_edges
+    room = min(len(edge_clocks), len(edge_levels))
+    net_n = net_force(coulomb, motion, force_n)
+    whole = glide(motion, net_n, interval)
+    # A leg is a motion in one direction under one net force. A turn makes two of the interval.
+    start, since_s = motion, 0.0
+    end, until_s = whole, interval.seconds
+    turning = turned(motion, whole)
+    if turning:
+        until_s, end = turn(handle, motion, net_n, interval.seconds)
+    while True:
+        while not cell.lower_m <= end.position_m < cell.upper_m and 0 <= n_edges < room:
+            upwards = end.position_m >= cell.upper_m
+            travel_m = (cell.upper_m if upwards else cell.lower_m) - start.position_m
+            at = since_s + reach(handle, start, net_n, until_s - since_s, travel_m)
+            if upwards:
+                stamp = math.ceil(at * encoder.clock_hz)
+                cell = Cell(cell.number + 1, cell.upper_m, edge(encoder, cell.number + 2))
+            else:
+                stamp = math.floor(at * encoder.clock_hz) + 1
+                cell = Cell(cell.number - 1, edge(encoder, cell.number - 1), cell.lower_m)
+            edge_clocks[n_edges] = clock + min(max(stamp, 1), clocks)  # rounding may put it outside, but it is not
+            edge_levels[n_edges] = level(cell.number)
+            n_edges += 1
+        if not cell.lower_m <= end.position_m < cell.upper_m:
+            n_edges = -1
+        if not turning:
+            return end, cell, n_edges
+        turning = False
+        start, since_s = end, until_s
+        end, until_s = whole, interval.seconds
+        if coulomb is not None:
+            net_n = net_force(coulomb, start, force_n)
+            end = resume(handle, coulomb, start, force_n, until_s - since_s)
