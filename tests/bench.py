@@ -15,6 +15,7 @@ from pathlib import Path
 import cocotb
 import numpy as np
 from amaranth.hdl import Shape
+from amaranth.lib.wiring import In
 from cocotb.clock import Clock
 from cocotb.simtime import get_sim_time
 from cocotb.triggers import ClockCycles, RisingEdge
@@ -87,12 +88,14 @@ class Bench:
         self.dut = dut
         members = component.signature.members
         self._signed = {name: Shape.cast(members[name].shape).signed for name in members}
+        self._inputs = [name for name in members if members[name].flow == In]
 
     async def reset(self):
         """Start the clock, zero every input and hold reset for two clocks."""
         if not hasattr(self, "_clock"):
             self._clock = Clock(self.dut.clk, PERIOD_NS, "ns")
             self._clock.start()
+        self.drive(**dict.fromkeys(self._inputs, 0))
         self.dut.rst.value = 1
         await ClockCycles(self.dut.clk, 2)
         self.dut.rst.value = 0

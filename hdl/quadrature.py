@@ -1,0 +1,246 @@
+"""Quadrature decoder: the pins of an incremental encoder to a count, with clock stamps, index and faults."""
+
+from amaranth.hdl import Cat, Module, Mux, Signal, signed
+from amaranth.lib import wiring
+from amaranth.lib.cdc import FFSynchronizer
+from amaranth.lib.wiring import In, Out
+
+from hardwall.model import quadrature as model
+
+
+class Quadrature(wiring.Component):
+    """The position of an encoder, in counts, from its pins A, B and Z; no count is wrong before a flag is up.
+
+    Equation: with (A, B) in the order 00, 10, 11, 01, 00 every edge of the filtered pins counts +1, in the other order
+    -1; `invert` swaps the signs. So in a cycle of 4 counts A rises at 0, B rises at 1, A falls at 2, B falls at 3.
+
+    Latency: `latency(glitch_clocks)` = glitch_clocks + 4 clock edges, from the first that sees a pin changed to that
+    after which the new count is out, both included: two of the synchroniser, glitch_clocks + 1 of the filter, one
+    that decodes and adds. Throughput: one edge a clock. The three pins are delayed alike.
+
+    Filter: a channel takes a new level once it was seen there at glitch_clocks + 1 clocks in a row. A pulse
+    shorter than glitch_clocks clocks never passes, one longer than glitch_clocks + 1 always does, whatever its phase.
+    The limit may change at any time: edges keep their order. If it is lowered while edges of both A and B wait, both
+    pass at once, which is `illegal` like any other such pair.
+
+    Speed: the count is exact up to 1 / max(1, (glitch_clocks + 1) / 2) edges a clock (`max_edge_rate` of the model,
+    where all of this is derived, also for edges out of place). Beyond, as long as each level of A and of B lasts a
+    clock or more (below 2 edges a clock), whatever the motion: `fault` is up no later than the first wrong count. At a
+    steady rate of ideal quadrature above 2 edges a clock it is up within `clocks_to_fault` of the model, unless the
+    rate is within the exact range of a multiple of 4, where the samples are those of a slow motion. Two flags do
+    this. `illegal`: A and B changed in one clock; nothing is counted or stamped. `overspeed`: the filter rejected a
+    pulse on A or B during which, its first and last clocks included, the other one had an edge. A lone glitch raises
+    neither; one that meets an edge of the other channel cannot be told from speed, and raises `overspeed`.
+
+    Start: the pins as sampled by the first clock after a reset are where counting starts, whatever their levels.
+
+    Rounding and overflow: none rounds. `count`, `index_count` and the stamps wrap, `illegal_count` saturates.
+
+    At the same time: an edge decoded in the clock of `preload` is added to `preload_count`, so no motion is lost; an
+    edge decoded in the clock of the index is in `index_count`; `arm` wins over an index, which is then not latched;
+    a fault in the clock of `clear` stays.
+
+    Parameters
+    ----------
+    count_width : int
+        Bits of the count, 2 to 62.
+    stamp_width : int
+        Bits of the clock stamps, 1 to 62.
+    glitch_width : int
+        Bits of `glitch_clocks`, 1 to 16.
+    fault_width : int
+        Bits of `illegal_count`, 1 to 32.
+
+    Members
+    -------
+    a, b, z : In(1)
+        Pins, asynchronous.
+    glitch_clocks : In(glitch_width)
+        Most clocks at which a pulse may be seen and still be rejected; 0 filters nothing.
+    invert : In(1)
+        Reverses the direction of the edges decoded from now on; neither the count nor the stamps change.
+    preload : In(1)
+        Strobe: sets the count.
+    preload_count : In(signed(count_width))
+        Counts.
+    arm : In(1)
+        Strobe: arms the index latch.
+    clear : In(1)
+        Strobe: clears `illegal`, `overspeed` and `illegal_count`.
+    count : Out(signed(count_width))
+        Position, counts.
+    index_count : Out(signed(count_width))
+        Position at the first rising edge of Z after `arm`, counts.
+    index_armed, index_latched : Out(1)
+        The latch is waiting for that edge; it has seen it.
+    stamp : Out(stamp_width)
+        Clocks since reset.
+    stamp_a_rise, stamp_b_rise, stamp_a_fall, stamp_b_fall : Out(stamp_width)
+        `stamp` in the clock that decoded the last edge of that kind, one before its count is out.
+    stepped : Out(1)
+        High for one clock with the count of a new edge.
+    illegal, overspeed : Out(1)
+        Sticky flags, see above.
+    fault : Out(1)
+        illegal or overspeed.
+    illegal_count : Out(fault_width)
+        Illegal changes since `clear`.
+
+    Raises
+    ------
+    TypeError
+        If a width is not an int.
+    ValueError
+        If a width is out of its range.
+
+    Source: decoding by 4 and the filter of consecutive equal samples are those of decoder chips (HCTL-2022 data sheet,
+    Avago, "Digital Noise Filter", fixed there at 3 samples); the flag for what such a filter hides is derived in the
+    model.
+    """
+
+    def __init__(self, count_width: int, stamp_width: int, glitch_width: int = 4, fault_width: int = 8):
+        for name, value, most in (
+            ("count_width", count_width, 62),
+            ("stamp_width", stamp_width, 62),
+            ("glitch_width", glitch_width, 16),
+            ("fault_width", fault_width, 32),
+        ):
+            least = 2 if name == "count_width" else 1
+            if not isinstance(value, int):
+                raise TypeError(f"{name} must be an int, not {value!r}")
+            if not least <= value <= most:
+                raise ValueError(f"{name} must be {least} to {most}, not {value!r}")
+        self._count_width = count_width
+        self._stamp_width = stamp_width
+        self._glitch_width = glitch_width
+        self._fault_width = fault_width
+        super().__init__(
+            {
+                "a": In(1),
+                "b": In(1),
+                "z": In(1),
+                "glitch_clocks": In(glitch_width),
+                "invert": In(1),
+                "preload": In(1),
+                "preload_count": In(signed(count_width)),
+                "arm": In(1),
+                "clear": In(1),
+                "count": Out(signed(count_width)),
+                "index_count": Out(signed(count_width)),
+                "index_armed": Out(1),
+                "index_latched": Out(1),
+                "stamp": Out(stamp_width),
+                "stamp_a_rise": Out(stamp_width),
+                "stamp_b_rise": Out(stamp_width),
+                "stamp_a_fall": Out(stamp_width),
+                "stamp_b_fall": Out(stamp_width),
+                "stepped": Out(1),
+                "illegal": Out(1),
+                "overspeed": Out(1),
+                "fault": Out(1),
+                "illegal_count": Out(fault_width),
+            }
+        )
+
+    @property
+    def count_width(self) -> int:
+        return self._count_width
+
+    @property
+    def stamp_width(self) -> int:
+        return self._stamp_width
+
+    @property
+    def glitch_width(self) -> int:
+        return self._glitch_width
+
+    @property
+    def fault_width(self) -> int:
+        return self._fault_width
+
+    @property
+    def params(self) -> model.Params:
+        """Parameters of the twin in `hardwall.model.quadrature`."""
+        return model.Params(self._count_width, self._stamp_width, self._fault_width)
+
+    def latency(self, glitch_clocks: int) -> int:
+        """Clock edges from the first that sees a pin changed to the new `count`, both included."""
+        return model.latency(glitch_clocks)
+
+    def elaborate(self, platform):
+        m = Module()
+        seen = Signal(3)
+        # Three independent bits, so they may share a synchroniser. A reset does not reach it: the start outlasts it.
+        m.submodules.synchroniser = FFSynchronizer(Cat(self.a, self.b, self.z), seen)
+        starting = Signal(range(model.START.starting + 1), init=model.START.starting)
+        running = starting == 0
+
+        # Filter. The comparison with >= of a counter that runs upwards keeps edges in their order when the limit
+        # changes: of two pending channels the one that left first has waited longer, whatever the limit.
+        level = Signal(3)
+        differs = Signal(3)
+        accepted = Signal(3)
+        waiting = Signal(3)
+        m.d.comb += [differs.eq((seen ^ level) & running.replicate(3)), waiting.eq(differs & ~accepted)]
+        for bit, channel in enumerate("abz"):
+            held = Signal(self._glitch_width, name=f"held_{channel}")
+            m.d.comb += accepted[bit].eq(differs[bit] & (held >= self.glitch_clocks))
+            # A waiting channel has held < glitch_clocks, so the sum fits.
+            m.d.sync += held.eq(Mux(waiting[bit], (held + 1)[: self._glitch_width], 0))
+        pending = Signal(3)
+        moved = Signal(3)
+        up = Signal()
+        m.d.sync += [
+            pending.eq(waiting),
+            level.eq(Mux(running, level ^ accepted, seen)),
+            moved.eq(accepted),
+            up.eq(level[0] ^ accepted[0] ^ level[1]),
+        ]
+
+        # A pulse is rejected when its channel comes back while pending.
+        previous = Signal(2)
+        crossed = Signal(2)
+        edges = seen[:2] ^ previous
+        crossing = crossed | Cat(edges[1], edges[0])
+        outrun = (pending & ~differs & crossing).any()
+        m.d.sync += [
+            previous.eq(seen[:2]),
+            crossed.eq(waiting[:2] & crossing),
+            self.overspeed.eq(outrun | (self.overspeed & ~self.clear)),
+            starting.eq(Mux(running, 0, (starting - 1)[: len(starting)])),
+        ]
+
+        # Decode, a clock after the filter: the comparison there and the addition here each have a clock of their own.
+        one = moved[0] ^ moved[1]
+        both = moved[0] & moved[1]
+        change = Signal(signed(2))
+        count = Signal(signed(self._count_width))
+        m.d.comb += [
+            change.eq(Mux(one, Mux(up ^ self.invert, 1, -1), 0)),
+            count.eq((Mux(self.preload, self.preload_count, self.count) + change)[: self._count_width]),
+        ]
+        m.d.sync += [
+            self.count.eq(count),
+            self.stepped.eq(one),
+            self.stamp.eq((self.stamp + 1)[: self._stamp_width]),
+        ]
+        for bit, rise, fall in ((0, self.stamp_a_rise, self.stamp_a_fall), (1, self.stamp_b_rise, self.stamp_b_fall)):
+            with m.If(one & moved[bit]):
+                with m.If(level[bit]):
+                    m.d.sync += rise.eq(self.stamp)
+                with m.Else():
+                    m.d.sync += fall.eq(self.stamp)
+
+        with m.If(self.arm):
+            m.d.sync += [self.index_armed.eq(1), self.index_latched.eq(0)]
+        with m.Elif(self.index_armed & moved[2] & level[2]):
+            m.d.sync += [self.index_armed.eq(0), self.index_latched.eq(1), self.index_count.eq(count)]
+
+        kept = Signal(self._fault_width)
+        m.d.comb += [kept.eq(Mux(self.clear, 0, self.illegal_count)), self.fault.eq(self.illegal | self.overspeed)]
+        m.d.sync += self.illegal.eq(both | (self.illegal & ~self.clear))
+        with m.If(both & ~kept.all()):
+            m.d.sync += self.illegal_count.eq((kept + 1)[: self._fault_width])
+        with m.Else():
+            m.d.sync += self.illegal_count.eq(kept)
+        return m

@@ -1,0 +1,504 @@
+"""The quadrature decoder: RTL against model at every clock, and the model against ideal and imperfect motion."""
+
+import hashlib
+import math
+import os
+import subprocess
+import sys
+
+import cocotb
+import numpy as np
+import pytest
+from amaranth.hdl import Cat, Module, ResetSignal, Shape
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+from cocotb.triggers import RisingEdge
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from bench import SAMPLES, SEED, Bench, Monitor, check, parameters, rng, simulate
+from hardwall.hdl.quadrature import Quadrature
+from hardwall.model import quadrature as model
+from hardwall.model.compiled import compiled
+from hardwall.model.fixed import wrap
+from hardwall.model.quadrature import START, Params, State, advance, clocks_to_fault, max_edge_rate, run, step
+
+INPUTS = ("a", "b", "z", "glitch_clocks", "invert", "preload", "preload_count", "arm", "clear")
+OUTPUTS = (*State._fields[: model.N_OUTPUTS], "fault")
+WIDE = {"count_width": 32, "stamp_width": 24}
+NARROW = {"count_width": 4, "stamp_width": 5, "glitch_width": 4, "fault_width": 2}
+PARAMS = Quadrature(**NARROW).params
+TO_COUNT = model.latency(0) - 1  # clocks between the one that samples a pin and the one that counts, unfiltered
+
+# Stimuli: arrays over clocks, one for each input and one for the reset.
+
+
+def stimulus(clocks: int, **columns) -> dict[str, np.ndarray]:
+    """Return `columns` (scalars or arrays) as arrays, zeros for the other inputs, with a reset in the first clock."""
+    full = {n: np.broadcast_to(columns.get(n, 0), clocks).astype(np.int64) for n in ("reset", *INPUTS)}
+    full["reset"][0] = 1
+    return full
+
+
+def joined(*parts: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    return {name: np.concatenate([part[name] for part in parts]) for name in ("reset", *INPUTS)}
+
+
+def pins(position) -> dict[str, np.ndarray]:
+    """Return the pins at a position in counts, with an index one count long every 16."""
+    position = np.asarray(position)
+    return {"a": (position + 3) % 4 < 2, "b": (position + 2) % 4 < 2, "z": position % 16 == 5}
+
+
+def at(clocks: int, *when: int) -> np.ndarray:
+    """Return a strobe at the given clocks."""
+    return np.isin(np.arange(clocks), when)
+
+
+def pulses(channel: str, glitch_clocks: int) -> dict[str, np.ndarray]:
+    """Return pulses of every width from 1 to glitch_clocks + 2 on one channel, the others low."""
+    apart = 2 * glitch_clocks + 9
+    clock = np.arange(apart * (glitch_clocks + 3))
+    level = clock % apart < clock // apart
+    return stimulus(len(clock), glitch_clocks=glitch_clocks, arm=clock % apart == apart - 1, **{channel: level})
+
+
+def turning(way: int) -> dict[str, np.ndarray]:
+    """Return 40 counts, 5 clocks each, from 3 counts before the narrow counter wraps."""
+    return stimulus(200, preload=at(200, 1), preload_count=4 * way, **pins(way * (np.arange(200) // 5)))
+
+
+def jumping(state: int) -> dict[str, np.ndarray]:
+    """Return both pins changing together, there and back, every 5 clocks from 10 on."""
+    clock = np.arange(40)
+    return stimulus(40, **pins(state + 2 * (np.maximum(clock // 5 - 1, 0) % 2)))
+
+
+def starting(levels: int, edge: int, glitch_clocks: int) -> dict[str, np.ndarray]:
+    """Return pins at any levels, and a change of A at the clock `edge` after the reset."""
+    a = (np.arange(30) > edge) ^ (levels & 1)
+    return stimulus(30, a=a, b=levels >> 1 & 1, z=levels >> 2, glitch_clocks=glitch_clocks)
+
+
+def meeting(strobe: str, when: int) -> dict[str, np.ndarray]:
+    """Return a strobe at any clock of: counts 1 to 6 at clocks 12 to 17, armed for the index; a jump; an overspeed."""
+    clock = np.arange(60)
+    columns = {
+        **pins(np.clip(clock - 11, 0, 6) + 2 * (clock >= 30)),
+        "glitch_clocks": 2 * (clock >= 40),
+        "preload_count": 5,
+        "arm": at(60, 4),
+    }
+    columns["a"] = columns["a"] ^ at(60, 50, 51)
+    columns["b"] = columns["b"] ^ (clock >= 51)
+    columns[strobe] = columns.get(strobe, 0) | at(60, when)
+    return stimulus(60, **columns)
+
+
+def directed() -> dict[str, np.ndarray]:
+    return joined(
+        *(pulses(channel, glitch_clocks) for channel in "abz" for glitch_clocks in range(16)),
+        *(turning(way) for way in (1, -1)),
+        *(jumping(state) for state in range(4)),
+        *(starting(levels, edge, length) for levels in range(8) for edge in range(6) for length in (0, 1, 15)),
+        *(meeting(strobe, when) for strobe in ("preload", "arm", "clear", "reset") for when in range(1, 60)),
+    )
+
+
+def random_stimulus(generator: np.random.Generator, clocks: int, width: int) -> dict[str, np.ndarray]:
+    """Return motion at 0 to nearly 4 edges a clock, reversing, with glitches, strobes and controls at random."""
+
+    def held(values: np.ndarray, longest: int) -> np.ndarray:
+        return np.repeat(values, generator.integers(1, longest, len(values)))[:clocks]
+
+    rate = 10 ** generator.uniform(-2.5, 0.6, clocks) * generator.choice([-1, 0, 1], clocks)
+    position = np.floor(np.cumsum(held(rate, 300)) + generator.uniform(0, 0.2, clocks)).astype(np.int64)
+    return stimulus(
+        clocks,
+        **{name: level ^ held(generator.random(clocks) < 0.02, 6) for name, level in pins(position).items()},
+        **{name: generator.random(clocks) < 0.02 for name in ("preload", "arm", "clear")},
+        reset=generator.random(clocks) < 1 / 2000,
+        glitch_clocks=held((16 ** generator.random(clocks)).astype(np.int64) - 1, 200),
+        invert=held(generator.integers(0, 2, clocks), 200),
+        preload_count=generator.integers(-(1 << (width - 1)), 1 << (width - 1), clocks),
+    )
+
+
+def expected(params: Params, inputs: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the outputs after every clock; a reset, which must come first, leaves those of START."""
+    resets = np.flatnonzero(inputs["reset"])
+    record = np.empty((model.N_OUTPUTS, len(inputs["reset"])), np.int64)
+    for begin, end in zip(resets, [*resets[1:], record.shape[1]], strict=True):
+        record[:, begin] = START[: model.N_OUTPUTS]
+        after = run(params, *(inputs[name][begin + 1 : end] for name in INPUTS))
+        record[:, begin + 1 : end] = after[: model.N_OUTPUTS]
+    outputs = dict(zip(OUTPUTS, record, strict=False))
+    return {**outputs, "fault": outputs["illegal"] | outputs["overspeed"]}
+
+
+# RTL against model.
+
+
+class Recorded(wiring.Component):
+    """The decoder with its inputs in one word and all it sees and shows in another: one write and one read a clock."""
+
+    def __init__(self, **widths: int):
+        self.decoder = Quadrature(**widths)
+        members = self.decoder.signature.members
+        self.shapes = {name: Shape.cast(members[name].shape) for name in (*INPUTS, *OUTPUTS)}
+        n_in = sum(self.shapes[name].width for name in INPUTS)
+        n_all = sum(shape.width for shape in self.shapes.values())
+        super().__init__({"stimulus": In(n_in), "record": Out(1 + n_all)})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.decoder = self.decoder
+        members = {name: getattr(self.decoder, name) for name in self.shapes}
+        m.d.comb += Cat(members[name] for name in INPUTS).eq(self.stimulus)
+        m.d.comb += self.record.eq(Cat(ResetSignal(), members.values()))
+        return m
+
+    def words(self, inputs: dict[str, np.ndarray]) -> list[int]:
+        """Return values of `stimulus`."""
+        words, offset = [0] * len(inputs["reset"]), 0
+        for name in INPUTS:
+            mask = (1 << self.shapes[name].width) - 1
+            words = [word | (value & mask) << offset for word, value in zip(words, inputs[name].tolist(), strict=True)]
+            offset += self.shapes[name].width
+        return words
+
+    def rows(self, words: list[int]) -> list[tuple[int, ...]]:
+        """Return values of `record` as the reset, the inputs and the outputs."""
+        columns, offset = [[word & 1 for word in words]], 1
+        for shape in self.shapes.values():
+            mask, sign = (1 << shape.width) - 1, (1 << shape.width - 1) * shape.signed
+            columns.append([((word >> offset & mask) ^ sign) - sign for word in words])
+            offset += shape.width
+        return list(zip(*columns, strict=True))
+
+
+class Part(Monitor):
+    """Some columns of a record of every clock, as a monitor of them."""
+
+    def __init__(self, names: tuple[str, ...], rows: list[tuple[int, ...]]):
+        self.names, self.rows, self.clocks = names, rows, list(range(len(rows)))
+
+
+async def play(dut, inputs: dict[str, np.ndarray]) -> tuple[Quadrature, Part, Part]:
+    """Return the decoder, its inputs at every clock edge, and its outputs after that edge, as the pins carried them."""
+    component = Recorded(**parameters())
+    await Bench(dut, component).reset()
+    words = []
+    for word, reset in zip([*component.words(inputs), 0], [*inputs["reset"].tolist(), 1], strict=True):
+        dut.stimulus.value = word
+        dut.rst.value = reset
+        await RisingEdge(dut.clk)
+        # As it was before the edge: the inputs that this edge takes, the outputs that the last one made.
+        words.append(int(dut.record.value))
+    rows = component.rows(words)
+    n_in = 1 + len(INPUTS)
+    taken = Part(("reset", *INPUTS), [row[:n_in] for row in rows[:-1]])
+    return component.decoder, taken, Part(OUTPUTS, [row[n_in:] for row in rows[1:]])
+
+
+@cocotb.test()
+async def follows_model(dut):
+    stimuli = joined(directed(), random_stimulus(rng(), SAMPLES, parameters()["count_width"]))
+    decoder, inputs, outputs = await play(dut, stimuli)
+    for part in (inputs, outputs):
+        assert all(len(set(part.column(name))) > 1 for name in part.names), "a pin never moved"
+    check(inputs, outputs, expected(decoder.params, {name: inputs.column(name) for name in inputs.names}))
+
+
+@cocotb.test()
+async def counts_after_the_promised_latency(dut):
+    a = np.arange(50) >= 10
+    decoder, _, outputs = await play(dut, joined(*(stimulus(50, a=a, glitch_clocks=length) for length in range(16))))
+    counted = outputs.column("count").reshape(16, 50).argmax(axis=1)
+    assert [*(counted - 10 + 1)] == [decoder.latency(length) for length in range(16)]
+
+
+@pytest.mark.parametrize("widths", [WIDE, NARROW])
+def test_rtl(widths):
+    simulate(__file__, Recorded, **widths)
+
+
+# What the model means, clock by clock; `directed` holds the RTL to the same.
+
+
+@pytest.mark.parametrize("glitch_clocks", range(16))
+@pytest.mark.parametrize("channel", "abz")
+def test_only_pulses_longer_than_the_limit_pass(channel, glitch_clocks):
+    seen = expected(PARAMS, pulses(channel, glitch_clocks))
+    assert seen["stepped"].sum() == (0 if channel == "z" else 4)
+    assert (np.diff(seen["index_latched"]) > 0).sum() == (2 if channel == "z" else 0)
+    assert seen["count"][-1] == seen["fault"][-1] == 0
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_count_and_stamps_wrap(way):
+    inputs = turning(way)
+    seen = expected(PARAMS, inputs)
+    clock = np.arange(200)
+    position = way * (clock // 5)
+    counts = 4 * way + position[1:-TO_COUNT]
+    assert (seen["count"][1 + TO_COUNT :] == wrap(counts, 4)).all()
+    assert len(set(seen["count"])) == 16
+    assert (seen["stamp"] == clock % 32).all()
+    for channel in "ab":
+        for kind, change in (("rise", 1), ("fall", -1)):
+            edges = np.diff(inputs[channel], prepend=inputs[channel][0]) == change
+            stamps = np.where(edges, clock + TO_COUNT - 1, 0)[:-TO_COUNT]
+            decoded = np.append(np.zeros(TO_COUNT, int), np.maximum.accumulate(stamps))
+            assert (seen[f"stamp_{channel}_{kind}"] == decoded % 32).all()
+
+
+@pytest.mark.parametrize("state", range(4))
+def test_a_jump_of_both_channels_is_illegal_and_not_counted(state):
+    seen = expected(PARAMS, jumping(state))
+    jumps = np.maximum((np.arange(40) - TO_COUNT) // 5 - 1, 0)
+    assert (seen["illegal_count"] == np.minimum(jumps, 3)).all()
+    assert (seen["illegal"] == (jumps > 0)).all()
+    assert not any(seen[name].any() for name in OUTPUTS if name not in ("stamp", "illegal", "illegal_count", "fault"))
+
+
+@pytest.mark.parametrize("glitch_clocks", [0, 1, 15])
+@pytest.mark.parametrize("edge", range(6))
+def test_the_pins_first_sampled_are_the_start(edge, glitch_clocks):
+    for levels in range(8):
+        seen = expected(PARAMS, starting(levels, edge, glitch_clocks))
+        up = 1 if (levels & 1) == (levels >> 1 & 1) else -1
+        # The first clock after the reset takes the start; what differs from it later is motion.
+        assert seen["count"][-1] == (0 if edge == 0 else up)
+        assert seen["stepped"].sum() == (0 if edge == 0 else 1)
+        assert not any(seen[name].any() for name in ("fault", "index_count", "illegal_count"))
+
+
+@pytest.mark.parametrize("when", range(1, 60))
+def test_strobes_that_meet_what_they_act_on(when):
+    seen = expected(PARAMS, meeting("preload", when))
+    steps = (np.arange(12, 18) + TO_COUNT >= when).sum() - (when <= 51 + TO_COUNT + 2)
+    assert seen["count"][-1] == wrap(5 + steps, 4)
+
+    seen = expected(PARAMS, meeting("arm", when))
+    index = 16 + TO_COUNT  # position 5
+    assert (seen["index_armed"][-1], seen["index_latched"][-1]) == ((0, 1) if when < index else (1, 0))
+    assert seen["index_count"][-1] == (0 if when == index else 5)
+
+    seen = expected(PARAMS, meeting("clear", when))
+    assert seen["illegal"][-1] == seen["illegal_count"][-1] == (when <= 30 + TO_COUNT)
+    assert seen["overspeed"][-1] == (when <= 52 + 2)
+
+
+def test_a_limit_lowered_with_two_edges_waiting_is_illegal():
+    clock = np.arange(40)
+    inputs = stimulus(40, a=clock >= 10, b=clock >= 13, glitch_clocks=np.where(clock < 18, 15, 0))
+    seen = expected(PARAMS, inputs)
+    assert (seen["count"][-1], seen["stepped"].sum(), seen["illegal_count"][-1]) == (0, 0, 1)
+
+
+def test_max_edge_rate():
+    assert [max_edge_rate(60e6, length) for length in (0, 1, 2, 3, 15)] == [60e6, 60e6, 40e6, 30e6, 7.5e6]
+    assert [max_edge_rate(1.0, length, 0.25) for length in (0, 1, 2, 3)] == [0.5, 0.5, 0.5, 0.375]
+    with pytest.raises(ValueError, match=r"not 0\.5$"):
+        max_edge_rate(1.0, 0, 0.5)
+
+
+# Steady motion. Positions are integers of 2**-32 counts, so that the true count is exact.
+
+ONE = 1 << 32
+
+
+@compiled
+def turn(params, glitch_clocks, rate, places, clocks):
+    """Turn steadily; return the clocks at which the count is first wrong and a flag is first up, else `clocks`.
+
+    places: where A rises, B rises, A falls and B falls in a cycle of 4 counts.
+    """
+    state = START
+    delay = glitch_clocks + 3
+    true = np.zeros(clocks, np.int64)
+    wrong = fault = clocks
+    for clock in range(clocks):
+        position = rate * clock
+        for place in places:
+            true[clock] += (position - place) >> 34
+        a = int((position - places[0]) % (4 * ONE) < places[2] - places[0])
+        b = int((position - places[1]) % (4 * ONE) < places[3] - places[1])
+        state = step(params, state, a, b, 0, glitch_clocks)
+        if clock >= delay and state.count != wrap(true[clock - delay] - true[0], params.count_width):
+            wrong = min(wrong, clock)
+        if state.illegal | state.overspeed:
+            fault = min(fault, clock)
+        if max(wrong, fault) < clocks:
+            break
+    return wrong, fault
+
+
+def edge_rates(glitch_clocks: int, edge_error: float) -> np.ndarray:
+    """Return rates up to 4 edges a clock: at the limits, close to them, simple fractions, and anything between."""
+    limits = [max_edge_rate(1.0, glitch_clocks, error) for error in (0.0, edge_error)]
+    limits += [4 - limits[0], 2 - 2 * edge_error]
+    near = [limit * (1 + way * 10.0**-k) for limit in limits for way in (1, -1) for k in range(1, 5)]
+    simple = [1 / 4, 1 / 3, 1 / 2, 2 / 3, 3 / 4, 1, 4 / 3, 3 / 2, 2, 5 / 2, 3, math.sqrt(2), math.e, math.pi]
+    rates = np.array([*limits, *near, *simple, *np.exp(rng().uniform(math.log(0.01), math.log(4), 40))])
+    return np.floor(rates[rates < 4] * ONE).astype(np.int64)
+
+
+@pytest.mark.parametrize("glitch_clocks", range(16))
+@pytest.mark.parametrize("edge_error", [0.0, 0.1, 0.3, 0.49])
+def test_steady_motion_is_exact_or_flagged(glitch_clocks, edge_error):
+    generator = rng()
+    ideal, exact = (int(max_edge_rate(1.0, glitch_clocks, error) * ONE) for error in (0.0, edge_error))
+    flagged = 0
+    for rate in edge_rates(glitch_clocks, edge_error):
+        bound = clocks_to_fault(rate / ONE, glitch_clocks)
+        clocks = 4000 if math.isinf(bound) else min(bound, 50_000)
+        for way in (1, -1):
+            errors = edge_error * generator.choice([-1.0, 1.0, generator.uniform(-1, 1)], 4)
+            places = ((np.arange(4) + errors + generator.uniform(0, 4)) * ONE).astype(np.int64)
+            wrong, fault = turn(Params(32, 8, 8), glitch_clocks, way * rate, places, clocks)
+            slow_record = 4 * ONE - rate <= ideal and edge_error == 0
+            if rate <= exact:
+                assert wrong == fault == clocks, rate / ONE
+            elif slow_record:
+                assert wrong < fault == clocks, rate / ONE
+            elif rate <= (2 - 2 * edge_error) * ONE:
+                assert fault <= wrong, rate / ONE
+            if clocks == bound and (rate <= (2 - 2 * edge_error) * ONE or edge_error == 0):
+                assert fault < bound, rate / ONE
+                flagged += 1
+    assert flagged >= 10
+
+
+@compiled
+def motion(before, now):
+    """Return the counts between two samples of A and B; 0 where both differ."""
+    change = before ^ now
+    return ((change ^ change >> 1) & 1) * (2 * ((now ^ before >> 1) & 1) - 1)
+
+
+@compiled
+def explore(shortest, longest, memory):
+    """Try all pins A and B and all limits from `shortest` to `longest` at every clock, without end, until a flag is up.
+
+    Return how many different states were met; from how many of them the pins could rest, no flag come up, and the
+    count be wrong or a jump be unseen; and in how many the count was no position of the time it may lag behind. A
+    state is that of the decoder, the pins of the last `memory` clocks, and the error of the count.
+    """
+    params = Params(4, 1, 1)
+    met = {np.int64(-1)}
+    todo = [
+        (advance(params, START, pins & 1, pins >> 1, 0, 100), pins * (((1 << 2 * memory) - 1) // 3), 0, 0)
+        for pins in range(4)
+    ]
+    wrong = late = 0
+    while len(todo) > 0:
+        state, history, position, jumped = todo.pop()
+        now = history & 3
+        if memory > 2 * longest + 4:
+            known = False
+            past = position
+            for back in range(2 * longest + 4):
+                known |= back >= shortest + 3 and state.count == wrap(past, 4)
+                past -= motion(history >> 2 * back + 2 & 3, history >> 2 * back & 3)
+            late += not known
+        for glitch_clocks in range(shortest, longest + 1):
+            rest = advance(params, state, now & 1, now >> 1, 0, longest + 4, glitch_clocks)
+            wrong += (rest.illegal | rest.overspeed) == 0 and (jumped > 0 or rest.count != wrap(position, 4))
+            for pins in range(4):
+                after = step(params, state, pins & 1, pins >> 1, 0, glitch_clocks)
+                if after.illegal | after.overspeed:
+                    continue
+                where = position + motion(now, pins)
+                seen = (history << 2 | pins) & ((1 << 2 * memory) - 1)
+                lost = jumped | int(now ^ pins == 3)
+                key = seen << 4 | (where - after.count) & 15
+                for part in (after.level, after.moved, after.up, after.pending, after.crossed, lost):
+                    key = key << 2 | part
+                key = key << 8 | after.held_a << 4 | after.held_b
+                if key not in met:
+                    met.add(key)
+                    todo.append((after, seen, where, lost))
+    return len(met) - 1, wrong, late
+
+
+@pytest.mark.parametrize(
+    ("shortest", "longest", "memory", "at_least"),
+    [(0, 0, 5, 700), (1, 1, 7, 6_000), (2, 2, 9, 50_000), (3, 3, 11, 400_000), (0, 2, 9, 200_000), (0, 15, 3, 10_000)],
+)
+def test_no_record_of_the_pins_loses_a_count_without_a_flag(shortest, longest, memory, at_least):
+    met, wrong, late = explore(shortest, longest, memory)
+    assert (wrong, late) == (0, 0)
+    assert met > at_least
+
+
+# The forms of one model.
+
+
+@compiled
+def stepwise(params, state, a, b, z, clocks, glitch_clocks, invert):
+    for _ in range(clocks):
+        state = step(params, state, a, b, z, glitch_clocks, invert)
+    return state
+
+
+HOLDS = st.lists(st.tuples(st.integers(0, 7), st.integers(0, 40), st.integers(0, 15), st.integers(0, 1)), max_size=30)
+
+
+@settings(max_examples=200, deadline=None)
+@given(armed=st.booleans(), holds=HOLDS)
+@example(armed=False, holds=[(0, 1, 0, 0), (1, 2, 0, 0)])
+def test_advance_is_so_many_steps(armed, holds):
+    slow = fast = step(PARAMS, START, 1, 0, 0, arm=1) if armed else START
+    for levels, clocks, glitch_clocks, invert in holds:
+        a, b, z = levels & 1, levels >> 1 & 1, levels >> 2
+        slow = stepwise(PARAMS, slow, a, b, z, clocks, glitch_clocks, invert)
+        fast = advance(PARAMS, fast, a, b, z, clocks, glitch_clocks, invert)
+        assert slow == fast
+
+
+def test_advance_jumps():
+    still = advance(PARAMS, START, 1, 1, 0, 1 << 61)
+    assert still == stepwise(PARAMS, START, 1, 1, 0, 32, 0, 0)
+
+
+def test_lanes_are_single_records():
+    lanes = [random_stimulus(np.random.default_rng([SEED, lane]), 500, 4) for lane in range(5)]
+    together = run(PARAMS, *(np.stack([lane[name] for lane in lanes]) for name in INPUTS))
+    assert together.count.shape == (5, 500)
+    for index, lane in enumerate(lanes):
+        alone = run(PARAMS, *(lane[name] for name in INPUTS))
+        assert all((both[index] == one).all() for both, one in zip(together, alone, strict=True))
+
+
+def digest() -> str:
+    inputs = random_stimulus(rng(), 2000, 4)
+    record = np.stack(run(PARAMS, *(inputs[name] for name in INPUTS)))
+    rest = advance(PARAMS, State(*record[:, -1].tolist()), 1, 0, 1, 1000, 3)
+    return hashlib.sha256(record.tobytes() + repr(tuple(map(int, rest))).encode()).hexdigest()
+
+
+def test_the_same_without_compilation():
+    code = "import test_quadrature; print(test_quadrature.digest())"
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.path.dirname(__file__)}
+    plain = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert plain.stdout.strip() == digest()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "error"),
+    [
+        ("count_width", 1, ValueError),
+        ("count_width", 63, ValueError),
+        ("stamp_width", 0, ValueError),
+        ("stamp_width", 63, ValueError),
+        ("glitch_width", 0, ValueError),
+        ("fault_width", 33, ValueError),
+        ("count_width", 8.0, TypeError),
+        ("fault_width", "8", TypeError),
+    ],
+)
+def test_bad_widths_are_refused(name, value, error):
+    with pytest.raises(error, match=f"{name} .* not {value!r}$"):
+        Quadrature(**{**WIDE, name: value})
