@@ -54,7 +54,7 @@ class Axis(wiring.Component):
         Force on the handle, force LSB.
     sampled, actuated : Out(1)
         High for one clock with the changed drive: after a sample; after one at which the drive follows the force.
-    count, velocity, force : Out(signed)
+    count, velocity, wall_force : Out(signed)
         Live count; the last sample's velocity and wall force.
     flags : Out
         Sticky, bits as `spec.design.flags`; the encoder's as the samples saw them.
@@ -96,7 +96,7 @@ class Axis(wiring.Component):
                 "actuated": Out(1),
                 "count": Out(count),
                 "velocity": Out(shape(design.estimator.velocity)),
-                "force": Out(shape(spec.force)),
+                "wall_force": Out(shape(spec.force)),
                 "flags": Out(len(design.flags)),
                 "illegal_count": Out(ILLEGAL_WIDTH),
                 "index_count": Out(count),
@@ -127,7 +127,7 @@ class Axis(wiring.Component):
         hdl = estimators.load(spec.estimator, __package__)
         m.submodules.estimator = estimator = hdl.Estimator(design.estimator)
         m.submodules.wall = wall = Wall(design.wall)
-        m.submodules.output = output = Output(design.output)
+        m.submodules.output_stage = output = Output(design.output)
 
         divider = Signal(range(max(spec.clocks_per_sample, 2)))
         strobe = Signal()
@@ -182,7 +182,7 @@ class Axis(wiring.Component):
             self.actuated.eq(output.valid & output.actuated),
             self.count.eq(decoder.count),
             self.velocity.eq(estimator.velocity),
-            self.force.eq(wall.force),
+            self.wall_force.eq(wall.force),
             self.illegal_count.eq(decoder.illegal_count),
             self.index_count.eq(decoder.index_count),
             self.index_armed.eq(decoder.index_armed),

@@ -14,16 +14,17 @@ from . import hit
 from .scene import Scene, load
 
 ROUNDS = 5
-SECONDS_OF_SCENE = {"float": 2.0, "fixed": 2.0, "rtl": 0.05}
-"""Simulated time a round, by backend: enough to last some tenths of a second."""
+SECONDS_OF_SCENE = {"float": 6.0, "fixed": 6.0, "rtl": 0.2}
+"""Simulated time a round, by backend: the whole protocol of the model's, enough of the RTL's to time it."""
 COCOTB_SAMPLES = 2000
+BARE = {"handle.coulomb_n": None, "amplifier": None}
 PARTS = {
-    "bare": {"handle.coulomb_n": None, "amplifier.delay_s": 0.0},
-    "coulomb friction": {"amplifier.delay_s": 0.0},
-    "amplifier delay": {"handle.coulomb_n": None, "amplifier.delay_s": 1e-3},
-    "encoder phase error": {"handle.coulomb_n": None, "amplifier.delay_s": 0.0, "encoder.phase_error_counts": 0.25},
+    "none": BARE,
+    "coulomb friction": {"amplifier": None, "handle.coulomb_n": 1e-12},
+    "amplifier delay": {"handle.coulomb_n": None, "amplifier.delay_s": 1e-6},
+    "encoder phase error": BARE | {"encoder.phase_error_counts": 1e-9},
 }
-"""Scenes that differ by one optional part from the first."""
+"""Scenes with one optional part each, so slight that the motion stays what it is without."""
 
 
 def _scene(name: str, changes: dict, seconds: float) -> Scene:

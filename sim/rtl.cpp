@@ -1,5 +1,5 @@
 // The Verilated axis behind a C interface, for a compiled loop: no Python, no simulator callbacks, no allocation a
-// sample. `axis_ports.h` is generated beside it: the widths of the ports that are read, and the parameter ports in
+// sample. With traces its clock is toggled here; without, by `harness.v`, which is faster. `axis_ports.h` is generated beside it: the widths of the ports that are read, and the parameter ports in
 // order.
 //
 // Clocks are numbered from 0, the first after reset. Edge n loads the registers that clock n + 1 sees.
@@ -27,22 +27,24 @@ struct Context {
     Context() { verilated.traceEverOn(true); }
 #endif
 
-    void dump(bool rising) {
+    // Run `clocks` clocks with the inputs as they are.
+    void run(int64_t clocks) {
 #if VM_TRACE
-        if (trace) trace->dump(static_cast<uint64_t>((clock + (rising ? 0.0 : 0.5)) * period_ps));
+        for (; clocks > 0; --clocks) {
+            for (int level : {1, 0}) {
+                axis.clk = level;
+                axis.eval();
+                if (trace) trace->dump(static_cast<uint64_t>((clock + 0.5 * !level) * period_ps));
+            }
+            ++clock;
+        }
 #else
-        (void)rising;
+        // The harness beside this file clocks itself: one evaluation of the inputs serves them all.
+        axis.clocks = clocks;
+        axis.go = !axis.go;
+        axis.eval();
+        clock += clocks;
 #endif
-    }
-
-    void cycle() {
-        axis.clk = 1;
-        axis.eval();
-        dump(true);
-        axis.clk = 0;
-        axis.eval();
-        dump(false);
-        ++clock;
     }
 };
 
@@ -58,7 +60,6 @@ extern "C" {
 void* axis_open(int64_t level, const int64_t* words) {
     auto* context = new Context;
     Vaxis& axis = context->axis;
-    axis.clk = 0;
     axis.rst = 1;
     axis.encoder_a = level & 1;
     axis.encoder_b = level >> 1 & 1;
@@ -68,13 +69,12 @@ void* axis_open(int64_t level, const int64_t* words) {
 #define WORD(index, name) axis.name = words[index];
     AXIS_WORDS
 #undef WORD
-    context->cycle();
-    context->cycle();
+    context->run(2);
     // Committed at the first strobe, the parameters hold from the first sample on.
     axis.rst = 0;
     axis.commit = 1;
     context->clock = 0;
-    context->cycle();
+    context->run(1);
     axis.commit = 0;
     return context;
 }
@@ -95,7 +95,8 @@ int64_t axis_advance(int64_t context_address, int64_t clocks_address, int64_t le
             context.axis.encoder_b = levels[taken] >> 1 & 1;
             ++taken;
         }
-        context.cycle();
+        const bool more = taken < count && clocks[taken] < until;
+        context.run((more ? clocks[taken] : until) - context.clock);
     }
     return taken;
 }

@@ -11,6 +11,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
+from amaranth.hdl import Shape
+from amaranth.lib.wiring import In
 
 from ..hdl.axis import Axis
 from ..hdl.export import to_verilog
@@ -20,17 +22,12 @@ from .controllers import Rtl, RtlState
 from .verilator import LINT_OPTIONS, environment
 
 SHIM = Path(__file__).with_name("rtl.cpp")
-OPTIMISE = [
-    "-O3",
-    "--x-assign",
-    "fast",
-    "--x-initial",
-    "fast",
-    "--noassert",
-    "-CFLAGS",
-    "-O3",
-    "-MAKEFLAGS",
-    "OPT_FAST=-O3",
+OPTIONS = [
+    *LINT_OPTIONS,
+    *("--prefix", "Vaxis", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--noassert"),
+    *("-CFLAGS", "-O3", "-MAKEFLAGS", "OPT_FAST=-O3"),
+    # The clocks of one call are iterations of one evaluation.
+    *("--converge-limit", str(1 << 30)),
 ]
 
 
@@ -48,6 +45,38 @@ def _ports(spec: AxisSpec) -> str:
     )
 
 
+def _harness(component: Axis) -> str:
+    """Return Verilog that gives the axis any number of clocks for one change of `go`.
+
+    Verilator evaluates what depends on the inputs anew at every call, and with a synchronous reset among them that is
+    all of the next-state logic. Clocked from within, the axis pays for it once a call, not twice a clock.
+    """
+    members = component.signature.members
+    ports = [("input", 1, "rst")]
+    ports += [
+        ("input" if member.flow == In else "output", Shape.cast(member.shape).width, name)
+        for name, member in members.items()
+    ]
+    declared = "".join(f",\n  {way} [{width - 1}:0] {name}" for way, width, name in ports)
+    connected = "".join(f", .{name}({name})" for _, _, name in ports)
+    return f"""module harness(input go, input [31:0] clocks{declared});
+  reg clk = 0, gone = 0;
+  reg [31:0] left = 0;
+  axis axis(.clk(clk){connected});
+  always @(go or posedge clk or negedge clk)
+    if (clk) clk <= 0;
+    else if (go != gone) begin
+      gone <= go;
+      left <= clocks - 1;
+      clk <= 1;
+    end else if (left != 0) begin
+      left <= left - 1;
+      clk <= 1;
+    end
+endmodule
+"""
+
+
 def build(spec: AxisSpec, traced: bool = False) -> Path:
     """Return the shared library of the axis, building it if it is not there.
 
@@ -61,29 +90,26 @@ def build(spec: AxisSpec, traced: bool = False) -> Path:
     Raises:
         BuildError: if the build fails.
     """
-    verilog, ports, shim = to_verilog(Axis(spec), "axis"), _ports(spec), SHIM.read_text()
-    options = [*LINT_OPTIONS, *OPTIMISE, *(["--trace-vcd"] if traced else [])]
-    content = "\0".join([verilog, ports, shim, version("verilator"), *options])
+    component = Axis(spec)
+    files = {"axis.v": to_verilog(component, "axis"), "axis_ports.h": _ports(spec), "rtl.cpp": SHIM.read_text()}
+    if traced:
+        options = [*OPTIONS, "--trace-vcd", "--top-module", "axis"]
+    else:
+        files["harness.v"] = _harness(component)
+        options = [*OPTIONS, "--top-module", "harness"]
+    content = "\0".join([*files.values(), version("verilator"), *options])
     folder = build_dir() / "rtl" / hashlib.sha256(content.encode()).hexdigest()[:16]
     library = folder / "libaxis.so"
     if library.exists():
         return library
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as name:
-        work = Path(name)
-        for file, text in (("axis.v", verilog), ("axis_ports.h", ports), ("rtl.cpp", shim)):
-            (work / file).write_text(text)
-        command = ["verilator", "--cc", "--build", "-j", str(os.cpu_count() or 1), "--top-module", "axis", *options]
-        command += [
-            "-CFLAGS",
-            f"-fPIC -I{work}",
-            "--lib-create",
-            "axis",
-            "--Mdir",
-            str(work / "obj"),
-            "axis.v",
-            "rtl.cpp",
-        ]
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as scratch:
+        work = Path(scratch)
+        for name, text in files.items():
+            (work / name).write_text(text)
+        command = ["verilator", "--cc", "--build", "-j", str(os.cpu_count() or 1), *options]
+        command += ["-CFLAGS", f"-fPIC -I{work}", "--lib-create", "axis", "--Mdir", str(work / "obj")]
+        command += [name for name in files if not name.endswith(".h")]
         done = subprocess.run(command, cwd=work, env=environment(), capture_output=True, text=True, check=False)
         if done.returncode:
             log = folder.parent / "failed.log"
@@ -91,8 +117,8 @@ def build(spec: AxisSpec, traced: bool = False) -> Path:
             raise BuildError(f"the Verilated library could not be built: see {log}")
         ready = work / "ready"
         ready.mkdir()
-        for file in ("axis.v", "axis_ports.h"):
-            shutil.move(work / file, ready / file)
+        for name in files:
+            shutil.move(work / name, ready / name)
         shutil.move(work / "obj" / "libaxis.so", ready / library.name)
         try:
             ready.rename(folder)

@@ -15,7 +15,7 @@ PINS = (
     "encoder_a", "encoder_b", "encoder_z", "drive_enable", "preload", "preload_count", "index_arm", "clear_flags",
 )  # fmt: skip
 OUTPUTS = (
-    "drive", "velocity", "force", "flags", "actuated",
+    "drive", "velocity", "wall_force", "flags", "actuated",
     "count", "illegal_count", "index_count", "index_latched", "stamp_a_rise",
 )  # fmt: skip
 SLACK = 12
