@@ -16,8 +16,9 @@ class Output(wiring.Component):
 
         drive <- force, changed by at most output_slew_limit, then held within +-output_force_limit
 
-    Between, the drive holds. A strobe with `fault` makes it zero at `valid`. `enable` low makes it zero at the next
-    clock, and it stays so until an actuation has `enable` from strobe to `valid`. Slewing starts again from zero.
+    No limit at run time exceeds `design.force_limit`. Between, the drive holds. A strobe with `fault` makes it zero at
+    `valid`. `enable` low makes it zero at the next clock, and it stays so until an actuation has `enable` from strobe
+    to `valid`. Slewing starts again from zero.
 
     Latency: `latency` clocks from `strobe` to the changed `drive`, with `valid`; the next `strobe` may come with
     `valid`.
@@ -40,7 +41,7 @@ class Output(wiring.Component):
     enable : In(1)
         Low forces the drive to zero, at once.
     output_force_limit : In(UQ)
-        Largest drive either way, force LSB.
+        Largest drive either way, force LSB; beyond `design.force_limit` it is that.
     output_slew_limit : In(UQ)
         Largest change an actuation, force LSB.
     drive : Out(SQ)
@@ -92,7 +93,9 @@ class Output(wiring.Component):
         change = Signal(signed(len(self.force) + 1))
         slewed = Signal(signed(len(self.output_slew_limit) + 2))
         slew, limit = Signal(signed(len(self.output_slew_limit) + 1)), Signal(signed(len(self.force)))
-        m.d.comb += [slew.eq(self.output_slew_limit), limit.eq(self.output_force_limit)]
+        most = self._design.force_limit
+        m.d.comb += slew.eq(self.output_slew_limit)
+        m.d.sync += limit.eq(Mux(self.output_force_limit > most, most, self.output_force_limit))
 
         def within(value, bound):
             return Mux(value > bound, bound, Mux(value < -bound, -bound, value))

@@ -41,6 +41,7 @@ FLOAT_START = State(0, 0.0)
 class Design:
     """Formats and run-time words of the output stage for an axis.
 
+    `force_limit` is the axis's largest drive; a greater word at run time changes nothing.
     `output_slew_limit` has one bit more than the largest change of the drive, so that its largest word limits nothing.
     """
 
@@ -50,6 +51,7 @@ class Design:
     def __init__(self, axis):
         self.decimation = axis.samples_per_actuation
         self.force = axis.force
+        self.force_limit = axis.force_limit_word
         self.slew = UQ(axis.force.width, 0)
         limit = UQ(axis.force.width - 2, 0)
         r = axis.force_resolution_n
@@ -60,11 +62,13 @@ class Design:
 
     def params(self, words: dict[str, int]) -> Params:
         """Return the kernel's parameters for the given run-time words."""
-        return Params(words["output_force_limit"], words["output_slew_limit"], self.decimation)
+        limit = min(words["output_force_limit"], self.force_limit)
+        return Params(limit, words["output_slew_limit"], self.decimation)
 
     def float_params(self, words: dict[str, int]) -> Params:
         """Return the same limits as floats."""
-        return Params(float(words["output_force_limit"]), float(words["output_slew_limit"]), self.decimation)
+        limits = self.params(words)
+        return Params(float(limits.force_limit), float(limits.slew_limit), self.decimation)
 
 
 @compiled

@@ -123,6 +123,7 @@ def hit(
         raise BadInput(f"--trace {waveform.name} needs --backend rtl: only hardware has waveforms")
     with _progress(f"{loaded.name} {loaded.controller.estimator} {backend}", loaded.samples) as advance:
         result = hits.run(loaded, backend, bool(plot or trace), advance, waveform)
+    # Whatever becomes of the files, what was computed is out.
     _show(result.report(), as_json)
     if plot:
         plot_hit(result, plot)
@@ -257,6 +258,24 @@ def verilog(
             print(path)
     except OSError as error:
         raise BadInput(f"-o {str(folder)!r} cannot be written: {error.strerror}") from None
+
+
+@app.command()
+def synth(
+    scene: SceneArgument = "mhz",
+    device: Annotated[Device, typer.Option(help="the part to place and route for")] = "ecp5-25k",
+    seeds: Annotated[int, typer.Option(min=1, max=99, help="how many placements; fmax is their median")] = 3,
+    estimator: Annotated[Estimator | None, typer.Option(help="velocity estimator [default: the scene's]")] = None,
+    set_: SetOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Size and speed of the axis, with the serial port of a board, on a real part."""
+    loaded = load(scene, _changes(set_, controller__estimator=estimator))
+    from .synthesis import synthesise  # noqa: PLC0415
+
+    with log.status(f"{device}: Yosys, then nextpnr with {seeds} seeds"):
+        report = synthesise(loaded, device, range(1, seeds + 1))
+    _show(report, as_json)
 
 
 def main() -> None:

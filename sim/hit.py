@@ -17,6 +17,7 @@ from .controllers import Model, ModelState
 from .encoder import Encoder, level, locate
 from .plant import Coulomb, Handle, Motion, span
 from .scene import Scene
+from .whole_file import whole_file
 
 BACKENDS = ("float", "fixed", "rtl")
 CHUNK = 1 << 16
@@ -64,10 +65,15 @@ class Hit:
         return float(self.detail.time_s[inside[0]]) if len(inside) else self.samples / self.scene.spec.sample_hz
 
     def save(self, path: Path) -> None:
-        """Write the traces as an .npz: `overview_time_s`, `detail_force_n` and so on, and the report as JSON text."""
+        """Write the traces as an .npz: `overview_time_s`, `detail_force_n` and so on, and the report as JSON text.
+
+        Raises:
+            OSError: if the file cannot be written.
+        """
         kept = {"overview": self.overview, "detail": self.detail}
         arrays = {f"{name}_{key}": array for name, trace in kept.items() for key, array in vars(trace).items()}
-        np.savez_compressed(path, report=json.dumps(self.report()), **arrays)
+        with whole_file(path) as part, part.open("wb") as file:
+            np.savez_compressed(file, report=json.dumps(self.report()), **arrays)
 
     def report(self) -> dict:
         """Return the summary that the command line prints, units in the keys."""

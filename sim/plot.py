@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from .hit import Hit
 from .record import Trace
+from .whole_file import whole_file
 
 SUFFIXES = (".pdf", ".png", ".svg")
 ESTIMATE, TRUE, BASELINE, FORCE = "tab:blue", "black", "0.8", "tab:red"
@@ -22,6 +23,9 @@ def plot_hit(hit: Hit, path: Path) -> None:
     Args:
         hit: a run with traces.
         path: ends in one of `SUFFIXES`.
+
+    Raises:
+        OSError: if the file cannot be written.
     """
     # Text as text, and nothing that varies from run to run.
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "hardwall", "font.size": 9}):
@@ -45,7 +49,8 @@ def plot_hit(hit: Hit, path: Path) -> None:
             for axis in axes[:, 1]:
                 axis.set_axis_off()
             axes[0, 1].set_title("the handle never reached the wall")
-        figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
+        with whole_file(path) as part:
+            figure.savefig(part, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
 
 
 def _first_contact(trace: Trace) -> Trace:

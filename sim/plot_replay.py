@@ -6,7 +6,9 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from .replay import Replay, ReplayError, judged_from, whole_file
+from .reference import judged_from
+from .replay import Replay, ReplayError
+from .whole_file import whole_file
 
 SUFFIXES = (".pdf", ".png", ".svg")
 DETAIL_S = 0.4
@@ -87,7 +89,8 @@ def plot_replay(result: Replay, path: str | Path) -> None:
         path: ends in one of `SUFFIXES`.
 
     Raises:
-        ReplayError: for another ending, or if the file cannot be written.
+        ReplayError: for another ending.
+        OSError: if the file cannot be written.
     """
     suffix = Path(path).suffix
     if suffix not in SUFFIXES:

@@ -12,40 +12,31 @@ What the axis must cover follows from the recording, each range rounded up to a 
 - clock, in periods a sample: enough for the force path, and for the fastest change through the decoder
   (`quadrature.max_edge_rate`); what a clock of `CLOCK_MAX_HZ` does not let through is an error on `rtl`.
 
-The bound C on the acceleration, from which an estimator gets its gains, is the largest |second derivative| of the
-reference, after the first second, rounded up to two digits: knowledge that a designer would have of the motion, not
-something that was known to an estimator at the time. It can be given instead. A recording that hardly accelerates gets
-a C that moves one count over its whole length, which counts cannot tell from none, or the least that words hold beside
-its travel and speed (`ACCELERATION_RANGE`).
+The bound C on the acceleration, from which an estimator gets its gains, is that of `reference`. It can be given
+instead. A recording that hardly accelerates gets a C that moves one count over its whole length, which counts cannot
+tell from none, or the least that words hold beside its travel and speed (`ACCELERATION_RANGE`).
 
-The reference is the central difference of the recorded counts, through a Butterworth filter of 4th order forward and
-backward: no delay. Its cutoff is `REFERENCE_HZ`, or a quarter of the rate where that is less.
-
-`float` and `fixed` take the counts as they are. `rtl` gets them through its pins: the change from one sample to the
-next becomes edges that are spread evenly over the interval, each moved by the decoder's latency so that the count at
-every strobe is the recorded one. The first sample is where the decoder starts.
+`float` and `fixed` take the counts as they are. `rtl` gets them `through_pins`.
 """
 
 import hashlib
 import math
-import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from scipy import signal
 
 from ..model import axis, estimators, quadrature
-from ..model.compiled import compiled
 from ..model.fixed import bits_for
 from ..model.spec import AxisSpec
-from .controllers import sample, sample_quietly
 from .encoder import level
 from .recording import Recording
+from .reference import REFERENCE_HZ, SETTLE_S, acceleration_bound, judged_from, zero_phase_velocity
+from .through_pins import DECODER_CLOCKS, GLITCH_CLOCKS, run_pins
+from .whole_file import whole_file
 
 BACKENDS = ("float", "fixed", "rtl")
 TRAVEL_MAX = 2.0**29
@@ -54,15 +45,6 @@ CLOCK_MAX_HZ = 100e6
 """Fastest clock of a replay: more counts a second are a fault of the recording, not a motion."""
 ACCELERATION_RANGE = 2.0**48
 """The largest ratio of travel or speed to C, in counts and samples, at which no estimator's words exceed int64."""
-REFERENCE_HZ = 40.0
-REFERENCE_ORDER = 4
-SETTLE_S = 1.0
-"""Estimates are judged from then on: before, an estimator is still catching up with the start."""
-GLITCH_CLOCKS = 0
-DECODER_CLOCKS = quadrature.latency(GLITCH_CLOCKS)
-"""An edge this long before a strobe is the last that is counted at it."""
-CHUNK_CLOCKS = 1 << 20
-"""Clocks between two looks at progress."""
 
 
 class ReplayError(ValueError):
@@ -151,7 +133,7 @@ class Replay:
         """Write time, recorded count and velocity of each sample as CSV, and the reference if there is `coarsen`.
 
         Raises:
-            ReplayError: if the file cannot be written.
+            OSError: if the file cannot be written.
         """
         columns = {
             "time_s": (self.recording.time_s, "%.9f"),
@@ -166,52 +148,6 @@ class Replay:
             file.writelines(
                 line % row for row in zip(*(values.tolist() for values, _ in columns.values()), strict=True)
             )
-
-
-@contextmanager
-def whole_file(path: str | Path) -> Iterator[Path]:
-    """Give a file beside `path` to write to; put it in the place of `path` once it is whole.
-
-    Raises:
-        ReplayError: if that cannot be done.
-    """
-    part = Path(path).with_name(f".{Path(path).stem}-{os.getpid()}{Path(path).suffix}")
-    try:
-        yield part
-        part.replace(path)
-    except OSError as error:
-        raise ReplayError(f"{path}: cannot be written ({error.strerror or error})") from None
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)
-
-
-def judged_from(rate_hz: float) -> int:
-    """Return the number of the first sample that is judged."""
-    return math.ceil(SETTLE_S * rate_hz)
-
-
-def zero_phase_velocity(counts: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
-    """Return the derivative of the counts, counts/s, low-passed forward and backward."""
-    sections = signal.butter(REFERENCE_ORDER, cutoff_hz, fs=rate_hz, output="sos")
-    derivative = np.gradient((counts - counts[0]).astype(np.float64)) * rate_hz
-    # The usual extension at the ends, three times the filter's length, where there are so many samples.
-    extension = min(3 * (2 * len(sections) + 1), len(counts) - 1)
-    return signal.sosfiltfilt(sections, derivative, padlen=extension)
-
-
-def acceleration_bound(velocity: np.ndarray, rate_hz: float) -> float:
-    """Return the largest |derivative| of a velocity after the first second, rounded up to two digits.
-
-    A record that is no longer counts from its start.
-    """
-    first = judged_from(rate_hz)
-    acceleration = np.gradient(velocity) * rate_hz
-    largest = float(np.abs(acceleration[first:] if len(velocity) > first else acceleration).max())
-    if largest == 0:
-        return 0.0
-    exponent = math.floor(math.log10(largest)) - 1
-    return float(f"{math.ceil(largest / 10.0**exponent)}e{exponent}")
 
 
 def _power_of_two(value: float) -> float:
@@ -259,69 +195,6 @@ def axis_spec(counts: np.ndarray, count: int, acceleration_max: float, estimator
     path = spec.design.latency_to_drive + DECODER_CLOCKS
     clocks = max(path, fastest / quadrature.max_edge_rate(1.0, GLITCH_CLOCKS))
     return replace(spec, clock_hz=int(_power_of_two(clocks)))
-
-
-@compiled
-def _append_edges(count, next_count, start, clocks, edge_clocks, edge_levels, n_edges):
-    """Append the edges from one count to another, spread over clocks start + 1 to start + clocks; return how many."""
-    change = next_count - count
-    total, direction = abs(change), 1 if change > 0 else -1
-    for i in range(total):
-        count += direction
-        edge_clocks[n_edges] = start + 1 + (2 * i + 1) * clocks // (2 * total)
-        edge_levels[n_edges] = level(count)
-        n_edges += 1
-    return n_edges
-
-
-@compiled
-def through_pins(controller, state, counts, clocks, latency, edges, n_edges, velocity, first, until):
-    """Take samples `first` to `until` of a record through a controller's pins; return (state, edges left).
-
-    Args:
-        controller, state: of `sim.controllers`.
-        counts: int64 array; the pins begin at the level of count 0, so the first count is to be 0.
-        clocks: clocks a sample; at least the largest change, and `latency` and the decoder's latency together.
-        latency: clocks from the strobe to the changed drive.
-        edges: a pair of int64 arrays for twice the largest change: edges on their way to the controller.
-        n_edges: edges in them, not yet taken.
-        velocity: array that takes the velocity of every sample.
-    """
-    edge_clocks, edge_levels = edges
-    for k in range(first, until):
-        strobe = (k + 1) * clocks - 1
-        if k + 1 < len(counts):
-            start = strobe - DECODER_CLOCKS
-            n_edges = _append_edges(counts[k], counts[k + 1], start, clocks, edge_clocks, edge_levels, n_edges)
-        if n_edges > 0:
-            state, taken = sample(controller, state, edge_clocks, edge_levels, n_edges, strobe, strobe + latency)
-            n_edges -= taken
-            for i in range(n_edges):
-                edge_clocks[i] = edge_clocks[taken + i]
-                edge_levels[i] = edge_levels[taken + i]
-        else:
-            state = sample_quietly(controller, state, strobe, strobe + latency)
-        velocity[k] = state.velocity
-    return state, n_edges
-
-
-def run_pins(controller, state, spec: AxisSpec, counts: np.ndarray, progress: Callable[[int], None] | None = None):
-    """Take a whole record through a controller's pins: return (velocity words, flags, seconds)."""
-    relative = counts - counts[0]
-    velocity = np.zeros(len(counts), np.int64)
-    room = 2 * int(np.abs(np.diff(relative)).max()) + 1
-    edges = np.zeros(room, np.int64), np.zeros(room, np.int64)
-    fixed = spec.clocks_per_sample, spec.design.latency_to_drive, edges
-    # Compiling is not running: a call with nothing to do keeps it out of the time.
-    through_pins(controller, state, relative, *fixed, 0, velocity, 0, 0)
-    began, n_edges = time.perf_counter(), 0
-    chunk = max(1, CHUNK_CLOCKS // spec.clocks_per_sample)
-    for first in range(0, len(counts), chunk):
-        until = min(first + chunk, len(counts))
-        state, n_edges = through_pins(controller, state, relative, *fixed, n_edges, velocity, first, until)
-        if progress:
-            progress(until)
-    return velocity, int(state.flags), time.perf_counter() - began
 
 
 def run(

@@ -117,6 +117,7 @@ def test_the_drive_never_exceeds_its_limits(name):
         elif k % d.decimation:
             assert value == before
         else:
+            limit = min(limit, d.force_limit)  # noqa: PLW2901
             assert abs(value) <= limit
             # The slew limit holds unless the force limit, which comes last, was drawn in beneath the drive.
             assert abs(value - before) <= slew or abs(value) == limit

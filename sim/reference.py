@@ -1,0 +1,47 @@
+"""The reference that estimates are held against, and the bound on the acceleration that is taken from it.
+
+The reference is the central difference of the recorded counts, through a Butterworth filter of 4th order forward and
+backward: no delay. Its cutoff is `REFERENCE_HZ`, or a quarter of the rate where that is less.
+
+The bound C on the acceleration is the largest |second derivative| of the reference, after the first second, rounded up
+to two digits: knowledge that a designer would have of the motion, not something that was known to an estimator at the
+time.
+"""
+
+import math
+
+import numpy as np
+from scipy import signal
+
+REFERENCE_HZ = 40.0
+REFERENCE_ORDER = 4
+SETTLE_S = 1.0
+"""Estimates are judged from then on: before, an estimator is still catching up with the start."""
+
+
+def judged_from(rate_hz: float) -> int:
+    """Return the number of the first sample that is judged."""
+    return math.ceil(SETTLE_S * rate_hz)
+
+
+def zero_phase_velocity(counts: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
+    """Return the derivative of the counts, counts/s, low-passed forward and backward."""
+    sections = signal.butter(REFERENCE_ORDER, cutoff_hz, fs=rate_hz, output="sos")
+    derivative = np.gradient((counts - counts[0]).astype(np.float64)) * rate_hz
+    # The usual extension at the ends, three times the filter's length, where there are so many samples.
+    extension = min(3 * (2 * len(sections) + 1), len(counts) - 1)
+    return signal.sosfiltfilt(sections, derivative, padlen=extension)
+
+
+def acceleration_bound(velocity: np.ndarray, rate_hz: float) -> float:
+    """Return the largest |derivative| of a velocity after the first second, rounded up to two digits.
+
+    A record that is no longer counts from its start.
+    """
+    first = judged_from(rate_hz)
+    acceleration = np.gradient(velocity) * rate_hz
+    largest = float(np.abs(acceleration[first:] if len(velocity) > first else acceleration).max())
+    if largest == 0:
+        return 0.0
+    exponent = math.floor(math.log10(largest)) - 1
+    return float(f"{math.ceil(largest / 10.0**exponent)}e{exponent}")
