@@ -1,0 +1,159 @@
+# Every task of the project; `make help` lists them. Names here are relative, so that `make -C` and odd paths work.
+#
+#   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
+#   ARGS="-k levant"          more options for pytest (test, soak)
+#   SEEDS="1 2" SAMPLES=10000 which seeds, and how many samples each (soak)
+
+SHELL := /bin/bash
+.SHELLFLAGS := -euo pipefail -c
+MAKEFLAGS += --no-builtin-rules --no-builtin-variables --no-print-directory
+# Verilator calls make itself, which must not think that it is part of this run.
+unexport MAKEFLAGS MFLAGS MAKELEVEL
+.DELETE_ON_ERROR:
+.DEFAULT_GOAL := all
+
+PYTHON ?= python3
+VENV := .venv
+RUN := $(VENV)/bin/python -m
+HARDWALL := $(VENV)/bin/hardwall
+SOURCES := $(wildcard hdl/*.py model/*.py sim/*.py sim/*.cpp sim/scenes/*.toml)
+
+SCENE := seed-2011
+ESTIMATORS := levant fdm
+REPORTS := $(ESTIMATORS:%=build/hit-%.json)
+PICTURES := $(ESTIMATORS:%=build/hit-%.png)
+
+# The iCE40 UltraPlus is too slow for 50 MHz.
+ON_ECP5 := --device ecp5-25k
+ON_ICE40 := --device ice40-up5k $(addprefix --set controller.,clock_hz=24000000 sample_hz=500000 actuation_hz=500000)
+
+SEEDS ?= $(shell shuf -i 1-999999999 -n 3)
+SAMPLES ?= 1000000
+PYTEST := $(RUN) pytest -n 2 --dist worksteal
+
+# ---- the tasks ------------------------------------------------------------------------------------------------------
+
+.PHONY: all test lint bench synth verilog soak clean distclean help tools FORCE
+
+all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
+	@$(HARDWALL) table $(REPORTS)
+	@printf '%s\n' $(PICTURES)
+
+test: $(VENV)/.test | tools ## every regression: the model against exact arithmetic, the RTL against the model
+	@$(PYTEST) $(ARGS)
+
+lint: $(VENV)/.test | tools ## style and common mistakes
+	@failed=0; $(RUN) ruff check . || failed=1; $(RUN) ruff format --check . || failed=1; exit $$failed
+
+bench: $(VENV)/.test | tools ## how fast the loop runs, beside cocotb
+	@$(HARDWALL) bench
+
+synth: $(VENV)/.synth | tools ## size and fmax on both devices, median of several place-and-route seeds
+	@$(HARDWALL) synth mhz $(ON_ECP5) --seeds 3
+	@$(HARDWALL) synth mhz $(ON_ICE40) --seeds 3
+
+verilog: $(VENV)/.sim | tools ## the axis of the scene as Verilog, in build/verilog/
+	@$(HARDWALL) verilog $(SCENE) --output-folder build/verilog
+
+soak: $(VENV)/.test | tools ## long random campaigns of RTL against model, with new seeds each time
+	@for seed in $(SEEDS); do \
+	  echo "HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES); again: make soak SEEDS=$$seed SAMPLES=$(SAMPLES)"; \
+	  HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES) $(PYTEST) -m rtl $(ARGS); \
+	done
+
+clean: ## remove what was built and cached
+	rm -rf build .hypothesis .pytest_cache .ruff_cache
+	find hdl model sim tests -name __pycache__ -prune -exec rm -rf {} +
+
+distclean: clean ## remove the tools in .venv too
+	rm -rf $(VENV) hardwall.egg-info
+
+help: ## this list
+	@sed -n 's/^\([a-z]*\):.* ## \(.*\)/\1:\2/p' Makefile | while IFS=: read -r task what; do \
+	  printf '  make %-10s %s\n' "$$task" "$$what"; done
+
+# ---- the main job: one report and one picture an estimator ----------------------------------------------------------
+
+# Two targets of one pattern are made together. The report comes last and whole: without it nothing looks done.
+build/hit-%.json build/hit-%.png: $(SOURCES) $(VENV)/.sim | tools
+	@mkdir -p build
+	@rm -f build/hit-$*.json
+	@echo "Hitting the wall of $(SCENE) with $*, the generated hardware in the loop ..."
+	@$(HARDWALL) hit $(SCENE) --estimator $* --backend rtl --plot build/hit-$*.png --json >build/hit-$*.partial
+	@mv build/hit-$*.partial build/hit-$*.json
+
+# ---- the tools, by need: .sim runs the loop, .test the regressions, .synth place and route --------------------------
+
+# .venv is made anew for another PYTHON, when its own is gone, and in a tree that was moved or copied.
+MADE_IN := $(file <$(VENV)/.made)
+MADE_BY := $(file <$(VENV)/.python)
+ifneq ($(MADE_IN),$(CURDIR))
+  STALE := moved
+else ifneq ($(origin PYTHON) $(PYTHON),$(origin PYTHON) $(if $(filter file,$(origin PYTHON)),$(PYTHON),$(MADE_BY)))
+  STALE := other
+else ifneq ($(shell { $(VENV)/bin/python -c 'print("runs")'; } 2>/dev/null || true),runs)
+  STALE := broken
+endif
+INTERPRETER := $(if $(STALE),$(PYTHON),$(VENV)/bin/python)
+
+$(VENV)/.made: $(if $(STALE),FORCE) | tools
+	@"$(PYTHON)" -m venv $(if $(MADE_IN),--clear) $(VENV)
+	@printf '%s\n' "$(PYTHON)" >$(VENV)/.python
+	@printf '%s\n' "$(CURDIR)" >$@
+
+# One pip at a time, whatever make does in parallel.
+define install
+@echo "Installing into $(VENV), once: $(2) ..."
+@flock $(VENV)/.made $(RUN) pip install --quiet --disable-pip-version-check --editable '.[$(1)]'
+@touch $@
+endef
+
+$(VENV)/.sim: pyproject.toml $(VENV)/.made | tools
+	$(call install,sim,the model and the loop)
+
+$(VENV)/.test: pyproject.toml $(VENV)/.sim | tools
+	$(call install,sim$(comma)test,the tests' tools)
+
+$(VENV)/.synth: pyproject.toml $(VENV)/.sim | tools
+	$(call install,sim$(comma)synth,place and route)
+
+comma := ,
+
+# ---- what only the system can give, named before anything starts ----------------------------------------------------
+
+# cocotb embeds Python in the simulator.
+EMBEDDED := $(filter test bench soak,$(MAKECMDGOALS))
+
+define CHECK_PYTHON
+import sys
+if sys.version_info < (3, 11):
+    sys.exit("Python 3.11 or newer, and $(INTERPRETER) is " + sys.version.split()[0] + "|python3")
+try:
+    import ensurepip, venv
+except ImportError:
+    sys.exit("Python's venv and ensurepip|python3-venv")
+if "$(EMBEDDED)":
+    import ctypes, os, sysconfig
+    name = "libpython" + sysconfig.get_config_var("LDVERSION") + ".so"
+    folders = "", sysconfig.get_config_var("LIBDIR")
+    for each in [os.path.join(folder, name + end) for folder in folders for end in ("", ".1.0")]:
+        try:
+            ctypes.CDLL(each)
+            break
+        except OSError:
+            pass
+    else:
+        sys.exit("Python as a shared library, " + name + "|libpython3-dev")
+endef
+
+tools: export CHECK = $(CHECK_PYTHON)
+tools:
+	@missing=0; \
+	needs() { echo "hardwall needs $$1: install the Debian or Ubuntu package $$2" >&2; missing=1; }; \
+	if [[ $$PWD =~ [[:space:]] ]]; then \
+	  echo "hardwall needs a path without spaces, for Verilator's makefiles" >&2; missing=1; fi; \
+	if ! command -v "$(INTERPRETER)" >/dev/null; then needs "Python 3.11 or newer, and there is no $(INTERPRETER)" python3; \
+	elif ! fault=$$("$(INTERPRETER)" -c "$$CHECK" 2>&1); then needs "$${fault%|*}" "$${fault##*|}"; fi; \
+	command -v c++ >/dev/null || needs "a C++ compiler, c++" g++; \
+	perl -MFindBin -MPod::Usage -e 1 2>/dev/null || needs "perl and its modules" perl; \
+	exit $$missing

@@ -1,0 +1,259 @@
+"""An axis for real packages: few pins, parameters and telemetry through a serial port, a drive that a filter can take.
+
+The frame of the serial port is one list of fields each way, `Board.commands` and `Board.telemetry`; `encode` and
+`decode` are what a host does with it.
+"""
+
+from collections.abc import Mapping
+
+from amaranth.hdl import Cat, ClockDomain, Const, Module, Mux, Shape, Signal, Value
+from amaranth.lib import wiring
+from amaranth.lib.cdc import FFSynchronizer
+from amaranth.lib.wiring import In, Out
+
+from hardwall.model.spec import AxisSpec
+
+from .axis import Axis
+
+PULSES = ("commit", "clear_flags", "preload", "index_arm")
+"""What a frame can do besides being read; the first bits of it."""
+TELEMETRY = (
+    "drive",
+    "count",
+    "velocity",
+    "wall_force",
+    "flags",
+    "illegal_count",
+    "index_count",
+    "index_armed",
+    "index_latched",
+    "stamp",
+    "stamp_a_rise",
+    "stamp_b_rise",
+    "stamp_a_fall",
+    "stamp_b_fall",
+)
+BYTE = 8
+
+
+class Board(wiring.Component):
+    """One axis behind a dozen pins.
+
+    Serial port: an SPI device, mode 0, most significant bit first. One frame of `frame_bits`, a whole number of bytes,
+    goes each way. While `scan_select_n` is high the shift register follows the telemetry; its fall freezes that
+    moment, and every rise of `scan_clock` then gives one bit out and takes one in. When `scan_select_n` rises after
+    exactly a frame whose last bit is 0, the pulses whose bits are set in it are given to the axis, all at one clock,
+    with the words that came with them: a `commit` makes the axis take every parameter at its next sample. After any
+    other frame, or number of bits, nothing happens: so one of zeros, one broken off and a line stuck high only read.
+
+    While a commit waits for its sample the register holds the words, deaf: a frame begun then is no frame, its
+    answer is not telemetry, and nothing comes of it. So a host leaves a sample period between frames.
+
+    Every level of `scan_clock` and `scan_select_n` must last 3 clocks, and `scan_in` be stable from a clock before the
+    rise of `scan_clock` to 2 after it; `scan_out` follows that rise by 2 to 4 clocks. So the serial clock may have up
+    to a sixth of the clock's rate.
+
+    Drive: first-order sigma-delta of the drive word, sign and magnitude. With N = `drive_bits`, per clock,
+
+        sum <- sum mod 2**N + |drive|        drive_pdm = (sum >= 2**N)
+
+    so the density of ones is exactly |drive| / 2**N: over 2**N clocks of a steady drive, |drive| ones.
+
+    Latency: `latency` clocks from the sample strobe to the first pulse that the changed drive makes. `drive_enable` low
+    makes `drive_pdm` low at once, through a gate that needs no clock, and the drive zero `enable_latency` clocks later.
+
+    Rounding and overflow: none; what a pulse did not carry yet stays in the sum, less than one pulse, also through a
+    change of sign. The axis limits the drive to less than 2**N.
+
+    Reset: `rst` resets all but the synchronisers, 2 to 3 clocks later; so does power-up.
+
+    Parameters
+    ----------
+    spec : hardwall.model.spec.AxisSpec
+        The axis.
+
+    Members
+    -------
+    clk : In(1)
+        Clock, of `spec.clock_hz`.
+    rst : In(1)
+        Asynchronous pin; resets while high.
+    encoder_a, encoder_b, encoder_z : In(1)
+        Asynchronous pins.
+    drive_enable : In(1)
+        Asynchronous pin; low: no drive. Must read low when nothing is connected.
+    scan_select_n, scan_clock, scan_in : In(1)
+        Asynchronous pins of the serial port.
+    scan_out : Out(1)
+        The serial port's answer.
+    drive_pdm : Out(1)
+        Pulses, of density |drive| / 2**N.
+    drive_sign : Out(1)
+        1: the drive is negative.
+
+    Raises
+    ------
+    TypeError
+        If `spec` is not an AxisSpec.
+    """
+
+    def __init__(self, spec: AxisSpec):
+        self._axis = Axis(spec)
+        self._spec = spec
+        super().__init__(
+            {
+                "clk": In(1),
+                "rst": In(1),
+                "encoder_a": In(1),
+                "encoder_b": In(1),
+                "encoder_z": In(1),
+                "drive_enable": In(1),
+                "scan_select_n": In(1),
+                "scan_clock": In(1),
+                "scan_in": In(1),
+                "scan_out": Out(1),
+                "drive_pdm": Out(1),
+                "drive_sign": Out(1),
+            }
+        )
+
+    @property
+    def spec(self) -> AxisSpec:
+        return self._spec
+
+    @property
+    def latency(self) -> int:
+        """Clocks from the sample strobe to the first pulse that the changed drive makes."""
+        return self._axis.latency + 2
+
+    @property
+    def enable_latency(self) -> int:
+        """Clock edges from the first that sees `drive_enable` low to the drive of zero, both included."""
+        return 3
+
+    @property
+    def drive_bits(self) -> int:
+        """Bits of the drive's magnitude, N above: those of its largest limit."""
+        return self._spec.force.width - 2
+
+    @property
+    def commands(self) -> tuple[tuple[str, Shape], ...]:
+        """Fields of a frame to the axis, in the order on the wire; unused bits follow."""
+        shapes = self._axis.signature.members
+        names = (*PULSES, "preload_count", *(word.name for word in self._spec.design.words))
+        return tuple((name, Shape.cast(shapes[name].shape)) for name in names)
+
+    @property
+    def telemetry(self) -> tuple[tuple[str, Shape], ...]:
+        """Fields of a frame from the axis, in the order on the wire; unused bits follow."""
+        shapes = self._axis.signature.members
+        return tuple((name, Shape.cast(shapes[name].shape)) for name in TELEMETRY)
+
+    @property
+    def frame_bits(self) -> int:
+        """Bits of a frame, each way: whole bytes, of which the last bit is unused."""
+        longest = max(sum(shape.width for _, shape in fields) for fields in (self.commands, self.telemetry))
+        return -(-(longest + 1) // BYTE) * BYTE
+
+    def encode(self, values: Mapping[str, int]) -> bytes:
+        """Return the frame that gives the axis `values`, by name; what is not named is zero.
+
+        Raises:
+            ValueError: for a name that is no field of a frame, or a value that does not fit its field.
+        """
+        frame, left = 0, self.frame_bits
+        known = dict(self.commands)
+        for name in values:
+            if name not in known:
+                raise ValueError(f"name must be one of {', '.join(known)}, not {name!r}")
+        for name, shape in known.items():
+            value, least = values.get(name, 0), -(1 << (shape.width - 1)) if shape.signed else 0
+            if not least <= value < least + (1 << shape.width):
+                raise ValueError(f"{name} must be {least} to {least + (1 << shape.width) - 1}, not {value!r}")
+            left -= shape.width
+            frame |= (value & ((1 << shape.width) - 1)) << left
+        return frame.to_bytes(self.frame_bits // BYTE, "big")
+
+    def decode(self, frame: bytes) -> dict[str, int]:
+        """Return the telemetry, by name, of a frame from the axis.
+
+        Raises:
+            ValueError: if it has not the length of a frame.
+        """
+        if len(frame) * BYTE != self.frame_bits:
+            raise ValueError(f"frame must have {self.frame_bits // BYTE} bytes, not {len(frame)!r}")
+        word, left, values = int.from_bytes(frame, "big"), self.frame_bits, {}
+        for name, shape in self.telemetry:
+            left -= shape.width
+            value = word >> left & ((1 << shape.width) - 1)
+            values[name] = value - (1 << shape.width) if shape.signed and value >> (shape.width - 1) else value
+        return values
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.axis = axis = self._axis
+        m.domains.sync = domain = ClockDomain()
+        m.d.comb += domain.clk.eq(self.clk)
+
+        def synchronised(pin: Value, name: str, init: int = 0) -> Signal:
+            seen = Signal(name=f"{name}_seen", init=init)
+            m.submodules[f"{name}_synchroniser"] = FFSynchronizer(pin, seen, init=init)
+            return seen
+
+        m.d.comb += domain.rst.eq(synchronised(self.rst, "rst", init=1))
+        enable = synchronised(self.drive_enable, "drive_enable")
+        select_n = synchronised(self.scan_select_n, "scan_select_n", init=1)
+        clock = synchronised(self.scan_clock, "scan_clock")
+        bit = synchronised(self.scan_in, "scan_in")
+        m.d.comb += [
+            axis.encoder_a.eq(self.encoder_a),
+            axis.encoder_b.eq(self.encoder_b),
+            axis.encoder_z.eq(self.encoder_z),
+            axis.drive_enable.eq(enable),
+        ]
+
+        # The first field of a frame is at the top of the register, whence it leaves.
+        frame = Signal(self.frame_bits)
+        taken = Signal(range(self.frame_bits + 2))
+        select_n_before, clock_before = Signal(init=1), Signal()
+        given = Signal()
+        m.d.sync += [
+            select_n_before.eq(select_n),
+            clock_before.eq(clock),
+            given.eq(select_n & ~select_n_before & (taken == self.frame_bits) & ~frame[0]),
+        ]
+        with m.If(given):
+            # Once given, a frame is none any more.
+            m.d.sync += taken.eq(self.frame_bits + 1)
+        with m.Elif(~axis.commit_pending):
+            with m.If(select_n & select_n_before):
+                m.d.sync += [frame.eq(_packed([getattr(axis, name) for name in TELEMETRY], len(frame))), taken.eq(0)]
+            with m.Elif(~select_n & clock & ~clock_before):
+                # Beyond a frame the number of bits stays one more.
+                m.d.sync += [frame.eq(Cat(bit, frame)), taken.eq(Mux(taken > self.frame_bits, taken, taken + 1))]
+        m.d.comb += self.scan_out.eq(frame[-1])
+
+        left = len(frame)
+        for name, shape in self.commands:
+            left -= shape.width
+            field = frame[left : left + shape.width]
+            m.d.comb += getattr(axis, name).eq(field & given if name in PULSES else field)
+
+        # The axis limits the drive, so its magnitude has the bits of the limit.
+        total = Signal(self.drive_bits + 1)
+        magnitude = Signal(self.drive_bits)
+        negative = Signal()
+        m.d.sync += [
+            magnitude.eq(Mux(axis.drive < 0, -axis.drive, axis.drive)),
+            negative.eq(axis.drive < 0),
+            total.eq(total[:-1] + magnitude),
+            self.drive_sign.eq(negative),
+        ]
+        m.d.comb += self.drive_pdm.eq(total[-1] & self.drive_enable)
+        return m
+
+
+def _packed(fields: list[Value], bits: int) -> Value:
+    """Return the fields in one word of so many bits, the first at the top, zeros below the last."""
+    used = sum(map(len, fields))
+    return Cat(Const(0, bits - used), *reversed(fields))

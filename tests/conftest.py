@@ -1,0 +1,44 @@
+"""What the whole suite shares: one seed, logged; the marker of what runs in the simulator; the recordings."""
+
+import inspect
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+ROOT = Path(__file__).absolute().parent.parent
+SEED = os.environ.setdefault("HARDWALL_SEED", "1")
+SAMPLES = os.environ.get("HARDWALL_SAMPLES", "the default number of")
+
+# The first example of a kernel includes its compilation; and every failure is to come again with the same seed.
+settings.register_profile("hardwall", deadline=None, database=None, print_blob=True)
+settings.load_profile("hardwall")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_configure(config: pytest.Config) -> None:
+    """Give Hypothesis the suite's seed, unless it was given one."""
+    if config.getoption("--hypothesis-seed") is None:
+        config.option.hypothesis_seed = SEED
+
+
+def pytest_report_header() -> str:
+    return f"HARDWALL_SEED={SEED}, {SAMPLES} samples a random campaign"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark as `rtl` the tests that call `bench.simulate`."""
+    for item in items:
+        code = getattr(inspect.unwrap(item.obj), "__code__", None)
+        if code and "simulate" in code.co_names:
+            item.add_marker("rtl")
+
+
+@pytest.fixture(scope="session")
+def recordings() -> Path:
+    """The folder of the recordings of real encoders, which are not part of the project; skips where it is absent."""
+    folder = ROOT.parent / "shared" / "data"
+    if not folder.is_dir():
+        pytest.skip("the recordings, ../shared/data, are not here")
+    return folder

@@ -1,0 +1,129 @@
+"""Verilog, and the table of its ports: each has what the other has, and both are the same every time."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from specs import spec
+
+from hardwall.hdl.axis import Axis
+from hardwall.hdl.boards import Board
+from hardwall.hdl.export import COLUMNS, port_table, to_verilog, write
+from hardwall.sim.verilator import LINT_OPTIONS, environment
+
+TOPS = {"axis": Axis, "board": Board}
+# Whoever instantiates the axis depends on these names; the words are those of its estimator.
+AXIS_PORTS = """
+clk rst encoder_a encoder_b encoder_z drive_enable clear_flags preload preload_count index_arm commit
+encoder_glitch_clocks encoder_invert levant_lambda levant_alpha levant_output wall_stiffness wall_damping wall_position
+wall_left wall_forbid_pull output_force_limit output_slew_limit drive sampled actuated count velocity wall_force flags
+illegal_count index_count index_armed index_latched stamp stamp_a_rise stamp_b_rise stamp_a_fall stamp_b_fall
+commit_pending
+"""
+BOARD_PORTS = """
+clk rst encoder_a encoder_b encoder_z drive_enable scan_select_n scan_clock scan_in scan_out drive_pdm drive_sign
+"""
+
+
+def rows(table: str) -> list[dict[str, str]]:
+    """Return a Markdown table's rows by column."""
+    lines = [[cell.strip() for cell in line.strip("|\n").split(" | ")] for line in table.splitlines()]
+    assert tuple(lines[0]) == COLUMNS
+    assert set(lines[1]) == {"---"}
+    return [dict(zip(COLUMNS, line, strict=True)) for line in lines[2:]]
+
+
+def verilog_ports(text: str, module: str) -> dict[str, tuple[str, int]]:
+    """Return direction and width of each port of a module, by name."""
+    names, body = re.search(rf"^module {module}\((.*?)\);(.*?)^endmodule", text, re.S | re.M).groups()
+    declared = re.findall(r"^  (input|output) (?:\[(\d+):0\] )?(\S+?) ?;", body, re.M)
+    ports = {name.lstrip("\\"): (way.removesuffix("put"), int(top or 0) + 1) for way, top, name in declared}
+    assert sorted(ports) == sorted(name.strip().lstrip("\\") for name in names.split(","))
+    return ports
+
+
+@pytest.mark.parametrize("top", TOPS)
+@pytest.mark.parametrize(("name", "estimator"), [("paper", "levant"), ("mhz", "fdm"), ("narrow", "levant")])
+def test_table_and_verilog_have_the_same_ports(name, estimator, top):
+    component = TOPS[top](spec(name, estimator))
+    table = rows(port_table(component))
+    seen = {row["port"].strip("`"): (row["direction"], int(row["width"])) for row in table}
+    assert len(seen) == len(table)
+    assert seen == verilog_ports(to_verilog(component, top), top)
+    assert all(row["what it is"] for row in table)
+
+
+@pytest.mark.parametrize(("top", "names"), [("axis", AXIS_PORTS), ("board", BOARD_PORTS)])
+def test_port_names_are_stable(top, names):
+    component = TOPS[top](spec("mhz"))
+    assert [row["port"].strip("`") for row in rows(port_table(component))] == names.split()
+
+
+def test_rows_tell_the_words():
+    axis = spec("mhz")
+    table = {row["port"].strip("`"): row for row in rows(port_table(Axis(axis)))}
+    for word in axis.design.words:
+        row = table[word.name]
+        assert (row["format"], row["reset"], row["what it is"]) == (str(word.format), str(word.reset), word.doc)
+        assert row["range"] == f"{word.si_min:.6g} to {word.si_max:.6g} {word.unit}".strip()
+    assert table["wall_position"]["one LSB"] == "1e-06 m"
+    assert table["drive"]["one LSB"] == "0.001 N"
+    assert table["stamp"]["one LSB"] == "2e-08 s"
+    lsb, unit = table["velocity"]["one LSB"].split(" ")
+    assert float(lsb) == pytest.approx(axis.design.estimator.velocity.lsb, rel=1e-5)
+    assert unit == "m/s"
+    for bit, flag in enumerate(axis.design.flags):
+        assert f"bit {bit} {flag}" in table["flags"]["what it is"]
+
+
+def test_other_components_are_refused():
+    with pytest.raises(TypeError, match=r"^component must be an Axis or a Board, not 3$"):
+        port_table(3)
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("verilog") / "made"
+    assert write(spec("mhz"), folder) == tuple(folder / name for name in ("axis.v", "board.v", "ports.md"))
+    return folder
+
+
+@pytest.mark.parametrize("top", TOPS)
+def test_written_verilog_passes_the_lint(written, top):
+    command = ["verilator", "--lint-only", *LINT_OPTIONS, "--top-module", top, str(written / f"{top}.v")]
+    done = subprocess.run(command, env=environment(), capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("top", TOPS)
+def test_written_verilog_says_what_it_is_of(written, top):
+    text = (written / f"{top}.v").read_text()
+    head = text.splitlines()[: text.splitlines().index("")]
+    assert all(line.startswith("//") for line in head)
+    for said in ("clock_hz = 50000000", "estimator = 'levant'", "gains = Gains(lambda_sqrt_m_per_s=15.8"):
+        assert any(line.startswith(f"// {said}") for line in head)
+    assert text.endswith(to_verilog(TOPS[top](spec("mhz")), top))
+
+
+def test_written_tables_are_all_there(written):
+    text = (written / "ports.md").read_text()
+    axis = spec("mhz")
+    assert port_table(Axis(axis)) in text
+    assert port_table(Board(axis)) in text
+    board = Board(axis)
+    for fields in (board.commands, board.telemetry):
+        listed = [rf"\| [\d:]+ \| `{name}` \| (un)?signed \|\n" for name, _ in fields]
+        assert re.search("".join(listed), text)
+
+
+def test_text_is_the_same_in_another_process(written, tmp_path):
+    program = (
+        "from specs import spec; from hardwall.hdl.export import write; import sys; write(spec('mhz'), sys.argv[1])"
+    )
+    command = [sys.executable, "-c", program, str(tmp_path)]
+    subprocess.run(command, cwd=Path(__file__).parent, env=environment() | {"PYTHONHASHSEED": "7"}, check=True)
+    for path in written.iterdir():
+        assert (tmp_path / path.name).read_bytes() == path.read_bytes()
+    assert len(list(tmp_path.iterdir())) == 3
