@@ -1,4 +1,4 @@
-# Every task of the project; `make help` lists them. Names here are relative, so that `make -C` and odd paths work.
+# Every task of the project; `make help` lists them. Names here are relative, so that `make -C` works from anywhere.
 #
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
 #   ARGS="-k levant"          more options for pytest (test, soak)

@@ -1,6 +1,8 @@
 """The command line. Results go to stdout, everything else to stderr; exit codes: 0, 1 failed run, 2 bad input."""
 
 import json
+import os
+import signal
 import sys
 import tomllib
 from pathlib import Path
@@ -278,16 +280,22 @@ def synth(
     _show(report, as_json)
 
 
+def _interrupted(*_: object) -> None:
+    """Stop at once: raising KeyboardInterrupt into compiled code, or into its compiler, crashes the process."""
+    log.show_cursor()
+    print("hardwall: error: interrupted", file=sys.stderr, flush=True)
+    os._exit(1)
+
+
 def main() -> None:
     """Run the command line; every failure is one line on stderr and an exit code."""
+    signal.signal(signal.SIGINT, _interrupted)
     try:
         app(standalone_mode=False)
     except typer.TyperException as error:
         code, message = 2, " ".join(error.format_message().split())
     except (BadInput, SceneError) as error:
         code, message = 2, str(error)
-    except (KeyboardInterrupt, typer.Abort):
-        code, message = 1, "interrupted"
     except (RuntimeError, OSError) as error:
         code, message = 1, str(error)
     else:

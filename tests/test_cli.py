@@ -15,6 +15,7 @@ SEED = (scene.FOLDER / "seed-2011.toml").read_text()
 def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
     """Return exit code, stdout and stderr of `hardwall ARGUMENTS`."""
     monkeypatch.setattr("sys.argv", ["hardwall", *map(str, arguments)])
+    monkeypatch.setattr("signal.signal", lambda *_: None)  # the signals are pytest's
     try:
         cli.main()
         code = 0

@@ -97,6 +97,7 @@ def test_a_hit_can_be_repeated():
 def test_pictures_traces_and_waveforms_are_written(tmp_path, capsys, monkeypatch):
     picture, trace, wave = (tmp_path / name for name in ("hit.svg", "hit.npz", "hit.fst"))
     short = [f"--set={key}={value}" for key, value in ONE_SECOND.items()]
+    monkeypatch.setattr("signal.signal", lambda *_: None)  # the signals are pytest's
     for option, path, backend in (("--plot", picture, "fixed"), ("--trace", trace, "fixed"), ("--trace", wave, "rtl")):
         monkeypatch.setattr("sys.argv", ["hardwall", "hit", "--backend", backend, option, str(path), "--json", *short])
         cli.main()
