@@ -105,17 +105,10 @@ class Estimator(wiring.Component):
         correction = Signal(max(design.lambda_.width + design.root.width + 2 - (design.product - velocity.f), 1))
         u = Signal(shape(velocity))
         next_u1 = Signal(shape(velocity))
-        positive, negative = e > 0, e < 0
+        positive, negative = Signal(), Signal()
 
         m.submodules.root = root = Sqrt(design.radicand.width)
-        m.d.comb += root.radicand.eq(shift_floor(Mux(negative, -e, e), velocity.f - design.radicand.f))
-
-        def limited(value):
-            return saturate(value, -velocity.max, velocity.max)
-
-        def towards(value, step):
-            """`value` moved by `step` against the sign of e, with room for the result."""
-            return value + Mux(negative, step, 0) - Mux(positive, step, 0)
+        m.d.comb += root.radicand.eq(shift_floor(Mux(e < 0, -e, e), velocity.f - design.radicand.f))
 
         m.d.sync += self.valid.eq(0)
         with m.FSM():
@@ -139,6 +132,7 @@ class Estimator(wiring.Component):
                 m.next = "ROOT"
             with m.State("ROOT"):
                 m.d.comb += root.start.eq(1)
+                m.d.sync += [positive.eq(e > 0), negative.eq(e < 0)]
                 m.next = "PRODUCT"
             with m.State("PRODUCT"), m.If(root.done):
                 m.d.sync += product.eq(self.levant_lambda * Cat(Const(1, 1), root.root))
@@ -147,12 +141,9 @@ class Estimator(wiring.Component):
                 m.d.sync += correction.eq(shift_round_half_up(product, design.product - velocity.f))
                 m.next = "OUTPUT"
             with m.State("OUTPUT"):
-                far_u, far_u1 = towards(u1, correction), towards(u1, self.levant_alpha)
-                m.d.sync += [
-                    u.eq(limited(far_u)),
-                    next_u1.eq(limited(far_u1)),
-                    self.saturated[1].eq((limited(far_u) != far_u) | (limited(far_u1) != far_u1)),
-                ]
+                held_u, far_u = _moved(u1, correction, negative, positive, velocity.max)
+                held_u1, far_u1 = _moved(u1, self.levant_alpha, negative, positive, velocity.max)
+                m.d.sync += [u.eq(held_u), next_u1.eq(held_u1), self.saturated[1].eq(far_u | far_u1)]
                 m.next = "UPDATE"
             with m.State("UPDATE"):
                 m.d.sync += [
@@ -163,3 +154,13 @@ class Estimator(wiring.Component):
                 ]
                 m.next = "SAMPLE"
         return m
+
+
+def _moved(value, step, up, down, most):
+    """Return `value` plus or less `step`, or as it is, held within +-`most`; and whether it was held.
+
+    Sum and difference side by side, for each needs a limit on one side only: `value` itself is within.
+    """
+    above, below = value + step > most, value - step < -most
+    higher, lower = Mux(above, most, value + step), Mux(below, -most, value - step)
+    return Mux(up, higher, Mux(down, lower, value)), up & above | down & below

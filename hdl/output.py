@@ -90,6 +90,7 @@ class Output(wiring.Component):
         m = Module()
         phase = Signal(range(max(self._design.decimation, 2)))
         allowed = Signal()
+        target = Signal.like(self.force)
         change = Signal(signed(len(self.force) + 1))
         slewed = Signal(signed(len(self.output_slew_limit) + 2))
         slew, limit = Signal(signed(len(self.output_slew_limit) + 1)), Signal(signed(len(self.force)))
@@ -97,29 +98,38 @@ class Output(wiring.Component):
         m.d.comb += slew.eq(self.output_slew_limit)
         m.d.sync += limit.eq(Mux(self.output_force_limit > most, most, self.output_force_limit))
 
-        def within(value, bound):
-            return Mux(value > bound, bound, Mux(value < -bound, -bound, value))
+        def outside(value, bound):
+            """Return whether the value is above bound, and whether it is below -bound."""
+            return value > bound, value + bound < 0
+
+        # Comparisons and sums side by side: either alone is a carry chain.
+        rises, falls = outside(change, slew)
+        above, below = outside(slewed, limit)
 
         m.d.sync += self.valid.eq(0)
         with m.FSM():
             with m.State("CHANGE"), m.If(self.strobe):
-                m.d.sync += [change.eq(self.force - self.drive), allowed.eq(self.enable & ~self.fault)]
+                m.d.sync += [
+                    target.eq(self.force),
+                    change.eq(self.force - self.drive),
+                    allowed.eq(self.enable & ~self.fault),
+                ]
                 m.next = "SLEW"
             with m.State("SLEW"):
                 m.d.sync += [
-                    slewed.eq(self.drive + within(change, slew)),
-                    self.limited[0].eq(within(change, slew) != change),
+                    slewed.eq(Mux(rises, self.drive + slew, Mux(falls, self.drive - slew, target))),
+                    self.limited[0].eq(rises | falls),
                 ]
                 m.next = "LIMIT"
             with m.State("LIMIT"):
                 actuated = (phase == 0) & allowed
                 with m.If(actuated):
-                    m.d.sync += self.drive.eq(within(slewed, limit))
+                    m.d.sync += self.drive.eq(Mux(above, limit, Mux(below, -limit, slewed)))
                 with m.If(~allowed):
                     m.d.sync += self.drive.eq(0)
                 m.d.sync += [
                     phase.eq(Mux(phase == self._design.decimation - 1, 0, phase + 1)),
-                    self.limited.eq(Mux(actuated, self.limited[0] | (within(slewed, limit) != slewed) << 1, 0)),
+                    self.limited.eq(Mux(actuated, self.limited[0] | (above | below) << 1, 0)),
                     self.actuated.eq(phase == 0),
                     self.valid.eq(1),
                 ]

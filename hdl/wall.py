@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from hardwall.model.wall import Design
 
-from .fixed import saturate, shape, shift_floor, shift_round_half_up
+from .fixed import shape, shift_floor
 
 
 class Wall(wiring.Component):
@@ -95,7 +95,8 @@ class Wall(wiring.Component):
         product = Signal(signed(len(gain) + len(operand)))
         spring_shift = design.push - design.stiffness.f
         damper_shift = design.push - design.damping.f - design.coarse.f
-        spring = Signal(signed(len(product) + spring_shift))
+        half = 1 << (design.push - 1) if design.push > 0 else 0
+        spring = Signal(signed(max(len(product) + spring_shift, half.bit_length() + 1) + 1))
         total = Signal(signed(max(len(spring), len(product) + damper_shift) + 1))
 
         m.d.sync += self.valid.eq(0)
@@ -115,17 +116,25 @@ class Wall(wiring.Component):
                 m.d.sync += [gain.eq(self.wall_damping), operand.eq(inward)]
                 m.next = "SUM"
             with m.State("SUM"):
-                m.d.sync += spring.eq(product << spring_shift)
+                # With half of a force LSB, so that the sum, rounded down, is the sum rounded half up.
+                m.d.sync += spring.eq((product << spring_shift) + half)
                 m.next = "PUSH"
             with m.State("PUSH"):
                 m.d.sync += total.eq(spring + (product << damper_shift))
                 m.next = "FORCE"
             with m.State("FORCE"):
-                least = Mux(self.wall_forbid_pull, 0, -design.force.max)
-                rounded = shift_round_half_up(total, design.push)
-                push = Mux(rounded < least, least, saturate(rounded, -design.force.max, design.force.max))
-                held = Mux(depth > 0, push, 0)
-                m.d.sync += [self.force.eq(Mux(self.wall_left, held, -held)), self.valid.eq(1)]
+                # The sign and the limits side by side: either alone is a carry chain.
+                top, left = design.force.max, self.wall_left
+                rounded = shift_floor(total, design.push)
+                push = rounded[: design.force.width].as_signed()
+                above = rounded > top
+                below = Mux(self.wall_forbid_pull, rounded < 0, rounded < -top)
+                limit = Mux(below & self.wall_forbid_pull, 0, Mux(above == left, top, -top))
+                within = Mux(left, push, -push)
+                m.d.sync += [
+                    self.force.eq(Mux(depth > 0, Mux(above | below, limit, within), 0)),
+                    self.valid.eq(1),
+                ]
                 m.next = "DEPTH"
         # The multiplier, registered on both sides: its result is there two clocks after its operands are chosen.
         m.d.sync += product.eq(gain * operand)

@@ -212,7 +212,8 @@ async def random_frames_reach_the_axis_and_telemetry_comes_back(dut):
     host = Host(dut, **parameters())
     await host.reset()
     read = []
-    while host.twin.clocks < 2 * SAMPLES:
+    # Fewer do not go everywhere.
+    while host.twin.clocks < 2 * max(SAMPLES, 100_000):
         host.rate = float(host.random.choice((0.0, 0.02, 0.3, 1.0), p=(0.1, 0.4, 0.4, 0.1)))
         host.illegal_rate = float(host.random.choice((0.0, 0.01)))
         answer, expected = await host.exchange(random_frame(host))
@@ -237,7 +238,8 @@ async def anything_but_a_whole_frame_only_reads(dut):
     await host.reset()
     host.rate = 0.02
     length = host.board.frame_bits
-    for bits in (0, 1, length - 1, length + 1, 2 * length, length):
+    wraps = 1 << (length + 1).bit_length()
+    for bits in (0, 1, length - 1, length + 1, 2 * length, wraps + length, length):
         await host.exchange(random_frame(host) | {"commit": 1, "preload": 1}, bits=bits)
         await host.edges(host.settling)
         answer, expected = await host.exchange({})
@@ -254,9 +256,10 @@ async def anything_but_a_whole_frame_only_reads(dut):
 async def while_a_commit_waits_the_port_is_deaf(dut):
     host = Host(dut, **parameters())
     await host.reset()
+    host.rate = 0.3
     for bits in (None, 0, None, 1, None):
         await host.edges(int(host.random.integers(0, host.twin.spec.clocks_per_sample)))
-        await host.exchange(random_frame(host) | {"commit": 1})
+        await host.exchange(random_frame(host) | {"commit": 1, "preload": 1})
         await host.exchange(random_frame(host) | {"commit": 1, "preload": 1}, bits=bits, heard=False)
         await host.edges(host.settling)
         answer, expected = await host.exchange({})
