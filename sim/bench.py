@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+from ..model.compiled import build_dir
 from . import hit
 from .scene import Scene, load
 
@@ -67,7 +68,8 @@ def _cocotb(name: str) -> Callable[[], float]:
             report = Path(folder) / "report.json"
             order = {"scene": name, "samples": COCOTB_SAMPLES, "report": str(report)}
             environ = {"HARDWALL_LOOP": json.dumps(order), "COCOTB_LOG_LEVEL": "WARNING"}
-            simulate(Axis(scene.spec), "hardwall.sim.cocotb_loop", Path(folder), environ)
+            log = build_dir() / "cocotb" / "bench.log"
+            simulate(Axis(scene.spec), "hardwall.sim.cocotb_loop", Path(folder), environ, log=log)
             result = json.loads(report.read_text())
         if result["force_sha256"] != words:
             raise RuntimeError(f"the RTL under cocotb and the model differ in their first {COCOTB_SAMPLES} force words")

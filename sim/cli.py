@@ -204,7 +204,7 @@ def table(
         "K (N/m)": "{stiffness_n_per_m:g}",
         "B (N s/m)": "{damping_n_s_per_m:g}",
         "wall": "{verdict}",
-        "RMS (mm)": "{rms_mm:.3g}",
+        "RMS (mm)": "{rms_mm:.5f}",
         "peak force (N)": "{max_force_n:.3f}",
         "samples/s": "{samples_per_s:.3g}",
         "force words": "{digest}",

@@ -22,6 +22,7 @@ def simulate(
     environ: dict[str, str],
     seed: int = 1,
     checks: str | None = None,
+    log: Path | None = None,
 ) -> None:
     """Run the cocotb tests of `module` on `component`.
 
@@ -32,6 +33,7 @@ def simulate(
         environ: variables for the simulator's process, beside this one's.
         seed: of cocotb's random numbers.
         checks: a regular expression of the tests to run; default: all.
+        log: a file for what the simulator prints; default: this process's stdout.
 
     Raises:
         RuntimeError: if the build fails, a test fails, or none ran.
@@ -67,10 +69,11 @@ def simulate(
             results_xml=str(build / f"results-{run}.xml"),
             test_filter=checks,
             seed=seed,
+            log_file=log,
             extra_env={**environ, "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])},
         )
     except SystemExit:
-        raise RuntimeError(f"a cocotb test of {module} failed: see above") from None
+        raise RuntimeError(f"a cocotb test of {module} failed: see {log or 'above'}") from None
     passed, failed = get_results(results)
     if not passed or failed:
         raise RuntimeError(

@@ -88,7 +88,7 @@ class Bench:
         self.dut = dut
         members = component.signature.members
         self._signed = {name: Shape.cast(members[name].shape).signed for name in members}
-        self._inputs = [name for name in members if members[name].flow == In]
+        self._inputs = [name for name in members if members[name].flow == In and name not in ("clk", "rst")]
 
     async def reset(self):
         """Start the clock, zero every input and hold reset for two clocks."""

@@ -145,12 +145,13 @@ class Host:
             self._turn()
 
     async def exchange(self, values: dict[str, int], bits: int | None = None, heard: bool = True, stuck: int = 0):
-        """Send a frame, or its first `bits`, or some more; return the answer, and the telemetry that it should be.
+        """Send a frame, or its first `bits`, or zeros before it; return the answer, and the telemetry it should be.
 
         Bits set in `stuck` are sent as ones. Unless `heard`, or if it is no whole frame, the axis is to get nothing.
         """
         frame = int.from_bytes(self.board.encode(values), "big") | stuck
         length = self.board.frame_bits
+        bits = length if bits is None else bits
         # The twin has seen `clocks` edges; the next has that number. The first edge to act on a change is number
         # `clocks` + SYNCHRONISER; the register followed the telemetry up to the one before.
         frozen = self.twin.clocks + SYNCHRONISER - 1
@@ -158,21 +159,21 @@ class Host:
         self.bench.drive(scan_select_n=0)
         await self.edges(HALF)
         answer = 0
-        for bit in range(length if bits is None else bits):
-            self.bench.drive(scan_clock=0, scan_in=frame >> max(length - 1 - bit, 0) & 1)
+        for bit in range(bits):
+            self.bench.drive(scan_clock=0, scan_in=frame >> (max(length, bits) - 1 - bit) & 1)
             await self.edges(HALF)
             answer = answer << 1 | int(self.dut.scan_out.value)
             self.bench.drive(scan_clock=1)
             await self.edges(HALF)
         self.bench.drive(scan_clock=0)
         await self.edges(HALF)
-        if heard and bits in (None, length):
+        if heard and bits == length:
             # An edge to see the rise, and the pulses are there at the next.
             self.given[self.twin.clocks + SYNCHRONISER + 1] = values
         self.bench.drive(scan_select_n=1)
         await self.edges(HALF)
         expected = self.captured.pop(frozen)
-        return (self.board.decode(answer.to_bytes(length // BYTE, "big")) if bits is None else None), expected
+        return (self.board.decode(answer.to_bytes(length // BYTE, "big")) if bits == length else None), expected
 
     async def commit(self, **values: int):
         """Send words, the others as after reset, and wait until they hold and have reached the pulses."""
