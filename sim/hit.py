@@ -64,6 +64,13 @@ class Hit:
         inside = np.flatnonzero(self.detail.position_m > 0)
         return float(self.detail.time_s[inside[0]]) if len(inside) else self.samples / self.scene.spec.sample_hz
 
+    @property
+    def estimate_rms_m_per_s(self) -> float | None:
+        """RMS error of the velocity estimate over `detail`, the first contact; None without traces, or a contact."""
+        if self.detail is None or not len(self.detail.time_s):
+            return None
+        return float(np.sqrt(np.mean((self.detail.estimate_m_per_s - self.detail.velocity_m_per_s) ** 2)))
+
     def save(self, path: Path) -> None:
         """Write the traces as an .npz: `overview_time_s`, `detail_force_n` and so on, and the report as JSON text.
 
@@ -77,6 +84,7 @@ class Hit:
 
     def report(self) -> dict:
         """Return the summary that the command line prints, units in the keys."""
+        error = self.estimate_rms_m_per_s
         return {
             "scene": self.scene.name,
             "backend": self.backend,
@@ -91,6 +99,7 @@ class Hit:
             "seconds": self.seconds,
             "samples_per_s": self.samples / self.seconds,
             "max_force_n": self.max_force_n,
+            "estimate_rms_mm_per_s": error and error * 1e3,
             "flags": self.flags,
             "force_sha256": self.force_sha256,
         }

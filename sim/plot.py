@@ -71,7 +71,7 @@ def _title(hit: Hit) -> str:
         f"{scene.name}: {scene.controller.estimator} (output {scene.output}), {hit.backend} backend, "
         f"{spec.sample_hz / 1e3:g} kHz sampling, {spec.actuation_hz / 1e3:g} kHz actuation\n"
         f"wall {scene.wall.stiffness_n_per_m / 1e3:g} kN/m, {scene.wall.damping_n_s_per_m:g} N s/m: {verdict}, "
-        f"RMS {hit.rms_m * 1e3:.3g} mm (threshold {scene.protocol.threshold_mm:g} mm)"
+        f"RMS {hit.rms_m * 1e3:.5f} mm (threshold {scene.protocol.threshold_mm:g} mm)"
     )
 
 
@@ -84,7 +84,7 @@ def _column(axes: np.ndarray, trace: Trace, time: np.ndarray, hit: Hit, zoomed: 
     position.set_ylim(low, high)
     position.set_ylabel("position (mm)")
 
-    if zoomed:
+    if zoomed and hit.scene.controller.estimator != "fdm":
         q, rate = hit.scene.spec.count_m, hit.scene.spec.sample_hz
         difference = np.diff(np.floor(trace.position_m / q)) * (q * rate)
         velocity.plot(time[1:], difference, color=BASELINE, lw=0.6, label="finite difference of the counts", zorder=1)
