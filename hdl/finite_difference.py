@@ -1,15 +1,15 @@
 """Velocity as the difference of successive counts."""
 
 from amaranth.hdl import Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.finite_difference import Design
 
+from . import Block
 from .fixed import saturate, shape
 
 
-class Estimator(wiring.Component):
+class Estimator(Block):
     """The finite difference of the last two counts.
 
     Equation: velocity = count - last count, modulo the count's width; 0 at the first sample.
@@ -47,28 +47,18 @@ class Estimator(wiring.Component):
     """
 
     def __init__(self, design: Design):
-        if not isinstance(design, Design):
-            raise TypeError(f"design must be a finite_difference.Design, not {design!r}")
-        self._design = design
         super().__init__(
-            {
+            design,
+            Design,
+            lambda: {
                 "strobe": In(1),
                 "restart": In(1),
                 "count": In(signed(design.count_width)),
                 "velocity": Out(shape(design.velocity)),
                 "saturated": Out(len(design.flags)),
                 "valid": Out(1),
-            }
+            },
         )
-
-    @property
-    def design(self) -> Design:
-        return self._design
-
-    @property
-    def latency(self) -> int:
-        """Clocks from `strobe` to `valid`."""
-        return self._design.latency
 
     def elaborate(self, platform):
         m = Module()

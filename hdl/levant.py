@@ -1,16 +1,16 @@
 """Levant's first-order sliding-mode differentiator."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.levant import Design
 
+from . import Block
 from .fixed import saturate, shape, shift_floor, shift_round_half_up
 from .sqrt import Sqrt
 
 
-class Estimator(wiring.Component):
+class Estimator(Block):
     """Levant's differentiator, explicit Euler, one sample at a time.
 
     Equation, per sample, in counts and sample periods:
@@ -63,11 +63,10 @@ class Estimator(wiring.Component):
     """
 
     def __init__(self, design: Design):
-        if not isinstance(design, Design):
-            raise TypeError(f"design must be a levant.Design, not {design!r}")
-        self._design = design
         super().__init__(
-            {
+            design,
+            Design,
+            lambda: {
                 "strobe": In(1),
                 "restart": In(1),
                 "count": In(signed(design.count_width)),
@@ -75,17 +74,8 @@ class Estimator(wiring.Component):
                 "velocity": Out(shape(design.velocity)),
                 "saturated": Out(len(design.flags)),
                 "valid": Out(1),
-            }
+            },
         )
-
-    @property
-    def design(self) -> Design:
-        return self._design
-
-    @property
-    def latency(self) -> int:
-        """Clocks from `strobe` to `valid`."""
-        return self._design.latency
 
     def elaborate(self, platform):
         m = Module()

@@ -1,15 +1,15 @@
 """From the wall's force to the drive."""
 
 from amaranth.hdl import Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.output import Design
 
+from . import Block
 from .fixed import shape
 
 
-class Output(wiring.Component):
+class Output(Block):
     """Decimation, slew limit and, last of all, the force limit.
 
     Equation, every `design.decimation` strobes, the first included:
@@ -60,11 +60,10 @@ class Output(wiring.Component):
     """
 
     def __init__(self, design: Design):
-        if not isinstance(design, Design):
-            raise TypeError(f"design must be an output.Design, not {design!r}")
-        self._design = design
         super().__init__(
-            {
+            design,
+            Design,
+            lambda: {
                 "strobe": In(1),
                 "force": In(shape(design.force)),
                 "fault": In(1),
@@ -74,17 +73,8 @@ class Output(wiring.Component):
                 "limited": Out(len(design.flags)),
                 "actuated": Out(1),
                 "valid": Out(1),
-            }
+            },
         )
-
-    @property
-    def design(self) -> Design:
-        return self._design
-
-    @property
-    def latency(self) -> int:
-        """Clocks from `strobe` to `valid`."""
-        return self._design.latency
 
     def elaborate(self, platform):
         m = Module()

@@ -1,15 +1,15 @@
 """The virtual wall: a unilateral spring and damper."""
 
 from amaranth.hdl import Module, Mux, Signal, signed
-from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.wall import Design
 
+from . import Block
 from .fixed import shape, shift_floor
 
 
-class Wall(wiring.Component):
+class Wall(Block):
     """The force of a unilateral spring and damper on the handle.
 
     Equation, with side = +1 where the wall fills greater positions, else -1:
@@ -61,28 +61,18 @@ class Wall(wiring.Component):
     """
 
     def __init__(self, design: Design):
-        if not isinstance(design, Design):
-            raise TypeError(f"design must be a wall.Design, not {design!r}")
-        self._design = design
         super().__init__(
-            {
+            design,
+            Design,
+            lambda: {
                 "strobe": In(1),
                 "count": In(signed(design.count_width)),
                 "velocity": In(shape(design.velocity)),
                 **{word.name: In(shape(word.format)) for word in design.words},
                 "force": Out(shape(design.force)),
                 "valid": Out(1),
-            }
+            },
         )
-
-    @property
-    def design(self) -> Design:
-        return self._design
-
-    @property
-    def latency(self) -> int:
-        """Clocks from `strobe` to `valid`."""
-        return self._design.latency
 
     def elaborate(self, platform):
         m = Module()
