@@ -87,13 +87,13 @@ class Design:
         blocks = self.estimator.params(words), self.wall.params(words), self.output.params(words)
         return Params(*blocks, *self._flag_bits)
 
-    def float_params(self, words: dict[str, int], stiffness_n_per_m: float, damping_n_s_per_m: float) -> Params:
-        """Return the float64 kernel's parameters: gains as given, not as rounded to words."""
+    def float_params(self, words: dict[str, int], si: dict[str, float]) -> Params:
+        """Return the float64 kernel's parameters: gains as given in `si`, by word's name, not as rounded to `words`."""
         outputs = self.spec.model.OUTPUTS
         selected = outputs[words.get(f"{self.spec.estimator}_output", 0)]
         return Params(
-            self.estimator.float_params(self.gains, selected),
-            self.wall.float_params(stiffness_n_per_m, damping_n_s_per_m, words),
+            self.estimator.float_params(self.gains, selected, si),
+            self.wall.float_params(si.get("wall_stiffness", 0.0), si.get("wall_damping", 0.0), words),
             self.output.float_params(words),
             *self._flag_bits,
         )
@@ -157,8 +157,8 @@ def run_pins(timing, decoder, settings, params, state, pins, first, until, out):
         state: a `PinState`.
         pins: int64, shape (8, clocks): A, B, Z, drive_enable, preload, preload_count, index_arm, clear_flags.
             `drive_enable` and `clear_flags` change between a changed drive and the next strobe only.
-        out: int64, shape (10, samples): drive, velocity, force, flags and actuated of each sample; and count,
-            illegal_count, index_count, index_latched, stamp_a_rise when its drive has changed.
+        out: int64, shape (14, samples): drive, velocity, force, flags and actuated of each sample; and count,
+            illegal_count, index_count, index_latched, index_armed and the four stamps when its drive has changed.
     """
     per_sample, latency = timing
     glitch_clocks, invert = settings
@@ -173,9 +173,11 @@ def run_pins(timing, decoder, settings, params, state, pins, first, until, out):
             restart = 0
         elif (n + 1 - latency) % per_sample == 0 and n >= latency:
             shown = (n + 1 - latency) // per_sample - 1
-            out[5, shown], out[6, shown] = state.decoder.count, state.decoder.illegal_count
-            out[7, shown], out[8, shown] = state.decoder.index_count, state.decoder.index_latched
-            out[9, shown] = state.decoder.stamp_a_rise
+            seen = state.decoder
+            out[5, shown], out[6, shown] = seen.count, seen.illegal_count
+            out[7, shown], out[8, shown], out[9, shown] = seen.index_count, seen.index_latched, seen.index_armed
+            out[10, shown], out[11, shown] = seen.stamp_a_rise, seen.stamp_b_rise
+            out[12, shown], out[13, shown] = seen.stamp_a_fall, seen.stamp_b_fall
         if pins[7, n]:
             now = State(now.estimator, now.output, 0)
         if not pins[3, n]:
@@ -235,7 +237,7 @@ class Axis:
         words = self.design.encode(**si)
         self._floating = floating
         if floating:
-            self._params = self.design.float_params(words, si.get("wall_stiffness", 0.0), si.get("wall_damping", 0.0))
+            self._params = self.design.float_params(words, si)
         else:
             self._params = self.design.params(words)
 

@@ -9,7 +9,7 @@ An estimator's module in `hardwall.model` provides
   names none;
 - `Design(axis, gains)`: formats, run-time words and latency derived from a `spec.AxisSpec`, with attributes `velocity`
   (a `fixed.SQ`, counts a sample), `words` (tuple of `words.Word`), `flags` (names of its saturation flags, bit 0
-  first), `latency` (clocks from strobe to valid), and methods `params(words)` and `float_params(gains, output)`;
+  first), `latency` (clocks from strobe to valid), and methods `params(words)` and `float_params(gains, output, si)`;
 - `START` and `FLOAT_START`: the states before the first sample;
 - kernels registered with `estimate` for its `Params` and its `FloatParams`.
 

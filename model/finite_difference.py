@@ -55,7 +55,7 @@ class Design:
     def params(self, words: dict[str, int]) -> Params:
         return Params(self.count_width, self.velocity.max)
 
-    def float_params(self, gains: Gains, output: str) -> FloatParams:
+    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
         return FloatParams(self.count_width)
 
 

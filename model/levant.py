@@ -179,12 +179,12 @@ class Design:
             velocity_max=self.velocity.max,
         )
 
-    def float_params(self, gains: Gains, output: str) -> FloatParams:
-        """Return the float64 algorithm's parameters, gains unrounded, per sample."""
+    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+        """Return the float64 algorithm's parameters, per sample: gains unrounded, those of `si` before the designed."""
         lam, alpha, _ = self.words
         return FloatParams(
-            gains.lambda_sqrt_m_per_s / lam.si_per_unit,
-            gains.alpha_m_per_s2 / alpha.si_per_unit,
+            si.get("levant_lambda", gains.lambda_sqrt_m_per_s) / lam.si_per_unit,
+            si.get("levant_alpha", gains.alpha_m_per_s2) / alpha.si_per_unit,
             OUTPUTS.index(output),
             self.count_width,
         )

@@ -81,11 +81,11 @@ class Design:
         self.push = max(self.stiffness.f, self.damping.f + self.coarse.f, 0)
         spring_bits = 16 + axis.count_width + self.push - self.stiffness.f
         damper_bits = 16 + self.coarse.width + self.push - self.damping.f - self.coarse.f
-        if max(spring_bits, damper_bits) > 61:
-            raise ValueError(
-                f"stiffness_max_n_per_m and damping_max_n_s_per_m must be within a factor that 61 bits hold, "
-                f"not {axis.stiffness_max_n_per_m!r} and {axis.damping_max_n_s_per_m!r}"
-            )
+        for name, bits in (("stiffness_max_n_per_m", damper_bits), ("damping_max_n_s_per_m", spring_bits)):
+            if bits > 61:
+                value = getattr(axis, name)
+                least = value * 2.0 ** (bits - 61)
+                raise ValueError(f"{name} must be at least {least:g} beside the other gain's largest, not {value!r}")
         self.words = (
             Word("wall_stiffness", self.stiffness, r / q, "N/m", 0, "spring of the wall"),
             Word("wall_damping", self.damping, r * tau / q, "N s/m", 0, "damper of the wall"),

@@ -18,14 +18,17 @@ ROUNDS = 5
 SECONDS_OF_SCENE = {"float": 6.0, "fixed": 6.0, "rtl": 0.2}
 """Simulated time a round, by backend: the whole protocol of the model's, enough of the RTL's to time it."""
 COCOTB_SAMPLES = 2000
-BARE = {"handle.coulomb_n": None, "amplifier": None}
-PARTS = {
-    "none": BARE,
-    "coulomb friction": {"amplifier": None, "handle.coulomb_n": 1e-12},
-    "amplifier delay": {"handle.coulomb_n": None, "amplifier.delay_s": 1e-6},
-    "encoder phase error": BARE | {"encoder.phase_error_counts": 1e-9},
-}
-"""Scenes with one optional part each, so slight that the motion stays what it is without."""
+
+
+def _parts(sample_s: float) -> dict[str, dict]:
+    """Return changes that leave a scene one optional part each, so slight that the motion is as without."""
+    bare = {"handle.coulomb_n": None, "amplifier": None}
+    return {
+        "none": bare,
+        "coulomb friction": bare | {"handle.coulomb_n": 1e-12},
+        "amplifier delay": {"handle.coulomb_n": None, "amplifier.delay_s": sample_s},
+        "encoder phase error": bare | {"encoder.phase_error_counts": 1e-9},
+    }
 
 
 def _scene(name: str, changes: dict, seconds: float) -> Scene:
@@ -66,7 +69,9 @@ def _cocotb(name: str) -> Callable[[], float]:
     def run() -> float:
         with tempfile.TemporaryDirectory() as folder:
             report = Path(folder) / "report.json"
-            order = {"scene": name, "samples": COCOTB_SAMPLES, "report": str(report)}
+            # The simulator runs in a folder of its own.
+            found = str(Path(name).absolute()) if name.endswith(".toml") else name
+            order = {"scene": found, "samples": COCOTB_SAMPLES, "report": str(report)}
             environ = {"HARDWALL_LOOP": json.dumps(order), "COCOTB_LOG_LEVEL": "WARNING"}
             log = build_dir() / "cocotb" / "bench.log"
             simulate(Axis(scene.spec), "hardwall.sim.cocotb_loop", Path(folder), environ, log=log)
@@ -88,7 +93,10 @@ def bench(scene: str, progress: Callable[[str], None]) -> dict:
     progress("compiling and building")
     speeds = {backend: _hits(_scene(scene, {}, seconds), backend) for backend, seconds in SECONDS_OF_SCENE.items()}
     speeds["cocotb"] = _cocotb(scene)
-    parts = {name: _hits(_scene(scene, changes, SECONDS_OF_SCENE["fixed"]), "fixed") for name, changes in PARTS.items()}
+    parts = {
+        name: _hits(_scene(scene, changes, SECONDS_OF_SCENE["fixed"]), "fixed")
+        for name, changes in _parts(1 / load(scene).spec.sample_hz).items()
+    }
     samples_per_s = _medians(speeds, progress)
     costs = {name: 1e9 / rate for name, rate in _medians(parts, progress).items()}
     return {

@@ -10,8 +10,10 @@ from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
 from ..model import estimators
 from .scene import SceneError, load, names
@@ -79,7 +81,7 @@ def _show(report: dict[str, Any], as_json: bool) -> None:
         return
     table = Table(box=None, show_header=False)
     for key, value in report.items():
-        table.add_row(f"[bold]{key}", _text(value))
+        table.add_row(Text(key, "bold"), Text(_text(value), overflow="fold"))
     Console(highlight=False, soft_wrap=True).print(table)
 
 
@@ -142,7 +144,7 @@ class _progress:
     def __init__(self, title: str, total: int):
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         self._bar = Progress(*columns, console=log, transient=True, disable=not log.is_terminal)
-        self._task = self._bar.add_task(title, total=total)
+        self._task = self._bar.add_task(escape(title), total=total)
 
     def __enter__(self):
         self._bar.start()
@@ -176,6 +178,8 @@ def replay(
     from .replay import ReplayError  # noqa: PLC0415
     from .replay import replay as run  # noqa: PLC0415
 
+    if out and out.exists() and file.exists() and out.samefile(file):
+        raise BadInput(f"--out must be another file than the recording, not {str(out)!r}")
     out, plot = _output_file(out, "--out", (".csv",)), _output_file(plot, "--plot", SUFFIXES)
     try:
         recording = load_recording(file, column, rate)
@@ -224,7 +228,7 @@ def table(
     for name in columns:
         result.add_column(name, justify="left" if name in ("scene", "estimator", "backend") else "right")
     for row in rows:
-        result.add_row(*row)
+        result.add_row(*map(Text, row))
     Console(highlight=False, width=max(120, log.width)).print(result)
 
 

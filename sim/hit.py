@@ -126,7 +126,8 @@ def model_controller(scene: Scene, floating: bool, start_level: int) -> tuple[Mo
     """Return the `float` or `fixed` controller of a scene, and its state after reset with the pins at `start_level`."""
     spec, design, words = scene.spec, scene.spec.design, scene.words
     if floating:
-        params = design.float_params(words, scene.wall.stiffness_n_per_m, scene.wall.damping_n_s_per_m)
+        si = {"wall_stiffness": scene.wall.stiffness_n_per_m, "wall_damping": scene.wall.damping_n_s_per_m}
+        params = design.float_params(words, si)
     else:
         params = design.params(words)
     decoder = quadrature.Params(spec.count_width, spec.stamp_width, 8)
@@ -215,7 +216,10 @@ def run(
     with Hardware(spec, scene.words, start_level, traced=waveform is not None) as hardware, _vcd(waveform) as vcd:
         # What the hardware will do is known before it runs: the contact is where the bit-accurate model has it.
         marks = _waveform_marks(scene, hardware, vcd) if waveform else ()
-        return _closed_loop(scene, backend, world, hardware.controller, hardware.start, at, records, progress, marks)
+        result = _closed_loop(scene, backend, world, hardware.controller, hardware.start, at, records, progress, marks)
+        if waveform:
+            hardware.end_trace()
+        return result
 
 
 @contextmanager

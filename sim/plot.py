@@ -18,7 +18,7 @@ ESTIMATE, TRUE, BASELINE, FORCE = "tab:blue", "black", "0.8", "tab:red"
 def plot_hit(hit: Hit, path: Path) -> None:
     """Draw position, velocities and force of a hit: the whole run on the left, its first contact on the right.
 
-    Beside the estimate stands the finite difference of the same counts, the baseline it is there to beat.
+    Beside the estimate stands the finite difference of counts without encoder errors, the baseline it is to beat.
 
     Args:
         hit: a run with traces.
@@ -87,19 +87,25 @@ def _column(axes: np.ndarray, trace: Trace, time: np.ndarray, hit: Hit, zoomed: 
     if zoomed and hit.scene.controller.estimator != "fdm":
         q, rate = hit.scene.spec.count_m, hit.scene.spec.sample_hz
         difference = np.diff(np.floor(trace.position_m / q)) * (q * rate)
-        velocity.plot(time[1:], difference, color=BASELINE, lw=0.6, label="finite difference of the counts", zorder=1)
+        velocity.plot(time[1:], difference, color=BASELINE, lw=0.6, label="finite difference of ideal counts", zorder=1)
     name = hit.scene.controller.estimator
     velocity.plot(time, trace.estimate_m_per_s, color=ESTIMATE, lw=0.8, label=f"estimate ({name} {hit.scene.output})")
     velocity.plot(time, trace.velocity_m_per_s, color=TRUE, lw=1, label="true")
     velocity.set_ylabel("velocity (m/s)")
     _frame(velocity, trace.velocity_m_per_s, trace.estimate_m_per_s)
 
-    force.plot(time, trace.force_n, color=FORCE, lw=0.8, drawstyle="steps-post", label="wall on handle")
+    force.plot(time, trace.force_n, color=FORCE, lw=0.8, drawstyle="steps-post", label=_drive_label(hit))
     force.axhline(-hit.scene.protocol.push_n, color="0.5", lw=0.8, ls=":", label="balance of the motor's push")
     force.set_ylabel("force (N)")
     for axis in axes:
         axis.grid(alpha=0.3)
         axis.legend(loc="best", fontsize=7, framealpha=0.9)
+
+
+def _drive_label(hit: Hit) -> str:
+    if hit.scene.delay_samples:
+        return f"drive, wall on handle; it acts {hit.scene.amplifier.delay_s * 1e3:g} ms later"
+    return "drive, wall on handle"
 
 
 def _frame(axis: Axes, *curves: np.ndarray) -> None:

@@ -29,6 +29,7 @@ from pathlib import Path
 import numpy as np
 
 TIME_COLUMN = "time_s"
+RATE_MIN_HZ = 1e-6
 RATE_MAX_HZ = 1e9
 SPAN_BITS = 32
 ACCEPTED = "a CSV file: UTF-8 text, a header line with the columns' names, one sample a line"
@@ -73,13 +74,13 @@ def load(path: str | Path, column: str, rate_hz: float | None = None) -> Recordi
     Raises:
         RecordingError: in one line, what is wrong, where, and what is accepted.
     """
-    if rate_hz is not None and not (isinstance(rate_hz, int | float) and 0 < rate_hz <= RATE_MAX_HZ):
-        raise RecordingError(f"{path}: the rate must be more than 0 and at most {RATE_MAX_HZ:g} Hz, not {rate_hz!r}")
+    if rate_hz is not None and not (isinstance(rate_hz, int | float) and RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ):
+        raise RecordingError(f"{path}: the rate must be {RATE_MIN_HZ:g} to {RATE_MAX_HZ:g} Hz, not {rate_hz!r}")
     header, rows = _rows(path)
     place = _place(path, header, column)
     time_place = _place(path, header, TIME_COLUMN) if TIME_COLUMN in header else None
     if time_place is None and rate_hz is None:
-        raise RecordingError(f"{path}: there is no column {TIME_COLUMN}, so the rate in Hz must be given")
+        raise RecordingError(f"{path}: there is no column {TIME_COLUMN}, so the rate in Hz must be given (--rate)")
 
     lines, counts, stamps = [], [], []
     for line, cells in rows:

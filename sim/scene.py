@@ -24,6 +24,10 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Rate = Annotated[int, Field(gt=0, le=10**9)]
 
 
+SAMPLES_MAX = 10**9
+"""Of a run's settling or measuring: a minute or two of the model's time, hours of the RTL's."""
+
+
 class SceneError(ValueError):
     """A scene that cannot be: one line, naming the file, the key and what is accepted."""
 
@@ -162,8 +166,9 @@ class Scene(Section):
 
     @property
     def samples(self) -> int:
-        """Samples of the protocol."""
-        return round((self.protocol.settle_s + self.protocol.measure_s) * self.controller.sample_hz)
+        """Samples of the protocol: those to settle, and those to measure."""
+        rate = self.controller.sample_hz
+        return round(self.protocol.settle_s * rate) + round(self.protocol.measure_s * rate)
 
 
 # Which scene key a message of the model speaks of, where the names differ.
@@ -208,20 +213,36 @@ def _check(scene: Scene) -> None:
             f"controller.speed_max_m_per_s must be at most {fastest:g}, the decoder's limit at this clock, count size, "
             f"glitch_clocks and edge error, not {spec.speed_max_m_per_s!r}"
         )
+    protocol, rate = scene.protocol, spec.sample_hz
+    longest = SAMPLES_MAX / rate
+    for key in ("settle_s", "measure_s"):
+        if not 0.5 < getattr(protocol, key) * rate <= SAMPLES_MAX:
+            raise ValueError(
+                f"protocol.{key} must be a sample of {1 / rate:g} s to {longest:g}, not {getattr(protocol, key)!r}"
+            )
+    if not 0.5 < protocol.mean_s * rate <= round(protocol.settle_s * rate):
+        raise ValueError(
+            f"protocol.mean_s must be a sample of {1 / rate:g} s to settle_s {protocol.settle_s:g}, "
+            f"not {protocol.mean_s!r}"
+        )
+    for name, most in (
+        ("stiffness_n_per_m", spec.stiffness_max_n_per_m),
+        ("damping_n_s_per_m", spec.damping_max_n_s_per_m),
+    ):
+        if getattr(scene.wall, name) > most:
+            raise ValueError(
+                f"wall.{name} must be 0 to {most:g}, what the controller is for, not {getattr(scene.wall, name)!r}"
+            )
     if scene.amplifier is not None:
+        if scene.amplifier.delay_s > protocol.settle_s:
+            raise ValueError(
+                f"amplifier.delay_s must be 0 to settle_s {protocol.settle_s:g}, not {scene.amplifier.delay_s!r}"
+            )
         exact = scene.amplifier.delay_s * spec.sample_hz
         if not math.isclose(exact, scene.delay_samples, abs_tol=1e-6):
             raise ValueError(
                 f"amplifier.delay_s must be a whole number of samples of {1 / spec.sample_hz:g} s, "
                 f"not {scene.amplifier.delay_s!r}"
-            )
-    protocol = scene.protocol
-    if protocol.mean_s > protocol.settle_s:
-        raise ValueError(f"protocol.mean_s must be at most settle_s {protocol.settle_s:g}, not {protocol.mean_s!r}")
-    for key in ("mean_s", "measure_s"):
-        if getattr(protocol, key) * spec.sample_hz < 1:
-            raise ValueError(
-                f"protocol.{key} must be at least a sample of {1 / spec.sample_hz:g} s, not {getattr(protocol, key)!r}"
             )
 
 
@@ -237,6 +258,8 @@ def _sentence(error: dict[str, Any]) -> str:
         return f"{key} is not a key of a scene{_suggestion(error['loc'])}"
     if error["type"] in ("model_type", "dict_type"):
         return f"{key} must be a section, not {error['input']!r}"
+    if key == "encoder.phase_error_counts":
+        return f"{key} must be a finite number, or a list of four, not {error['input']!r}"
     relations = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
     wanted = " and ".join(f"{words} {limits[short]:g}" for short, words in relations.items() if short in limits)
     if not wanted:
@@ -257,7 +280,7 @@ def _suggestion(location: tuple) -> str:
         section = next(kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Section))
     keys = [key for key in section.model_fields if key != "name"]
     near = difflib.get_close_matches(str(location[-1]), keys, 1)
-    return f"; did you mean {near[0]}?" if near else f"; its section has {', '.join(keys)}"
+    return f"; did you mean {near[0]}?" if near else f"; its section has {', '.join(keys) or 'no keys'}"
 
 
 def names() -> list[str]:

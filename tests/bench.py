@@ -122,13 +122,18 @@ class Bench:
     def monitor(self, strobe: str, *names: str) -> Monitor:
         return Monitor(self, strobe, names)
 
-    async def transact(self, strobe: str, done: str, **values: int) -> None:
-        """Drive `values` with a one-clock `strobe` and wait until `done` has been seen."""
+    async def transact(self, strobe: str, done: str, idle: bool = True, **values: int) -> None:
+        """Drive `values` with a one-clock `strobe` and wait for `done`; with `idle`, until the clock after it."""
         self.drive(**values, **{strobe: 1})
         await RisingEdge(self.dut.clk)
         self.drive(**{strobe: 0})
         await RisingEdge(getattr(self.dut, done))
-        await RisingEdge(self.dut.clk)
+        if idle:
+            await RisingEdge(self.dut.clk)
+
+    async def rest(self) -> None:
+        """Let the monitors see what the last transaction brought."""
+        await ClockCycles(self.dut.clk, 2)
 
 
 def check(inputs: Monitor, outputs: Monitor, expected: dict[str, np.ndarray], latency: int | None = None) -> None:

@@ -16,7 +16,8 @@ PINS = (
 )  # fmt: skip
 OUTPUTS = (
     "drive", "velocity", "wall_force", "flags", "actuated",
-    "count", "illegal_count", "index_count", "index_latched", "stamp_a_rise",
+    "count", "illegal_count", "index_count", "index_latched", "index_armed",
+    "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall",
 )  # fmt: skip
 SLACK = 12
 """Clocks of each sample after the drive has changed, in which the host may act."""
@@ -105,12 +106,19 @@ async def motion(bench: Bench, spec: AxisSpec, samples: int, random: np.random.G
         if random.random() < 0.02:
             spacing = float(random.choice([4, 8, 15, 40, 200])) if random.random() < 0.98 else 1.0
             direction = int(random.choice([-1, 1]))
-        quarter = (quarter + direction) % 4
+        # Now and then both pins at once: an illegal transition, whatever else comes.
+        quarter = (quarter + direction * (2 if random.random() < 0.002 else 1)) % 4
         a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[quarter]
         bench.drive(encoder_a=a, encoder_b=b)
         if random.random() < 0.01:
             bench.drive(encoder_z=int(random.integers(0, 2)))
         await Timer(max(1, int(random.exponential(spacing))) * period, "ns")
+
+
+async def committed_with(dut) -> None:
+    """Check that a commit is over when the next sample is."""
+    await RisingEdge(dut.sampled)
+    assert not int(dut.commit_pending.value)
 
 
 async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Generator, commits: list) -> None:
@@ -142,6 +150,10 @@ async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Gen
             bench.drive(**{pulse: 1})
             await Timer(bench.period_ns, "ns")
             bench.drive(**{pulse: 0})
+        if pulse == "commit":
+            await Timer(bench.period_ns, "ns")
+            assert int(dut.commit_pending.value), "a commit waits for the strobe"
+            cocotb.start_soon(committed_with(dut))
 
 
 @cocotb.test()

@@ -47,6 +47,14 @@ def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
             "controller.gains.levant.alpha_m_per_s2 must be 9.31323e-08 to 51200 at these rates, not 1000000000.0",
         ),
         (["hit", "--stiffness", "1e9"], "wall.stiffness_n_per_m must be 0 to 255996 N/m, not 1000000000.0"),
+        (["hit", "--stiffness", "250e3"], "wall.stiffness_n_per_m must be 0 to 200000, what the controller is for"),
+        (["hit", "--set", "protocol.settle_s=1e308"], "protocol.settle_s must be a sample of 0.0001 s to 100000"),
+        (["hit", "--set", "protocol.measure_s=1e-9"], "protocol.measure_s must be a sample of 0.0001 s to 100000"),
+        (["hit", "--set", "amplifier.delay_s=1e300"], "amplifier.delay_s must be 0 to settle_s 4, not 1e+300"),
+        (
+            ["hit", "--set", "controller.gains.fdm.x=1"],
+            "controller.gains.fdm.x is not a key of a scene; its section has",
+        ),
         (["hit", "--stiffness", "-5"], "wall.stiffness_n_per_m must be at least 0, not -5.0"),
         (["hit", "--damping", "1e6"], "wall.damping_n_s_per_m must be 0 to 409"),
         (
@@ -54,7 +62,10 @@ def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
             "controller.speed_max_m_per_s must be at most 8, the decoder's limit",
         ),
         (["hit", "--set", "encoder.phase_error_counts=0.99"], "encoder.phase_error_counts and duty_error_counts must"),
-        (["hit", "--set", "encoder.phase_error_counts=[1,2]"], "encoder.phase_error_counts must be"),
+        (
+            ["hit", "--set", "encoder.phase_error_counts=[1,2]"],
+            "encoder.phase_error_counts must be a finite number, or a list of four",
+        ),
         (["hit", "--output", "u7"], "controller.output must be one of u, u1, not 'u7'"),
         (["hit", "--estimator", "fdm", "--output", "u1"], "controller.output must be one of u, not 'u1'"),
         (["hit", "--estimator", "kalman"], "'kalman' is not one of 'fdm', 'levant'"),
@@ -66,7 +77,10 @@ def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
         (["hit", "--trace", "hit.fst", "--backend", "fixed"], "--trace hit.fst needs --backend rtl"),
         (["hit", "--set", "amplifier.delay_s=1.5e-5"], "amplifier.delay_s must be a whole number of samples"),
         (["hit", "--set", "protocol.start_m=-9.0"], "protocol.start_m must be -0.15 to 0"),
-        (["hit", "--set", "protocol.mean_s=9.0"], "protocol.mean_s must be at most settle_s 4, not 9.0"),
+        (
+            ["hit", "--set", "protocol.mean_s=9.0"],
+            "protocol.mean_s must be a sample of 0.0001 s to settle_s 4, not 9.0",
+        ),
         (["table", "no-such.json"], "no-such.json: no such file"),
         (["shoot"], "No such command 'shoot'"),
     ],
@@ -103,6 +117,25 @@ def test_bad_scene_files_are_named(monkeypatch, capsys, tmp_path, content, messa
     assert message in err
     assert err.count("\n") == 1
     assert (code, out) == (2, "")
+
+
+def test_a_replay_does_not_overwrite_its_recording(monkeypatch, capsys, tmp_path):
+    file = tmp_path / "recording.csv"
+    file.write_text("counts\n" + "0\n" * 9)
+    code, out, err = call(monkeypatch, capsys, "replay", file, "--column", "counts", "--rate", "1000", "--out", file)
+    assert "--out must be another file than the recording" in err
+    assert (code, out) == (2, "")
+    assert file.read_text().startswith("counts\n")
+    code, _, err = call(monkeypatch, capsys, "replay", file, "--column", "counts", "--rate", "1e-300")
+    assert (code, err.count("\n")) == (2, 1)
+
+
+def test_a_name_with_markup_is_only_a_name(monkeypatch, capsys, tmp_path):
+    file = tmp_path / "[red]x.toml"
+    file.write_text(SEED)
+    code, out, _ = call(monkeypatch, capsys, "hit", file, "--backend", "float")
+    assert code == 0
+    assert "[red]x" in out
 
 
 def test_a_scene_file_of_ones_own_runs(monkeypatch, capsys, tmp_path):

@@ -37,6 +37,7 @@ async def follows_model(dut):
     component = make(name)
     bench = Bench(dut, component)
     await bench.reset()
+    coin = rng()  # whether the next strobe comes with this one's end
     inputs = bench.monitor("strobe", "count", "restart")
     outputs = bench.monitor("valid", "velocity", "saturated")
     half = 1 << (component.design.count_width - 1)
@@ -48,7 +49,8 @@ async def follows_model(dut):
     )
     counts = np.concatenate([ends, jumps, walk])
     for count, restart in zip(counts.tolist(), (random.random(len(counts)) < 0.01).tolist(), strict=True):
-        await bench.transact("strobe", "valid", count=count, restart=restart)
+        await bench.transact("strobe", "valid", idle=coin.random() < 0.5, count=count, restart=restart)
+    await bench.rest()
     expected = model(name, inputs.rows)
     assert expected["saturated"].any()
     check(inputs, outputs, expected, component.latency)

@@ -74,11 +74,13 @@ async def follows_model(dut):
     component = make(name)
     bench = Bench(dut, component)
     await bench.reset()
+    coin = rng()  # whether the next strobe comes with this one's end
     inputs = bench.monitor("strobe", "count", "restart", *NAMES)
     outputs = bench.monitor("valid", "velocity", "saturated")
     for count, restart, *gains in stimulus(name, SAMPLES):
         drive = dict(zip(NAMES, gains, strict=True))
-        await bench.transact("strobe", "valid", count=count, restart=restart, **drive)
+        await bench.transact("strobe", "valid", idle=coin.random() < 0.5, count=count, restart=restart, **drive)
+    await bench.rest()
     expected = model(name, inputs.rows)
     # The campaign is worth its name only if it reached both saturations, and the quiet track too.
     assert 0 in expected["saturated"]

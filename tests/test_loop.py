@@ -38,9 +38,20 @@ def test_rtl_gives_the_models_force_words(estimator, wall, stable):
     assert result.max_force_n > 1
 
 
-def test_rtl_gives_the_models_force_words_with_an_imperfect_encoder():
-    result = same_words("seed-2011", {"encoder.phase_error_counts": 0.25, "encoder.duty_error_counts": 0.1})
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("wall", [STABLE, UNSTABLE], ids=["stable", "unstable"])
+def test_rtl_gives_the_models_force_words_with_an_imperfect_encoder(estimator, wall):
+    errors = {"encoder.phase_error_counts": 0.25, "encoder.duty_error_counts": 0.1}
+    result = same_words("seed-2011", ESTIMATORS[estimator] | wall | errors | ONE_SECOND)
     assert result.max_force_n > 1
+
+
+@pytest.mark.parametrize("estimator", ["levant u", "fdm"])
+def test_rtl_gives_the_models_force_words_when_samples_leave_no_slack(estimator):
+    """The fastest sampling that a clock allows: the next strobe comes as the drive changes."""
+    clock_hz = load("mhz", ESTIMATORS[estimator]).spec.design.latency_to_drive * 1_000_000
+    slow = {"controller.clock_hz": clock_hz, "controller.glitch_clocks": 0, "protocol.measure_s": 0.01}
+    assert same_words("mhz", ESTIMATORS[estimator] | ONE_SECOND | slow).max_force_n > 1
 
 
 def test_rtl_gives_the_models_force_words_and_flags_when_the_encoder_is_too_fast():
@@ -57,6 +68,13 @@ def test_rtl_gives_the_models_force_words_at_a_megahertz(estimator):
     result = same_words("mhz", ESTIMATORS[estimator] | ONE_SECOND)
     assert result.samples == 1_000_000
     assert result.max_force_n > 1
+
+
+def test_rtl_gives_the_models_force_words_at_a_megahertz_in_a_wall_that_throws_the_handle_back():
+    """The stiffest wall that the words hold, and an encoder out of phase."""
+    wall = {"wall.stiffness_n_per_m": 200e3, "wall.damping_n_s_per_m": 0.0, "encoder.phase_error_counts": 0.25}
+    result = same_words("mhz", wall | ONE_SECOND | {"protocol.measure_s": 0.05})
+    assert not result.stable
 
 
 def test_float_and_fixed_agree_on_what_the_wall_does():
@@ -85,8 +103,10 @@ def test_a_late_amplifier_is_late_by_exactly_its_delay():
     apart = int(np.argmax(paths[0].position_m != paths[1].position_m))
     first_force = int(np.argmax(paths[1].force_n != 0))
     assert apart == first_force + 1
-    unchanged = paths[0].velocity_m_per_s[apart : apart + 49]
-    assert (np.diff(unchanged) > 0).all(), "the motor still pushes it on"
+    # The motor pushes the late one on until the first force, 50 samples late, acts; and not a sample longer.
+    speed = np.diff(paths[0].velocity_m_per_s[first_force : first_force + 53])
+    assert (speed[:50] > 0).all()
+    assert (speed[51:] < 0).all()
 
 
 def test_a_hit_can_be_repeated():

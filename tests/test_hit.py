@@ -1,0 +1,81 @@
+"""The protocol of a hit: what is reported of it, against plain numpy on every sample of the run."""
+
+import hashlib
+
+import numpy as np
+import pytest
+
+from hardwall.sim import hit
+from hardwall.sim.scene import load
+
+# An unstable wall, so that means and distances are large; and times that are no whole number of chunks or actuations.
+SCENE = {
+    "protocol.settle_s": 0.8503,
+    "protocol.mean_s": 0.1207,
+    "protocol.measure_s": 0.2111,
+    "wall.stiffness_n_per_m": 60e3,
+}
+
+
+@pytest.fixture(scope="module")
+def run():
+    """Return a run and all of its samples: an overview of every one."""
+    scene = load("seed-2011", SCENE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(hit, "OVERVIEW_POINTS", scene.samples)
+        patch.setattr(hit, "CHUNK", 1000)
+        return hit.run(scene, "fixed", traces=True)
+
+
+def test_mean_and_rms_are_those_of_the_positions(run):
+    x, settled = run.overview.position_m, 8503
+    assert len(x) == run.samples == 8503 + 2111
+    mean = x[settled - 1207 : settled].mean()
+    assert run.mean_m == pytest.approx(mean, rel=1e-12)
+    assert run.rms_m == pytest.approx(np.sqrt(np.mean((x[settled:] - mean) ** 2)), rel=1e-12)
+    assert run.rms_m > 1e-4
+
+
+def test_the_verdict_is_the_thresholds(run):
+    assert not run.stable
+    for factor, stable in ((0.999, False), (1.001, True)):
+        threshold = {"protocol.threshold_mm": run.rms_m * 1e3 * factor}
+        assert hit.run(load("seed-2011", SCENE | threshold), "fixed").stable is stable
+
+
+def test_the_digest_is_of_the_drive_of_every_actuation(run):
+    words = np.round(run.overview.force_n / run.scene.spec.force_resolution_n)[::10].astype("<i4")
+    assert run.force_sha256 == hashlib.sha256(words.tobytes()).hexdigest()
+    assert run.max_force_n == pytest.approx(np.abs(run.overview.force_n).max())
+
+
+def test_the_estimates_error_is_that_of_the_contact(run):
+    error = run.detail.estimate_m_per_s - run.detail.velocity_m_per_s
+    assert run.estimate_rms_m_per_s == pytest.approx(error.std(), rel=0.1)
+    assert hit.run(run.scene, "fixed").estimate_rms_m_per_s is None
+
+
+def test_scene_keys_reach_the_hardwares_words():
+    spec = load("seed-2011").spec
+    words = {word.name: word for word in spec.design.words}
+    changed = load("seed-2011", {"controller.slew_limit_n_per_s": 500.0, "wall.forbid_pull": True}).words
+    assert words["output_slew_limit"].to_si(changed["output_slew_limit"]) == 500.0
+    assert changed["wall_forbid_pull"] == 1
+    assert load("seed-2011").words["wall_forbid_pull"] == 0
+
+
+def test_a_slew_limit_limits_and_a_wall_that_may_not_pull_does_not():
+    free, slow, pushing = (
+        hit.run(load("seed-2011", change), "fixed", traces=True)
+        for change in ({}, {"controller.slew_limit_n_per_s": 500.0}, {"wall.forbid_pull": True})
+    )
+    assert "slew_limited" in slow.flags
+    assert "slew_limited" not in free.flags
+    assert np.abs(np.diff(slow.detail.force_n)).max() <= 0.5 + 1e-9 < np.abs(np.diff(free.detail.force_n)).max()
+    assert free.detail.force_n.max() > 0.1
+    assert pushing.detail.force_n.max() == 0
+
+
+def test_half_samples_in_the_protocol_are_no_trouble():
+    times = {"protocol.settle_s": 3.5e-4, "protocol.mean_s": 1e-4, "protocol.measure_s": 1e-4, "amplifier": None}
+    assert hit.run(load("seed-2011", times), "fixed").samples == 5
