@@ -5,15 +5,13 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model import estimators
+from hardwall.model.axis import GLITCH_WIDTH, ILLEGAL_WIDTH
 from hardwall.model.spec import AxisSpec
 
 from .fixed import shape
 from .output import Output
 from .quadrature import Quadrature
 from .wall import Wall
-
-GLITCH_WIDTH = 4
-ILLEGAL_WIDTH = 8
 
 
 class Axis(wiring.Component):

@@ -21,6 +21,10 @@ from .fixed import UQ
 from .spec import AxisSpec
 from .words import Word
 
+GLITCH_WIDTH = 4
+"""Bits of the glitch filter's length: up to 15 clocks."""
+ILLEGAL_WIDTH = 8
+"""Bits of the count of illegal transitions, which saturates: one is a fault, a full count a broken cable."""
 ENCODER_FLAGS = ("encoder_illegal", "encoder_overspeed")
 
 
@@ -46,7 +50,8 @@ class Design:
     """Formats, run-time words and latencies of an axis, derived from its `AxisSpec`.
 
     Attributes:
-        estimator, wall, output: the blocks' designs.
+        decoder: the decoder's `quadrature.Params`.
+        estimator, wall, output: the other blocks' designs.
         words: every run-time word, in the order of the hardware's ports.
         flags: names of the sticky flags, bit 0 first.
         latency_to_drive: clocks from the sample strobe to the changed drive.
@@ -56,11 +61,19 @@ class Design:
         gains = spec.gains if spec.gains is not None else spec.model.Gains.default(spec.acceleration_max_m_per_s2)
         self.spec = spec
         self.gains = gains
+        self.decoder = quadrature.Params(spec.count_width, spec.stamp_width, ILLEGAL_WIDTH)
         self.estimator = spec.model.Design(spec, gains)
         self.wall = wall.Design(spec, self.estimator.velocity)
         self.output = output.Design(spec)
         self.words = (
-            Word("encoder_glitch_clocks", UQ(4, 0), 1.0, "", 0, "longest pulse that the glitch filter rejects, clocks"),
+            Word(
+                "encoder_glitch_clocks",
+                UQ(GLITCH_WIDTH, 0),
+                1.0,
+                "",
+                0,
+                "longest pulse that the glitch filter rejects, clocks",
+            ),
             Word("encoder_invert", UQ(1, 0), 1.0, "", 0, "1: count the other way"),
             *self.estimator.words,
             *self.wall.words,

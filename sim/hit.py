@@ -124,14 +124,13 @@ def world_of(scene: Scene) -> loop.World:
 
 def model_controller(scene: Scene, floating: bool, start_level: int) -> tuple[Model, ModelState]:
     """Return the `float` or `fixed` controller of a scene, and its state after reset with the pins at `start_level`."""
-    spec, design, words = scene.spec, scene.spec.design, scene.words
+    design, words = scene.spec.design, scene.words
     if floating:
         si = {"wall_stiffness": scene.wall.stiffness_n_per_m, "wall_damping": scene.wall.damping_n_s_per_m}
         params = design.float_params(words, si)
     else:
         params = design.params(words)
-    decoder = quadrature.Params(spec.count_width, spec.stamp_width, 8)
-    controller = Model(decoder, words["encoder_glitch_clocks"], words["encoder_invert"], params)
+    controller = Model(design.decoder, words["encoder_glitch_clocks"], words["encoder_invert"], params)
     state = design.start(floating)
     velocity = 0.0 if floating else 0
     return controller, ModelState(state.output.drive, velocity, 0, quadrature.START, state, 0, start_level)

@@ -76,7 +76,7 @@ def reference(spec: AxisSpec, pins: np.ndarray, commits: list[tuple[int, dict[st
     """Return OUTPUTS of each sample, from the model; `commits` says at which strobe which words take effect."""
     design = spec.design
     words = {word.name: word.reset for word in design.words}
-    decoder = quadrature.Params(spec.count_width, spec.stamp_width, 8)
+    decoder = design.decoder
     timing = spec.clocks_per_sample, design.latency_to_drive
     state = axis.PinState(quadrature.START, design.start(), 0)
     out = np.zeros((len(OUTPUTS), samples), np.int64)

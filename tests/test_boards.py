@@ -8,7 +8,6 @@ from cocotb.triggers import RisingEdge, Timer
 from specs import spec
 
 from bench import SAMPLES, Bench, parameters, rng, simulate
-from hardwall.hdl.axis import ILLEGAL_WIDTH
 from hardwall.hdl.boards import BYTE, PULSES, TELEMETRY, Board
 from hardwall.model import output, quadrature, wall
 from hardwall.model.estimators import estimate
@@ -35,7 +34,7 @@ class Twin:
         self.clocks = 0
         self.words = {word.name: word.reset for word in self.design.words}
         self.restart, self.waiting = 0, None
-        self.decoder_params = quadrature.Params(self.spec.count_width, self.spec.stamp_width, ILLEGAL_WIDTH)
+        self.decoder_params = self.spec.design.decoder
         self.decoder, self.estimator, self.output = quadrature.START, self.spec.model.START, output.START
         self.velocity = self.wall_force = self.drive = self.sticky = 0
         self.loaded, self.raised = {}, {}

@@ -78,7 +78,7 @@ def test_every_strobe_sees_the_recorded_count(clocks):
         ]
     )
     width = 40
-    decoder = quadrature.Params(width, spec.stamp_width, 8)
+    decoder = spec.design.decoder._replace(count_width=width)
     axis = spec.design.params(spec.design.encode())
     # A finite difference as wide as the count.
     axis = axis._replace(estimator=axis.estimator._replace(count_width=width, velocity_max=2**width))
