@@ -25,6 +25,8 @@ from hardwall.sim import cocotb_runner
 SEED = int(os.environ.get("HARDWALL_SEED", "1"))
 SAMPLES = int(os.environ.get("HARDWALL_SAMPLES", "100000"))
 PERIOD_NS = 10
+CAMPAIGN = {"timeout_time": SAMPLES + 20_000, "timeout_unit": "us"}
+"""For `cocotb.test` of a campaign: hardware that stops answering fails, instead of hanging, at 100 clocks a sample."""
 
 
 def simulate(test_file: str, make: Callable, *, checks: str | None = None, **parameters) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from specs import spec
 
-from bench import SAMPLES, Bench, check, parameters, rng, simulate
+from bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from hardwall.hdl.finite_difference import Estimator
 from hardwall.model.estimators import estimate
 from hardwall.model.finite_difference import START
@@ -31,7 +31,7 @@ def model(name: str, rows) -> dict[str, np.ndarray]:
     return {"velocity": np.array(velocity), "saturated": np.array(flags)}
 
 
-@cocotb.test()
+@cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     name = parameters()["name"]
     component = make(name)

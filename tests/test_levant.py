@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from specs import spec
 
-from bench import SAMPLES, Bench, check, parameters, rng, simulate
+from bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from hardwall.hdl.levant import Estimator
 from hardwall.model import levant
 from hardwall.model.estimators import estimate
@@ -68,7 +68,7 @@ def stimulus(name: str, samples: int):
         yield count, int(random.random() < 0.002), *gains, int(random.integers(0, 2))
 
 
-@cocotb.test()
+@cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     name = parameters()["name"]
     component = make(name)

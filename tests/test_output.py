@@ -6,7 +6,7 @@ import pytest
 from cocotb.triggers import ClockCycles, RisingEdge
 from specs import spec
 
-from bench import SAMPLES, Bench, check, parameters, rng, simulate
+from bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from hardwall.hdl.output import Output
 from hardwall.model import output
 
@@ -47,7 +47,7 @@ def model(d: output.Design, rows) -> dict[str, np.ndarray]:
     return dict(zip(("drive", "limited", "actuated"), np.array(out).T, strict=True))
 
 
-@cocotb.test()
+@cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     component = make(**parameters())
     bench = Bench(dut, component)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from cocotb.triggers import ClockCycles, RisingEdge
 
-from bench import SAMPLES, Bench, check, parameters, rng, simulate
+from bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from hardwall.hdl.sqrt import Sqrt
 from hardwall.model.sqrt import isqrt
 
@@ -29,7 +29,7 @@ def test_model_is_exhaustively_exact_below_two_to_the_18():
     assert all(isqrt(r) == math.isqrt(r) for r in range(1 << 18))
 
 
-@cocotb.test()
+@cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     width = parameters()["width"]
     component = Sqrt(width)

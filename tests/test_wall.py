@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from specs import spec
 
-from bench import SAMPLES, Bench, check, parameters, rng, simulate
+from bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from hardwall.hdl.wall import Wall
 from hardwall.model import wall
 
@@ -62,7 +62,7 @@ def model(d: wall.Design, rows) -> list[int]:
     return [wall.render(d.params(dict(zip(NAMES, words, strict=True))), c, v) for c, v, *words in rows]
 
 
-@cocotb.test()
+@cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     component = make(**parameters())
     bench = Bench(dut, component)
