@@ -165,7 +165,7 @@ def test_rounding_is_a_small_change_of_position(name):
             assert eta <= 2 * math.sqrt(abs(e)) * delta / lam + (delta / lam) ** 2 + 1e-9
             if abs(e) <= 1:
                 largest = max(largest, eta)
-    # The bound is no luxury: the budget of the design page is used to a good part.
+    # The bound is no luxury: a good part of the budget is used.
     assert levant.POSITION_BUDGET / 8 < largest <= levant.POSITION_BUDGET + (delta / lam) ** 2
 
 
