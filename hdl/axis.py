@@ -167,7 +167,7 @@ class Axis(wiring.Component):
             decoder.clear.eq(self.clear_flags),
             estimator.strobe.eq(strobe),
             estimator.restart.eq(restart),
-            estimator.count.eq(decoder.count),
+            *(getattr(estimator, name).eq(getattr(decoder, name)) for name in design.estimator.inputs),
             wall.strobe.eq(estimator.valid),
             wall.count.eq(sampled_count),
             wall.velocity.eq(estimator.velocity),

@@ -1,15 +1,14 @@
 """Velocity as the difference of successive counts."""
 
-from amaranth.hdl import Module, Mux, Signal, signed
-from amaranth.lib.wiring import In, Out
+from amaranth.hdl import Module, Mux, Signal
 
 from hardwall.model.finite_difference import Design
 
-from . import Block
-from .fixed import saturate, shape
+from . import EstimatorBlock
+from .fixed import saturate
 
 
-class Estimator(Block):
+class Estimator(EstimatorBlock):
     """The finite difference of the last two counts.
 
     Equation: velocity = count - last count, modulo the count's width; 0 at the first sample.
@@ -23,42 +22,11 @@ class Estimator(Block):
     design : hardwall.model.finite_difference.Design
         Formats.
 
-    Members
-    -------
-    strobe : In(1)
-        Takes a sample.
-    restart : In(1)
-        With `strobe`: this sample counts as the first.
-    count : In(signed)
-        Position, counts; may wrap.
-    velocity : Out(SQ)
-        Counts a sample; valid from `valid` until the next.
-    saturated : Out(1)
-        With `valid`: bit 0, the velocity saturated.
-    valid : Out(1)
-        High for one clock.
-
-    Raises
-    ------
-    TypeError
-        If `design` is not of that class.
-
     Source: Chawda, Celik, O'Malley, World Haptics 2011, "FDM".
     """
 
     def __init__(self, design: Design):
-        super().__init__(
-            design,
-            Design,
-            lambda: {
-                "strobe": In(1),
-                "restart": In(1),
-                "count": In(signed(design.count_width)),
-                "velocity": Out(shape(design.velocity)),
-                "saturated": Out(len(design.flags)),
-                "valid": Out(1),
-            },
-        )
+        super().__init__(design, Design)
 
     def elaborate(self, platform):
         m = Module()

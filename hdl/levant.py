@@ -1,16 +1,15 @@
 """Levant's first-order sliding-mode differentiator."""
 
 from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed
-from amaranth.lib.wiring import In, Out
 
 from hardwall.model.levant import Design
 
-from . import Block
+from . import EstimatorBlock
 from .fixed import saturate, shape, shift_floor, shift_round_half_up
 from .sqrt import Sqrt
 
 
-class Estimator(Block):
+class Estimator(EstimatorBlock):
     """Levant's differentiator, explicit Euler, one sample at a time.
 
     Equation, per sample, in counts and sample periods:
@@ -33,49 +32,11 @@ class Estimator(Block):
     design : hardwall.model.levant.Design
         Formats; its module derives them.
 
-    Members
-    -------
-    strobe : In(1)
-        Takes a sample.
-    restart : In(1)
-        With `strobe`: this sample counts as the first.
-    count : In(signed)
-        Position, counts.
-    levant_lambda : In(UQ)
-        lambda tau / sqrt(q), counts^(1/2) a sample.
-    levant_alpha : In(UQ)
-        alpha tau^2 / q, counts a sample^2.
-    levant_output : In(1)
-        0: `velocity` is u; 1: it is u1, after this sample's update.
-    velocity : Out(SQ)
-        Counts a sample; valid from `valid` until the next.
-    saturated : Out(2)
-        With `valid`: bit 0, e saturated; bit 1, u or u1 did.
-    valid : Out(1)
-        High for one clock.
-
-    Raises
-    ------
-    TypeError
-        If `design` is not of that class.
-
     Source: Chawda, Celik, O'Malley, World Haptics 2011, the first-order differentiator; Levant 1998.
     """
 
     def __init__(self, design: Design):
-        super().__init__(
-            design,
-            Design,
-            lambda: {
-                "strobe": In(1),
-                "restart": In(1),
-                "count": In(signed(design.count_width)),
-                **{word.name: In(shape(word.format)) for word in design.words},
-                "velocity": Out(shape(design.velocity)),
-                "saturated": Out(len(design.flags)),
-                "valid": Out(1),
-            },
-        )
+        super().__init__(design, Design)
 
     def elaborate(self, platform):
         m = Module()

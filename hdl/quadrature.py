@@ -79,6 +79,13 @@ class Quadrature(wiring.Component):
         `stamp` in the clock that decoded the last edge of that kind, one before its count is out.
     stepped : Out(1)
         High for one clock with the count of a new edge.
+    edge : Out(2)
+        Kind of the last counted edge: 0 A rose, 1 B rose, 2 A fell, 3 B fell. Its stamp is that of this kind.
+    down : Out(1)
+        Whether that edge counted -1.
+    run : Out(3)
+        Edges in a row that counted that way, at most 4: so many stamps are of this run. 0 before the first edge, and
+        after an illegal change.
     illegal, overspeed : Out(1)
         Sticky flags, see above.
     fault : Out(1)
@@ -135,6 +142,9 @@ class Quadrature(wiring.Component):
                 "stamp_a_fall": Out(stamp_width),
                 "stamp_b_fall": Out(stamp_width),
                 "stepped": Out(1),
+                "edge": Out(2),
+                "down": Out(1),
+                "run": Out(range(model.RUN_MAX + 1)),
                 "illegal": Out(1),
                 "overspeed": Out(1),
                 "fault": Out(1),
@@ -213,10 +223,12 @@ class Quadrature(wiring.Component):
         # Decode, a clock after the filter: the comparison there and the addition here each have a clock of their own.
         one = moved[0] ^ moved[1]
         both = moved[0] & moved[1]
+        down = Signal()
         change = Signal(signed(2))
         count = Signal(signed(self._count_width))
         m.d.comb += [
-            change.eq(Mux(one, Mux(up ^ self.invert, 1, -1), 0)),
+            down.eq(~(up ^ self.invert)),
+            change.eq(Mux(one, Mux(down, -1, 1), 0)),
             count.eq((Mux(self.preload, self.preload_count, self.count) + change)[: self._count_width]),
         ]
         m.d.sync += [
@@ -230,6 +242,16 @@ class Quadrature(wiring.Component):
                     m.d.sync += rise.eq(self.stamp)
                 with m.Else():
                     m.d.sync += fall.eq(self.stamp)
+
+        with m.If(one):
+            m.d.sync += [
+                self.edge.eq(Cat(moved[1], ~(moved[:2] & level[:2]).any())),
+                self.down.eq(down),
+                # Saturates: RUN_MAX is a power of two.
+                self.run.eq(Mux(self.down == down, self.run + ~self.run[-1], 1)),
+            ]
+        with m.Elif(both):
+            m.d.sync += self.run.eq(0)
 
         with m.If(self.arm):
             m.d.sync += [self.index_armed.eq(1), self.index_latched.eq(0)]

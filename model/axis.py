@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import output, quadrature, wall
+from . import estimators, output, quadrature, wall
 from .compiled import compiled
 from .estimators import estimate
 from .fixed import UQ
@@ -58,7 +58,7 @@ class Design:
     """
 
     def __init__(self, spec: AxisSpec):
-        gains = spec.gains if spec.gains is not None else spec.model.Gains.default(spec.acceleration_max_m_per_s2)
+        gains = spec.gains if spec.gains is not None else spec.model.Gains.default(spec)
         self.spec = spec
         self.gains = gains
         self.decoder = quadrature.Params(spec.count_width, spec.stamp_width, ILLEGAL_WIDTH)
@@ -103,7 +103,7 @@ class Design:
     def float_params(self, words: dict[str, int], si: dict[str, float]) -> Params:
         """Return the float64 kernel's parameters: gains as given in `si`, by word's name, not as rounded to `words`."""
         outputs = self.spec.model.OUTPUTS
-        selected = outputs[words.get(f"{self.spec.estimator}_output", 0)]
+        selected = outputs[words.get(estimators.output_word(self.spec.estimator), 0)]
         return Params(
             self.estimator.float_params(self.gains, selected, si),
             self.wall.float_params(si.get("wall_stiffness", 0.0), si.get("wall_damping", 0.0), words),
@@ -123,18 +123,18 @@ class Design:
 
 
 @compiled
-def step(params, state, count, restart, fault, enable):
+def step(params, state, seen, restart, fault, enable):
     """Take one sample: return (state, velocity, force); the drive is `state.output.drive`.
 
     Args:
         params, state: of `Design.params` and `Design.start`, or their float64 counterparts.
-        count: position, counts, as a signed word that may have wrapped.
+        seen: a `quadrature.Seen`.
         restart: true where the count was preloaded since the last sample; the estimator starts afresh.
         fault: the encoder's two sticky flags; any of them forces the drive to zero.
         enable: false forces the drive to zero.
     """
-    estimator, velocity, estimator_flags = estimate(params.estimator, state.estimator, count, restart)
-    force = wall.render(params.wall, count, velocity)
+    estimator, velocity, estimator_flags = estimate(params.estimator, state.estimator, seen, restart)
+    force = wall.render(params.wall, seen.count, velocity)
     driven, output_flags = output.step(params.output, state.output, force, enable and not fault)
     flags = state.flags | fault | estimator_flags << params.estimator_bit | output_flags << params.output_bit
     return State(estimator, driven, flags), velocity, force
@@ -144,7 +144,7 @@ def step(params, state, count, restart, fault, enable):
 def run(params, state, counts, velocity, force, drive, flags):
     """Take a record of `counts` sample by sample; fill the other arrays, of the same length; return the state."""
     for k in range(len(counts)):
-        state, velocity[k], force[k] = step(params, state, counts[k], 0, 0, 1)
+        state, velocity[k], force[k] = step(params, state, quadrature.seen_count(counts[k]), 0, 0, 1)
         drive[k] = state.output.drive
         flags[k] = state.flags
     return state
@@ -181,16 +181,17 @@ def run_pins(timing, decoder, settings, params, state, pins, first, until, out):
         if (n + 1) % per_sample == 0:
             fault = state.decoder.illegal | state.decoder.overspeed << 1
             out[4, sample] = now.output.phase == 0
-            now, out[1, sample], out[2, sample] = step(params, now, state.decoder.count, restart, fault, pins[3, n])
+            seen = quadrature.seen(state.decoder)
+            now, out[1, sample], out[2, sample] = step(params, now, seen, restart, fault, pins[3, n])
             out[0, sample], out[3, sample] = now.output.drive, now.flags
             restart = 0
         elif (n + 1 - latency) % per_sample == 0 and n >= latency:
             shown = (n + 1 - latency) // per_sample - 1
-            seen = state.decoder
-            out[5, shown], out[6, shown] = seen.count, seen.illegal_count
-            out[7, shown], out[8, shown], out[9, shown] = seen.index_count, seen.index_latched, seen.index_armed
-            out[10, shown], out[11, shown] = seen.stamp_a_rise, seen.stamp_b_rise
-            out[12, shown], out[13, shown] = seen.stamp_a_fall, seen.stamp_b_fall
+            live = state.decoder
+            out[5, shown], out[6, shown] = live.count, live.illegal_count
+            out[7, shown], out[8, shown], out[9, shown] = live.index_count, live.index_latched, live.index_armed
+            out[10, shown], out[11, shown] = live.stamp_a_rise, live.stamp_b_rise
+            out[12, shown], out[13, shown] = live.stamp_a_fall, live.stamp_b_fall
         if pins[7, n]:
             now = State(now.estimator, now.output, 0)
         if not pins[3, n]:
@@ -241,18 +242,20 @@ class Axis:
         floating: true for the same algorithms in float64, gains unrounded and estimator unsaturated.
         si: run-time parameters, e.g. `wall_stiffness=20e3` (N/m); the rest stay as after reset (the wall off).
 
+    Attributes:
+        design: the spec's `Design`.
+        words: run-time words by port name.
+        params: parameters of `step`.
+
     Raises:
         ValueError: for an unknown name or a value out of range.
     """
 
     def __init__(self, spec: AxisSpec, floating: bool = False, **si: float):
         self.design = spec.design
-        words = self.design.encode(**si)
-        self._floating = floating
-        if floating:
-            self._params = self.design.float_params(words, si)
-        else:
-            self._params = self.design.params(words)
+        self.words = words = self.design.encode(**si)
+        self.floating = floating
+        self.params = self.design.float_params(words, si) if floating else self.design.params(words)
 
     def run(self, counts: np.ndarray) -> Record:
         """Run records of counts from the start state.
@@ -263,8 +266,11 @@ class Axis:
 
         Raises:
             TypeError: if the counts are not integers.
-            ValueError: if they have not one or two dimensions.
+            ValueError: if they have not one or two dimensions; or if the estimator needs more than counts, the stamps
+                of edges: `hardwall.model.stamped.run` has them.
         """
+        if estimators.uses_stamps(self.design.spec.estimator):
+            raise ValueError(f"estimator must be one that needs only counts, not {self.design.spec.estimator!r}")
         counts = np.asarray(counts)
         if not np.issubdtype(counts.dtype, np.integer):
             raise TypeError(f"counts must be integers, not {counts.dtype!r}")
@@ -272,11 +278,11 @@ class Axis:
             raise ValueError(f"counts must have 1 or 2 dimensions, not {counts.ndim!r}")
         half = 1 << (self.design.spec.count_width - 1)
         lanes = np.atleast_2d(((counts.astype(np.int64) + half) & (2 * half - 1)) - half)
-        number = np.float64 if self._floating else np.int64
+        number = np.float64 if self.floating else np.int64
         velocity, force, drive = (np.zeros(lanes.shape, number) for _ in range(3))
         flags = np.zeros(lanes.shape, np.int64)
         for lane in range(len(lanes)):
-            start = self.design.start(self._floating)
-            run(self._params, start, lanes[lane], velocity[lane], force[lane], drive[lane], flags[lane])
+            start = self.design.start(self.floating)
+            run(self.params, start, lanes[lane], velocity[lane], force[lane], drive[lane], flags[lane])
         shape = counts.shape
         return Record(self.design, *(array.reshape(shape) for array in (velocity, force, drive, flags)))

@@ -5,11 +5,13 @@ To add one: `hdl/NAME.py`, `model/NAME.py`, `tests/test_NAME.py`, and one line i
 An estimator's module in `hardwall.model` provides
 
 - `OUTPUTS`: the names of its selectable outputs, the default first;
-- `Gains`: a frozen dataclass of SI gains; `Gains.default(acceleration_max_m_per_s2)` gives those for a scene that
-  names none;
-- `Design(axis, gains)`: formats, run-time words and latency derived from a `spec.AxisSpec`, with attributes `velocity`
-  (a `fixed.SQ`, counts a sample), `words` (tuple of `words.Word`), `flags` (names of its saturation flags, bit 0
-  first), `latency` (clocks from strobe to valid), and methods `params(words)` and `float_params(gains, output, si)`;
+- `Gains`: a frozen dataclass of gains, units in their names; `Gains.default(axis)` gives those of a `spec.AxisSpec`
+  that names none, from its rates, ranges and count size alone;
+- `Design(axis, gains)`: formats, run-time words and latency derived from a `spec.AxisSpec`, with attributes `inputs`
+  (names of what it uses of `quadrature.Seen`), `velocity` (a `fixed.SQ`, counts a sample), `words` (tuple of
+  `words.Word`; one named `NAME_output`, hyphens as underscores, selects among several outputs), `flags` (names of its
+  saturation flags, bit 0 first), `latency` (clocks from strobe to valid), and methods `params(words)` and
+  `float_params(gains, output, si)`;
 - `START` and `FLOAT_START`: the states before the first sample;
 - kernels registered with `estimate` for its `Params` and its `FloatParams`.
 
@@ -27,6 +29,16 @@ ESTIMATORS = {
 }
 
 
+def uses_stamps(name: str) -> bool:
+    """Return whether estimator `name` needs the clock stamps of edges, beside the count."""
+    return load(name).Design.inputs != ("count",)
+
+
+def output_word(name: str) -> str:
+    """Return the name of the run-time word that selects among the outputs of estimator `name`."""
+    return f"{name.replace('-', '_')}_output"
+
+
 def load(name: str, package: str = __package__) -> ModuleType:
     """Return the module of estimator `name` in `package` (this one, or `hardwall.hdl`).
 
@@ -39,13 +51,13 @@ def load(name: str, package: str = __package__) -> ModuleType:
 
 
 @by_type
-def estimate(params, state, count, restart):
+def estimate(params, state, seen, restart):
     """Take one sample: return (state, velocity, flags).
 
     Args:
         params: an estimator's `Params` (integer words) or `FloatParams` (the same algorithm in float64).
         state: its state, from `START` or `FLOAT_START` or the previous call.
-        count: position, counts, as a signed word that may have wrapped.
+        seen: a `quadrature.Seen`; its count is a signed word that may have wrapped.
         restart: true to forget the past: this sample counts as the first.
 
     Returns:

@@ -15,7 +15,7 @@ class Gains:
     """A finite difference has no gains."""
 
     @classmethod
-    def default(cls, acceleration_max_m_per_s2: float) -> "Gains":
+    def default(cls, axis) -> "Gains":
         return cls()
 
 
@@ -44,6 +44,7 @@ class Design:
     overshoots still reads true. It saturates beyond, with the flag `velocity_saturated`.
     """
 
+    inputs = ("count",)
     flags = ("velocity_saturated",)
     words = ()
     latency = 2
@@ -66,13 +67,13 @@ def _difference(width, state, count, restart):
 
 @estimate.register(Params)
 @compiled
-def step(params, state, count, restart):
-    difference = _difference(params.count_width, state, count, restart)
+def step(params, state, seen, restart):
+    difference = _difference(params.count_width, state, seen.count, restart)
     velocity = saturate(difference, -params.velocity_max - 1, params.velocity_max)
-    return State(1, count), velocity, int(velocity != difference)
+    return State(1, seen.count), velocity, int(velocity != difference)
 
 
 @estimate.register(FloatParams)
 @compiled
-def float_step(params, state, count, restart):
-    return State(1, count), float(_difference(params.count_width, state, count, restart)), 0
+def float_step(params, state, seen, restart):
+    return State(1, seen.count), float(_difference(params.count_width, state, seen.count, restart)), 0

@@ -69,9 +69,10 @@ class Gains:
                 raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
 
     @classmethod
-    def default(cls, acceleration_max_m_per_s2: float) -> "Gains":
-        """Return the paper's proposed gains for |f''| <= C: lambda = sqrt(C), alpha = 1.1 C."""
-        return cls(math.sqrt(acceleration_max_m_per_s2), 1.1 * acceleration_max_m_per_s2)
+    def default(cls, axis) -> "Gains":
+        """Return the paper's proposed gains for |f''| <= C, the axis's bound: lambda = sqrt(C), alpha = 1.1 C."""
+        bound = axis.acceleration_max_m_per_s2
+        return cls(math.sqrt(bound), 1.1 * bound)
 
 
 class Params(NamedTuple):
@@ -120,6 +121,7 @@ class Design:
         ValueError: if the gains do not fit any format that int64 can hold, with the accepted range.
     """
 
+    inputs = ("count",)
     flags = ("error_saturated", "velocity_saturated")
 
     def __init__(self, axis, gains: Gains):
@@ -205,9 +207,9 @@ def _sign(value):
 
 @estimate.register(Params)
 @compiled
-def step(params, state, count, restart):
+def step(params, state, seen, restart):
     fresh = restart or not state.running
-    moved = 0 if fresh else wrap(count - state.count, params.count_width)
+    moved = 0 if fresh else wrap(seen.count - state.count, params.count_width)
     lead = 0 if fresh else state.lead
     u1 = 0 if fresh else state.u1
 
@@ -221,15 +223,15 @@ def step(params, state, count, restart):
     u1 = saturate(far_u1, -params.velocity_max, params.velocity_max)
 
     flags = int(error != distance) | int(u != far_u or u1 != far_u1) << 1
-    return State(1, count, error + u, u1), u1 if params.output else u, flags
+    return State(1, seen.count, error + u, u1), u1 if params.output else u, flags
 
 
 @estimate.register(FloatParams)
 @compiled
-def float_step(params, state, count, restart):
+def float_step(params, state, seen, restart):
     """The paper's algorithm in float64, unsaturated: the reference for what fixed point costs."""
     fresh = restart or not state.running
-    moved = 0 if fresh else wrap(count - state.count, params.count_width)
+    moved = 0 if fresh else wrap(seen.count - state.count, params.count_width)
     lead = 0.0 if fresh else state.lead
     u1 = 0.0 if fresh else state.u1
 
@@ -237,4 +239,4 @@ def float_step(params, state, count, restart):
     sign = _sign(error)
     u = u1 - params.lambda_ * math.sqrt(abs(error)) * sign
     u1 = u1 - params.alpha * sign
-    return State(1, count, error + u, u1), u1 if params.output else u, 0
+    return State(1, seen.count, error + u, u1), u1 if params.output else u, 0

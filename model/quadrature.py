@@ -53,6 +53,9 @@ class State(NamedTuple):
     stamp_a_fall: int
     stamp_b_fall: int
     stepped: int
+    edge: int  # of the last counted edge: A_RISE, B_RISE, A_FALL or B_FALL
+    down: int  # whether it counted -1
+    run: int  # edges in a row that counted that way, at most RUN_MAX; 0: none, or what came before is not known
     illegal: int
     overspeed: int
     illegal_count: int
@@ -70,8 +73,54 @@ class State(NamedTuple):
     starting: int  # clocks until the synchronisers are filled
 
 
+A_RISE, B_RISE, A_FALL, B_FALL = range(4)
+RUN_MAX = 4
+"""A full cycle of the encoder: with so many edges one way, each of the four stamps is of this cycle."""
 N_OUTPUTS = State._fields.index("first")
+
+
+class Seen(NamedTuple):
+    """What an estimator may use of the decoder at a strobe: outputs of the hardware, by the same names.
+
+    The last edge stands at the scale's edge number `count + down` (cell n lies between edges n and n + 1), and was
+    decoded at the stamp of its kind, `stamp - that` clocks ago, modulo the stamp's width; of kind `edge`. The `run - 1`
+    edges before it stand a count each farther back, and their kinds and stamps go back likewise.
+    """
+
+    count: int
+    stamp: int
+    stamp_a_rise: int
+    stamp_b_rise: int
+    stamp_a_fall: int
+    stamp_b_fall: int
+    edge: int
+    down: int
+    run: int
+
+
 START = State(*(3 if name == "starting" else 0 for name in State._fields))
+
+
+@compiled
+def seen(state):
+    """Return what an estimator sees of a decoder's `state`."""
+    return Seen(
+        state.count,
+        state.stamp,
+        state.stamp_a_rise,
+        state.stamp_b_rise,
+        state.stamp_a_fall,
+        state.stamp_b_fall,
+        state.edge,
+        state.down,
+        state.run,
+    )
+
+
+@compiled
+def seen_count(count):
+    """Return what an estimator sees that uses the count alone."""
+    return Seen(count, 0, 0, 0, 0, 0, 0, 0, 0)
 
 
 def latency(glitch_clocks: int) -> int:
@@ -146,9 +195,13 @@ def step(params, state, a, b, z, glitch_clocks=0, invert=0, preload=0, preload_c
     one = (state.moved ^ state.moved >> 1) & 1
     both = state.moved & state.moved >> 1 & 1
     base = preload_count if preload else state.count
-    count = wrap(base + one * (2 * (state.up ^ invert) - 1), params.count_width)
+    down = ~(state.up ^ invert) & 1
+    count = wrap(base + one * (1 - 2 * down), params.count_width)
     one_a = one & state.moved
     one_b = one & state.moved >> 1
+    risen = level & state.moved & 3
+    kind = one_b + 2 * int(risen == 0)
+    run = min(state.run + 1, RUN_MAX) if state.down == down else 1
     indexed = state.index_armed & ~arm & (state.moved & level) >> 2
     illegal_count = (0 if clear else state.illegal_count) + both
     return State(
@@ -162,6 +215,9 @@ def step(params, state, a, b, z, glitch_clocks=0, invert=0, preload=0, preload_c
         state.stamp if one_a & ~level else state.stamp_a_fall,
         state.stamp if one_b & ~(level >> 1) else state.stamp_b_fall,
         one,
+        kind if one else state.edge,
+        down if one else state.down,
+        run if one else (0 if both else state.run),
         both | (state.illegal & ~clear),
         outrun | (state.overspeed & ~clear),
         min(illegal_count, (1 << params.fault_width) - 1),
@@ -201,6 +257,9 @@ def _rest(params, state, pins, clocks):
         state.stamp_a_fall,
         state.stamp_b_fall,
         0,
+        state.edge,
+        state.down,
+        state.run,
         state.illegal,
         state.overspeed,
         state.illegal_count,

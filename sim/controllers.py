@@ -1,34 +1,16 @@
 """The three controllers that can close the loop: pins and a sample strobe in, drive out.
 
-`float` and `fixed` are the models of decoder and axis, in float64 or in the hardware's integers; `rtl` is the
+`float` and `fixed` are the models of decoder and axis (`hardwall.model.stamped`), in float64 or in the hardware's
+integers; `rtl` is the
 Verilated hardware behind function pointers. All take the same clock-stamped edges, sample at the same clock, and
 change the drive the same number of clocks later. Their states share the fields `drive`, `velocity` and `flags`.
 """
 
 from typing import NamedTuple
 
-from ..model import axis, quadrature
+from ..model import stamped
 from ..model.compiled import by_type, compiled
 from .pointer import call
-
-
-class Model(NamedTuple):
-    """Parameters of decoder and axis; integer words make `fixed`, float64 ones `float`."""
-
-    decoder: quadrature.Params
-    glitch_clocks: int
-    invert: int
-    axis: axis.Params
-
-
-class ModelState(NamedTuple):
-    drive: float  # force LSB
-    velocity: float  # words of the estimator's format; float: counts a sample
-    flags: int
-    decoder: quadrature.State
-    axis: axis.State
-    clock: int  # to which the decoder has been advanced
-    level: int  # of the pins, a | b << 1
 
 
 class Rtl(NamedTuple):
@@ -52,8 +34,8 @@ def sample(controller, state, edge_clocks, edge_levels, n_edges, strobe, until):
     """Take one sample: return (state, taken), `taken` being the number of edges used up.
 
     Args:
-        controller: `Model` or `Rtl`.
-        state: `ModelState` or `RtlState`.
+        controller: `stamped.Controller` or `Rtl`.
+        state: `stamped.State` or `RtlState`.
         edge_clocks, edge_levels: int64 arrays; from which clock on the pins show which level, a | b << 1.
         n_edges: edges in them: those that the last call did not take, and those since.
         strobe: number of the clock at which the count is sampled.
@@ -66,35 +48,16 @@ def sample_quietly(controller, state, strobe, until):
     """Take one sample with no edges: return the state. Passing no array makes it much the cheaper call."""
 
 
-@compiled
-def _decode(controller, decoder, level, clocks):
-    return quadrature.advance(
-        controller.decoder, decoder, level & 1, level >> 1, 0, clocks, controller.glitch_clocks, controller.invert
-    )
-
-
-@sample_quietly.register(Model)
+@sample_quietly.register(stamped.Controller)
 @compiled
 def _model_sample_quietly(controller, state, strobe, until):
-    decoder = _decode(controller, state.decoder, state.level, strobe - state.clock)
-    fault = decoder.illegal | decoder.overspeed << 1
-    after, velocity, _ = axis.step(controller.axis, state.axis, decoder.count, 0, fault, 1)
-    return ModelState(after.output.drive, velocity, after.flags, decoder, after, strobe, state.level)
+    return stamped.sample_quietly(controller, state, strobe)
 
 
-@sample.register(Model)
+@sample.register(stamped.Controller)
 @compiled
 def _model_sample(controller, state, edge_clocks, edge_levels, n_edges, strobe, until):
-    decoder, clock, level, taken = state.decoder, state.clock, state.level, 0
-    # The strobe sees registers loaded by the clocks before it: an edge at the strobe's own clock is for the next.
-    while taken < n_edges and edge_clocks[taken] < strobe:
-        if edge_clocks[taken] > clock:
-            decoder = _decode(controller, decoder, level, edge_clocks[taken] - clock)
-            clock = edge_clocks[taken]
-        level = edge_levels[taken]
-        taken += 1
-    state = ModelState(state.drive, state.velocity, state.flags, decoder, state.axis, clock, level)
-    return _model_sample_quietly(controller, state, strobe, until), taken
+    return stamped.sample(controller, state, edge_clocks, edge_levels, 0, n_edges, strobe)
 
 
 # What `read` of sim/rtl.cpp answers.

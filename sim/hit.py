@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..model import quadrature
+from ..model import stamped
+from ..model.axis import Axis
 from . import loop, record
-from .controllers import Model, ModelState
 from .encoder import Encoder, level, locate
 from .plant import Coulomb, Handle, Motion, span
 from .scene import Scene
@@ -122,20 +122,6 @@ def world_of(scene: Scene) -> loop.World:
     )
 
 
-def model_controller(scene: Scene, floating: bool, start_level: int) -> tuple[Model, ModelState]:
-    """Return the `float` or `fixed` controller of a scene, and its state after reset with the pins at `start_level`."""
-    design, words = scene.spec.design, scene.words
-    if floating:
-        si = {"wall_stiffness": scene.wall.stiffness_n_per_m, "wall_damping": scene.wall.damping_n_s_per_m}
-        params = design.float_params(words, si)
-    else:
-        params = design.params(words)
-    controller = Model(design.decoder, words["encoder_glitch_clocks"], words["encoder_invert"], params)
-    state = design.start(floating)
-    velocity = 0.0 if floating else 0
-    return controller, ModelState(state.output.drive, velocity, 0, quadrature.START, state, 0, start_level)
-
-
 class _Tally:
     """Mean, RMS, largest force and force words of a run, chunk by chunk."""
 
@@ -207,7 +193,7 @@ def run(
         )
     at = loop.Progress(0, start, cell, scene.protocol.push_n, 0)
     if backend != "rtl":
-        controller, state = model_controller(scene, floating, start_level)
+        controller, state = stamped.controller(Axis(spec, floating, **scene.parameters), start_level)
         return _closed_loop(scene, backend, world, controller, state, at, records, progress, ())
 
     from .rtl import Hardware  # noqa: PLC0415  (the other backends need neither Amaranth nor a C++ compiler)

@@ -1,7 +1,8 @@
 """Recorded counts through a velocity estimator, on any backend, and held against a reference that is not causal.
 
 The axis of a replay has units of its own, which make one piece of hardware serve any recording: the metre of its
-`AxisSpec` is a *recorded count* and its second is a *sample period*. With `coarsen` = N the axis sees counts // N, so
+`AxisSpec` is a *recorded count* and its second is `SECOND` *sample periods* (so long that no clock stamp of an edge
+wraps meanwhile). With `coarsen` = N the axis sees counts // N, so
 its count is N recorded counts, and everything that is reported is in recorded counts and true seconds, whatever N is.
 The floor puts coarse counts (N - 1) / 2 recorded counts too low on average: constant, so no velocity comes of it.
 
@@ -16,7 +17,8 @@ The bound C on the acceleration, from which an estimator gets its gains, is that
 instead. A recording that hardly accelerates gets a C that moves one count over its whole length, which counts cannot
 tell from none, or the least that words hold beside its travel and speed (`ACCELERATION_RANGE`).
 
-`float` and `fixed` take the counts as they are. `rtl` gets them `through_pins`.
+`float` and `fixed` take the counts as they are; `rtl`, and any estimator that uses the stamps of edges, gets them
+`through_pins`.
 """
 
 import hashlib
@@ -29,7 +31,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..model import axis, estimators, quadrature
+from ..model import axis, estimators, quadrature, stamped
 from ..model.fixed import bits_for
 from ..model.spec import AxisSpec
 from .encoder import level
@@ -39,6 +41,7 @@ from .through_pins import DECODER_CLOCKS, GLITCH_CLOCKS, run_pins
 from .whole_file import whole_file
 
 BACKENDS = ("float", "fixed", "rtl")
+SECOND = 1 << 10
 TRAVEL_MAX = 2.0**29
 """Of an axis with a 32-bit count."""
 CLOCK_MAX_HZ = 100e6
@@ -168,7 +171,7 @@ def _least_bound(counts: np.ndarray) -> float:
 
 
 def axis_spec(counts: np.ndarray, count: int, acceleration_max: float, estimator: str) -> AxisSpec:
-    """Return the axis for a recording, in recorded counts and sample periods; the module says how it follows.
+    """Return the axis for a recording, in units of its own; the module says how it follows.
 
     Args:
         counts: as the axis sees them, each `count` recorded counts.
@@ -178,23 +181,28 @@ def axis_spec(counts: np.ndarray, count: int, acceleration_max: float, estimator
     travel, speed = _ranges(counts)
     # The wall and the output stage are there and do nothing: any ranges do.
     spec = AxisSpec(
-        clock_hz=1 << 16,
-        sample_hz=1,
-        actuation_hz=1,
+        clock_hz=SECOND << 16,
+        sample_hz=SECOND,
+        actuation_hz=SECOND,
         count_m=float(count),
         travel_m=travel * count,
-        speed_max_m_per_s=speed * count,
-        acceleration_max_m_per_s2=acceleration_max,
+        speed_max_m_per_s=speed * count * SECOND,
+        acceleration_max_m_per_s2=acceleration_max * SECOND**2,
         force_max_n=1.0,
         force_resolution_n=1.0,
         stiffness_max_n_per_m=1.0 / count,
-        damping_max_n_s_per_m=1.0 / count,
+        damping_max_n_s_per_m=1.0 / count / SECOND,
         estimator=estimator,
     )
     # The edges of an interval begin before its strobe, and must not reach into the force path of the one before.
     path = spec.design.latency_to_drive + DECODER_CLOCKS
     clocks = max(path, fastest / quadrature.max_edge_rate(1.0, GLITCH_CLOCKS))
-    return replace(spec, clock_hz=int(_power_of_two(clocks)))
+    return replace(spec, clock_hz=int(_power_of_two(clocks)) * SECOND)
+
+
+def needs_pins(estimator: str, backend: str) -> bool:
+    """Return whether the counts go through pins: into hardware, or to be stamped."""
+    return backend == "rtl" or estimators.uses_stamps(estimator)
 
 
 def run(
@@ -217,7 +225,7 @@ def run(
         RuntimeError: if the RTL could not be built.
     """
     outputs = spec.model.OUTPUTS
-    choice = {f"{spec.estimator}_output": outputs.index(output)} if len(outputs) > 1 else {}
+    choice = {estimators.output_word(spec.estimator): outputs.index(output)} if len(outputs) > 1 else {}
     if backend == "rtl":
         from .rtl import Hardware  # noqa: PLC0415  (the other backends need neither Amaranth nor a C++ compiler)
 
@@ -225,6 +233,8 @@ def run(
         with Hardware(spec, words, int(level(0))) as hardware:
             return run_pins(hardware.controller, hardware.start, spec, counts, progress)
     model = axis.Axis(spec, floating=backend == "float", **choice)
+    if needs_pins(spec.estimator, backend):
+        return run_pins(*stamped.controller(model, int(level(0))), spec, counts, progress)
     model.run(counts[:0])  # compiles
     began = time.perf_counter()
     record = model.run(counts)
@@ -301,7 +311,7 @@ def replay(
 
     count = coarsen or 1
     counts = recording.counts // count
-    if backend == "rtl":
+    if needs_pins(estimator, backend):
         _check_speed(recording, counts, count)
     reference = zero_phase_velocity(recording.counts, rate, cutoff)
     if bound is None:
@@ -310,8 +320,8 @@ def replay(
         spec = axis_spec(counts, count, bound / rate**2, estimator)
     except ValueError as error:
         raise ReplayError(
-            f"acceleration_max_counts_per_s2 must give gains that fit this recording (in counts and samples: {error}), "
-            f"not {bound!r}"
+            f"acceleration_max_counts_per_s2 must give gains that fit this recording (as if {SECOND} samples were a "
+            f"second: {error}), not {bound!r}"
         ) from None
     velocity, flags, seconds = run(spec, counts, backend, output, progress)
 
@@ -337,8 +347,10 @@ def replay(
 
 
 def _gains(spec: AxisSpec, rate_hz: float) -> dict[str, float]:
-    """Return the gains of an axis by name, in counts and seconds: a metre is a count, and a second a sample."""
+    """Return the gains of an axis by name, in counts and true seconds."""
+    powers = {"_per_s2": 2, "_per_s": 1, "_hz": 1, "_s": -1}  # of one over time, by the ending of the name
     return {
-        name.replace("_m_", "_counts_"): value * rate_hz ** (2 if name.endswith("_s2") else 1)
+        name.replace("_m_", "_counts_"): value
+        * (rate_hz / SECOND) ** next((power for ending, power in powers.items() if name.endswith(ending)), 0)
         for name, value in vars(spec.design.gains).items()
     }

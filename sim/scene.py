@@ -144,8 +144,8 @@ class Scene(Section):
         return self.controller.output or self.spec.model.OUTPUTS[0]
 
     @cached_property
-    def words(self) -> dict[str, int]:
-        """Run-time words; the count is 0 at the start, so the wall's position is its distance from there."""
+    def parameters(self) -> dict[str, float]:
+        """Run-time parameters in SI units, by word; the count is 0 at the start, so the wall is so far from there."""
         si = {
             "encoder_glitch_clocks": self.controller.glitch_clocks,
             "wall_stiffness": self.wall.stiffness_n_per_m,
@@ -154,10 +154,15 @@ class Scene(Section):
             "wall_forbid_pull": self.wall.forbid_pull,
         }
         if len(self.spec.model.OUTPUTS) > 1:
-            si[f"{self.controller.estimator}_output"] = self.spec.model.OUTPUTS.index(self.output)
+            si[estimators.output_word(self.controller.estimator)] = self.spec.model.OUTPUTS.index(self.output)
         if self.controller.slew_limit_n_per_s is not None:
             si["output_slew_limit"] = self.controller.slew_limit_n_per_s
-        return self.spec.design.encode(**si)
+        return si
+
+    @cached_property
+    def words(self) -> dict[str, int]:
+        """The same as the hardware takes them."""
+        return self.spec.design.encode(**self.parameters)
 
     @property
     def delay_samples(self) -> int:

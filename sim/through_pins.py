@@ -69,7 +69,7 @@ def through_pins(controller, state, counts, clocks, latency, edges, n_edges, vel
 def run_pins(controller, state, spec: AxisSpec, counts: np.ndarray, progress: Callable[[int], None] | None = None):
     """Take a whole record through a controller's pins: return (velocity words, flags, seconds)."""
     relative = counts - counts[0]
-    velocity = np.zeros(len(counts), np.int64)
+    velocity = np.zeros(len(counts), np.asarray(state.velocity).dtype)
     room = 2 * int(np.abs(np.diff(relative)).max()) + 1
     edges = np.zeros(room, np.int64), np.zeros(room, np.int64)
     fixed = spec.clocks_per_sample, spec.design.latency_to_drive, edges

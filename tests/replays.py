@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 from scipy import signal
+from specs import EVERY_OUTPUT
 
 from hardwall.sim.recording import Recording
 
 COARSEN = 16
 # About the largest of the recordings' own. One for all, so that one piece of hardware an estimator serves every test.
 BOUND = 1e6
-EVERY = pytest.mark.parametrize(("estimator", "output"), [("levant", "u"), ("levant", "u1"), ("fdm", "u")])
+EVERY = pytest.mark.parametrize(("estimator", "output"), EVERY_OUTPUT)
 
 
 def recording(counts, rate_hz=1000.0, start_s=0.0) -> Recording:

@@ -3,7 +3,7 @@
 import math
 from functools import cache
 
-from hardwall.model import levant
+from hardwall.model import estimators, levant
 from hardwall.model.spec import AxisSpec
 
 ADJUSTED = levant.Gains(500 * math.sqrt(1e-3), 50.0)
@@ -41,6 +41,8 @@ SPECS = {
     "narrow": NARROW,
     "wide": WIDE,
 }
+
+EVERY_OUTPUT = [(name, output) for name in estimators.ESTIMATORS for output in estimators.load(name).OUTPUTS]
 
 
 @cache

@@ -8,7 +8,7 @@ from specs import ADJUSTED, MHZ, spec
 
 from bench import SAMPLES, Bench, parameters, rng, simulate
 from hardwall.hdl.axis import Axis
-from hardwall.model import axis, quadrature
+from hardwall.model import axis, estimators, quadrature
 from hardwall.model.spec import AxisSpec
 
 PINS = (
@@ -45,8 +45,9 @@ def random_words(design: axis.Design, random: np.random.Generator) -> dict[str, 
     words["wall_left"], words["wall_forbid_pull"] = random.integers(0, 2, 2).tolist()
     words["encoder_glitch_clocks"] = int(random.choice([0, 1, 2, 5]))
     words["encoder_invert"] = int(random.random() < 0.2)
-    if "levant_output" in words:
-        words["levant_output"] = int(random.integers(0, 2))
+    outputs, selector = design.spec.model.OUTPUTS, estimators.output_word(design.spec.estimator)
+    if len(outputs) > 1:
+        words[selector] = int(random.integers(0, len(outputs)))
     return words
 
 
@@ -192,7 +193,7 @@ async def follows_model(dut):
     assert {(clock - first_clock - latency + 1) % spec.clocks_per_sample for clock in seen.clocks} == {0}
 
 
-@pytest.mark.parametrize("estimator", ["levant", "fdm"])
+@pytest.mark.parametrize("estimator", estimators.ESTIMATORS)
 def test_rtl(estimator):
     simulate(__file__, make, estimator=estimator)
 

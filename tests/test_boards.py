@@ -63,7 +63,8 @@ class Twin:
     def _sample(self) -> None:
         d, decoder, now = self.design, self.decoder, self.clocks
         params = d.params(self.words)
-        self.estimator, velocity, raised = estimate(params.estimator, self.estimator, decoder.count, self.restart)
+        seen = quadrature.seen(decoder)
+        self.estimator, velocity, raised = estimate(params.estimator, self.estimator, seen, self.restart)
         force = wall.render(params.wall, decoder.count, velocity)
         fault = decoder.illegal | decoder.overspeed
         self.output, limited = output.step(params.output, self.output, force, not fault)

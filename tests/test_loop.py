@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from specs import EVERY_OUTPUT
 
 from hardwall.sim import cli, hit
 from hardwall.sim.scene import load
@@ -12,9 +13,7 @@ from hardwall.sim.scene import load
 STABLE = {"wall.stiffness_n_per_m": 10e3, "wall.damping_n_s_per_m": 20.0}
 UNSTABLE = {"wall.stiffness_n_per_m": 100e3, "wall.damping_n_s_per_m": 20.0}
 ESTIMATORS = {
-    "levant u": {"controller.estimator": "levant", "controller.output": "u"},
-    "levant u1": {"controller.estimator": "levant", "controller.output": "u1"},
-    "fdm": {"controller.estimator": "fdm", "controller.output": None},
+    f"{name} {output}": {"controller.estimator": name, "controller.output": output} for name, output in EVERY_OUTPUT
 }
 ONE_SECOND = {"protocol.settle_s": 0.7, "protocol.mean_s": 0.1, "protocol.measure_s": 0.3}
 
@@ -46,7 +45,7 @@ def test_rtl_gives_the_models_force_words_with_an_imperfect_encoder(estimator, w
     assert result.max_force_n > 1
 
 
-@pytest.mark.parametrize("estimator", ["levant u", "fdm"])
+@pytest.mark.parametrize("estimator", ["levant u", "fdm u"])
 def test_rtl_gives_the_models_force_words_when_samples_leave_no_slack(estimator):
     """The fastest sampling that a clock allows: the next strobe comes as the drive changes."""
     clock_hz = load("mhz", ESTIMATORS[estimator]).spec.design.latency_to_drive * 1_000_000

@@ -252,6 +252,23 @@ def test_count_and_stamps_wrap(way):
             assert (seen[f"stamp_{channel}_{kind}"] == decoded % 32).all()
 
 
+@pytest.mark.parametrize("way", [1, -1])
+def test_the_last_edge_is_named_and_its_run_counted(way):
+    """There and back, 10 counts each way."""
+    clock = np.arange(100)
+    position = way * np.minimum(clock // 5, np.maximum(20 - clock // 5, 0))
+    seen = expected(PARAMS, stimulus(100, **pins(position)))
+    for now in range(1 + TO_COUNT, 100):
+        passed = np.diff(position[1 : now - TO_COUNT + 1])
+        ways = passed[passed != 0]
+        run = next((i for i, turn in enumerate(ways[::-1]) if turn != ways[-1]), len(ways))
+        assert seen["run"][now] == min(run, 4)
+        if run:
+            assert seen["down"][now] == (ways[-1] < 0)
+            # Upwards, A rises as position 1 is entered; downwards, what rises upwards falls.
+            assert seen["edge"][now] == (position[now - TO_COUNT] + (2 if ways[-1] < 0 else 3)) % 4
+
+
 @pytest.mark.parametrize("state", range(4))
 def test_a_jump_of_both_channels_is_illegal_and_not_counted(state):
     seen = expected(PARAMS, jumping(state))

@@ -156,11 +156,11 @@ def test_the_widest(estimator, output):
         ({"acceleration_max_counts_per_s2": math.inf}, "acceleration_max_counts_per_s2 must be finite and more than 0"),
         (
             {"acceleration_max_counts_per_s2": 1e12},
-            "acceleration_max_counts_per_s2 must give gains that fit this recording (in counts and samples: ",
+            "acceleration_max_counts_per_s2 must give gains that fit this recording (as if 1024 samples were a second",
         ),
         (
             {"acceleration_max_counts_per_s2": 1e-12},
-            "acceleration_max_counts_per_s2 must give gains that fit this recording (in counts and samples: ",
+            "acceleration_max_counts_per_s2 must give gains that fit this recording (as if 1024 samples were a second",
         ),
     ],
 )

@@ -13,6 +13,7 @@ from specs import ADJUSTED, MHZ, PAPER, SPECS, spec
 from hardwall.model import levant
 from hardwall.model.axis import Axis
 from hardwall.model.estimators import estimate
+from hardwall.model.quadrature import seen_count
 from hardwall.model.spec import AxisSpec
 
 
@@ -151,7 +152,7 @@ def largest_error(design) -> float:
     for k, count in enumerate(counts.tolist()):
         if k >= axis.sample_hz:
             largest = max(largest, abs(state.lead * design.velocity.lsb - (count - state.count)))
-        state, _, _ = estimate(params, state, count, 0)
+        state, _, _ = estimate(params, state, seen_count(count), 0)
     return largest
 
 

@@ -8,8 +8,7 @@ import pytest
 from replays import BOUND, COARSEN, EVERY, recording, swing
 
 from bench import rng
-from hardwall.model import quadrature
-from hardwall.sim.controllers import Model, ModelState
+from hardwall.model import quadrature, stamped
 from hardwall.sim.encoder import level
 from hardwall.sim.replay import replay, run
 from hardwall.sim.through_pins import through_pins
@@ -82,11 +81,11 @@ def test_every_strobe_sees_the_recorded_count(clocks):
     axis = spec.design.params(spec.design.encode())
     # A finite difference as wide as the count.
     axis = axis._replace(estimator=axis.estimator._replace(count_width=width, velocity_max=2**width))
-    state = ModelState(0, 0, 0, quadrature.START, spec.design.start(), 0, int(level(0)))
+    state = stamped.State(0, 0, 0, 0, quadrature.START, spec.design.start(), 0, int(level(0)))
     edges = np.zeros(2 * clocks, np.int64), np.zeros(2 * clocks, np.int64)
     velocity = np.zeros(len(counts), np.int64)
     state, left = through_pins(
-        Model(decoder, 0, 0, axis), state, counts, clocks, 30, edges, 0, velocity, 0, len(counts)
+        stamped.Controller(decoder, 0, 0, axis), state, counts, clocks, 30, edges, 0, velocity, 0, len(counts)
     )
     assert velocity.tolist() == np.diff(counts, prepend=0).tolist()
     assert (left, state.flags) == (0, 0)
