@@ -104,7 +104,10 @@ def measure(
     """
     known = signals.load(signal)
     bound = acceleration_max_m_per_s2 or known.acceleration_max_m_per_s2
-    spec = axis_spec(estimator, sample_hz, bound, gains)
+    try:
+        spec = axis_spec(estimator, sample_hz, bound, gains)
+    except ValueError as error:
+        raise ValueError(f"{estimator} at {sample_hz} Hz with C {bound:g} m/s^2: {error}") from None
     begin = math.ceil(known.judged_from_s * sample_hz)
     judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
     for first, words, flags in velocities(known, spec, output, backend, offsets(phase_error_counts)):
