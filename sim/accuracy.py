@@ -45,7 +45,11 @@ def outputs(text: str) -> list[tuple[str, str]]:
 
 
 def axis_spec(
-    estimator: str, sample_hz: int, acceleration_max_m_per_s2: float, gains: dict[str, float] | None = None
+    estimator: str,
+    sample_hz: int,
+    acceleration_max_m_per_s2: float,
+    gains: dict[str, float] | None = None,
+    bits_dropped: int = 0,
 ) -> AxisSpec:
     """Return the axis: the device of the scene `mhz` at another rate.
 
@@ -60,6 +64,7 @@ def axis_spec(
         acceleration_max_m_per_s2=acceleration_max_m_per_s2,
         estimator=estimator,
         gains=gains and estimators.load(estimator).Gains(**gains),
+        estimator_bits_dropped=bits_dropped,
     )
 
 
@@ -86,6 +91,7 @@ def measure(
     phase_error_counts: float = 0.0,
     acceleration_max_m_per_s2: float | None = None,
     gains: dict[str, float] | None = None,
+    bits_dropped: int = 0,
 ) -> dict:
     """Return one row: what was measured, units in the keys; `judge` says what the figures are.
 
@@ -97,6 +103,7 @@ def measure(
         phase_error_counts: by how much the encoder's channel B is late.
         acceleration_max_m_per_s2: C for the default gains; None for the signal's own.
         gains: others, by the names of the estimator's `Gains`.
+        bits_dropped: fraction bits that the estimator's words are to lack.
 
     Raises:
         ValueError: if the axis cannot be; the message names the field.
@@ -105,7 +112,7 @@ def measure(
     known = signals.load(signal)
     bound = acceleration_max_m_per_s2 or known.acceleration_max_m_per_s2
     try:
-        spec = axis_spec(estimator, sample_hz, bound, gains)
+        spec = axis_spec(estimator, sample_hz, bound, gains, bits_dropped)
     except ValueError as error:
         raise ValueError(f"{estimator} at {sample_hz} Hz with C {bound:g} m/s^2: {error}") from None
     begin = math.ceil(known.judged_from_s * sample_hz)
@@ -127,6 +134,7 @@ def measure(
         "delay_s": judge.delay_s(lambda times: exact_velocity(known.motion, times + begin / sample_hz)),
         "chatter_mm_s": judge.chatter * 1e3,
         "clock_hz": spec.clock_hz,
+        "velocity_bits": spec.design.estimator.velocity.width,
         "encoder_phase_error_counts": phase_error_counts,
         "acceleration_max_mm_s2": bound * 1e3,
         "gains": asdict(spec.design.gains),

@@ -149,6 +149,18 @@ COST_COLUMNS = {"estimator": "left", "device": "left"} | dict.fromkeys(
 )
 
 
+def _costs(names: list[str], device: str, seeds: int) -> list[dict]:
+    """Return what each estimator costs on a device."""
+    from . import parallel  # noqa: PLC0415
+    from .costs import cost  # noqa: PLC0415
+    from .store import Store  # noqa: PLC0415
+
+    jobs = [{"estimator": name, "device": device, "seeds": list(range(1, seeds + 1))} for name in names]
+    # Each places with several processes of its own.
+    with progress(f"costs on {device}", len(jobs)) as advance:
+        return parallel.run(cost, jobs, Store("costs"), 1, advance)
+
+
 def costs(
     wanted: EstimatorsOption = None,
     device: Annotated[Device | None, typer.Option(help="the part [default: each]")] = None,
@@ -156,19 +168,10 @@ def costs(
     as_json: JsonOption = False,
 ) -> None:
     """What each estimator takes of a device: alone, and the board with it placed and routed (a minute or two each)."""
-    from . import parallel  # noqa: PLC0415
-    from .costs import RATES, cost  # noqa: PLC0415
-    from .store import Store  # noqa: PLC0415
+    from .costs import RATES  # noqa: PLC0415
 
-    names = dict.fromkeys(curve.estimator for curve in _curves(None, wanted))
-    jobs = [
-        {"estimator": name, "device": part, "seeds": list(range(1, seeds + 1))}
-        for part in ([device] if device else RATES)
-        for name in names
-    ]
-    # Each places with several processes of its own.
-    with progress("costs", len(jobs)) as advance:
-        rows = parallel.run(cost, jobs, Store("costs"), 1, advance)
+    names = list(dict.fromkeys(curve.estimator for curve in _curves(None, wanted)))
+    rows = [row for part in ([device] if device else RATES) for row in _costs(names, part, seeds)]
     if as_json:
         print(json.dumps(rows))
         return
@@ -181,7 +184,82 @@ def costs(
     show_table(COST_COLUMNS, lines)
 
 
+def choose(
+    rate: Annotated[float, typer.Option(metavar="HZ", help="sample rate")] = 1e6,
+    wanted: EstimatorsOption = None,
+    backend: Annotated[Backend, typer.Option(help="float64 algorithm, bit-accurate model, or RTL")] = "fixed",
+    device: Annotated[Device, typer.Option(help="the part that the logic is counted on")] = "ecp5-25k",
+    seeds: Annotated[int, typer.Option(min=1, max=99, help="placements; fmax is their median")] = 3,
+    workers: WorkersOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """The table to choose an estimator by: its error in each situation, all with one set of gains, and its cost."""
+    from . import parallel, situations  # noqa: PLC0415
+    from .accuracy import measure  # noqa: PLC0415
+    from .store import Store  # noqa: PLC0415
+
+    (sample_hz,) = _rates(str(rate), ())
+    pairs = [(curve.estimator, curve.output) for curve in _curves(None, wanted)]
+    jobs = situations.jobs(pairs, sample_hz, backend)
+    try:
+        with progress(f"situations, {backend}", len(jobs)) as advance:
+            measured = parallel.run(measure, jobs, Store("accuracy"), workers, advance)
+    except ValueError as error:
+        raise BadInput(str(error)) from None
+    rows = situations.table(pairs, measured, _costs(list(dict.fromkeys(name for name, _ in pairs)), device, seeds))
+    if as_json:
+        print(json.dumps(rows))
+        return
+    names = list(situations.SITUATIONS)
+    best = {name: min(row["rms_mm_s"][name] for row in rows) for name in names}
+    lines = []
+    for row in rows:
+        errors = [f"{row['rms_mm_s'][name]:.3g}{'*' * (row['rms_mm_s'][name] == best[name])}" for name in names]
+        delay = "" if row["impact_delay_s"] is None else f"{row['impact_delay_s'] * 1e6:.3g}"
+        logic = [str(row[name]) for name in ("lut4", "ff", "dsp", "bram", "latency_clocks")]
+        lines.append(
+            [f"{row['estimator']} {row['output']}".strip(), *errors, delay, *logic, f"{row['max_sample_hz']:,}"]
+        )
+    heads = [*names, "impact delay (us)", "LUT4", "FF", "DSP", "BRAM", "clocks", "max samples/s"]
+    show_table({"RMS error (mm/s)": "left"} | dict.fromkeys(heads, "right"), lines)
+
+
+def bits(
+    rate: Annotated[float, typer.Option(metavar="HZ", help="sample rate")] = 1e6,
+    wanted: EstimatorsOption = None,
+    workers: WorkersOption = None,
+    plot: PlotOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """What a bit buys: error and logic as the words of an estimator shrink bit by bit from the derived widths."""
+    from . import parallel  # noqa: PLC0415
+    from .bits import DROPPED, bit  # noqa: PLC0415
+    from .plot_accuracy import SUFFIXES, save, what_a_bit_buys  # noqa: PLC0415
+    from .store import Store  # noqa: PLC0415
+
+    plot = output_file(plot, "--plot", SUFFIXES)
+    (sample_hz,) = _rates(str(rate), ())
+    jobs = [
+        {"estimator": curve.estimator, "output": curve.output, "sample_hz": sample_hz, "bits_dropped": dropped}
+        for curve in _curves(None, wanted)
+        for dropped in DROPPED
+    ]
+    with progress("bits", len(jobs)) as advance:
+        found = parallel.run(bit, jobs, Store("bits"), workers, advance)
+    rows = [row for row in found if row]
+    if as_json:
+        print(json.dumps(rows))
+    else:
+        columns = ("bits_dropped", "velocity_bits", "rms_mm_s", "lut4", "ff", "dsp")
+        lines = [[f"{row['estimator']} {row['output']}", *(f"{row[name]:.5g}" for name in columns)] for row in rows]
+        heads = ("bits dropped", "velocity bits", "RMS (mm/s)", "LUT4", "FF", "DSP")
+        show_table({"estimator": "left"} | dict.fromkeys(heads, "right"), lines)
+    if plot:
+        save(what_a_bit_buys(rows), plot)
+        log.print(f"picture: {plot}")
+
+
 def add_commands(app: typer.Typer) -> None:
     """Add the commands of this file to the command line."""
-    for command in (accuracy, costs):
+    for command in (accuracy, costs, choose, bits):
         app.command()(command)

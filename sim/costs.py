@@ -2,10 +2,8 @@
 
 from collections.abc import Iterable
 
-from ..hdl import __name__ as hdl
-from ..model import estimators
 from .scene import load
-from .synthesis import cells, synthesise
+from .synthesis import estimator_cells, synthesise
 
 RATES = {
     "ecp5-25k": {},
@@ -31,14 +29,12 @@ def cost(estimator: str, device: str, seeds: Iterable[int]) -> dict:
         SynthesisError: if a tool is missing or fails, as when the board does not fit.
     """
     scene = load("mhz", RATES[device] | {"controller.estimator": estimator, "controller.output": None})
-    design = scene.spec.design.estimator
-    alone = cells(estimators.load(estimator, hdl).Estimator(design), device, scene.spec.clock_hz)
     return {
         "estimator": estimator,
         "device": device,
         "clock_mhz": scene.spec.clock_hz / 1e6,
         "sample_hz": scene.spec.sample_hz,
-        **alone,
-        "latency_clocks": design.latency,
+        **estimator_cells(scene.spec, device),
+        "latency_clocks": scene.spec.design.estimator.latency,
         "board": synthesise(scene, device, list(seeds)),
     }

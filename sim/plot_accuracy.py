@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from . import signals
 from .accuracy import axis_spec, exact_velocity
-from .figures import Curve, lower_bound_m_per_s, window_floor_m_per_s
+from .figures import Curve, label, lower_bound_m_per_s, window_floor_m_per_s
 from .stream import velocities
 from .whole_file import whole_file
 
@@ -101,3 +101,33 @@ def _bounds(axes: Axes, rows: list[dict]) -> None:
     floor = [window_floor_m_per_s(signal, rate) * 1e3 for rate in rates]
     axes.axhline(bound, color="black", ls="--", lw=1, label=f"2√(Cε) = {bound:.3g}: no smaller largest error is sure")
     axes.plot(rates, floor, color="black", ls=":", lw=1.3, label="difference over 2√(ε/C): RMS by its formula")
+
+
+def what_a_bit_buys(rows: list[dict]) -> Figure:
+    """Return the picture of error against the velocity's width, and against logic, a curve for each estimator's output.
+
+    Args:
+        rows: of `bits.bit`.
+    """
+    picture = Figure(figsize=(12, 6), layout="constrained")
+    by_width, by_logic = picture.subplots(1, 2, sharey=True)
+    names = list(dict.fromkeys((row["estimator"], row["output"]) for row in rows))
+    colours = mpl.colormaps["tab20"].colors
+    for index, (estimator, output) in enumerate(names):
+        own = [row for row in rows if (row["estimator"], row["output"]) == (estimator, output)]
+        errors = [row["rms_mm_s"] for row in own]
+        style = {"color": colours[index % 20], "marker": MARKERS[index % len(MARKERS)], "ms": 4, "lw": 1.2}
+        by_width.plot([row["velocity_bits"] for row in own], errors, label=label(estimator, output), **style)
+        by_logic.plot([row["lut4"] for row in own], errors, **style)
+        # The widths that follow from the spec.
+        for axes, key in ((by_width, "velocity_bits"), (by_logic, "lut4")):
+            axes.plot(own[0][key], errors[0], marker="o", ms=9, mfc="none", mec=style["color"])
+    by_width.set_xlabel("bits of the velocity")
+    by_logic.set_xlabel("LUT4 of the estimator alone (ECP5)")
+    by_width.set_ylabel("RMS error (mm/s)")
+    by_width.set_yscale("log")
+    for axes in (by_width, by_logic):
+        axes.grid(alpha=0.3, which="both")
+    picture.suptitle(f"the paper's signal at {rows[0]['sample_hz'] / 1e6:g} MHz; circles: the derived widths")
+    picture.legend(loc="outside right center", fontsize=8)
+    return picture

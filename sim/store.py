@@ -39,13 +39,15 @@ class Store:
     def __init__(self, kind: str):
         self.path = build_dir() / "results" / f"{kind}-{_sources()}.jsonl"
         self._known: dict[str, Any] = {}
-        if self.path.exists():
-            for line in self.path.read_text(encoding="utf-8").splitlines():
-                try:
-                    key, result = json.loads(line)
-                except ValueError:
-                    continue  # the last line of a run that was killed while it wrote
-                self._known[key] = result
+        text = self.path.read_text(encoding="utf-8") if self.path.exists() else ""
+        # A run that was killed while it wrote leaves a piece of a line: it is no result, and the next begins after it.
+        self._torn = text[-1:] not in ("", "\n")
+        for line in text.splitlines():
+            try:
+                key, result = json.loads(line)
+            except ValueError:
+                continue
+            self._known[key] = result
 
     @staticmethod
     def _key(job: dict) -> str:
@@ -60,4 +62,5 @@ class Store:
         self._known[self._key(job)] = result
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with self.path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps([self._key(job), result]) + "\n")
+            file.write("\n" * self._torn + json.dumps([self._key(job), result]) + "\n")
+        self._torn = False

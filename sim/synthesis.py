@@ -22,12 +22,12 @@ from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from amaranth.lib.wiring import Component
-
+from ..hdl import __name__ as hdl
 from ..hdl.boards import Board
 from ..hdl.export import to_verilog
-from ..model import quadrature
+from ..model import estimators, quadrature
 from ..model.compiled import build_dir
+from ..model.spec import AxisSpec
 from .scene import Scene
 
 CONSTRAINTS = Path(__file__).absolute().parent.parent / "constraints"
@@ -207,14 +207,15 @@ def _timing(device: Device, report: dict) -> tuple[float, str]:
     return longest, ends
 
 
-def cells(component: Component, device: str, clock_hz: int) -> dict[str, int]:
-    """Return what a component alone takes of a device, as synthesised and before it is placed: lut4, ff, dsp, bram.
+def estimator_cells(spec: AxisSpec, device: str) -> dict[str, int]:
+    """Return what the estimator of an axis takes of a device, synthesised alone and not placed: lut4, ff, dsp, bram.
 
     Raises:
         SynthesisError: if a tool is missing or fails.
     """
     part = DEVICES[device]
-    folder = _netlist(f"part-{device}", part, to_verilog(component, "board"), "", clock_hz)
+    component = estimators.load(spec.estimator, hdl).Estimator(spec.design.estimator)
+    folder = _netlist(f"estimator-{device}", part, to_verilog(component, "board"), "", spec.clock_hz)
     found = json.loads((folder / "board.json").read_text(encoding="utf-8"))["modules"]["board"]["cells"]
     types = [cell["type"] for cell in found.values()]
     counted = {name: sum(weights.get(kind, 0) for kind in types) for name, weights in part.cells.items()}
