@@ -9,6 +9,7 @@ from .estimators import estimate
 from .fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from .quadrature import RUN_MAX
 from .sqrt import isqrt
+from .sqrt import latency as sqrt_latency
 from .words import GAIN_BITS, Word
 
 OUTPUTS = ("u",)
@@ -20,13 +21,11 @@ WIDTH_MAX = 40
 """Most bits of velocity and acceleration."""
 ACCELERATION_BITS = 3
 """The acceleration may reach 2**ACCELERATION_BITS C: an impact exceeds the C of a motion."""
-MANTISSA_BITS = 15
-"""Least bits of a time that multiply and divide: with a sign, one operand of an iCE40UP's multiplier."""
-ROOT_BITS = 4
+ROOT_BITS = 6
 """The root resolves the least error that it limits to 2**-ROOT_BITS."""
 LEARN_SHIFT = 5
 """An edge's residual moves the two places that it depends on by 2**-LEARN_SHIFT of it."""
-PLACE_BITS = 18
+PLACE_BITS = 22
 """Places of edges resolve 2**-PLACE_BITS counts."""
 REST_BITS = 3
 """An axis rests when 2**REST_BITS of the last intervals, rounded up to a power of two, have brought no edge."""
@@ -34,8 +33,8 @@ LEFT_MAX = 46
 """No left shift of a gain word exceeds this, beyond which all of them saturate: 16 + 46 bits fit int64."""
 DIGITS = 2
 """Quotient bits a clock."""
-STEPS = 20
-"""Clocks of the sequence besides the quotient's: see `hardwall.hdl.levant_edge`."""
+STEPS = 17
+"""Clocks of the sequence besides the root's or the quotient's: see `hardwall.hdl.levant_edge`."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,6 @@ class Params(NamedTuple):
     turn_span: int
     error_shift: int
     radicand_shift: int
-    radicand_max: int
     limit_shift: int
     slope_shift: int
     alpha_shift: int
@@ -115,6 +113,7 @@ class FloatParams(NamedTuple):
     clocks: int
     shortest: int
     mantissa: int
+    steepest: float
 
 
 START = State(0, 0, 0, 0, 0, 0, 0, 0, (0, 0, 0, 0))
@@ -160,7 +159,9 @@ class Design:
         # Times, clocks.
         window = clock * min(math.sqrt(axis.speed_max_m_per_s / (clock * bound)), math.sqrt(q / bound) / 4)
         self.shortest = min(max(math.floor(math.log2(max(window, 2.0))), 1), axis.stamp_width - 3)
-        self.mantissa = max(MANTISSA_BITS, bits_for(4 * max(clocks, 1 << self.shortest)))
+        within_count = clock * math.sqrt(q / bound)
+        exact = bits_for(math.sqrt(within_count * 2.0 ** (SPEED_BITS - 2)))
+        self.mantissa = min(max(exact, bits_for(4 * max(clocks, 1 << self.shortest))), axis.stamp_width - 1)
         span = max(axis.stamp_width - 1 - self.mantissa, 0)
 
         # Velocity and acceleration.
@@ -214,7 +215,12 @@ class Design:
     @property
     def latency(self) -> int:
         """Clocks from strobe to valid."""
-        return STEPS + -(-(self.velocity.width - 1) // DIGITS)
+        return STEPS + max(self.quotient_latency, sqrt_latency(self.radicand.width + 1))
+
+    @property
+    def quotient_latency(self) -> int:
+        """Clocks of the division: one to load, and one for each `DIGITS` bits."""
+        return 1 + -(-(self.velocity.width - 1) // DIGITS)
 
     def params(self, words: dict[str, int]) -> Params:
         """Return the kernel's parameters for the given run-time words."""
@@ -234,7 +240,6 @@ class Design:
             turn_span=self.turn_span,
             error_shift=f - e_f,
             radicand_shift=e_f - self.radicand.f,
-            radicand_max=self.radicand.max,
             limit_shift=self.lambda_.f + self.root.f - f,
             slope_shift=f - a_f,
             alpha_shift=self.alpha.f - a_f,
@@ -257,6 +262,7 @@ class Design:
             self.clocks,
             self.shortest,
             self.mantissa,
+            self.acceleration.max * self.acceleration.lsb,
         )
 
 
@@ -354,22 +360,21 @@ def _correct(params, state, seen, interval, passed):
     slope = min(quotient, most)
     change = slope
     if shift == 0:
-        radicand = min(shift_floor(size, params.radicand_shift), params.radicand_max) << (length & 1)
+        radicand = shift_floor(size, params.radicand_shift) << (length & 1)
         change = min(slope, shift_floor(params.lambda_ * isqrt(radicand), params.limit_shift - (length >> 1)))
     relay = min(shift_floor(params.alpha, max(params.alpha_shift - length, -LEFT_MAX)), steepest)
     bend = min(shift_floor(slope, params.slope_shift + length), relay)
 
     far_velocity = velocity + turn - sign * change
-    far_acceleration = acceleration - sign * bend
     velocity = saturate(far_velocity, -most, most)
-    acceleration = saturate(far_acceleration, -steepest, steepest)
+    acceleration = saturate(acceleration - sign * bend, -steepest, steepest)
     if seen.run == RUN_MAX:
         most_learnt = params.learn_max >> shift
         residual = saturate(error, -most_learnt, most_learnt) << shift
         by = shift_round_half_up(residual, params.learn_shift)
         places = _shifted(places, kind, state.kind, by, params.place_max)
     flags = int(distance != passed or slope != quotient)
-    flags |= int(velocity != far_velocity or acceleration != far_acceleration) << 1
+    flags |= int(velocity != far_velocity) << 1
     return velocity, acceleration, places, flags
 
 
@@ -430,6 +435,7 @@ def _float_correct(params, state, seen, interval, passed):
         change = min(slope, params.lambda_ * math.sqrt(abs(error) * scale))
     velocity = velocity + turn - sign * change
     acceleration = acceleration - sign * min(slope / scale, params.alpha * scale)
+    acceleration = saturate(acceleration, -params.steepest, params.steepest)
     if seen.run == RUN_MAX:
         most_learnt = params.clocks / 4
         by = saturate(error, -most_learnt, most_learnt) * 2.0**-LEARN_SHIFT
