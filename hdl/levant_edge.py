@@ -7,7 +7,7 @@ from hardwall.model.quadrature import RUN_MAX
 from hardwall.model.sqrt import latency as sqrt_latency
 
 from . import EstimatorBlock
-from .fixed import saturate, shape, shift_floor, shift_round_half_up
+from .fixed import shape, shift_floor, shift_round_half_up
 from .sqrt import Sqrt
 
 
@@ -61,7 +61,7 @@ class Estimator(EstimatorBlock):
         # The sample, and what is to be done with it.
         stamps = Array([self.stamp_a_rise, self.stamp_b_rise, self.stamp_a_fall, self.stamp_b_fall])
         fresh, full_run, new, correct, carry, taken, rest = (Signal() for _ in range(7))
-        now, at, since_new, age = (Signal(d.stamp_width) for _ in range(4))
+        now, at, age = (Signal(d.stamp_width) for _ in range(3))
         to, to_kind, passed = Signal.like(number), Signal(2), Signal.like(number)
 
         # A time, its length in bits, and as it multiplies: the top bits, `cut` having been dropped.
@@ -108,31 +108,34 @@ class Estimator(EstimatorBlock):
         # Bits of an interval in use beyond the fewest.
         first = d.shortest + 1
         more = Signal(range(max(far - d.shortest, 2)))
-        more_halves = Signal(range(max((d.mantissa >> 1) - (first >> 1), 0) + 1))
+        few = Signal(range(max(d.mantissa - first, 0) + 1))
+        few_halves = Signal(range(max((d.mantissa >> 1) - (first >> 1), 0) + 1))
         m.d.sync += [
             more.eq(length - first),
-            more_halves.eq((length >> 1) - (first >> 1)),
-            relay.eq(_least(_shifted(self.levant_edge_alpha, p.alpha_shift - first, more), acceleration.max)),
-            slope.eq(_least(quotient.quotient, velocity.max)),
-            bent.eq(_least(shift_floor(slope, p.slope_shift + first) >> more, velocity.max)),
+            few.eq(length - first),
+            few_halves.eq((length >> 1) - (first >> 1)),
+            relay.eq(_least(_shifted(self.levant_edge_alpha, p.alpha_shift - first, few), len(relay))),
+            slope.eq(_least(quotient.quotient, len(slope))),
+            bent.eq(_least(shift_floor(slope, p.slope_shift + first) >> more, len(bent))),
         ]
 
         # The places learn while the root is drawn.
-        most_learnt = Const(p.learn_max) >> e_cut
+        here, there = Signal(shape(place)), Signal(shape(place))
+        m.d.comb += [here.eq(places[to_kind]), there.eq(places[kind])]
         residual = Signal(signed(p.learn_max.bit_length() + 1))
         learnt = Signal(signed(max(len(residual) - p.learn_shift, 1) + 1))
         place_to, place_since = Signal(shape(place)), Signal(shape(place))
         m.d.sync += [
-            residual.eq(Mux(e > most_learnt, most_learnt, Mux(e < -most_learnt, -most_learnt, e)) << e_cut),
+            residual.eq(_fitted(_fitted(e, len(residual)) << e_cut, len(residual))),
             learnt.eq(shift_round_half_up(residual, p.learn_shift)),
-            place_to.eq(saturate(places[to_kind] + learnt, -p.place_max, p.place_max)),
-            place_since.eq(saturate(places[kind] - learnt, -p.place_max, p.place_max)),
+            place_to.eq(_fitted(here + learnt, place.width)),
+            place_since.eq(_fitted(there - learnt, place.width)),
         ]
 
         # What no further edge allows.
         age_time = Signal(d.mantissa)
         bound = Signal(velocity.width - 1)
-        low, high, line = (Signal(shape(velocity)) for _ in range(3))
+        line, onward, end = Signal(shape(velocity)), Signal(velocity.width - 1), Signal(signed(velocity.width + 1))
         flags = Signal(2)
 
         m.d.sync += self.valid.eq(0)
@@ -151,7 +154,6 @@ class Estimator(EstimatorBlock):
             with m.State("DIFFERENCE"):
                 m.d.sync += [
                     measure.eq(Mux(fresh, 0, at - stamp)),
-                    since_new.eq(now - at),
                     age.eq(now - Mux(fresh, at, stamp)),
                     # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
                     passed.eq(Mux(fresh, 0, (to - number)[: len(passed)].as_signed())),
@@ -166,7 +168,7 @@ class Estimator(EstimatorBlock):
                 unknown = ~known | measure[far]
                 timed = (measure >> d.shortest) != 0
                 waited = (age >> first) != 0
-                held = saturate(passed, -d.distance.max, d.distance.max)
+                held = _fitted(passed, d.distance.width)
                 m.d.sync += [
                     new.eq(came),
                     correct.eq(came & ~unknown & timed),
@@ -174,7 +176,7 @@ class Estimator(EstimatorBlock):
                     taken.eq(~came | unknown | timed | waited),
                     distance.eq(held),
                     beyond.eq(held != passed),
-                    apart.eq(places[to_kind] - places[kind]),
+                    apart.eq(here - there),
                 ]
                 with m.If(came & unknown):
                     m.d.sync += [known.eq(1), v.eq(0), a.eq(0)]
@@ -186,7 +188,7 @@ class Estimator(EstimatorBlock):
                     e_cut.eq(cut),
                     drop.eq(kept),
                     way.eq(((distance * d.clocks) << place.f) + apart),
-                    measure.eq(Mux(new & taken, since_new, age)),
+                    measure.eq(now - Mux(new & taken, at, stamp)),
                 ]
                 with m.If(correct):
                     m.d.sync += length.eq(size)
@@ -196,10 +198,10 @@ class Estimator(EstimatorBlock):
                 m.next = "TURN"
             with m.State("TURN"):
                 m.d.sync += [
-                    turn.eq(saturate(coarse, -2 * velocity.max, 2 * velocity.max)),
+                    turn.eq(_fitted(coarse, len(turn))),
                     age_time.eq(time),
                     age_drop.eq(kept),
-                    bound.eq(_least(Const(p.bound) >> Mux(size == 0, 0, size - 1)[: len(size)], velocity.max)),
+                    bound.eq(_least(Const(p.bound) >> Mux(size == 0, 0, size - 1)[: len(size)], len(bound))),
                     rest.eq(taken & (measure[far] | (size > length + REST_BITS))),
                 ]
                 with m.If(taken & measure[far]):
@@ -207,7 +209,7 @@ class Estimator(EstimatorBlock):
                 m.next = "MEAN"
             with m.State("MEAN"):
                 m.d.sync += [
-                    left.eq(saturate(v + (turn >> 1), -velocity.max, velocity.max)),
+                    left.eq(_fitted(v + (turn >> 1), velocity.width)),
                     ahead.eq(Mux(correct | carry, v + turn, v)),
                 ]
                 m.next = "PLACE PRODUCT"
@@ -223,20 +225,22 @@ class Estimator(EstimatorBlock):
                 m.d.sync += root_product.eq(self.levant_edge_lambda * root.root)
                 m.next = "LIMIT"
             with m.State("LIMIT"):
-                steep = _least(_shifted(root_product, p.limit_shift - (first >> 1), more_halves), velocity.max)
+                steep = _least(_shifted(root_product, p.limit_shift - (first >> 1), few_halves), len(limit))
                 m.d.sync += limit.eq(Mux(e_cut == 0, steep, velocity.max))
+                with m.If(e_cut != 0):
+                    m.d.sync += relay.eq(acceleration.max)
                 m.next = "CHANGE"
             with m.State("CHANGE"):
                 m.d.sync += [
                     change.eq(Mux(correct, _signed(Mux(limit < slope, limit, slope), e < 0), 0)),
                     bend.eq(Mux(correct, _signed(Mux(relay < bent, relay, bent), e < 0), 0)),
-                    flags[0].eq(correct & (beyond | (quotient.quotient > velocity.max))),
+                    flags[0].eq(correct & (beyond | quotient.quotient[len(slope) :].any())),
                 ]
                 m.next = "UPDATE"
             with m.State("UPDATE"):
                 far_v = ahead - change
-                held_v = saturate(far_v, -velocity.max, velocity.max)
-                held_a = saturate(a - bend, -acceleration.max, acceleration.max)
+                held_v = _fitted(far_v, velocity.width)
+                held_a = _fitted(a - bend, acceleration.width)
                 m.d.sync += [
                     v.eq(Mux(rest, 0, held_v)),
                     a.eq(Mux(rest, 0, held_a)),
@@ -252,24 +256,24 @@ class Estimator(EstimatorBlock):
                 m.next = "LINE PRODUCT"
             with m.State("LINE PRODUCT"):
                 room = Mux(v < 0, bound + v, bound - v)
-                onward = Mux(room < 0, 0, room)
-                m.d.sync += [
-                    low.eq(Mux(v > 0, -v, -onward)),
-                    high.eq(Mux(v < 0, -v, onward)),
-                ]
+                m.d.sync += onward.eq(Mux(room < 0, 0, room))
                 m.next = "LINE TURN"
             with m.State("LINE TURN"):
-                m.d.sync += turn.eq(saturate(coarse, -2 * velocity.max, 2 * velocity.max))
+                m.d.sync += turn.eq(_fitted(coarse, len(turn)))
                 m.next = "LINE"
             with m.State("LINE"):
                 straight = v + turn
-                held_line = saturate(straight, -velocity.max, velocity.max)
+                held_line = _fitted(straight, velocity.width)
                 m.d.sync += [line.eq(held_line), flags[1].eq(flags[1] | (held_line != straight))]
+                m.next = "END"
+            with m.State("END"):
+                # Only the end on the line's own side of 0 can hold it.
+                m.d.sync += end.eq(Mux((line < 0) == (v < 0), _signed(onward, v < 0), -v))
                 m.next = "OUTPUT"
             with m.State("OUTPUT"):
-                inside = Mux(line > high, high, Mux(line < low, low, line))
+                beyond_end = ((line - end) < 0) == (line < 0)
                 m.d.sync += [
-                    self.velocity.eq(Mux(taken, inside, line)),
+                    self.velocity.eq(Mux(taken & beyond_end, end, line)),
                     self.saturated.eq(flags),
                     self.valid.eq(1),
                 ]
@@ -340,8 +344,18 @@ def _shifted(value, right: int, left):
     return (value << left) >> right if right > 0 else value << -right << left
 
 
-def _least(value, most: int):
-    return Mux(value > most, most, value)
+def _least(value, bits: int):
+    """Return an unsigned `value`, or the largest word of `bits` where it is more."""
+    return Mux(value[bits:].any(), (1 << bits) - 1, value[:bits])
+
+
+def _fitted(value, bits: int):
+    """Return a signed `value` held within `bits` of two's complement: its top bits tell, no comparison is needed."""
+    if len(value) <= bits:
+        return value
+    top = value[bits - 1 :]
+    held = Mux(value[-1], -1 << (bits - 1), (1 << (bits - 1)) - 1)
+    return Mux(top.any() & ~top.all(), held, value[:bits].as_signed())
 
 
 def _signed(value, negative):

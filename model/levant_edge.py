@@ -21,7 +21,7 @@ WIDTH_MAX = 40
 """Most bits of velocity and acceleration."""
 ACCELERATION_BITS = 3
 """The acceleration may reach 2**ACCELERATION_BITS C: an impact exceeds the C of a motion."""
-ROOT_BITS = 6
+ROOT_BITS = 5
 """The root resolves the least error that it limits to 2**-ROOT_BITS."""
 LEARN_SHIFT = 5
 """An edge's residual moves the two places that it depends on by 2**-LEARN_SHIFT of it."""
@@ -33,7 +33,7 @@ LEFT_MAX = 46
 """No left shift of a gain word exceeds this, beyond which all of them saturate: 16 + 46 bits fit int64."""
 DIGITS = 2
 """Quotient bits a clock."""
-STEPS = 17
+STEPS = 18
 """Clocks of the sequence besides the root's or the quotient's: see `hardwall.hdl.levant_edge`."""
 
 
@@ -114,6 +114,8 @@ class FloatParams(NamedTuple):
     shortest: int
     mantissa: int
     steepest: float
+    learn_max: float
+    place_max: float
 
 
 START = State(0, 0, 0, 0, 0, 0, 0, 0, (0, 0, 0, 0))
@@ -179,7 +181,7 @@ class Design:
         # Errors of place, in counts times D.
         self.error = SQ(self.velocity.i + self.mantissa + 2, f - min(max(self.shortest - 1, 0), f))
         fine = PLACE_BITS - math.floor(math.log2(clocks))
-        self.place = SQ(bits_for(clocks) + 1, max(fine, 0))
+        self.place = SQ(max(bits_for(clocks / 2), 0) + 1, max(fine, 0))
         passed = 2 * speed * (2 + (2 << self.shortest) / clocks) + 1
         self.distance = SQ(min(1 + bits_for(passed), axis.count_width), 0)
 
@@ -244,8 +246,8 @@ class Design:
             slope_shift=f - a_f,
             alpha_shift=self.alpha.f - a_f,
             learn_shift=e_f - self.place.f + LEARN_SHIFT,
-            learn_max=shift_floor(self.clocks, 2 - e_f),
-            place_max=shift_floor(self.clocks, 1 - self.place.f),
+            learn_max=(1 << bits_for(self.clocks / 4) + e_f) - 1,
+            place_max=self.place.max,
             bound=shift_floor(5 * self.clocks, 1 - f),
             velocity_max=self.velocity.max,
             acceleration_max=self.acceleration.max,
@@ -262,7 +264,9 @@ class Design:
             self.clocks,
             self.shortest,
             self.mantissa,
-            self.acceleration.max * self.acceleration.lsb,
+            2.0 ** (self.acceleration.i - 1),
+            2.0 ** bits_for(self.clocks / 4),
+            2.0 ** (self.place.i - 1),
         )
 
 
@@ -304,24 +308,22 @@ def _last_stamp(seen):
 
 
 @compiled
-def _shifted(places, to, since, by, most):
-    """Return the places with that of kind `to` higher and that of kind `since` lower, held within +-`most`."""
+def _shifted(places, to, since, by, low, high):
+    """Return the places with that of kind `to` higher and that of kind `since` lower, within `low` to `high`."""
     return (
-        saturate(places[0] + by * (int(to == 0) - int(since == 0)), -most, most),
-        saturate(places[1] + by * (int(to == 1) - int(since == 1)), -most, most),
-        saturate(places[2] + by * (int(to == 2) - int(since == 2)), -most, most),
-        saturate(places[3] + by * (int(to == 3) - int(since == 3)), -most, most),
+        saturate(places[0] + by * (int(to == 0) - int(since == 0)), low, high),
+        saturate(places[1] + by * (int(to == 1) - int(since == 1)), low, high),
+        saturate(places[2] + by * (int(to == 2) - int(since == 2)), low, high),
+        saturate(places[3] + by * (int(to == 3) - int(since == 3)), low, high),
     )
 
 
 @compiled
 def _within(line, velocity, bound):
     """Return the extrapolated `line` held to what no further edge allows: see the module."""
-    if velocity > 0:
-        return saturate(line, -velocity, max(bound - velocity, 0))
     if velocity < 0:
         return saturate(line, -max(bound + velocity, 0), -velocity)
-    return saturate(line, -bound, bound)
+    return saturate(line, -velocity, max(bound - velocity, 0))
 
 
 @compiled
@@ -331,12 +333,17 @@ def _sign(value):
 
 
 @compiled
+def _fitted(value, most):
+    """Return `value` held within the two's complement word whose largest is `most`."""
+    return saturate(value, ~most, most)
+
+
+@compiled
 def _turn(params, acceleration, time):
-    """Return the change of velocity over `time` clocks: velocity words, rounded down, within twice the format."""
+    """Return the change of velocity over `time` clocks: velocity words, rounded down, with one bit more."""
     shift = max(_length(time) - params.mantissa, 0)
     coarse = shift_floor(acceleration * (time >> shift), params.turn_shift)
-    most = 2 * params.velocity_max
-    return saturate(shift_floor(coarse, params.turn_span - shift), -most, most)
+    return _fitted(shift_floor(coarse, params.turn_span - shift), 2 * params.velocity_max + 1)
 
 
 @compiled
@@ -350,29 +357,27 @@ def _correct(params, state, seen, interval, passed):
     most, steepest = params.velocity_max, params.acceleration_max
 
     turn = _turn(params, acceleration, interval)
-    mean = saturate(velocity + (turn >> 1), -most, most)
-    distance = saturate(passed, -params.distance_max, params.distance_max)
+    mean = _fitted(velocity + (turn >> 1), most)
+    distance = _fitted(passed, params.distance_max)
     place = shift_floor(distance * params.clocks, -params.place_fraction) + places[kind] - places[state.kind]
     error = shift_floor(mean * time, params.error_shift) - shift_floor(place, shift - params.place_shift)
     sign, size = _sign(error), abs(error)
 
     quotient = (size << params.error_shift) // time
     slope = min(quotient, most)
-    change = slope
+    change, bend = slope, min(shift_floor(slope, params.slope_shift + length), steepest)
     if shift == 0:
         radicand = shift_floor(size, params.radicand_shift) << (length & 1)
-        change = min(slope, shift_floor(params.lambda_ * isqrt(radicand), params.limit_shift - (length >> 1)))
-    relay = min(shift_floor(params.alpha, max(params.alpha_shift - length, -LEFT_MAX)), steepest)
-    bend = min(shift_floor(slope, params.slope_shift + length), relay)
+        change = min(change, shift_floor(params.lambda_ * isqrt(radicand), params.limit_shift - (length >> 1)))
+        bend = min(bend, shift_floor(params.alpha, max(params.alpha_shift - length, -LEFT_MAX)))
 
     far_velocity = velocity + turn - sign * change
-    velocity = saturate(far_velocity, -most, most)
-    acceleration = saturate(acceleration - sign * bend, -steepest, steepest)
+    velocity = _fitted(far_velocity, most)
+    acceleration = _fitted(acceleration - sign * bend, steepest)
     if seen.run == RUN_MAX:
-        most_learnt = params.learn_max >> shift
-        residual = saturate(error, -most_learnt, most_learnt) << shift
+        residual = _fitted(_fitted(error, params.learn_max) << shift, params.learn_max)
         by = shift_round_half_up(residual, params.learn_shift)
-        places = _shifted(places, kind, state.kind, by, params.place_max)
+        places = _shifted(places, kind, state.kind, by, ~params.place_max, params.place_max)
     flags = int(distance != passed or slope != quotient)
     flags |= int(velocity != far_velocity) << 1
     return velocity, acceleration, places, flags
@@ -401,7 +406,7 @@ def step(params, state, seen, restart):
             velocity, acceleration, places, flags = _correct(params, state, seen, interval, passed)
         elif age >> (params.shortest + 1):
             moved = velocity + _turn(params, acceleration, interval)
-            velocity = saturate(moved, -most, most)
+            velocity = _fitted(moved, most)
             flags = int(moved != velocity) << 1
         else:
             taken = 0
@@ -414,7 +419,7 @@ def step(params, state, seen, restart):
         velocity, acceleration = 0, 0
         known = int(known and not age >> far)
     straight = velocity + _turn(params, acceleration, age)
-    line = saturate(straight, -most, most)
+    line = _fitted(straight, most)
     flags |= int(line != straight) << 1
     if taken:
         line = _within(line, velocity, min(params.bound >> max(_length(age) - 1, 0), most))
@@ -430,16 +435,15 @@ def _float_correct(params, state, seen, interval, passed):
     place = passed * params.clocks + places[kind] - places[state.kind]
     error = (velocity + turn / 2) * interval - place
     sign, slope = _sign(error), abs(error) / interval
-    change = slope
+    change, bend = slope, slope / scale
     if interval >> params.mantissa == 0:
-        change = min(slope, params.lambda_ * math.sqrt(abs(error) * scale))
+        change = min(change, params.lambda_ * math.sqrt(abs(error) * scale))
+        bend = min(bend, params.alpha * scale)
     velocity = velocity + turn - sign * change
-    acceleration = acceleration - sign * min(slope / scale, params.alpha * scale)
-    acceleration = saturate(acceleration, -params.steepest, params.steepest)
+    acceleration = saturate(acceleration - sign * bend, -params.steepest, params.steepest)
     if seen.run == RUN_MAX:
-        most_learnt = params.clocks / 4
-        by = saturate(error, -most_learnt, most_learnt) * 2.0**-LEARN_SHIFT
-        places = _shifted(places, kind, state.kind, by, params.clocks / 2)
+        by = saturate(error, -params.learn_max, params.learn_max) * 2.0**-LEARN_SHIFT
+        places = _shifted(places, kind, state.kind, by, -params.place_max, params.place_max)
     return velocity, acceleration, places
 
 
