@@ -330,12 +330,12 @@ def test_one_sample_of_words_is_within_the_derived_bound_of_the_algorithm(sample
     axis, seen, _ = motion("paper", sample_hz, 0.4 if sample_hz > 1_000_000 else 5.0)
     d, words = axis.design.estimator, {word.name: word.reset for word in axis.design.estimator.words}
     params = d.params(words)
-    exact = d.float_params(None, "u", {word.name: word.to_si(word.reset) for word in d.words})
-    state, lsb, checked, random = START, d.velocity.lsb, 0, rng()
-    starts = random.integers(0, seen.shape[1] - 200, 20)
-    for start in starts.tolist():
+    exact = d.float_params(axis.design.gains, "u", {word.name: word.to_si(word.reset) for word in d.words})
+    lsb, checked, random = d.velocity.lsb, 0, rng()
+    samples = max(200, (8 << d.shortest) // d.clocks)
+    for start in random.integers(0, seen.shape[1] - samples, 10).tolist():
         state = START
-        for k in range(start, start + 200):
+        for k in range(start, start + samples):
             now = Seen(*(int(x) for x in seen[:, k]))
             places = tuple(place * d.place.lsb for place in state.places)
             same = state._replace(
@@ -379,11 +379,14 @@ def steady(d, samples: int, every: int, scale: Scale | None = None, up: bool = T
         yield *scale.row(), 0
 
 
-def test_start_makes_no_transient_and_the_second_edge_gives_the_velocity():
+def test_start_makes_no_transient_and_the_second_edge_gives_a_velocity():
     d = design("mhz")
-    seen = walk("mhz", steady(d, 700, 100))
+    seen = walk("mhz", steady(d, 60_000, 100))
     assert seen[:199] == [(0, 0)] * 199
-    assert {velocity for velocity, _ in seen[199:]} == {math.floor(2**d.velocity.f / 100)}
+    assert seen[199][0] > 0
+    # Learning rests once less than half an LSB is left to learn: two places may be so far off. The rest is rounding.
+    unlearnt = 2.0**levant_edge.LEARN_SHIFT * d.place.lsb / (100 * d.clocks) / d.velocity.lsb
+    assert max(abs(velocity - 2**d.velocity.f / 100) for velocity, _ in seen[50_000:]) <= unlearnt + 6
 
 
 @pytest.mark.parametrize("every", [50, 1000])
