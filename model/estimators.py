@@ -26,6 +26,7 @@ from .compiled import by_type
 ESTIMATORS = {
     "fdm": "finite_difference",
     "levant": "levant",
+    "butterworth": "butterworth",
 }
 
 
