@@ -65,8 +65,30 @@ class Estimator(EstimatorBlock):
             with m.Default():
                 m.d.comb += scaled.eq(shift_floor(product, shifts[-1]))
         held = saturate(total, -state_max, state_max)
+        limited = saturate(moved, -design.step_max, design.step_max)
 
         m.d.sync += [self.valid.eq(0), product.eq(operand * coefficient), term.eq(scaled)]
+        # One clock each. A product takes a clock, its shift another, while the next one follows behind.
+        sequence = {
+            "DIFFERENCE": [d.eq(limited), self.saturated[0].eq(limited != moved)],
+            "INPUT": [four_x.eq(d + (d1 << 1) + d2), d1.eq(d), d2.eq(d1)],
+            "ERROR": [
+                operand.eq((four_x << (design.operand.f - 2)) - (y >> drop)),
+                coefficient.eq(self.butterworth_frequency),
+            ],
+            "PUSH": [operand.eq(w >> drop), coefficient.eq(self.butterworth_damping)],
+            "DRAG": [],
+            "ADD PUSH": [total.eq(w + term)],
+            "SUBTRACT DRAG": [total.eq(total - term)],
+            "LIMIT W": [w.eq(held), self.saturated[1].eq(held != total)],
+            "OPERAND": [operand.eq(w >> drop), coefficient.eq(self.butterworth_frequency)],
+            "MOVE": [],
+            "SHIFT": [],
+            "ADD MOVE": [total.eq(y + term)],
+            "LIMIT Y": [y.eq(held), self.saturated[1].eq(self.saturated[1] | (held != total))],
+            "OUTPUT": [self.velocity.eq(shift_round_half_up(y, state.f - velocity.f)), self.valid.eq(1)],
+        }
+        following = [*list(sequence)[1:], "SAMPLE"]
         with m.FSM():
             with m.State("SAMPLE"), m.If(self.strobe):
                 fresh = self.restart | ~running
@@ -79,48 +101,8 @@ class Estimator(EstimatorBlock):
                 with m.If(fresh):
                     m.d.sync += [d1.eq(0), d2.eq(0), w.eq(0), y.eq(0)]
                 m.next = "DIFFERENCE"
-            with m.State("DIFFERENCE"):
-                limited = saturate(moved, -design.step_max, design.step_max)
-                m.d.sync += [d.eq(limited), self.saturated[0].eq(limited != moved)]
-                m.next = "INPUT"
-            with m.State("INPUT"):
-                m.d.sync += [four_x.eq(d + (d1 << 1) + d2), d1.eq(d), d2.eq(d1)]
-                m.next = "ERROR"
-            with m.State("ERROR"):
-                m.d.sync += [
-                    operand.eq((four_x << (design.operand.f - 2)) - (y >> drop)),
-                    coefficient.eq(self.butterworth_frequency),
-                ]
-                m.next = "PUSH"
-            # Each product takes a clock, its shift another, while the next one follows behind.
-            with m.State("PUSH"):
-                m.d.sync += [operand.eq(w >> drop), coefficient.eq(self.butterworth_damping)]
-                m.next = "DRAG"
-            with m.State("DRAG"):
-                m.next = "ADD PUSH"
-            with m.State("ADD PUSH"):
-                m.d.sync += total.eq(w + term)
-                m.next = "SUBTRACT DRAG"
-            with m.State("SUBTRACT DRAG"):
-                m.d.sync += total.eq(total - term)
-                m.next = "LIMIT W"
-            with m.State("LIMIT W"):
-                m.d.sync += [w.eq(held), self.saturated[1].eq(held != total)]
-                m.next = "OPERAND"
-            with m.State("OPERAND"):
-                m.d.sync += [operand.eq(w >> drop), coefficient.eq(self.butterworth_frequency)]
-                m.next = "MOVE"
-            with m.State("MOVE"):
-                m.next = "SHIFT"
-            with m.State("SHIFT"):
-                m.next = "ADD MOVE"
-            with m.State("ADD MOVE"):
-                m.d.sync += total.eq(y + term)
-                m.next = "LIMIT Y"
-            with m.State("LIMIT Y"):
-                m.d.sync += [y.eq(held), self.saturated[1].eq(self.saturated[1] | (held != total))]
-                m.next = "OUTPUT"
-            with m.State("OUTPUT"):
-                m.d.sync += [self.velocity.eq(shift_round_half_up(y, state.f - velocity.f)), self.valid.eq(1)]
-                m.next = "SAMPLE"
+            for (name, statements), after in zip(sequence.items(), following, strict=True):
+                with m.State(name):
+                    m.d.sync += statements
+                    m.next = after
         return m

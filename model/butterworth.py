@@ -27,12 +27,13 @@ Formats, derived. C' = C tau^2 / q is the bound on the acceleration in counts a 
 
 - d is held within `step_max`: what twice the largest speed moves in a sample, begun within a count, and one count for
   an edge out of its place. Beyond, it saturates (flag `speed_saturated`), and what it loses is lost.
-- f, fraction bits of the velocity: an LSB is at most sqrt(C') 2**-RESOLUTION_BITS. sqrt(C') is half of the minimax bound
-  2 sqrt(C eps), eps one count.
+- f, fraction bits of the velocity: an LSB is at most sqrt(C') 2**-RESOLUTION_BITS. sqrt(C') is half of the minimax
+  bound 2 sqrt(C eps), eps one count.
 - operands have GUARD_BITS more, which makes OPERAND_NORM of their LSB 0.38 of an LSB of the velocity.
 - accumulators have `reach` bits more again, 1/gamma at the least cutoff as a power of two, no less than 2: their
-  errors come to 0.1. Together less than a half: *under a constant difference n, y settles within half an LSB of n and the velocity,
-  rounded half up, is n exactly*; 0 at standstill. No cycle is left in the velocity, and its gain at DC is exactly 1.
+  errors come to 0.1. Together less than a half: *under a constant difference n, y settles within half an LSB of n and
+  the velocity, rounded half up, is n exactly*; 0 at standstill. No cycle is left in the velocity, and its gain at DC
+  is exactly 1.
 - i holds STATE_NORM times `step_max`, and one more. With coefficients of any one cutoff nothing else saturates; while
   the host changes them, or with coefficients of no cutoff, w or y may (flag `state_saturated`).
 - `frequency` and `damping`, run-time words, are gamma and beta with a common exponent, value = word 16**-exponent,

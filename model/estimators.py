@@ -27,6 +27,7 @@ ESTIMATORS = {
     "fdm": "finite_difference",
     "levant": "levant",
     "butterworth": "butterworth",
+    "kalman": "kalman",
 }
 
 

@@ -178,7 +178,7 @@ def test_the_norms_are_those_of_the_module():
 @pytest.mark.parametrize("sample_hz", RATES)
 @pytest.mark.parametrize("cutoff", ["30 Hz", "default", "0.4 fs"])
 def test_fixed_is_float_within_the_derived_bound(sample_hz, cutoff):
-    """On the paper's signal: rounding within its norms, coefficients by their exact response; in all 1 % of the error."""
+    """On the paper's signal: rounding within its norms, coefficients by their response; all within 1 % of the error."""
     gains = {"30 Hz": Gains(30.0), "default": None, "0.4 fs": Gains(CUTOFF_MAX * sample_hz)}[cutoff]
     axis = axis_at(sample_hz, "butterworth", gains)
     d = axis.design.estimator
@@ -194,7 +194,7 @@ def test_fixed_is_float_within_the_derived_bound(sample_hz, cutoff):
     bound = operand * d.operand.lsb + product * d.state.lsb + d.velocity.lsb / 2
     assert np.abs(fixed.velocity * d.velocity.lsb - as_rounded).max() <= bound
     assert not fixed.flags.any()
-    judged = slice(int(sample_hz), None)
+    judged = slice(len(counts) // 5, None)
     own = rms((exact.velocity_m_per_s - truth)[judged])
     assert rms((fixed.velocity_m_per_s - exact.velocity_m_per_s)[judged]) <= 0.01 * own
 
