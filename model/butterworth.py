@@ -53,7 +53,7 @@ from .estimators import estimate
 from .fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from .words import GAIN_BITS, Word
 
-OUTPUTS = ("v",)
+OUTPUTS = ("u",)
 CUTOFF_MAX = 0.4
 """Highest cutoff, of the sampling rate."""
 RESOLUTION_BITS = 10

@@ -62,7 +62,7 @@ from .estimators import estimate
 from .fixed import SQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from .words import GAIN_BITS, Word, gain_format
 
-OUTPUTS = ("v",)
+OUTPUTS = ("u",)
 RESOLUTION_BITS = 11
 """The output LSB is no larger than sqrt(C') over two to this."""
 GUARD_BITS = 6

@@ -235,7 +235,7 @@ def test_fixed_is_float_within_the_derived_bound(sample_hz, gains):
     fixed = held.run(counts)
     exact = Axis(axis, floating=True).run(counts)
     rounded = {word.name: word.to_si(held.words[word.name]) for word in d.words}
-    params = d.float_params(axis.design.gains, "v", rounded)
+    params = d.float_params(axis.design.gains, "u", rounded)
     _, as_rounded, _ = run(params, FLOAT_START, counts)
 
     bits = tuple(fmt.f - d.lead.f for fmt in (d.v, d.a, d.operand))
@@ -285,11 +285,11 @@ def test_no_input_overflows(name):
     a, _, first = system([word.reset * word.format.lsb for word in d.words])
     states = impulse(a, first, 60_000)
     responses = [np.concatenate([[-1], (PREDICT @ states)[0]]), *states[1:]]
-    for response, field in zip(responses, ("lead", "v", "a"), strict=True):
+    for response, field in zip(responses, ("lead", "u", "a"), strict=True):
         steps = d.step_max * np.sign(response)[::-1].astype(np.int64)
         state, velocity, flags = run(params, START, np.cumsum([0, *steps]))
         assert not flags.any()
-        if field == "v":
+        if field == "u":
             assert abs(state.v) * d.v.lsb > 0.95 * np.abs(response).sum() * d.step_max
             assert np.abs(velocity).max() <= d.velocity.max
 
