@@ -26,7 +26,7 @@ so is STATE_NORM, to w and y from x: no input makes more of them.
 Formats, derived. C' = C tau^2 / q is the bound on the acceleration in counts a sample^2.
 
 - d is held within `step_max`: what twice the largest speed moves in a sample, begun within a count, and one count for
-  an edge out of its place. Beyond, it saturates (flag `speed_saturated`), and what it loses is lost.
+  an edge out of its place. Beyond, it saturates (flag `velocity_saturated`), and what it loses is lost.
 - f, fraction bits of the velocity: an LSB is at most sqrt(C') 2**-RESOLUTION_BITS. sqrt(C') is half of the minimax
   bound 2 sqrt(C eps), eps one count.
 - operands have GUARD_BITS more, which makes OPERAND_NORM of their LSB 0.38 of an LSB of the velocity.
@@ -155,7 +155,7 @@ class Design:
     """
 
     inputs = ("count",)
-    flags = ("speed_saturated", "state_saturated")
+    flags = ("velocity_saturated", "state_saturated")
     latency = STEPS
 
     def __init__(self, axis, gains: Gains):
