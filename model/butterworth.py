@@ -4,7 +4,7 @@ Per sample, with d the difference of the last two counts, in counts and sample p
 
     x  = (d + 2 d' + d'') / 4            the last three differences: the double zero at half the sampling rate
     w <- w + gamma (x - y) - beta w
-    y <- y + gamma w                     the velocity; with the w just made
+    y <- y + gamma w                     the velocity, output `u`; with the w just made
 
 With g = tan(pi f_c / f_s) and D = 1 + sqrt(2) g + g^2, gamma = 2 g / sqrt(D) and beta = 2 sqrt(2) g / D make this the
 bilinear transform, prewarped, of 1 / (s^2 + sqrt(2) s + 1): eliminate w, and y[k] - (2 - beta - gamma^2) y[k-1] +
@@ -53,7 +53,7 @@ from .estimators import estimate
 from .fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from .words import GAIN_BITS, Word
 
-OUTPUTS = ("v",)
+OUTPUTS = ("u",)
 CUTOFF_MAX = 0.4
 """Highest cutoff, of the sampling rate."""
 RESOLUTION_BITS = 10

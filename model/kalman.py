@@ -6,11 +6,11 @@ Position, velocity and acceleration, x, v and a, in counts and sample periods; p
     r  = f - x                               innovation
     x <- x + K_x r,  v <- v + K_v r,  a <- a + K_a r
 
-x is held as its distance to the last count, `lead` = x - f, so that the count may wrap. The output is v. It is the
+x is held as its distance to the last count, `lead` = x - f, so that the count may wrap. The output `u` is v. It is the
 filter of a velocity driven by white jerk. With K_a = 0, a is held at 0 and it is that of white acceleration, with two
-integrators: `Design.words_for(..., integrators=2)`. On the paper's signal two integrators lag by 1/omega whatever the
-motion, three only by what the acceleration changes meanwhile: 0.16 against 0.09 mm/s at 1 MHz with the gains below, and
-at the best bandwidth of each 0.16 and 0.02. So three are the default.
+integrators: `Design.words_for(..., integrators=2)`. On the paper's signal two integrators lag by sqrt(2)/omega whatever
+the motion, three only by what the acceleration changes meanwhile: 0.16 against 0.09 mm/s at 1 MHz with the gains below,
+and at the best bandwidth of each 0.16 and 0.02. So three are the default.
 
 Source: Belanger, Dobrovolny, Helmy, Zhang, International Journal of Robotics Research 17 (1998), 1225.
 
@@ -62,7 +62,7 @@ from .estimators import estimate
 from .fixed import SQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from .words import GAIN_BITS, Word, gain_format
 
-OUTPUTS = ("v",)
+OUTPUTS = ("u",)
 RESOLUTION_BITS = 11
 """The output LSB is no larger than sqrt(C') over two to this."""
 GUARD_BITS = 6

@@ -187,7 +187,7 @@ def test_fixed_is_float_within_the_derived_bound(sample_hz, cutoff):
     fixed = held.run(counts)
     exact = Axis(axis, floating=True).run(counts)
     rounded = {word.name: word.to_si(held.words[word.name]) for word in d.words}
-    params = d.float_params(axis.design.gains, "v", rounded)
+    params = d.float_params(axis.design.gains, "u", rounded)
     _, as_rounded, _ = run(params, FLOAT_START, counts)
 
     operand, product = rounding(params.gamma, params.beta)

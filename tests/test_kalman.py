@@ -235,7 +235,7 @@ def test_fixed_is_float_within_the_derived_bound(sample_hz, gains):
     fixed = held.run(counts)
     exact = Axis(axis, floating=True).run(counts)
     rounded = {word.name: word.to_si(held.words[word.name]) for word in d.words}
-    params = d.float_params(axis.design.gains, "v", rounded)
+    params = d.float_params(axis.design.gains, "u", rounded)
     _, as_rounded, _ = run(params, FLOAT_START, counts)
 
     bits = tuple(fmt.f - d.lead.f for fmt in (d.v, d.a, d.operand))
