@@ -4,7 +4,7 @@ Per sample, with d the difference of the last two counts, in counts and sample p
 
     x  = (d + 2 d' + d'') / 4            the last three differences: the double zero at half the sampling rate
     w <- w + gamma (x - y) - beta w
-    y <- y + gamma w                     the velocity; with the w just made
+    y <- y + gamma w                     the velocity, output `u`; with the w just made
 
 With g = tan(pi f_c / f_s) and D = 1 + sqrt(2) g + g^2, gamma = 2 g / sqrt(D) and beta = 2 sqrt(2) g / D make this the
 bilinear transform, prewarped, of 1 / (s^2 + sqrt(2) s + 1): eliminate w, and y[k] - (2 - beta - gamma^2) y[k-1] +
@@ -26,7 +26,7 @@ so is STATE_NORM, to w and y from x: no input makes more of them.
 Formats, derived. C' = C tau^2 / q is the bound on the acceleration in counts a sample^2.
 
 - d is held within `step_max`: what twice the largest speed moves in a sample, begun within a count, and one count for
-  an edge out of its place. Beyond, it saturates (flag `speed_saturated`), and what it loses is lost.
+  an edge out of its place. Beyond, it saturates (flag `velocity_saturated`), and what it loses is lost.
 - f, fraction bits of the velocity: an LSB is at most sqrt(C') 2**-RESOLUTION_BITS. sqrt(C') is half of the minimax
   bound 2 sqrt(C eps), eps one count.
 - operands have GUARD_BITS more, which makes OPERAND_NORM of their LSB 0.38 of an LSB of the velocity.
@@ -155,7 +155,7 @@ class Design:
     """
 
     inputs = ("count",)
-    flags = ("speed_saturated", "state_saturated")
+    flags = ("velocity_saturated", "state_saturated")
     latency = STEPS
 
     def __init__(self, axis, gains: Gains):

@@ -6,11 +6,11 @@ Position, velocity and acceleration, x, v and a, in counts and sample periods; p
     r  = f - x                               innovation
     x <- x + K_x r,  v <- v + K_v r,  a <- a + K_a r
 
-x is held as its distance to the last count, `lead` = x - f, so that the count may wrap. The output is v. It is the
+x is held as its distance to the last count, `lead` = x - f, so that the count may wrap. The output `u` is v. It is the
 filter of a velocity driven by white jerk. With K_a = 0, a is held at 0 and it is that of white acceleration, with two
-integrators: `Design.words_for(..., integrators=2)`. On the paper's signal two integrators lag by 1/omega whatever the
-motion, three only by what the acceleration changes meanwhile: 0.16 against 0.09 mm/s at 1 MHz with the gains below, and
-at the best bandwidth of each 0.16 and 0.02. So three are the default.
+integrators: `Design.words_for(..., integrators=2)`. On the paper's signal two integrators lag by sqrt(2)/omega whatever
+the motion, three only by what the acceleration changes meanwhile: 0.16 against 0.09 mm/s at 1 MHz with the gains below,
+and at the best bandwidth of each 0.16 and 0.02. So three are the default.
 
 Source: Belanger, Dobrovolny, Helmy, Zhang, International Journal of Robotics Research 17 (1998), 1225.
 
@@ -32,12 +32,12 @@ sooner. The gains follow from h alone: `steady_state`. For small h, K = (2 h, 2 
 Formats, derived. C' = C tau^2 / q; 2**reach is no less than 1/h nor than 1.
 
 - The difference of counts is held within `step_max`: what twice the largest speed moves in a sample, begun within a
-  count, and one count for an edge out of its place. Beyond, it saturates (flag `speed_saturated`): what it loses is
+  count, and one count for an edge out of its place. Beyond, it saturates (flag `velocity_saturated`): what it loses is
   a displacement of the scale, and of no consequence later.
 - Then the states are bounded: by the norms (sums of absolute impulse responses) from the difference of counts to v, a
   and lead, `norms`, times `step_max`. Their formats hold that and one more of their unit; with the gains of a noise
   model nothing else saturates. With other gains `lead` may (flag `innovation_saturated`; it drags x along),
-  or v or a (flag `velocity_saturated`).
+  or v or a (flag `state_saturated`).
 - f, fraction bits of the velocity: an LSB is at most sqrt(C') 2**-RESOLUTION_BITS.
 - lead, v and a have GUARD_BITS more, v `reach` more and a twice `reach` more again, for a state's rounding error comes
   out 1, 1/h and 1/h^2 times. An error of r comes out h times, so the operand r has reach - 1 bits less than lead. All
@@ -206,7 +206,7 @@ class Design:
     """
 
     inputs = ("count",)
-    flags = ("speed_saturated", "innovation_saturated", "velocity_saturated")
+    flags = ("velocity_saturated", "innovation_saturated", "state_saturated")
     latency = STEPS
 
     def __init__(self, axis, gains: Gains):
