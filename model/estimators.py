@@ -39,6 +39,18 @@ def output_word(name: str) -> str:
     return f"{name.replace('-', '_')}_output"
 
 
+def choose(name: str, output: str) -> dict[str, int]:
+    """Return the run-time word, by name, that selects an output of estimator `name`; none where there is one only.
+
+    Raises:
+        ValueError: if the estimator has no such output.
+    """
+    outputs = load(name).OUTPUTS
+    if output not in outputs:
+        raise ValueError(f"output of {name} must be one of {', '.join(outputs)}, not {output!r}")
+    return {output_word(name): outputs.index(output)} if len(outputs) > 1 else {}
+
+
 def load(name: str, package: str = __package__) -> ModuleType:
     """Return the module of estimator `name` in `package` (this one, or `hardwall.hdl`).
 

@@ -224,8 +224,7 @@ def run(
     Raises:
         RuntimeError: if the RTL could not be built.
     """
-    outputs = spec.model.OUTPUTS
-    choice = {estimators.output_word(spec.estimator): outputs.index(output)} if len(outputs) > 1 else {}
+    choice = estimators.choose(spec.estimator, output)
     if backend == "rtl":
         from .rtl import Hardware  # noqa: PLC0415  (the other backends need neither Amaranth nor a C++ compiler)
 

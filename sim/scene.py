@@ -153,8 +153,7 @@ class Scene(Section):
             "wall_position": -self.protocol.start_m,
             "wall_forbid_pull": self.wall.forbid_pull,
         }
-        if len(self.spec.model.OUTPUTS) > 1:
-            si[estimators.output_word(self.controller.estimator)] = self.spec.model.OUTPUTS.index(self.output)
+        si |= estimators.choose(self.controller.estimator, self.output)
         if self.controller.slew_limit_n_per_s is not None:
             si["output_slew_limit"] = self.controller.slew_limit_n_per_s
         return si
