@@ -26,6 +26,8 @@ from .compiled import by_type
 ESTIMATORS = {
     "fdm": "finite_difference",
     "levant": "levant",
+    "period": "period",
+    "period-count": "period_count",
 }
 
 
