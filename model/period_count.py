@@ -75,8 +75,9 @@ class Gains:
         acceleration = axis.acceleration_max_m_per_s2 / (axis.count_m * axis.sample_hz**2)
         window = 1 << min(max(round(math.log2(2 / (3 * acceleration)) / 2), 0), _window_bits_max(axis))
         error = 1 / window + 1.5 * acceleration * window
-        speed = max(min(math.sqrt(4 * axis.clocks_per_sample * error), CYCLE_SPEED), SWITCH_MIN / window)
-        return cls(window / axis.sample_hz, speed * axis.velocity_unit_m_per_s)
+        speed = min(math.sqrt(4 * axis.clocks_per_sample * error), CYCLE_SPEED)
+        switch = min(max(round(speed * window), SWITCH_MIN), (1 << (axis.count_width - 1)) - 1)
+        return cls(window / axis.sample_hz, switch / window * axis.velocity_unit_m_per_s)
 
 
 class Params(NamedTuple):

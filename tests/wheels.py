@@ -1,7 +1,7 @@
 """Edges of a wheel that turns at random: rows for the estimators that time them, and the speeds they promise."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 
@@ -25,13 +25,16 @@ class Strobe:
     edges: int
 
 
-def turn(design, random: np.random.Generator, samples: int, invert: bool = False) -> tuple[list[Strobe], list[Edge]]:
+def turn(
+    design, random: np.random.Generator, samples: int, invert: bool = False, most: int | None = None
+) -> tuple[list[Strobe], list[Edge]]:
     """Return strobes and edges: steady and bent motions of all speeds, turns within a count, bursts, stops, pauses.
 
-    A sample lasts any time that the design allows, and has no more edges than half the counter's range.
+    A sample lasts any time that the design allows, and has fewer edges than `most`, half the counter's range or one a
+    clock, whichever is least.
     """
     modulus, clocks = 1 << design.stamp_width, design.clocks
-    most = min(clocks, (1 << (design.count_width - 1)) - 2)
+    most = min(clocks, (1 << (design.count_width - 1)) - 2, most or clocks)
     strobes, edges = [], []
     now, place, speed, bend, left = 0, 0.5, 0.0, 0.0, 0
     up = True
@@ -92,46 +95,75 @@ def rows(design, strobes: list[Strobe], edges: list[Edge]):
         yield count, strobe.at % modulus, *stamps, last.kind, last.down, run, strobe.restart
 
 
-def speeds(design, strobes: list[Strobe], edges: list[Edge]):
-    """Yield (speed, direction) that `period` promises at each strobe, exact, from every edge there was, unwrapped."""
-    limit = Fraction(3, 4) * (1 << design.stamp_width)
-    before, since, speed = None, None, Fraction(0)
-    for k, strobe in enumerate(strobes):
-        if k == 0 or strobe.restart:
-            since = strobe.edges  # edges before are forgotten
-        seen = edges[: strobe.edges] if strobe.edges < 40 else edges[strobe.edges - 40 : strobe.edges]
-        dropped = strobe.edges - len(seen)
-        known = [e for i, e in enumerate(seen) if i + dropped >= since and strobe.at - e.at < limit]
-        if not known or known[-1] is not seen[-1]:
-            speed, before = Fraction(0), strobe
-            yield speed, bool(seen and seen[-1].down)
-            continue
-        last, run = seen[-1], run_length(seen)
-        mine = [e for e in seen[-run:] if e in known]
-        if strobe.edges > before.edges:
-            speed = Fraction(0)
-            if len(mine) >= 2:
-                speed = Fraction(1, mine[-1].at - mine[-2].at)
-            if cycle := last_cycle(edges, before, strobe, run, since, limit):
-                speed = cycle
-        bounds = [Fraction(3, 2) / (strobe.at - last.at)]
-        if len(mine) == 4:
-            bounds.append(Fraction(4, strobe.at - mine[0].at))
+def anything(design, random: np.random.Generator, samples: int):
+    """Yield rows that no encoder gives: every input anywhere in its range, often at its ends."""
+    half, stamps = 1 << (design.count_width - 1), 1 << design.stamp_width
+    count = stamp = 0
+    for _ in range(samples):
+        count += int(random.integers(-half, half) if random.random() < 0.1 else random.integers(-9, 10))
+        stamp += int(random.integers(1, stamps))
+        ages = [int(random.integers(0, 1 << int(random.integers(1, design.stamp_width + 1)))) for _ in range(4)]
+        ages = [
+            age if random.random() < 0.9 else int(random.choice([0, 1, stamps // 4 * 3, stamps - 1])) for age in ages
+        ]
+        kinds = [int(random.integers(0, m)) for m in (4, 2, 5)]
+        yield (
+            (count + half) % (2 * half) - half,
+            stamp % stamps,
+            *((stamp - age) % stamps for age in ages),
+            *kinds,
+            int(random.random() < 0.01),
+        )
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What can be known at a strobe, exact, from every edge there was, unwrapped.
+
+    Attributes:
+        restart: whether nothing before counts.
+        count: the count, without wrap.
+        down: the last edge's direction.
+        ages: of those of the last edges that went one way, at most 4, that are known; the newest first; clocks. Empty
+            where the last edge itself is not.
+        news: whether there were edges since the strobe before.
+        cycle: (counts, clocks) over whole cycles up to the last edge, if all of them went one way.
+    """
+
+    restart: bool
+    count: int
+    down: bool
+    ages: list[int]
+    news: bool
+    cycle: tuple[int, int] | None
+
+
+def sights(design, strobes: list[Strobe], edges: list[Edge]) -> Iterator[Sight]:
+    """Yield what each strobe sees: an edge is known from a restart on until it is 3/4 of the stamp's range old."""
+    limit = 3 * (1 << design.stamp_width) // 4
+    before, since = None, 0
+    for strobe in strobes:
+        restart = before is None or bool(strobe.restart)
+        since = strobe.edges if restart else since
+        last = edges[strobe.edges - 1] if strobe.edges else Edge(0, 0, 0, 0)
+        run = run_length(edges[max(strobe.edges - 4, 0) : strobe.edges])
+        ages = [strobe.at - edge.at for edge in reversed(edges[max(strobe.edges - run, since) : strobe.edges])]
+        ages = [age for age in ages if age < limit]
+        news = before is not None and strobe.edges > before.edges
+        cycle = _cycle(edges, before, strobe, run, since, limit) if news and ages else None
+        yield Sight(restart, last.number - last.down, bool(last.down), ages, news, cycle)
         before = strobe
-        yield min(speed, *bounds), bool(last.down)
 
 
-def last_cycle(edges, before: Strobe, strobe: Strobe, run: int, since: int, limit: Fraction) -> Fraction | None:
-    """Return the speed over whole cycles up to the last edge, if all of them went one way."""
+def _cycle(edges, before: Strobe, strobe: Strobe, run: int, since: int, limit: int) -> tuple[int, int] | None:
     last = edges[strobe.edges - 1]
     old = edges[max(before.edges - 4, 0) : before.edges]
     if not old or old[-1].down != last.down:
         return None
-    forward = abs(last.number - old[-1].number)
-    if (last.number - old[-1].number) * (1 - 2 * last.down) <= 0 or run < min(4, run_length(old) + forward):
+    forward = (last.number - old[-1].number) * (1 - 2 * last.down)
+    if forward <= 0 or run < min(4, run_length(old) + forward):
         return None
-    first = max(since, before.edges - run_length(old))
-    for edge in reversed(edges[first : before.edges]):
+    for edge in reversed(edges[max(since, before.edges - run_length(old)) : before.edges]):
         if edge.kind == last.kind:
-            return Fraction(abs(last.number - edge.number), last.at - edge.at) if before.at - edge.at < limit else None
+            return (abs(last.number - edge.number), last.at - edge.at) if before.at - edge.at < limit else None
     return None
