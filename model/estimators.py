@@ -28,6 +28,8 @@ ESTIMATORS = {
     "levant": "levant",
     "butterworth": "butterworth",
     "kalman": "kalman",
+    "period": "period",
+    "period-count": "period_count",
 }
 
 
