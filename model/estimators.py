@@ -30,6 +30,7 @@ ESTIMATORS = {
     "kalman": "kalman",
     "period": "period",
     "period-count": "period_count",
+    "levant-edge": "levant_edge",
 }
 
 
