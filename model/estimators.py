@@ -26,6 +26,9 @@ from .compiled import by_type
 ESTIMATORS = {
     "fdm": "finite_difference",
     "levant": "levant",
+    "levant-semi-implicit": "levant_semi_implicit",
+    "levant-implicit": "levant_implicit",
+    "levant-adaptive": "levant_adaptive",
 }
 
 
