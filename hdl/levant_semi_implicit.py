@@ -82,13 +82,13 @@ class Estimator(EstimatorBlock):
         beyond = Signal(len(size))
         positive, negative = Signal(), Signal()
         next_u1, far_u1 = Signal.like(u1), Signal()
-        u, rest = Signal.like(u1), Signal.like(size)
+        u, correction, rest = Signal.like(u1), Signal.like(size), Signal.like(size)
 
         m.submodules.root = root = Sqrt(self.design.radicand.width)
         factor = self._factor(root)
         product = Signal(len(self._word(0)) + len(factor))
         full = Signal.like(self._correction(product))
-        correction = Signal(len(size))
+        below = full[-1] if full.shape().signed else Const(0)
         m.d.comb += root.radicand.eq(self._radicand(beyond))
 
         m.d.sync += self.valid.eq(0)
@@ -123,7 +123,7 @@ class Estimator(EstimatorBlock):
                 m.d.sync += full.eq(self._correction(product))
                 m.next = "LIMIT"
             with m.State("LIMIT"):
-                m.d.sync += correction.eq(Mux(full < 0, 0, Mux(full > beyond, beyond, full)))
+                m.d.sync += correction.eq(Mux(below, 0, Mux(full > beyond, beyond, full)))
                 m.next = "OUTPUT"
             with m.State("OUTPUT"):
                 held, far = moved_by(next_u1, correction, negative, positive, velocity.max)
