@@ -31,6 +31,9 @@ ESTIMATORS = {
     "period": "period",
     "period-count": "period_count",
     "levant-edge": "levant_edge",
+    "levant-semi-implicit": "levant_semi_implicit",
+    "levant-implicit": "levant_implicit",
+    "levant-adaptive": "levant_adaptive",
 }
 
 
