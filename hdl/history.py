@@ -16,8 +16,8 @@ class History(Block):
     Equation: position <- position + limit(count - last count), modulo 2**width; 0 at the first sample, and with
     `restart`. change = position - (the one `age` stored positions before it, 0 if that was before the first).
 
-    Latency: `latency` clocks from `strobe` to `valid`. `change` follows `age`, and the position of a `valid`, by
-    `change_latency` clocks; an age may come every clock. The next `strobe` may come with `valid`.
+    Latency: `latency` clocks from `strobe` to `valid`. `change` is there 2 clocks after its `age`, and from 1 after
+    `valid` on; an age may come every clock. The next `strobe` may come 1 clock after `valid`.
 
     Rounding and overflow: the change of a sample is limited, with `limited`; all else is exact. The count may wrap.
 
@@ -67,11 +67,6 @@ class History(Block):
             },
         )
 
-    @property
-    def change_latency(self) -> int:
-        """Clocks from `age`, or from the `valid` of a position less one, to `change`."""
-        return 2
-
     def elaborate(self, platform):
         m = Module()
         design = self._design
@@ -79,7 +74,7 @@ class History(Block):
         last, moved = Signal.like(self.count), Signal.like(self.count)
         step = Signal(signed(design.change.i))
         position = Signal(signed(design.width))
-        phase = Signal(range(design.every))
+        phase = Signal(range(max(design.every, 2)))
         head, known = Signal(design.age_bits), Signal(design.age_bits)
 
         m.d.sync += [taken.eq(self.strobe), summed.eq(taken), self.valid.eq(summed)]

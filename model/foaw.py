@@ -137,6 +137,7 @@ class Design:
     flags = ("velocity_saturated",)
 
     def __init__(self, axis, gains: Gains):
+        self.count_width = axis.count_width
         self.history = history.Design(axis, gains.window_s, TAPS)
         self.spacing = self.history.longest // TAPS
         self.velocity = SQ(self.history.change.i, self.history.fraction + ROUNDING_BITS)

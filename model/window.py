@@ -110,6 +110,7 @@ class Design:
     flags = ("velocity_saturated",)
 
     def __init__(self, axis, gains: Gains):
+        self.count_width = axis.count_width
         self.history = history.Design(axis, gains.window_s)
         self.velocity = SQ(self.history.change.i, self.history.fraction + ROUNDING_BITS)
         self.fraction = self.history.age_bits + ROUNDING_BITS

@@ -36,7 +36,7 @@ async def follows_model(dut):
     await bench.reset()
     inputs = bench.monitor("start", "dividend", "divisor")
     outputs = bench.monitor("done", "quotient")
-    for dividend, divisor in pairs(component, SAMPLES // 20):
+    for dividend, divisor in pairs(component, SAMPLES // 50):
         await bench.transact("start", "done", idle=coin.random() < 0.5, dividend=dividend, divisor=divisor)
     await bench.rest()
     quotients = [divide(dividend, divisor, component.fraction) for dividend, divisor in inputs.rows]
@@ -61,9 +61,8 @@ async def a_start_while_busy_abandons_the_quotient_in_hand(dut):
     [
         {"dividend_width": 20, "divisor_width": 11, "fraction": 18, "quotient_bits": 21},
         {"dividend_width": 5, "divisor_width": 9, "fraction": 11, "quotient_bits": 12},
-        {"dividend_width": 12, "divisor_width": 2, "fraction": 0, "quotient_bits": 11},
     ],
-    ids=["wide", "small dividend", "whole"],
+    ids=["wide", "small dividend"],
 )
 def test_rtl(sizes):
     simulate(__file__, make, **sizes)
