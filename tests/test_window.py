@@ -44,9 +44,7 @@ def stimulus(name: str, samples: int):
             count += way
             yield count, 0, (top, reset, 1, 0)[k // 7 % 4]
     for _ in range(samples - samples // 4 - samples // 28 * 7):
-        count += int(
-            random.integers(-half, half) if random.random() < 0.01 else random.integers(-fast - 1, fast + 2)
-        )
+        count += int(random.integers(-half, half) if random.random() < 0.01 else random.integers(-fast - 1, fast + 2))
         length = int(random.integers(0, top + 1)) if random.random() < 0.5 else reset
         yield count, int(random.random() < 0.002), length
 
