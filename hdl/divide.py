@@ -119,9 +119,7 @@ class Divide(wiring.Component):
             m.d.sync += [
                 negative.eq(self.dividend < 0),
                 remainder.eq(size[low:]),
-                digits.eq(
-                    Cat(Const(0, self._fraction), size[:low])[-bits:] if low < len(size) else size << self._fraction
-                ),
+                digits.eq(Cat(Const(0, self._fraction), size[:low])),
                 left.eq(steps + 1),
                 self.done.eq(0),
             ]

@@ -1,12 +1,16 @@
 """First-order adaptive windowing."""
 
-from amaranth.hdl import Array, Module, Mux, Signal, signed
+from amaranth.hdl import Array, Module, Mux, Shape, Signal, Value, signed
 
 from hardwall.model.foaw import BAND, TAPS, UNIT, WEIGHTS, Design
+from hardwall.model.history import LATENCY as HISTORY_LATENCY
 
 from . import EstimatorBlock
 from .divide import Divide
 from .history import History
+
+FIRST = HISTORY_LATENCY + 1
+"""Clock at which the change of the first tap is there."""
 
 
 class Estimator(EstimatorBlock):
@@ -42,36 +46,16 @@ class Estimator(EstimatorBlock):
         m = Module()
         design, spacing = self._design, self._design.spacing
         m.submodules.history = history = History(design.history)
+        clock = Signal(range(FIRST + TAPS + 4))
+        last, total, sums, taps = self._search(m, clock, history.change)
 
-        # Largest change of one tap; of i taps, i times that. All widths of the search follow.
-        tap = design.history.change.max * spacing * design.history.every
-
-        def holding(largest: int):
-            return signed(largest.bit_length() + 1)
-
-        change = holding(TAPS * tap)
-        slope_shape = holding((tap << BAND.f) * UNIT + BAND.max * UNIT)
-        weights = Array(WEIGHTS.tolist())
-        triangle = TAPS * (TAPS + 1) // 2
-        pyramid = triangle * (TAPS + 2) // 3
-
-        # Clock n of the search multiplies tap n - 1, bounds tap n - 2 and decides on tap n - 3.
-        clock = Signal(range(TAPS + 6))
-        weight = Signal(UNIT.bit_length())
-        slope, margin = Signal(slope_shape), Signal(range(BAND.max * UNIT + 1))
-        centre, below, above = Signal(slope_shape), Signal(slope_shape), Signal(slope_shape)
-        changes = [Signal(change, name=f"change_{stage}") for stage in range(2)]
-        low, high = Signal(slope_shape), Signal(slope_shape)
-        searching = Signal()
-        tried, taps = Signal(range(TAPS + 2)), Signal(range(TAPS + 1))
-        last, total, sums = Signal(change), Signal(holding(triangle * tap)), Signal(holding(pyramid * tap))
-        product = Signal(holding(TAPS * triangle * tap))
-
-        ends = [0, *range(1, TAPS + 1)]
+        # Least squares by sums of sums: taps total - 2 sums, over taps (taps + 1) (taps + 2) / 6.
+        product = Signal(signed(taps.shape().width + len(total)))
+        ends = range(TAPS + 1)
         squares = [n * (n + 1) * (n + 2) // 6 for n in ends]
-        divisors = [Array(n * spacing for n in numbers) for numbers in (ends, squares)]
+        of_ends, of_squares = (Array(n * spacing for n in numbers) for numbers in (ends, squares))
         m.submodules.division = division = Divide(
-            len(product), (pyramid * spacing).bit_length(), design.fraction, design.velocity.width - 1
+            len(product), (squares[-1] * spacing).bit_length(), design.fraction, design.velocity.width - 1
         )
         dividend, divisor = Signal.like(division.dividend), Signal.like(division.divisor)
         age = Signal.like(history.age, init=spacing)
@@ -84,49 +68,21 @@ class Estimator(EstimatorBlock):
             division.divisor.eq(divisor),
         ]
 
-        # The pipeline runs on always; what it decides counts while `searching`.
-        m.d.sync += [
-            weight.eq(weights[clock]),
-            slope.eq((history.change[: change.width].as_signed() * weight) << BAND.f),
-            margin.eq(self.foaw_band * weight),
-            changes[0].eq(history.change),
-            centre.eq(slope),
-            below.eq(slope - margin),
-            above.eq(slope + margin),
-            changes[1].eq(changes[0]),
-        ]
-        first = Signal()
-        fits = first | (tried <= self.foaw_window) & (low <= centre) & (centre <= high)
-        with m.If(searching):
-            with m.If(fits):
-                m.d.sync += [
-                    low.eq(Mux(first | (below > low), below, low)),
-                    high.eq(Mux(first | (above < high), above, high)),
-                    last.eq(changes[1]),
-                    total.eq(Mux(first, 0, total) + changes[1]),
-                    sums.eq(Mux(first, 0, sums + total)),
-                    taps.eq(tried),
-                ]
-            with m.Else():
-                m.d.sync += searching.eq(0)
-            m.d.sync += [first.eq(0), tried.eq(tried + 1)]
-
         m.d.sync += [division.start.eq(0), self.valid.eq(division.done)]
         with m.If(clock != 0):
-            m.d.sync += [clock.eq(clock + 1), age.eq(age + spacing)]
+            m.d.sync += clock.eq(clock + 1)
+        # The next tap is asked for every clock, from when the newest position is there for the first one's change.
+        with m.If(clock >= FIRST - 2):
+            m.d.sync += age.eq(age + spacing)
         with m.Switch(clock):
-            with m.Case(0), m.If(history.valid):
-                m.d.sync += [clock.eq(1), age.eq(age + spacing)]
-            with m.Case(3):
-                m.d.sync += [searching.eq(1), first.eq(1), tried.eq(1)]
-            with m.Case(TAPS + 3):
-                m.d.sync += searching.eq(0)
-            with m.Case(TAPS + 4):
+            with m.Case(0), m.If(self.strobe):
+                m.d.sync += clock.eq(1)
+            with m.Case(FIRST + TAPS + 2):
                 m.d.sync += product.eq(taps * total)
-            with m.Case(TAPS + 5):
+            with m.Case(FIRST + TAPS + 3):
                 m.d.sync += [
                     dividend.eq(Mux(self.foaw_output, product - (sums << 1), last)),
-                    divisor.eq(Mux(self.foaw_output, divisors[1][taps], divisors[0][taps])),
+                    divisor.eq(Mux(self.foaw_output, of_squares[taps], of_ends[taps])),
                     division.start.eq(1),
                     clock.eq(0),
                     age.eq(spacing),
@@ -136,3 +92,56 @@ class Estimator(EstimatorBlock):
             with m.If(history.stored):
                 m.d.sync += self.velocity.eq(division.quotient)
         return m
+
+    def _search(self, m: Module, clock: Signal, change: Value) -> tuple[Signal, Signal, Signal, Signal]:
+        """Add the search, in which tap i's change is there at clock FIRST + i - 1, and decided on two clocks later.
+
+        Return, of the window found: its change, the sum of its taps', the sum of the sums before the last, its taps.
+        """
+        # No change of a tap is larger than this, so none of i taps than i times it; all widths follow.
+        tap = self._design.history.change.max * self._design.spacing * self._design.history.every
+        triangle = TAPS * (TAPS + 1) // 2
+        slopes = _holding((tap << BAND.f) * UNIT + BAND.max * UNIT)
+
+        weights = Array(WEIGHTS.tolist())
+        weight = Signal(UNIT.bit_length())
+        slope, margin = Signal(slopes), Signal(range(BAND.max * UNIT + 1))
+        centre, below, above = Signal(slopes), Signal(slopes), Signal(slopes)
+        before, newest = Signal(_holding(TAPS * tap)), Signal(_holding(TAPS * tap))
+        index = (clock - (FIRST - 2))[: len(clock)]
+        m.d.sync += [
+            weight.eq(weights[index]),
+            slope.eq((change[: len(before)].as_signed() * weight) << BAND.f),
+            margin.eq(self.foaw_band * weight),
+            before.eq(change),
+            centre.eq(slope),
+            below.eq(slope - margin),
+            above.eq(slope + margin),
+            newest.eq(before),
+        ]
+
+        searching, first = Signal(), Signal()
+        tried, taps = Signal(range(TAPS + 2)), Signal(range(TAPS + 1))
+        low, high = Signal(slopes), Signal(slopes)
+        last, total = Signal(_holding(TAPS * tap)), Signal(_holding(triangle * tap))
+        sums = Signal(_holding(triangle * (TAPS + 2) // 3 * tap))
+        fits = first | (tried <= self.foaw_window) & (low <= centre) & (centre <= high)
+        with m.If(searching):
+            m.d.sync += [first.eq(0), tried.eq(tried + 1), searching.eq(fits & (tried != TAPS))]
+            with m.If(fits):
+                m.d.sync += [
+                    low.eq(Mux(first | (below > low), below, low)),
+                    high.eq(Mux(first | (above < high), above, high)),
+                    last.eq(newest),
+                    total.eq(Mux(first, 0, total) + newest),
+                    sums.eq(Mux(first, 0, sums + total)),
+                    taps.eq(tried),
+                ]
+        with m.Elif(clock == FIRST + 1):
+            m.d.sync += [searching.eq(1), first.eq(1), tried.eq(1)]
+        return last, total, sums, taps
+
+
+def _holding(largest: int) -> Shape:
+    """Return the signed shape of what is `largest` in magnitude at most."""
+    return signed(largest.bit_length() + 1)

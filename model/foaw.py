@@ -26,9 +26,8 @@ largest speed, and where it stores every M-th only.
 
 Formats, derived:
 
-- Slopes are compared in units of 1 / lcm(1 ... TAPS), in which D_i / i are whole: **the check is exact**. The unit times
-  D_i takes a weight of 15 bits, one multiplier of either device: that is why TAPS is 12, the last number before it
-  would be 19 bits.
+- Slopes are compared in units of 1 / lcm(1 ... TAPS), in which D_i / i are whole: **the check is exact**. D_i's weight
+  then has 15 bits, one multiplier of either device: that is why TAPS is 12, for with 13 it would have 19.
 - `foaw_band` UQ(4, 2): quarter counts, up to four periods of the encoder less one of them.
 - `foaw_window`: N at run time, in taps; 0 counts as 1, more than TAPS as TAPS.
 - `velocity` SQ(i, f): i that of `history.change`, for both fits are averages of the changes with positive weights.
@@ -59,7 +58,7 @@ BAND_COUNTS = 1.0
 BAND = UQ(4, 2)
 ROUNDING_BITS = 8
 """An LSB of the velocity is less than 2**-ROUNDING_BITS counts over the longest window."""
-STEPS = 7
+STEPS = 6
 """Clocks of the sequence besides history, one a tap, and division: see `hardwall.hdl.foaw`."""
 WEIGHTS = np.array([0, *(UNIT // i for i in range(1, TAPS + 1))])
 """Of D_i in 1 / UNIT, by i."""
@@ -91,7 +90,7 @@ class Gains:
 
 
 class Params(NamedTuple):
-    """`band` in 1 / `scale` counts; `spacing` in stored positions; `fraction` bits of a quotient by taps and spacing."""
+    """`band` in 1 / `scale` counts; `spacing` in stored positions; `fraction` bits of the quotient."""
 
     history: history.Params
     output: int
