@@ -97,7 +97,7 @@ class Divide(wiring.Component):
         negative = Signal()
         remainder = Signal.like(self.divisor)
         digits = Signal(bits)
-        left = Signal(range(steps + 1))
+        left = Signal(range(steps + 2))
         size = Mux(self.dividend < 0, -self.dividend, self.dividend)[: len(self.dividend)]
 
         rest, shifted = remainder, digits

@@ -127,21 +127,23 @@ def take(params, state, count, restart):
         count: a signed word that may have wrapped.
         restart: true to forget the past: this sample counts as the first.
     """
-    last = len(state.positions) - 1
-    if restart or not state.running:
-        position, phase, known, limited = 0, 0, 0, False
+    # Taken out once: each mention of an array in a state costs the compiled closed loop its reference counting.
+    running, last_count, position, phase, head, known, positions = state
+    last = len(positions) - 1
+    limited = False
+    if restart or not running:
+        position, phase, known = 0, 0, 0
     else:
-        moved = wrap(count - state.count, params.count_width)
+        moved = wrap(count - last_count, params.count_width)
         change = saturate(moved, -params.change_max, params.change_max)
-        position = wrap(state.position + change, params.width)
-        phase = (state.phase + 1) & (params.every - 1)
-        known = min(state.known + 1, last) if phase == 0 else state.known
+        position = wrap(position + change, params.width)
+        phase = (phase + 1) & (params.every - 1)
+        known = min(known + 1, last) if phase == 0 else known
         limited = change != moved
-    head = state.head
     if phase == 0:
         head = (head + 1) & last
-        state.positions[head] = position
-    return State(1, count, position, phase, head, known, state.positions), phase == 0, limited
+        positions[head] = position
+    return State(1, count, position, phase, head, known, positions), phase == 0, limited
 
 
 @compiled
@@ -149,5 +151,6 @@ def change_over(params, state, age):
     """Return the change of position since `age` stored positions ago, 1 to `Design.age_max`; from a stored one."""
     if age > state.known:
         return state.position
-    older = state.positions[(state.head - age) & (len(state.positions) - 1)]
+    positions = state.positions
+    older = positions[(state.head - age) & (len(positions) - 1)]
     return wrap(state.position - older, params.width)
