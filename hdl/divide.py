@@ -1,4 +1,4 @@
-"""Unsigned integer division, rounded down: one quotient bit a clock."""
+"""Unsigned integer division, rounded down: one quotient bit a clock, or a few."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import wiring
@@ -12,8 +12,8 @@ class Divide(wiring.Component):
 
     Equation: quotient = min(floor(dividend / divisor), 2**quotient_width - 1); a division by 0 gives the latter.
 
-    Latency: `latency` clocks from `start` to `done`: one to load, one a quotient bit, however wide the operands. The
-    next `start` may come with `done`.
+    Latency: `latency` clocks from `start` to `done`: one to load, one for each `bits_per_clock` bits of the quotient,
+    however wide the operands. The next `start` may come with `done`.
 
     Rounding and overflow: rounds down, exactly; a quotient that does not fit, that of 0 by 0 included, saturates and
     raises `saturated`.
@@ -22,6 +22,8 @@ class Divide(wiring.Component):
     ----------
     dividend_width, divisor_width, quotient_width : int
         Bits, 1 or more each.
+    bits_per_clock : int
+        Of the quotient, 1 or more: each is a subtraction more between two registers.
 
     Members
     -------
@@ -41,25 +43,26 @@ class Divide(wiring.Component):
     Raises
     ------
     TypeError
-        If a width is not an int.
+        If a parameter is not an int.
     ValueError
-        If a width is less than 1.
+        If it is less than 1.
 
     Source: restoring division in base 2, the school's long division.
     """
 
-    def __init__(self, dividend_width: int, divisor_width: int, quotient_width: int):
-        widths = {
+    def __init__(self, dividend_width: int, divisor_width: int, quotient_width: int, bits_per_clock: int = 1):
+        sizes = {
             "dividend_width": dividend_width,
             "divisor_width": divisor_width,
             "quotient_width": quotient_width,
+            "bits_per_clock": bits_per_clock,
         }
-        for name, width in widths.items():
-            if isinstance(width, bool) or not isinstance(width, int):
-                raise TypeError(f"{name} must be an int, not {width!r}")
-            if width < 1:
-                raise ValueError(f"{name} must be 1 or more, not {width!r}")
-        self._widths = widths
+        for name, size in sizes.items():
+            if isinstance(size, bool) or not isinstance(size, int):
+                raise TypeError(f"{name} must be an int, not {size!r}")
+            if size < 1:
+                raise ValueError(f"{name} must be 1 or more, not {size!r}")
+        self._sizes = sizes
         super().__init__(
             {
                 "start": In(1),
@@ -73,49 +76,54 @@ class Divide(wiring.Component):
 
     @property
     def dividend_width(self) -> int:
-        return self._widths["dividend_width"]
+        return self._sizes["dividend_width"]
 
     @property
     def divisor_width(self) -> int:
-        return self._widths["divisor_width"]
+        return self._sizes["divisor_width"]
 
     @property
     def quotient_width(self) -> int:
-        return self._widths["quotient_width"]
+        return self._sizes["quotient_width"]
+
+    @property
+    def bits_per_clock(self) -> int:
+        return self._sizes["bits_per_clock"]
 
     @property
     def latency(self) -> int:
         """Clocks from `start` to `done`."""
-        return model.latency(self.quotient_width)
+        return model.latency(self.quotient_width, self.bits_per_clock)
 
     def elaborate(self, platform):
         m = Module()
-        bits = self.quotient_width
+        bits, steps = self.quotient_width, self.latency - 1
         divisor = Signal(self.divisor_width)
         remainder = Signal(self.divisor_width)
-        left = Signal(range(bits + 1))
+        digits = Signal(steps * self.bits_per_clock)
+        left = Signal(range(steps + 1))
 
-        # The quotient fits only if what stands above its bits of the dividend is less than the divisor; the remainder
-        # then is so at every step. The dividend's low bits leave at the top of the register that the quotient enters.
-        above = self.dividend[bits:]
-        taken = Cat(self.quotient[-1], remainder)
-        rest = taken - divisor
-        fits = ~rest[-1]
+        # The dividend's low bits leave at the top of the register that the quotient enters; what stands above them is
+        # the first remainder. The quotient fits if what stands above *its* bits is less than the divisor.
+        rest, shifted = remainder, digits
+        for _ in range(self.bits_per_clock):
+            taken = Cat(shifted[-1], rest)
+            less = taken - divisor
+            fits = ~less[-1]
+            rest = Mux(fits, less, taken)[: len(remainder)]
+            shifted = Cat(fits | self.saturated, shifted[:-1])
 
+        m.d.comb += self.quotient.eq(digits)
         m.d.sync += self.done.eq(left == 1)
         with m.If(left != 0):
-            m.d.sync += [
-                remainder.eq(Mux(fits, rest, taken)[: len(remainder)]),
-                self.quotient.eq(Cat(fits | self.saturated, self.quotient)[:bits]),
-                left.eq(left - 1),
-            ]
+            m.d.sync += [remainder.eq(rest), digits.eq(shifted), left.eq(left - 1)]
         with m.If(self.start):
             m.d.sync += [
                 divisor.eq(self.divisor),
-                remainder.eq(above[: len(remainder)]),
-                self.quotient.eq(self.dividend[:bits]),
-                self.saturated.eq(above >= self.divisor),
-                left.eq(bits),
+                remainder.eq(self.dividend[len(digits) :]),
+                digits.eq(self.dividend),
+                self.saturated.eq(self.dividend[bits:] >= self.divisor),
+                left.eq(steps),
                 self.done.eq(0),
             ]
         return m

@@ -13,9 +13,9 @@ def divide(dividend, divisor, quotient_width):
     return min(dividend // divisor, largest) if divisor > 0 else largest
 
 
-def latency(quotient_width: int) -> int:
+def latency(quotient_width: int, bits_per_clock: int = 1) -> int:
     """Return the clocks from `start` to `done` of the hardware.
 
-    One to load, and one for each bit of the quotient.
+    One to load, and one for each `bits_per_clock` bits of the quotient.
     """
-    return 1 + quotient_width
+    return 1 + -(-quotient_width // bits_per_clock)

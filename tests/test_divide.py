@@ -84,13 +84,13 @@ async def a_new_start_abandons_the_old_one(dut):
     assert quotients.rows == [(1, 0)] * (component.latency - 1)
 
 
-@pytest.mark.parametrize("widths", WIDTHS, ids=str)
+@pytest.mark.parametrize("widths", [*((*widths, 1) for widths in WIDTHS), (24, 10, 14, 2), (20, 26, 19, 3)], ids=str)
 def test_rtl(widths):
-    names = ("dividend_width", "divisor_width", "quotient_width")
+    names = ("dividend_width", "divisor_width", "quotient_width", "bits_per_clock")
     simulate(__file__, Divide, **dict(zip(names, widths, strict=True)))
 
 
-@pytest.mark.parametrize("name", ["dividend_width", "divisor_width", "quotient_width"])
+@pytest.mark.parametrize("name", ["dividend_width", "divisor_width", "quotient_width", "bits_per_clock"])
 @pytest.mark.parametrize(("width", "error"), [(0, ValueError), (-3, ValueError), (8.0, TypeError), ("8", TypeError)])
 def test_bad_width_is_refused(name, width, error):
     widths = {"dividend_width": 8, "divisor_width": 8, "quotient_width": 8, name: width}

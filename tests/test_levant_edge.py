@@ -1,18 +1,23 @@
 """stub"""
+
 import cocotb
 import numpy as np
 import pytest
 from estimator_bench import follow
 from specs import spec
+
 from bench import CAMPAIGN, SAMPLES, parameters, rng, simulate
 from hardwall.hdl.levant_edge import Estimator
 from hardwall.model.levant_edge import START
 
+
 def design(name):
     return spec(name, "levant-edge").design.estimator
 
+
 def make(name):
     return Estimator(design(name))
+
 
 def stimulus(d, samples):
     random = rng()
@@ -31,7 +36,16 @@ def stimulus(d, samples):
             up = random.random() < 0.5
         now += d.clocks if random.random() < 0.97 else int(random.integers(1, W))
         if speed == 7:
-            yield (int(random.integers(-half, half)), now % W, *(int(x) for x in random.integers(0, W, 4)), int(random.integers(0, 4)), int(random.integers(0, 2)), int(random.integers(0, 5)), 0, *gains)
+            yield (
+                int(random.integers(-half, half)),
+                now % W,
+                *(int(x) for x in random.integers(0, W, 4)),
+                int(random.integers(0, 4)),
+                int(random.integers(0, 2)),
+                int(random.integers(0, 5)),
+                0,
+                *gains,
+            )
             continue
         n = int(random.random() < 4.0 ** (-speed)) if speed else int(random.integers(0, 30))
         at = now - int(random.integers(1, d.clocks))
@@ -46,6 +60,7 @@ def stimulus(d, samples):
             stamps[edge] = at % W
         yield (count, now % W, *stamps, edge, down, run, int(random.random() < 0.001), *gains)
 
+
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     name = parameters()["name"]
@@ -55,6 +70,7 @@ async def follows_model(dut):
     print(np.unique(expected["saturated"], return_counts=True))
     assert np.bitwise_or.reduce(expected["saturated"]) == 0b11
 
-@pytest.mark.parametrize("name", ["paper","mhz", "narrow"])
+
+@pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
 def test_rtl(name):
     simulate(__file__, make, name=name)
