@@ -26,8 +26,14 @@ from .compiled import by_type
 ESTIMATORS = {
     "fdm": "finite_difference",
     "levant": "levant",
+    "butterworth": "butterworth",
+    "kalman": "kalman",
     "period": "period",
     "period-count": "period_count",
+    "levant-edge": "levant_edge",
+    "levant-semi-implicit": "levant_semi_implicit",
+    "levant-implicit": "levant_implicit",
+    "levant-adaptive": "levant_adaptive",
 }
 
 

@@ -44,6 +44,8 @@ class AxisSpec:
         damping_max_n_s_per_m: largest wall damping, N s/m.
         estimator: name of the velocity estimator.
         gains: that estimator's `Gains`, or None for its default ones.
+        estimator_bits_dropped: fraction bits that the estimator's words are to lack of the derived ones; to see what a
+            bit buys.
 
     Raises:
         TypeError: for a field of the wrong kind.
@@ -63,6 +65,7 @@ class AxisSpec:
     damping_max_n_s_per_m: float
     estimator: str = "levant"
     gains: object = field(default=None)
+    estimator_bits_dropped: int = 0
 
     def __post_init__(self):
         for name, kind in self.__annotations__.items():
@@ -71,8 +74,10 @@ class AxisSpec:
                 raise TypeError(f"{name} must be an int, not {value!r}")
             if kind is float and (isinstance(value, bool) or not isinstance(value, int | float)):
                 raise TypeError(f"{name} must be a number, not {value!r}")
-            if kind in (int, float) and not (math.isfinite(value) and value > 0):
+            if kind in (int, float) and name != "estimator_bits_dropped" and not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
+        if not 0 <= self.estimator_bits_dropped <= 32:
+            raise ValueError(f"estimator_bits_dropped must be 0 to 32, not {self.estimator_bits_dropped!r}")
         self._check_rates()
         self._check_widths()
         if self.design.latency_to_drive > self.clocks_per_sample:

@@ -1,186 +1,174 @@
-"""How accurate each velocity estimator is: known motions, at any rate, on any backend, held against the exact derivative.
+"""How accurate a velocity estimator is: known motions at any rate, on any backend, held against the exact derivative.
 
-For one estimator, signal and rate (`measure`), over the samples from `Signal.judged_from_s` on, with v the exact velocity
-at the sample's time and w the estimate:
-
-- `rms`, `max`: of w - v;
-- `chatter`: RMS of what is left of w - v less its mean over each 10 ms: the part that a damper turns into noise;
-- `delay`: that d for which v(t - d) correlates best with w(t); none for a constant velocity.
-
-Gains are the estimator's default ones for the signal's own bound C on the acceleration, or for one that is given.
-The clock is the slowest multiple of the rate that is 50 MHz or more and leaves 50 clocks a sample, enough for every
-estimator's path; above 1 MHz it is faster than a real part, and so the stamps finer. The row says which it was.
+Gains are the estimator's default ones for the signal's own bound C on the acceleration, unless others are given. The
+clock is the slowest multiple of the rate that is 50 MHz or more and leaves 50 clocks a sample, enough for every
+estimator's path; above 1 MHz it is faster than that of a real part, and so the stamps are finer. The row says which it
+was.
 """
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from ..model import estimators
 from ..model.compiled import compiled
 from ..model.spec import AxisSpec
+from . import signals
 from .encoder import offsets
+from .judge import Judge
 from .motion import velocity
+from .recording import load as load_recording
+from .replay import replay
 from .scene import load as load_scene
-from .signals import Signal
 from .stream import velocities
 
 RATES_HZ = (1_000, 10_000_000)
 """The slowest and the fastest rate that is measured."""
 CLOCK_HZ = 50_000_000
 CLOCKS = 50
-"""Clocks of the slowest and of the shortest sample."""
-CHATTER_S = 0.01
-DELAY_POINTS = 1 << 15
-DELAY_MAX_S = 0.1
-DELAY_STEPS = 400
+COARSEN = 16
+"""A recording's counts are made so much coarser, and judged against the full ones."""
 
 
-@dataclass(frozen=True)
-class Contestant:
-    """An estimator's output, with the gains it is to have.
+def outputs(text: str) -> list[tuple[str, str]]:
+    """Return the (estimator, output) that `NAME` (every output of it) or `NAME:OUTPUT` stands for.
 
-    Attributes:
-        estimator, output: their names.
-        gains: the estimator's gains; None for those that follow from C and the rate.
+    Raises:
+        ValueError: if there is none.
     """
-
-    estimator: str
-    output: str
-    gains: object = None
-
-    @classmethod
-    def parse(cls, text: str) -> list["Contestant"]:
-        """Return the contestants that `NAME` (every output of it) or `NAME:OUTPUT` stands for.
-
-        Raises:
-            ValueError: if there is none.
-        """
-        name, _, output = text.partition(":")
-        outputs = estimators.load(name).OUTPUTS
-        if output:
-            estimators.choose(name, output)
-        return [cls(name, each) for each in ([output] if output else outputs)]
+    name, _, output = text.partition(":")
+    available = estimators.load(name).OUTPUTS
+    if output:
+        estimators.choose(name, output)
+    return [(name, each) for each in ([output] if output else available)]
 
 
-def axis_spec(contestant: Contestant, sample_hz: int, acceleration_max_m_per_s2: float) -> AxisSpec:
-    """Return the axis: the device of the scene `mhz` at another rate."""
+def axis_spec(
+    estimator: str,
+    sample_hz: int,
+    acceleration_max_m_per_s2: float,
+    gains: dict[str, float] | None = None,
+    bits_dropped: int = 0,
+) -> AxisSpec:
+    """Return the axis: the device of the scene `mhz` at another rate.
+
+    Raises:
+        ValueError: if it cannot be; the message names the field.
+    """
     return replace(
         load_scene("mhz").spec,
         clock_hz=sample_hz * max(-(-CLOCK_HZ // sample_hz), CLOCKS),
         sample_hz=sample_hz,
         actuation_hz=sample_hz,
         acceleration_max_m_per_s2=acceleration_max_m_per_s2,
-        estimator=contestant.estimator,
-        gains=contestant.gains,
+        estimator=estimator,
+        gains=gains and estimators.load(estimator).Gains(**gains),
+        estimator_bits_dropped=bits_dropped,
     )
 
 
 @compiled
-def _exact(motion, sample_hz, first, out):
-    """Fill `out` with the exact velocities from sample `first` on."""
+def _velocities(motion, times, out):
+    """Fill `out` with the exact velocities at times, s."""
     for i in range(len(out)):
-        out[i] = velocity(motion, (first + i) / sample_hz)
+        out[i] = velocity(motion, times[i])
 
 
-@compiled
-def _at(motion, times, delay_s, out):
-    """Fill `out` with the exact velocities at `times`, `delay_s` earlier."""
-    for i in range(len(out)):
-        out[i] = velocity(motion, times[i] - delay_s)
-
-
-class _Blocks:
-    """Means over blocks of so many samples, of values that come in chunks."""
-
-    def __init__(self, samples: int, size: int):
-        self.size = size
-        self._sums = np.zeros(-(-samples // size))
-        self._samples = samples
-
-    def add(self, first: int, values: np.ndarray) -> None:
-        np.add.at(self._sums, np.arange(first, first + len(values)) // self.size, values)
-
-    @property
-    def lengths(self) -> np.ndarray:
-        ends = np.minimum(np.arange(1, len(self._sums) + 1) * self.size, self._samples)
-        return np.diff(ends, prepend=0)
-
-    @property
-    def means(self) -> np.ndarray:
-        return self._sums / self.lengths
-
-
-def _delay_s(motion, times: np.ndarray, estimate: np.ndarray) -> float | None:
-    """Return the delay at which the exact velocity correlates best with the estimate; None if it does not vary."""
-    exact = np.empty(len(times))
-
-    def mismatch(delay_s: float) -> float:
-        _at(motion, times, delay_s, exact)
-        return -float(estimate @ exact) / math.sqrt(float(exact @ exact))
-
-    _at(motion, times, 0.0, exact)
-    if np.ptp(exact) < 1e-9 or not estimate.any():
-        return None
-    tried = np.linspace(-DELAY_MAX_S, DELAY_MAX_S, DELAY_STEPS + 1)
-    best = tried[int(np.argmin([mismatch(delay_s) for delay_s in tried]))]
-    step = tried[1] - tried[0]
-    found = minimize_scalar(mismatch, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9})
-    return float(found.x)
+def exact_velocity(motion, times: np.ndarray) -> np.ndarray:
+    """Return the exact velocities (m/s) of a motion at times (s)."""
+    out = np.empty(len(times))
+    _velocities(motion, times, out)
+    return out
 
 
 def measure(
-    contestant: Contestant,
-    signal: Signal,
+    estimator: str,
+    output: str,
+    signal: str,
     sample_hz: int,
     backend: str = "float",
     phase_error_counts: float = 0.0,
     acceleration_max_m_per_s2: float | None = None,
+    gains: dict[str, float] | None = None,
+    bits_dropped: int = 0,
 ) -> dict:
-    """Return one row: what was measured, units in the keys.
+    """Return one row: what was measured, units in the keys; `judge` says what the figures are.
+
+    Args:
+        estimator, output: their names.
+        signal: as for `signals.load`.
+        sample_hz: rate of the estimator.
+        backend: `float`, `fixed` or `rtl`.
+        phase_error_counts: by how much the encoder's channel B is late.
+        acceleration_max_m_per_s2: C for the default gains; None for the signal's own.
+        gains: others, by the names of the estimator's `Gains`.
+        bits_dropped: fraction bits that the estimator's words are to lack.
 
     Raises:
         ValueError: if the axis cannot be; the message names the field.
         RuntimeError: if the RTL could not be built.
     """
-    bound = acceleration_max_m_per_s2 or signal.acceleration_max_m_per_s2
-    spec = axis_spec(contestant, sample_hz, bound)
-    begin = math.ceil(signal.judged_from_s * sample_hz)
-    samples = int(signal.seconds * sample_hz) - begin
-    chatter = _Blocks(samples, max(1, round(CHATTER_S * sample_hz)))
-    shape = _Blocks(samples, -(-samples // DELAY_POINTS))
-    squares = largest = 0.0
-    exact = np.empty(0)
-    for first, estimate, flags in velocities(signal, spec, contestant.output, backend, offsets(phase_error_counts)):
-        skipped = max(begin - first, 0)
-        if skipped >= len(estimate):
-            continue
-        estimate, since = estimate[skipped:], first + skipped - begin
-        exact = np.resize(exact, len(estimate))
-        _exact(signal.motion, float(sample_hz), begin + since, exact)
-        error = estimate - exact
-        squares += float(error @ error)
-        largest = max(largest, float(np.abs(error).max()))
-        chatter.add(since, error)
-        shape.add(since, estimate)
-    slow = float(np.average(chatter.means**2, weights=chatter.lengths))
-    middles = (begin + np.arange(len(shape.means)) * shape.size + (shape.lengths - 1) / 2) / sample_hz
+    known = signals.load(signal)
+    bound = acceleration_max_m_per_s2 or known.acceleration_max_m_per_s2
+    try:
+        spec = axis_spec(estimator, sample_hz, bound, gains, bits_dropped)
+    except ValueError as error:
+        raise ValueError(f"{estimator} at {sample_hz} Hz with C {bound:g} m/s^2: {error}") from None
+    begin = math.ceil(known.judged_from_s * sample_hz)
+    judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
+    for first, words, flags in velocities(known, spec, output, backend, offsets(phase_error_counts)):
+        raised |= flags
+        estimate = words[max(begin - first, 0) :]
+        since = first + len(words) - len(estimate)
+        times = np.arange(since, since + len(estimate)) / sample_hz
+        judge.add(since - begin, estimate, exact_velocity(known.motion, times))
     return {
-        "estimator": contestant.estimator,
-        "output": contestant.output,
+        "estimator": estimator,
+        "output": output,
         "backend": backend,
         "sample_hz": sample_hz,
-        "signal": signal.name,
-        "rms_mm_s": math.sqrt(squares / samples) * 1e3,
-        "max_mm_s": largest * 1e3,
-        "delay_s": _delay_s(signal.motion, middles, shape.means),
-        "chatter_mm_s": math.sqrt(max(squares / samples - slow, 0.0)) * 1e3,
-        "samples": samples,
+        "signal": signal,
+        "rms_mm_s": judge.rms * 1e3,
+        "max_mm_s": judge.largest * 1e3,
+        "delay_s": judge.delay_s(lambda times: exact_velocity(known.motion, times + begin / sample_hz)),
+        "chatter_mm_s": judge.chatter * 1e3,
         "clock_hz": spec.clock_hz,
+        "velocity_bits": spec.design.estimator.velocity.width,
         "encoder_phase_error_counts": phase_error_counts,
         "acceleration_max_mm_s2": bound * 1e3,
         "gains": asdict(spec.design.gains),
-        "flags": spec.design.flag_names(flags),
+        "flags": spec.design.flag_names(raised),
+    }
+
+
+def measure_recording(estimator: str, output: str, file: str, column: str, backend: str = "float") -> dict:
+    """Return one row of a recording at its own rate, its counts `COARSEN` times coarser, in recorded counts.
+
+    What a count is in mm the file does not say, so the keys of figures end in `_counts_s`. Held against the zero-phase
+    derivative of the full counts; a recording has no clock stamps, so edges are spread evenly over each sample.
+
+    Raises:
+        RecordingError, ReplayError: in one line, what cannot be and what is accepted.
+        RuntimeError: if the RTL could not be built.
+    """
+    result = replay(load_recording(file, column), estimator, output, backend, coarsen=COARSEN)
+    rate, begin = result.recording.rate_hz, result.judged_from
+    estimate, exact = result.velocity_counts_per_s[begin:], result.reference_counts_per_s[begin:]
+    judge = Judge(len(estimate), rate)
+    judge.add(0, estimate, exact)
+    times = np.arange(len(exact)) / rate
+    return {
+        "estimator": estimator,
+        "output": output,
+        "backend": backend,
+        "sample_hz": rate,
+        "signal": f"{file}:{column}",
+        "rms_counts_s": judge.rms,
+        "max_counts_s": judge.largest,
+        "delay_s": judge.delay_s(lambda wanted: np.interp(wanted, times, exact)),
+        "chatter_counts_s": judge.chatter,
+        "acceleration_max_counts_s2": result.acceleration_max_counts_per_s2,
+        "gains": result.gains,
+        "flags": result.flags,
     }

@@ -4,19 +4,29 @@ import json
 import os
 import signal
 import sys
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
-from rich.text import Text
 
-from ..model import estimators
-from .scene import SceneError, load, names
+from .cli_estimators import add_commands
+from .scene import SceneError, load
+from .terminal import (
+    Backend,
+    BadInput,
+    Device,
+    Estimator,
+    JsonOption,
+    PlotOption,
+    SceneArgument,
+    SetOption,
+    log,
+    output_file,
+    progress,
+    scene_changes,
+    show,
+    show_table,
+)
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -24,71 +34,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="A stiff virtual wall in hardware: encoder edges in, force out.",
 )
-log = Console(stderr=True, highlight=False)
-
-Estimator = Literal[tuple(estimators.ESTIMATORS)]
-Backend = Literal["float", "fixed", "rtl"]
-Device = Literal["ecp5-25k", "ice40-up5k"]
-
-SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help=f"{', '.join(names())}, or a .toml file")]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="change a key of the scene; an empty value takes it out"),
-]
-JsonOption = Annotated[bool, typer.Option("--json", help="print one JSON object on stdout")]
-
-
-class BadInput(Exception):
-    """One line: what is wrong with what was given, and what is accepted."""
-
-
-def _changes(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
-    """Return scene changes from `--set` and from options of their own (None: not given)."""
-    changes = {}
-    for assignment in assignments or []:
-        key, equals, text = assignment.partition("=")
-        if not equals or not key:
-            raise BadInput(f"--set must be KEY=VALUE, not {assignment!r}")
-        try:
-            changes[key] = tomllib.loads(f"value = {text}")["value"] if text else None
-        except tomllib.TOMLDecodeError:
-            changes[key] = text
-    named = {key.replace("__", "."): value for key, value in options.items() if value is not None}
-    return changes | named
-
-
-def _output_file(path: Path | None, option: str, suffixes: tuple[str, ...]) -> Path | None:
-    """Return the path, its folder made; bad input if nothing could be written there."""
-    if path is None:
-        return None
-    if path.suffix not in suffixes:
-        raise BadInput(f"{option} must end in {' or '.join(suffixes)}, not {str(path)!r}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("ab"):
-            pass
-    except OSError as error:
-        raise BadInput(f"{option} {str(path)!r} cannot be written: {error.strerror}") from None
-    if path.stat().st_size == 0:
-        path.unlink()
-    return path
-
-
-def _show(report: dict[str, Any], as_json: bool) -> None:
-    """Print a report: one JSON object, or a table of its keys."""
-    if as_json:
-        print(json.dumps(report))
-        return
-    table = Table(box=None, show_header=False)
-    for key, value in report.items():
-        table.add_row(Text(key, "bold"), Text(_text(value), overflow="fold"))
-    Console(highlight=False, soft_wrap=True).print(table)
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return ", ".join(map(_text, value)) if isinstance(value, list) else str(value)
 
 
 @app.command()
@@ -102,14 +47,14 @@ def hit(
     stiffness: Annotated[float | None, typer.Option(help="of the wall, N/m")] = None,
     damping: Annotated[float | None, typer.Option(help="of the wall, N s/m")] = None,
     set_: SetOption = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw the hit: .png, .svg or .pdf")] = None,
+    plot: PlotOption = None,
     trace: Annotated[
         Path | None, typer.Option(metavar="FILE", help=".npz: the samples; .fst: a waveform of the contact (rtl)")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Hit the wall: the founding paper's protocol, and whether the wall is stable."""
-    changes = _changes(
+    changes = scene_changes(
         set_,
         controller__estimator=estimator,
         controller__output=output,
@@ -120,15 +65,15 @@ def hit(
     from . import hit as hits  # noqa: PLC0415  (compiled kernels are loaded only where they run)
     from .plot import SUFFIXES, plot_hit  # noqa: PLC0415
 
-    plot = _output_file(plot, "--plot", SUFFIXES)
-    trace = _output_file(trace, "--trace", (".fst", ".npz"))
+    plot = output_file(plot, "--plot", SUFFIXES)
+    trace = output_file(trace, "--trace", (".fst", ".npz"))
     waveform = trace if trace and trace.suffix == ".fst" else None
     if waveform and backend != "rtl":
         raise BadInput(f"--trace {waveform.name} needs --backend rtl: only hardware has waveforms")
-    with _progress(f"{loaded.name} {loaded.controller.estimator} {backend}", loaded.samples) as advance:
+    with progress(f"{loaded.name} {loaded.controller.estimator} {backend}", loaded.samples) as advance:
         result = hits.run(loaded, backend, bool(plot or trace), advance, waveform)
     # Whatever becomes of the files, what was computed is out.
-    _show(result.report(), as_json)
+    show(result.report(), as_json)
     if plot:
         plot_hit(result, plot)
         log.print(f"picture: {plot}")
@@ -136,22 +81,6 @@ def hit(
         result.save(trace)
     if trace:
         log.print(f"trace: {trace}")
-
-
-class _progress:
-    """A progress bar on stderr while a run lasts; gives the function that moves it."""
-
-    def __init__(self, title: str, total: int):
-        columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-        self._bar = Progress(*columns, console=log, transient=True, disable=not log.is_terminal)
-        self._task = self._bar.add_task(escape(title), total=total)
-
-    def __enter__(self):
-        self._bar.start()
-        return lambda done: self._bar.update(self._task, completed=done)
-
-    def __exit__(self, *_) -> None:
-        self._bar.stop()
 
 
 @app.command()
@@ -168,7 +97,7 @@ def replay(
         typer.Option(metavar="C", help="counts/s^2, sets the gains [default: the recording's]"),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="write the velocities")] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FILE", help="draw them: .png, .svg or .pdf")] = None,
+    plot: PlotOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Put recorded counts through an estimator; the RTL gets them through its pins."""
@@ -180,14 +109,14 @@ def replay(
 
     if out and out.exists() and file.exists() and out.samefile(file):
         raise BadInput(f"--out must be another file than the recording, not {str(out)!r}")
-    out, plot = _output_file(out, "--out", (".csv",)), _output_file(plot, "--plot", SUFFIXES)
+    out, plot = output_file(out, "--out", (".csv",)), output_file(plot, "--plot", SUFFIXES)
     try:
         recording = load_recording(file, column, rate)
-        with _progress(f"{file.name} {estimator} {backend}", len(recording.counts)) as advance:
+        with progress(f"{file.name} {estimator} {backend}", len(recording.counts)) as advance:
             result = run(recording, estimator, output, backend, coarsen, acceleration_max, progress=advance)
     except (RecordingError, ReplayError) as error:
         raise BadInput(str(error)) from None
-    _show(result.report(), as_json)
+    show(result.report(), as_json)
     if out:
         result.save(out)
         log.print(f"velocities: {out}")
@@ -224,12 +153,7 @@ def table(
             raise BadInput(f"{file}: no such file") from None
         except (OSError, ValueError, KeyError, TypeError):
             raise BadInput(f"{file}: not a JSON report of `hardwall hit --json`") from None
-    result = Table()
-    for name in columns:
-        result.add_column(name, justify="left" if name in ("scene", "estimator", "backend") else "right")
-    for row in rows:
-        result.add_row(*map(Text, row))
-    Console(highlight=False, width=max(120, log.width)).print(result)
+    show_table({name: "left" if name in ("scene", "estimator", "backend") else "right" for name in columns}, rows)
 
 
 @app.command()
@@ -244,7 +168,7 @@ def bench(scene: SceneArgument = "mhz", as_json: JsonOption = False) -> None:
         return
     costs = report.pop("ns_per_sample_of_parts")
     speeds = {f"{name} (samples/s)": value for name, value in report.pop("samples_per_s").items()}
-    _show(report | speeds | {f"{name} (ns/sample)": value for name, value in costs.items()}, as_json)
+    show(report | speeds | {f"{name} (ns/sample)": value for name, value in costs.items()}, as_json)
 
 
 @app.command()
@@ -255,7 +179,7 @@ def verilog(
     set_: SetOption = None,
 ) -> None:
     """Write the axis of a scene as Verilog, with a table of its ports."""
-    spec = load(scene, _changes(set_, controller__estimator=estimator)).spec
+    spec = load(scene, scene_changes(set_, controller__estimator=estimator)).spec
     from ..hdl.export import write  # noqa: PLC0415
 
     try:
@@ -276,12 +200,15 @@ def synth(
     as_json: JsonOption = False,
 ) -> None:
     """Size and speed of the axis, with the serial port of a board, on a real part."""
-    loaded = load(scene, _changes(set_, controller__estimator=estimator))
+    loaded = load(scene, scene_changes(set_, controller__estimator=estimator))
     from .synthesis import synthesise  # noqa: PLC0415
 
     with log.status(f"{device}: Yosys, then nextpnr with {seeds} seeds"):
         report = synthesise(loaded, device, range(1, seeds + 1))
-    _show(report, as_json)
+    show(report, as_json)
+
+
+add_commands(app)
 
 
 def _interrupted(*_: object) -> None:

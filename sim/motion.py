@@ -242,7 +242,7 @@ def edges(motion, encoder: Encoder, seconds: float, step_s: float, offset_clocks
     Args:
         motion: one of this module's.
         encoder: the scale and its clock.
-        seconds: how long.
+        seconds: how long; up to the next whole step.
         step_s: so short that the motion turns at most once in it.
         offset_clocks: added to every stamp.
     """

@@ -91,10 +91,15 @@ class Replay:
     def clock_hz(self) -> float:
         return self.spec.clocks_per_sample * self.recording.rate_hz
 
+    @property
+    def judged_from(self) -> int:
+        """Number of the first sample that is judged."""
+        return judged_from(self.recording.rate_hz)
+
     def _rms(self, velocity: np.ndarray) -> float | None:
         if self.coarsen is None:
             return None
-        error = (velocity - self.reference_counts_per_s)[judged_from(self.recording.rate_hz) :]
+        error = (velocity - self.reference_counts_per_s)[self.judged_from :]
         return float(np.sqrt(np.mean(error**2)))
 
     @cached_property

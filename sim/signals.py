@@ -1,5 +1,6 @@
 """The signals that estimators are judged on: motions with names, how long they last, and from when they count."""
 
+import cmath
 import math
 import re
 from collections.abc import Callable
@@ -42,13 +43,10 @@ class Signal:
 
 def paper() -> Signal:
     """50 exp(-t) sin(2 pi t) mm, 5 s, judged from 1 s on; C is its largest acceleration."""
-    # At t = 0 the second derivative is -2 (decay)(omega); it is largest where the third one vanishes first.
-    decay, omega = 1.0, 2 * math.pi
-    size = decay**2 + omega**2
-    at = (math.pi - 3 * math.atan2(omega, -decay) + 2 * math.pi) % math.pi / omega
-    largest = abs(
-        PAPER.amplitude_m * size * math.exp(-decay * at) * math.sin(omega * at + 2 * math.atan2(omega, -decay))
-    )
+    # f is the imaginary part of A exp(p t); its second derivative is largest where the third first vanishes.
+    p = complex(-PAPER.decay_per_s, math.tau * PAPER.frequency_hz)
+    at = (-3 * cmath.phase(p)) % math.pi / p.imag
+    largest = abs((PAPER.amplitude_m * p**2 * cmath.exp(p * at)).imag)
     return Signal("paper", PAPER, 5.0, 1.0, largest)
 
 

@@ -1,7 +1,7 @@
 """A known motion through an axis on any backend: velocities at every sample, in chunks, with no plant and no wall.
 
 The edges are placed such that the count at the strobe of sample k is the position at time k / sample_hz, exactly: the
-decoder's latency is left out, as it is the same for every estimator. A stamp is the clock at which its edge was decoded.
+decoder's latency is left out, as it is the same for every estimator. A stamp is the clock that decoded its edge.
 """
 
 from collections.abc import Iterator

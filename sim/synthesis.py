@@ -22,10 +22,12 @@ from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from ..hdl import __name__ as hdl
 from ..hdl.boards import Board
 from ..hdl.export import to_verilog
-from ..model import quadrature
+from ..model import estimators, quadrature
 from ..model.compiled import build_dir
+from ..model.spec import AxisSpec
 from .scene import Scene
 
 CONSTRAINTS = Path(__file__).absolute().parent.parent / "constraints"
@@ -50,6 +52,7 @@ class Device:
         frequency: how a line of that file begins that sets a frequency, which here is the scene's.
         counted: resource by resource, the name in nextpnr's report.
         flip_flops: how the names of flip-flop cells begin.
+        cells: of a netlist that is not placed, resource by resource: how many of it each type of cell is.
         multiplier_ns: longest delay through a multiplier block without registers, if nextpnr does not know it.
     """
 
@@ -59,6 +62,7 @@ class Device:
     frequency: str
     counted: dict[str, str] = field(hash=False)
     flip_flops: str
+    cells: dict[str, dict[str, int]] = field(hash=False)
     multiplier_ns: float | None = None
 
 
@@ -70,6 +74,7 @@ DEVICES = {
         frequency="FREQUENCY",
         counted={"lut4": "TRELLIS_COMB", "dsp": "MULT18X18D", "bram": "DP16KD"},
         flip_flops="TRELLIS_FF",
+        cells={"lut4": {"LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 6}, "dsp": {"MULT18X18D": 1}, "bram": {"DP16KD": 1}},
     ),
     # A logic cell is a LUT4 with a flip-flop: one that holds only the latter counts as a LUT4 too.
     "ice40-up5k": Device(
@@ -79,6 +84,7 @@ DEVICES = {
         frequency="set_frequency",
         counted={"lut4": "ICESTORM_LC", "dsp": "ICESTORM_DSP", "bram": "ICESTORM_RAM"},
         flip_flops="SB_DFF",
+        cells={"lut4": {"SB_LUT4": 1}, "dsp": {"SB_MAC16": 1}, "bram": {"SB_RAM40_4K": 1}},
         # Project IceStorm's timings of the part, cell SB_MAC16: 8.8 ns from B[1] to O[31].
         multiplier_ns=9.0,
     ),
@@ -199,6 +205,21 @@ def _timing(device: Device, report: dict) -> tuple[float, str]:
         if into is not None and out is not None and into + device.multiplier_ns + out > longest:
             longest, ends = into + device.multiplier_ns + out, "through a multiplier"
     return longest, ends
+
+
+def estimator_cells(spec: AxisSpec, device: str) -> dict[str, int]:
+    """Return what the estimator of an axis takes of a device, synthesised alone and not placed: lut4, ff, dsp, bram.
+
+    Raises:
+        SynthesisError: if a tool is missing or fails.
+    """
+    part = DEVICES[device]
+    component = estimators.load(spec.estimator, hdl).Estimator(spec.design.estimator)
+    folder = _netlist(f"estimator-{device}", part, to_verilog(component, "board"), "", spec.clock_hz)
+    found = json.loads((folder / "board.json").read_text(encoding="utf-8"))["modules"]["board"]["cells"]
+    types = [cell["type"] for cell in found.values()]
+    counted = {name: sum(weights.get(kind, 0) for kind in types) for name, weights in part.cells.items()}
+    return counted | {"ff": sum(kind.startswith(part.flip_flops) for kind in types)}
 
 
 def _half_registered(netlist: dict) -> bool:

@@ -10,6 +10,7 @@ import pytest
 from replays import BOUND, COARSEN, EVERY, recording, reference_of, swing
 
 from bench import rng
+from hardwall.model.estimators import ESTIMATORS
 from hardwall.sim.plot_replay import SUFFIXES, plot_replay
 from hardwall.sim.recording import Recording, load
 from hardwall.sim.replay import ReplayError, replay
@@ -144,7 +145,7 @@ def test_the_widest(estimator, output):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"estimator": "kalman"}, "estimator must be one of fdm, levant, not 'kalman'"),
+        ({"estimator": "nobody"}, f"estimator must be one of {', '.join(ESTIMATORS)}, not 'nobody'"),
         ({"output": "u2"}, "output of levant must be one of u, u1, not 'u2'"),
         ({"estimator": "fdm", "output": "u1"}, "output of fdm must be one of u, not 'u1'"),
         ({"backend": "gpu"}, "backend must be one of float, fixed, rtl, not 'gpu'"),

@@ -1,0 +1,486 @@
+"""DOC"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from .compiled import compiled
+from .estimators import estimate
+from .fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
+from .quadrature import RUN_MAX
+from .sqrt import isqrt
+from .sqrt import latency as sqrt_latency
+from .words import GAIN_BITS, Word
+
+OUTPUTS = ("u",)
+HEADROOM_BITS = 2
+"""A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
+SPEED_BITS = 18
+"""The velocity resolves sqrt(C q), the speed that C gives within half a count, to 2**-SPEED_BITS."""
+WIDTH_MAX = 40
+"""Most bits of velocity and acceleration."""
+ACCELERATION_BITS = 3
+"""The acceleration may reach 2**ACCELERATION_BITS C: an impact exceeds the C of a motion."""
+ROOT_BITS = 5
+"""The root resolves the least error that it limits to 2**-ROOT_BITS."""
+LEARN_SHIFT = 5
+"""An edge's residual moves the two places that it depends on by 2**-LEARN_SHIFT of it."""
+PLACE_BITS = 22
+"""Places of edges resolve 2**-PLACE_BITS counts."""
+REST_BITS = 3
+"""An axis rests when 2**REST_BITS of the last intervals, rounded up to a power of two, have brought no edge."""
+LEFT_MAX = 46
+"""No left shift of a gain word exceeds this, beyond which all of them saturate: 16 + 46 bits fit int64."""
+DIGITS = 2
+"""Quotient bits a clock."""
+STEPS = 18
+"""Clocks of the sequence besides the root's or the quotient's: see `hardwall.hdl.levant_edge`."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains in SI units: lambda in m^(1/2)/s^(3/2), alpha in m/s^3.
+
+    Raises:
+        ValueError: if either is not finite and more than 0.
+    """
+
+    lambda_sqrt_m_per_s3: float
+    alpha_m_per_s3: float
+
+    def __post_init__(self):
+        for name, value in vars(self).items():
+            if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
+                raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
+
+    @classmethod
+    def default(cls, axis) -> "Gains":
+        """Return alpha = 2 C / sqrt(q / C) and Levant's lambda = 1.5 sqrt(alpha), with C and q the axis's."""
+        bound = axis.acceleration_max_m_per_s2
+        alpha = 2 * bound * math.sqrt(bound / axis.count_m)
+        return cls(1.5 * math.sqrt(alpha), alpha)
+
+
+class Params(NamedTuple):
+    """Words and shifts of the integer kernel; see `Design` for the formats."""
+
+    lambda_: int
+    alpha: int
+    count_width: int
+    stamp_width: int
+    clocks: int
+    shortest: int
+    mantissa: int
+    distance_max: int
+    place_fraction: int
+    place_shift: int
+    turn_shift: int
+    turn_span: int
+    error_shift: int
+    radicand_shift: int
+    limit_shift: int
+    slope_shift: int
+    alpha_shift: int
+    learn_shift: int
+    learn_max: int
+    place_max: int
+    bound: int
+    velocity_max: int
+    acceleration_max: int
+
+
+class State(NamedTuple):
+    """The anchor (edge number `number`, `stamp`, `kind`; `known` if it was seen to come), velocity and acceleration there
+    (words; float: counts a sample, and that a clock), the interval's length in bits, and the four places of the edges.
+    """
+
+    running: int
+    known: int
+    number: int
+    stamp: int
+    kind: int
+    length: int
+    velocity: float
+    acceleration: float
+    places: tuple
+
+
+class FloatParams(NamedTuple):
+    lambda_: float
+    alpha: float
+    count_width: int
+    stamp_width: int
+    clocks: int
+    shortest: int
+    mantissa: int
+    steepest: float
+    learn_max: float
+    place_max: float
+
+
+START = State(0, 0, 0, 0, 0, 0, 0, 0, (0, 0, 0, 0))
+FLOAT_START = State(0, 0, 0, 0, 0, 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
+
+
+class Design:
+    """Formats, run-time words and latency of the differentiator for an axis: the module says how they follow.
+
+    Attributes:
+        velocity, acceleration, error, place: formats of v, of a, of E over 2**k, of an edge's place times D.
+        mantissa: bits of a time as it multiplies and divides.
+        shortest: bits below those of the shortest interval used, 2**shortest clocks.
+        distance: format of the edges passed in an interval.
+        root, radicand: formats of the root and its integer radicand.
+        lambda_, alpha: gain formats.
+        words: `levant_edge_lambda`, `levant_edge_alpha`.
+
+    Raises:
+        ValueError: if the gains or the rates do not fit any format that int64 can hold, with the accepted range.
+    """
+
+    inputs = (
+        "count",
+        "stamp",
+        "stamp_a_rise",
+        "stamp_b_rise",
+        "stamp_a_fall",
+        "stamp_b_fall",
+        "edge",
+        "down",
+        "run",
+    )
+    flags = ("error_saturated", "velocity_saturated")
+
+    def __init__(self, axis, gains: Gains):
+        tau, q, clock, clocks = 1 / axis.sample_hz, axis.count_m, axis.clock_hz, axis.clocks_per_sample
+        bound, speed = axis.acceleration_max_m_per_s2, axis.speed_max_counts_per_sample
+        self.count_width, self.stamp_width, self.clocks = axis.count_width, axis.stamp_width, clocks
+        if 4 * clocks > 1 << axis.stamp_width:
+            raise ValueError(f"sample_hz must be 4 or more for stamps that last a second, not {axis.sample_hz!r}")
+
+        # Times, clocks.
+        window = clock * min(math.sqrt(axis.speed_max_m_per_s / (clock * bound)), math.sqrt(q / bound) / 4)
+        self.shortest = min(max(math.floor(math.log2(max(window, 2.0))), 1), axis.stamp_width - 3)
+        within_count = clock * math.sqrt(q / bound)
+        exact = bits_for(math.sqrt(within_count * 2.0 ** (SPEED_BITS - 2)))
+        self.mantissa = min(max(exact, bits_for(4 * max(clocks, 1 << self.shortest))), axis.stamp_width - 1)
+        span = max(axis.stamp_width - 1 - self.mantissa, 0)
+
+        # Velocity and acceleration.
+        i = 1 + bits_for(max(2 * speed, 2.0))
+        least = math.sqrt(bound / q) * tau
+        slowest = clocks * 2.0 ** (1 - axis.stamp_width)
+        f = max(SPEED_BITS - math.floor(math.log2(least)), 1 - math.floor(math.log2(slowest)), 0)
+        f = min(f, WIDTH_MAX - i, 60 - self.mantissa - i)
+        self.velocity = SQ(i, max(f - axis.estimator_bits_dropped, 0))
+        f = self.velocity.f
+        largest = bound * tau / q / clock
+        i = 1 + ACCELERATION_BITS + bits_for(largest)
+        self.acceleration = SQ(i, self.velocity.width - i)
+
+        # Errors of place, in counts times D.
+        self.error = SQ(self.velocity.i + self.mantissa + 2, f - min(max(self.shortest - 1, 0), f))
+        fine = PLACE_BITS - math.floor(math.log2(clocks))
+        self.place = SQ(max(bits_for(clocks / 2), 0) + 1, max(fine, 0))
+        passed = 2 * speed * (2 + (2 << self.shortest) / clocks) + 1
+        self.distance = SQ(min(1 + bits_for(passed), axis.count_width), 0)
+
+        # Gains.
+        alpha = gains.alpha_m_per_s3 * tau / q / clock**2
+        lam = gains.lambda_sqrt_m_per_s3 * math.sqrt(tau / q) / clock
+        self.alpha = _gain("alpha_m_per_s3", gains.alpha_m_per_s3, alpha)
+        self.lambda_ = _gain("lambda_sqrt_m_per_s3", gains.lambda_sqrt_m_per_s3, lam)
+        limited = lam**2 * 8.0**self.shortest
+        root_f = max(bits_for(2.0**ROOT_BITS / math.sqrt(limited)), 0)
+        self.radicand = UQ(self.error.i - 1, 2 * min(root_f, (self.error.f + 1) // 2))
+        self.root = UQ((self.radicand.width + 2) // 2 - self.radicand.f // 2, self.radicand.f // 2)
+        self.words = (
+            Word(
+                "levant_edge_lambda",
+                self.lambda_,
+                math.sqrt(q / tau) * clock,
+                "m^(1/2)/s^(3/2)",
+                self.lambda_.from_real(lam),
+                "gain of the square-root term",
+            ),
+            Word(
+                "levant_edge_alpha",
+                self.alpha,
+                q / tau * clock**2,
+                "m/s^3",
+                self.alpha.from_real(alpha),
+                "gain of the sign term",
+            ),
+        )
+        self.turn_span = span
+
+    @property
+    def latency(self) -> int:
+        """Clocks from strobe to valid."""
+        return STEPS + max(self.quotient_latency, sqrt_latency(self.radicand.width + 1))
+
+    @property
+    def quotient_latency(self) -> int:
+        """Clocks of the division: one to load, and one for each `DIGITS` bits."""
+        return 1 + -(-(self.velocity.width - 1) // DIGITS)
+
+    def params(self, words: dict[str, int]) -> Params:
+        """Return the kernel's parameters for the given run-time words."""
+        f, a_f, e_f = self.velocity.f, self.acceleration.f, self.error.f
+        return Params(
+            lambda_=words["levant_edge_lambda"],
+            alpha=words["levant_edge_alpha"],
+            count_width=self.count_width,
+            stamp_width=self.stamp_width,
+            clocks=self.clocks,
+            shortest=self.shortest,
+            mantissa=self.mantissa,
+            distance_max=self.distance.max,
+            place_fraction=self.place.f,
+            place_shift=e_f - self.place.f,
+            turn_shift=a_f - f - self.turn_span,
+            turn_span=self.turn_span,
+            error_shift=f - e_f,
+            radicand_shift=e_f - self.radicand.f,
+            limit_shift=self.lambda_.f + self.root.f - f,
+            slope_shift=f - a_f,
+            alpha_shift=self.alpha.f - a_f,
+            learn_shift=e_f - self.place.f + LEARN_SHIFT,
+            learn_max=(1 << bits_for(self.clocks / 4) + e_f) - 1,
+            place_max=self.place.max,
+            bound=shift_floor(5 * self.clocks, 1 - f),
+            velocity_max=self.velocity.max,
+            acceleration_max=self.acceleration.max,
+        )
+
+    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+        """Return the float64 algorithm's parameters: gains unrounded, those of `si` before the designed."""
+        lam, alpha = self.words
+        return FloatParams(
+            si.get("levant_edge_lambda", gains.lambda_sqrt_m_per_s3) / lam.si_per_unit,
+            si.get("levant_edge_alpha", gains.alpha_m_per_s3) / alpha.si_per_unit,
+            self.count_width,
+            self.stamp_width,
+            self.clocks,
+            self.shortest,
+            self.mantissa,
+            2.0 ** (self.acceleration.i - 1),
+            2.0 ** bits_for(self.clocks / 4),
+            2.0 ** (self.place.i - 1),
+        )
+
+
+def _gain(name: str, value: float, scaled: float) -> UQ:
+    """Return the format of a gain of `value` SI and `scaled` in counts, samples and clocks."""
+    if not 2.0**-60 <= scaled <= 2.0**20:
+        unit = value / scaled
+        raise ValueError(f"{name} must be {2.0**-60 * unit:g} to {2.0**20 * unit:g} at these rates, not {value!r}")
+    i = HEADROOM_BITS + bits_for(scaled)
+    return UQ(i, GAIN_BITS - i)
+
+
+@compiled
+def _length(value):
+    """Return the bits of a word: the least n with value < 2**n."""
+    n = 0
+    while value >> n:
+        n += 1
+    return n
+
+
+@compiled
+def _number(params, seen):
+    """Return the number of the last edge on the scale."""
+    return wrap(seen.count + seen.down, params.count_width)
+
+
+@compiled
+def _kind(seen):
+    """Return which of the four edges of a cycle of the scale the last one was: the kind it is upwards."""
+    return seen.edge ^ seen.down << 1
+
+
+@compiled
+def _last_stamp(seen):
+    if seen.edge < 2:
+        return seen.stamp_b_rise if seen.edge else seen.stamp_a_rise
+    return seen.stamp_b_fall if seen.edge & 1 else seen.stamp_a_fall
+
+
+@compiled
+def _shifted(places, to, since, by, low, high):
+    """Return the places with that of kind `to` higher and that of kind `since` lower, within `low` to `high`."""
+    return (
+        saturate(places[0] + by * (int(to == 0) - int(since == 0)), low, high),
+        saturate(places[1] + by * (int(to == 1) - int(since == 1)), low, high),
+        saturate(places[2] + by * (int(to == 2) - int(since == 2)), low, high),
+        saturate(places[3] + by * (int(to == 3) - int(since == 3)), low, high),
+    )
+
+
+@compiled
+def _within(line, velocity, bound):
+    """Return the extrapolated `line` held to what no further edge allows: see the module."""
+    if velocity < 0:
+        return saturate(line, -max(bound + velocity, 0), -velocity)
+    return saturate(line, -velocity, max(bound - velocity, 0))
+
+
+@compiled
+def _sign(value):
+    # int() for plain Python on numpy scalars, whose truths do not subtract.
+    return int(value > 0) - int(value < 0)
+
+
+@compiled
+def _fitted(value, most):
+    """Return `value` held within the two's complement word whose largest is `most`."""
+    return saturate(value, ~most, most)
+
+
+@compiled
+def _turn(params, acceleration, time):
+    """Return the change of velocity over `time` clocks: velocity words, rounded down, with one bit more."""
+    shift = max(_length(time) - params.mantissa, 0)
+    coarse = shift_floor(acceleration * (time >> shift), params.turn_shift)
+    return _fitted(shift_floor(coarse, params.turn_span - shift), 2 * params.velocity_max + 1)
+
+
+@compiled
+def _correct(params, state, seen, interval, passed):
+    """Return (velocity, acceleration, places, flags) at the new edge, `interval` clocks and `passed` edges on."""
+    velocity, acceleration, places = state.velocity, state.acceleration, state.places
+    kind = _kind(seen)
+    length = _length(interval)
+    shift = max(length - params.mantissa, 0)
+    time = interval >> shift
+    most, steepest = params.velocity_max, params.acceleration_max
+
+    turn = _turn(params, acceleration, interval)
+    mean = _fitted(velocity + (turn >> 1), most)
+    distance = _fitted(passed, params.distance_max)
+    place = shift_floor(distance * params.clocks, -params.place_fraction) + places[kind] - places[state.kind]
+    error = shift_floor(mean * time, params.error_shift) - shift_floor(place, shift - params.place_shift)
+    sign, size = _sign(error), abs(error)
+
+    quotient = (size << params.error_shift) // time
+    slope = min(quotient, most)
+    change, bend = slope, min(shift_floor(slope, params.slope_shift + length), steepest)
+    if shift == 0:
+        radicand = shift_floor(size, params.radicand_shift) << (length & 1)
+        change = min(change, shift_floor(params.lambda_ * isqrt(radicand), params.limit_shift - (length >> 1)))
+        bend = min(bend, shift_floor(params.alpha, max(params.alpha_shift - length, -LEFT_MAX)))
+
+    far_velocity = velocity + turn - sign * change
+    velocity = _fitted(far_velocity, most)
+    acceleration = _fitted(acceleration - sign * bend, steepest)
+    if seen.run == RUN_MAX:
+        residual = _fitted(_fitted(error, params.learn_max) << shift, params.learn_max)
+        by = shift_round_half_up(residual, params.learn_shift)
+        places = _shifted(places, kind, state.kind, by, ~params.place_max, params.place_max)
+    flags = int(distance != passed or slope != quotient)
+    flags |= int(velocity != far_velocity) << 1
+    return velocity, acceleration, places, flags
+
+
+@estimate.register(Params)
+@compiled
+def step(params, state, seen, restart):
+    fresh = restart or not state.running
+    if fresh:
+        state = State(1, 0, _number(params, seen), _last_stamp(seen), _kind(seen), 0, 0, 0, (0, 0, 0, 0))
+    mask, far = (1 << params.stamp_width) - 1, params.stamp_width - 1
+    most = params.velocity_max
+    interval = (_last_stamp(seen) - state.stamp) & mask
+    passed = wrap(_number(params, seen) - state.number, params.count_width)
+    age = (seen.stamp - state.stamp) & mask
+
+    known, length = state.known, state.length
+    velocity, acceleration, places = state.velocity, state.acceleration, state.places
+    new, taken, flags = int(interval != 0 or passed != 0), 1, 0
+    if new:
+        if not known or interval >> far:
+            known, velocity, acceleration = 1, 0, 0
+        elif interval >> params.shortest:
+            length = _length(interval)
+            velocity, acceleration, places, flags = _correct(params, state, seen, interval, passed)
+        elif age >> (params.shortest + 1):
+            moved = velocity + _turn(params, acceleration, interval)
+            velocity = _fitted(moved, most)
+            flags = int(moved != velocity) << 1
+        else:
+            taken = 0
+    number, stamp, kind = state.number, state.stamp, state.kind
+    if new and taken:
+        number, stamp, kind = _number(params, seen), _last_stamp(seen), _kind(seen)
+        age = (seen.stamp - stamp) & mask
+
+    if taken and (age >> far or age >> (length + REST_BITS)):
+        velocity, acceleration = 0, 0
+        known = int(known and not age >> far)
+    straight = velocity + _turn(params, acceleration, age)
+    line = _fitted(straight, most)
+    flags |= int(line != straight) << 1
+    if taken:
+        line = _within(line, velocity, min(params.bound >> max(_length(age) - 1, 0), most))
+    return State(1, known, number, stamp, kind, length, velocity, acceleration, places), line, flags
+
+
+@compiled
+def _float_correct(params, state, seen, interval, passed):
+    velocity, acceleration, places = state.velocity, state.acceleration, state.places
+    kind = _kind(seen)
+    scale = 2.0 ** _length(interval)
+    turn = acceleration * interval
+    place = passed * params.clocks + places[kind] - places[state.kind]
+    error = (velocity + turn / 2) * interval - place
+    sign, slope = _sign(error), abs(error) / interval
+    change, bend = slope, slope / scale
+    if interval >> params.mantissa == 0:
+        change = min(change, params.lambda_ * math.sqrt(abs(error) * scale))
+        bend = min(bend, params.alpha * scale)
+    velocity = velocity + turn - sign * change
+    acceleration = saturate(acceleration - sign * bend, -params.steepest, params.steepest)
+    if seen.run == RUN_MAX:
+        by = saturate(error, -params.learn_max, params.learn_max) * 2.0**-LEARN_SHIFT
+        places = _shifted(places, kind, state.kind, by, -params.place_max, params.place_max)
+    return velocity, acceleration, places
+
+
+@estimate.register(FloatParams)
+@compiled
+def float_step(params, state, seen, restart):
+    """The same algorithm in float64, unsaturated: the reference for what fixed point costs."""
+    fresh = restart or not state.running
+    if fresh:
+        state = State(1, 0, _number(params, seen), _last_stamp(seen), _kind(seen), 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
+    mask, far = (1 << params.stamp_width) - 1, params.stamp_width - 1
+    interval = (_last_stamp(seen) - state.stamp) & mask
+    passed = wrap(_number(params, seen) - state.number, params.count_width)
+    age = (seen.stamp - state.stamp) & mask
+
+    known, length = state.known, state.length
+    velocity, acceleration, places = state.velocity, state.acceleration, state.places
+    new, taken = int(interval != 0 or passed != 0), 1
+    if new:
+        if not known or interval >> far:
+            known, velocity, acceleration = 1, 0.0, 0.0
+        elif interval >> params.shortest:
+            length = _length(interval)
+            velocity, acceleration, places = _float_correct(params, state, seen, interval, passed)
+        elif age >> (params.shortest + 1):
+            velocity = velocity + acceleration * interval
+        else:
+            taken = 0
+    number, stamp, kind = state.number, state.stamp, state.kind
+    if new and taken:
+        number, stamp, kind = _number(params, seen), _last_stamp(seen), _kind(seen)
+        age = (seen.stamp - stamp) & mask
+
+    if taken and (age >> far or age >> (length + REST_BITS)):
+        velocity, acceleration = 0.0, 0.0
+        known = int(known and not age >> far)
+    line = velocity + acceleration * age
+    if taken:
+        line = _within(line, velocity, 2.5 * params.clocks * 2.0 ** -max(_length(age) - 1, 0))
+    return State(1, known, number, stamp, kind, length, velocity, acceleration, places), line, 0

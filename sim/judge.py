@@ -1,0 +1,88 @@
+"""What is said of a velocity estimate that is held against the truth, sample by sample.
+
+With v the true velocity and w the estimate, over the judged samples:
+
+- `rms`, `largest`: of w - v;
+- `chatter`: RMS of w - v less its mean over each 10 ms: the part that a damper turns into noise;
+- `delay_s`: that d for which v(t - d) correlates best with w(t); None where v does not vary, or w is nothing.
+
+The correlation is over means of blocks, at most `DELAY_POINTS` of them; within a block v must be as good as straight.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+CHATTER_S = 0.01
+DELAY_POINTS = 1 << 15
+DELAY_MAX_S = 0.1
+DELAY_STEPS = 400
+
+
+class _Means:
+    """Means over blocks of so many samples, of values that come in chunks."""
+
+    def __init__(self, samples: int, size: int):
+        self._size = size
+        self._sums = np.zeros(-(-samples // size))
+        ends = np.minimum(np.arange(1, len(self._sums) + 1) * size, samples)
+        self.lengths = np.diff(ends, prepend=0)
+        self.middles = ends - (self.lengths + 1) / 2
+
+    def add(self, first: int, values: np.ndarray) -> None:
+        blocks = np.arange(first, first + len(values)) // self._size
+        np.add.at(self._sums, blocks, values)
+
+    @property
+    def values(self) -> np.ndarray:
+        return self._sums / self.lengths
+
+
+class Judge:
+    """The figures of one estimate, from chunks of it.
+
+    Args:
+        samples: how many there will be.
+        sample_hz: their rate.
+    """
+
+    def __init__(self, samples: int, sample_hz: float):
+        self._samples, self._sample_hz = samples, sample_hz
+        self._slow = _Means(samples, max(1, round(CHATTER_S * sample_hz)))
+        self._shape = _Means(samples, -(-samples // DELAY_POINTS))
+        self._squares = 0.0
+        self.largest = 0.0
+
+    def add(self, first: int, estimate: np.ndarray, exact: np.ndarray) -> None:
+        """Take samples `first` and on."""
+        error = estimate - exact
+        self._squares += float(error @ error)
+        self.largest = max(self.largest, float(np.abs(error).max(initial=0.0)))
+        self._slow.add(first, error)
+        self._shape.add(first, estimate)
+
+    @property
+    def rms(self) -> float:
+        return math.sqrt(self._squares / self._samples)
+
+    @property
+    def chatter(self) -> float:
+        slow = float(np.average(self._slow.values**2, weights=self._slow.lengths))
+        return math.sqrt(max(self._squares / self._samples - slow, 0.0))
+
+    def delay_s(self, exact_at: Callable[[np.ndarray], np.ndarray]) -> float | None:
+        """Return the delay; `exact_at` gives the true velocity at times in seconds since the first sample."""
+        times, estimate = self._shape.middles / self._sample_hz, self._shape.values
+        if np.ptp(exact_at(times)) < 1e-9 or not estimate.any():
+            return None
+
+        def mismatch(delay_s: float) -> float:
+            exact = exact_at(times - delay_s)
+            return -float(estimate @ exact) / math.sqrt(float(exact @ exact))
+
+        tried = np.linspace(-DELAY_MAX_S, DELAY_MAX_S, DELAY_STEPS + 1)
+        best, step = tried[int(np.argmin([mismatch(delay_s) for delay_s in tried]))], tried[1] - tried[0]
+        found = minimize_scalar(mismatch, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9})
+        return float(found.x)

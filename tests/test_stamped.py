@@ -1,0 +1,74 @@
+"""An axis on a record of stamped edges: decoder and axis, clock by clock and all at once, give the same."""
+
+import numpy as np
+import pytest
+from specs import spec
+
+from bench import rng
+from hardwall.model import axis, quadrature, stamped
+from hardwall.model.axis import Axis
+
+SPEC = spec("mhz", "fdm")
+UPWARDS = [0b00, 0b01, 0b11, 0b10]
+
+
+def walk(samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return edges of a random walk, at most one a clock, and the count from each of its clocks on."""
+    random = rng()
+    clocks = np.flatnonzero(random.random(samples * SPEC.clocks_per_sample) < 0.006)
+    clocks = clocks[clocks > 10]
+    counts = np.cumsum(random.choice([-1, 1], len(clocks), p=[0.3, 0.7]))
+    return clocks, np.array(UPWARDS)[counts % 4], counts
+
+
+@pytest.mark.parametrize("floating", [False, True])
+def test_records_are_the_decoders_clocks_and_the_axis_samples(floating):
+    samples, period = 400, SPEC.clocks_per_sample
+    clocks, levels, _ = walk(samples)
+    of = Axis(SPEC, floating, wall_stiffness=5e3, wall_damping=3.0, encoder_glitch_clocks=2, wall_position=10e-6)
+    seen = stamped.run(of, clocks, levels, samples)
+    # Every clock on its own.
+    pins = np.zeros(samples * period, np.int64)
+    for clock, level in zip(clocks, levels, strict=True):
+        pins[clock:] = level
+    decoded = quadrature.run(of.design.decoder, pins & 1, pins >> 1, 0, glitch_clocks=2)
+    state = of.design.start(floating)
+    for k in range(samples):
+        before = quadrature.State(*(int(column[(k + 1) * period - 2]) for column in decoded))
+        fault = before.illegal | before.overspeed << 1
+        state, velocity, force = axis.step(of.params, state, quadrature.seen(before), 0, fault, 1)
+        assert (velocity, force, state.output.drive, state.flags) == (
+            seen.velocity[k], seen.force[k], seen.drive[k], seen.flags[k]
+        ), k  # fmt: skip
+    assert np.abs(seen.force).max() > 0
+
+
+def test_counts_come_after_the_decoders_latency():
+    clocks, levels, counts = walk(400)
+    seen = stamped.run(Axis(SPEC), clocks, levels, 400)
+    strobes = np.arange(1, 401) * SPEC.clocks_per_sample - 1
+    latency = quadrature.latency(0)
+    passed = np.searchsorted(clocks, strobes - latency, side="right")
+    assert np.cumsum(seen.velocity).tolist() == np.concatenate([[0], counts])[passed].tolist()
+
+
+def test_no_edges_are_standstill():
+    seen = stamped.run(Axis(SPEC), np.array([], np.int64), [], 5, level=3)
+    assert not any((seen.velocity.any(), seen.drive.any(), seen.flags.any()))
+
+
+@pytest.mark.parametrize(
+    ("clocks", "levels", "level", "error", "message"),
+    [
+        ([1.5], [1], 0, TypeError, r"^edge_clocks must be integers"),
+        ([1], ["a"], 0, TypeError, r"^edge_levels must be integers"),
+        ([1, 2], [1], 0, ValueError, r"^edge_clocks and edge_levels must have one shape"),
+        ([3, 2], [1, 3], 0, ValueError, r"^edge_clocks must be 0 or more and never decrease"),
+        ([-1], [1], 0, ValueError, r"^edge_clocks must be 0 or more"),
+        ([1], [4], 0, ValueError, r"^edge_levels must be 0 to 3"),
+        ([1], [1], 5, ValueError, r"^level must be 0 to 3"),
+    ],
+)
+def test_what_is_no_record_is_refused(clocks, levels, level, error, message):
+    with pytest.raises(error, match=message):
+        stamped.run(Axis(SPEC), np.array(clocks), np.array(levels), 5, level)
