@@ -6,9 +6,9 @@ With c clocks a sample, velocities in counts a sample and times in clocks:
                                     B: from now back to the edge three before the last; the next completes a cycle
     fast    v = n / w               n: counts moved in the last full window of w = 2**k samples, held for the next
 
-D needs no multiplication, and the constant dividend and the one comparison of D with B make this the cheapest hardware
-that times edges. It is immune to misplaced edges as `period` is, for it subtracts stamps of one kind alone; but after
-a turn it reads 0 until there is a cycle in the new direction.
+D needs no multiplication: one division of a constant, by the larger of D and B. It is immune to misplaced edges as
+`period` is, for it subtracts stamps of one kind alone; but after a turn it reads 0 until there is a cycle in the new
+direction.
 
 Errors, with |f''| <= C in counts and samples. A cycle's stamps are late by less than a clock, v^2 / 4 c, and it is of
 D / 2 and up to a gap ago, 3 C / v. A window's counts are off by less than one, 1 / w, and it is of w / 2 to 3 w / 2
