@@ -71,8 +71,8 @@ class Estimator(EstimatorBlock):
                 m.d.sync += correction.eq(shift_round_half_up(product, design.product - velocity.f))
                 m.next = "OUTPUT"
             with m.State("OUTPUT"):
-                held_u, far_u = moved_by(u1, correction, negative, positive, velocity.max)
-                held_u1, far_u1 = moved_by(u1, self.levant_alpha, negative, positive, velocity.max)
+                held_u, far_u = _moved(u1, correction, negative, positive, velocity.max)
+                held_u1, far_u1 = _moved(u1, self.levant_alpha, negative, positive, velocity.max)
                 m.d.sync += [u.eq(held_u), next_u1.eq(held_u1), self.saturated[1].eq(far_u | far_u1)]
                 m.next = "UPDATE"
             with m.State("UPDATE"):
@@ -118,7 +118,7 @@ def arrive(m, block, lead, u1, e, then):
     return first
 
 
-def moved_by(value, step, up, down, most):
+def _moved(value, step, up, down, most):
     """Return `value` plus or less `step`, or as it is, held within +-`most`; and whether it was held.
 
     Sum and difference side by side, for each needs a limit on one side only: `value` itself is within.

@@ -5,8 +5,8 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
 from hardwall.model.levant_semi_implicit import Design
 
 from . import EstimatorBlock
-from .fixed import shape, shift_floor, shift_round_half_up
-from .levant import arrive, moved_by
+from .fixed import saturate, shape, shift_floor, shift_round_half_up
+from .levant import arrive
 from .sqrt import Sqrt
 
 
@@ -71,70 +71,75 @@ class Estimator(EstimatorBlock):
     def elaborate(self, platform):
         m = Module()
         velocity, error = self.design.velocity, self.design.error
+        most = velocity.max
 
         lead = Signal(signed(max(error.width, velocity.width) + 1))
         u1 = Signal(shape(velocity))
 
-        # One clock a step; the root takes its own time between ROOT and PRODUCT.
+        # One clock a step, one carry chain a clock.
         e = Signal(shape(error))
-        size = Signal(error.width - 1)
-        near = Signal(min(self.design.alpha.width, len(size)))
-        beyond = Signal(len(size))
-        positive, negative = Signal(), Signal()
-        next_u1, far_u1 = Signal.like(u1), Signal()
-        u, correction, rest = Signal.like(u1), Signal.like(size), Signal.like(size)
+        negative = Signal()
+        size, near, beyond, rest = (Signal(error.width - 1) for _ in range(4))
+        difference = Signal(signed(max(len(size), self.design.alpha.width) + 1))
+        far_u1, far_u = (Signal(signed(max(len(size), len(u1)) + 2)) for _ in range(2))
+        next_u1 = Signal.like(u1)
+        # `near` is there long before u1 is wanted.
+        m.d.sync += [far_u1.eq(Mux(negative, u1 + near, u1 - near)), next_u1.eq(saturate(far_u1, -most, most))]
 
         m.submodules.root = root = Sqrt(self.design.radicand.width)
         factor = self._factor(root)
         product = Signal(len(self._word(0)) + len(factor))
-        full = Signal.like(self._correction(product))
-        below = full[-1] if full.shape().signed else Const(0)
-        m.d.comb += root.radicand.eq(self._radicand(beyond))
 
         m.d.sync += self.valid.eq(0)
         with m.FSM():
             first = arrive(m, self, lead, u1, e, "MAGNITUDE")
             after = self._adapt(m, first, e, size)
             with m.State("MAGNITUDE"):
-                m.d.sync += [
-                    size.eq(Mux(e < 0, -e, e)),
-                    positive.eq(e > 0),
-                    negative.eq(e < 0),
-                    product.eq(self._word(0) * factor),
-                ]
+                m.d.sync += [size.eq(Mux(e < 0, -e, e)), negative.eq(e < 0), product.eq(self._word(0) * factor)]
                 m.next = after
             with m.State("BAND"):
-                within = size < self._alpha()
-                m.d.sync += [
-                    near.eq(Mux(within, size, self._alpha())),
-                    beyond.eq(Mux(within, 0, size - self._alpha())),
-                ]
+                m.d.sync += difference.eq(size - self._alpha())
                 self._square(m, product)
+                m.next = "SPLIT"
+            with m.State("SPLIT"):
+                within = difference < 0
+                m.d.sync += [near.eq(Mux(within, size, self._alpha())), beyond.eq(Mux(within, 0, difference))]
                 m.next = "ROOT"
-            with m.State("ROOT"):
-                m.d.comb += root.start.eq(1)
-                held, far = moved_by(u1, near, negative, positive, velocity.max)
-                m.d.sync += [next_u1.eq(held), far_u1.eq(far)]
-                m.next = "PRODUCT"
-            with m.State("PRODUCT"), m.If(root.done):
-                m.d.sync += product.eq(self._word(0) * factor)
-                m.next = "CORRECTION"
-            with m.State("CORRECTION"):
-                m.d.sync += full.eq(self._correction(product))
-                m.next = "LIMIT"
-            with m.State("LIMIT"):
-                m.d.sync += correction.eq(Mux(below, 0, Mux(full > beyond, beyond, full)))
-                m.next = "OUTPUT"
+            correction = self._correct(m, root, factor, product, beyond)
             with m.State("OUTPUT"):
-                held, far = moved_by(next_u1, correction, negative, positive, velocity.max)
-                m.d.sync += [u.eq(held), rest.eq(beyond - correction), self.saturated[1].eq(far | far_u1)]
+                m.d.sync += far_u.eq(Mux(negative, next_u1 + correction, next_u1 - correction))
+                m.d.sync += rest.eq(beyond - correction)
                 m.next = "UPDATE"
             with m.State("UPDATE"):
+                u = saturate(far_u, -most, most)
                 m.d.sync += [
                     lead.eq(Mux(negative, next_u1 - rest, next_u1 + rest)),
                     u1.eq(next_u1),
                     self.velocity.eq(Mux(self._word(2), next_u1, u)),
+                    self.saturated[1].eq((u != far_u) | (next_u1 != far_u1)),
                     self.valid.eq(1),
                 ]
                 m.next = "SAMPLE"
         return m
+
+    def _correct(self, m, root, factor, product, beyond) -> Value:
+        """Add the states from ROOT to OUTPUT, not included; return g. The root takes its own time before PRODUCT."""
+        full, correction = Signal.like(self._correction(product)), Signal.like(beyond)
+        below, above = Signal(), Signal()
+        m.d.comb += root.radicand.eq(self._radicand(beyond))
+        with m.State("ROOT"):
+            m.d.comb += root.start.eq(1)
+            m.next = "PRODUCT"
+        with m.State("PRODUCT"), m.If(root.done):
+            m.d.sync += product.eq(self._word(0) * factor)
+            m.next = "CORRECTION"
+        with m.State("CORRECTION"):
+            m.d.sync += full.eq(self._correction(product))
+            m.next = "COMPARE"
+        with m.State("COMPARE"):
+            m.d.sync += [below.eq(full[-1] & full.shape().signed), above.eq(full > beyond)]
+            m.next = "LIMIT"
+        with m.State("LIMIT"):
+            m.d.sync += correction.eq(Mux(below, 0, Mux(above, beyond, full)))
+            m.next = "OUTPUT"
+        return correction

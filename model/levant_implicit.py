@@ -17,7 +17,7 @@ b, and z = sqrt(|e+|) is the positive root of z^2 + lambda z = |b| - alpha. Toge
 a continuous map of b, whose g never exceeds beyond. The outputs are u, the corrected velocity, and u1, the integral
 state. What is said there of standstill, constant speed, low and high rates holds here word for word: in the band both
 outputs are exactly the finite difference; beyond it g is smaller, so it is the smoother of the two between 1 and
-100 kHz. (At alpha < |b| it keeps an e+ of its own, so a constant count takes some samples more to the band.)
+100 kHz. (It keeps an e+ of its own where the other has none, so a count that stands takes some samples more.)
 
 Source: implicit Euler for the super-twisting algorithm, Acary, Brogliato 2010 and 2012; Brogliato, Polyakov, Efimov,
 IEEE Trans. Automatic Control 2020; closed form for the differentiator, Mojallizadeh, Brogliato, Acary, Int. J. Robust
@@ -28,10 +28,11 @@ Formats are those of `levant_semi_implicit`, and differ thus:
 - g = lambda root - lambda^2/2, root = sqrt(beyond + lambda^2/4): lambda^2, once for all, is a product of the same
   multiplier as lambda times the root. `radicand` has room for lambda^2/4 at the largest word. There lambda^2/4 is
   rounded down to the radicand's LSB, a position of 2**-(2 root.f); in g, lambda^2/2 is rounded to f bits.
-- With the root's half LSB as in `levant`, g is off by at most delta = lambda 2**-(root.f+1) + 2 * 2**-(f+1), and the same
-  u follows exactly from a beyond displaced by at most eta = (2 z + lambda) delta / lambda + (delta / lambda)^2
-  + 2**-(2 root.f). At an |e+| of 1 count, 2 z + lambda is sqrt(4 + lambda^2) or less for beyond = 1: each of the two
-  parts of delta is held to POSITION_BUDGET / 2 there. g is held within 0 to beyond.
+- With the root's half LSB as in `levant`, g is off by at most delta = lambda 2**-(root.f+1) + 2 * 2**-(f+1), and the
+  same u follows exactly from a beyond displaced by at most
+  eta = 2 sqrt(beyond + lambda^2/4) delta / lambda + (delta / lambda)^2 + 2**-(2 root.f).
+  At beyond = 1 count the slope is sqrt(4 + lambda^2): each of the two parts of delta is held to POSITION_BUDGET / 2
+  there, which at low rates takes a root of more bits than the explicit one. g is held within 0 to beyond.
 """
 
 import math

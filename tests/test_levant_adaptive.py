@@ -1,4 +1,4 @@
-"""Gains that adapt: RTL against model, model against exact rationals, the law against what it promises and where not."""
+"""Gains that adapt: RTL against model, model against exact rationals, the law against what it promises."""
 
 import itertools
 import math
@@ -114,16 +114,17 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
         assert (g / lsb).denominator == 1
         return near, min(g, beyond)
 
-    rows = levants.wrapped(d, stimulus(d, 20_000))
+    rows = levants.wrapped(d, stimulus(d, 10_000))
     seen = model(d, rows, START)
     for k, (velocity, flags) in enumerate(levants.oracle_run(d, rows, step)):
         assert (velocity, flags) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {rows[k]}"
 
 
-@pytest.mark.parametrize("name", ["paper", "mhz"])
-def test_rounding_is_a_small_change_of_position(name):
+@pytest.mark.parametrize("rate", [10_000, 100_000])
+def test_rounding_is_a_small_change_of_position(rate):
     """Every u follows exactly, without rounding, from a beyond changed by no more than the derived eta."""
-    d, axis = design(name), spec(name, NAME)
+    axis = levants.at_rate(NAME, rate, 12.0)
+    d = axis.design.estimator
     t = np.arange(20_000) / axis.sample_hz
     counts = np.floor(0.01 / axis.count_m * np.sin(2 * np.pi * 4 * t)).astype(np.int64)
     levels = [state.level for state in visit(d, counts)]
@@ -144,7 +145,7 @@ def test_rounding_is_a_small_change_of_position(name):
 
 
 @pytest.mark.parametrize("bound", [levants.PAPERS_BOUND, 12.0])
-@pytest.mark.parametrize(("rate", "runs"), zip(levants.RATES, (200, 200, 40, 8, 2), strict=True))
+@pytest.mark.parametrize(("rate", "runs"), [*zip(levants.RATES, (200, 200, 40, 8, 2), strict=True)])
 def test_word_length_costs_a_hundredth_at_every_rate(rate, runs, bound):
     """Of many runs: a rounding that tips a loss makes another run of it, 2 to 8 % better or worse below 1 MHz."""
     exact, fixed = levants.rms_errors(levants.at_rate(NAME, rate, bound), "u", 0.4, runs)
@@ -154,12 +155,12 @@ def test_word_length_costs_a_hundredth_at_every_rate(rate, runs, bound):
 @pytest.mark.parametrize("acceleration", [0.1, -1.0, 10.0])
 @pytest.mark.parametrize("rate", [10_000, 100_000])
 def test_a_step_of_acceleration_after_rest_is_seen_within_the_derived_error_and_time(rate, acceleration):
-    """Until the level falls, and for one sample more: sqrt(2 (LOST + 1) A q) and sqrt(2 (LOST + 1) q / A)."""
+    """sqrt(2 (LOST + 1) A q) and sqrt(2 (LOST + 1) q / A), a sample more; and as it is seen, lambda_j's step."""
     axis_spec = levants.at_rate(NAME, rate, 12.0)
     d, tau, steep = axis_spec.design.estimator, 1 / rate, abs(acceleration)
     error = math.sqrt(2 * (LOST + 1) * steep * COUNT_M) + steep * tau
     latest = math.sqrt(2 * (LOST + 1) * COUNT_M / steep) + tau
-    for phase in rng().random(5):
+    for phase in rng().random(3):
         t = np.arange(-rate, round(2 * latest * rate)) * tau
         truth = acceleration * np.maximum(t, 0)
         counts = np.floor(truth * np.maximum(t, 0) / 2 / COUNT_M + phase).astype(np.int64)
@@ -168,7 +169,9 @@ def test_a_step_of_acceleration_after_rest_is_seen_within_the_derived_error_and_
         seen = rate + int(np.argmax(levels[rate:] < d.levels))
         assert 0 < t[seen] <= latest
         velocity = levants.axis(axis_spec).run(counts).velocity_m_per_s
-        assert np.abs(velocity - truth)[rate : seen + 1].max() <= error
+        assert np.abs(velocity - truth)[rate:seen].max() <= error
+        overshoot = math.sqrt((LOST + 1) * 12.0 * 2.0 ** -levels[seen] * COUNT_M)
+        assert abs(velocity[seen] - truth[seen]) <= max(error, overshoot)
 
 
 def rms(name: str, rate: int, bound: float, counts: np.ndarray, truth: np.ndarray, first: int = 0) -> float:
