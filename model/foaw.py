@@ -28,10 +28,13 @@ Formats, derived:
 
 - Slopes are compared in units of 1 / lcm(1 ... TAPS), in which D_i / i are whole: **the check is exact**. D_i's weight
   then has 15 bits, one multiplier of either device: that is why TAPS is 12, for with 13 it would have 19.
-- `foaw_band` UQ(4, 2): quarter counts, up to four periods of the encoder less one of them.
+- `foaw_band` UQ(4, 2): quarter counts, to nearly four periods of the encoder.
 - `foaw_window`: N at run time, in taps; 0 counts as 1, more than TAPS as TAPS.
 - `velocity` SQ(i, f): i that of `history.change`, for both fits are averages of the changes with positive weights.
 - f: rounding toward zero, by less than 2**-ROUNDING_BITS of a count over the longest window, as in `window`.
+
+Source: Janabi-Sharifi, Hayward, Chen, Discrete-time adaptive windowing for velocity estimation, IEEE Transactions on
+Control Systems Technology 2000.
 """
 
 import math

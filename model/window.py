@@ -26,7 +26,7 @@ Formats, derived:
   longest window that the word can set, keeps rounding below 0.6 % of that for every n. A count of motion over the
   window is never less than 2**ROUNDING_BITS LSB, so there is no dead zone; standing for n samples gives exactly 0.
 
-Source: the minimax window, Chawda, Celik, O'Malley 2011 compare with; the bound is elementary, from Taylor's formula.
+Source: elementary; the bound is Taylor's formula and the triangle inequality.
 """
 
 import math
