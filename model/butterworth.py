@@ -181,6 +181,7 @@ class Design:
         self.cutoff_min_hz = gains.cutoff_hz if reach == needed else 2.0**-reach * axis.sample_hz / (2 * math.pi)
         self.cutoff_min_hz = max(self.cutoff_min_hz, least)
 
+        f = axis.shrunk(f)
         self.velocity = SQ(i, f)
         self.operand = SQ(i + 1, f + GUARD_BITS)
         self.state = SQ(i, f + GUARD_BITS + reach)

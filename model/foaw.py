@@ -142,8 +142,8 @@ class Design:
         self.count_width = axis.count_width
         self.history = history.Design(axis, gains.window_s, TAPS)
         self.spacing = self.history.longest // TAPS
-        self.velocity = SQ(self.history.change.i, self.history.fraction + ROUNDING_BITS)
-        self.fraction = self.history.age_bits + ROUNDING_BITS
+        self.velocity = SQ(self.history.change.i, axis.shrunk(self.history.fraction + ROUNDING_BITS))
+        self.fraction = axis.shrunk(self.history.age_bits + ROUNDING_BITS)
         tap_s = self.spacing * self.history.every / axis.sample_hz
         window = min(max(round(gains.window_s / tap_s), 1), TAPS)
         band = BAND.from_real(gains.band_counts)

@@ -236,7 +236,7 @@ class Design:
                 f"not {gains.acceleration_rms_m_per_s2!r}"
             )
         root = math.sqrt(axis.acceleration_max_m_per_s2 / axis.count_m) / axis.sample_hz
-        f = min(max(RESOLUTION_BITS - math.floor(math.log2(root)), 0), room)
+        f = axis.shrunk(min(max(RESOLUTION_BITS - math.floor(math.log2(root)), 0), room))
         fine = f + GUARD_BITS
         self.velocity = SQ(i, f)
         self.lead, self.v, self.a = SQ(i_lead, fine), SQ(i, fine + reach), SQ(i_a, fine + 2 * reach)

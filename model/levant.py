@@ -153,9 +153,9 @@ class Design:
 
         lam_i = HEADROOM_BITS + bits_for(lam)
         self.lambda_ = UQ(lam_i, GAIN_BITS - lam_i)
-        root_f = bits_for(self._position_per_root(lam) / POSITION_BUDGET)
+        root_f = max(bits_for(self._position_per_root(lam) / POSITION_BUDGET) - axis.estimator_bits_dropped, 0)
         self.product = self.lambda_.f + root_f + 1
-        f = self._fraction(axis, lam, alpha, f_max)
+        f = axis.shrunk(self._fraction(axis, lam, alpha, f_max))
         self.velocity = SQ(i, f)
         self.alpha = UQ(HEADROOM_BITS + bits_for(alpha), f)
         catch = max(bits_for(self._catch(2 * speed, lam)), 1)

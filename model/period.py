@@ -52,7 +52,7 @@ from .divide import divide
 from .divide import latency as divide_latency
 from .estimators import estimate
 from .fixed import SQ, bits_for, wrap
-from .quadrature import RUN_MAX
+from .quadrature import RUN_MAX, Seen
 
 OUTPUTS = ("u",)
 ERROR_SHARE = 0.01
@@ -156,7 +156,7 @@ def velocity_format(axis, least_fraction: int = 0) -> SQ:
     if i + f > 62:
         most = 2.0 ** (60 - f) * axis.velocity_unit_m_per_s
         raise ValueError(f"speed_max_m_per_s must be at most {most:g}, not {axis.speed_max_m_per_s!r}")
-    return SQ(i, f)
+    return SQ(i, axis.shrunk(f))
 
 
 class Design:
@@ -166,7 +166,7 @@ class Design:
         ValueError: if a sample is too long for the stamps, or the dividend for int64, with the accepted range.
     """
 
-    inputs = ("count", "stamp", "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall", "edge", "down", "run")
+    inputs = Seen._fields
     flags = ("velocity_saturated",)
     words = ()
 

@@ -42,6 +42,7 @@ from .divide import latency as divide_latency
 from .estimators import estimate
 from .fixed import UQ, bits_for, saturate, wrap
 from .period import NOTHING, OBSERVE_STEPS, Memory, check_stamps, observe, velocity_format
+from .quadrature import Seen
 from .words import Word
 
 OUTPUTS = ("u",)
@@ -130,7 +131,7 @@ class Design:
         ValueError: if the gains, or the axis, do not fit formats that int64 can hold, with the accepted range.
     """
 
-    inputs = ("count", "stamp", "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall", "edge", "down", "run")
+    inputs = Seen._fields
     flags = ("velocity_saturated",)
     cycles_max = 2
     """More than one cycle in a sample is not timed; how many there are is all the same."""

@@ -112,8 +112,8 @@ class Design:
     def __init__(self, axis, gains: Gains):
         self.count_width = axis.count_width
         self.history = history.Design(axis, gains.window_s)
-        self.velocity = SQ(self.history.change.i, self.history.fraction + ROUNDING_BITS)
-        self.fraction = self.history.age_bits + ROUNDING_BITS
+        self.velocity = SQ(self.history.change.i, axis.shrunk(self.history.fraction + ROUNDING_BITS))
+        self.fraction = axis.shrunk(self.history.age_bits + ROUNDING_BITS)
         self.words = (
             Word(
                 "window_length",
