@@ -1,6 +1,6 @@
 """A sliding-mode differentiator driven by the clock-stamped edges of the encoder."""
 
-from amaranth.hdl import Array, Cat, Const, Elaboratable, Module, Mux, Signal, signed
+from amaranth.hdl import Array, Cat, Const, Elaboratable, Module, Mux, Signal, signed, unsigned
 
 from hardwall.model.levant_edge import DIGITS, REST_BITS, Design
 from hardwall.model.quadrature import RUN_MAX
@@ -46,239 +46,285 @@ class Estimator(EstimatorBlock):
 
     def elaborate(self, platform):
         m = Module()
-        d = self._design
-        p = d.params({word.name: word.reset for word in d.words})
-        velocity, acceleration, error, place = d.velocity, d.acceleration, d.error, d.place
-        far = d.stamp_width - 1
-
-        # Held from sample to sample: the anchor, the motion there, the places of the four edges.
-        running, known = Signal(), Signal()
-        number, stamp, kind = Signal.like(self.count), Signal(d.stamp_width), Signal(2)
-        length = Signal(range(d.stamp_width + 1))
-        v, a = Signal(shape(velocity)), Signal(shape(acceleration))
-        places = Array(Signal(shape(place), name=f"place_{n}") for n in range(4))
-
-        # The sample, and what is to be done with it.
-        stamps = Array([self.stamp_a_rise, self.stamp_b_rise, self.stamp_a_fall, self.stamp_b_fall])
-        fresh, full_run, new, correct, carry, taken, rest = (Signal() for _ in range(7))
-        now, at, age = (Signal(d.stamp_width) for _ in range(3))
-        to, to_kind, passed = Signal.like(number), Signal(2), Signal.like(number)
-
-        # A time, its length in bits, and as it multiplies: the top bits, `cut` having been dropped.
-        measure, size = Signal(d.stamp_width), Signal(range(d.stamp_width + 1))
-        cut = Signal(range(d.turn_span + 2))
-        m.d.sync += size.eq(_length(measure))
-        m.d.comb += cut.eq(Mux(size > d.mantissa, size - d.mantissa, 0))
-        time = (measure >> cut)[: d.mantissa]
-
-        # One multiplier, signed by unsigned, and what it says of a change of velocity.
-        left, right = Signal(signed(velocity.width)), Signal(d.mantissa)
-        product = Signal(signed(velocity.width + d.mantissa))
-        drop, age_drop = Signal(range(d.turn_span + 1)), Signal(range(d.turn_span + 1))
-        # A time with its top bit set is cut by one bit more; but then the acceleration is 0.
-        kept = (d.turn_span - cut)[: len(drop)]
-        turn, ahead = Signal(signed(velocity.width + 1)), Signal(signed(velocity.width + 2))
-        coarse = shift_floor(product, p.turn_shift) >> drop
-        m.d.sync += product.eq(left * right)
-
-        # The error of the predicted place, and what it changes.
-        distance = Signal(shape(d.distance))
-        apart = Signal(signed(place.width + 1))
-        way = Signal(signed(max(d.distance.width + d.clocks.bit_length() + place.f, place.width + 1) + 1))
-        moved = Signal(signed(error.width))
-        e = Signal(signed(error.width))
-        e_cut = Signal.like(cut)
-        beyond = Signal()
-        slope = Signal(velocity.width - 1)
-        limit, bent, relay = Signal.like(slope), Signal.like(slope), Signal(acceleration.width - 1)
-        change, bend = Signal(signed(velocity.width)), Signal(signed(acceleration.width))
-
-        m.submodules.root = root = Sqrt(d.radicand.width + 1)
-        m.submodules.quotient = quotient = _Quotient(error.width - 1 + p.error_shift, d.mantissa, len(slope))
-        magnitude = Mux(e < 0, -e, e)[: error.width - 1]
-        radicand = shift_floor(magnitude, p.radicand_shift)
-        m.d.comb += [
-            root.radicand.eq(Mux(length[0], radicand << 1, radicand)),
-            quotient.dividend.eq(magnitude << p.error_shift),
-            quotient.divisor.eq(right),
-        ]
-        solved = root.done if _root_is_last(d) else quotient.done
-        root_product = Signal(d.lambda_.width + d.root.width)
-
-        # Bits of an interval in use beyond the fewest.
-        first = d.shortest + 1
-        more = Signal(range(max(far - d.shortest, 2)))
-        few = Signal(range(max(d.mantissa - first, 0) + 1))
-        few_halves = Signal(range(max((d.mantissa >> 1) - (first >> 1), 0) + 1))
-        m.d.sync += [
-            more.eq(length - first),
-            few.eq(length - first),
-            few_halves.eq((length >> 1) - (first >> 1)),
-            relay.eq(_least(_shifted(self.levant_edge_alpha, p.alpha_shift - first, few), len(relay))),
-            slope.eq(_least(quotient.quotient, len(slope))),
-            bent.eq(_least(shift_floor(slope, p.slope_shift + first) >> more, len(bent))),
-        ]
-
-        # The places learn while the root is drawn.
-        here, there = Signal(shape(place)), Signal(shape(place))
-        m.d.comb += [here.eq(places[to_kind]), there.eq(places[kind])]
-        residual = Signal(signed(p.learn_max.bit_length() + 1))
-        learnt = Signal(signed(max(len(residual) - p.learn_shift, 1) + 1))
-        place_to, place_since = Signal(shape(place)), Signal(shape(place))
-        m.d.sync += [
-            residual.eq(_fitted(_fitted(e, len(residual)) << e_cut, len(residual))),
-            learnt.eq(shift_round_half_up(residual, p.learn_shift)),
-            place_to.eq(_fitted(here + learnt, place.width)),
-            place_since.eq(_fitted(there - learnt, place.width)),
-        ]
-
-        # What no further edge allows.
-        age_time = Signal(d.mantissa)
-        bound = Signal(velocity.width - 1)
-        line, onward, end = Signal(shape(velocity)), Signal(velocity.width - 1), Signal(signed(velocity.width + 1))
-        flags = Signal(2)
-
+        s = _Signals(self)
+        self._measure(m, s)
+        self._solve(m, s)
+        self._learn(m, s)
         m.d.sync += self.valid.eq(0)
         with m.FSM():
-            with m.State("SAMPLE"), m.If(self.strobe):
-                m.d.sync += [
-                    fresh.eq(self.restart | ~running),
-                    running.eq(1),
-                    now.eq(self.stamp),
-                    at.eq(stamps[self.edge]),
-                    to.eq(self.count + self.down),
-                    to_kind.eq(self.edge ^ Cat(0, self.down)),
-                    full_run.eq(self.run == RUN_MAX),
-                ]
-                m.next = "DIFFERENCE"
-            with m.State("DIFFERENCE"):
-                m.d.sync += [
-                    measure.eq(Mux(fresh, 0, at - stamp)),
-                    age.eq(now - Mux(fresh, at, stamp)),
-                    # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
-                    passed.eq(Mux(fresh, 0, (to - number)[: len(passed)].as_signed())),
-                ]
-                with m.If(fresh):
-                    m.d.sync += [known.eq(0), v.eq(0), a.eq(0), length.eq(0)]
-                    m.d.sync += [number.eq(to), stamp.eq(at), kind.eq(to_kind)]
-                    m.d.sync += [places[n].eq(0) for n in range(4)]
-                m.next = "DECISION"
-            with m.State("DECISION"):
-                came = (measure != 0) | (passed != 0)
-                unknown = ~known | measure[far]
-                timed = (measure >> d.shortest) != 0
-                waited = (age >> first) != 0
-                held = _fitted(passed, d.distance.width)
-                m.d.sync += [
-                    new.eq(came),
-                    correct.eq(came & ~unknown & timed),
-                    carry.eq(came & ~unknown & ~timed & waited),
-                    taken.eq(~came | unknown | timed | waited),
-                    distance.eq(held),
-                    beyond.eq(held != passed),
-                    apart.eq(here - there),
-                ]
-                with m.If(came & unknown):
-                    m.d.sync += [known.eq(1), v.eq(0), a.eq(0)]
-                m.next = "TIME"
-            with m.State("TIME"):
-                m.d.sync += [
-                    left.eq(a),
-                    right.eq(time),
-                    e_cut.eq(cut),
-                    drop.eq(kept),
-                    way.eq(((distance * d.clocks) << place.f) + apart),
-                    measure.eq(now - Mux(new & taken, at, stamp)),
-                ]
-                with m.If(correct):
-                    m.d.sync += length.eq(size)
-                m.next = "TURN PRODUCT"
-            with m.State("TURN PRODUCT"):
-                m.d.sync += moved.eq(shift_floor(way, -p.place_shift) >> e_cut)
-                m.next = "TURN"
-            with m.State("TURN"):
-                m.d.sync += [
-                    turn.eq(_fitted(coarse, len(turn))),
-                    age_time.eq(time),
-                    age_drop.eq(kept),
-                    bound.eq(_least(Const(p.bound) >> Mux(size == 0, 0, size - 1)[: len(size)], len(bound))),
-                    rest.eq(taken & (measure[far] | (size > length + REST_BITS))),
-                ]
-                with m.If(taken & measure[far]):
-                    m.d.sync += known.eq(0)
-                m.next = "MEAN"
-            with m.State("MEAN"):
-                m.d.sync += [
-                    left.eq(_fitted(v + (turn >> 1), velocity.width)),
-                    ahead.eq(Mux(correct | carry, v + turn, v)),
-                ]
-                m.next = "PLACE PRODUCT"
-            with m.State("PLACE PRODUCT"):
-                m.next = "ERROR"
-            with m.State("ERROR"):
-                m.d.sync += e.eq(shift_floor(product, p.error_shift) - moved)
-                m.next = "SOLVE"
-            with m.State("SOLVE"):
-                m.d.comb += [root.start.eq(1), quotient.start.eq(1)]
-                m.next = "LIMIT PRODUCT"
-            with m.State("LIMIT PRODUCT"), m.If(solved):
-                m.d.sync += root_product.eq(self.levant_edge_lambda * root.root)
-                m.next = "LIMIT"
-            with m.State("LIMIT"):
-                steep = _least(_shifted(root_product, p.limit_shift - (first >> 1), few_halves), len(limit))
-                m.d.sync += limit.eq(Mux(e_cut == 0, steep, velocity.max))
-                with m.If(e_cut != 0):
-                    m.d.sync += relay.eq(acceleration.max)
-                m.next = "CHANGE"
-            with m.State("CHANGE"):
-                m.d.sync += [
-                    change.eq(Mux(correct, _signed(Mux(limit < slope, limit, slope), e < 0), 0)),
-                    bend.eq(Mux(correct, _signed(Mux(relay < bent, relay, bent), e < 0), 0)),
-                    flags[0].eq(correct & (beyond | quotient.quotient[len(slope) :].any())),
-                ]
-                m.next = "UPDATE"
-            with m.State("UPDATE"):
-                far_v = ahead - change
-                held_v = _fitted(far_v, velocity.width)
-                held_a = _fitted(a - bend, acceleration.width)
-                m.d.sync += [
-                    v.eq(Mux(rest, 0, held_v)),
-                    a.eq(Mux(rest, 0, held_a)),
-                    left.eq(Mux(rest, 0, held_a)),
-                    right.eq(age_time),
-                    drop.eq(age_drop),
-                    flags[1].eq(held_v != far_v),
-                ]
-                with m.If(new & taken):
-                    m.d.sync += [number.eq(to), stamp.eq(at), kind.eq(to_kind)]
-                with m.If(correct & full_run & (to_kind != kind)):
-                    m.d.sync += [places[to_kind].eq(place_to), places[kind].eq(place_since)]
-                m.next = "LINE PRODUCT"
-            with m.State("LINE PRODUCT"):
-                room = Mux(v < 0, bound + v, bound - v)
-                m.d.sync += onward.eq(Mux(room < 0, 0, room))
-                m.next = "LINE TURN"
-            with m.State("LINE TURN"):
-                m.d.sync += turn.eq(_fitted(coarse, len(turn)))
-                m.next = "LINE"
-            with m.State("LINE"):
-                straight = v + turn
-                held_line = _fitted(straight, velocity.width)
-                m.d.sync += [line.eq(held_line), flags[1].eq(flags[1] | (held_line != straight))]
-                m.next = "END"
-            with m.State("END"):
-                # Only the end on the line's own side of 0 can hold it.
-                m.d.sync += end.eq(Mux((line < 0) == (v < 0), _signed(onward, v < 0), -v))
-                m.next = "OUTPUT"
-            with m.State("OUTPUT"):
-                beyond_end = ((line - end) < 0) == (line < 0)
-                m.d.sync += [
-                    self.velocity.eq(Mux(taken & beyond_end, end, line)),
-                    self.saturated.eq(flags),
-                    self.valid.eq(1),
-                ]
-                m.next = "SAMPLE"
+            self._states_of_the_sample(m, s)
+            self._states_of_the_error(m, s)
+            self._states_of_the_correction(m, s)
+            self._states_of_the_line(m, s)
         return m
+
+    def _measure(self, m, s):
+        """A time as it multiplies: its top bits. The multiplier, and what it makes of an acceleration."""
+        d, p = self._design, s.params
+        m.d.sync += [s.size.eq(_length(s.measure)), s.product.eq(s.left * s.right)]
+        m.d.comb += [
+            s.cut.eq(Mux(s.size > d.mantissa, s.size - d.mantissa, 0)),
+            s.time.eq(s.measure >> s.cut),
+            # A time with its top bit set is cut by one bit more; but then the acceleration is 0.
+            s.kept.eq(d.turn_span - s.cut),
+            s.turned.eq(_fitted(shift_floor(s.product, p.turn_shift) >> s.drop, len(s.turned))),
+        ]
+
+    def _solve(self, m, s):
+        """Root and quotient of the error, and the limits of what they change, ready well before they are asked for."""
+        d, p = self._design, s.params
+        error, velocity = d.error, d.velocity
+        m.submodules.root = root = Sqrt(d.radicand.width + 1)
+        m.submodules.quotient = quotient = _Quotient(error.width - 1 + p.error_shift, d.mantissa, velocity.width - 1)
+        magnitude = Mux(s.e < 0, -s.e, s.e)[: error.width - 1]
+        radicand = shift_floor(magnitude, p.radicand_shift)
+        root_is_last = sqrt_latency(d.radicand.width + 1) >= d.quotient_latency
+        m.d.comb += [
+            root.start.eq(s.start),
+            root.radicand.eq(Mux(s.length[0], radicand << 1, radicand)),
+            quotient.start.eq(s.start),
+            quotient.dividend.eq(magnitude << p.error_shift),
+            quotient.divisor.eq(s.right),
+            s.root.eq(root.root),
+            s.solved.eq(root.done if root_is_last else quotient.done),
+        ]
+        first = d.shortest + 1
+        most, steepest = len(s.slope), len(s.bent)
+        # Bits of the interval beyond the fewest; `few` where it is not cut.
+        more = Signal(range(max(d.stamp_width - first, 2)))
+        few = Signal(range(max(d.mantissa - first, 0) + 1))
+        halves = Signal(range(max((d.mantissa >> 1) - (first >> 1), 0) + 1))
+        m.d.sync += [
+            more.eq(s.length - first),
+            few.eq(s.length - first),
+            halves.eq((s.length >> 1) - (first >> 1)),
+            s.slope.eq(_least(quotient.quotient, most)),
+            s.far_slope.eq(quotient.quotient[most:].any()),
+            s.bent.eq(_least(shift_floor(s.slope, p.slope_shift + first) >> more, steepest)),
+            s.limit.eq(_least(_shifted(s.root_product, p.limit_shift - (first >> 1), halves), most)),
+            s.relay.eq(_least(_shifted(self.levant_edge_alpha, p.alpha_shift - first, few), steepest)),
+        ]
+
+    def _learn(self, m, s):
+        """The places learn while the root is drawn."""
+        p, place = s.params, self._design.place
+        residual = Signal(signed(p.learn_max.bit_length() + 1))
+        learnt = Signal(signed(max(len(residual) - p.learn_shift, 1) + 1))
+        m.d.comb += [s.here.eq(s.places[s.to_kind]), s.there.eq(s.places[s.kind])]
+        m.d.sync += [
+            residual.eq(_fitted(s.e, len(residual))),
+            learnt.eq(shift_round_half_up(residual, p.learn_shift)),
+            s.next_here.eq(_fitted(s.here + learnt, place.width)),
+            s.next_there.eq(_fitted(s.there - learnt, place.width)),
+        ]
+
+    def _states_of_the_sample(self, m, s):
+        """What the sample is: which edge came last, and what is to be done with it."""
+        d = self._design
+        with m.State("SAMPLE"), m.If(self.strobe):
+            stamps = Array([self.stamp_a_rise, self.stamp_b_rise, self.stamp_a_fall, self.stamp_b_fall])
+            m.d.sync += [
+                s.fresh.eq(self.restart | ~s.running),
+                s.running.eq(1),
+                s.now.eq(self.stamp),
+                s.at.eq(stamps[self.edge]),
+                s.to.eq(self.count + self.down),
+                s.to_kind.eq(self.edge ^ Cat(0, self.down)),
+                s.full_run.eq(self.run == RUN_MAX),
+            ]
+            m.next = "DIFFERENCE"
+        with m.State("DIFFERENCE"):
+            m.d.sync += [
+                s.measure.eq(Mux(s.fresh, 0, s.at - s.stamp)),
+                s.waited.eq(((s.now - s.stamp)[: d.stamp_width] >> (d.shortest + 1)) != 0),
+                # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
+                s.passed.eq(Mux(s.fresh, 0, (s.to - s.number)[: len(s.passed)].as_signed())),
+            ]
+            with m.If(s.fresh):
+                m.d.sync += [s.known.eq(0), s.v.eq(0), s.a.eq(0), s.length.eq(0)]
+                m.d.sync += [s.number.eq(s.to), s.stamp.eq(s.at), s.kind.eq(s.to_kind)]
+                m.d.sync += [s.places[n].eq(0) for n in range(4)]
+            m.next = "DECISION"
+        with m.State("DECISION"):
+            came = (s.measure != 0) | (s.passed != 0)
+            unknown = ~s.known | s.measure[-1]
+            timed = (s.measure >> d.shortest) != 0
+            held = _fitted(s.passed, d.distance.width)
+            m.d.sync += [
+                s.correct.eq(came & ~unknown & timed),
+                s.carry.eq(came & ~unknown & ~timed & s.waited),
+                s.anchor.eq(came & (unknown | timed | s.waited)),
+                s.loose.eq(came & ~(unknown | timed | s.waited)),
+                s.distance.eq(held),
+                s.beyond.eq(held != s.passed),
+                s.apart.eq(s.here - s.there),
+            ]
+            with m.If(came & unknown):
+                m.d.sync += [s.known.eq(1), s.v.eq(0), s.a.eq(0)]
+            m.next = "TIME"
+
+    def _states_of_the_error(self, m, s):
+        """The velocity predicted for the edge, and the error of the place predicted for it, over its interval."""
+        d, p = self._design, s.params
+        with m.State("TIME"):
+            m.d.sync += [
+                s.left.eq(s.a),
+                s.right.eq(s.time),
+                s.e_cut.eq(s.cut),
+                s.drop.eq(s.kept),
+                s.way.eq(((s.distance * d.clocks) << d.place.f) + s.apart),
+                s.measure.eq(s.now - Mux(s.anchor, s.at, s.stamp)),
+            ]
+            with m.If(s.correct):
+                m.d.sync += s.length.eq(s.size)
+            m.next = "TURN PRODUCT"
+        with m.State("TURN PRODUCT"):
+            m.d.sync += s.moved.eq(shift_floor(s.way, -p.place_shift) >> s.e_cut)
+            m.next = "TURN"
+        with m.State("TURN"):
+            gone = ~s.loose & s.measure[-1]
+            since = Mux(s.size == 0, 0, s.size - 1)[: len(s.size)]
+            m.d.sync += [
+                s.turn.eq(s.turned),
+                s.age_time.eq(s.time),
+                s.age_drop.eq(s.kept),
+                s.bound.eq(_least(Const(p.bound) >> since, len(s.bound))),
+                s.rest.eq(gone | ~s.loose & (s.size > s.length + REST_BITS)),
+                s.known.eq(s.known & ~gone),
+            ]
+            m.next = "MEAN"
+        with m.State("MEAN"):
+            m.d.sync += [
+                s.left.eq(_fitted(s.v + (s.turn >> 1), len(s.left))),
+                s.ahead.eq(Mux(s.correct | s.carry, s.v + s.turn, s.v)),
+            ]
+            m.next = "PLACE PRODUCT"
+        with m.State("PLACE PRODUCT"):
+            m.next = "ERROR"
+        with m.State("ERROR"):
+            m.d.sync += s.e.eq(shift_floor(s.product, p.error_shift) - s.moved)
+            m.next = "START"
+
+    def _states_of_the_correction(self, m, s):
+        """Root and quotient; the changes that they make, limited; the new anchor."""
+        d = self._design
+        with m.State("START"):
+            m.d.comb += s.start.eq(1)
+            m.next = "SOLVE"
+        with m.State("SOLVE"), m.If(s.solved):
+            m.d.sync += s.root_product.eq(self.levant_edge_lambda * s.root)
+            m.next = "LIMIT"
+        with m.State("LIMIT"):
+            m.next = "CHANGE"
+        with m.State("CHANGE"):
+            limited = s.e_cut == 0
+            change = Mux(limited & (s.limit < s.slope), s.limit, s.slope)
+            bend = Mux(limited & (s.relay < s.bent), s.relay, s.bent)
+            m.d.sync += [
+                s.change.eq(Mux(s.correct, change, 0)),
+                s.bend.eq(Mux(s.correct, bend, 0)),
+                s.flags[0].eq(s.correct & (s.beyond | s.far_slope)),
+            ]
+            m.next = "SIGN"
+        with m.State("SIGN"):
+            with m.If(s.e < 0):
+                m.d.sync += [s.change.eq(-s.change), s.bend.eq(-s.bend)]
+            m.next = "UPDATE"
+        with m.State("UPDATE"):
+            far_v = s.ahead - s.change
+            v = _fitted(far_v, d.velocity.width)
+            a = Mux(s.rest, 0, _fitted(s.a - s.bend, d.acceleration.width))
+            m.d.sync += [
+                s.v.eq(Mux(s.rest, 0, v)),
+                s.a.eq(a),
+                s.left.eq(a),
+                s.right.eq(s.age_time),
+                s.drop.eq(s.age_drop),
+                s.flags[1].eq(v != far_v),
+            ]
+            with m.If(s.anchor):
+                m.d.sync += [s.number.eq(s.to), s.stamp.eq(s.at), s.kind.eq(s.to_kind)]
+            with m.If(s.correct & s.full_run & (s.to_kind != s.kind)):
+                m.d.sync += [s.places[s.to_kind].eq(s.next_here), s.places[s.kind].eq(s.next_there)]
+            m.next = "LINE PRODUCT"
+
+    def _states_of_the_line(self, m, s):
+        """The velocity now, on a line from the anchor, held to what no further edge allows."""
+        d = self._design
+        with m.State("LINE PRODUCT"):
+            room = Mux(s.v < 0, s.bound + s.v, s.bound - s.v)
+            m.d.sync += s.onward.eq(Mux(room < 0, 0, room))
+            m.next = "LINE TURN"
+        with m.State("LINE TURN"):
+            m.d.sync += s.turn.eq(s.turned)
+            m.next = "LINE"
+        with m.State("LINE"):
+            straight = s.v + s.turn
+            line = _fitted(straight, d.velocity.width)
+            m.d.sync += [s.line.eq(line), s.flags[1].eq(s.flags[1] | (line != straight))]
+            m.next = "END"
+        with m.State("END"):
+            # Only the end on the line's own side of 0 can hold it.
+            m.d.sync += s.end.eq(Mux((s.line < 0) == (s.v < 0), _signed(s.onward, s.v < 0), -s.v))
+            m.next = "OUTPUT"
+        with m.State("OUTPUT"):
+            past_end = ((s.line - s.end) < 0) == (s.line < 0)
+            m.d.sync += [
+                self.velocity.eq(Mux(~s.loose & past_end, s.end, s.line)),
+                self.saturated.eq(s.flags),
+                self.valid.eq(1),
+            ]
+            m.next = "SAMPLE"
+
+
+class _Signals:
+    """The registers and wires of an estimator, by the names of the model's."""
+
+    def __init__(self, block: Estimator):
+        d = block.design
+        self.params = d.params({word.name: word.reset for word in d.words})
+        count, clocks, velocity = signed(d.count_width), unsigned(d.stamp_width), shape(d.velocity)
+
+        # Held from sample to sample: the anchor, the motion there, the places of the four edges.
+        self.running, self.known = Signal(), Signal()
+        self.number, self.stamp, self.kind = Signal(count), Signal(clocks), Signal(2)
+        self.length = Signal(range(d.stamp_width + 1))
+        self.v, self.a = Signal(velocity), Signal(shape(d.acceleration))
+        self.places = Array(Signal(shape(d.place), name=f"place_{n}") for n in range(4))
+
+        # Of the sample. `anchor`: its edge is the new anchor; `loose`: it is not yet.
+        self.fresh, self.full_run, self.rest, self.beyond = Signal(), Signal(), Signal(), Signal()
+        self.correct, self.carry, self.anchor, self.loose = Signal(), Signal(), Signal(), Signal()
+        self.now, self.at, self.waited = Signal(clocks), Signal(clocks), Signal()
+        self.to, self.to_kind, self.passed = Signal(count), Signal(2), Signal(count)
+        self.flags = Signal(2)
+
+        # A time and its length, as it multiplies, and what it makes of an acceleration.
+        self.measure, self.size = Signal(clocks), Signal(range(d.stamp_width + 1))
+        self.cut, self.kept = Signal(range(d.turn_span + 2)), Signal(range(d.turn_span + 1))
+        self.time, self.age_time = Signal(d.mantissa), Signal(d.mantissa)
+        self.drop, self.age_drop = Signal.like(self.kept), Signal.like(self.kept)
+        self.left, self.right = Signal(velocity), Signal(d.mantissa)
+        self.product = Signal(signed(d.velocity.width + d.mantissa))
+        self.turned, self.turn = (Signal(signed(d.velocity.width + 1)) for _ in range(2))
+        self.ahead = Signal(signed(d.velocity.width + 2))
+
+        # The error of place, and what it changes.
+        self.distance, self.apart = Signal(shape(d.distance)), Signal(signed(d.place.width + 1))
+        bits = max(d.distance.width + d.clocks.bit_length() + d.place.f, d.place.width + 1) + 1
+        self.way, self.moved = Signal(signed(bits)), Signal(shape(d.error))
+        self.e, self.e_cut = Signal(shape(d.error)), Signal.like(self.cut)
+        self.start, self.solved, self.root = Signal(), Signal(), Signal(d.root.width)
+        self.root_product = Signal(d.lambda_.width + d.root.width)
+        self.slope, self.far_slope, self.limit = Signal(d.velocity.width - 1), Signal(), Signal(d.velocity.width - 1)
+        self.bent, self.relay = Signal(d.acceleration.width - 1), Signal(d.acceleration.width - 1)
+        self.change, self.bend = Signal(velocity), Signal(shape(d.acceleration))
+        self.here, self.there = Signal(shape(d.place)), Signal(shape(d.place))
+        self.next_here, self.next_there = Signal(shape(d.place)), Signal(shape(d.place))
+
+        # What no further edge allows.
+        self.bound, self.onward = Signal(d.velocity.width - 1), Signal(d.velocity.width - 1)
+        self.line, self.end = Signal(velocity), Signal(signed(d.velocity.width + 1))
 
 
 class _Quotient(Elaboratable):
@@ -324,11 +370,6 @@ class _Quotient(Elaboratable):
                 self.done.eq(0),
             ]
         return m
-
-
-def _root_is_last(design: Design) -> bool:
-    """Return whether the root takes as long as the quotient, or longer."""
-    return sqrt_latency(design.radicand.width + 1) >= design.quotient_latency
 
 
 def _length(value):

@@ -25,7 +25,7 @@ ROOT_BITS = 5
 """The root resolves the least error that it limits to 2**-ROOT_BITS."""
 LEARN_SHIFT = 5
 """An edge's residual moves the two places that it depends on by 2**-LEARN_SHIFT of it."""
-PLACE_BITS = 22
+PLACE_BITS = 21
 """Places of edges resolve 2**-PLACE_BITS counts."""
 REST_BITS = 3
 """An axis rests when 2**REST_BITS of the last intervals, rounded up to a power of two, have brought no edge."""
@@ -33,7 +33,7 @@ LEFT_MAX = 46
 """No left shift of a gain word exceeds this, beyond which all of them saturate: 16 + 46 bits fit int64."""
 DIGITS = 2
 """Quotient bits a clock."""
-STEPS = 18
+STEPS = 19
 """Clocks of the sequence besides the root's or the quotient's: see `hardwall.hdl.levant_edge`."""
 
 
@@ -90,8 +90,10 @@ class Params(NamedTuple):
 
 
 class State(NamedTuple):
-    """The anchor (edge number `number`, `stamp`, `kind`; `known` if it was seen to come), velocity and acceleration there
-    (words; float: counts a sample, and that a clock), the interval's length in bits, and the four places of the edges.
+    """The anchor (`known` if it was seen to come), the motion there, and the places of the four kinds of edges.
+
+    Velocity, acceleration and places are words (float: counts a sample, that a clock, counts times clocks a sample);
+    `length` is that of the last interval used, bits.
     """
 
     running: int
@@ -365,8 +367,7 @@ def _correct(params, state, seen, interval, passed):
     velocity = _fitted(far_velocity, most)
     acceleration = _fitted(acceleration - sign * bend, steepest)
     if seen.run == RUN_MAX:
-        residual = _fitted(_fitted(error, params.learn_max) << shift, params.learn_max)
-        by = shift_round_half_up(residual, params.learn_shift)
+        by = shift_round_half_up(_fitted(error, params.learn_max), params.learn_shift)
         places = _shifted(places, kind, state.kind, by, ~params.place_max, params.place_max)
     flags = int(distance != passed or slope != quotient)
     flags |= int(velocity != far_velocity) << 1
@@ -432,7 +433,8 @@ def _float_correct(params, state, seen, interval, passed):
     velocity = velocity + turn - sign * change
     acceleration = saturate(acceleration - sign * bend, -params.steepest, params.steepest)
     if seen.run == RUN_MAX:
-        by = saturate(error, -params.learn_max, params.learn_max) * 2.0**-LEARN_SHIFT
+        coarse = error * 2.0 ** -max(_length(interval) - params.mantissa, 0)
+        by = saturate(coarse, -params.learn_max, params.learn_max) * 2.0**-LEARN_SHIFT
         places = _shifted(places, kind, state.kind, by, -params.place_max, params.place_max)
     return velocity, acceleration, places
 
