@@ -2,7 +2,8 @@
 #
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
 #   ARGS="-k levant"          more options for pytest (test, soak)
-#   SEEDS="1 2" SAMPLES=10000 which seeds, and how many samples each (soak)
+#   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
+#                             which seeds, how many samples each, and how many of endurance (soak)
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
@@ -29,6 +30,7 @@ ON_ICE40 := --device ice40-up5k $(addprefix --set controller.,clock_hz=24000000 
 
 SEEDS ?= $(shell shuf -i 1-999999999 -n 3)
 SAMPLES ?= 1000000
+ENDURANCE ?= 1000000000
 PYTEST := $(RUN) pytest -n 2 --dist worksteal
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
@@ -55,7 +57,9 @@ synth: $(VENV)/.synth | tools ## size and fmax on both devices, median of severa
 verilog: $(VENV)/.sim | tools ## the axis of the scene as Verilog, in build/verilog/
 	@$(HARDWALL) verilog $(SCENE) --output-folder build/verilog
 
-soak: $(VENV)/.test | tools ## long random campaigns of RTL against model, with new seeds each time
+soak: $(VENV)/.test | tools ## long campaigns: every estimator for 10^9 samples, RTL against model with new seeds
+	@echo "HARDWALL_ENDURANCE=$(ENDURANCE)"
+	@HARDWALL_ENDURANCE=$(ENDURANCE) $(PYTEST) tests/test_endurance.py
 	@for seed in $(SEEDS); do \
 	  echo "HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES); again: make soak SEEDS=$$seed SAMPLES=$(SAMPLES)"; \
 	  HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES) $(PYTEST) -m rtl $(ARGS); \

@@ -43,14 +43,10 @@ class Estimator(EstimatorBlock):
         design = self._design
         velocity, error = design.velocity, design.error
 
-        running = Signal()
-        last = Signal.like(self.count)
         lead = Signal(signed(max(error.width, velocity.width) + 1))
         u1 = Signal(shape(velocity))
 
         # One clock a step; the root takes its own time between ROOT and PRODUCT.
-        moved = Signal.like(self.count)
-        distance = Signal(signed(max(len(lead), design.count_width + velocity.f) + 1))
         e = Signal(shape(error))
         product = Signal(design.lambda_.width + design.root.width + 1)
         correction = Signal(max(design.lambda_.width + design.root.width + 2 - (design.product - velocity.f), 1))
@@ -63,24 +59,7 @@ class Estimator(EstimatorBlock):
 
         m.d.sync += self.valid.eq(0)
         with m.FSM():
-            with m.State("SAMPLE"), m.If(self.strobe):
-                fresh = self.restart | ~running
-                # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
-                m.d.sync += [
-                    moved.eq(Mux(fresh, 0, (self.count - last)[: len(moved)].as_signed())),
-                    lead.eq(Mux(fresh, 0, lead)),
-                    u1.eq(Mux(fresh, 0, u1)),
-                    last.eq(self.count),
-                    running.eq(1),
-                ]
-                m.next = "DISTANCE"
-            with m.State("DISTANCE"):
-                m.d.sync += distance.eq(lead - (moved << velocity.f))
-                m.next = "ERROR"
-            with m.State("ERROR"):
-                held = saturate(distance, -error.max, error.max)
-                m.d.sync += [e.eq(held), self.saturated[0].eq(held != distance)]
-                m.next = "ROOT"
+            arrive(m, self, lead, u1, e, "ROOT")
             with m.State("ROOT"):
                 m.d.comb += root.start.eq(1)
                 m.d.sync += [positive.eq(e > 0), negative.eq(e < 0)]
@@ -105,6 +84,38 @@ class Estimator(EstimatorBlock):
                 ]
                 m.next = "SAMPLE"
         return m
+
+
+def arrive(m, block, lead, u1, e, then):
+    """Add the states from the strobe to the error e, those that all of the family begin with; state `then` follows.
+
+    At the first sample `lead` and `u1` are cleared; the signal returned says, after the strobe, that it is one.
+    """
+    velocity, error = block.design.velocity, block.design.error
+    running = Signal()
+    last, moved = Signal.like(block.count), Signal.like(block.count)
+    distance = Signal(signed(max(len(lead), len(moved) + velocity.f) + 1))
+    first = Signal()
+    fresh = block.restart | ~running
+    with m.State("SAMPLE"), m.If(block.strobe):
+        # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
+        m.d.sync += [
+            moved.eq(Mux(fresh, 0, (block.count - last)[: len(moved)].as_signed())),
+            lead.eq(Mux(fresh, 0, lead)),
+            u1.eq(Mux(fresh, 0, u1)),
+            last.eq(block.count),
+            running.eq(1),
+            first.eq(fresh),
+        ]
+        m.next = "DISTANCE"
+    with m.State("DISTANCE"):
+        m.d.sync += distance.eq(lead - (moved << velocity.f))
+        m.next = "ERROR"
+    with m.State("ERROR"):
+        held = saturate(distance, -error.max, error.max)
+        m.d.sync += [e.eq(held), block.saturated[0].eq(held != distance)]
+        m.next = then
+    return first
 
 
 def _moved(value, step, up, down, most):

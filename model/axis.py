@@ -112,10 +112,12 @@ class Design:
         )
 
     def start(self, floating: bool = False) -> State:
-        """Return the state before the first sample."""
-        if floating:
-            return State(self.spec.model.FLOAT_START, output.FLOAT_START, 0)
-        return State(self.spec.model.START, output.START, 0)
+        """Return the state before the first sample, for one run: it may hold arrays that the run writes to."""
+        if hasattr(self.estimator, "start"):
+            estimator = self.estimator.start(floating)
+        else:
+            estimator = self.spec.model.FLOAT_START if floating else self.spec.model.START
+        return State(estimator, output.FLOAT_START if floating else output.START, 0)
 
     def flag_names(self, flags: int) -> list[str]:
         """Return the names of the flags raised in `flags`."""

@@ -84,6 +84,10 @@ def by_type(declaration: Callable) -> Callable:
         return body
 
     def register(kind: type) -> Callable:
+        # The names of compiled functions contain those of their arguments' classes, without the module: two classes
+        # of one name and the same fields would run each other's code.
+        kind.__name__ = f"{kind.__module__}.{kind.__qualname__}"
+
         def add(variant: Callable) -> Callable:
             variants[kind] = variant
             return variant

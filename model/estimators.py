@@ -12,7 +12,8 @@ An estimator's module in `hardwall.model` provides
   `words.Word`; one named `NAME_output`, hyphens as underscores, selects among several outputs), `flags` (names of its
   saturation flags, bit 0 first), `latency` (clocks from strobe to valid), and methods `params(words)` and
   `float_params(gains, output, si)`;
-- `START` and `FLOAT_START`: the states before the first sample;
+- `START` and `FLOAT_START`: the states before the first sample; or, for an estimator whose state holds an array, a
+  method `start(floating)` of `Design`, which makes a new one for every run;
 - kernels registered with `estimate` for its `Params` and its `FloatParams`.
 
 The module of the same name in `hardwall.hdl` provides `Estimator`, the component, constructed from a `Design`.
@@ -26,7 +27,16 @@ from .compiled import by_type
 ESTIMATORS = {
     "fdm": "finite_difference",
     "levant": "levant",
+    "butterworth": "butterworth",
+    "kalman": "kalman",
+    "period": "period",
+    "period-count": "period_count",
     "levant-edge": "levant_edge",
+    "levant-semi-implicit": "levant_semi_implicit",
+    "levant-implicit": "levant_implicit",
+    "levant-adaptive": "levant_adaptive",
+    "window": "window",
+    "foaw": "foaw",
 }
 
 
@@ -69,7 +79,7 @@ def estimate(params, state, seen, restart):
 
     Args:
         params: an estimator's `Params` (integer words) or `FloatParams` (the same algorithm in float64).
-        state: its state, from `START` or `FLOAT_START` or the previous call.
+        state: its state, from the start or the previous call; an array in it is written in place.
         seen: a `quadrature.Seen`; its count is a signed word that may have wrapped.
         restart: true to forget the past: this sample counts as the first.
 

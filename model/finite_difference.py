@@ -51,7 +51,7 @@ class Design:
 
     def __init__(self, axis, gains: Gains):
         self.count_width = axis.count_width
-        self.velocity = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), 0)
+        self.velocity = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), axis.shrunk(0))
 
     def params(self, words: dict[str, int]) -> Params:
         return Params(self.count_width, self.velocity.max)

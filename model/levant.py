@@ -28,6 +28,8 @@ Formats, derived. Let lam = lambda tau / sqrt(q) and alp = alpha tau^2 / q be th
   `alpha` likewise.
 
 Both states saturate at the velocity format (flag `velocity_saturated`).
+
+`levant_semi_implicit`, `levant_implicit` and `levant_adaptive` take from here what they have in common with it.
 """
 
 import math
@@ -35,7 +37,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from .compiled import compiled
-from .estimators import estimate
+from .estimators import estimate, output_word
 from .fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from .sqrt import isqrt
 from .sqrt import latency as sqrt_latency
@@ -112,7 +114,13 @@ FLOAT_START = State(0, 0, 0.0, 0.0)
 class Design:
     """Formats, run-time words and latency of the differentiator for an axis: the module says how they follow.
 
+    Its kin of other kernels differ in the attributes of the class and in the methods that begin with one underscore.
+
     Attributes:
+        name: in the registry; the words begin with it.
+        kinds: `Params` and `FloatParams` of the kernels.
+        steps: clocks of the sequence besides the root.
+        roundings: how often u is rounded to its fraction bits.
         velocity, error, root, radicand: formats of u and u1, e, sqrt(|e|) and its integer radicand.
         product: fraction bits of lambda times twice the root.
         words: `levant_lambda`, `levant_alpha`, `levant_output`.
@@ -123,6 +131,10 @@ class Design:
 
     inputs = ("count",)
     flags = ("error_saturated", "velocity_saturated")
+    name = "levant"
+    kinds = (Params, FloatParams)
+    steps = STEPS
+    roundings = 1
 
     def __init__(self, axis, gains: Gains):
         tau, q = 1 / axis.sample_hz, axis.count_m
@@ -135,61 +147,106 @@ class Design:
         # A gain that moves u across its whole range in a sample is no gain; one too small needs more than int64.
         f_max = 60 - max(axis.count_width, i)
         largest = 2.0 ** (i - 1)
-        _check(gains.lambda_sqrt_m_per_s, "lambda_sqrt_m_per_s", 2 / (2.0**f_max * POSITION_BUDGET), largest, lam)
-        _check(gains.alpha_m_per_s2, "alpha_m_per_s2", 2.0 ** (ALPHA_BITS - f_max), largest, alpha)
-        f = max(ALPHA_BITS - math.floor(math.log2(alpha)), bits_for(2 / (lam * POSITION_BUDGET)), 0)
-        self.velocity = SQ(i, f)
-        catch = max(bits_for((2 * speed / lam) ** 2), 1)
-        self.error = SQ(1 + min(catch, axis.count_width - 1), f)
-        root_f = bits_for(2 / POSITION_BUDGET)
-        self.radicand = UQ(self.error.i - 1, 2 * root_f)
-        self.root = UQ((self.radicand.width + 1) // 2 - root_f, root_f)
+        least_lam, least_alpha = self._least(f_max)
+        _check(gains.lambda_sqrt_m_per_s, "lambda_sqrt_m_per_s", least_lam, largest, lam)
+        _check(gains.alpha_m_per_s2, "alpha_m_per_s2", least_alpha, largest, alpha)
 
         lam_i = HEADROOM_BITS + bits_for(lam)
         self.lambda_ = UQ(lam_i, GAIN_BITS - lam_i)
+        root_f = max(bits_for(self._position_per_root(lam) / POSITION_BUDGET) - axis.estimator_bits_dropped, 0)
+        self.product = self.lambda_.f + root_f + 1
+        f = axis.shrunk(self._fraction(axis, lam, alpha, f_max))
+        self.velocity = SQ(i, f)
         self.alpha = UQ(HEADROOM_BITS + bits_for(alpha), f)
-        self.product = self.lambda_.f + self.root.f + 1
+        catch = max(bits_for(self._catch(2 * speed, lam)), 1)
+        self.error = SQ(1 + min(catch, axis.count_width - 1), f)
+        self.radicand = UQ(self._radicand_i(), 2 * root_f)
+        self.root = UQ((self.radicand.width + 1) // 2 - root_f, root_f)
+        # The step of u before it is limited, and one bit: in int64.
+        _check(
+            gains.lambda_sqrt_m_per_s,
+            "lambda_sqrt_m_per_s",
+            least_lam,
+            2.0 ** (61 - f - self.root.i - HEADROOM_BITS),
+            lam,
+        )
+
+        prefix = self.name.replace("-", "_")
         self.words = (
             Word(
-                "levant_lambda",
+                f"{prefix}_lambda",
                 self.lambda_,
                 math.sqrt(q) / tau,
                 "m^(1/2)/s",
                 self.lambda_.from_real(lam),
                 "gain of the square-root term",
             ),
-            Word("levant_alpha", self.alpha, q / tau**2, "m/s^2", self.alpha.from_real(alpha), "gain of the sign term"),
-            Word("levant_output", UQ(1, 0), 1.0, "", 0, "velocity output: 0 for u, 1 for u1"),
+            Word(
+                f"{prefix}_alpha", self.alpha, q / tau**2, "m/s^2", self.alpha.from_real(alpha), "gain of the sign term"
+            ),
+            Word(output_word(self.name), UQ(1, 0), 1.0, "", 0, "velocity output: 0 for u, 1 for u1"),
         )
+
+    def _least(self, f_max: int) -> tuple[float, float]:
+        """Return the least lambda and alpha, per sample, that `f_max` fraction bits can hold."""
+        return self.roundings * 2 / (2.0**f_max * POSITION_BUDGET), 2.0 ** (ALPHA_BITS - f_max)
+
+    def _position_per_root(self, lam: float) -> float:
+        """Return by how many counts a root's error of 1 displaces the position at |e| = 1 count."""
+        return 2.0
+
+    def _fraction(self, axis, lam: float, alpha: float, f_max: int) -> int:
+        """Return the fraction bits of e, u and u1."""
+        rounding = self.roundings * self._position_per_root(lam) / (lam * POSITION_BUDGET)
+        return max(ALPHA_BITS - math.floor(math.log2(alpha)), bits_for(rounding), 0)
+
+    def _catch(self, step: float, lam: float) -> float:
+        """Return the error, in counts, that makes u step by `step`."""
+        return (step / lam) ** 2
+
+    def _radicand_i(self) -> int:
+        """Return the integer bits of the radicand."""
+        return self.error.i - 1
 
     @property
     def latency(self) -> int:
         """Clocks from strobe to valid."""
-        return STEPS + sqrt_latency(self.radicand.width)
+        return self.steps + sqrt_latency(self.radicand.width)
 
     def params(self, words: dict[str, int]) -> Params:
         """Return the kernel's parameters for the given run-time words."""
-        return Params(
-            lambda_=words["levant_lambda"],
-            alpha=words["levant_alpha"],
-            output=words["levant_output"],
+        lam, alpha, output = (words[word.name] for word in self.words)
+        return self.kinds[0](
+            lambda_=lam,
+            alpha=alpha,
+            output=output,
             count_width=self.count_width,
             fraction=self.velocity.f,
             radicand_shift=self.velocity.f - self.radicand.f,
             product_shift=self.product - self.velocity.f,
             error_max=self.error.max,
             velocity_max=self.velocity.max,
+            **self._more(),
         )
 
     def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
         """Return the float64 algorithm's parameters, per sample: gains unrounded, those of `si` before the designed."""
         lam, alpha, _ = self.words
-        return FloatParams(
-            si.get("levant_lambda", gains.lambda_sqrt_m_per_s) / lam.si_per_unit,
-            si.get("levant_alpha", gains.alpha_m_per_s2) / alpha.si_per_unit,
-            OUTPUTS.index(output),
-            self.count_width,
+        return self.kinds[1](
+            lambda_=si.get(lam.name, gains.lambda_sqrt_m_per_s) / lam.si_per_unit,
+            alpha=si.get(alpha.name, gains.alpha_m_per_s2) / alpha.si_per_unit,
+            output=OUTPUTS.index(output),
+            count_width=self.count_width,
+            **self._more_float(),
         )
+
+    def _more(self) -> dict[str, int]:
+        """Return what the parameters of the integer kernel have beyond `Params`."""
+        return {}
+
+    def _more_float(self) -> dict[str, int]:
+        """Return what the parameters of the float64 kernel have beyond `FloatParams`."""
+        return {}
 
 
 def _check(value: float, name: str, low: float, high: float, scaled: float) -> None:
@@ -200,22 +257,28 @@ def _check(value: float, name: str, low: float, high: float, scaled: float) -> N
 
 
 @compiled
-def _sign(value):
+def sign_of(value):
+    """Return -1, 0 or 1."""
     # int() for plain Python on numpy scalars, whose truths do not subtract.
     return int(value > 0) - int(value < 0)
+
+
+@compiled
+def arrive(params, state, seen, restart):
+    """Return (counts moved since the last sample, lead, u1), all 0 at the first sample; of either kernel."""
+    fresh = restart or not state.running
+    moved = 0 if fresh else wrap(seen.count - state.count, params.count_width)
+    return moved, 0 if fresh else state.lead, 0 if fresh else state.u1
 
 
 @estimate.register(Params)
 @compiled
 def step(params, state, seen, restart):
-    fresh = restart or not state.running
-    moved = 0 if fresh else wrap(seen.count - state.count, params.count_width)
-    lead = 0 if fresh else state.lead
-    u1 = 0 if fresh else state.u1
+    moved, lead, u1 = arrive(params, state, seen, restart)
 
     distance = lead - (moved << params.fraction)
     error = saturate(distance, -params.error_max, params.error_max)
-    sign = _sign(error)
+    sign = sign_of(error)
     root = isqrt(shift_floor(abs(error), params.radicand_shift))
     far_u = u1 - sign * shift_round_half_up(params.lambda_ * (2 * root + 1), params.product_shift)
     u = saturate(far_u, -params.velocity_max, params.velocity_max)
@@ -230,13 +293,10 @@ def step(params, state, seen, restart):
 @compiled
 def float_step(params, state, seen, restart):
     """The paper's algorithm in float64, unsaturated: the reference for what fixed point costs."""
-    fresh = restart or not state.running
-    moved = 0 if fresh else wrap(seen.count - state.count, params.count_width)
-    lead = 0.0 if fresh else state.lead
-    u1 = 0.0 if fresh else state.u1
+    moved, lead, u1 = arrive(params, state, seen, restart)
 
     error = lead - moved
-    sign = _sign(error)
+    sign = sign_of(error)
     u = u1 - params.lambda_ * math.sqrt(abs(error)) * sign
     u1 = u1 - params.alpha * sign
     return State(1, seen.count, error + u, u1), u1 if params.output else u, 0

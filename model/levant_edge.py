@@ -100,7 +100,7 @@ from typing import NamedTuple
 from .compiled import compiled
 from .estimators import estimate
 from .fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
-from .quadrature import RUN_MAX
+from .quadrature import RUN_MAX, Seen
 from .sqrt import isqrt
 from .sqrt import latency as sqrt_latency
 from .words import GAIN_BITS, Word
@@ -233,17 +233,7 @@ class Design:
         ValueError: if the gains or the rates do not fit any format that int64 can hold, with the accepted range.
     """
 
-    inputs = (
-        "count",
-        "stamp",
-        "stamp_a_rise",
-        "stamp_b_rise",
-        "stamp_a_fall",
-        "stamp_b_fall",
-        "edge",
-        "down",
-        "run",
-    )
+    inputs = Seen._fields
     flags = ("error_saturated", "velocity_saturated")
 
     def __init__(self, axis, gains: Gains):
@@ -267,7 +257,7 @@ class Design:
         slowest = clocks * 2.0 ** (1 - axis.stamp_width)
         f = max(SPEED_BITS - math.floor(math.log2(least)), 1 - math.floor(math.log2(slowest)), 0)
         f = min(f, WIDTH_MAX - i, 60 - self.mantissa - i)
-        self.velocity = SQ(i, max(f - axis.estimator_bits_dropped, 0))
+        self.velocity = SQ(i, axis.shrunk(f))
         f = self.velocity.f
         largest = bound * tau / q / clock
         i = 1 + ACCELERATION_BITS + bits_for(largest)

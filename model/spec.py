@@ -107,6 +107,20 @@ class AxisSpec:
                 f"{self.force_max_n:g}, not {self.force_resolution_n!r}"
             )
 
+    def shrunk(self, derived: int) -> int:
+        """Return the fraction bits of an estimator's word: the derived ones less `estimator_bits_dropped`.
+
+        Raises:
+            ValueError: if there are not so many to drop.
+        """
+        left = derived - self.estimator_bits_dropped
+        if self.estimator_bits_dropped and left < 0:
+            raise ValueError(
+                f"estimator_bits_dropped must be 0 to {max(derived, 0)} with this estimator, "
+                f"not {self.estimator_bits_dropped!r}"
+            )
+        return left
+
     @property
     def clocks_per_sample(self) -> int:
         return self.clock_hz // self.sample_hz

@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import sys
-from multiprocessing import active_children
 from pathlib import Path
 from typing import Annotated
 
@@ -214,8 +213,6 @@ add_commands(app)
 
 def _interrupted(*_: object) -> None:
     """Stop at once: raising KeyboardInterrupt into compiled code, or into its compiler, crashes the process."""
-    for worker in active_children():
-        worker.kill()
     log.show_cursor()
     print("hardwall: error: interrupted", file=sys.stderr, flush=True)
     os._exit(1)

@@ -10,6 +10,10 @@ from typing import Any
 from .store import Store
 
 
+class Interrupted(RuntimeError):
+    """The user wants no more; what was done is kept."""
+
+
 def _deaf() -> None:
     """Leave interrupts to the parent, which ends its workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -33,6 +37,7 @@ def run(
 
     Raises:
         Exception: of the first job that fails; what others gave until then is kept.
+        Interrupted: by the user; the workers are ended.
     """
     jobs = list(jobs)
     left = [job for index, job in enumerate(jobs) if store.get(job) is None and job not in jobs[:index]]
@@ -54,10 +59,19 @@ def run(
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(workers, mp_context=context, initializer=_deaf) as pool:
             futures = {pool.submit(function, **job): job for job in left}
+            # This process only waits, so that here an interrupt may be raised: compiled code would not survive it.
+            before = signal.signal(signal.SIGINT, signal.default_int_handler)
             try:
                 for future in as_completed(futures):
                     keep(futures[future], future.result())
-            except Exception:
+            except BaseException as error:
+                alive = multiprocessing.active_children()
                 pool.shutdown(wait=False, cancel_futures=True)
+                for worker in alive:
+                    worker.kill()
+                if isinstance(error, KeyboardInterrupt):
+                    raise Interrupted("interrupted") from None
                 raise
+            finally:
+                signal.signal(signal.SIGINT, before)
     return [store.get(job) for job in jobs]

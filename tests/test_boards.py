@@ -35,7 +35,7 @@ class Twin:
         self.words = {word.name: word.reset for word in self.design.words}
         self.restart, self.waiting = 0, None
         self.decoder_params = self.spec.design.decoder
-        self.decoder, self.estimator, self.output = quadrature.START, self.spec.model.START, output.START
+        self.decoder, self.estimator, self.output = quadrature.START, self.design.start().estimator, output.START
         self.velocity = self.wall_force = self.drive = self.sticky = 0
         self.loaded, self.raised = {}, {}
         self.sum = self.magnitude = self.negative = self.pulse = self.sign = 0

@@ -68,7 +68,7 @@ def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
         ),
         (["hit", "--output", "u7"], "controller.output must be one of u, u1, not 'u7'"),
         (["hit", "--estimator", "fdm", "--output", "u1"], "controller.output must be one of u, not 'u1'"),
-        (["hit", "--estimator", "kalman"], "'kalman' is not one of 'fdm', 'levant'"),
+        (["hit", "--estimator", "nobody"], "'nobody' is not one of 'fdm', 'levant'"),
         (["hit", "--backend", "vhdl"], "'vhdl' is not one of 'float', 'fixed', 'rtl'"),
         (["hit", "--stiffness", "stiff"], "--stiffness"),
         (["hit", "--plot", "hit.bmp"], "--plot must end in .pdf or .png or .svg, not 'hit.bmp'"),

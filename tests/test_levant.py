@@ -3,20 +3,18 @@
 import math
 from fractions import Fraction
 
-import cocotb
+import levants
 import numpy as np
 import pytest
-from estimator_bench import follow, model
+from estimator_bench import model
 from specs import spec
 
-from bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from bench import simulate
 from hardwall.hdl.levant import Estimator
 from hardwall.model import levant
 from hardwall.model.estimators import estimate
 from hardwall.model.levant import START
 from hardwall.model.quadrature import seen_count
-
-NAMES = ("levant_lambda", "levant_alpha", "levant_output")
 
 
 def design(name: str) -> levant.Design:
@@ -31,55 +29,7 @@ def words(name: str, **changed: int) -> dict[str, int]:
     return {word.name: changed.get(word.name, word.reset) for word in design(name).words}
 
 
-def stimulus(name: str, samples: int):
-    """Yield rows that visit the track, its saturations, the wrap of the count and the ends of the gains."""
-    d, random = design(name), rng()
-    half, fast = 1 << (d.count_width - 1), d.velocity.max >> d.velocity.f
-    reset = [words(name)[n] for n in NAMES[:2]]
-    top = [d.lambda_.max, d.alpha.max]
-    # Nominal gains follow a smooth motion, through the wrap of the count.
-    t = np.arange(samples // 4)
-    smooth = np.floor(half * (1 + 0.5 * np.sin(t * min(1, fast / half) / 2)) + random.random(len(t))).astype(np.int64)
-    for count in smooth.tolist():
-        yield count, 0, *reset, 0
-    # The worst signs for overflow: full swings of the count at the largest gains, held until everything saturates.
-    for period in (1, 2, 3, 7, 50):
-        for k in range(samples // 50):
-            yield (-half, half // 2 - 1, half - 1)[k // period % 3], 0, *top, k & 1
-    # A ramp faster than the velocity format, long enough for alpha alone to carry u1 to its end.
-    for k in range(d.velocity.max // top[1] + 50):
-        yield -k * (fast + 1), 0, *top, 0
-    # A walk with jumps, gains anywhere, restarts.
-    count = 0
-    for _ in range(samples - samples // 4 - samples // 10):
-        count += int(
-            random.integers(-half, half) if random.random() < 0.01 else random.integers(-2 * fast, 2 * fast + 1)
-        )
-        gains = reset if random.random() < 0.5 else [int(random.integers(0, m + 1)) for m in top]
-        yield count, int(random.random() < 0.002), *gains, int(random.integers(0, 2))
-
-
-@cocotb.test(**CAMPAIGN)
-async def follows_model(dut):
-    name = parameters()["name"]
-    expected = await follow(dut, make(name), stimulus(name, SAMPLES), START)
-    # The campaign is worth its name only if it reached both saturations, and the quiet track too.
-    assert 0 in expected["saturated"]
-    assert np.bitwise_or.reduce(expected["saturated"]) == 0b11
-
-
-@cocotb.test()
-async def reset_mid_stream_starts_afresh(dut):
-    name = parameters()["name"]
-    bench = Bench(dut, make(name))
-    await bench.reset()
-    reset = words(name)
-    await bench.transact("strobe", "valid", count=0, **reset)
-    await bench.transact("strobe", "valid", count=1, **reset)
-    assert bench.reader("velocity")() != 0
-    await bench.reset()
-    await bench.transact("strobe", "valid", count=-1, **reset)
-    assert bench.reader("velocity")() == 0
+follows_model, reset_mid_stream_starts_afresh = levants.campaign(make, START, fewer=())
 
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
@@ -116,8 +66,7 @@ def oracle(d: levant.Design, rows):
 @pytest.mark.parametrize("name", ["paper", "proposed", "mhz", "narrow"])
 def test_model_is_the_exact_equation_rounded_as_documented(name):
     d = design(name)
-    half = 1 << (d.count_width - 1)
-    rows = [((c + half) % (2 * half) - half, *rest) for c, *rest in stimulus(name, 20_000)]
+    rows = levants.wrapped(d, levants.stimulus(d, 20_000))
     seen = model(d, rows, START)
     for k, (velocity, flags) in enumerate(oracle(d, rows)):
         assert (velocity, flags) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {rows[k]}"
@@ -157,17 +106,15 @@ def test_start_makes_no_transient():
         assert (velocity, flags, state.u1, state.lead) == (0, 0, 0, 0)
 
 
-@pytest.mark.parametrize(
-    ("gains", "named"),
-    [
-        ({"lambda_sqrt_m_per_s": -1.0, "alpha_m_per_s2": 1.0}, "lambda_sqrt_m_per_s"),
-        ({"lambda_sqrt_m_per_s": 1.0, "alpha_m_per_s2": math.nan}, "alpha_m_per_s2"),
-        ({"lambda_sqrt_m_per_s": 1e9, "alpha_m_per_s2": 1.0}, "lambda_sqrt_m_per_s must be .* to .*, not"),
-        ({"lambda_sqrt_m_per_s": 1.0, "alpha_m_per_s2": 1e12}, "alpha_m_per_s2 must be .* to .*, not"),
-        ({"lambda_sqrt_m_per_s": 1.0, "alpha_m_per_s2": 1e-12}, "alpha_m_per_s2 must be .* to .*, not"),
-        ({"lambda_sqrt_m_per_s": 1e-12, "alpha_m_per_s2": 1.0}, "lambda_sqrt_m_per_s must be .* to .*, not"),
-    ],
-)
+@pytest.mark.parametrize("output", levant.OUTPUTS)
+@pytest.mark.parametrize("bound", [levants.PAPERS_BOUND, 12.0])
+@pytest.mark.parametrize("rate", levants.RATES)
+def test_word_length_costs_a_hundredth_at_every_rate(rate, bound, output):
+    exact, fixed = levants.rms_errors(levants.at_rate("levant", rate, bound), output, 0.4, runs=4)
+    assert abs(fixed - exact) <= 0.01 * exact
+
+
+@pytest.mark.parametrize(("gains", "named"), levants.REFUSED)
 def test_gains_that_cannot_be_held_are_refused(gains, named):
     with pytest.raises(ValueError, match=f"^{named}"):
         levant.Design(spec("paper"), levant.Gains(**gains))

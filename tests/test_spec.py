@@ -12,7 +12,7 @@ from specs import ADJUSTED, MHZ, PAPER, SPECS, spec
 
 from hardwall.model import levant
 from hardwall.model.axis import Axis
-from hardwall.model.estimators import estimate
+from hardwall.model.estimators import ESTIMATORS, estimate
 from hardwall.model.quadrature import seen_count
 from hardwall.model.spec import AxisSpec
 
@@ -58,7 +58,7 @@ def test_gain_words_are_as_close_as_promised(name):
         ({"force_resolution_n": 1e-9}, r"force_resolution_n must be .* to 40"),
         ({"force_resolution_n": 41.0}, r"force_resolution_n must be .* to 40"),
         ({"sample_hz": 1_000_000}, r"sample_hz must leave 33 clocks for the force path, so at most 363636"),
-        ({"estimator": "kalman"}, r"estimator must be one of fdm, levant, not 'kalman'"),
+        ({"estimator": "nobody"}, f"estimator must be one of {', '.join(ESTIMATORS)}, not 'nobody'"),
         (
             {"stiffness_max_n_per_m": 1e-30},
             r"stiffness_max_n_per_m must be at least .* beside the other gain's largest, not 1e-30",

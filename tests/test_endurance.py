@@ -1,0 +1,114 @@
+"""Estimators that run for long, at the largest and the smallest speeds: no drift, no overflow, no surprise later on.
+
+`HARDWALL_ENDURANCE` says for how many samples; `make soak` takes 10^9. The decoder's outputs are made up as they are
+at a steady rate of edges, which is as fast as arithmetic can be.
+"""
+
+import os
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from specs import spec
+
+from hardwall.model import estimators, quadrature
+from hardwall.model.axis import Axis
+from hardwall.model.compiled import compiled
+from hardwall.model.estimators import estimate
+from hardwall.model.fixed import wrap
+from hardwall.model.quadrature import RUN_MAX, Seen
+
+SAMPLES = int(os.environ.get("HARDWALL_ENDURANCE", "1000000"))
+WINDOWS = 10
+# Clocks from one edge to the next, at 50 clocks a sample, and whether downwards.
+STEADY = {
+    "standstill": (0, 0),
+    "slowest": (50_000_000, 1),
+    "slow": (24_999, 0),
+    "odd": (487, 1),
+    "largest up": (25, 0),
+    "largest down": (25, 1),
+    "beyond": (3, 0),
+}
+
+
+class Widths(NamedTuple):
+    count: int
+    stamp: int
+
+
+@compiled
+def _stamp(widths, number, period):
+    """Return the stamp of edge `number`, the first being 1; it is counted a clock later."""
+    return (number * period - 1) & ((1 << widths.stamp) - 1) if number > 0 else 0
+
+
+@compiled
+def _seen(widths, clock, period, down):
+    """Return what a decoder shows at a clock, with an edge every `period` clocks from the reset on."""
+    n = clock // period if period else 0
+    # Upwards A rises with the first edge, downwards B.
+    last = (2 - n) & 3 if down else (n - 1) & 3
+    step = 1 if down else -1
+    a, b = _stamp(widths, n, period), _stamp(widths, n - 1, period)
+    c, d = _stamp(widths, n - 2, period), _stamp(widths, n - 3, period)
+    stamps = (a, b, c, d)
+    return Seen(
+        wrap(-n if down else n, widths.count),
+        clock & ((1 << widths.stamp) - 1),
+        stamps[((0 - last) * step) & 3],
+        stamps[((1 - last) * step) & 3],
+        stamps[((2 - last) * step) & 3],
+        stamps[((3 - last) * step) & 3],
+        last if n else 0,
+        down if n else 0,
+        min(n, RUN_MAX),
+    )
+
+
+@compiled
+def _endure(params, state, widths, clocks_per_sample, period, down, first, until):
+    """Take samples; return the state, and least, largest and summed velocity."""
+    low, high, total = 1 << 62, -(1 << 62), 0
+    for k in range(first, until):
+        seen = _seen(widths, (k + 1) * clocks_per_sample - 1, period, down)
+        state, velocity, _ = estimate(params, state, seen, 0)
+        low, high, total = min(low, velocity), max(high, velocity), total + velocity
+    return state, low, high, total
+
+
+def test_what_is_made_up_is_what_a_decoder_shows():
+    widths, clock = Widths(6, 9), np.arange(1500)
+    params = quadrature.Params(widths.count, widths.stamp, 8)
+    for period, down in ((7, 0), (7, 1), (13, 0), (13, 1)):
+        # The decoder counts edge n at clock n period, so it is at the pins a latency earlier.
+        quarter = (clock + quadrature.latency(0)) // period * (-1 if down else 1) & 3
+        levels = quarter ^ quarter >> 1
+        record = quadrature.run(params, levels & 1, levels >> 1, 0)
+        for now in range(1, 1500):
+            state = quadrature.State(*(int(column[now - 1]) for column in record))
+            made, shown = _seen(widths, now, period, down), quadrature.seen(state)
+            # Stamps of edges that have not been yet mean nothing.
+            names = [name for name in Seen._fields if made.run == RUN_MAX or not name.startswith("stamp_")]
+            assert [getattr(shown, name) for name in names] == [getattr(made, name) for name in names], now
+
+
+@pytest.mark.parametrize("speed", STEADY)
+@pytest.mark.parametrize("estimator", estimators.ESTIMATORS)
+def test_later_is_as_earlier(estimator, speed):
+    """After the first tenth, in which it settles, no tenth of a steady run reaches further than the second."""
+    axis_spec = spec("mhz", estimator)
+    axis, (period, down) = Axis(axis_spec), STEADY[speed]
+    state, widths = axis.design.start().estimator, Widths(axis_spec.count_width, axis_spec.stamp_width)
+    length, seen = SAMPLES // WINDOWS, []
+    for window in range(WINDOWS):
+        state, low, high, total = _endure(
+            axis.params.estimator, state, widths, axis_spec.clocks_per_sample, period, down,
+            window * length, (window + 1) * length,
+        )  # fmt: skip
+        seen.append((low, high, total / length))
+    fmt = axis.design.estimator.velocity
+    assert all(fmt.min <= low <= high <= fmt.max for low, high, _ in seen)
+    # In time the words repeat themselves, so what was not reached in a tenth of the run is not reached in the next.
+    assert min(low for low, _, _ in seen[2:]) >= seen[1][0] - 1
+    assert max(high for _, high, _ in seen[2:]) <= seen[1][1] + 1
