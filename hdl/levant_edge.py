@@ -1,12 +1,13 @@
 """A sliding-mode differentiator driven by the clock-stamped edges of the encoder."""
 
-from amaranth.hdl import Array, Cat, Const, Elaboratable, Module, Mux, Signal, signed, unsigned
+from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, signed, unsigned
 
-from hardwall.model.levant_edge import DIGITS, REST_BITS, Design
+from hardwall.model.levant_edge import QUOTIENT_BITS, REST_BITS, Design
 from hardwall.model.quadrature import RUN_MAX
 from hardwall.model.sqrt import latency as sqrt_latency
 
 from . import EstimatorBlock
+from .divide import Divide
 from .fixed import shape, shift_floor, shift_round_half_up
 from .sqrt import Sqrt
 
@@ -75,7 +76,9 @@ class Estimator(EstimatorBlock):
         d, p = self._design, s.params
         error, velocity = d.error, d.velocity
         m.submodules.root = root = Sqrt(d.radicand.width + 1)
-        m.submodules.quotient = quotient = _Quotient(error.width - 1 + p.error_shift, d.mantissa, velocity.width - 1)
+        m.submodules.quotient = quotient = Divide(
+            error.width - 1 + p.error_shift, d.mantissa, velocity.width - 1, QUOTIENT_BITS
+        )
         magnitude = Mux(s.e < 0, -s.e, s.e)[: error.width - 1]
         radicand = shift_floor(magnitude, p.radicand_shift)
         root_is_last = sqrt_latency(d.radicand.width + 1) >= d.quotient_latency
@@ -98,8 +101,8 @@ class Estimator(EstimatorBlock):
             more.eq(s.length - first),
             few.eq(s.length - first),
             halves.eq((s.length >> 1) - (first >> 1)),
-            s.slope.eq(_least(quotient.quotient, most)),
-            s.far_slope.eq(quotient.quotient[most:].any()),
+            s.slope.eq(quotient.quotient),
+            s.far_slope.eq(quotient.saturated),
             s.bent.eq(_least(shift_floor(s.slope, p.slope_shift + first) >> more, steepest)),
             s.limit.eq(_least(_shifted(s.root_product, p.limit_shift - (first >> 1), halves), most)),
             s.relay.eq(_least(_shifted(self.levant_edge_alpha, p.alpha_shift - first, few), steepest)),
@@ -325,51 +328,6 @@ class _Signals:
         # What no further edge allows.
         self.bound, self.onward = Signal(d.velocity.width - 1), Signal(d.velocity.width - 1)
         self.line, self.end = Signal(velocity), Signal(signed(d.velocity.width + 1))
-
-
-class _Quotient(Elaboratable):
-    """floor(dividend / divisor), or the largest word where it does not fit, `DIGITS` quotient bits a clock.
-
-    `done` comes one clock after `start` and one more for each `DIGITS` bits; the quotient stays until the next start.
-    """
-
-    def __init__(self, dividend: int, divisor: int, quotient: int):
-        self.start, self.done = Signal(), Signal()
-        self.dividend, self.divisor = Signal(dividend), Signal(divisor)
-        self.quotient = Signal(-(-quotient // DIGITS) * DIGITS)
-
-    def elaborate(self, platform):
-        m = Module()
-        bits = len(self.quotient)
-        divisor, remainder = Signal.like(self.divisor), Signal.like(self.divisor)
-        over = Signal()
-        left = Signal(range(bits // DIGITS + 1))
-
-        above = self.dividend[bits:]
-        rest, digits = remainder, []
-        for n in range(DIGITS):
-            taken = Cat(self.quotient[bits - 1 - n], rest)
-            less = taken - divisor
-            digits.insert(0, ~less[-1] | over)
-            rest = Mux(less[-1], taken, less)[: len(remainder)]
-
-        m.d.sync += self.done.eq(left == 1)
-        with m.If(left != 0):
-            m.d.sync += [
-                remainder.eq(rest),
-                self.quotient.eq(Cat(*digits, self.quotient)[:bits]),
-                left.eq(left - 1),
-            ]
-        with m.If(self.start):
-            m.d.sync += [
-                divisor.eq(self.divisor),
-                remainder.eq(above[: len(remainder)]),
-                self.quotient.eq(self.dividend[:bits]),
-                over.eq(above >= self.divisor),
-                left.eq(bits // DIGITS),
-                self.done.eq(0),
-            ]
-        return m
 
 
 def _length(value):

@@ -35,8 +35,8 @@ the cell leaves at most 2 D/s - |v|; and one that turns within it returns no fas
 and (5/2) D 2**-l - v, where 2**l <= s < 2**(l+1): never tighter than a cell a quarter too wide. An axis rests, v = a =
 0, once s has more than REST_BITS bits more than the last T: for a parabola through the cell it never does (its longest
 interval is 4.8 times the one before); and, edges slower than that not being told from rest, after half the range of
-the stamp. A stop from constant speed reads exactly 0 after 2.5 to 5 times the time of a count (where that is shorter than
-the shortest interval, after two of those more), at the latest after 16 intervals; until then it reads the old speed.
+the stamp. A stop from constant speed reads exactly 0 after 2.5 to 5 times the time of a count (and two of the shortest
+intervals, where a count takes less), at the latest after 16 intervals; until then it reads the old speed.
 
 Guarantee. For |f''| <= C, place errors up to p counts and E on the surface, |u - f'| <= (C + |a|)(T/2 + s) + 2 p D / T
 with T the last interval in use; the motion is reached within a few edges, as each step takes at least lambda or alpha's
@@ -98,6 +98,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from .compiled import compiled
+from .divide import divide
+from .divide import latency as divide_latency
 from .estimators import estimate
 from .fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from .quadrature import RUN_MAX, Seen
@@ -124,8 +126,8 @@ REST_BITS = 3
 """An axis rests when 2**REST_BITS of the last intervals, rounded up to a power of two, have brought no edge."""
 LEFT_MAX = 46
 """No left shift of a gain word exceeds this, beyond which all of them saturate: 16 + 46 bits fit int64."""
-DIGITS = 2
-"""Quotient bits a clock."""
+QUOTIENT_BITS = 2
+"""Bits of the quotient that a clock brings."""
 STEPS = 19
 """Clocks of the sequence besides the root's or the quotient's: see `hardwall.hdl.levant_edge`."""
 
@@ -170,6 +172,7 @@ class Params(NamedTuple):
     turn_shift: int
     turn_span: int
     error_shift: int
+    quotient_width: int
     radicand_shift: int
     limit_shift: int
     slope_shift: int
@@ -306,8 +309,8 @@ class Design:
 
     @property
     def quotient_latency(self) -> int:
-        """Clocks of the division: one to load, and one for each `DIGITS` bits."""
-        return 1 + -(-(self.velocity.width - 1) // DIGITS)
+        """Clocks of the division."""
+        return divide_latency(self.velocity.width - 1, QUOTIENT_BITS)
 
     def params(self, words: dict[str, int]) -> Params:
         """Return the kernel's parameters for the given run-time words."""
@@ -326,6 +329,7 @@ class Design:
             turn_shift=a_f - f - self.turn_span,
             turn_span=self.turn_span,
             error_shift=f - e_f,
+            quotient_width=self.velocity.width - 1,
             radicand_shift=e_f - self.radicand.f,
             limit_shift=self.lambda_.f + self.root.f - f,
             slope_shift=f - a_f,
@@ -448,8 +452,7 @@ def _correct(params, state, seen, interval, passed):
     error = shift_floor(mean * time, params.error_shift) - shift_floor(place, shift - params.place_shift)
     sign, size = _sign(error), abs(error)
 
-    quotient = (size << params.error_shift) // time
-    slope = min(quotient, most)
+    slope = divide(size << params.error_shift, time, params.quotient_width)
     change, bend = slope, min(shift_floor(slope, params.slope_shift + length), steepest)
     if shift == 0:
         radicand = shift_floor(size, params.radicand_shift) << (length & 1)
@@ -462,7 +465,7 @@ def _correct(params, state, seen, interval, passed):
     if seen.run == RUN_MAX:
         by = shift_round_half_up(_fitted(error, params.learn_max), params.learn_shift)
         places = _shifted(places, kind, state.kind, by, ~params.place_max, params.place_max)
-    flags = int(distance != passed or slope != quotient)
+    flags = int(distance != passed or size << params.error_shift >= time << params.quotient_width)
     flags |= int(velocity != far_velocity) << 1
     return velocity, acceleration, places, flags
 

@@ -92,10 +92,12 @@ def stimulus(d: levant_edge.Design, samples: int):
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     name = parameters()["name"]
-    expected = await follow(dut, make(name), stimulus(design(name), parameters()["samples"]), START)
-    # The campaign is worth its name only if it reached both saturations, and the quiet track too.
+    samples = SAMPLES // 10 if name == "narrow" else SAMPLES
+    expected = await follow(dut, make(name), stimulus(design(name), samples), START)
+    # The campaign is worth its name only if it reached both saturations, and the quiet track too. The narrow count
+    # cannot tell so many edges in the shortest interval as would be an error beyond the velocity's format.
     assert 0 in expected["saturated"]
-    assert np.bitwise_or.reduce(expected["saturated"]) == 0b11
+    assert np.bitwise_or.reduce(expected["saturated"]) == (0b10 if name == "narrow" else 0b11)
 
 
 @cocotb.test()
@@ -120,9 +122,9 @@ async def reset_mid_stream_starts_afresh(dut):
     assert await sample(1) == 0
 
 
-@pytest.mark.parametrize(("name", "samples"), [("mhz", SAMPLES // 2), ("narrow", SAMPLES // 10)])
-def test_rtl(name, samples):
-    simulate(__file__, make, name=name, samples=samples)
+@pytest.mark.parametrize("name", ["mhz", "narrow"])
+def test_rtl(name):
+    simulate(__file__, make, name=name)
 
 
 class Oracle:
