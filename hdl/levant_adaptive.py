@@ -5,7 +5,7 @@ from amaranth.hdl import Mux, Signal, Value, signed
 from hardwall.model.levant_adaptive import LOST, Design
 
 from . import levant_semi_implicit
-from .fixed import shift_floor
+from .fixed import shift_floor, shift_round_half_up
 
 
 class Estimator(levant_semi_implicit.Estimator):
@@ -26,8 +26,8 @@ class Estimator(levant_semi_implicit.Estimator):
     Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
     `valid`.
 
-    Rounding and overflow: alpha 2**-j rounds down; the root rounds down and half of its LSB is added back; the rest is
-    exact; b, u and u1 saturate, with flags. The count may wrap; no counter of the law can.
+    Rounding and overflow: alpha 2**-j rounds down; the root rounds down and half of its LSB is added back; g rounds
+    half up, and the rest is exact; b, u and u1 saturate, with flags. The count may wrap; no counter of the law can.
 
     Parameters
     ----------
@@ -54,7 +54,8 @@ class Estimator(levant_semi_implicit.Estimator):
         return Mux(self._level[0], shift_floor(beyond, shift + 1), shift_floor(beyond, shift))
 
     def _correction(self, product):
-        return (product << (self.design.velocity.f - self.design.product)) >> (self._level >> 1)
+        slowed = (product << self.design.spare) >> (self._level >> 1)
+        return shift_round_half_up(slowed, self.design.product + self.design.spare - self.design.velocity.f)
 
     def _adapt(self, m, first, e, size):
         design, level = self.design, self._level

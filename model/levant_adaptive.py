@@ -59,8 +59,9 @@ Formats are those of `levant_semi_implicit`, and differ thus:
   the time to the largest speed, 2 sqrt(q / L) = speed_max / C, for a slower estimate averages whole strokes; and not
   more than int64 has fraction bits for.
 - f, the fraction bits of b, u and u1: alpha at the last level has at least LEAST_ALPHA_BITS below its top one, so that
-  its shift, which rounds down, changes it by at most 2**-LEAST_ALPHA_BITS; and no bit of lambda_j times the root falls
-  below: the correction is exact, and delta = lambda_j 2**-(root.f+1).
+  its shift, which rounds down, changes it by at most 2**-LEAST_ALPHA_BITS; and the budget of position holds for lambda
+  at the last level. The product of lambda and root is shifted by the level without loss, and then rounded. At odd
+  levels the root is that of half the radicand, so delta = lambda_j sqrt(2) 2**-(root.f+1) + 2**-(f+1) there.
 - `elapsed` and `calm` stop where they have no more to decide, so they cannot overflow. The thresholds follow the gains
   that were designed, not those set at run time; at the first sample j is 0.
 - A loss is a matter of one rounding, so fixed and real trajectories part. Below 1 MHz the RMS of a single 0.5 s run
@@ -73,11 +74,10 @@ from typing import NamedTuple
 from . import levant_semi_implicit
 from .compiled import compiled
 from .estimators import estimate
-from .fixed import bits_for, saturate, shift_floor
-from .levant import HEADROOM_BITS, OUTPUTS, POSITION_BUDGET, Gains, arrive, sign_of
+from .fixed import bits_for, saturate, shift_floor, shift_round_half_up
+from .levant import OUTPUTS, POSITION_BUDGET, Gains, arrive, sign_of
 from .levant_semi_implicit import band, float_settle, settle
 from .sqrt import isqrt
-from .words import GAIN_BITS
 
 __all__ = ["FLOAT_START", "OUTPUTS", "START", "Design", "FloatParams", "Gains", "Params", "State"]
 
@@ -100,7 +100,7 @@ LEAST_ALPHA_BITS = 5
 
 
 class Params(NamedTuple):
-    """As `levant.Params`; and of the adaptation: `levels`; for even and odd levels, the first thresholds of time."""
+    """As `levant.Params`; and of the adaptation, as `Design`; thresholds of time for even and for odd levels."""
 
     lambda_: int
     alpha: int
@@ -111,6 +111,7 @@ class Params(NamedTuple):
     product_shift: int
     error_max: int
     velocity_max: int
+    spare: int
     levels: int
     reach_even: int
     reach_odd: int
@@ -168,19 +169,24 @@ class Design(levant_semi_implicit.Design):
         self.hold = _times(HOLD * 2 / math.sqrt(most))
 
     def _least(self, f_max: int) -> tuple[float, float]:
-        # One level: the product as a whole, see `_fraction`, and alpha.
-        root_f = bits_for(self._position_per_root(0.0) / POSITION_BUDGET)
-        return 2.0 ** (GAIN_BITS + root_f + 1 - HEADROOM_BITS - f_max), 2.0 ** (LEAST_ALPHA_BITS - f_max)
+        # Those of level 0: if there is room for no more, it is the only one.
+        return super()._least(f_max)[0], 2.0 ** (LEAST_ALPHA_BITS - f_max)
 
     def _fraction(self, axis, lam: float, alpha: float, f_max: int) -> int:
         def bits(levels: int) -> int:
-            return max(LEAST_ALPHA_BITS + levels - math.floor(math.log2(alpha)), self.product + levels // 2, 0)
+            rounding = self._position_per_root(lam) * 2 ** (levels / 2) / (lam * POSITION_BUDGET)
+            return max(LEAST_ALPHA_BITS + levels - math.floor(math.log2(alpha)), bits_for(rounding), 0)
 
         slowest = axis.speed_max_m_per_s**2 / (4 * axis.count_m * axis.acceleration_max_m_per_s2)
         self.levels = max(min(LEVELS, math.floor(math.log2(slowest))), 0)
         while self.levels and bits(self.levels) > f_max:
             self.levels -= 1
         return bits(self.levels)
+
+    @property
+    def spare(self) -> int:
+        """Bits that the largest shift of lambda takes from the product."""
+        return self.levels // 2
 
     def reach_samples(self, level: int) -> int:
         """Return how many samples on one side reach `level`, 1 or more."""
@@ -191,6 +197,9 @@ class Design(levant_semi_implicit.Design):
         return -(-_threshold(*self.hold, level) >> TIME_BITS)
 
     def _more(self) -> dict[str, int]:
+        return {"spare": self.spare, **self._more_float()}
+
+    def _more_float(self) -> dict[str, int]:
         (reach_even, reach_odd), (hold_even, hold_odd) = self.reach, self.hold
         return {
             "levels": self.levels,
@@ -199,8 +208,6 @@ class Design(levant_semi_implicit.Design):
             "hold_even": hold_even,
             "hold_odd": hold_odd,
         }
-
-    _more_float = _more
 
 
 def _times(first: float) -> tuple[int, int]:
@@ -253,9 +260,9 @@ def step(params, state, seen, restart):
     level = adapted[0]
     sign, near, beyond = band(error, params.alpha >> level)
     root = isqrt(shift_floor(beyond, params.radicand_shift + (level & 1)))
-    # The shift is never to the right beyond the product's last bit: exact.
-    full = shift_floor(params.lambda_ * (2 * root + 1), params.product_shift + (level >> 1))
-    lead, u1, velocity, far = settle(params, u1, sign, near, beyond, min(full, beyond))
+    product = (params.lambda_ * (2 * root + 1) << params.spare) >> (level >> 1)
+    correction = min(shift_round_half_up(product, params.product_shift + params.spare), beyond)
+    lead, u1, velocity, far = settle(params, u1, sign, near, beyond, correction)
     return State(1, seen.count, lead, u1, *adapted), velocity, int(error != distance) | far << 1
 
 

@@ -110,8 +110,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
         near = min(abs(b), math.floor(alpha / 2**level / lsb) * lsb)
         beyond = abs(b) - near
         root = Fraction(math.isqrt(math.floor(beyond / 2 ** (level % 2) * scale**2)), scale) + Fraction(1, 2 * scale)
-        g = lam * root / 2 ** (level // 2)
-        assert (g / lsb).denominator == 1
+        g = math.floor(lam * root / 2 ** (level // 2) / lsb + Fraction(1, 2)) * lsb
         return near, min(g, beyond)
 
     rows = levants.wrapped(d, stimulus(d, 10_000))
@@ -138,8 +137,8 @@ def test_rounding_is_a_small_change_of_position(rate):
         lam = d.lambda_.to_real(d.words[0].reset) * 2.0 ** (-level / 2)
         near = min(abs(b), (d.words[1].reset >> level) * d.velocity.lsb)
         beyond, g = abs(b) - near, math.copysign(1, b) * (lead.u1 - velocity) * d.velocity.lsb
-        # No rounding but the root's: half an LSB of it, and of the root of half the radicand at odd levels.
-        delta = lam * 2.0 ** -(d.root.f + 1) * math.sqrt(1 + level % 2)
+        # At odd levels the root is that of half the radicand.
+        delta = lam * 2.0 ** -(d.root.f + 1) * math.sqrt(1 + level % 2) + 2.0 ** -(d.velocity.f + 1)
         eta = abs(max((g / lam) ** 2, g) - beyond)
         assert eta <= max(2 * math.sqrt(beyond) * delta / lam + (delta / lam) ** 2, delta) + 1e-9
 
