@@ -1,32 +1,13 @@
-"""What the tests of the linear filters share: the paper's signal, whole records through a kernel, impulse responses."""
+"""What the tests of the linear filters share: whole records through a kernel, impulse responses."""
 
 import numpy as np
-from specs import PAPER
 
 from hardwall.model.compiled import compiled
 from hardwall.model.estimators import estimate
 from hardwall.model.quadrature import seen_count
-from hardwall.model.spec import AxisSpec
 
-BOUND = 1.6785
-"""C of the paper's signal, m/s^2."""
-RATES = {1e3: 5.0, 1e4: 5.0, 1e5: 2.0, 1e6: 1.25, 1e7: 0.5}
-"""Sampling rates, Hz, and how much of the signal is run there, s; it is judged from a fifth on."""
-
-
-def axis_at(sample_hz: float, estimator: str, gains=None) -> AxisSpec:
-    """Return the paper's device at a sampling rate, for its signal."""
-    fields = {**PAPER, "clock_hz": 50_000_000 if sample_hz <= 1e6 else 10**9, "acceleration_max_m_per_s2": BOUND}
-    rates = {"sample_hz": int(sample_hz), "actuation_hz": int(sample_hz)}
-    return AxisSpec(**{**fields, **rates}, estimator=estimator, gains=gains)
-
-
-def paper_signal(sample_hz: float, seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return counts and true velocity, m/s, of f(t) = 50 exp(-t) sin(2 pi t) mm on counts of 1 um."""
-    t = np.arange(round(sample_hz * seconds) + 1) / sample_hz
-    swing, turn = np.sin(2 * np.pi * t), 2 * np.pi * np.cos(2 * np.pi * t)
-    decay = 0.05 * np.exp(-t)
-    return np.floor(decay * swing / 1e-6).astype(np.int64), decay * (turn - swing)
+SECONDS = {1_000: 5.0, 10_000: 5.0, 100_000: 2.0, 1_000_000: 1.25, 10_000_000: 0.5}
+"""How much of the paper's signal is run at each rate, s; it is judged from a fifth on."""
 
 
 @compiled

@@ -3,12 +3,11 @@
 import math
 from collections.abc import Iterator
 from fractions import Fraction
-from functools import cache
 
 import cocotb
 import numpy as np
 from estimator_bench import follow, reset_words
-from specs import MHZ
+from papers_signal import axis_at, swing
 
 from bench import CAMPAIGN, SAMPLES, Bench, parameters, rng
 from hardwall.model import estimators, levant
@@ -17,9 +16,8 @@ from hardwall.model.estimators import estimate
 from hardwall.model.quadrature import seen_count
 from hardwall.model.spec import AxisSpec
 
-RATES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
-PAPERS_BOUND = 1.6785
-"""C of the paper's signal, m/s^2."""
+TURN_S = 1 + math.atan(2 * math.pi) / (2 * math.pi)
+"""When the paper's signal turns: its velocity is 0."""
 REFUSED = [
     ({"lambda_sqrt_m_per_s": -1.0, "alpha_m_per_s2": 1.0}, "lambda_sqrt_m_per_s"),
     ({"lambda_sqrt_m_per_s": 1.0, "alpha_m_per_s2": math.nan}, "alpha_m_per_s2"),
@@ -97,21 +95,6 @@ def campaign(make, start, rows=stimulus, fewer: tuple[str, ...] = ("narrow",)):
     return follows_model, reset_mid_stream_starts_afresh
 
 
-@cache
-def at_rate(estimator: str, rate: int, bound: float = PAPERS_BOUND) -> AxisSpec:
-    """Return the paper's device at a rate, with default gains for a bound on the acceleration, m/s^2."""
-    clock = 1_000_000_000 if rate > 1_000_000 else 50_000_000
-    fields = {"clock_hz": clock, "sample_hz": rate, "actuation_hz": 1_000, "acceleration_max_m_per_s2": bound}
-    return AxisSpec(**{**MHZ, **fields}, estimator=estimator)
-
-
-def signal(rate: int, seconds: float, phase: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Return counts and true velocity, m/s, of the paper's signal from a turn on: its velocity begins at 0."""
-    t = (1 + math.atan(2 * math.pi) / (2 * math.pi)) + np.arange(round(seconds * rate)) / rate
-    sine, cosine, decay = np.sin(2 * np.pi * t), np.cos(2 * np.pi * t), 0.05 * np.exp(-t)
-    return np.floor(decay * sine / 1e-6 + phase).astype(np.int64), decay * (2 * np.pi * cosine - sine)
-
-
 def axis(axis_spec: AxisSpec, output: str = "u", floating: bool = False) -> Axis:
     """Return an axis with that output selected."""
     outputs = axis_spec.model.OUTPUTS
@@ -124,7 +107,7 @@ def rms_errors(axis_spec: AxisSpec, output: str, seconds: float, runs: int = 1) 
     random, squares = rng(), np.zeros(2)
     both = [axis(axis_spec, output, floating) for floating in (True, False)]
     for _ in range(runs):
-        counts, truth = signal(axis_spec.sample_hz, seconds, random.random())
+        counts, truth = swing(axis_spec.sample_hz, seconds, TURN_S, random.random())
         squares += [np.mean((one.run(counts).velocity_m_per_s - truth) ** 2) for one in both]
     exact, fixed = np.sqrt(squares / runs)
     return exact, fixed
@@ -174,7 +157,7 @@ def oracle_run(d: levant.Design, rows, step) -> Iterator[tuple[int, int]]:
 
 def check_wrap_and_restart(axis_spec: AxisSpec) -> None:
     """The count may wrap anywhere, and a restart in mid-motion is a start."""
-    counts, _ = signal(axis_spec.sample_hz, 0.2)
+    counts, _ = swing(axis_spec.sample_hz, 0.2, TURN_S)
     one, half = axis(axis_spec), 1 << (axis_spec.count_width - 1)
     expected = one.run(counts).velocity
     assert expected.any()
@@ -202,7 +185,7 @@ def check_no_drift(axis_spec: AxisSpec) -> None:
 
 def check_finite_difference_in_the_band(estimator: str) -> None:
     """At 1 kHz alpha is 13 counts: where the count's second difference is less, there is no memory and no chatter."""
-    axis_spec = at_rate(estimator, 1_000, 12.0)
+    axis_spec = axis_at(estimator, 1_000, 12.0)
     d = axis_spec.design.estimator
     assert d.alpha.to_real(d.words[1].reset) > 12
     moved = np.cumsum(rng().integers(-6, 7, 5000))
@@ -215,11 +198,11 @@ def check_finite_difference_in_the_band(estimator: str) -> None:
 
 def check_standstill(estimator: str, rate: int) -> None:
     """A count that stands after 30 mm/s gives exactly 0 on both outputs, after 0.1 s at the latest; `levant` never."""
-    axis_spec = at_rate(estimator, rate)
+    axis_spec = axis_at(estimator, rate)
     ramp = np.floor(np.arange(rate // 20) * 0.03 / rate / axis_spec.count_m)
     counts = np.concatenate([ramp, np.full(rate // 4, ramp[-1])]).astype(np.int64)
     until = len(ramp) + rate // 10
-    explicit = axis(at_rate("levant", rate)).run(counts).velocity
+    explicit = axis(axis_at("levant", rate)).run(counts).velocity
     assert (np.abs(explicit[until:]) > 0).mean() > 0.99
     for output in axis_spec.model.OUTPUTS:
         velocity = axis(axis_spec, output).run(counts).velocity

@@ -7,7 +7,8 @@ import cocotb
 import numpy as np
 import pytest
 from estimator_bench import follow, model, reset_words
-from filters import RATES, axis_at, impulse, norms, paper_signal, rms, run
+from filters import SECONDS, impulse, norms, rms, run
+from papers_signal import RATES, axis_at, swing
 from scipy.signal import butter, sosfilt
 from specs import spec
 
@@ -128,7 +129,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
 def test_the_algorithm_is_scipys(sample_hz, ratio):
     """Of a random walk of the count, from rest."""
     gains = None if ratio is None else Gains(ratio if ratio > 1 else ratio * sample_hz)
-    axis = axis_at(sample_hz, "butterworth", gains)
+    axis = axis_at("butterworth", sample_hz, gains=gains)
     steps = rng().integers(-1, 2, 20_000)
     seen = Axis(axis, floating=True).run(np.cumsum(steps)).velocity
     cutoff = axis.design.gains.cutoff_hz
@@ -180,9 +181,9 @@ def test_the_norms_are_those_of_the_module():
 def test_fixed_is_float_within_the_derived_bound(sample_hz, cutoff):
     """On the paper's signal: rounding within its norms, coefficients by their response; all within 1 % of the error."""
     gains = {"30 Hz": Gains(30.0), "default": None, "0.4 fs": Gains(CUTOFF_MAX * sample_hz)}[cutoff]
-    axis = axis_at(sample_hz, "butterworth", gains)
+    axis = axis_at("butterworth", sample_hz, gains=gains)
     d = axis.design.estimator
-    counts, truth = paper_signal(sample_hz, RATES[sample_hz])
+    counts, truth = swing(sample_hz, SECONDS[sample_hz])
     held = Axis(axis)
     fixed = held.run(counts)
     exact = Axis(axis, floating=True).run(counts)
@@ -201,8 +202,8 @@ def test_fixed_is_float_within_the_derived_bound(sample_hz, cutoff):
 
 @pytest.mark.parametrize("floating", [False, True])
 def test_figure_2_at_its_crossing(floating):
-    axis = axis_at(1e4, "butterworth", Gains(1e3))
-    counts, truth = paper_signal(1e4, 5.0)
+    axis = axis_at("butterworth", 10_000, gains=Gains(1e3))
+    counts, truth = swing(10_000, 5.0)
     error = (Axis(axis, floating=floating).run(counts).velocity_m_per_s - truth)[10_000:]
     assert rms(error) == pytest.approx(0.621e-3, rel=0.01)
 
@@ -268,10 +269,10 @@ def test_default_cutoff_has_half_the_minimax_window_for_delay():
     axis = spec("mhz", "butterworth")
     delay = math.sqrt(2) / (2 * math.pi * Gains.default(axis).cutoff_hz)
     assert delay == pytest.approx(math.sqrt(axis.count_m / axis.acceleration_max_m_per_s2))
-    assert Gains.default(axis_at(500, "butterworth")).cutoff_hz == 200
+    assert Gains.default(axis_at("butterworth", 500)).cutoff_hz == 200
     # A host asks for a cutoff and gets it.
     host = Axis(axis, floating=True, **axis.design.estimator.words_for(30.0))
-    other = Axis(axis_at(1e6, "butterworth", Gains(30.0)), floating=True)
+    other = Axis(axis_at("butterworth", 1_000_000, gains=Gains(30.0)), floating=True)
     assert host.params.estimator[:2] == pytest.approx(other.params.estimator[:2])
 
 

@@ -7,7 +7,7 @@ import cocotb
 import numpy as np
 import pytest
 from estimator_bench import follow, model, reset_words
-from figure_2 import RATES, figure_2
+from papers_signal import RATES, axis_at, piece
 from specs import spec
 
 from bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
@@ -144,7 +144,7 @@ def test_model_is_the_published_algorithm(name):
 @pytest.mark.parametrize("output", [0, 1])
 @pytest.mark.parametrize("rate_hz", RATES)
 def test_fixed_point_costs_less_than_an_lsb_and_a_hundredth_of_the_error(rate_hz, output):
-    axis, counts, exact = figure_2("foaw", rate_hz)
+    axis, (counts, exact) = axis_at("foaw", rate_hz), piece(rate_hz)
     floating, fixed = (Axis(axis, way, foaw_output=output).run(counts).velocity_m_per_s for way in (True, False))
     lsb = axis.design.estimator.velocity.lsb * axis.velocity_unit_m_per_s
     assert np.abs(fixed - floating).max() < lsb * (1 + 1e-9)

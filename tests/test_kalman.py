@@ -7,7 +7,8 @@ import cocotb
 import numpy as np
 import pytest
 from estimator_bench import follow, model, reset_words
-from filters import BOUND, RATES, axis_at, impulse, norms, paper_signal, rms, run
+from filters import SECONDS, impulse, norms, rms, run
+from papers_signal import BOUND, RATES, axis_at, swing
 from scipy.linalg import solve_discrete_are
 from specs import spec
 
@@ -156,15 +157,15 @@ def test_gains_at_the_least_and_the_largest_index():
 
 def test_default_bandwidth_is_that_of_the_bound_at_any_rate():
     for rate in (1e5, 1e6, 1e7):
-        axis = axis_at(rate, "kalman")
+        axis = axis_at("kalman", rate)
         expected = math.sqrt(BOUND / axis.count_m) / rate
         # tanh, exp and coth are linear to the ratio of a sample to the minimax window.
         assert axis.design.gains.index(axis) == pytest.approx(expected, rel=expected)
 
 
 def test_the_algorithm_is_the_textbooks():
-    axis = axis_at(1e4, "kalman")
-    counts, _ = paper_signal(1e4, 1.0)
+    axis = axis_at("kalman", 10_000)
+    counts, _ = swing(10_000, 1.0)
     seen = Axis(axis, floating=True).run(counts).velocity
     gains = np.array(steady_state(axis.design.gains.index(axis)))
     state, expected = np.zeros(3), np.zeros(len(counts))
@@ -221,16 +222,16 @@ def test_the_norms_are_those_of_the_module(integrators):
     assert integrators == 2 or (np.max(used, 0) > 0.95).all()
 
 
-SLOW = Gains.default(axis_at(1e6, "fdm")).__dict__ | {"acceleration_time_s": 1.0}
+SLOW = Gains.default(axis_at("fdm", 1_000_000)).__dict__ | {"acceleration_time_s": 1.0}
 
 
 @pytest.mark.parametrize("sample_hz", RATES)
 @pytest.mark.parametrize("gains", [None, Gains(**SLOW)], ids=["default", "slow"])
 def test_fixed_is_float_within_the_derived_bound(sample_hz, gains):
     """On the paper's signal: rounding within its norms, gains by their exact response; all within 1 % of the error."""
-    axis = axis_at(sample_hz, "kalman", gains)
+    axis = axis_at("kalman", sample_hz, gains=gains)
     d = axis.design.estimator
-    counts, truth = paper_signal(sample_hz, RATES[sample_hz])
+    counts, truth = swing(sample_hz, SECONDS[sample_hz])
     held = Axis(axis)
     fixed = held.run(counts)
     exact = Axis(axis, floating=True).run(counts)
@@ -251,8 +252,8 @@ def test_fixed_is_float_within_the_derived_bound(sample_hz, gains):
 
 def test_three_integrators_are_better_than_two():
     """On the paper's signal, by the same noise model."""
-    axis = axis_at(1e5, "kalman")
-    counts, truth = paper_signal(1e5, 5.0)
+    axis = axis_at("kalman", 100_000)
+    counts, truth = swing(100_000, 5.0)
     two = axis.design.estimator.words_for(axis.design.gains, integrators=2)
     errors = [rms((Axis(axis, **words).run(counts).velocity_m_per_s - truth)[100_000:]) for words in ({}, two)]
     assert errors == pytest.approx([0.087e-3, 0.165e-3], rel=0.02)

@@ -7,6 +7,7 @@ import levants
 import numpy as np
 import pytest
 from estimator_bench import model
+from papers_signal import BOUND, RATES, axis_at
 from specs import spec
 
 from bench import simulate
@@ -107,10 +108,10 @@ def test_start_makes_no_transient():
 
 
 @pytest.mark.parametrize("output", levant.OUTPUTS)
-@pytest.mark.parametrize("bound", [levants.PAPERS_BOUND, 12.0])
-@pytest.mark.parametrize("rate", levants.RATES)
+@pytest.mark.parametrize("bound", [BOUND, 12.0])
+@pytest.mark.parametrize("rate", RATES)
 def test_word_length_costs_a_hundredth_at_every_rate(rate, bound, output):
-    exact, fixed = levants.rms_errors(levants.at_rate("levant", rate, bound), output, 0.4, runs=4)
+    exact, fixed = levants.rms_errors(axis_at("levant", rate, bound), output, 0.4, runs=4)
     assert abs(fixed - exact) <= 0.01 * exact
 
 

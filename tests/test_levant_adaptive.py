@@ -8,6 +8,7 @@ import levants
 import numpy as np
 import pytest
 from estimator_bench import model, reset_words
+from papers_signal import BOUND, RATES, axis_at, swing
 from specs import spec
 
 from bench import rng, simulate
@@ -122,7 +123,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
 @pytest.mark.parametrize("rate", [10_000, 100_000])
 def test_rounding_is_a_small_change_of_position(rate):
     """Every u follows exactly, without rounding, from a beyond changed by no more than the derived eta."""
-    axis = levants.at_rate(NAME, rate, 12.0)
+    axis = axis_at(NAME, rate, 12.0)
     d = axis.design.estimator
     t = np.arange(20_000) / axis.sample_hz
     counts = np.floor(0.01 / axis.count_m * np.sin(2 * np.pi * 4 * t)).astype(np.int64)
@@ -143,11 +144,11 @@ def test_rounding_is_a_small_change_of_position(rate):
         assert eta <= max(2 * math.sqrt(beyond) * delta / lam + (delta / lam) ** 2, delta) + 1e-9
 
 
-@pytest.mark.parametrize("bound", [levants.PAPERS_BOUND, 12.0])
-@pytest.mark.parametrize(("rate", "runs"), [*zip(levants.RATES, (200, 200, 40, 8, 2), strict=True)])
+@pytest.mark.parametrize("bound", [BOUND, 12.0])
+@pytest.mark.parametrize(("rate", "runs"), [*zip(RATES, (200, 200, 40, 8, 2), strict=True)])
 def test_word_length_costs_a_hundredth_at_every_rate(rate, runs, bound):
     """Of many runs: a rounding that tips a loss makes another run of it, 2 to 8 % better or worse below 1 MHz."""
-    exact, fixed = levants.rms_errors(levants.at_rate(NAME, rate, bound), "u", 0.4, runs)
+    exact, fixed = levants.rms_errors(axis_at(NAME, rate, bound), "u", 0.4, runs)
     assert abs(fixed - exact) <= 0.01 * exact
 
 
@@ -155,7 +156,7 @@ def test_word_length_costs_a_hundredth_at_every_rate(rate, runs, bound):
 @pytest.mark.parametrize("rate", [10_000, 100_000])
 def test_a_step_of_acceleration_after_rest_is_seen_within_the_derived_error_and_time(rate, acceleration):
     """sqrt(2 (LOST + 1) A q) and sqrt(2 (LOST + 1) q / A), a sample more; and as it is seen, lambda_j's step."""
-    axis_spec = levants.at_rate(NAME, rate, 12.0)
+    axis_spec = axis_at(NAME, rate, 12.0)
     d, tau, steep = axis_spec.design.estimator, 1 / rate, abs(acceleration)
     error = math.sqrt(2 * (LOST + 1) * steep * COUNT_M) + steep * tau
     latest = math.sqrt(2 * (LOST + 1) * COUNT_M / steep) + tau
@@ -175,15 +176,15 @@ def test_a_step_of_acceleration_after_rest_is_seen_within_the_derived_error_and_
 
 def rms(name: str, rate: int, bound: float, counts: np.ndarray, truth: np.ndarray, first: int = 0) -> float:
     """Return the RMS error of u, m/s, from a sample on."""
-    velocity = levants.axis(levants.at_rate(name, rate, bound)).run(counts).velocity_m_per_s
+    velocity = levants.axis(axis_at(name, rate, bound)).run(counts).velocity_m_per_s
     return math.sqrt(np.mean((velocity - truth)[first:] ** 2))
 
 
 def test_a_bound_seven_times_too_large_costs_nothing():
-    counts, truth = levants.signal(100_000, 1.0)
-    fixed_gains = {bound: rms("levant", 100_000, bound, counts, truth) for bound in (levants.PAPERS_BOUND, 12.0)}
+    counts, truth = swing(100_000, 1.0, levants.TURN_S)
+    fixed_gains = {bound: rms("levant", 100_000, bound, counts, truth) for bound in (BOUND, 12.0)}
     adapted = rms(NAME, 100_000, 12.0, counts, truth)
-    assert adapted < fixed_gains[levants.PAPERS_BOUND] < fixed_gains[12.0] / 2
+    assert adapted < fixed_gains[BOUND] < fixed_gains[12.0] / 2
 
 
 @pytest.mark.parametrize("speed", [1e-4, 1e-3, 1e-2])
@@ -220,19 +221,19 @@ def test_the_counters_of_the_law_are_bounded():
 
 
 def test_fewer_levels_where_words_or_strokes_are_short():
-    narrow = levants.at_rate(NAME, 10_000_000)
+    narrow = axis_at(NAME, 10_000_000)
     assert 0 < narrow.design.estimator.levels < levant_adaptive.LEVELS
     assert narrow.design.estimator.velocity.f <= 60 - narrow.count_width
 
 
-@pytest.mark.parametrize("rate", levants.RATES[:4])
+@pytest.mark.parametrize("rate", RATES[:4])
 def test_a_count_that_stands_is_zero(rate):
     levants.check_standstill(NAME, rate)
 
 
 def test_wrap_restart_and_drift():
-    levants.check_wrap_and_restart(levants.at_rate(NAME, 10_000))
-    levants.check_no_drift(levants.at_rate(NAME, 1_000_000, 12.0))
+    levants.check_wrap_and_restart(axis_at(NAME, 10_000))
+    levants.check_no_drift(axis_at(NAME, 1_000_000, 12.0))
 
 
 @pytest.mark.parametrize(("gains", "named"), levants.REFUSED)

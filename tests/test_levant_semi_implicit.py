@@ -7,6 +7,7 @@ import levants
 import numpy as np
 import pytest
 from estimator_bench import model
+from papers_signal import BOUND, RATES, axis_at
 from specs import spec
 
 from bench import rng, simulate
@@ -91,10 +92,10 @@ def test_rounding_is_a_small_change_of_position(name):
 
 
 @pytest.mark.parametrize("output", levant_semi_implicit.OUTPUTS)
-@pytest.mark.parametrize("bound", [levants.PAPERS_BOUND, 12.0])
-@pytest.mark.parametrize("rate", levants.RATES)
+@pytest.mark.parametrize("bound", [BOUND, 12.0])
+@pytest.mark.parametrize("rate", RATES)
 def test_word_length_costs_a_hundredth_at_every_rate(rate, bound, output):
-    exact, fixed = levants.rms_errors(levants.at_rate(NAME, rate, bound), output, 0.4, runs=4)
+    exact, fixed = levants.rms_errors(axis_at(NAME, rate, bound), output, 0.4, runs=4)
     assert abs(fixed - exact) <= 0.01 * exact
 
 
@@ -102,21 +103,21 @@ def test_in_the_band_it_is_the_finite_difference():
     levants.check_finite_difference_in_the_band(NAME)
 
 
-@pytest.mark.parametrize("rate", levants.RATES[:4])
+@pytest.mark.parametrize("rate", RATES[:4])
 def test_a_count_that_stands_is_zero(rate):
     levants.check_standstill(NAME, rate)
 
 
 def test_at_1_khz_the_chatter_is_gone():
-    ours, _ = levants.rms_errors(levants.at_rate(NAME, 1_000), "u", 4.0)
-    explicit, _ = levants.rms_errors(levants.at_rate("levant", 1_000), "u", 4.0)
-    difference, _ = levants.rms_errors(levants.at_rate("fdm", 1_000), "u", 4.0)
+    ours, _ = levants.rms_errors(axis_at(NAME, 1_000), "u", 4.0)
+    explicit, _ = levants.rms_errors(axis_at("levant", 1_000), "u", 4.0)
+    difference, _ = levants.rms_errors(axis_at("fdm", 1_000), "u", 4.0)
     assert ours <= difference < explicit / 4
 
 
 def test_wrap_restart_and_drift():
-    levants.check_wrap_and_restart(levants.at_rate(NAME, 10_000))
-    levants.check_no_drift(levants.at_rate(NAME, 1_000_000, 12.0))
+    levants.check_wrap_and_restart(axis_at(NAME, 10_000))
+    levants.check_no_drift(axis_at(NAME, 1_000_000, 12.0))
 
 
 @pytest.mark.parametrize(("gains", "named"), levants.REFUSED)

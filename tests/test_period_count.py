@@ -8,6 +8,7 @@ import cocotb
 import numpy as np
 import pytest
 from estimator_bench import follow, model, reset_words
+from papers_signal import RATES
 from specs import spec
 from wheels import anything, rows, sights, turn
 
@@ -21,7 +22,6 @@ from hardwall.sim import accuracy, motion, signals, stream
 from hardwall.sim.encoder import offsets
 
 CONTESTANT = accuracy.Contestant("period-count", "u")
-RATES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 
 
 def design(name: str) -> period_count.Design:

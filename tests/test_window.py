@@ -7,7 +7,7 @@ import cocotb
 import numpy as np
 import pytest
 from estimator_bench import follow, model, reset_words
-from figure_2 import RATES, figure_2
+from papers_signal import RATES, axis_at, piece
 from specs import spec
 
 from bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
@@ -108,7 +108,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
 
 @pytest.mark.parametrize("rate_hz", RATES)
 def test_fixed_point_costs_less_than_an_lsb_and_a_hundredth_of_the_error(rate_hz):
-    axis, counts, exact = figure_2("window", rate_hz)
+    axis, (counts, exact) = axis_at("window", rate_hz), piece(rate_hz)
     floating, fixed = (Axis(axis, floating).run(counts).velocity_m_per_s for floating in (True, False))
     lsb = axis.design.estimator.velocity.lsb * axis.velocity_unit_m_per_s
     assert np.abs(fixed - floating).max() < lsb * (1 + 1e-9)
@@ -120,7 +120,7 @@ def test_fixed_point_costs_less_than_an_lsb_and_a_hundredth_of_the_error(rate_hz
 @pytest.mark.parametrize("rate_hz", RATES)
 def test_the_error_is_within_the_guaranteed_bound(rate_hz):
     """On the paper's signal, and on the parabola that attains the bound but for the rounding of counts."""
-    axis, counts, exact = figure_2("window", rate_hz)
+    axis, (counts, exact) = axis_at("window", rate_hz), piece(rate_hz)
     d, c = axis.design.estimator, axis.acceleration_max_m_per_s2 / axis.count_m / rate_hz**2
     (word,) = d.words
     n = word.reset * d.history.every
