@@ -22,7 +22,7 @@ def run(params, state, counts: np.ndarray):
     width = params.count_width
     half = 1 << (width - 1)
     wrapped = ((np.asarray(counts, np.int64) + half) & (2 * half - 1)) - half
-    velocity = np.zeros(len(wrapped), np.float64 if type(params).__name__ == "FloatParams" else np.int64)
+    velocity = np.zeros(len(wrapped), np.float64 if isinstance(params[0], float) else np.int64)
     flags = np.zeros(len(wrapped), np.int64)
     return _run(params, state, wrapped, velocity, flags), velocity, flags
 

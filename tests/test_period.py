@@ -21,7 +21,7 @@ from hardwall.model.quadrature import Seen
 from hardwall.sim import accuracy, motion, signals, stream
 from hardwall.sim.encoder import offsets
 
-CONTESTANT = accuracy.Contestant("period", "u")
+NAME = "period"
 
 
 def design(name: str) -> period.Design:
@@ -113,7 +113,7 @@ def exact(signal, axis, samples):
 def test_fixed_point_is_the_algorithm_rounded(rate):
     """Rounding is the only difference, at most half an LSB in every sample; and 1 % of the estimator's own error."""
     signal = replace(signals.paper(), seconds=0.3)
-    axis = accuracy.axis_spec(CONTESTANT, rate, signal.acceleration_max_m_per_s2)
+    axis = accuracy.axis_spec(NAME, rate, signal.acceleration_max_m_per_s2)
     fixed, flags = velocities(signal, axis, "fixed")
     real, _ = velocities(signal, axis, "float")
     assert flags == 0
@@ -129,7 +129,7 @@ def test_fixed_point_is_the_algorithm_rounded(rate):
 def test_misplaced_edges_change_nothing_at_constant_speed(speed, rate):
     """Within the stamp's own error, v / D, of the exact speed, whatever phase and duty are."""
     signal = replace(signals.steady(speed), seconds=0.05 if speed > 2 else 0.5)
-    axis = accuracy.axis_spec(CONTESTANT, rate, signals.DEVICE_ACCELERATION)
+    axis = accuracy.axis_spec(NAME, rate, signals.DEVICE_ACCELERATION)
     v = speed * 1e-3 / axis.count_m / axis.clock_hz  # counts a clock
     samples_a_cycle = 4 / v / axis.clocks_per_sample
     for errors in ((0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.4), ((0.2, -0.1, 0.0, 0.15), 0.1)):
@@ -143,7 +143,7 @@ def test_misplaced_edges_change_nothing_at_constant_speed(speed, rate):
 def test_misplaced_edges_change_little_on_the_way():
     """On the paper's signal the RMS error is as with ideal edges but for the few of each turn."""
     signal, rate = signals.paper(), 10_000
-    axis = accuracy.axis_spec(CONTESTANT, rate, signal.acceleration_max_m_per_s2)
+    axis = accuracy.axis_spec(NAME, rate, signal.acceleration_max_m_per_s2)
     true = exact(signal, axis, int(signal.seconds * rate))[rate:]
     ideal, misplaced = (
         np.sqrt(np.mean((velocities(signal, axis, "fixed", late)[0][rate:] - true) ** 2))
@@ -154,7 +154,7 @@ def test_misplaced_edges_change_little_on_the_way():
 
 def test_a_standing_axis_reads_zero_and_a_slowing_one_falls():
     signal = signals.Signal("stop", motion.Stop(5e-3, 0.1, 1.0), 1.2, 0.0, signals.DEVICE_ACCELERATION)
-    axis = accuracy.axis_spec(CONTESTANT, 10_000, signals.DEVICE_ACCELERATION)
+    axis = accuracy.axis_spec(NAME, 10_000, signals.DEVICE_ACCELERATION)
     seen, _ = velocities(signal, axis, "fixed")
     after = np.arange(len(seen)) / axis.sample_hz - 0.105
     d = axis.design.estimator

@@ -21,7 +21,7 @@ from hardwall.model.quadrature import seen_count
 from hardwall.sim import accuracy, motion, signals, stream
 from hardwall.sim.encoder import offsets
 
-CONTESTANT = accuracy.Contestant("period-count", "u")
+NAME = "period-count"
 
 
 def design(name: str) -> period_count.Design:
@@ -109,7 +109,7 @@ def velocities(signal, axis, backend, encoder=(0.0, 0.0, 0.0, 0.0)):
 def test_fixed_point_is_the_algorithm_rounded(rate):
     """Rounding is the only difference, at most half an LSB in every sample; and 1 % of the estimator's own error."""
     signal = replace(signals.paper(), seconds=0.3)
-    axis = accuracy.axis_spec(CONTESTANT, rate, signal.acceleration_max_m_per_s2)
+    axis = accuracy.axis_spec(NAME, rate, signal.acceleration_max_m_per_s2)
     fixed, flags = velocities(signal, axis, "fixed")
     real, _ = velocities(signal, axis, "float")
     assert flags == 0
@@ -124,7 +124,7 @@ def test_fixed_point_is_the_algorithm_rounded(rate):
 def test_errors_and_jumps_are_within_the_bounds(rate):
     """Braked through the switching speed at the axis's acceleration: each mode keeps its promise."""
     bound = 12.0
-    axis = accuracy.axis_spec(CONTESTANT, rate, bound)
+    axis = accuracy.axis_spec(NAME, rate, bound)
     d, unit = axis.design.estimator, axis.velocity_unit_m_per_s
     window, switch = 1 << d.window_bits, axis.design.gains.switch_m_per_s
     seconds = switch / bound + 4 * window / rate
@@ -148,7 +148,7 @@ def test_errors_and_jumps_are_within_the_bounds(rate):
 def test_misplaced_edges_change_nothing_below_the_switching_speed(errors):
     """Within the stamp's own error, v / D, of the exact speed."""
     signal = replace(signals.steady(29.7), seconds=0.05)
-    axis = accuracy.axis_spec(CONTESTANT, 100_000, signals.DEVICE_ACCELERATION)
+    axis = accuracy.axis_spec(NAME, 100_000, signals.DEVICE_ACCELERATION)
     seen, _ = velocities(signal, axis, "float", offsets(*errors))
     v = 29.7e-3 / axis.count_m / axis.clock_hz  # counts a clock
     settled = seen[math.ceil(12 / v / axis.clocks_per_sample) :] / axis.count_m / axis.clock_hz
