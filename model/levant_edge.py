@@ -62,7 +62,8 @@ stamps, then with B late by 0.25 count; hit: 0.35 kg at 0.3 m/s on 10 kN/m and 2
 
 Where it is worse than `levant` u1: at constant speed of a metre a second (0.22 against 0.013: the stamp over the
 shortest interval), for vibration of a count or so at hundreds of hertz (12 m/s^2 up to 1 kHz: 1.7 to 2.2 against 1.2,
-peaks of 17), and in the intervals after a stop from a millimetre a second or less.
+peaks of 17), in the intervals after a stop from a millimetre a second or less; and on recorded counts, whose edges have
+no stamps of their own: those made up between two samples are no better than the sample.
 
 Source: Levant 1998 for the law; implicit discretisation of sliding modes after Acary and Brogliato; its use on
 stamped edges with learnt places is this project's.
