@@ -153,14 +153,17 @@ class Design:
 
         lam_i = HEADROOM_BITS + bits_for(lam)
         self.lambda_ = UQ(lam_i, GAIN_BITS - lam_i)
-        root_f = max(bits_for(self._position_per_root(lam) / POSITION_BUDGET) - axis.estimator_bits_dropped, 0)
+        error_i = 1 + min(max(bits_for(self._catch(2 * speed, lam)), 1), axis.count_width - 1)
+        radicand_i = self._radicand_i(error_i)
+        # A radicand is one of 62 bits at most.
+        root_f = min(bits_for(self._position_per_root(lam) / POSITION_BUDGET), (62 - radicand_i) // 2)
+        root_f = max(root_f - axis.estimator_bits_dropped, 0)
         self.product = self.lambda_.f + root_f + 1
         f = axis.shrunk(self._fraction(axis, lam, alpha, f_max))
         self.velocity = SQ(i, f)
         self.alpha = UQ(HEADROOM_BITS + bits_for(alpha), f)
-        catch = max(bits_for(self._catch(2 * speed, lam)), 1)
-        self.error = SQ(1 + min(catch, axis.count_width - 1), f)
-        self.radicand = UQ(self._radicand_i(), 2 * root_f)
+        self.error = SQ(error_i, f)
+        self.radicand = UQ(radicand_i, 2 * root_f)
         self.root = UQ((self.radicand.width + 1) // 2 - root_f, root_f)
         # The step of u before it is limited, and one bit: in int64.
         _check(
@@ -204,9 +207,9 @@ class Design:
         """Return the error, in counts, that makes u step by `step`."""
         return (step / lam) ** 2
 
-    def _radicand_i(self) -> int:
-        """Return the integer bits of the radicand."""
-        return self.error.i - 1
+    def _radicand_i(self, error_i: int) -> int:
+        """Return the integer bits of the radicand, with those of the error."""
+        return error_i - 1
 
     @property
     def latency(self) -> int:

@@ -32,7 +32,8 @@ Formats are those of `levant_semi_implicit`, and differ thus:
   same u follows exactly from a beyond displaced by at most
   eta = 2 sqrt(beyond + lambda^2/4) delta / lambda + (delta / lambda)^2 + 2**-(2 root.f).
   At beyond = 1 count the slope is sqrt(4 + lambda^2): each of the two parts of delta is held to POSITION_BUDGET / 2
-  there, which at low rates takes a root of more bits than the explicit one. g is held within 0 to beyond.
+  there, which at low rates takes a root of more bits than the explicit one. (Where lambda is thousands, the radicand
+  would exceed int64: the root then has the bits that are left, and delta grows.) g is held within 0 to beyond.
 """
 
 import math
@@ -86,8 +87,8 @@ class Design(levant_semi_implicit.Design):
     def _position_per_root(self, lam: float) -> float:
         return math.sqrt(4 + lam**2)
 
-    def _radicand_i(self) -> int:
-        return max(self.error.i - 1, 2 * self.lambda_.i - 2) + 1
+    def _radicand_i(self, error_i: int) -> int:
+        return max(error_i - 1, 2 * self.lambda_.i - 2) + 1
 
     @property
     def quarter_shift(self) -> int:

@@ -156,7 +156,7 @@ def test_gains_at_the_least_and_the_largest_index():
 
 
 def test_default_bandwidth_is_that_of_the_bound_at_any_rate():
-    for rate in (1e5, 1e6, 1e7):
+    for rate in (100_000, 1_000_000, 10_000_000):
         axis = axis_at("kalman", rate)
         expected = math.sqrt(BOUND / axis.count_m) / rate
         # tanh, exp and coth are linear to the ratio of a sample to the minimax window.
