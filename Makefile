@@ -35,7 +35,7 @@ PYTEST := $(RUN) pytest -n 2 --dist worksteal
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test lint bench synth verilog soak clean distclean help tools FORCE
+.PHONY: all test lint bench synth choose figures verilog soak clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -53,6 +53,14 @@ bench: $(VENV)/.test | tools ## how fast the loop runs, beside cocotb
 synth: $(VENV)/.synth | tools ## size and fmax on both devices, median of several place-and-route seeds
 	@$(HARDWALL) synth mhz $(ON_ECP5) --seeds 3
 	@$(HARDWALL) synth mhz $(ON_ICE40) --seeds 3
+
+choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy, and cost on both devices (half an hour)
+	@$(HARDWALL) costs
+	@$(HARDWALL) choose
+
+figures: $(VENV)/.synth | tools ## the founding paper's figures 1 and 2, and what a bit buys, as pictures in build/ (half an hour)
+	@for number in 1 2; do $(HARDWALL) accuracy --figure $$number --plot build/figure-$$number.png; done
+	@$(HARDWALL) bits --plot build/bits.png
 
 verilog: $(VENV)/.sim | tools ## the axis of the scene as Verilog, in build/verilog/
 	@$(HARDWALL) verilog $(SCENE) --output-folder build/verilog

@@ -27,6 +27,7 @@ RATES_HZ = (1_000, 10_000_000)
 """The slowest and the fastest rate that is measured."""
 CLOCK_HZ = 50_000_000
 CLOCKS = 50
+DELAY_MAX_S = 0.1
 COARSEN = 16
 """A recording's counts are made so much coarser, and judged against the full ones."""
 
@@ -66,6 +67,20 @@ def axis_spec(
         gains=gains and estimators.load(estimator).Gains(**gains),
         estimator_bits_dropped=bits_dropped,
     )
+
+
+def spec_of(job: dict) -> AxisSpec:
+    """Return the axis that `measure` would measure for these arguments.
+
+    Raises:
+        ValueError: if there is no such axis; the message names the field.
+    """
+    bound = job.get("acceleration_max_m_per_s2") or signals.load(job["signal"]).acceleration_max_m_per_s2
+    name, rate = job["estimator"], job["sample_hz"]
+    try:
+        return axis_spec(name, rate, bound, job.get("gains"), job.get("bits_dropped", 0))
+    except ValueError as error:
+        raise ValueError(f"{name} at {rate} Hz with C {bound:g} m/s^2: {error}") from None
 
 
 @compiled
@@ -110,11 +125,16 @@ def measure(
         RuntimeError: if the RTL could not be built.
     """
     known = signals.load(signal)
-    bound = acceleration_max_m_per_s2 or known.acceleration_max_m_per_s2
-    try:
-        spec = axis_spec(estimator, sample_hz, bound, gains, bits_dropped)
-    except ValueError as error:
-        raise ValueError(f"{estimator} at {sample_hz} Hz with C {bound:g} m/s^2: {error}") from None
+    spec = spec_of(
+        {
+            "estimator": estimator,
+            "signal": signal,
+            "sample_hz": sample_hz,
+            "acceleration_max_m_per_s2": acceleration_max_m_per_s2,
+            "gains": gains,
+            "bits_dropped": bits_dropped,
+        }
+    )
     begin = math.ceil(known.judged_from_s * sample_hz)
     judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
     for first, words, flags in velocities(known, spec, output, backend, offsets(phase_error_counts)):
@@ -131,22 +151,31 @@ def measure(
         "signal": signal,
         "rms_mm_s": judge.rms * 1e3,
         "max_mm_s": judge.largest * 1e3,
-        "delay_s": judge.delay_s(lambda times: exact_velocity(known.motion, times + begin / sample_hz)),
+        "delay_s": judge.delay_s(
+            lambda times: exact_velocity(known.motion, times + begin / sample_hz), known.delay_max_s
+        ),
         "chatter_mm_s": judge.chatter * 1e3,
         "clock_hz": spec.clock_hz,
         "velocity_bits": spec.design.estimator.velocity.width,
         "encoder_phase_error_counts": phase_error_counts,
-        "acceleration_max_mm_s2": bound * 1e3,
+        "acceleration_max_mm_s2": spec.acceleration_max_m_per_s2 * 1e3,
         "gains": asdict(spec.design.gains),
         "flags": spec.design.flag_names(raised),
     }
 
 
-def measure_recording(estimator: str, output: str, file: str, column: str, backend: str = "float") -> dict:
+def measure_recording(
+    estimator: str, output: str, file: str, column: str, backend: str = "float", content: str = ""
+) -> dict:
     """Return one row of a recording at its own rate, its counts `COARSEN` times coarser, in recorded counts.
 
     What a count is in mm the file does not say, so the keys of figures end in `_counts_s`. Held against the zero-phase
     derivative of the full counts; a recording has no clock stamps, so edges are spread evenly over each sample.
+
+    Args:
+        estimator, output, backend: as for `measure`.
+        file, column: of the recording.
+        content: a digest of the file, for a result that is kept to belong to.
 
     Raises:
         RecordingError, ReplayError: in one line, what cannot be and what is accepted.
@@ -166,7 +195,7 @@ def measure_recording(estimator: str, output: str, file: str, column: str, backe
         "signal": f"{file}:{column}",
         "rms_counts_s": judge.rms,
         "max_counts_s": judge.largest,
-        "delay_s": judge.delay_s(lambda wanted: np.interp(wanted, times, exact)),
+        "delay_s": judge.delay_s(lambda wanted: np.interp(wanted, times, exact), DELAY_MAX_S),
         "chatter_counts_s": judge.chatter,
         "acceleration_max_counts_s2": result.acceleration_max_counts_per_s2,
         "gains": result.gains,

@@ -1,5 +1,6 @@
 """The commands that compare velocity estimators."""
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Annotated
@@ -9,8 +10,10 @@ import typer
 from ..model import estimators
 from .terminal import Backend, BadInput, Device, JsonOption, PlotOption, log, output_file, progress, show_table
 
-COLUMNS = {"estimator": "left", "signal": "left", "rate (Hz)": "right", "RMS (mm/s)": "right", "largest": "right"}
-COLUMNS |= {"chatter": "right", "delay (us)": "right", "flags": "left"}
+COLUMNS = {"estimator": "left", "signal": "left"} | dict.fromkeys(("rate (Hz)", "RMS", "largest", "chatter"), "right")
+COLUMNS |= {"unit": "left", "delay (us)": "right", "flags": "left"}
+DRAWN_HZ_MAX = 100_000
+"""Figure 1 is drawn sample by sample."""
 
 EstimatorsOption = Annotated[
     str | None, typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="which [default: all]")
@@ -18,19 +21,19 @@ EstimatorsOption = Annotated[
 WorkersOption = Annotated[int | None, typer.Option(min=1, help="processes [default: one a core]")]
 
 
-def _rates(text: str | None, usual: tuple[int, ...]) -> list[int]:
+def _rates(text: str, option: str) -> list[int]:
     from .accuracy import RATES_HZ  # noqa: PLC0415  (kernels are loaded only where they run)
 
     rates = []
-    for word in text.split(",") if text else ():
+    for word in text.split(","):
         try:
             rate = float(word)
         except ValueError:
             rate = 0.0
         if not (RATES_HZ[0] <= rate <= RATES_HZ[1] and rate == int(rate)):
-            raise BadInput(f"--rates must be whole numbers of {RATES_HZ[0]:g} to {RATES_HZ[1]:g} Hz, not {word!r}")
+            raise BadInput(f"{option} must be whole numbers of {RATES_HZ[0]:g} to {RATES_HZ[1]:g} Hz, not {word!r}")
         rates.append(int(rate))
-    return list(dict.fromkeys(rates)) or list(usual)
+    return list(dict.fromkeys(rates))
 
 
 def _line(row: dict) -> list[str]:
@@ -39,7 +42,8 @@ def _line(row: dict) -> list[str]:
     delay = "" if row["delay_s"] is None else f"{row['delay_s'] * 1e6:.4g}"
     rms, largest, chatter = figures
     name = f"{row['estimator']} {row['output']}"
-    return [name, row["signal"], f"{row['sample_hz']:g}", rms, largest, chatter, delay, ", ".join(row["flags"])]
+    shown = [name, row["signal"], f"{row['sample_hz']:g}", rms, largest, chatter]
+    return [*shown, unit.replace("_", "/"), delay, ", ".join(row["flags"])]
 
 
 def _curves(figure: int | None, wanted: str | None) -> list:
@@ -51,10 +55,16 @@ def _curves(figure: int | None, wanted: str | None) -> list:
         return figures.curves(figure)
     names = estimators.ESTIMATORS if wanted is None else wanted.split(",")
     try:
-        pairs = [pair for name in names for pair in outputs(name)]
+        pairs = [pair for name in names for pair in outputs(name.strip())]
     except ValueError as error:
         raise BadInput(f"--estimators: {error}") from None
     return [figures.Curve(figures.label(*pair), *pair) for pair in dict.fromkeys(pairs)]
+
+
+def _recording(name: str) -> tuple[str, str]:
+    """Return the file and the column of a signal `FILE.csv:COLUMN`; a column may have a colon."""
+    stem, _, column = name.partition(".csv:")
+    return f"{stem}.csv", column
 
 
 def _check_signals(names: list[str]) -> list[str]:
@@ -80,7 +90,9 @@ def accuracy(
     wanted: EstimatorsOption = None,
     rates: Annotated[str | None, typer.Option(metavar="HZ,...", help="sample rates, e.g. 1e3,10e3,1e6")] = None,
     backend: Annotated[Backend, typer.Option(help="float64 algorithm, bit-accurate model, or RTL")] = "float",
-    encoder_phase_error: Annotated[float, typer.Option(metavar="COUNTS", help="channel B late by so much")] = 0.0,
+    encoder_phase_error: Annotated[
+        float, typer.Option(metavar="COUNTS", help="channel B late by so much, -0.95 to 0.95")
+    ] = 0.0,
     acceleration_max: Annotated[
         float | None, typer.Option(metavar="C", help="m/s^2, sets the gains [default: the signal's own]")
     ] = None,
@@ -90,21 +102,30 @@ def accuracy(
 ) -> None:
     """Hold velocity estimators against the exact derivative of known motions, at any rate."""
     from . import figures, parallel  # noqa: PLC0415
-    from .accuracy import measure, measure_recording  # noqa: PLC0415
+    from .accuracy import measure, measure_recording, spec_of  # noqa: PLC0415
     from .encoder import offsets  # noqa: PLC0415
-    from .plot_accuracy import SUFFIXES  # noqa: PLC0415
+    from .plot_accuracy import SUFFIXES, against_rate, figure_1, save  # noqa: PLC0415
     from .recording import RecordingError  # noqa: PLC0415
+    from .recording import load as load_recording  # noqa: PLC0415
     from .replay import ReplayError  # noqa: PLC0415
     from .store import Store  # noqa: PLC0415
 
     if figure and signal:
         raise BadInput(f"--figure {figure} has a signal of its own: give it or --signal, not both")
-    names, curves = signal or ["paper"], _curves(figure, wanted)
+    names, curves = list(dict.fromkeys(signal or ["paper"])), _curves(figure, wanted)
     recordings = _check_signals(names)
+    given = rates is not None or encoder_phase_error or acceleration_max is not None
+    if given and len(recordings) == len(names):
+        raise BadInput(
+            "--rates, --encoder-phase-error and --acceleration-max are for known motions: a recording has its own"
+        )
     if acceleration_max is not None and not 0 < acceleration_max < 1e6:
         raise BadInput(f"--acceleration-max must be more than 0 and less than 1e6 m/s^2, not {acceleration_max!r}")
     if plot and (recordings or len(names) > 1):
         raise BadInput("--plot draws error against rate for one signal that is no recording: give one --signal")
+    at = figures.RATES_HZ[figure or 2] if rates is None else _rates(rates, "--rates")
+    if plot and figure == 1 and (len(at) > 1 or at[0] > DRAWN_HZ_MAX):
+        raise BadInput(f"--figure 1 is drawn at one rate of at most {DRAWN_HZ_MAX:g} Hz, not {rates!r}")
     plot = output_file(plot, "--plot", SUFFIXES)
     options = {"backend": backend, "phase_error_counts": encoder_phase_error}
     if acceleration_max is not None:
@@ -112,17 +133,28 @@ def accuracy(
     # The fastest rates take longest: they go first.
     jobs = [
         (curve.label, curve.job(name, rate, **options))
-        for rate in sorted(_rates(rates, figures.RATES_HZ[figure or 2]), reverse=True)
+        for rate in sorted(at, reverse=True)
         for name in names
         if name not in recordings
         for curve in curves
     ]
+    files = [
+        {"estimator": curve.estimator, "output": curve.output, "file": file, "column": column, "backend": backend}
+        for file, column in (_recording(name) for name in recordings)
+        for curve in curves
+    ]
     try:
         offsets(encoder_phase_error)
+        # What cannot be is said before anything long begins.
+        for _, job in jobs:
+            spec_of(job)
+        for file, column in (_recording(name) for name in recordings):
+            load_recording(file, column)
+        files = [job | {"content": hashlib.sha256(Path(job["file"]).read_bytes()).hexdigest()} for job in files]
         with progress(f"accuracy, {backend}", len(jobs)) as advance:
             rows = parallel.run(measure, [job for _, job in jobs], Store("accuracy"), workers, advance)
-        for file, column in (name.rsplit(":", 1) for name in recordings):
-            rows += [measure_recording(curve.estimator, curve.output, file, column, backend) for curve in curves]
+        with progress(f"recordings, {backend}", len(files)) as advance:
+            rows += parallel.run(measure_recording, files, Store("recordings"), workers, advance)
     except (ValueError, RecordingError, ReplayError) as error:
         raise BadInput(str(error)) from None
     if as_json:
@@ -130,18 +162,9 @@ def accuracy(
     else:
         show_table(COLUMNS, [_line(row) for row in sorted(rows, key=lambda row: (row["signal"], row["sample_hz"]))])
     if plot:
-        _draw(figure, curves, [name for name, _ in jobs], rows, plot)
-
-
-def _draw(figure: int | None, curves: list, labels: list[str], rows: list[dict], path: Path) -> None:
-    from . import plot_accuracy  # noqa: PLC0415
-
-    if figure == 1:
-        picture = plot_accuracy.figure_1(curves, rows[0]["backend"], rows[0]["sample_hz"])
-    else:
-        picture = plot_accuracy.against_rate(rows, labels)
-    plot_accuracy.save(picture, path)
-    log.print(f"picture: {path}")
+        labels = [label for label, _ in jobs]
+        save(figure_1(curves, rows) if figure == 1 else against_rate(rows, labels), plot)
+        log.print(f"picture: {plot}")
 
 
 COST_COLUMNS = {"estimator": "left", "device": "left"} | dict.fromkeys(
@@ -198,7 +221,7 @@ def choose(
     from .accuracy import measure  # noqa: PLC0415
     from .store import Store  # noqa: PLC0415
 
-    (sample_hz,) = _rates(str(rate), ())
+    (sample_hz,) = _rates(str(rate), "--rate")
     pairs = [(curve.estimator, curve.output) for curve in _curves(None, wanted)]
     jobs = situations.jobs(pairs, sample_hz, backend)
     try:
@@ -238,7 +261,7 @@ def bits(
     from .store import Store  # noqa: PLC0415
 
     plot = output_file(plot, "--plot", SUFFIXES)
-    (sample_hz,) = _rates(str(rate), ())
+    (sample_hz,) = _rates(str(rate), "--rate")
     jobs = [
         {"estimator": curve.estimator, "output": curve.output, "sample_hz": sample_hz, "bits_dropped": dropped}
         for curve in _curves(None, wanted)

@@ -17,8 +17,9 @@ import numpy as np
 from ..model import estimators
 from . import signals
 from .accuracy import exact_velocity
+from .scene import load
 
-COUNT_M = 1e-6
+COUNT_M = load("mhz").encoder.count_m
 RATES_HZ = {
     1: (10_000,),
     2: (*(step * 10**decade for decade in (3, 4, 5, 6) for step in (1, 2, 5)), 10_000_000),
@@ -36,7 +37,8 @@ class Curve:
     Attributes:
         label: in the legend.
         estimator, output: their names.
-        gains: by the rate, for an estimator whose gains are not the default ones.
+        gains: others than the default ones, by name.
+        cutoff_of_rate: a cutoff, as a share of the sample rate, in their place.
     """
 
     label: str

@@ -4,7 +4,8 @@ With v the true velocity and w the estimate, over the judged samples:
 
 - `rms`, `largest`: of w - v;
 - `chatter`: RMS of w - v less its mean over each 10 ms: the part that a damper turns into noise;
-- `delay_s`: that d for which v(t - d) correlates best with w(t); None where v does not vary, or w is nothing.
+- `delay_s`: that d for which v(t - d) correlates best with w(t); None where v does not vary, w is nothing, or no such d
+  is within the limits.
 
 The correlation is over means of blocks, at most `DELAY_POINTS` of them; within a block v must be as good as straight.
 """
@@ -17,7 +18,6 @@ from scipy.optimize import minimize_scalar
 
 CHATTER_S = 0.01
 DELAY_POINTS = 1 << 15
-DELAY_MAX_S = 0.1
 DELAY_STEPS = 400
 
 
@@ -72,8 +72,13 @@ class Judge:
         slow = float(np.average(self._slow.values**2, weights=self._slow.lengths))
         return math.sqrt(max(self._squares / self._samples - slow, 0.0))
 
-    def delay_s(self, exact_at: Callable[[np.ndarray], np.ndarray]) -> float | None:
-        """Return the delay; `exact_at` gives the true velocity at times in seconds since the first sample."""
+    def delay_s(self, exact_at: Callable[[np.ndarray], np.ndarray], within_s: float) -> float | None:
+        """Return the delay.
+
+        Args:
+            exact_at: gives the true velocity at times in seconds since the first sample.
+            within_s: look for it from minus to plus this; less than half a period of what is periodic.
+        """
         times, estimate = self._shape.middles / self._sample_hz, self._shape.values
         if np.ptp(exact_at(times)) < 1e-9 or not estimate.any():
             return None
@@ -82,7 +87,10 @@ class Judge:
             exact = exact_at(times - delay_s)
             return -float(estimate @ exact) / math.sqrt(float(exact @ exact))
 
-        tried = np.linspace(-DELAY_MAX_S, DELAY_MAX_S, DELAY_STEPS + 1)
-        best, step = tried[int(np.argmin([mismatch(delay_s) for delay_s in tried]))], tried[1] - tried[0]
+        tried = np.linspace(-within_s, within_s, DELAY_STEPS + 1)
+        number = int(np.argmin([mismatch(delay_s) for delay_s in tried]))
+        if number in (0, DELAY_STEPS):
+            return None
+        best, step = tried[number], tried[1] - tried[0]
         found = minimize_scalar(mismatch, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9})
         return float(found.x)

@@ -5,6 +5,7 @@ import os
 import signal
 from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import suppress
 from typing import Any
 
 from .store import Store
@@ -14,9 +15,17 @@ class Interrupted(RuntimeError):
     """The user wants no more; what was done is kept."""
 
 
-def _deaf() -> None:
-    """Leave interrupts to the parent, which ends its workers."""
+def _alone() -> None:
+    """Make a worker the head of its own group, which the parent ends as a whole; leave interrupts to the parent."""
+    os.setpgrp()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _end(worker: multiprocessing.Process) -> None:
+    """End a worker, and what it has started."""
+    with suppress(ProcessLookupError):
+        os.killpg(worker.pid, signal.SIGKILL)
+    worker.kill()
 
 
 def run(
@@ -40,7 +49,7 @@ def run(
         Interrupted: by the user; the workers are ended.
     """
     jobs = list(jobs)
-    left = [job for index, job in enumerate(jobs) if store.get(job) is None and job not in jobs[:index]]
+    left = [job for index, job in enumerate(jobs) if job not in store and job not in jobs[:index]]
     done = len(jobs) - len(left)
 
     def keep(job: dict, result: Any) -> None:
@@ -57,7 +66,7 @@ def run(
     else:
         # Spawned: a fork would copy a process that has threads.
         context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=_deaf) as pool:
+        with ProcessPoolExecutor(workers, mp_context=context, initializer=_alone) as pool:
             futures = {pool.submit(function, **job): job for job in left}
             # This process only waits, so that here an interrupt may be raised: compiled code would not survive it.
             before = signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -68,7 +77,7 @@ def run(
                 alive = multiprocessing.active_children()
                 pool.shutdown(wait=False, cancel_futures=True)
                 for worker in alive:
-                    worker.kill()
+                    _end(worker)
                 if isinstance(error, KeyboardInterrupt):
                     raise Interrupted("interrupted") from None
                 raise

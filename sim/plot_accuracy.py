@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from . import signals
 from .accuracy import axis_spec, exact_velocity
+from .encoder import offsets
 from .figures import Curve, label, lower_bound_m_per_s, window_floor_m_per_s
 from .stream import velocities
 from .whole_file import whole_file
@@ -17,6 +18,8 @@ SUFFIXES = (".pdf", ".png", ".svg")
 MARKERS = "osv^<>DPX*hpd"
 REACHING_S = (0.0, 0.06)
 TURNING_S = (1.2, 1.28)
+LEAST_MM_S = 1e-6
+"""What is less is drawn as this: an axis of decades has no zero."""
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -30,17 +33,21 @@ def save(figure: Figure, path: Path) -> None:
         figure.savefig(part, format=path.suffix[1:], dpi=150, metadata=metadata)
 
 
-def figure_1(curves: list[Curve], backend: str, sample_hz: int) -> Figure:
-    """Return the paper's first figure: estimates of a decaying sine over time, and two pieces of it enlarged."""
-    signal = signals.load("paper")
+def figure_1(curves: list[Curve], rows: list[dict]) -> Figure:
+    """Return the paper's first figure: estimates of a decaying sine over time, and two pieces of it enlarged.
+
+    Args:
+        curves: what to draw.
+        rows: of `accuracy.measure`, one for each: at which rate, on which backend, with which gains and encoder.
+    """
+    signal, backend, sample_hz = signals.load("paper"), rows[0]["backend"], rows[0]["sample_hz"]
     picture = Figure(figsize=(10, 7), layout="constrained")
     panels = picture.subplot_mosaic("aa;bc", height_ratios=(1, 1.2))
     times = np.arange(int(signal.seconds * sample_hz)) / sample_hz
     exact = exact_velocity(signal.motion, times)
-    for curve in curves:
-        bound = signal.acceleration_max_m_per_s2
-        spec = axis_spec(curve.estimator, sample_hz, bound, curve.job("paper", sample_hz)["gains"])
-        parts = velocities(signal, spec, curve.output, backend, (0.0, 0.0, 0.0, 0.0))
+    for curve, row in zip(curves, rows, strict=True):
+        spec = axis_spec(row["estimator"], sample_hz, row["acceleration_max_mm_s2"] / 1e3, row["gains"])
+        parts = velocities(signal, spec, row["output"], backend, offsets(row["encoder_phase_error_counts"]))
         estimate = np.concatenate([part for _, part, _ in parts])
         for axes in panels.values():
             axes.plot(times, estimate * 1e3, lw=0.9, label=curve.label)
@@ -62,24 +69,26 @@ def figure_1(curves: list[Curve], backend: str, sample_hz: int) -> Figure:
     return picture
 
 
-def against_rate(rows: list[dict], labels: list[str], key: str = "rms_mm_s") -> Figure:
-    """Return the picture of a figure of merit against the sample rate, a curve for each label.
+def against_rate(rows: list[dict], labels: list[str]) -> Figure:
+    """Return the picture of the RMS error against the sample rate, a curve for each label.
 
     Args:
         rows: of `accuracy.measure`, all of one signal.
         labels: what each row is called.
-        key: which figure.
     """
     picture = Figure(figsize=(10, 8), layout="constrained")
     axes = picture.subplots()
     names = list(dict.fromkeys(labels))
     colours = mpl.colormaps["tab20"].colors
     for index, name in enumerate(names):
-        points = [(row["sample_hz"], row[key]) for row, of in zip(rows, labels, strict=True) if of == name]
+        points = [
+            (row["sample_hz"], max(row["rms_mm_s"], LEAST_MM_S))
+            for row, of in zip(rows, labels, strict=True)
+            if of == name
+        ]
         style = {"color": colours[index % 20], "marker": MARKERS[index % len(MARKERS)], "ms": 4, "lw": 1.3}
         axes.plot(*zip(*sorted(points), strict=True), label=name, **style)
-    if key == "rms_mm_s" and rows[0]["signal"] in signals.SIGNALS:
-        _bounds(axes, rows)
+    _bounds(axes, rows)
     first = rows[0]
     phase = first["encoder_phase_error_counts"]
     encoder = f", encoder out of phase by {phase:g} counts" if phase else ""
@@ -87,7 +96,7 @@ def against_rate(rows: list[dict], labels: list[str], key: str = "rms_mm_s") -> 
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlabel("sample rate (Hz)")
-    axes.set_ylabel({"rms_mm_s": "RMS error (mm/s)", "max_mm_s": "largest error (mm/s)"}[key])
+    axes.set_ylabel("RMS error (mm/s)")
     axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize=7.5, ncols=1, loc="center left", bbox_to_anchor=(1.0, 0.5))
     return picture

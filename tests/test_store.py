@@ -1,5 +1,7 @@
 """Results that took time: kept as they come, found again, and given up when the sources change."""
 
+import multiprocessing
+
 import pytest
 
 from hardwall.sim import parallel, store
@@ -29,15 +31,20 @@ def test_what_was_put_is_there_for_the_next(tmp_path):
     assert list(tmp_path.rglob("*.jsonl")) == [Store("some").path]
 
 
-def test_a_line_that_was_cut_off_is_no_result():
+def test_a_line_that_was_cut_off_is_no_result_and_spoils_none():
     kept = Store("some")
     kept.put({"a": 1}, 1)
     kept.put({"a": 2}, 2)
     kept.path.write_text(kept.path.read_text()[:-4])
     again = Store("some")
-    assert (again.get({"a": 1}), again.get({"a": 2})) == (1, None)
+    assert (again.get({"a": 1}), {"a": 2} in again) == (1, False)
     again.put({"a": 2}, 2)
     assert Store("some").get({"a": 2}) == 2
+
+
+def test_nothing_is_a_result_too():
+    Store("some").put({"a": 1}, None)
+    assert {"a": 1} in Store("some")
 
 
 def test_other_sources_begin_anew(monkeypatch):
@@ -56,9 +63,14 @@ def test_jobs_give_results_in_their_order_and_once(workers):
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_a_job_that_fails_loses_none_that_was_done(workers):
-    jobs = [{"number": number} for number in (1, 2, -3)]
+def test_a_job_that_fails_ends_the_run_and_loses_none_that_was_done(workers):
+    jobs = [{"number": number} for number in (1, 2, -3, 4)]
+    done = []
     with pytest.raises(ValueError, match=r"^number must be 0 or more, not -3$"):
-        parallel.run(square, jobs[: 2 if workers == 1 else 0] + jobs[2:], Store("squares"), workers)
-    parallel.run(square, jobs[:2], Store("squares"), workers)
-    assert parallel.run(refuse, jobs[:2], Store("squares"), workers) == [{"square": 1}, {"square": 4}]
+        parallel.run(square, jobs, Store("squares"), workers, done.append)
+    kept = Store("squares")
+    assert sum(job in kept for job in jobs) == len(done)
+    assert jobs[2] not in kept
+    if workers == 1:
+        assert len(done) == 2
+    assert multiprocessing.active_children() == []
