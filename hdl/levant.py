@@ -19,7 +19,7 @@ class Estimator(EstimatorBlock):
         x  <- x + u
         u1 <- u1 - alpha sign(e)
 
-    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: no false transient.
+    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: from rest, no false transient.
 
     Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
     `valid`.

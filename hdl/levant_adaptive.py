@@ -21,7 +21,8 @@ class Estimator(levant_semi_implicit.Estimator):
     j falls as soon as |b| is more than quantisation explains, to what the time since b changed its sign asks for; it
     rises by one after a time of calm. The module of the design has the law.
 
-    Start: at the first sample, and with `restart`, x = count, u1 = 0 and j = 0, so u = 0: no false transient.
+    Start: at the first sample, and with `restart`, x = count, u1 = 0 and j = 0, so u = 0: from rest, no false
+    transient.
 
     Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
     `valid`.

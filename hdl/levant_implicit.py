@@ -18,7 +18,7 @@ class Estimator(levant_semi_implicit.Estimator):
         u  = u1 - sign(b) g,        g = lambda sqrt(beyond + lambda^2 / 4) - lambda^2 / 2,    beyond = |b| - near
         x  <- x + u
 
-    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: no false transient.
+    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: from rest, no false transient.
 
     Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
     `valid`. One multiplier, for lambda^2 before the root and for lambda times the root after it.

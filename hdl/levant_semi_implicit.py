@@ -20,7 +20,7 @@ class Estimator(EstimatorBlock):
         u  = u1 - sign(b) g,        g = min(lambda sqrt(beyond), beyond),    beyond = |b| - near
         x  <- x + u
 
-    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: no false transient.
+    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: from rest, no false transient.
 
     Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
     `valid`.

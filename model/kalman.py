@@ -48,7 +48,8 @@ Formats, derived. C' = C tau^2 / q; 2**reach is no less than 1/h nor than 1.
   for gains of the designed h or a larger one that the words hold; with a smaller one the last bits may move.
 - int64 ends at 62 bits: f gives way.
 
-Restart and the first sample: all states 0.
+Restart and the first sample: all states 0; the count may wrap. From rest that is no transient; out of a motion it is
+the step response, as for any step of velocity: about 41 % over, and settled in a few times sqrt(q / C).
 """
 
 import math
@@ -60,7 +61,7 @@ import numpy as np
 from .compiled import compiled
 from .estimators import estimate
 from .fixed import SQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
-from .words import GAIN_BITS, Word, gain_format
+from .words import GAIN_BITS, Word, check_positive, gain_format
 
 OUTPUTS = ("u",)
 RESOLUTION_BITS = 11
@@ -95,9 +96,7 @@ class Gains:
     noise_time_s: float
 
     def __post_init__(self):
-        for name, value in vars(self).items():
-            if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
+        check_positive(self)
 
     @classmethod
     def default(cls, axis) -> "Gains":

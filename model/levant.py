@@ -29,6 +29,12 @@ Formats, derived. Let lam = lambda tau / sqrt(q) and alp = alpha tau^2 / q be th
 
 Both states saturate at the velocity format (flag `velocity_saturated`).
 
+Ends. The count may wrap. The first sample, and one with `restart`, begins with x = count and u1 = 0: from rest there is
+no transient; out of a motion u0 it is that of a step of u0, which u overshoots by about 40 % and follows in about
+2 u0 / alpha, as it does the largest step (0.3 m/s with C = 12 m/s^2: 0.42 m/s at most, 43 ms). Up to the largest speed
+nothing saturates once that is over. At standstill u and u1 never come to rest but chatter by lambda sqrt(alpha tau^2)
+and alpha tau: see `levant_semi_implicit` for what does.
+
 `levant_semi_implicit`, `levant_implicit` and `levant_adaptive` take from here what they have in common with it.
 """
 
@@ -41,7 +47,7 @@ from .estimators import estimate, output_word
 from .fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from .sqrt import isqrt
 from .sqrt import latency as sqrt_latency
-from .words import GAIN_BITS, Word
+from .words import GAIN_BITS, Word, check_positive
 
 OUTPUTS = ("u", "u1")
 ALPHA_BITS = 9
@@ -66,9 +72,7 @@ class Gains:
     alpha_m_per_s2: float
 
     def __post_init__(self):
-        for name, value in vars(self).items():
-            if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
+        check_positive(self)
 
     @classmethod
     def default(cls, axis) -> "Gains":

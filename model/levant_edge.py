@@ -90,8 +90,8 @@ Saturation. v and u at the velocity format (flag `velocity_saturated`); the dist
 and what is learnt saturate silently: as limits they are part of the law, in float64 too.
 
 Ends. The count may wrap, and the stamp: differences are modulo their widths. The first sample, and one with `restart`,
-forgets all, the places too; u = 0 until the second edge after it. An interval of half the stamp's range or more says
-only where the axis is.
+forgets all, the places too; u = 0 until the second edge in use after it, so a reset in motion is no transient. An
+interval of half the stamp's range or more says only where the axis is.
 """
 
 import math
@@ -103,10 +103,11 @@ from .divide import divide
 from .divide import latency as divide_latency
 from .estimators import estimate
 from .fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
-from .quadrature import RUN_MAX, Seen
+from .levant import sign_of
+from .quadrature import RUN_MAX, Seen, stamp_of
 from .sqrt import isqrt
 from .sqrt import latency as sqrt_latency
-from .words import GAIN_BITS, Word
+from .words import GAIN_BITS, Word, check_positive
 
 OUTPUTS = ("u",)
 HEADROOM_BITS = 2
@@ -145,9 +146,7 @@ class Gains:
     alpha_m_per_s3: float
 
     def __post_init__(self):
-        for name, value in vars(self).items():
-            if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
+        check_positive(self)
 
     @classmethod
     def default(cls, axis) -> "Gains":
@@ -391,13 +390,6 @@ def _kind(seen):
 
 
 @compiled
-def _last_stamp(seen):
-    if seen.edge < 2:
-        return seen.stamp_b_rise if seen.edge else seen.stamp_a_rise
-    return seen.stamp_b_fall if seen.edge & 1 else seen.stamp_a_fall
-
-
-@compiled
 def _shifted(places, to, since, by, low, high):
     """Return the places with that of kind `to` higher and that of kind `since` lower, within `low` to `high`."""
     return (
@@ -414,12 +406,6 @@ def _within(line, velocity, bound):
     if velocity < 0:
         return saturate(line, -max(bound + velocity, 0), -velocity)
     return saturate(line, -velocity, max(bound - velocity, 0))
-
-
-@compiled
-def _sign(value):
-    # int() for plain Python on numpy scalars, whose truths do not subtract.
-    return int(value > 0) - int(value < 0)
 
 
 @compiled
@@ -451,7 +437,7 @@ def _correct(params, state, seen, interval, passed):
     distance = _fitted(passed, params.distance_max)
     place = shift_floor(distance * params.clocks, -params.place_fraction) + places[kind] - places[state.kind]
     error = shift_floor(mean * time, params.error_shift) - shift_floor(place, shift - params.place_shift)
-    sign, size = _sign(error), abs(error)
+    sign, size = sign_of(error), abs(error)
 
     slope = divide(size << params.error_shift, time, params.quotient_width)
     change, bend = slope, min(shift_floor(slope, params.slope_shift + length), steepest)
@@ -476,10 +462,10 @@ def _correct(params, state, seen, interval, passed):
 def step(params, state, seen, restart):
     fresh = restart or not state.running
     if fresh:
-        state = State(1, 0, _number(params, seen), _last_stamp(seen), _kind(seen), 0, 0, 0, (0, 0, 0, 0))
+        state = State(1, 0, _number(params, seen), stamp_of(seen, seen.edge), _kind(seen), 0, 0, 0, (0, 0, 0, 0))
     mask, far = (1 << params.stamp_width) - 1, params.stamp_width - 1
     most = params.velocity_max
-    interval = (_last_stamp(seen) - state.stamp) & mask
+    interval = (stamp_of(seen, seen.edge) - state.stamp) & mask
     passed = wrap(_number(params, seen) - state.number, params.count_width)
     age = (seen.stamp - state.stamp) & mask
 
@@ -500,7 +486,7 @@ def step(params, state, seen, restart):
             taken = 0
     number, stamp, kind = state.number, state.stamp, state.kind
     if new and taken:
-        number, stamp, kind = _number(params, seen), _last_stamp(seen), _kind(seen)
+        number, stamp, kind = _number(params, seen), stamp_of(seen, seen.edge), _kind(seen)
         age = (seen.stamp - stamp) & mask
 
     if taken and (age >> far or age >> (length + REST_BITS)):
@@ -522,7 +508,7 @@ def _float_correct(params, state, seen, interval, passed):
     turn = acceleration * interval
     place = passed * params.clocks + places[kind] - places[state.kind]
     error = (velocity + turn / 2) * interval - place
-    sign, slope = _sign(error), abs(error) / interval
+    sign, slope = sign_of(error), abs(error) / interval
     change, bend = slope, slope / scale
     if interval >> params.mantissa == 0:
         change = min(change, params.lambda_ * math.sqrt(abs(error) * scale))
@@ -542,9 +528,11 @@ def float_step(params, state, seen, restart):
     """The same algorithm in float64, unsaturated: the reference for what fixed point costs."""
     fresh = restart or not state.running
     if fresh:
-        state = State(1, 0, _number(params, seen), _last_stamp(seen), _kind(seen), 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
+        state = State(
+            1, 0, _number(params, seen), stamp_of(seen, seen.edge), _kind(seen), 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0)
+        )
     mask, far = (1 << params.stamp_width) - 1, params.stamp_width - 1
-    interval = (_last_stamp(seen) - state.stamp) & mask
+    interval = (stamp_of(seen, seen.edge) - state.stamp) & mask
     passed = wrap(_number(params, seen) - state.number, params.count_width)
     age = (seen.stamp - state.stamp) & mask
 
@@ -563,7 +551,7 @@ def float_step(params, state, seen, restart):
             taken = 0
     number, stamp, kind = state.number, state.stamp, state.kind
     if new and taken:
-        number, stamp, kind = _number(params, seen), _last_stamp(seen), _kind(seen)
+        number, stamp, kind = _number(params, seen), stamp_of(seen, seen.edge), _kind(seen)
         age = (seen.stamp - stamp) & mask
 
     if taken and (age >> far or age >> (length + REST_BITS)):

@@ -9,8 +9,9 @@ clocks a sample, velocities in counts a sample and times in clocks:
     bound    |v| <= 3 c / 2 A   the last edge was A ago, and the next is at most 1.5 counts from it
              |v| <= 4 c / B     the edge three before it was B ago, and the next is of one kind with that
 
-A cycle is used only if all its edges went one way; of those that lie in one sample all are used (m > 1), so the mean
-is over a sample or a cycle, whichever is longer. A gap is off by twice the encoder's error, relative; it serves for at
+A cycle is used only if all its edges went one way, as far as samples tell: where one hides a turn and a turn back, v is
+the mean over it. Of the cycles that lie in one sample all are used (m > 1), so the mean is over a sample or a cycle,
+whichever is longer. A gap is off by twice the encoder's error, relative; it serves for at
 most four edges after a turn (for the paper's signal at 1 MHz, RMS in mm/s: nothing until there is a cycle 0.120, half
 of the gap's speed 0.101, all edges since the turn 0.094, the gap 0.092). With one edge in this direction v = 0.
 
@@ -52,7 +53,7 @@ from .divide import divide
 from .divide import latency as divide_latency
 from .estimators import estimate
 from .fixed import SQ, bits_for, wrap
-from .quadrature import RUN_MAX, Seen
+from .quadrature import RUN_MAX, Seen, stamp_of
 
 OUTPUTS = ("u",)
 ERROR_SHARE = 0.01
@@ -193,29 +194,21 @@ class Design:
 
 
 @compiled
-def _stamp(record, kind):
-    """Return the stamp of a kind: of what is `Seen`, or of `Memory`."""
-    low = record.stamp_b_rise if kind & 1 else record.stamp_a_rise
-    high = record.stamp_b_fall if kind & 1 else record.stamp_a_fall
-    return high if kind & 2 else low
-
-
-@compiled
 def observe(params, memory, seen, restart):
     """Take the stamps of a sample: return (memory, `Times`)."""
     modulus = (1 << params.stamp_width) - 1
     first = restart or not memory.running
     fresh = 0
     for kind in range(4):
-        stamp = _stamp(seen, kind)
+        stamp = stamp_of(seen, kind)
         old = (seen.stamp - stamp) & modulus >= modulus - (modulus >> 2)
-        if not first and (stamp != _stamp(memory, kind) or (memory.fresh >> kind & 1 and not old)):
+        if not first and (stamp != stamp_of(memory, kind) or (memory.fresh >> kind & 1 and not old)):
             fresh |= 1 << kind
     kind, left, right = seen.edge, (seen.edge - 1) & 3, (seen.edge + 1) & 3
-    period = (_stamp(seen, kind) - _stamp(memory, kind)) & modulus
-    age = (seen.stamp - _stamp(seen, kind)) & modulus
-    left_age = (seen.stamp - _stamp(seen, left)) & modulus
-    right_age = (seen.stamp - _stamp(seen, right)) & modulus
+    period = (stamp_of(seen, kind) - stamp_of(memory, kind)) & modulus
+    age = (seen.stamp - stamp_of(seen, kind)) & modulus
+    left_age = (seen.stamp - stamp_of(seen, left)) & modulus
+    right_age = (seen.stamp - stamp_of(seen, right)) & modulus
     left_known, right_known = fresh >> left & 1, fresh >> right & 1
 
     # A neighbour of the last edge's kind is the edge before it, or the one three before; which, their ages tell.

@@ -43,7 +43,7 @@ from .estimators import estimate
 from .fixed import UQ, bits_for, saturate, wrap
 from .period import NOTHING, OBSERVE_STEPS, Memory, check_stamps, observe, velocity_format
 from .quadrature import Seen
-from .words import Word
+from .words import Word, check_positive
 
 OUTPUTS = ("u",)
 CYCLE_SPEED = 3.0
@@ -66,9 +66,7 @@ class Gains:
     switch_m_per_s: float
 
     def __post_init__(self):
-        for name, value in vars(self).items():
-            if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
+        check_positive(self)
 
     @classmethod
     def default(cls, axis) -> "Gains":

@@ -118,6 +118,14 @@ def seen(state):
 
 
 @compiled
+def stamp_of(record, kind):
+    """Return the last stamp of a kind of edge, of a `Seen` or what else has the four fields."""
+    low = record.stamp_b_rise if kind & 1 else record.stamp_a_rise
+    high = record.stamp_b_fall if kind & 1 else record.stamp_a_fall
+    return high if kind & 2 else low
+
+
+@compiled
 def seen_count(count):
     """Return what an estimator sees that uses the count alone."""
     return Seen(count, 0, 0, 0, 0, 0, 0, 0, 0)

@@ -136,7 +136,7 @@ class AxisSpec:
 
     @property
     def stamp_width(self) -> int:
-        """Bits of a clock stamp: it wraps after a second or more, so edges slower than 1 Hz read as standing."""
+        """Bits of a clock stamp: it wraps after a second or more, so edges of less than about 2 Hz read as standing."""
         return bits_for(self.clock_hz)
 
     @property

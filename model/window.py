@@ -40,7 +40,7 @@ from .fixed import SQ, UQ
 from .history import change_over, take
 from .signed_divide import divide
 from .signed_divide import latency as divide_latency
-from .words import Word
+from .words import Word, check_positive
 
 OUTPUTS = ("u",)
 EPS_COUNTS = 0.5
@@ -62,9 +62,7 @@ class Gains:
     window_s: float
 
     def __post_init__(self):
-        value = self.window_s
-        if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-            raise ValueError(f"window_s must be finite and more than 0, not {value!r}")
+        check_positive(self)
 
     @classmethod
     def default(cls, axis) -> "Gains":

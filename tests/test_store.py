@@ -73,4 +73,6 @@ def test_a_job_that_fails_ends_the_run_and_loses_none_that_was_done(workers):
     assert jobs[2] not in kept
     if workers == 1:
         assert len(done) == 2
-    assert multiprocessing.active_children() == []
+    for worker in multiprocessing.active_children():
+        worker.join(30)
+        assert not worker.is_alive()
