@@ -234,7 +234,7 @@ def run(
         from .rtl import Hardware  # noqa: PLC0415  (the other backends need neither Amaranth nor a C++ compiler)
 
         words = spec.design.encode(encoder_glitch_clocks=GLITCH_CLOCKS, **choice)
-        with Hardware(spec, words, int(level(0))) as hardware:
+        with Hardware(spec, words, int(level(0)), short=True) as hardware:
             return run_pins(hardware.controller, hardware.start, spec, counts, progress)
     model = axis.Axis(spec, floating=backend == "float", **choice)
     if needs_pins(spec.estimator, backend):

