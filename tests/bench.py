@@ -23,7 +23,7 @@ from cocotb.triggers import ClockCycles, RisingEdge
 from hardwall.sim import cocotb_runner
 
 SEED = int(os.environ.get("HARDWALL_SEED", "1"))
-SAMPLES = int(os.environ.get("HARDWALL_SAMPLES", "100000"))
+SAMPLES = int(os.environ.get("HARDWALL_SAMPLES", "20000"))
 PERIOD_NS = 10
 CAMPAIGN = {"timeout_time": SAMPLES + 20_000, "timeout_unit": "us"}
 """For `cocotb.test` of a campaign: hardware that stops answering fails, instead of hanging, at 100 clocks a sample."""
