@@ -97,9 +97,7 @@ def campaign(make, start, rows=stimulus, fewer: tuple[str, ...] = ("narrow",)):
 
 def axis(axis_spec: AxisSpec, output: str = "u", floating: bool = False) -> Axis:
     """Return an axis with that output selected."""
-    outputs = axis_spec.model.OUTPUTS
-    word = {estimators.output_word(axis_spec.estimator): outputs.index(output)} if len(outputs) > 1 else {}
-    return Axis(axis_spec, floating, **word)
+    return Axis(axis_spec, floating, **estimators.choose(axis_spec.estimator, output))
 
 
 def rms_errors(axis_spec: AxisSpec, output: str, seconds: float, runs: int = 1) -> tuple[float, float]:

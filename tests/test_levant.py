@@ -7,7 +7,6 @@ import levants
 import numpy as np
 import pytest
 from estimator_bench import model
-from papers_signal import BOUND, RATES, axis_at
 from specs import spec
 
 from bench import simulate
@@ -105,22 +104,3 @@ def test_start_makes_no_transient():
     for _ in range(100):
         state, velocity, flags = estimate(params, state, seen_count(-777_777), 0)
         assert (velocity, flags, state.u1, state.lead) == (0, 0, 0, 0)
-
-
-@pytest.mark.parametrize("output", levant.OUTPUTS)
-@pytest.mark.parametrize("bound", [BOUND, 12.0])
-@pytest.mark.parametrize("rate", RATES)
-def test_word_length_costs_a_hundredth_at_every_rate(rate, bound, output):
-    exact, fixed = levants.rms_errors(axis_at("levant", rate, bound), output, 0.4, runs=4)
-    assert abs(fixed - exact) <= 0.01 * exact
-
-
-@pytest.mark.parametrize(("gains", "named"), levants.REFUSED)
-def test_gains_that_cannot_be_held_are_refused(gains, named):
-    with pytest.raises(ValueError, match=f"^{named}"):
-        levant.Design(spec("paper"), levant.Gains(**gains))
-
-
-def test_wrong_design_is_refused():
-    with pytest.raises(TypeError, match=r"not 3$"):
-        Estimator(3)

@@ -224,24 +224,3 @@ def test_fewer_levels_where_words_or_strokes_are_short():
     narrow = axis_at(NAME, 10_000_000)
     assert 0 < narrow.design.estimator.levels < levant_adaptive.LEVELS
     assert narrow.design.estimator.velocity.f <= 60 - narrow.count_width
-
-
-@pytest.mark.parametrize("rate", RATES[:4])
-def test_a_count_that_stands_is_zero(rate):
-    levants.check_standstill(NAME, rate)
-
-
-def test_wrap_restart_and_drift():
-    levants.check_wrap_and_restart(axis_at(NAME, 10_000))
-    levants.check_no_drift(axis_at(NAME, 1_000_000, 12.0))
-
-
-@pytest.mark.parametrize(("gains", "named"), levants.REFUSED)
-def test_gains_that_cannot_be_held_are_refused(gains, named):
-    with pytest.raises(ValueError, match=f"^{named}"):
-        levant_adaptive.Design(spec("paper", NAME), levant_adaptive.Gains(**gains))
-
-
-def test_wrong_design_is_refused():
-    with pytest.raises(TypeError, match=r"not 3$"):
-        Estimator(3)

@@ -7,7 +7,6 @@ import levants
 import numpy as np
 import pytest
 from estimator_bench import model
-from papers_signal import BOUND, RATES, axis_at
 from specs import spec
 
 from bench import rng, simulate
@@ -89,43 +88,3 @@ def test_rounding_is_a_small_change_of_position(name):
             largest = max(largest, eta)
     # The bound is no luxury: a good part of the budget is used.
     assert POSITION_BUDGET / 8 < largest <= max(POSITION_BUDGET, delta) + (delta / lam) ** 2
-
-
-@pytest.mark.parametrize("output", levant_semi_implicit.OUTPUTS)
-@pytest.mark.parametrize("bound", [BOUND, 12.0])
-@pytest.mark.parametrize("rate", RATES)
-def test_word_length_costs_a_hundredth_at_every_rate(rate, bound, output):
-    exact, fixed = levants.rms_errors(axis_at(NAME, rate, bound), output, 0.4, runs=4)
-    assert abs(fixed - exact) <= 0.01 * exact
-
-
-def test_in_the_band_it_is_the_finite_difference():
-    levants.check_finite_difference_in_the_band(NAME)
-
-
-@pytest.mark.parametrize("rate", RATES[:4])
-def test_a_count_that_stands_is_zero(rate):
-    levants.check_standstill(NAME, rate)
-
-
-def test_at_1_khz_the_chatter_is_gone():
-    ours, _ = levants.rms_errors(axis_at(NAME, 1_000), "u", 4.0)
-    explicit, _ = levants.rms_errors(axis_at("levant", 1_000), "u", 4.0)
-    difference, _ = levants.rms_errors(axis_at("fdm", 1_000), "u", 4.0)
-    assert ours <= difference < explicit / 4
-
-
-def test_wrap_restart_and_drift():
-    levants.check_wrap_and_restart(axis_at(NAME, 10_000))
-    levants.check_no_drift(axis_at(NAME, 1_000_000, 12.0))
-
-
-@pytest.mark.parametrize(("gains", "named"), levants.REFUSED)
-def test_gains_that_cannot_be_held_are_refused(gains, named):
-    with pytest.raises(ValueError, match=f"^{named}"):
-        levant_semi_implicit.Design(spec("paper", NAME), levant_semi_implicit.Gains(**gains))
-
-
-def test_wrong_design_is_refused():
-    with pytest.raises(TypeError, match=r"not 3$"):
-        Estimator(3)

@@ -10,7 +10,7 @@ import pytest
 from estimator_bench import follow, model, reset_words
 from papers_signal import RATES
 from specs import spec
-from wheels import anything, rows, sights, turn
+from wheels import anything, check_rounding_is_the_only_difference, rows, sights, turn, velocities
 
 from bench import CAMPAIGN, SAMPLES, parameters, rng, simulate
 from hardwall.hdl.period_count import Estimator
@@ -18,7 +18,7 @@ from hardwall.model import period_count
 from hardwall.model.estimators import estimate
 from hardwall.model.period_count import START
 from hardwall.model.quadrature import seen_count
-from hardwall.sim import accuracy, motion, signals, stream
+from hardwall.sim import accuracy, motion, signals
 from hardwall.sim.encoder import offsets
 
 NAME = "period-count"
@@ -99,25 +99,9 @@ def test_model_is_the_exact_speed_rounded(name, switch):
     assert modes[True] > 100
 
 
-def velocities(signal, axis, backend, encoder=(0.0, 0.0, 0.0, 0.0)):
-    """Return the velocity at every sample, m/s, and the flags."""
-    chunks = list(stream.velocities(signal, axis, "u", backend, encoder))
-    return np.concatenate([chunk for _, chunk, _ in chunks]), chunks[-1][2]
-
-
 @pytest.mark.parametrize("rate", RATES)
 def test_fixed_point_is_the_algorithm_rounded(rate):
-    """Rounding is the only difference, at most half an LSB in every sample; and 1 % of the estimator's own error."""
-    signal = replace(signals.paper(), seconds=0.3)
-    axis = accuracy.axis_spec(NAME, rate, signal.acceleration_max_m_per_s2)
-    fixed, flags = velocities(signal, axis, "fixed")
-    real, _ = velocities(signal, axis, "float")
-    assert flags == 0
-    half_lsb = axis.design.estimator.velocity.lsb / 2 * axis.velocity_unit_m_per_s
-    assert np.abs(fixed - real).max() <= half_lsb * (1 + 1e-9)
-    first = rate // 100  # the signal starts at full speed: before the first edges the error is all of it
-    exact = np.array([motion.velocity(signal.motion, k / rate) for k in range(first, len(real), 7)])
-    assert np.sqrt(np.mean((fixed - real) ** 2)) <= 0.01 * np.sqrt(np.mean((real[first::7] - exact) ** 2))
+    check_rounding_is_the_only_difference(NAME, rate)
 
 
 @pytest.mark.parametrize("rate", [10_000, 1_000_000])

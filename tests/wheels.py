@@ -1,9 +1,11 @@
-"""Edges of a wheel that turns at random: rows for the estimators that time them, and the speeds they promise."""
+"""For the estimators that time edges: those of a wheel that turns at random, and known motions in both arithmetics."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+
+from hardwall.sim import accuracy, motion, signals, stream
 
 
 @dataclass(frozen=True)
@@ -167,3 +169,28 @@ def _cycle(edges, before: Strobe, strobe: Strobe, run: int, since: int, limit: i
         if edge.kind == last.kind:
             return (abs(last.number - edge.number), last.at - edge.at) if before.at - edge.at < limit else None
     return None
+
+
+def velocities(signal, axis, backend, encoder=(0.0, 0.0, 0.0, 0.0)):
+    """Return the velocity at every sample, m/s, and the flags."""
+    chunks = list(stream.velocities(signal, axis, "u", backend, encoder))
+    return np.concatenate([chunk for _, chunk, _ in chunks]), chunks[-1][2]
+
+
+def exact(signal, axis, samples):
+    """Return the exact velocity at every sample, m/s."""
+    return np.array([motion.velocity(signal.motion, k / axis.sample_hz) for k in range(samples)])
+
+
+def check_rounding_is_the_only_difference(name: str, rate: int) -> None:
+    """At most half an LSB in every sample of the paper's signal; and 1 % of the estimator's own error."""
+    signal = replace(signals.paper(), seconds=0.3)
+    axis = accuracy.axis_spec(name, rate, signal.acceleration_max_m_per_s2)
+    fixed, flags = velocities(signal, axis, "fixed")
+    real, _ = velocities(signal, axis, "float")
+    assert flags == 0
+    half_lsb = axis.design.estimator.velocity.lsb / 2 * axis.velocity_unit_m_per_s
+    assert np.abs(fixed - real).max() <= half_lsb * (1 + 1e-9)
+    first = rate // 100  # the signal starts at full speed: before the first edges the error is all of it
+    own = real[first::7] - exact(signal, axis, len(real))[first::7]
+    assert np.sqrt(np.mean((fixed - real) ** 2)) <= 0.01 * np.sqrt(np.mean(own**2))
