@@ -6,6 +6,8 @@ from amaranth.lib.wiring import In, Out
 
 from hardwall.model import divide as model
 
+from . import check_int
+
 
 class Divide(wiring.Component):
     """The exact quotient of two words, rounded down, in as many bits as are wanted.
@@ -58,10 +60,7 @@ class Divide(wiring.Component):
             "bits_per_clock": bits_per_clock,
         }
         for name, size in sizes.items():
-            if isinstance(size, bool) or not isinstance(size, int):
-                raise TypeError(f"{name} must be an int, not {size!r}")
-            if size < 1:
-                raise ValueError(f"{name} must be 1 or more, not {size!r}")
+            check_int(name, size, 1)
         self._sizes = sizes
         super().__init__(
             {

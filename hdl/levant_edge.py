@@ -2,13 +2,14 @@
 
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, signed, unsigned
 
-from hardwall.model.levant_edge import QUOTIENT_BITS, REST_BITS, Design
+from hardwall.model.levant_edge import REST_BITS, Design
+from hardwall.model.levant_edge_design import QUOTIENT_BITS
 from hardwall.model.quadrature import RUN_MAX
 from hardwall.model.sqrt import latency as sqrt_latency
 
 from . import EstimatorBlock
 from .divide import Divide
-from .fixed import shape, shift_floor, shift_round_half_up
+from .fixed import at_most, fitted, length_of, shape, shift_floor, shift_round_half_up
 from .sqrt import Sqrt
 
 
@@ -62,13 +63,13 @@ class Estimator(EstimatorBlock):
     def _measure(self, m, s):
         """A time as it multiplies: its top bits. The multiplier, and what it makes of an acceleration."""
         d, p = self._design, s.params
-        m.d.sync += [s.size.eq(_length(s.measure)), s.product.eq(s.left * s.right)]
+        m.d.sync += [s.size.eq(length_of(s.measure)), s.product.eq(s.left * s.right)]
         m.d.comb += [
             s.cut.eq(Mux(s.size > d.mantissa, s.size - d.mantissa, 0)),
             s.time.eq(s.measure >> s.cut),
             # A time with its top bit set is cut by one bit more; but then the acceleration is 0.
             s.kept.eq(d.turn_span - s.cut),
-            s.turned.eq(_fitted(shift_floor(s.product, p.turn_shift) >> s.drop, len(s.turned))),
+            s.turned.eq(fitted(shift_floor(s.product, p.turn_shift) >> s.drop, len(s.turned))),
         ]
 
     def _solve(self, m, s):
@@ -103,9 +104,9 @@ class Estimator(EstimatorBlock):
             halves.eq((s.length >> 1) - (first >> 1)),
             s.slope.eq(quotient.quotient),
             s.far_slope.eq(quotient.saturated),
-            s.bent.eq(_least(shift_floor(s.slope, p.slope_shift + first) >> more, steepest)),
-            s.limit.eq(_least(_shifted(s.root_product, p.limit_shift - (first >> 1), halves), most)),
-            s.relay.eq(_least(_shifted(self.levant_edge_alpha, p.alpha_shift - first, few), steepest)),
+            s.bent.eq(at_most(shift_floor(s.slope, p.slope_shift + first) >> more, steepest)),
+            s.limit.eq(at_most(_shifted(s.root_product, p.limit_shift - (first >> 1), halves), most)),
+            s.relay.eq(at_most(_shifted(self.levant_edge_alpha, p.alpha_shift - first, few), steepest)),
         ]
 
     def _learn(self, m, s):
@@ -115,10 +116,10 @@ class Estimator(EstimatorBlock):
         learnt = Signal(signed(max(len(residual) - p.learn_shift, 1) + 1))
         m.d.comb += [s.here.eq(s.places[s.to_kind]), s.there.eq(s.places[s.kind])]
         m.d.sync += [
-            residual.eq(_fitted(s.e, len(residual))),
+            residual.eq(fitted(s.e, len(residual))),
             learnt.eq(shift_round_half_up(residual, p.learn_shift)),
-            s.next_here.eq(_fitted(s.here + learnt, place.width)),
-            s.next_there.eq(_fitted(s.there - learnt, place.width)),
+            s.next_here.eq(fitted(s.here + learnt, place.width)),
+            s.next_there.eq(fitted(s.there - learnt, place.width)),
         ]
 
     def _states_of_the_sample(self, m, s):
@@ -152,7 +153,7 @@ class Estimator(EstimatorBlock):
             came = (s.measure != 0) | (s.passed != 0)
             unknown = ~s.known | s.measure[-1]
             timed = (s.measure >> d.shortest) != 0
-            held = _fitted(s.passed, d.distance.width)
+            held = fitted(s.passed, d.distance.width)
             m.d.sync += [
                 s.correct.eq(came & ~unknown & timed),
                 s.carry.eq(came & ~unknown & ~timed & s.waited),
@@ -191,14 +192,14 @@ class Estimator(EstimatorBlock):
                 s.turn.eq(s.turned),
                 s.age_time.eq(s.time),
                 s.age_drop.eq(s.kept),
-                s.bound.eq(_least(Const(p.bound) >> since, len(s.bound))),
+                s.bound.eq(at_most(Const(p.bound) >> since, len(s.bound))),
                 s.rest.eq(gone | ~s.loose & (s.size > s.length + REST_BITS)),
                 s.known.eq(s.known & ~gone),
             ]
             m.next = "MEAN"
         with m.State("MEAN"):
             m.d.sync += [
-                s.left.eq(_fitted(s.v + (s.turn >> 1), len(s.left))),
+                s.left.eq(fitted(s.v + (s.turn >> 1), len(s.left))),
                 s.ahead.eq(Mux(s.correct | s.carry, s.v + s.turn, s.v)),
             ]
             m.next = "PLACE PRODUCT"
@@ -235,8 +236,8 @@ class Estimator(EstimatorBlock):
             m.next = "UPDATE"
         with m.State("UPDATE"):
             far_v = s.ahead - s.change
-            v = _fitted(far_v, d.velocity.width)
-            a = Mux(s.rest, 0, _fitted(s.a - s.bend, d.acceleration.width))
+            v = fitted(far_v, d.velocity.width)
+            a = Mux(s.rest, 0, fitted(s.a - s.bend, d.acceleration.width))
             m.d.sync += [
                 s.v.eq(Mux(s.rest, 0, v)),
                 s.a.eq(a),
@@ -263,7 +264,7 @@ class Estimator(EstimatorBlock):
             m.next = "LINE"
         with m.State("LINE"):
             straight = s.v + s.turn
-            line = _fitted(straight, d.velocity.width)
+            line = fitted(straight, d.velocity.width)
             m.d.sync += [s.line.eq(line), s.flags[1].eq(s.flags[1] | (line != straight))]
             m.next = "END"
         with m.State("END"):
@@ -330,31 +331,9 @@ class _Signals:
         self.line, self.end = Signal(velocity), Signal(signed(d.velocity.width + 1))
 
 
-def _length(value):
-    """Return the bits of a word: the least n with value < 2**n."""
-    if len(value) == 1:
-        return value
-    half = len(value) // 2
-    return Mux(value[half:].any(), half + _length(value[half:]), _length(value[:half]))
-
-
 def _shifted(value, right: int, left):
     """Return floor(value * 2**(left - right)), `left` a signal."""
     return (value << left) >> right if right > 0 else value << -right << left
-
-
-def _least(value, bits: int):
-    """Return an unsigned `value`, or the largest word of `bits` where it is more."""
-    return Mux(value[bits:].any(), (1 << bits) - 1, value[:bits])
-
-
-def _fitted(value, bits: int):
-    """Return a signed `value` held within `bits` of two's complement: its top bits tell, no comparison is needed."""
-    if len(value) <= bits:
-        return value
-    top = value[bits - 1 :]
-    held = Mux(value[-1], -1 << (bits - 1), (1 << (bits - 1)) - 1)
-    return Mux(top.any() & ~top.all(), held, value[:bits].as_signed())
 
 
 def _signed(value, negative):

@@ -5,9 +5,9 @@ from amaranth.hdl import Module, Mux, Signal, signed
 from hardwall.model.period_count import Design
 
 from . import EstimatorBlock
+from .cycle_times import CycleTimes
 from .divide import Divide
 from .fixed import saturate
-from .period import Observer
 
 
 class Estimator(EstimatorBlock):
@@ -43,7 +43,7 @@ class Estimator(EstimatorBlock):
         design = self._design
         velocity, window_bits = design.velocity, design.window_bits
 
-        m.submodules.times = times = Observer(design)
+        m.submodules.times = times = CycleTimes(design.count_width, design.stamp_width, design.cycles_max)
         for name in ("strobe", "restart", *design.inputs):
             m.d.comb += getattr(times, name).eq(getattr(self, name))
 
@@ -78,7 +78,7 @@ class Estimator(EstimatorBlock):
 
         m.d.sync += self.valid.eq(0)
         with m.FSM():
-            with m.State("OBSERVE"), m.If(times.ready):
+            with m.State("OBSERVE"), m.If(times.valid):
                 with m.If(times.age == 0):
                     m.d.sync += cycle.eq(0)
                 with m.Elif(times.news & (times.cycles <= 1)):

@@ -7,6 +7,8 @@ from amaranth.lib.wiring import In, Out
 
 from hardwall.model import quadrature as model
 
+from . import check_int
+
 
 class Quadrature(wiring.Component):
     """The position of an encoder, in counts, from its pins A, B and Z; no count is wrong before a flag is up.
@@ -106,17 +108,10 @@ class Quadrature(wiring.Component):
     """
 
     def __init__(self, count_width: int, stamp_width: int, glitch_width: int = 4, fault_width: int = 8):
-        for name, value, most in (
-            ("count_width", count_width, 62),
-            ("stamp_width", stamp_width, 62),
-            ("glitch_width", glitch_width, 16),
-            ("fault_width", fault_width, 32),
-        ):
-            least = 2 if name == "count_width" else 1
-            if not isinstance(value, int):
-                raise TypeError(f"{name} must be an int, not {value!r}")
-            if not least <= value <= most:
-                raise ValueError(f"{name} must be {least} to {most}, not {value!r}")
+        check_int("count_width", count_width, 2, 62)
+        check_int("stamp_width", stamp_width, 1, 62)
+        check_int("glitch_width", glitch_width, 1, 16)
+        check_int("fault_width", fault_width, 1, 32)
         self._count_width = count_width
         self._stamp_width = stamp_width
         self._glitch_width = glitch_width

@@ -6,6 +6,7 @@ from amaranth.lib.wiring import In, Out
 
 from hardwall.model import signed_divide as model
 
+from . import check_int
 from .divide import Divide
 
 
@@ -52,17 +53,10 @@ class SignedDivide(wiring.Component):
     """
 
     def __init__(self, dividend_width: int, divisor_width: int, fraction: int, quotient_bits: int):
-        given = {
-            "dividend_width": (dividend_width, 2),
-            "divisor_width": (divisor_width, 1),
-            "fraction": (fraction, 0),
-            "quotient_bits": (quotient_bits, max(fraction, 1) if isinstance(fraction, int) else 1),
-        }
-        for name, (value, least) in given.items():
-            if not isinstance(value, int):
-                raise TypeError(f"{name} must be an int, not {value!r}")
-            if value < least:
-                raise ValueError(f"{name} must be {least} or more, not {value!r}")
+        check_int("dividend_width", dividend_width, 2)
+        check_int("divisor_width", divisor_width, 1)
+        check_int("fraction", fraction, 0)
+        check_int("quotient_bits", quotient_bits, max(fraction, 1))
         self._fraction, self._quotient_bits = fraction, quotient_bits
         super().__init__(
             {
@@ -73,6 +67,14 @@ class SignedDivide(wiring.Component):
                 "done": Out(1),
             }
         )
+
+    @property
+    def dividend_width(self) -> int:
+        return len(self.dividend)
+
+    @property
+    def divisor_width(self) -> int:
+        return len(self.divisor)
 
     @property
     def fraction(self) -> int:

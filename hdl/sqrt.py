@@ -6,6 +6,8 @@ from amaranth.lib.wiring import In, Out
 
 from hardwall.model import sqrt as model
 
+from . import check_int
+
 
 class Sqrt(wiring.Component):
     """The exact integer square root of a word.
@@ -44,10 +46,7 @@ class Sqrt(wiring.Component):
     """
 
     def __init__(self, width: int):
-        if not isinstance(width, int):
-            raise TypeError(f"width must be an int, not {width!r}")
-        if width < 1:
-            raise ValueError(f"width must be 1 or more, not {width!r}")
+        check_int("width", width, 1)
         self._width = width
         super().__init__(
             {

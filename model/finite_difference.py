@@ -1,4 +1,9 @@
-"""Velocity as the difference of successive counts: the baseline that every estimator is held against."""
+"""Velocity as the difference of successive counts: the baseline that every estimator is held against.
+
+Ends. The difference is taken modulo the count's width, so the count may wrap. A step, or a speed, of more than twice
+the largest speed saturates for that sample alone. The first sample, and one with `restart`, reads 0, and so does
+standstill; a reset in motion is right from the second sample on.
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple

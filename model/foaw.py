@@ -33,6 +33,10 @@ Formats, derived:
 - `velocity` SQ(i, f): i that of `history.change`, for both fits are averages of the changes with positive weights.
 - f: rounding toward zero, by less than 2**-ROUNDING_BITS of a count over the longest window, as in `window`.
 
+Ends. Standing for the window gives exactly 0. A step of more than two bands leaves one tap: it reads as its counts / T
+for T samples, then not at all; of one beyond twice the largest speed the part up to that counts. After the first
+sample or a restart in motion the axis counts as having stood: as after a step of velocity.
+
 Source: Janabi-Sharifi, Hayward, Chen, Discrete-time adaptive windowing for velocity estimation, IEEE Transactions on
 Control Systems Technology 2000.
 """

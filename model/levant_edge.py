@@ -68,23 +68,6 @@ no stamps of their own: those made up between two samples are no better than the
 Source: Levant 1998 for the law; implicit discretisation of sliding modes after Acary and Brogliato; its use on
 stamped edges with learnt places is this project's.
 
-Formats, derived.
-
-- `velocity` SQ(i, f): i holds twice the largest speed; f resolves sqrt(C q), the speed that C gives within half a
-  count, to 2**-SPEED_BITS, and at least the slowest edges. `acceleration` has the same width, so that one multiplier
-  serves, and i for 2**ACCELERATION_BITS C. Both at most WIDTH_MAX bits, and so wide that their product with a time
-  fits int64.
-- `mantissa`: a time multiplies and divides by so many top bits. A T cut to them is off by 2**(1 - mantissa) of itself,
-  and the speed of a count in it, D/T, is then moved by no more than 4 LSB of velocity; at least four samples and four
-  shortest intervals are exact.
-- `error`, E over 2**k where k bits are cut: i for |v| 2**mantissa and the place it is held against, f as many less than
-  velocity's as the shortest interval has bits, less one: half an LSB of velocity after the division.
-- `place`: half a count, in steps of 2**-PLACE_BITS. `distance`: edges at twice the largest speed in two samples and two
-  shortest intervals; more saturate.
-- `radicand`, `root`: the least error that lambda limits, lambda^2 T^3 at the shortest T, is resolved in its root to
-  2**-ROOT_BITS.
-- `lambda`, `alpha` UQ, GAIN_BITS wide, with HEADROOM_BITS above the designed gain for changes at run time.
-
 Saturation. v and u at the velocity format (flag `velocity_saturated`); the distance, or |E| / T at the velocity format
 (flag `error_saturated`), after which a motion within the format is found again at the next edges. Acceleration, places
 and what is learnt saturate silently: as limits they are part of the law, in float64 too.
@@ -95,94 +78,26 @@ interval of half the stamp's range or more says only where the axis is.
 """
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from .compiled import compiled
 from .divide import divide
-from .divide import latency as divide_latency
 from .estimators import estimate
-from .fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
+from .fixed import saturate, shift_floor, shift_round_half_up, wrap
 from .levant import sign_of
-from .quadrature import RUN_MAX, Seen, stamp_of
+from .levant_edge_design import LEARN_SHIFT, Design, FloatParams, Gains, Params
+from .quadrature import RUN_MAX, stamp_of
 from .sqrt import isqrt
-from .sqrt import latency as sqrt_latency
-from .words import GAIN_BITS, Word, check_positive
 
 OUTPUTS = ("u",)
-HEADROOM_BITS = 2
-"""A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
-SPEED_BITS = 18
-"""The velocity resolves sqrt(C q), the speed that C gives within half a count, to 2**-SPEED_BITS."""
-WIDTH_MAX = 40
-"""Most bits of velocity and acceleration."""
-ACCELERATION_BITS = 3
-"""The acceleration may reach 2**ACCELERATION_BITS C: an impact exceeds the C of a motion."""
-ROOT_BITS = 5
-"""The root resolves the least error that it limits to 2**-ROOT_BITS."""
-LEARN_SHIFT = 5
-"""An edge's residual moves the two places that it depends on by 2**-LEARN_SHIFT of it."""
-PLACE_BITS = 21
-"""Places of edges resolve 2**-PLACE_BITS counts."""
+__all__ = ["FLOAT_START", "OUTPUTS", "START", "Design", "Gains"]
 REST_BITS = 3
 """An axis rests when 2**REST_BITS of the last intervals, rounded up to a power of two, have brought no edge."""
 LEFT_MAX = 46
 """No left shift of a gain word exceeds this, beyond which all of them saturate: 16 + 46 bits fit int64."""
-QUOTIENT_BITS = 2
-"""Bits of the quotient that a clock brings."""
-STEPS = 19
-"""Clocks of the sequence besides the root's or the quotient's: see `hardwall.hdl.levant_edge`."""
-
-
-@dataclass(frozen=True)
-class Gains:
-    """Gains in SI units: lambda in m^(1/2)/s^(3/2), alpha in m/s^3.
-
-    Raises:
-        ValueError: if either is not finite and more than 0.
-    """
-
-    lambda_sqrt_m_per_s3: float
-    alpha_m_per_s3: float
-
-    def __post_init__(self):
-        check_positive(self)
-
-    @classmethod
-    def default(cls, axis) -> "Gains":
-        """Return alpha = 2 C / sqrt(q / C) and Levant's lambda = 1.5 sqrt(alpha), with C and q the axis's."""
-        bound = axis.acceleration_max_m_per_s2
-        alpha = 2 * bound * math.sqrt(bound / axis.count_m)
-        return cls(1.5 * math.sqrt(alpha), alpha)
-
-
-class Params(NamedTuple):
-    """Words and shifts of the integer kernel; see `Design` for the formats."""
-
-    lambda_: int
-    alpha: int
-    count_width: int
-    stamp_width: int
-    clocks: int
-    shortest: int
-    mantissa: int
-    distance_max: int
-    place_fraction: int
-    place_shift: int
-    turn_shift: int
-    turn_span: int
-    error_shift: int
-    quotient_width: int
-    radicand_shift: int
-    limit_shift: int
-    slope_shift: int
-    alpha_shift: int
-    learn_shift: int
-    learn_max: int
-    place_max: int
-    bound: int
-    velocity_max: int
-    acceleration_max: int
+ANCHOR, FIRST, TIMED, CARRIED, LOOSE = range(5)
+"""What the last edge is: the anchor itself; the first known; one to correct by; one too close that has stayed the last
+for long, a new anchor as well; one too close as yet."""
 
 
 class State(NamedTuple):
@@ -203,169 +118,8 @@ class State(NamedTuple):
     places: tuple
 
 
-class FloatParams(NamedTuple):
-    lambda_: float
-    alpha: float
-    count_width: int
-    stamp_width: int
-    clocks: int
-    shortest: int
-    mantissa: int
-    steepest: float
-    learn_max: float
-    place_max: float
-
-
 START = State(0, 0, 0, 0, 0, 0, 0, 0, (0, 0, 0, 0))
 FLOAT_START = State(0, 0, 0, 0, 0, 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
-
-
-class Design:
-    """Formats, run-time words and latency of the differentiator for an axis: the module says how they follow.
-
-    Attributes:
-        velocity, acceleration, error, place: formats of v, of a, of E over 2**k, of an edge's place times D.
-        mantissa: bits of a time as it multiplies and divides.
-        shortest: bits below those of the shortest interval used, 2**shortest clocks.
-        distance: format of the edges passed in an interval.
-        root, radicand: formats of the root and its integer radicand.
-        lambda_, alpha: gain formats.
-        words: `levant_edge_lambda`, `levant_edge_alpha`.
-
-    Raises:
-        ValueError: if the gains or the rates do not fit any format that int64 can hold, with the accepted range.
-    """
-
-    inputs = Seen._fields
-    flags = ("error_saturated", "velocity_saturated")
-
-    def __init__(self, axis, gains: Gains):
-        tau, q, clock, clocks = 1 / axis.sample_hz, axis.count_m, axis.clock_hz, axis.clocks_per_sample
-        bound, speed = axis.acceleration_max_m_per_s2, axis.speed_max_counts_per_sample
-        self.count_width, self.stamp_width, self.clocks = axis.count_width, axis.stamp_width, clocks
-        if 4 * clocks > 1 << axis.stamp_width:
-            raise ValueError(f"sample_hz must be 4 or more for stamps that last a second, not {axis.sample_hz!r}")
-
-        # Times, clocks.
-        window = clock * min(math.sqrt(axis.speed_max_m_per_s / (clock * bound)), math.sqrt(q / bound) / 4)
-        self.shortest = min(max(math.floor(math.log2(max(window, 2.0))), 1), axis.stamp_width - 3)
-        within_count = clock * math.sqrt(q / bound)
-        exact = bits_for(math.sqrt(within_count * 2.0 ** (SPEED_BITS - 2)))
-        self.mantissa = min(max(exact, bits_for(4 * max(clocks, 1 << self.shortest))), axis.stamp_width - 1)
-        span = max(axis.stamp_width - 1 - self.mantissa, 0)
-
-        # Velocity and acceleration.
-        i = 1 + bits_for(max(2 * speed, 2.0))
-        least = math.sqrt(bound / q) * tau
-        slowest = clocks * 2.0 ** (1 - axis.stamp_width)
-        f = max(SPEED_BITS - math.floor(math.log2(least)), 1 - math.floor(math.log2(slowest)), 0)
-        f = min(f, WIDTH_MAX - i, 60 - self.mantissa - i)
-        self.velocity = SQ(i, axis.shrunk(f))
-        f = self.velocity.f
-        largest = bound * tau / q / clock
-        i = 1 + ACCELERATION_BITS + bits_for(largest)
-        self.acceleration = SQ(i, self.velocity.width - i)
-
-        # Errors of place, in counts times D.
-        self.error = SQ(self.velocity.i + self.mantissa + 2, f - min(max(self.shortest - 1, 0), f))
-        fine = PLACE_BITS - math.floor(math.log2(clocks))
-        self.place = SQ(max(bits_for(clocks / 2), 0) + 1, max(fine, 0))
-        passed = 2 * speed * (2 + (2 << self.shortest) / clocks) + 1
-        self.distance = SQ(min(1 + bits_for(passed), axis.count_width), 0)
-
-        # Gains.
-        alpha = gains.alpha_m_per_s3 * tau / q / clock**2
-        lam = gains.lambda_sqrt_m_per_s3 * math.sqrt(tau / q) / clock
-        self.alpha = _gain("alpha_m_per_s3", gains.alpha_m_per_s3, alpha)
-        self.lambda_ = _gain("lambda_sqrt_m_per_s3", gains.lambda_sqrt_m_per_s3, lam)
-        limited = lam**2 * 8.0**self.shortest
-        root_f = max(bits_for(2.0**ROOT_BITS / math.sqrt(limited)), 0)
-        self.radicand = UQ(self.error.i - 1, 2 * min(root_f, (self.error.f + 1) // 2))
-        self.root = UQ((self.radicand.width + 2) // 2 - self.radicand.f // 2, self.radicand.f // 2)
-        self.words = (
-            Word(
-                "levant_edge_lambda",
-                self.lambda_,
-                math.sqrt(q / tau) * clock,
-                "m^(1/2)/s^(3/2)",
-                self.lambda_.from_real(lam),
-                "gain of the square-root term",
-            ),
-            Word(
-                "levant_edge_alpha",
-                self.alpha,
-                q / tau * clock**2,
-                "m/s^3",
-                self.alpha.from_real(alpha),
-                "gain of the sign term",
-            ),
-        )
-        self.turn_span = span
-
-    @property
-    def latency(self) -> int:
-        """Clocks from strobe to valid."""
-        return STEPS + max(self.quotient_latency, sqrt_latency(self.radicand.width + 1))
-
-    @property
-    def quotient_latency(self) -> int:
-        """Clocks of the division."""
-        return divide_latency(self.velocity.width - 1, QUOTIENT_BITS)
-
-    def params(self, words: dict[str, int]) -> Params:
-        """Return the kernel's parameters for the given run-time words."""
-        f, a_f, e_f = self.velocity.f, self.acceleration.f, self.error.f
-        return Params(
-            lambda_=words["levant_edge_lambda"],
-            alpha=words["levant_edge_alpha"],
-            count_width=self.count_width,
-            stamp_width=self.stamp_width,
-            clocks=self.clocks,
-            shortest=self.shortest,
-            mantissa=self.mantissa,
-            distance_max=self.distance.max,
-            place_fraction=self.place.f,
-            place_shift=e_f - self.place.f,
-            turn_shift=a_f - f - self.turn_span,
-            turn_span=self.turn_span,
-            error_shift=f - e_f,
-            quotient_width=self.velocity.width - 1,
-            radicand_shift=e_f - self.radicand.f,
-            limit_shift=self.lambda_.f + self.root.f - f,
-            slope_shift=f - a_f,
-            alpha_shift=self.alpha.f - a_f,
-            learn_shift=e_f - self.place.f + LEARN_SHIFT,
-            learn_max=(1 << bits_for(self.clocks / 4) + e_f) - 1,
-            place_max=self.place.max,
-            bound=shift_floor(5 * self.clocks, 1 - f),
-            velocity_max=self.velocity.max,
-            acceleration_max=self.acceleration.max,
-        )
-
-    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
-        """Return the float64 algorithm's parameters: gains unrounded, those of `si` before the designed."""
-        lam, alpha = self.words
-        return FloatParams(
-            si.get("levant_edge_lambda", gains.lambda_sqrt_m_per_s3) / lam.si_per_unit,
-            si.get("levant_edge_alpha", gains.alpha_m_per_s3) / alpha.si_per_unit,
-            self.count_width,
-            self.stamp_width,
-            self.clocks,
-            self.shortest,
-            self.mantissa,
-            2.0 ** (self.acceleration.i - 1),
-            2.0 ** bits_for(self.clocks / 4),
-            2.0 ** (self.place.i - 1),
-        )
-
-
-def _gain(name: str, value: float, scaled: float) -> UQ:
-    """Return the format of a gain of `value` SI and `scaled` in counts, samples and clocks."""
-    if not 2.0**-60 <= scaled <= 2.0**20:
-        unit = value / scaled
-        raise ValueError(f"{name} must be {2.0**-60 * unit:g} to {2.0**20 * unit:g} at these rates, not {value!r}")
-    i = HEADROOM_BITS + bits_for(scaled)
-    return UQ(i, GAIN_BITS - i)
 
 
 @compiled
@@ -387,6 +141,38 @@ def _number(params, seen):
 def _kind(seen):
     """Return which of the four edges of a cycle of the scale the last one was: the kind it is upwards."""
     return seen.edge ^ seen.down << 1
+
+
+@compiled
+def _started(params, seen, zero):
+    """Return the state of a first sample: its edge is where time and position count from, but was not seen to come."""
+    number, stamp, kind = _number(params, seen), stamp_of(seen, seen.edge), _kind(seen)
+    return State(1, 0, number, stamp, kind, 0, zero, zero, (zero, zero, zero, zero))
+
+
+@compiled
+def _met(params, state, seen):
+    """Return (what the last edge is to this sample, clocks and edges from the anchor to it)."""
+    mask = (1 << params.stamp_width) - 1
+    interval = (stamp_of(seen, seen.edge) - state.stamp) & mask
+    passed = wrap(_number(params, seen) - state.number, params.count_width)
+    if interval == 0 and passed == 0:
+        return ANCHOR, interval, passed
+    if not state.known or interval >> (params.stamp_width - 1):
+        return FIRST, interval, passed
+    if interval >> params.shortest:
+        return TIMED, interval, passed
+    waited = ((seen.stamp - state.stamp) & mask) >> (params.shortest + 1)
+    return (CARRIED if waited else LOOSE), interval, passed
+
+
+@compiled
+def _anchor(params, state, seen, met):
+    """Return (number, stamp, kind) of the anchor from here on, and the clocks since."""
+    number, stamp, kind = state.number, state.stamp, state.kind
+    if met not in (ANCHOR, LOOSE):
+        number, stamp, kind = _number(params, seen), stamp_of(seen, seen.edge), _kind(seen)
+    return number, stamp, kind, (seen.stamp - stamp) & ((1 << params.stamp_width) - 1)
 
 
 @compiled
@@ -460,42 +246,31 @@ def _correct(params, state, seen, interval, passed):
 @estimate.register(Params)
 @compiled
 def step(params, state, seen, restart):
-    fresh = restart or not state.running
-    if fresh:
-        state = State(1, 0, _number(params, seen), stamp_of(seen, seen.edge), _kind(seen), 0, 0, 0, (0, 0, 0, 0))
-    mask, far = (1 << params.stamp_width) - 1, params.stamp_width - 1
-    most = params.velocity_max
-    interval = (stamp_of(seen, seen.edge) - state.stamp) & mask
-    passed = wrap(_number(params, seen) - state.number, params.count_width)
-    age = (seen.stamp - state.stamp) & mask
-
+    if restart or not state.running:
+        state = _started(params, seen, 0)
+    met, interval, passed = _met(params, state, seen)
     known, length = state.known, state.length
     velocity, acceleration, places = state.velocity, state.acceleration, state.places
-    new, taken, flags = int(interval != 0 or passed != 0), 1, 0
-    if new:
-        if not known or interval >> far:
-            known, velocity, acceleration = 1, 0, 0
-        elif interval >> params.shortest:
-            length = _length(interval)
-            velocity, acceleration, places, flags = _correct(params, state, seen, interval, passed)
-        elif age >> (params.shortest + 1):
-            moved = velocity + _turn(params, acceleration, interval)
-            velocity = _fitted(moved, most)
-            flags = int(moved != velocity) << 1
-        else:
-            taken = 0
-    number, stamp, kind = state.number, state.stamp, state.kind
-    if new and taken:
-        number, stamp, kind = _number(params, seen), stamp_of(seen, seen.edge), _kind(seen)
-        age = (seen.stamp - stamp) & mask
+    most, flags = params.velocity_max, 0
+    if met == FIRST:
+        known, velocity, acceleration = 1, 0, 0
+    elif met == TIMED:
+        length = _length(interval)
+        velocity, acceleration, places, flags = _correct(params, state, seen, interval, passed)
+    elif met == CARRIED:
+        moved = velocity + _turn(params, acceleration, interval)
+        velocity = _fitted(moved, most)
+        flags = int(moved != velocity) << 1
+    number, stamp, kind, age = _anchor(params, state, seen, met)
 
-    if taken and (age >> far or age >> (length + REST_BITS)):
+    gone = age >> (params.stamp_width - 1)
+    if met != LOOSE and (gone or age >> (length + REST_BITS)):
         velocity, acceleration = 0, 0
-        known = int(known and not age >> far)
+        known = int(known and not gone)
     straight = velocity + _turn(params, acceleration, age)
     line = _fitted(straight, most)
     flags |= int(line != straight) << 1
-    if taken:
+    if met != LOOSE:
         line = _within(line, velocity, min(params.bound >> max(_length(age) - 1, 0), most))
     return State(1, known, number, stamp, kind, length, velocity, acceleration, places), line, flags
 
@@ -526,38 +301,25 @@ def _float_correct(params, state, seen, interval, passed):
 @compiled
 def float_step(params, state, seen, restart):
     """The same algorithm in float64, unsaturated: the reference for what fixed point costs."""
-    fresh = restart or not state.running
-    if fresh:
-        state = State(
-            1, 0, _number(params, seen), stamp_of(seen, seen.edge), _kind(seen), 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0)
-        )
-    mask, far = (1 << params.stamp_width) - 1, params.stamp_width - 1
-    interval = (stamp_of(seen, seen.edge) - state.stamp) & mask
-    passed = wrap(_number(params, seen) - state.number, params.count_width)
-    age = (seen.stamp - state.stamp) & mask
-
+    if restart or not state.running:
+        state = _started(params, seen, 0.0)
+    met, interval, passed = _met(params, state, seen)
     known, length = state.known, state.length
     velocity, acceleration, places = state.velocity, state.acceleration, state.places
-    new, taken = int(interval != 0 or passed != 0), 1
-    if new:
-        if not known or interval >> far:
-            known, velocity, acceleration = 1, 0.0, 0.0
-        elif interval >> params.shortest:
-            length = _length(interval)
-            velocity, acceleration, places = _float_correct(params, state, seen, interval, passed)
-        elif age >> (params.shortest + 1):
-            velocity = velocity + acceleration * interval
-        else:
-            taken = 0
-    number, stamp, kind = state.number, state.stamp, state.kind
-    if new and taken:
-        number, stamp, kind = _number(params, seen), stamp_of(seen, seen.edge), _kind(seen)
-        age = (seen.stamp - stamp) & mask
+    if met == FIRST:
+        known, velocity, acceleration = 1, 0.0, 0.0
+    elif met == TIMED:
+        length = _length(interval)
+        velocity, acceleration, places = _float_correct(params, state, seen, interval, passed)
+    elif met == CARRIED:
+        velocity = velocity + acceleration * interval
+    number, stamp, kind, age = _anchor(params, state, seen, met)
 
-    if taken and (age >> far or age >> (length + REST_BITS)):
+    gone = age >> (params.stamp_width - 1)
+    if met != LOOSE and (gone or age >> (length + REST_BITS)):
         velocity, acceleration = 0.0, 0.0
-        known = int(known and not age >> far)
+        known = int(known and not gone)
     line = velocity + acceleration * age
-    if taken:
+    if met != LOOSE:
         line = _within(line, velocity, 2.5 * params.clocks * 2.0 ** -max(_length(age) - 1, 0))
     return State(1, known, number, stamp, kind, length, velocity, acceleration, places), line, 0

@@ -1,8 +1,7 @@
 """Velocity from the time of whole encoder cycles between the clock stamps of their edges, in fixed point.
 
-An encoder's four edges of a cycle (A rise, B rise, A fall, B fall) may be out of place, each by its own error, but an
-edge is exactly 4 counts from the one of its kind in the next cycle. So only edges of one kind are subtracted. With c
-clocks a sample, velocities in counts a sample and times in clocks:
+Only edges of one kind are subtracted, so it is immune to misplaced ones: `hardwall.model.cycle_times`. With c clocks a
+sample, velocities in counts a sample and times in clocks:
 
     cycle    v = 4 m c / D      the last edge, and the last one of its kind that the sample before knew: m cycles in D
     gap      v = c / g          until there is such a cycle in this direction: the last two edges, g apart
@@ -34,37 +33,32 @@ Formats, derived.
 - The quotient has one bit more, for rounding half up, so its width is that of `velocity`.
 - Cycles: the decoder counts an edge a clock at most, so ceil(c / 4); more are held to that.
 
-A stamp wraps after 2**stamp_width clocks, a second or more. An edge is forgotten in the last quarter of that time, for
-which a sample must be no longer than such a quarter; older ones cannot alias. So at standstill v = 0, exactly, once the
-last edge is AGE_LIMIT of the stamp's range ago, or earlier if the bound is less than half an LSB. An axis whose cycle
-is longer reads by gaps, and one whose gap is longer reads 0.
+At standstill v = 0, exactly, once the last edge is AGE_LIMIT of the stamp's range ago, or earlier if the bound is less
+than half an LSB. An axis whose cycle is longer reads by gaps, and one whose gap is longer reads 0. Twice the largest
+speed fits the format; the largest step of position is a cycle's mean like any other.
 
-The velocity saturates at its format's largest word, either sign, with the flag `velocity_saturated`. Counts are
-subtracted modulo their width. At the first sample, and with a restart, what came before is forgotten: 0 until two new
-edges. An illegal transition ends the run of known edges; one that is followed within its sample by four more edges is
-known by the decoder's flag alone.
+The velocity saturates at its format's largest word, either sign, with the flag `velocity_saturated`. Count and stamps
+may wrap. At the first sample, and with a restart, what came before is forgotten: 0 until two new edges.
 """
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from . import cycle_times
 from .compiled import compiled
+from .cycle_times import AGE_LIMIT, NOTHING, Memory, observe
 from .divide import divide
 from .divide import latency as divide_latency
 from .estimators import estimate
-from .fixed import SQ, bits_for, wrap
-from .quadrature import RUN_MAX, Seen, stamp_of
+from .fixed import SQ, bits_for
+from .quadrature import Seen
 
 OUTPUTS = ("u",)
 ERROR_SHARE = 0.01
 """How much rounding may add to the stamp's own error."""
-AGE_LIMIT = 0.75
-"""Part of the stamp's range after which an edge is forgotten: its two top bits set."""
 DIVIDEND_BITS = 56
 """Of stamp and sample: a dividend, at most c 4 ceil(c / 4) 2**(f + 1) < 2**(stamp_width + 6) c, is then an int64."""
-OBSERVE_STEPS = 6
-"""Clocks from a strobe to its `Times`: see `hardwall.hdl.period`."""
-STEPS = OBSERVE_STEPS + 2
+STEPS = cycle_times.LATENCY + 2
 """Clocks of the sequence besides the division."""
 
 
@@ -95,20 +89,6 @@ class FloatParams(NamedTuple):
     clocks: int
 
 
-class Memory(NamedTuple):
-    """What is kept of the last sample's `Seen`, and which kinds' stamps are known (bit k: kind k) and not too old."""
-
-    running: int
-    count: int
-    down: int
-    run: int
-    stamp_a_rise: int
-    stamp_b_rise: int
-    stamp_a_fall: int
-    stamp_b_fall: int
-    fresh: int
-
-
 class State(NamedTuple):
     """`speed` is that of the last cycle or gap, without bound and sign: a quotient (float: counts a sample)."""
 
@@ -116,18 +96,6 @@ class State(NamedTuple):
     speed: float
 
 
-class Times(NamedTuple):
-    """What a sample's stamps say: times in clocks, numbers of edges and cycles; 0 where there is none."""
-
-    news: int  # whether there is a new edge
-    cycles: int  # in `cycle`
-    cycle: int
-    gap: int
-    age: int  # of the last edge
-    cycle_age: int  # of the edge three before it
-
-
-NOTHING = Memory(0, 0, 0, 0, 0, 0, 0, 0, 0)
 START = State(NOTHING, 0)
 FLOAT_START = State(NOTHING, 0.0)
 
@@ -191,52 +159,6 @@ class Design:
 
     def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
         return FloatParams(self.count_width, self.stamp_width, self.clocks)
-
-
-@compiled
-def observe(params, memory, seen, restart):
-    """Take the stamps of a sample: return (memory, `Times`)."""
-    modulus = (1 << params.stamp_width) - 1
-    first = restart or not memory.running
-    fresh = 0
-    for kind in range(4):
-        stamp = stamp_of(seen, kind)
-        old = (seen.stamp - stamp) & modulus >= modulus - (modulus >> 2)
-        if not first and (stamp != stamp_of(memory, kind) or (memory.fresh >> kind & 1 and not old)):
-            fresh |= 1 << kind
-    kind, left, right = seen.edge, (seen.edge - 1) & 3, (seen.edge + 1) & 3
-    period = (stamp_of(seen, kind) - stamp_of(memory, kind)) & modulus
-    age = (seen.stamp - stamp_of(seen, kind)) & modulus
-    left_age = (seen.stamp - stamp_of(seen, left)) & modulus
-    right_age = (seen.stamp - stamp_of(seen, right)) & modulus
-    left_known, right_known = fresh >> left & 1, fresh >> right & 1
-
-    # A neighbour of the last edge's kind is the edge before it, or the one three before; which, their ages tell.
-    left_first = left_known and not (right_known and right_age < left_age)
-    before = left_age if left_first else right_age
-    run = seen.run if fresh >> kind & 1 else 0
-    gap = (before - age) & modulus if run >= 2 and (left_known or right_known) else 0
-    cycle_age = max(left_age, right_age) if run == RUN_MAX and left_known and right_known else 0
-
-    moved = wrap(seen.count - memory.count, params.count_width)
-    forward = -moved if seen.down else moved
-    one_way = seen.down == memory.down and forward > 0 and (run == RUN_MAX or run == memory.run + forward)
-    # The edge of this kind that the last sample knew stands so many counts before the last one that it saw.
-    known = memory.fresh >> kind & 1 and -forward & 3 < memory.run
-    cycles = (forward + 3) >> 2 if one_way and known else 0
-
-    memory = Memory(
-        1,
-        seen.count,
-        seen.down,
-        seen.run,
-        seen.stamp_a_rise,
-        seen.stamp_b_rise,
-        seen.stamp_a_fall,
-        seen.stamp_b_fall,
-        fresh,
-    )
-    return memory, Times(int(period != 0), cycles, period, gap, age if run else 0, cycle_age)
 
 
 @compiled

@@ -28,20 +28,23 @@ Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992: fix
 
 Formats. `velocity` as that of `period`, with at least k fraction bits, so that n / w is exact. A window may be no
 longer than half the counter's range at twice the largest speed, so that n does not alias. D, B and ages are as in
-`period`: v = 0, exactly, when B is AGE_LIMIT of the stamp's range. Both speeds saturate at the format, with the flag
-`velocity_saturated`. First sample and restart: 0 until there are five edges in one direction, or a fast window.
+`period`: v = 0, exactly, when B is AGE_LIMIT of the stamp's range. Count and stamps may wrap; the largest step is a
+fast window, and no cycle. Both speeds saturate at the format, with the flag `velocity_saturated`. First sample and
+restart: 0 until there are five edges in one direction, or a fast window.
 """
 
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from . import cycle_times
 from .compiled import compiled
+from .cycle_times import NOTHING, Memory, observe
 from .divide import divide
 from .divide import latency as divide_latency
 from .estimators import estimate
 from .fixed import UQ, bits_for, saturate, wrap
-from .period import NOTHING, OBSERVE_STEPS, Memory, check_stamps, observe, velocity_format
+from .period import check_stamps, velocity_format
 from .quadrature import Seen
 from .words import Word, check_positive
 
@@ -50,7 +53,7 @@ CYCLE_SPEED = 3.0
 """Counts a sample at which switching is due: with a misplaced edge still no more than the four of a cycle."""
 SWITCH_MIN = 2
 """Counts a window to switch at: with fewer the hysteresis would hold it in counting for good."""
-STEPS = OBSERVE_STEPS + 2
+STEPS = cycle_times.LATENCY + 2
 """Clocks of the sequence besides the division: see `hardwall.hdl.period_count`."""
 
 

@@ -26,6 +26,10 @@ Formats, derived:
   longest window that the word can set, keeps rounding below 0.6 % of that for every n. A count of motion over the
   window is never less than 2**ROUNDING_BITS LSB, so there is no dead zone; standing for n samples gives exactly 0.
 
+Ends. v never leaves its format. A step shows as its counts / n for n samples, then is gone; of one beyond twice the
+largest speed the part up to that. After the first sample or a restart in motion v is too small for n samples, in
+proportion to the motion seen.
+
 Source: elementary; the bound is Taylor's formula and the triangle inequality.
 """
 

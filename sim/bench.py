@@ -74,7 +74,7 @@ def _cocotb(name: str) -> Callable[[], float]:
             order = {"scene": found, "samples": COCOTB_SAMPLES, "report": str(report)}
             environ = {"HARDWALL_LOOP": json.dumps(order), "COCOTB_LOG_LEVEL": "WARNING"}
             log = build_dir() / "cocotb" / "bench.log"
-            simulate(Axis(scene.spec), "hardwall.sim.cocotb_loop", Path(folder), environ, log=log)
+            simulate(Axis(scene.spec), "axis", "hardwall.sim.cocotb_loop", Path(folder), environ, log=log)
             result = json.loads(report.read_text())
         if result["force_sha256"] != words:
             raise RuntimeError(f"the RTL under cocotb and the model differ in their first {COCOTB_SAMPLES} force words")

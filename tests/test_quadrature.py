@@ -8,14 +8,14 @@ import sys
 import cocotb
 import numpy as np
 import pytest
-from amaranth.hdl import Cat, Module, ResetSignal, Shape
+from amaranth.hdl import Cat, Module, ResetSignal, unsigned
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 from cocotb.triggers import RisingEdge
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bench import SAMPLES, SEED, Bench, Monitor, check, parameters, rng, simulate
+from bench import SAMPLES, SEED, Bench, Packing, Record, check, packing_of, parameters, rng, simulate
 from hardwall.hdl.quadrature import Quadrature
 from hardwall.model import quadrature as model
 from hardwall.model.compiled import compiled
@@ -143,61 +143,34 @@ class Recorded(wiring.Component):
 
     def __init__(self, **widths: int):
         self.decoder = Quadrature(**widths)
-        members = self.decoder.signature.members
-        self.shapes = {name: Shape.cast(members[name].shape) for name in (*INPUTS, *OUTPUTS)}
-        n_in = sum(self.shapes[name].width for name in INPUTS)
-        n_all = sum(shape.width for shape in self.shapes.values())
-        super().__init__({"stimulus": In(n_in), "record": Out(1 + n_all)})
+        shapes = packing_of(self.decoder).shapes
+        self.stimuli = Packing({name: shapes[name] for name in INPUTS})
+        self.records = Packing({"reset": unsigned(1), **{name: shapes[name] for name in (*INPUTS, *OUTPUTS)}})
+        super().__init__({"stimulus": In(self.stimuli.width), "record": Out(self.records.width)})
 
     def elaborate(self, platform):
         m = Module()
         m.submodules.decoder = self.decoder
-        members = {name: getattr(self.decoder, name) for name in self.shapes}
-        m.d.comb += Cat(members[name] for name in INPUTS).eq(self.stimulus)
-        m.d.comb += self.record.eq(Cat(ResetSignal(), members.values()))
+        m.d.comb += Cat(getattr(self.decoder, name) for name in INPUTS).eq(self.stimulus)
+        m.d.comb += self.record.eq(Cat(ResetSignal(), (getattr(self.decoder, name) for name in (*INPUTS, *OUTPUTS))))
         return m
 
-    def words(self, inputs: dict[str, np.ndarray]) -> list[int]:
-        """Return values of `stimulus`."""
-        words, offset = [0] * len(inputs["reset"]), 0
-        for name in INPUTS:
-            mask = (1 << self.shapes[name].width) - 1
-            words = [word | (value & mask) << offset for word, value in zip(words, inputs[name].tolist(), strict=True)]
-            offset += self.shapes[name].width
-        return words
 
-    def rows(self, words: list[int]) -> list[tuple[int, ...]]:
-        """Return values of `record` as the reset, the inputs and the outputs."""
-        columns, offset = [[word & 1 for word in words]], 1
-        for shape in self.shapes.values():
-            mask, sign = (1 << shape.width) - 1, (1 << shape.width - 1) * shape.signed
-            columns.append([((word >> offset & mask) ^ sign) - sign for word in words])
-            offset += shape.width
-        return list(zip(*columns, strict=True))
-
-
-class Part(Monitor):
-    """Some columns of a record of every clock, as a monitor of them."""
-
-    def __init__(self, names: tuple[str, ...], rows: list[tuple[int, ...]]):
-        self.names, self.rows, self.clocks = names, rows, list(range(len(rows)))
-
-
-async def play(dut, inputs: dict[str, np.ndarray]) -> tuple[Quadrature, Part, Part]:
+async def play(dut, inputs: dict[str, np.ndarray]) -> tuple[Quadrature, Record, Record]:
     """Return the decoder, its inputs at every clock edge, and its outputs after that edge, as the pins carried them."""
     component = Recorded(**parameters())
     await Bench(dut, component).reset()
     words = []
-    for word, reset in zip([*component.words(inputs), 0], [*inputs["reset"].tolist(), 1], strict=True):
-        dut.stimulus.value = word
+    stimuli = [dict(zip(INPUTS, row, strict=True)) for row in zip(*(inputs[name] for name in INPUTS), strict=True)]
+    for row, reset in zip([*stimuli, {}], [*inputs["reset"].tolist(), 1], strict=True):
+        dut.stimulus.value = component.stimuli.pack(row)
         dut.rst.value = reset
         await RisingEdge(dut.clk)
         # As it was before the edge: the inputs that this edge takes, the outputs that the last one made.
         words.append(int(dut.record.value))
-    rows = component.rows(words)
-    n_in = 1 + len(INPUTS)
-    taken = Part(("reset", *INPUTS), [row[:n_in] for row in rows[:-1]])
-    return component.decoder, taken, Part(OUTPUTS, [row[n_in:] for row in rows[1:]])
+    clocks = list(range(len(words) - 1))
+    taken = Record(("reset", *INPUTS), component.records, words[:-1], clocks)
+    return component.decoder, taken, Record(OUTPUTS, component.records, words[1:], clocks)
 
 
 @cocotb.test()
