@@ -214,7 +214,7 @@ async def random_frames_reach_the_axis_and_telemetry_comes_back(dut):
     await host.reset()
     read = []
     # Fewer do not go everywhere.
-    while host.twin.clocks < 2 * max(SAMPLES, 100_000):
+    while host.twin.clocks < max(2 * SAMPLES, 200_000):
         host.rate = float(host.random.choice((0.0, 0.02, 0.3, 1.0), p=(0.1, 0.4, 0.4, 0.1)))
         host.illegal_rate = float(host.random.choice((0.0, 0.01)))
         answer, expected = await host.exchange(random_frame(host))

@@ -54,13 +54,9 @@ async def follows_model(dut):
     widths = component.dividend_width, component.divisor_width, component.quotient_width
     bench = Bench(dut, component)
     await bench.reset()
-    coin = rng()  # whether the next strobe comes with this one's end
-    starts = bench.monitor("start", "dividend", "divisor")
-    quotients = bench.monitor("done", "quotient", "saturated")
-    for dividend, divisor in stimulus(*widths, SAMPLES // 10):
-        await bench.transact("start", "done", idle=coin.random() < 0.5, dividend=dividend, divisor=divisor)
-    await bench.rest()
-    pairs = list(zip(starts.column("dividend").tolist(), starts.column("divisor").tolist(), strict=True))
+    operands, results = ("dividend", "divisor"), ("quotient", "saturated")
+    starts, quotients = await bench.campaign("start", "done", operands, results, stimulus(*widths, SAMPLES // 10))
+    pairs = starts.rows
     expected = {
         "quotient": np.array([divide(a, b, widths[2]) for a, b in pairs]),
         "saturated": np.array([b == 0 or a // b >= 1 << widths[2] for a, b in pairs]),

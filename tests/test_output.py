@@ -52,20 +52,9 @@ async def follows_model(dut):
     component = make(**parameters())
     bench = Bench(dut, component)
     await bench.reset()
-    coin = rng()  # whether the next strobe comes with this one's end
     bench.drive(enable=1)
-    inputs = bench.monitor("strobe", "force", "fault", *NAMES)
-    outputs = bench.monitor("valid", "drive", "limited", "actuated")
-    for force, fault, *words in stimulus(component.design, SAMPLES):
-        await bench.transact(
-            "strobe",
-            "valid",
-            idle=coin.random() < 0.5,
-            force=force,
-            fault=fault,
-            **dict(zip(NAMES, words, strict=True)),
-        )
-    await bench.rest()
+    names, rows = ("force", "fault", *NAMES), stimulus(component.design, SAMPLES)
+    inputs, outputs = await bench.campaign("strobe", "valid", names, ("drive", "limited", "actuated"), rows)
     expected = model(component.design, inputs.rows)
     assert set(expected["limited"].tolist()) == {0, 1, 2, 3}
     check(inputs, outputs, expected, component.latency)

@@ -32,13 +32,10 @@ def pairs(component: SignedDivide, samples: int):
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     component = make(**parameters())
-    bench, coin = Bench(dut, component), rng()
+    bench = Bench(dut, component)
     await bench.reset()
-    inputs = bench.monitor("start", "dividend", "divisor")
-    outputs = bench.monitor("done", "quotient")
-    for dividend, divisor in pairs(component, SAMPLES // 50):
-        await bench.transact("start", "done", idle=coin.random() < 0.5, dividend=dividend, divisor=divisor)
-    await bench.rest()
+    operands, rows = ("dividend", "divisor"), pairs(component, SAMPLES // 50)
+    inputs, outputs = await bench.campaign("start", "done", operands, ("quotient",), rows)
     quotients = [divide(dividend, divisor, component.fraction) for dividend, divisor in inputs.rows]
     check(inputs, outputs, {"quotient": quotients}, component.latency)
 

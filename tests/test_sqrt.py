@@ -35,14 +35,10 @@ async def follows_model(dut):
     component = Sqrt(width)
     bench = Bench(dut, component)
     await bench.reset()
-    coin = rng()  # whether the next strobe comes with this one's end
-    starts = bench.monitor("start", "radicand")
-    roots = bench.monitor("done", "root")
     # Exhaustive where that is less than the random campaign.
     radicands = range(1 << width) if 1 << width <= SAMPLES else rng().integers(0, 1 << width, SAMPLES).tolist()
-    for radicand in [*around_squares(width), *radicands]:
-        await bench.transact("start", "done", idle=coin.random() < 0.5, radicand=radicand)
-    await bench.rest()
+    rows = [(radicand,) for radicand in [*around_squares(width), *radicands]]
+    starts, roots = await bench.campaign("start", "done", ("radicand",), ("root",), rows)
     expected = np.array([isqrt(r) for r in starts.column("radicand").tolist()])
     check(starts, roots, {"root": expected}, component.latency)
 

@@ -67,13 +67,8 @@ async def follows_model(dut):
     component = make(**parameters())
     bench = Bench(dut, component)
     await bench.reset()
-    coin = rng()  # whether the next strobe comes with this one's end
-    inputs = bench.monitor("strobe", "count", "velocity", *NAMES)
-    outputs = bench.monitor("valid", "force")
-    for count, velocity, *words in stimulus(component.design, SAMPLES):
-        drive = dict(zip(NAMES, words, strict=True))
-        await bench.transact("strobe", "valid", idle=coin.random() < 0.5, count=count, velocity=velocity, **drive)
-    await bench.rest()
+    rows = stimulus(component.design, SAMPLES)
+    inputs, outputs = await bench.campaign("strobe", "valid", ("count", "velocity", *NAMES), ("force",), rows)
     expected = model(component.design, inputs.rows)
     top = component.design.force.max
     assert {-top, 0, top} <= set(expected)
