@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from .cli_estimators import add_commands
+from . import cli_estimators, cli_zwidth
 from .scene import SceneError, load
 from .terminal import (
     Backend,
@@ -208,7 +208,8 @@ def synth(
     show(report, as_json)
 
 
-add_commands(app)
+cli_estimators.add_commands(app)
+cli_zwidth.add_commands(app)
 
 
 def _interrupted(*_: object) -> None:

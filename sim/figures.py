@@ -1,4 +1,4 @@
-"""The founding paper's Figures 1 and 2, and the second carried on to every estimator and to 10 MHz: what is in them.
+"""The founding paper's Figures 1, 2 and 5, the second carried on to every estimator and to 10 MHz: what is in them.
 
 Beside the estimators, Figure 2 has two lines that no run gives, for |f''| <= C and noise up to eps = q/2, half a count:
 
@@ -24,6 +24,8 @@ RATES_HZ = {
     1: (10_000,),
     2: (*(step * 10**decade for decade in (3, 4, 5, 6) for step in (1, 2, 5)), 10_000_000),
 }
+PROPOSED = {"lambda_sqrt_m_per_s": math.sqrt(12.0), "alpha_m_per_s2": 13.2}
+"""The paper's proposed gains, for its C of 12 m/s^2."""
 ADJUSTED = {"lambda_sqrt_m_per_s": 500 * math.sqrt(1e-3), "alpha_m_per_s2": 50.0}
 """The paper's adjusted gains; its alpha was lost, and this one satisfies the condition that it names."""
 LAG_HZ = 100.0
@@ -81,6 +83,18 @@ def curves(figure: int) -> list[Curve]:
         if (name, output) not in shown
     ]
     return papers + others
+
+
+def methods() -> dict[str, Curve]:
+    """Return the methods of the paper's Figure 5, by the name used on the command line."""
+    filtered = {
+        f"fdm-{cutoff}": Curve(f"FDM + {cutoff} Hz", "butterworth", "u", {"cutoff_hz": float(cutoff)})
+        for cutoff in (30, 100, 500, 1000)
+    }
+    return filtered | {
+        "proposed": Curve("Levant u, proposed gains", "levant", "u", PROPOSED),
+        "adjusted": Curve("Levant u, adjusted gains", "levant", "u", ADJUSTED),
+    }
 
 
 def label(estimator: str, output: str) -> str:

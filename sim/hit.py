@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -22,6 +23,8 @@ from .whole_file import whole_file
 BACKENDS = ("float", "fixed", "rtl")
 CHUNK = 1 << 16
 """Samples between two looks at progress."""
+LOOK_S = 0.1
+"""Time between two looks at whether the verdict is sure."""
 OVERVIEW_POINTS = 6000
 DETAIL_FROM_M = -0.2e-3
 DETAIL_S = 0.1
@@ -127,6 +130,9 @@ class _Tally:
 
     def __init__(self, scene: Scene, exact: bool):
         spec, protocol = scene.spec, scene.protocol
+        self._limit = spec.force.max if exact else spec.force_max_n / spec.force_resolution_n
+        self._hopeless = round(protocol.measure_s * spec.sample_hz) * (protocol.threshold_mm * 1e-3) ** 2
+        self._late = 0.0
         self._settled = round(protocol.settle_s * spec.sample_hz)
         self._mean_from = self._settled - round(protocol.mean_s * spec.sample_hz)
         self._decimation = spec.samples_per_actuation
@@ -141,7 +147,14 @@ class _Tally:
 
     @property
     def rms_m(self) -> float:
-        return (self._squares / self._measured) ** 0.5
+        """Of what was measured; infinite if nothing was."""
+        return (self._squares / self._measured) ** 0.5 if self._measured else math.inf
+
+    @property
+    def sure_unstable(self) -> bool:
+        """Whether the rest of the run cannot make it stable: the squares alone exceed what the threshold allows. Or the
+        force is at its limit in the second half of the settling, as long after the impact: it will not settle."""
+        return self._squares >= self._hopeless or self._late >= self._limit
 
     @property
     def force_sha256(self) -> str | None:
@@ -156,7 +169,10 @@ class _Tally:
         if len(rest):
             self._squares += float(np.square(rest - self.mean_m).sum())
             self._measured += len(rest)
-        self.largest_drive = max(self.largest_drive, float(np.abs(drives).max()))
+        largest = float(np.abs(drives).max())
+        self.largest_drive = max(self.largest_drive, largest)
+        if 2 * first >= self._settled:
+            self._late = max(self._late, largest)
         if self._digest:
             self._digest.update(drives[-first % self._decimation :: self._decimation].astype("<i4").tobytes())
 
@@ -167,6 +183,7 @@ def run(
     traces: bool = False,
     progress: Callable[[int], None] | None = None,
     waveform: Path | None = None,
+    until_sure: bool = False,
 ) -> Hit:
     """Hit the wall of `scene` and return what came of it.
 
@@ -176,6 +193,8 @@ def run(
         traces: keep samples of the whole run and of the contact.
         progress: called with the number of samples done.
         waveform: for `rtl`, an FST file to write, of every signal around the contact.
+        until_sure: end a run that is unstable for certain, or whose handle outruns the encoder by far; its `rms_m` is
+            that until then, or infinite.
 
     Raises:
         RuntimeError: if the handle outran every decoder's limit by far, or the RTL could not be built.
@@ -194,14 +213,16 @@ def run(
     at = loop.Progress(0, start, cell, scene.protocol.push_n, 0)
     if backend != "rtl":
         controller, state = stamped.controller(Axis(spec, floating, **scene.parameters), start_level)
-        return _closed_loop(scene, backend, world, controller, state, at, records, progress, ())
+        return _closed_loop(scene, backend, world, controller, state, at, records, progress, (), until_sure)
 
     from .rtl import Hardware  # noqa: PLC0415  (the other backends need neither Amaranth nor a C++ compiler)
 
     with Hardware(spec, scene.words, start_level, traced=waveform is not None) as hardware, _vcd(waveform) as vcd:
         # What the hardware will do is known before it runs: the contact is where the bit-accurate model has it.
         marks = _waveform_marks(scene, hardware, vcd) if waveform else ()
-        result = _closed_loop(scene, backend, world, hardware.controller, hardware.start, at, records, progress, marks)
+        result = _closed_loop(
+            scene, backend, world, hardware.controller, hardware.start, at, records, progress, marks, until_sure
+        )
         if waveform:
             hardware.end_trace()
         return result
@@ -229,23 +250,26 @@ def _waveform_marks(scene: Scene, hardware, vcd: Path) -> list[tuple[int, Callab
     return [(first, lambda: hardware.trace(vcd)), (first + length, hardware.end_trace)]
 
 
-def _closed_loop(scene, backend, world, controller, state, at, records, progress, marks) -> Hit:
+def _closed_loop(scene, backend, world, controller, state, at, records, progress, marks, until_sure) -> Hit:
     """Run the loop in chunks that end at the `marks` (sample, action), and tally it."""
     floating, total = backend == "float", scene.samples
     number = np.float64 if floating else np.int64
     delay = loop.Delay(np.zeros(scene.delay_samples, number)) if scene.delay_samples else None
     edges = np.zeros(loop.EDGE_CAPACITY, np.int64), np.zeros(loop.EDGE_CAPACITY, np.int64)
-    positions, drives = np.zeros(CHUNK), np.zeros(CHUNK, number)
+    chunk = max(round(LOOK_S * scene.spec.sample_hz), 1) if until_sure else CHUNK
+    positions, drives = np.zeros(chunk), np.zeros(chunk, number)
     tally, actions = _Tally(scene, exact=not floating), dict(marks)
     # Compiling is not running: a call with nothing to do keeps it out of the time.
     loop.run(world, controller, state, at, delay, records, edges, positions, drives, 0)
     began = time.perf_counter()
-    while at.sample < total:
+    while at.sample < total and not (until_sure and tally.sure_unstable):
         first = at.sample
         if first in actions:
             actions.pop(first)()
-        until = min(first + CHUNK, total, *(sample for sample in actions if sample > first))
+        until = min(first + chunk, total, *(sample for sample in actions if sample > first))
         state, at = loop.run(world, controller, state, at, delay, records, edges, positions, drives, until)
+        if at.n_edges < 0 and until_sure:
+            break
         if at.n_edges < 0:
             when = at.sample / scene.spec.sample_hz
             raise RuntimeError(f"the handle passed more than {loop.EDGE_CAPACITY} edges in a sample, at {when:g} s")
@@ -255,10 +279,10 @@ def _closed_loop(scene, backend, world, controller, state, at, records, progress
     return Hit(
         scene=scene,
         backend=backend,
-        samples=total,
+        samples=at.sample,
         seconds=time.perf_counter() - began,
         mean_m=tally.mean_m,
-        rms_m=tally.rms_m,
+        rms_m=math.inf if at.n_edges < 0 else tally.rms_m,
         max_force_n=tally.largest_drive * scene.spec.force_resolution_n,
         flags=scene.spec.design.flag_names(int(state.flags)),
         force_sha256=tally.force_sha256,

@@ -45,14 +45,15 @@ def figure_1(curves: list[Curve], rows: list[dict]) -> Figure:
     panels = picture.subplot_mosaic("aa;bc", height_ratios=(1, 1.2))
     times = np.arange(int(signal.seconds * sample_hz)) / sample_hz
     exact = exact_velocity(signal.motion, times)
-    for curve, row in zip(curves, rows, strict=True):
+    for index, (curve, row) in enumerate(zip(curves, rows, strict=True)):
         spec = axis_spec(row["estimator"], sample_hz, row["acceleration_max_mm_s2"] / 1e3, row["gains"])
         parts = velocities(signal, spec, row["output"], backend, offsets(row["encoder_phase_error_counts"]))
         estimate = np.concatenate([part for _, part, _ in parts])
         for axes in panels.values():
-            axes.plot(times, estimate * 1e3, lw=0.9, label=curve.label)
+            # The first on top: what chatters hides what lags.
+            axes.plot(times, estimate * 1e3, lw=0.9, label=curve.label, zorder=3 - index / len(curves))
     for axes in panels.values():
-        axes.plot(times, exact * 1e3, color="black", lw=0.9, label="exact derivative")
+        axes.plot(times, exact * 1e3, color="black", lw=0.9, label="exact derivative", zorder=4)
         axes.set_xlabel("time (s)")
         axes.set_ylabel("velocity (mm/s)")
         axes.grid(alpha=0.3)

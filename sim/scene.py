@@ -3,8 +3,6 @@
 Units are in the keys. Every error is one line that names the file, the key and what is accepted.
 """
 
-import difflib
-import math
 import tomllib
 from functools import cached_property
 from pathlib import Path
@@ -12,9 +10,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from ..model import estimators, quadrature
+from ..model import estimators
 from ..model.spec import AxisSpec
 from .encoder import offsets
+from .scene_checks import check, sentence
 
 FOLDER = Path(__file__).with_name("scenes")
 
@@ -22,10 +21,6 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Rate = Annotated[int, Field(gt=0, le=10**9)]
-
-
-SAMPLES_MAX = 10**9
-"""Of a run's settling or measuring: a minute or two of the model's time, hours of the RTL's."""
 
 
 class SceneError(ValueError):
@@ -116,6 +111,16 @@ class ProtocolSection(Section):
     threshold_mm: Positive
 
 
+class ZWidthSection(Section):
+    """Steps of a map of stable walls: see `hardwall.sim.boundary`."""
+
+    stiffness_step_n_per_m: Positive
+    stiffness_to_n_per_m: Positive
+    damping_from_n_s_per_m: NotNegative
+    damping_to_n_s_per_m: NotNegative
+    damping_step_n_s_per_m: Positive
+
+
 class Scene(Section):
     """One scene; `load` reads it, and checks what the sections cannot check alone."""
 
@@ -126,6 +131,7 @@ class Scene(Section):
     wall: WallSection
     amplifier: AmplifierSection | None = None
     protocol: ProtocolSection
+    zwidth: ZWidthSection | None = None
 
     @cached_property
     def spec(self) -> AxisSpec:
@@ -175,118 +181,6 @@ class Scene(Section):
         return round(self.protocol.settle_s * rate) + round(self.protocol.measure_s * rate)
 
 
-# Which scene key a message of the model speaks of, where the names differ.
-KEYS = {
-    "wall_stiffness": "wall.stiffness_n_per_m",
-    "wall_damping": "wall.damping_n_s_per_m",
-    "start_m": "protocol.start_m",
-    "output_slew_limit": "controller.slew_limit_n_per_s",
-    "count_m": "encoder.count_m",
-    "phase_error_counts": "encoder.phase_error_counts",
-}
-
-
-def _key_of(message: str, estimator: str) -> str:
-    """Return the message with its leading field name as a scene key."""
-    name, _, rest = message.partition(" ")
-    if name in KEYS:
-        return f"{KEYS[name]} {rest}"
-    if name in ControllerSection.model_fields:
-        return f"controller.{message}"
-    return f"controller.gains.{estimator}.{message}"
-
-
-def _check(scene: Scene) -> None:
-    """Raise ValueError for what the sections cannot see alone; the message begins with the key."""
-    try:
-        spec = scene.spec
-        if scene.output not in spec.model.OUTPUTS:
-            raise ValueError(f"output must be one of {', '.join(spec.model.OUTPUTS)}, not {scene.output!r}")
-        if -scene.protocol.start_m > spec.travel_m:
-            raise ValueError(
-                f"start_m must be {-spec.travel_m:g} to 0, within travel_m, not {scene.protocol.start_m!r}"
-            )
-        _ = scene.words, scene.encoder.offsets
-    except (TypeError, ValueError) as error:
-        raise ValueError(_key_of(str(error), scene.controller.estimator)) from None
-
-    error_counts = max(map(abs, scene.encoder.offsets))
-    fastest = spec.count_m * quadrature.max_edge_rate(spec.clock_hz, scene.controller.glitch_clocks, error_counts)
-    if spec.speed_max_m_per_s > fastest:
-        raise ValueError(
-            f"controller.speed_max_m_per_s must be at most {fastest:g}, the decoder's limit at this clock, count size, "
-            f"glitch_clocks and edge error, not {spec.speed_max_m_per_s!r}"
-        )
-    protocol, rate = scene.protocol, spec.sample_hz
-    longest = SAMPLES_MAX / rate
-    for key in ("settle_s", "measure_s"):
-        if not 0.5 < getattr(protocol, key) * rate <= SAMPLES_MAX:
-            raise ValueError(
-                f"protocol.{key} must be a sample of {1 / rate:g} s to {longest:g}, not {getattr(protocol, key)!r}"
-            )
-    if not 0.5 < protocol.mean_s * rate <= round(protocol.settle_s * rate):
-        raise ValueError(
-            f"protocol.mean_s must be a sample of {1 / rate:g} s to settle_s {protocol.settle_s:g}, "
-            f"not {protocol.mean_s!r}"
-        )
-    for name, most in (
-        ("stiffness_n_per_m", spec.stiffness_max_n_per_m),
-        ("damping_n_s_per_m", spec.damping_max_n_s_per_m),
-    ):
-        if getattr(scene.wall, name) > most:
-            raise ValueError(
-                f"wall.{name} must be 0 to {most:g}, what the controller is for, not {getattr(scene.wall, name)!r}"
-            )
-    if scene.amplifier is not None:
-        if scene.amplifier.delay_s > protocol.settle_s:
-            raise ValueError(
-                f"amplifier.delay_s must be 0 to settle_s {protocol.settle_s:g}, not {scene.amplifier.delay_s!r}"
-            )
-        exact = scene.amplifier.delay_s * spec.sample_hz
-        if not math.isclose(exact, scene.delay_samples, abs_tol=1e-6):
-            raise ValueError(
-                f"amplifier.delay_s must be a whole number of samples of {1 / spec.sample_hz:g} s, "
-                f"not {scene.amplifier.delay_s!r}"
-            )
-
-
-def _sentence(error: dict[str, Any]) -> str:
-    """Return one pydantic error as 'key must ..., not value'."""
-    key = ".".join(
-        str(part) for part in error["loc"] if not str(part).startswith(("function-", "constrained", "list[", "float"))
-    )
-    limits = error.get("ctx", {})
-    if error["type"] == "missing":
-        return f"{key} is missing"
-    if error["type"] == "extra_forbidden":
-        return f"{key} is not a key of a scene{_suggestion(error['loc'])}"
-    if error["type"] in ("model_type", "dict_type"):
-        return f"{key} must be a section, not {error['input']!r}"
-    if key == "encoder.phase_error_counts":
-        return f"{key} must be a finite number, or a list of four, not {error['input']!r}"
-    relations = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
-    wanted = " and ".join(f"{words} {limits[short]:g}" for short, words in relations.items() if short in limits)
-    if not wanted:
-        wanted = (
-            error["msg"]
-            .removeprefix("Input should be ")
-            .replace("a valid ", "a ")
-            .replace("a integer", "a whole number")
-        )
-    return f"{key} must be {wanted}, not {error['input']!r}"
-
-
-def _suggestion(location: tuple) -> str:
-    """Return which keys the section of a misspelt one has, and the nearest first."""
-    section: Any = Scene
-    for part in location[:-1]:
-        kinds = [section.model_fields[part].annotation, *getattr(section.model_fields[part].annotation, "__args__", ())]
-        section = next(kind for kind in kinds if isinstance(kind, type) and issubclass(kind, Section))
-    keys = [key for key in section.model_fields if key != "name"]
-    near = difflib.get_close_matches(str(location[-1]), keys, 1)
-    return f"; did you mean {near[0]}?" if near else f"; its section has {', '.join(keys) or 'no keys'}"
-
-
 def names() -> list[str]:
     """Return the names of the scenes that come with the project."""
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
@@ -321,11 +215,11 @@ def load(scene: str, changes: dict[str, Any] | None = None) -> Scene:
             place[last] = value
     try:
         result = Scene(name=path.stem, **{key: value for key, value in content.items() if key != "name"})
-        _check(result)
+        check(result)
     except ValidationError as error:
         # A misspelt key is also a missing one: the misspelling says more.
         worst = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
-        raise SceneError(f"{scene}: {_sentence(worst)}") from None
+        raise SceneError(f"{scene}: {sentence(worst, Scene)}") from None
     except ValueError as error:
         raise SceneError(f"{scene}: {error}") from None
     return result

@@ -41,12 +41,13 @@ class Store:
 
     Args:
         kind: names the file.
+        known: whether what an earlier process left is used; else it is made anew.
     """
 
-    def __init__(self, kind: str):
+    def __init__(self, kind: str, known: bool = True):
         self.path = build_dir() / "results" / f"{kind}-{_sources()}.jsonl"
         self._known: dict[str, Any] = {}
-        text = self.path.read_text(encoding="utf-8") if self.path.exists() else ""
+        text = self.path.read_text(encoding="utf-8") if known and self.path.exists() else ""
         for line in text.splitlines():
             try:
                 key, result = json.loads(line)

@@ -1,0 +1,130 @@
+"""What theory says of the largest stiffness: two bounds for passivity, and the exact boundary of the linear loop.
+
+- Colgate and Schenkel: a wall sampled every T is passive if b > K T / 2 + |B|.
+- Abbott and Okamura: with B = 0, position quantised to q and Coulomb friction f_c, if K <= min(2 b / T, 2 f_c / q).
+- Linear: without friction that sticks and without quantisation, in contact, the loop with a linear estimator is linear
+  and periodic with the force's update. It is stable while every eigenvalue of what a period does to the state is
+  within the unit circle. Nothing is approximated: the zero-order hold, the clocks from strobe to drive, those of the
+  decoder, the amplifier's delay and the estimator are all in the matrix.
+
+A passive wall is stable with any hand, so the first two lie below the third.
+"""
+
+import numpy as np
+from scipy import signal
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+from ..model.quadrature import latency
+from .scene import Scene
+
+LINEAR = ("fdm", "butterworth")
+"""Estimators that the exact boundary is known for."""
+DRIVE = 3
+"""Index of the drive in the loop's state."""
+SEARCH = 100
+"""Stiffnesses, spaced evenly in their logarithm, among which the first unstable one is looked for."""
+
+
+def colgate_schenkel_n_per_m(scene: Scene, damping_n_s_per_m: float) -> float:
+    """Return the largest stiffness that is passive with a wall's damping, N/m; 0 where none is."""
+    period_s = 1 / scene.controller.actuation_hz
+    return max(2 * (scene.handle.viscous_n_s_per_m - abs(damping_n_s_per_m)) / period_s, 0.0)
+
+
+def abbott_okamura_n_per_m(scene: Scene) -> float:
+    """Return the largest stiffness that is passive without damping on a quantised position, N/m."""
+    viscous = 2 * scene.handle.viscous_n_s_per_m * scene.controller.actuation_hz
+    return min(viscous, 2 * (scene.handle.coulomb_n or 0.0) / scene.encoder.count_m)
+
+
+def _estimator(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Return the estimator as (A, B, C, D) from position (m) to velocity (m/s), one step a sample.
+
+    Raises:
+        ValueError: if it is not linear.
+    """
+    name, rate = scene.controller.estimator, float(scene.spec.sample_hz)
+    if name not in LINEAR:
+        raise ValueError(f"estimator must be one of {', '.join(LINEAR)} for a linear loop, not {name!r}")
+    numerator, denominator = np.array([rate, -rate]), np.array([1.0, 0.0])
+    if name == "butterworth":
+        b, a = signal.butter(2, scene.spec.design.gains.cutoff_hz, fs=rate)
+        numerator, denominator = np.convolve(numerator, b), np.convolve(denominator, a)
+    a, b, c, d = signal.tf2ss(numerator, denominator)
+    return a, b[:, 0], c[0], float(d[0, 0])
+
+
+def _span(scene: Scene, seconds: float) -> np.ndarray:
+    """Return what a span does to (position, velocity, applied force), which stays."""
+    mass, viscous = scene.handle.mass_kg, scene.handle.viscous_n_s_per_m
+    return expm(np.array([[0, 1, 0], [0, -viscous / mass, 1 / mass], [0, 0, 0]]) * seconds)
+
+
+class Loop:
+    """The linear loop of a scene in contact, over one update period of the force.
+
+    The state, at the instant that the count of a sample stands for: position (m), velocity (m/s), applied force (N),
+    the drive (N) in force, those on their way through the amplifier, the estimator's own.
+
+    Raises:
+        ValueError: if the estimator is not linear.
+    """
+
+    def __init__(self, scene: Scene):
+        self._a, self._b, self._c, self._d = _estimator(scene)
+        spec, delay = scene.spec, scene.delay_samples
+        self._n_state = 4 + delay + len(self._a)
+        self._own = slice(4 + delay, self._n_state)
+        seen_s = latency(scene.controller.glitch_clocks) / spec.clock_hz
+        until_drive_s = spec.design.latency_to_drive / spec.clock_hz
+        early, late, applied = (np.eye(self._n_state) for _ in range(3))
+        early[:3, :3] = _span(scene, seen_s + until_drive_s)
+        late[:3, :3] = _span(scene, 1 / spec.sample_hz - seen_s - until_drive_s)
+        applied[2] = 0
+        if delay:
+            # The oldest leaves, the new one enters.
+            applied[2, 4] = 1
+            applied[4 : 4 + delay] = 0
+            applied[range(4, 3 + delay), range(5, 4 + delay)] = 1
+            applied[3 + delay, DRIVE] = 1
+        else:
+            applied[2, DRIVE] = 1
+        after = late @ applied @ early
+        self._after_first = np.linalg.matrix_power(after @ self._sampled(), spec.samples_per_actuation - 1) @ after
+
+    def _sampled(self) -> np.ndarray:
+        """Return what the estimator makes of a sample."""
+        sampled = np.eye(self._n_state)
+        sampled[self._own, self._own] = self._a
+        sampled[self._own, 0] = self._b
+        return sampled
+
+    def radius(self, stiffness_n_per_m: float, damping_n_s_per_m: float) -> float:
+        """Return the largest magnitude of a period's eigenvalues; below 1 the loop is stable."""
+        updated = self._sampled()
+        updated[DRIVE] = 0
+        updated[DRIVE, 0] = -stiffness_n_per_m - damping_n_s_per_m * self._d
+        updated[DRIVE, self._own] = -damping_n_s_per_m * self._c
+        return float(np.abs(np.linalg.eigvals(self._after_first @ updated)).max())
+
+
+def linear_limit_n_per_m(loop: Loop, damping_n_s_per_m: float, least: float = 1.0, most: float = 1e8) -> float:
+    """Return the stiffness (N/m) at which the linear loop with a wall's damping first becomes unstable.
+
+    Args:
+        loop: of a scene, whose friction that sticks and whose quantisation are left out.
+        damping_n_s_per_m: of the wall.
+        least, most: the range that is searched, N/m.
+
+    Returns:
+        That stiffness; 0 where even the least is unstable, `most` where none is.
+    """
+    found = least
+    for stiffness in np.geomspace(least, most, SEARCH):
+        if loop.radius(stiffness, damping_n_s_per_m) >= 1:
+            if stiffness == least:
+                return 0.0
+            return brentq(lambda k: loop.radius(k, damping_n_s_per_m) - 1, found, stiffness, rtol=1e-9)
+        found = stiffness
+    return most

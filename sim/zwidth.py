@@ -1,0 +1,179 @@
+"""The Z-width of estimators: for each, the edge of the region of walls that its hits leave stable.
+
+A map is a number of traces, one for each method, and a trace asks for one hit at a time. Hits of different traces run
+side by side on the workers of a Dask cluster; every verdict is kept as it comes. A verdict depends on the scene and the
+wall alone, so the map is the same whatever the number of workers, and an interrupted one goes on where it was.
+"""
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from typing import Any
+
+from distributed import Client, as_completed
+
+from . import hit
+from .boundary import Edge, Grid, area, trace
+from .figures import Curve
+from .scene import Scene, load
+from .store import Store
+
+
+@dataclass(frozen=True)
+class Map:
+    """The edge of one method's stable region.
+
+    Attributes:
+        curve: the method.
+        edges: by B.
+        hits: walls that were hit for it.
+    """
+
+    curve: Curve
+    edges: list[Edge]
+    hits: int
+
+    @property
+    def area(self) -> float:
+        """Of the stable region, N^2 s/m^2."""
+        return area(self.edges)
+
+    @property
+    def largest_n_per_m(self) -> float:
+        """The largest stable stiffness."""
+        return max(edge.stable_n_per_m for edge in self.edges)
+
+    def report(self) -> dict[str, Any]:
+        """Return the map as the command line prints it; the boundary in [B (N s/m), K (N/m)], K stable."""
+        return {
+            "label": self.curve.label,
+            "estimator": self.curve.estimator,
+            "output": self.curve.output,
+            "gains": self.curve.gains,
+            "boundary": [[edge.damping_n_s_per_m, edge.stable_n_per_m] for edge in self.edges],
+            "area_n2_s_per_m2": self.area,
+            "largest_stiffness_n_per_m": self.largest_n_per_m,
+            "hits": self.hits,
+        }
+
+
+def grid_of(scene: Scene) -> Grid:
+    """Return the steps of a scene's maps.
+
+    Raises:
+        ValueError: if it has no section `zwidth`.
+    """
+    if scene.zwidth is None:
+        raise ValueError(f"{scene.name}: zwidth is missing: a map needs its steps")
+    return Grid(**scene.zwidth.model_dump())
+
+
+def changes_of(curve: Curve) -> dict[str, Any]:
+    """Return what a method changes in a scene, by dotted key."""
+    gains = f"controller.gains.{curve.estimator}"
+    return {
+        "controller.estimator": curve.estimator,
+        "controller.output": curve.output,
+        **({gains: curve.gains} if curve.gains else {}),
+    }
+
+
+def verdict(scene: str, content: str, changes: dict, stiffness: float, damping: float, backend: str) -> dict:
+    """Hit a wall; return whether it is `stable`, and its `rms_mm` up to where that was sure.
+
+    Args:
+        scene: name or file, which must be where the worker runs.
+        content: digest of that file, so that a result belongs to it.
+        changes: of the scene, by dotted key.
+        stiffness, damping: of the wall, N/m and N s/m.
+        backend: one of `hit.BACKENDS`.
+
+    Raises:
+        SceneError: if there is no such scene.
+    """
+    wall = {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": damping}
+    result = hit.run(load(scene, changes | wall), backend, until_sure=True)
+    return {"stable": result.stable, "rms_mm": result.rms_m * 1e3}
+
+
+class _Tracing:
+    """One trace on its way: which wall it asks for, and what it found at the end."""
+
+    def __init__(self, curve: Curve, grid: Grid, job: Callable[[float, float], dict]):
+        self._steps: Generator = trace(grid)
+        self._curve, self._job = curve, job
+        self._hits = 0
+        self.wanted: dict | None = None
+        self.found: Map | None = None
+        self._send(None)
+
+    def answer(self, result: dict) -> None:
+        """Go on from the verdict on the wall that was wanted."""
+        self._hits += 1
+        self._send(result["stable"])
+
+    def _send(self, stable: bool | None) -> None:
+        try:
+            self.wanted = self._job(*self._steps.send(stable))
+        except StopIteration as end:
+            self.wanted, self.found = None, Map(self._curve, end.value, self._hits)
+
+    @property
+    def damping_n_s_per_m(self) -> float | None:
+        """B that the trace has come to; None at its end."""
+        return self.wanted and self.wanted["damping"]
+
+
+def run(
+    curves: list[Curve],
+    grid: Grid,
+    common: dict[str, Any],
+    store: Store,
+    client: Client | None = None,
+    progress: Callable[[list[float | None]], None] | None = None,
+) -> list[Map]:
+    """Return the map of each method.
+
+    Args:
+        curves: the methods.
+        grid: steps and ends.
+        common: the arguments of `verdict` but for `changes` and the wall; `changes` of all methods, if any.
+        store: where verdicts are kept, and looked for.
+        client: of a Dask cluster; None for this process alone.
+        progress: called after every verdict with the B that each trace has come to, None for one that ended.
+    """
+    changes = common.get("changes", {})
+
+    def asks(curve: Curve) -> Callable[[float, float], dict]:
+        own = common | {"changes": changes | changes_of(curve)}
+        return lambda stiffness, damping: own | {"stiffness": stiffness, "damping": damping}
+
+    traces = [_Tracing(curve, grid, asks(curve)) for curve in curves]
+
+    def forward(tracing: _Tracing) -> dict | None:
+        """Answer what the store can; return the hit that is wanted next."""
+        while tracing.wanted and tracing.wanted in store:
+            tracing.answer(store.get(tracing.wanted))
+        if progress:
+            progress([each.damping_n_s_per_m for each in traces])
+        return tracing.wanted
+
+    def taken(tracing: _Tracing, result: dict) -> dict | None:
+        store.put(tracing.wanted, result)
+        return forward(tracing)
+
+    if client is None:
+        for tracing in traces:
+            job = forward(tracing)
+            while job:
+                job = taken(tracing, verdict(**job))
+    else:
+        # Every hit is a run of its own, also one that another trace has asked for.
+        waiting = {client.submit(verdict, **job, pure=False): each for each in traces if (job := forward(each))}
+        queue = as_completed(waiting)
+        for future in queue:
+            tracing = waiting.pop(future)
+            if job := taken(tracing, future.result()):
+                following = client.submit(verdict, **job, pure=False)
+                waiting[following] = tracing
+                queue.add(following)
+    return [tracing.found for tracing in traces]

@@ -1,0 +1,65 @@
+"""Tracing of a stable region: on regions that are known, what is asked and what is found."""
+
+import pytest
+
+from hardwall.sim.boundary import Edge, Grid, area, trace
+
+GRID = Grid(10.0, 100.0, 1.0, 6.0, 0.5)
+
+
+def traced(stable, grid: Grid = GRID) -> tuple[list[Edge], list[tuple[float, float]]]:
+    """Return the edges, and the walls that were hit, of a region given by a function of K and B."""
+    steps, asked = trace(grid), []
+    try:
+        wall = next(steps)
+        while True:
+            asked.append(wall)
+            wall = steps.send(stable(*wall))
+    except StopIteration as end:
+        return end.value, asked
+
+
+def limit(damping: float) -> float:
+    """Rises, falls, and ends."""
+    return 5 + 30 * damping - 5.5 * damping**2
+
+
+def test_the_edge_is_found_on_the_grid_and_no_wall_is_hit_twice():
+    edges, asked = traced(lambda stiffness, damping: stiffness <= limit(damping))
+    assert len(asked) == len(set(asked))
+    assert edges[-1].stable_n_per_m == 0
+    assert [edge.damping_n_s_per_m for edge in edges] == GRID.dampings[: len(edges)]
+    for edge in edges:
+        exact = max(limit(edge.damping_n_s_per_m), 0)
+        assert edge.stable_n_per_m == exact // 10 * 10
+        assert edge.marginal_n_per_m == edge.stable_n_per_m + 10
+
+
+def test_the_walls_are_hit_in_the_order_of_the_paper():
+    """Up from the softest; then a step of B, and from the marginal K up or down."""
+    _, asked = traced(lambda stiffness, damping: stiffness <= (30 if damping < 2 else 10))
+    assert asked[:4] == [(10, 1), (20, 1), (30, 1), (40, 1)]
+    assert asked[4:8] == [(40, 1.5), (30, 1.5), (40, 2), (30, 2)]
+    assert asked[8:11] == [(20, 2), (10, 2), (20, 2.5)]
+
+
+def test_a_region_that_leaves_the_map_has_no_marginal_wall_there():
+    edges, asked = traced(lambda *_: True)
+    assert {edge.stable_n_per_m for edge in edges} == {100.0}
+    assert {edge.marginal_n_per_m for edge in edges} == {None}
+    assert len(asked) == 10 + len(GRID.dampings) - 1
+
+
+def test_nothing_stable_is_one_hit():
+    assert traced(lambda *_: False) == ([Edge(1.0, 0.0, 10.0)], [(10.0, 1.0)])
+
+
+def test_area_is_that_of_trapezoids():
+    edges = [Edge(1.0, 10.0, None), Edge(3.0, 30.0, None), Edge(4.0, 0.0, None)]
+    assert area(edges) == 2 * 20 + 15
+    assert area(edges[:1]) == 0
+
+
+@pytest.mark.parametrize(("last", "count"), [(1.0, 1), (1.2, 1), (1.3, 2), (6.0, 11)])
+def test_dampings_go_to_the_last_whole_step(last, count):
+    assert len(Grid(10.0, 100.0, 1.0, last, 0.5).dampings) == count

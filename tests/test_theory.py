@@ -1,0 +1,83 @@
+"""Theory of stiff walls: the closed forms, and the linear loop against the simulation that it leaves nothing out of."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hardwall.sim import hit, theory
+from hardwall.sim.scene import load
+
+# No friction that sticks, hardly a count; slow enough for the decoder, long enough to tell growing from fading.
+LINEAR = {
+    "handle.coulomb_n": None,
+    "encoder.count_m": 1e-8,
+    "controller.travel_m": 0.02,
+    "controller.speed_max_m_per_s": 0.05,
+    "controller.glitch_clocks": 0,
+    "protocol.start_m": -2e-4,
+    "protocol.settle_s": 40.0,
+    "protocol.threshold_mm": 5e-4,
+    "controller.output": "u",
+}
+PROMPT = {"amplifier": None, "controller.actuation_hz": 10_000, "controller.stiffness_max_n_per_m": 1e6}
+CASES = {
+    "fdm, soft": ("fdm", {}, 10.0, {}),
+    "fdm, damped": ("fdm", {}, 60.0, {}),
+    "filter of 100 Hz": ("butterworth", {"cutoff_hz": 100.0}, 20.0, {}),
+    "filter of 1 kHz": ("butterworth", {"cutoff_hz": 1000.0}, 100.0, {}),
+    "force at every sample": ("fdm", {}, 10.0, PROMPT),
+    "filter, force at every sample": ("butterworth", {"cutoff_hz": 300.0}, 30.0, PROMPT),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_simulation_turns_unstable_within_2_percent_of_the_linear_limit(case):
+    name, gains, damping, others = CASES[case]
+    changes = LINEAR | others | {"controller.estimator": name, "wall.damping_n_s_per_m": damping}
+    changes |= {f"controller.gains.{name}": gains} if gains else {}
+    limit = theory.linear_limit_n_per_m(theory.Loop(load("seed-2011", changes)), damping)
+    for share, stable in ((0.98, True), (1.02, False)):
+        result = hit.run(load("seed-2011", changes | {"wall.stiffness_n_per_m": share * limit}), "float")
+        assert result.flags == []
+        assert result.stable == stable, f"{share} of {limit} N/m: RMS {result.rms_m} m"
+
+
+def test_a_loop_without_damping_anywhere_is_unstable_at_every_stiffness():
+    scene = load("seed-2011", {"handle.viscous_n_s_per_m": 0.0, "controller.estimator": "fdm"})
+    assert theory.linear_limit_n_per_m(theory.Loop(scene), 0.0) == 0.0
+
+
+def test_a_fast_undelayed_loop_has_the_limit_of_gil_and_hulin():
+    """K < (b + B) / (T / 2 + delay), linear stability's first order in T; the estimator's half sample is beyond it."""
+    changes = {"controller.estimator": "fdm", "handle.viscous_n_s_per_m": 5.0}
+    scene = load("mhz", changes)
+    delay_s = (scene.spec.design.latency_to_drive + 6) / scene.spec.clock_hz
+    expected = 5.0 / (0.5e-6 + delay_s)
+    assert theory.linear_limit_n_per_m(theory.Loop(scene), 0.0) == pytest.approx(expected, rel=0.01)
+
+
+def test_other_estimators_are_refused():
+    with pytest.raises(ValueError, match=r"^estimator must be one of fdm, butterworth .*, not 'levant'$"):
+        theory.Loop(load("seed-2011"))
+
+
+def test_passivity():
+    scene = load("seed-2011", {"handle.viscous_n_s_per_m": 3.0})
+    assert theory.colgate_schenkel_n_per_m(scene, 1.0) == pytest.approx(2 * (3 - 1) * 1000)
+    assert theory.colgate_schenkel_n_per_m(scene, -1.0) == pytest.approx(2 * (3 - 1) * 1000)
+    assert theory.colgate_schenkel_n_per_m(scene, 4.0) == 0
+    assert theory.abbott_okamura_n_per_m(scene) == pytest.approx(2 * 3 * 1000)
+    coarse = load("seed-2011", {"handle.viscous_n_s_per_m": 300.0, "encoder.count_m": 1e-6})
+    assert theory.abbott_okamura_n_per_m(coarse) == pytest.approx(2 * 0.1 / 1e-6)
+
+
+def test_a_passive_wall_is_within_the_linear_limit():
+    scene = load("seed-2011", {"handle.viscous_n_s_per_m": 8.0, "controller.estimator": "fdm"})
+    loop = theory.Loop(scene)
+    for damping in np.linspace(0, 7, 8):
+        # Colgate and Schenkel's sampler has no delay besides its hold: compare with as much.
+        prompt = load("seed-2011", {"handle.viscous_n_s_per_m": 8.0, "controller.estimator": "fdm", "amplifier": None})
+        passive = theory.colgate_schenkel_n_per_m(prompt, damping)
+        assert theory.linear_limit_n_per_m(theory.Loop(prompt), damping) > passive
+        assert math.isfinite(theory.linear_limit_n_per_m(loop, damping))

@@ -1,0 +1,162 @@
+"""Maps of stable walls: early ends, any number of workers, interrupts, what is printed and what is refused."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from distributed import Client, LocalCluster
+from test_cli import call
+
+from hardwall.sim import figures, hit, zwidth
+from hardwall.sim.scene import load
+from hardwall.sim.store import Store
+
+SMALL = {
+    "zwidth.stiffness_step_n_per_m": 4e3,
+    "zwidth.damping_from_n_s_per_m": 10.0,
+    "zwidth.damping_to_n_s_per_m": 20.0,
+    "zwidth.damping_step_n_s_per_m": 10.0,
+    "protocol.settle_s": 2.0,
+    "protocol.measure_s": 0.5,
+}
+SET = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
+COMMON = {"scene": "seed-2011", "content": "", "changes": SMALL, "backend": "fixed"}
+CURVES = [figures.methods()[name] for name in ("fdm-100", "adjusted")]
+
+
+@pytest.fixture(autouse=True)
+def fresh(tmp_path, monkeypatch):
+    """Results go to an empty folder; what is compiled stays where it is."""
+    monkeypatch.setattr("hardwall.sim.store.build_dir", lambda: tmp_path / "build")
+
+
+def grid():
+    return zwidth.grid_of(load("seed-2011", SMALL))
+
+
+@pytest.fixture(scope="module")
+def map_of_one_process(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hardwall.sim.store.build_dir", lambda: tmp_path_factory.mktemp("one"))
+        return zwidth.run(CURVES, grid(), COMMON, Store("zwidth"))
+
+
+@pytest.mark.parametrize("backend", ["float", "fixed"])
+@pytest.mark.parametrize("estimator", ["fdm", "levant"])
+def test_an_early_end_changes_no_verdict(backend, estimator):
+    for stiffness in (5e3, 15e3, 40e3, 150e3):
+        for damping in (10.0, 120.0, 300.0):
+            wall = {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": damping}
+            scene = load("seed-2011", wall | {"controller.estimator": estimator})
+            whole, early = hit.run(scene, backend), hit.run(scene, backend, until_sure=True)
+            assert early.stable == whole.stable, wall
+            assert early.samples <= whole.samples
+            if whole.stable:
+                assert (early.samples, early.force_sha256) == (whole.samples, whole.force_sha256)
+                # Sums in other pieces round otherwise.
+                assert early.rms_m == pytest.approx(whole.rms_m, rel=1e-9, abs=1e-15)
+
+
+def test_two_workers_give_the_map_of_one(map_of_one_process):
+    options = {"threads_per_worker": 1, "dashboard_address": None}
+    with LocalCluster(n_workers=2, **options) as cluster, Client(cluster) as client:
+        assert zwidth.run(CURVES, grid(), COMMON, Store("zwidth"), client) == map_of_one_process
+
+
+def test_a_map_goes_on_from_what_is_known(map_of_one_process, monkeypatch):
+    """Ended after five hits, then gone on: none of the five is hit again, and the map is the same."""
+    real, hits = zwidth.verdict, []
+
+    def counted(**job):
+        if len(hits) == 5:
+            raise KeyboardInterrupt
+        hits.append(job)
+        return real(**job)
+
+    monkeypatch.setattr(zwidth, "verdict", counted)
+    with pytest.raises(KeyboardInterrupt):
+        zwidth.run(CURVES, grid(), COMMON, Store("zwidth"))
+    before = list(hits)
+    monkeypatch.setattr(zwidth, "verdict", lambda **job: hits.append(job) or real(**job))
+    assert zwidth.run(CURVES, grid(), COMMON, Store("zwidth")) == map_of_one_process
+    assert len(hits) == sum(each.hits for each in map_of_one_process)
+    assert all(job not in before for job in hits[5:])
+
+
+@pytest.mark.rtl
+def test_the_rtl_gives_the_map_of_fixed(monkeypatch, capsys):
+    few = [*SET, "--set", "zwidth.stiffness_to_n_per_m=20e3", "--set", "zwidth.damping_to_n_s_per_m=10.0"]
+    few += ["--set", "controller.clock_hz=6000000", "--estimators", "adjusted", "--workers", 1, "--json"]
+    fixed, rtl = (
+        json.loads(call(monkeypatch, capsys, "zwidth", *few, "--backend", each)[1])["maps"] for each in ("fixed", "rtl")
+    )
+    assert fixed == rtl
+    assert fixed[0]["hits"] > 2
+
+
+def test_report_and_picture(monkeypatch, capsys, tmp_path, map_of_one_process):
+    picture = tmp_path / "map.svg"
+    names = ["--estimators", "fdm-100,adjusted", "--workers", 1]
+    code, out, _ = call(monkeypatch, capsys, "zwidth", *SET, *names, "--json", "--plot", picture)
+    assert code == 0
+    report = json.loads(out)
+    assert report["maps"] == [each.report() for each in map_of_one_process]
+    assert report["hits"] == sum(each["hits"] for each in report["maps"])
+    text = picture.read_text()
+    wanted = ("damping B of the wall (N s/m)", "largest stable stiffness K (kN/m)", "FDM + 100 Hz", "linear loop")
+    assert [label for label in wanted if label not in text] == []
+    code, out, _ = call(monkeypatch, capsys, "zwidth", *SET, *names, "--resume")
+    assert code == 0
+    assert "Levant u, adjusted gains" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["mhz"], "mhz: zwidth is missing: a map needs its steps"),
+        (["--estimators", "nobody"], "--estimators: estimator must be one of fdm, "),
+        (
+            ["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"],
+            "--scheduler tcp://127.0.0.1:1 has workers",
+        ),
+        (["--set", "zwidth.stiffness_step_n_per_m=0"], "zwidth.stiffness_step_n_per_m must be more than 0"),
+        (["--set", "zwidth.stiffness_to_n_per_m=1e9"], "zwidth.stiffness_to_n_per_m must be 1000 to 200000"),
+        (["--set", "zwidth.damping_to_n_s_per_m=1.0"], "zwidth.damping_to_n_s_per_m must be 6 to 400"),
+        (["--plot", "map.gif"], "--plot must end in .pdf or .png or .svg"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, message):
+    code, out, err = call(monkeypatch, capsys, "zwidth", *arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_a_scheduler_that_is_not_there_is_a_failure(monkeypatch, capsys):
+    monkeypatch.setattr("hardwall.sim.cluster.TIMEOUT_S", 0.5)
+    code, out, err = call(monkeypatch, capsys, "zwidth", *SET, "--scheduler", "tcp://127.0.0.1:1")
+    assert (code, out) == (1, "")
+    assert "no Dask scheduler answers at tcp://127.0.0.1:1" in err
+
+
+def test_an_interrupted_map_says_how_to_go_on(tmp_path):
+    command = [Path(sys.executable).with_name("hardwall"), "zwidth", "--workers", "2", "--json"]
+    build = tmp_path / "results"
+    process = subprocess.Popen(
+        command, env={**os.environ, "HARDWALL_BUILD": str(build)}, stderr=subprocess.PIPE, stdout=subprocess.PIPE,
+        text=True, start_new_session=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and not list(build.glob("results/zwidth-*.jsonl")):
+        time.sleep(0.2)
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (1, "")
+    assert err.splitlines()[-1] == "hardwall: error: interrupted; --resume goes on from here"
+    kept = [line for line in next(build.glob("results/zwidth-*.jsonl")).read_text().splitlines() if line]
+    assert len(kept) > 0
