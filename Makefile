@@ -58,9 +58,10 @@ choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy,
 	@$(HARDWALL) costs
 	@$(HARDWALL) choose
 
-figures: $(VENV)/.synth | tools ## the founding paper's figures 1, 2, 5, and what a bit buys, as pictures in build/ (half an hour)
+figures: $(VENV)/.synth | tools ## the founding paper's figures 1, 2, 4, 5, and what a bit buys, as pictures in build/ (half an hour)
 	@for number in 1 2; do $(HARDWALL) accuracy --figure $$number --plot build/figure-$$number.png; done
-	@$(HARDWALL) zwidth --plot build/zwidth.png
+	@$(HARDWALL) lipschitz --plot build/figure-4.png
+	@$(HARDWALL) zwidth --plot build/figure-5.png
 	@$(HARDWALL) bits --plot build/bits.png
 
 verilog: $(VENV)/.sim | tools ## the axis of the scene as Verilog, in build/verilog/

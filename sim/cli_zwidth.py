@@ -1,4 +1,4 @@
-"""The command that maps which walls are stable."""
+"""The commands about stiff walls: which are stable, and what a hit asks of Levant's gains."""
 
 import hashlib
 import json
@@ -21,6 +21,7 @@ from .terminal import (
     output_file,
     progress,
     scene_changes,
+    show,
     show_table,
 )
 
@@ -144,6 +145,31 @@ def zwidth(
         log.print(f"picture: {plot}")
 
 
+def lipschitz(
+    scene: SceneArgument = "seed-2011",
+    before: Annotated[float, typer.Option(min=0.0, metavar="S", help="of the record, before the contact")] = 0.1,
+    after: Annotated[float, typer.Option(min=1e-3, metavar="S", help="and after it")] = 0.4,
+    sines: Annotated[int, typer.Option(min=1, max=20, help="how many are fitted")] = 7,
+    set_: SetOption = None,
+    plot: PlotOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """The bound C on the acceleration, from sines fitted to a hit, and the gains that follow: the paper's Figure 4."""
+    changes = scene_changes(set_)
+    load(scene, changes)
+    from .lipschitz import measure  # noqa: PLC0415  (kernels are loaded only where they run)
+    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
+    from .plot_lipschitz import plot_lipschitz  # noqa: PLC0415
+
+    plot = output_file(plot, "--plot", SUFFIXES)
+    found = measure(scene, changes, before, after, sines)
+    show(found.report(), as_json)
+    if plot:
+        save(plot_lipschitz(found), plot)
+        log.print(f"picture: {plot}")
+
+
 def add_commands(app: typer.Typer) -> None:
-    """Add the command of this file to the command line."""
-    app.command()(zwidth)
+    """Add the commands of this file to the command line."""
+    for command in (zwidth, lipschitz):
+        app.command()(command)
