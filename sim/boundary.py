@@ -8,6 +8,7 @@ Nothing here hits a wall: `trace` is a generator that yields walls and is sent v
 who answers, or in which order several maps are answered.
 """
 
+import math
 from collections.abc import Generator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -26,13 +27,18 @@ class Grid:
     @property
     def dampings(self) -> list[float]:
         """Every B of the map, N s/m."""
-        steps = round((self.damping_to_n_s_per_m - self.damping_from_n_s_per_m) / self.damping_step_n_s_per_m)
-        return [self.damping_from_n_s_per_m + n * self.damping_step_n_s_per_m for n in range(steps + 1)]
+        first, step = self.damping_from_n_s_per_m, self.damping_step_n_s_per_m
+        return [first + n * step for n in range(_whole((self.damping_to_n_s_per_m - first) / step) + 1)]
 
     @property
     def rows(self) -> int:
         """Number of steps of K."""
-        return round(self.stiffness_to_n_per_m / self.stiffness_step_n_per_m)
+        return _whole(self.stiffness_to_n_per_m / self.stiffness_step_n_per_m)
+
+
+def _whole(steps: float) -> int:
+    """Return how many whole steps there are, where a division may have lost the last bit of one."""
+    return math.floor(steps * (1 + 1e-12))
 
 
 @dataclass(frozen=True)

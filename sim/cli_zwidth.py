@@ -1,15 +1,13 @@
 """The commands about stiff walls: which are stable, and what a hit asks of Levant's gains."""
 
-import hashlib
 import json
 import time
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .scene import Scene, SceneError, load
+from .scene import SceneError, load, read
 from .terminal import (
     Backend,
     BadInput,
@@ -25,7 +23,8 @@ from .terminal import (
     show_table,
 )
 
-COLUMNS = {"method": "left"} | dict.fromkeys(("area (kN/m N s/m)", "largest K (kN/m)", "to B (N s/m)", "hits"), "right")
+COLUMNS = {"method": "left"}
+COLUMNS |= dict.fromkeys(("area (kN/m N s/m)", "largest K (kN/m)", "to B (N s/m)", "leaves the map", "hits"), "right")
 
 
 def _curves(wanted: str | None) -> list:
@@ -48,9 +47,11 @@ def _curves(wanted: str | None) -> list:
     return curves
 
 
-def _content(scene: str) -> str:
-    """Return a digest of the scene, if it is a file of the user's."""
-    return hashlib.sha256(Path(scene).read_bytes()).hexdigest() if scene.endswith(".toml") else ""
+def _refuse(changes: dict, keys: tuple[str, ...], instead: str) -> None:
+    """Refuse changes of a scene that the command makes itself."""
+    for key in changes:
+        if key.startswith(keys):
+            raise BadInput(f"--set {key} is what this command sets itself: {instead}")
 
 
 def _limits(scene: str, changes: dict, maps: list, dampings: list[float]) -> list[list[float] | None]:
@@ -90,14 +91,16 @@ def zwidth(
 ) -> None:
     """Map the walls that are stable: for each estimator, the largest stiffness at every damping."""
     changes = scene_changes(set_)
-    loaded: Scene = load(scene, changes)
+    loaded = load(scene, changes)
     from . import cluster, figures  # noqa: PLC0415  (kernels are loaded only where they run)
     from . import zwidth as maps_of  # noqa: PLC0415
     from .figure_5 import facts  # noqa: PLC0415
     from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
     from .plot_zwidth import plot_zwidth  # noqa: PLC0415
-    from .store import Store  # noqa: PLC0415
+    from .store import Store, sources  # noqa: PLC0415
 
+    _refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "see --estimators")
+    _refuse(changes, ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m"), "see the scene's section zwidth")
     if workers and scheduler:
         raise BadInput(f"--scheduler {scheduler} has workers of its own: give it or --workers, not both")
     try:
@@ -107,11 +110,11 @@ def zwidth(
     plot, curves = output_file(plot, "--plot", SUFFIXES), _curves(wanted)
     for curve in curves:
         load(scene, changes | maps_of.changes_of(curve))
-    found = str(Path(scene).absolute()) if scene.endswith(".toml") else scene
-    common = {"scene": found, "content": _content(scene), "changes": changes, "backend": backend}
+    common = {"scene": scene, "text": read(scene), "sources": sources(), "changes": changes, "backend": backend}
     began = time.perf_counter()
     total = len(curves) * len(grid.dampings)
-    with progress(f"{loaded.name} Z-width, {backend}", total) as advance, cluster.client(workers, scheduler) as client:
+    title, workers_of = f"{loaded.name} Z-width, {backend}", cluster.client(len(curves), workers, scheduler)
+    with progress(title, total) as advance, workers_of as client:
 
         def columns_done(dampings: list[float | None]) -> None:
             advance(sum(len(grid.dampings) if b is None else grid.dampings.index(b) for b in dampings))
@@ -130,7 +133,8 @@ def zwidth(
                 each.curve.label,
                 f"{each.area / 1e3:.1f}",
                 f"{each.largest_n_per_m / 1e3:g}",
-                f"{each.edges[-1].damping_n_s_per_m:g}",
+                f"{each.damping_n_s_per_m:g}",
+                "yes" if each.leaves else "no",
                 str(each.hits),
             ]
             for each in maps
@@ -157,6 +161,7 @@ def lipschitz(
     """The bound C on the acceleration, from sines fitted to a hit, and the gains that follow: the paper's Figure 4."""
     changes = scene_changes(set_)
     load(scene, changes)
+    _refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "it takes the paper's filter")
     from .lipschitz import measure  # noqa: PLC0415  (kernels are loaded only where they run)
     from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
     from .plot_lipschitz import plot_lipschitz  # noqa: PLC0415

@@ -130,9 +130,7 @@ class _Tally:
 
     def __init__(self, scene: Scene, exact: bool):
         spec, protocol = scene.spec, scene.protocol
-        self._limit = spec.force.max if exact else spec.force_max_n / spec.force_resolution_n
         self._hopeless = round(protocol.measure_s * spec.sample_hz) * (protocol.threshold_mm * 1e-3) ** 2
-        self._late = 0.0
         self._settled = round(protocol.settle_s * spec.sample_hz)
         self._mean_from = self._settled - round(protocol.mean_s * spec.sample_hz)
         self._decimation = spec.samples_per_actuation
@@ -152,9 +150,8 @@ class _Tally:
 
     @property
     def sure_unstable(self) -> bool:
-        """Whether the rest of the run cannot make it stable: the squares alone exceed what the threshold allows. Or the
-        force is at its limit in the second half of the settling, as long after the impact: it will not settle."""
-        return self._squares >= self._hopeless or self._late >= self._limit
+        """Whether the rest of the run cannot make it stable: its squares already exceed what the threshold allows."""
+        return self._squares >= self._hopeless
 
     @property
     def force_sha256(self) -> str | None:
@@ -169,10 +166,7 @@ class _Tally:
         if len(rest):
             self._squares += float(np.square(rest - self.mean_m).sum())
             self._measured += len(rest)
-        largest = float(np.abs(drives).max())
-        self.largest_drive = max(self.largest_drive, largest)
-        if 2 * first >= self._settled:
-            self._late = max(self._late, largest)
+        self.largest_drive = max(self.largest_drive, float(np.abs(drives).max()))
         if self._digest:
             self._digest.update(drives[-first % self._decimation :: self._decimation].astype("<i4").tobytes())
 

@@ -93,12 +93,13 @@ def measure(scene: str, changes: dict[str, Any], before_s: float, after_s: float
     """
     loaded = load(scene, changes | changes_of(figures.methods()[METHOD]))
     result = hit.run(loaded, "fixed", traces=True)
-    if not len(result.detail.time_s):
-        raise RuntimeError("the handle never reached the wall: a record without a contact has no impact")
+    if not (result.detail.position_m > 0).any():
+        near = f"{hit.DETAIL_S:g} s of coming within {-hit.DETAIL_FROM_M * 1e3:g} mm"
+        raise RuntimeError(f"the handle did not reach the wall, or not within {near}: there is no impact to fit")
     whole, contact = result.overview, result.detail
     times = whole.time_s - result.contact_s
     inside = np.flatnonzero((times >= -before_s) & (times <= after_s))
-    kept = inside[:: max(len(inside) // POINTS, 1)]
+    kept = inside[:: max(-(-len(inside) // POINTS), 1)]
     positions = np.floor(whole.position_m[kept] / loaded.encoder.count_m) * loaded.encoder.count_m
     try:
         sines = fit(times[kept] - times[kept][0] if len(kept) else times[kept], positions, count)

@@ -196,12 +196,36 @@ def load(scene: str, changes: dict[str, Any] | None = None) -> Scene:
     Raises:
         SceneError: in one line, what is wrong, where, and what is accepted.
     """
-    path = Path(scene) if scene.endswith(".toml") else FOLDER / f"{scene}.toml"
+    return parse(scene, read(scene), changes)
+
+
+def read(scene: str) -> str:
+    """Return the text of the scene of that name, or in that file.
+
+    Raises:
+        SceneError: if there is none.
+    """
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        return _path(scene).read_text(encoding="utf-8")
     except FileNotFoundError:
         raise SceneError(f"scene must be one of {', '.join(names())}, or a .toml file, not {scene!r}") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, UnicodeDecodeError) as error:
+        raise SceneError(f"{scene}: not a readable TOML file: {str(error).splitlines()[0]}") from None
+
+
+def _path(scene: str) -> Path:
+    return Path(scene) if scene.endswith(".toml") else FOLDER / f"{scene}.toml"
+
+
+def parse(scene: str, text: str, changes: dict[str, Any] | None = None) -> Scene:
+    """Return the scene of a text, with some keys changed: `load` without the file, which messages still name.
+
+    Raises:
+        SceneError: as `load`.
+    """
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
         raise SceneError(f"{scene}: not a readable TOML file: {str(error).splitlines()[0]}") from None
     for key, value in (changes or {}).items():
         *sections, last = key.split(".")
@@ -214,7 +238,7 @@ def load(scene: str, changes: dict[str, Any] | None = None) -> Scene:
         if value is not None:
             place[last] = value
     try:
-        result = Scene(name=path.stem, **{key: value for key, value in content.items() if key != "name"})
+        result = Scene(name=_path(scene).stem, **{key: value for key, value in content.items() if key != "name"})
         check(result)
     except ValidationError as error:
         # A misspelt key is also a missing one: the misspelling says more.

@@ -10,6 +10,8 @@ from ..model import quadrature
 
 SAMPLES_MAX = 10**9
 """Of a run's settling or measuring: a minute or two of the model's time, hours of the RTL's."""
+STEPS_MAX = 10_000
+"""Of a map, in either direction."""
 
 # Which scene key a message of the model speaks of, where the names differ.
 KEYS = {
@@ -108,6 +110,14 @@ def _check_map(scene) -> None:
     ):
         if not least <= getattr(steps, key) <= most:
             raise ValueError(f"zwidth.{key} must be {least:g} to {most:g}, not {getattr(steps, key)!r}")
+    for key, span in (
+        ("stiffness_step_n_per_m", steps.stiffness_to_n_per_m),
+        ("damping_step_n_s_per_m", steps.damping_to_n_s_per_m - steps.damping_from_n_s_per_m),
+    ):
+        if span > STEPS_MAX * getattr(steps, key):
+            raise ValueError(
+                f"zwidth.{key} must be at least {span / STEPS_MAX:g}, {STEPS_MAX} steps, not {getattr(steps, key)!r}"
+            )
 
 
 def sentence(error: dict[str, Any], scene: type[BaseModel]) -> str:

@@ -24,7 +24,7 @@ TOOLS = (
 
 
 @cache
-def _sources() -> str:
+def sources() -> str:
     """Return a digest of every source and of the versions of what computes."""
     digest = hashlib.sha256()
     root = Path(__file__).absolute().parent.parent
@@ -45,7 +45,7 @@ class Store:
     """
 
     def __init__(self, kind: str, known: bool = True):
-        self.path = build_dir() / "results" / f"{kind}-{_sources()}.jsonl"
+        self.path = build_dir() / "results" / f"{kind}-{sources()}.jsonl"
         self._known: dict[str, Any] = {}
         text = self.path.read_text(encoding="utf-8") if known and self.path.exists() else ""
         for line in text.splitlines():

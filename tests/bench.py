@@ -205,7 +205,7 @@ class Bench:
         start, observed, coin = getattr(self.dut, strobe), self.dut.observed, rng()
         taken, given = Record(inputs, self.packing, [], []), Record(outputs, self.packing, [], [])
         held: tuple[int | None, ...] = (None,) * len(inputs)
-        ends = 0
+        ends, waiting = 0, False
 
         async def count_ends():
             nonlocal ends
@@ -213,19 +213,29 @@ class Bench:
                 await end
                 ends += 1
 
+        async def look() -> tuple[int, int]:
+            """Return the clock and what the component sees and shows at its next edge."""
+            await clock
+            return self.clock_number(), int(observed.value)
+
         counting = cocotb.start_soon(count_ends())
         for row in rows:
             # A port that keeps its value need not be written again: most run-time words change seldom.
             self.drive(**{name: new for name, new, old in zip(inputs, row, held, strict=True) if new != old})
             start.value, held = 1, row
-            await clock
-            taken.add(self.clock_number(), int(observed.value))
+            seen = await look()
+            taken.add(*seen)
+            (still,) = self.packing.column(done, [seen[1]])
+            assert still == waiting, f"{done} is {still} at the strobe after {len(given.clocks)} ends"
+            if waiting:
+                given.add(*seen)
             start.value = 0
             await end
-            # It counts where the next edge of the clock would see it, as for a monitor.
-            given.add(self.clock_number() + 1, int(observed.value))
-            if coin.random() < 0.5:
-                await clock
+            waiting = coin.random() < 0.5
+            if not waiting:
+                given.add(*await look())
+        if waiting:
+            given.add(*await look())
         await self.rest()
         counting.cancel()
         assert ends == len(given.clocks), f"{len(given.clocks)} strobes but {ends} ends"

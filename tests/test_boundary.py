@@ -54,12 +54,17 @@ def test_nothing_stable_is_one_hit():
     assert traced(lambda *_: False) == ([Edge(1.0, 0.0, 10.0)], [(10.0, 1.0)])
 
 
+def test_rows_go_to_the_last_whole_step():
+    assert Grid(35e3, 100e3, 1.0, 2.0, 1.0).rows == 2
+    assert Grid(0.1, 0.3, 1.0, 2.0, 1.0).rows == 3
+
+
 def test_area_is_that_of_trapezoids():
     edges = [Edge(1.0, 10.0, None), Edge(3.0, 30.0, None), Edge(4.0, 0.0, None)]
     assert area(edges) == 2 * 20 + 15
     assert area(edges[:1]) == 0
 
 
-@pytest.mark.parametrize(("last", "count"), [(1.0, 1), (1.2, 1), (1.3, 2), (6.0, 11)])
+@pytest.mark.parametrize(("last", "count"), [(1.0, 1), (1.2, 1), (1.4999, 1), (1.5, 2), (6.0, 11)])
 def test_dampings_go_to_the_last_whole_step(last, count):
     assert len(Grid(10.0, 100.0, 1.0, last, 0.5).dampings) == count

@@ -54,7 +54,7 @@ def test_the_least_alpha_satisfies_the_condition_just():
         (["--sines", "0"], 2, "--sines"),
         (["--after", "0"], 2, "--after"),
         (["--before", "0", "--after", "0.005"], 1, "the record is too short: values must be at least 28 for 7 sines"),
-        (["--set", "protocol.push_n=0.05"], 1, "the handle never reached the wall"),
+        (["--set", "protocol.push_n=0.05"], 1, "the handle did not reach the wall, or not within 0.1 s"),
     ],
 )
 def test_what_cannot_be_is_said_in_a_line(monkeypatch, capsys, arguments, code, message):

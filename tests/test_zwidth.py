@@ -13,8 +13,8 @@ from distributed import Client, LocalCluster
 from test_cli import call
 
 from hardwall.sim import figures, hit, zwidth
-from hardwall.sim.scene import load
-from hardwall.sim.store import Store
+from hardwall.sim.scene import load, read
+from hardwall.sim.store import Store, sources
 
 SMALL = {
     "zwidth.stiffness_step_n_per_m": 4e3,
@@ -25,7 +25,9 @@ SMALL = {
     "protocol.measure_s": 0.5,
 }
 SET = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
-COMMON = {"scene": "seed-2011", "content": "", "changes": SMALL, "backend": "fixed"}
+COMMON = {
+    "scene": "seed-2011", "text": read("seed-2011"), "sources": sources(), "changes": SMALL, "backend": "fixed",
+}  # fmt: skip
 CURVES = [figures.methods()[name] for name in ("fdm-100", "adjusted")]
 
 
@@ -49,17 +51,32 @@ def map_of_one_process(tmp_path_factory):
 @pytest.mark.parametrize("backend", ["float", "fixed"])
 @pytest.mark.parametrize("estimator", ["fdm", "levant"])
 def test_an_early_end_changes_no_verdict(backend, estimator):
+    ended = 0
     for stiffness in (5e3, 15e3, 40e3, 150e3):
         for damping in (10.0, 120.0, 300.0):
             wall = {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": damping}
             scene = load("seed-2011", wall | {"controller.estimator": estimator})
             whole, early = hit.run(scene, backend), hit.run(scene, backend, until_sure=True)
             assert early.stable == whole.stable, wall
-            assert early.samples <= whole.samples
+            ended += early.samples < whole.samples
             if whole.stable:
                 assert (early.samples, early.force_sha256) == (whole.samples, whole.force_sha256)
                 # Sums in other pieces round otherwise.
                 assert early.rms_m == pytest.approx(whole.rms_m, rel=1e-9, abs=1e-15)
+    assert ended >= 3
+
+
+def test_a_wall_that_settles_late_is_not_ended_early():
+    """The force is at its limit for a sample now and then, and the handle rests in the end all the same."""
+    changes = {"controller.estimator": "fdm", "protocol.push_n": 0.138, "wall.stiffness_n_per_m": 10e3}
+    result = hit.run(load("mhz", changes | {"wall.damping_n_s_per_m": 40.0}), "float", until_sure=True)
+    assert result.stable
+    assert result.samples == result.scene.samples
+
+
+def test_a_worker_with_other_sources_is_refused():
+    with pytest.raises(RuntimeError, match=r"has other sources of hardwall, or versions of its tools$"):
+        zwidth.verdict(**COMMON | {"sources": "0"}, stiffness=1e3, damping=10.0)
 
 
 def test_two_workers_give_the_map_of_one(map_of_one_process):
@@ -127,6 +144,10 @@ def test_report_and_picture(monkeypatch, capsys, tmp_path, map_of_one_process):
         (["--set", "zwidth.stiffness_step_n_per_m=0"], "zwidth.stiffness_step_n_per_m must be more than 0"),
         (["--set", "zwidth.stiffness_to_n_per_m=1e9"], "zwidth.stiffness_to_n_per_m must be 1000 to 200000"),
         (["--set", "zwidth.damping_to_n_s_per_m=1.0"], "zwidth.damping_to_n_s_per_m must be 6 to 400"),
+        (["--set", "zwidth.damping_step_n_s_per_m=1e-9"], "zwidth.damping_step_n_s_per_m must be at least 0.0294"),
+        (["--set", "zwidth.stiffness_step_n_per_m=1e-3"], "zwidth.stiffness_step_n_per_m must be at least 10, 10000"),
+        (["--set", "controller.estimator=fdm"], "--set controller.estimator is what this command sets itself: see"),
+        (["--set", "wall.damping_n_s_per_m=1.0"], "--set wall.damping_n_s_per_m is what this command sets itself"),
         (["--plot", "map.gif"], "--plot must end in .pdf or .png or .svg"),
     ],
 )
@@ -135,6 +156,23 @@ def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, mes
     assert (code, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1
+
+
+def test_a_scene_of_a_file_need_not_be_there_any_more(tmp_path, map_of_one_process):
+    file = tmp_path / "mine.toml"
+    file.write_text(read("seed-2011"))
+    common = COMMON | {"scene": str(file), "text": read(str(file))}
+    file.unlink()
+    assert zwidth.run(CURVES, grid(), common, Store("zwidth")) == map_of_one_process
+
+
+def test_a_scheduler_without_workers_is_a_failure(monkeypatch, capsys):
+    monkeypatch.setattr("hardwall.sim.cluster.TIMEOUT_S", 0.5)
+    with LocalCluster(n_workers=0, dashboard_address=None) as cluster:
+        address = cluster.scheduler_address
+        code, out, err = call(monkeypatch, capsys, "zwidth", *SET, "--scheduler", address)
+    assert (code, out) == (1, "")
+    assert f"the Dask scheduler at {address} has no workers" in err
 
 
 def test_a_scheduler_that_is_not_there_is_a_failure(monkeypatch, capsys):
@@ -157,6 +195,6 @@ def test_an_interrupted_map_says_how_to_go_on(tmp_path):
     os.killpg(process.pid, signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (1, "")
-    assert err.splitlines()[-1] == "hardwall: error: interrupted; --resume goes on from here"
+    assert err == "hardwall: error: interrupted; --resume goes on from here\n"
     kept = [line for line in next(build.glob("results/zwidth-*.jsonl")).read_text().splitlines() if line]
     assert len(kept) > 0
