@@ -38,10 +38,17 @@ def plot_zwidth(
     if any(limits):
         axes.plot([], [], color="0.4", ls="--", lw=0.9, label="linear loop, no friction, exact (same colour)")
     colgate = [colgate_schenkel_n_per_m(scene, damping) / 1e3 for damping in dampings]
-    axes.plot(dampings, colgate, color="black", ls=":", lw=1.4, label="passive: Colgate, Schenkel")
+    axes.plot(
+        dampings,
+        colgate,
+        color="black",
+        ls=":",
+        lw=1.4,
+        label=f"passive: Colgate, Schenkel (none for B over {scene.handle.viscous_n_s_per_m:g} N s/m)",
+    )
     abbott = abbott_okamura_n_per_m(scene) / 1e3
     axes.plot(
-        [0], [abbott], "k_", ms=16, mew=2, clip_on=False, label=f"passive at B = 0: Abbott, Okamura, {abbott:.3g}"
+        [0], [abbott], "k_", ms=16, mew=2, clip_on=False, label=f"passive at B = 0: Abbott, Okamura ({abbott:.3g} kN/m)"
     )
     controller = scene.controller
     axes.set_title(
