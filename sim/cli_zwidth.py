@@ -13,8 +13,11 @@ from .terminal import (
     BadInput,
     JsonOption,
     PlotOption,
+    ResumeOption,
     SceneArgument,
+    SchedulerOption,
     SetOption,
+    WorkersOption,
     log,
     output_file,
     progress,
@@ -54,19 +57,35 @@ def _refuse(changes: dict, keys: tuple[str, ...], instead: str) -> None:
             raise BadInput(f"--set {key} is what this command sets itself: {instead}")
 
 
-def _limits(scene: str, changes: dict, maps: list, dampings: list[float]) -> list[list[float] | None]:
+def _limits(maps: list, dampings: list[float]) -> list[list[float] | None]:
     """Return the linear loop's limits at every B, for the methods that are linear."""
     from . import theory  # noqa: PLC0415
-    from .zwidth import changes_of  # noqa: PLC0415
 
     limits = []
     for each in maps:
-        limit = None
-        if each.curve.estimator in theory.LINEAR:
-            loop = theory.Loop(load(scene, changes | changes_of(each.curve)))
+        limit, scene = None, each.case.parsed
+        if scene.controller.estimator in theory.LINEAR:
+            loop = theory.Loop(scene)
             limit = [theory.linear_limit_n_per_m(loop, damping) for damping in dampings]
         limits.append(limit)
     return limits
+
+
+def make_maps(title: str, cases: list, backend: str, workers: int | None, scheduler: str | None, resume: bool) -> list:
+    """Return the map of each case, made on the cluster that the options ask for, with a bar of what is done."""
+    from . import cluster, store  # noqa: PLC0415  (kernels are loaded only where they run)
+    from . import zwidth as maps_of  # noqa: PLC0415
+
+    if workers and scheduler:
+        raise BadInput(f"--scheduler {scheduler} has workers of its own: give it or --workers, not both")
+    try:
+        for case in cases:
+            maps_of.grid_of(case.parsed)
+    except ValueError as error:
+        raise SceneError(str(error)) from None
+    workers_of = cluster.client(len(cases), workers, scheduler)
+    with progress(title, len(cases)) as advance, workers_of as client:
+        return maps_of.run(cases, backend, store.Store("zwidth", resume), client, advance)
 
 
 def zwidth(
@@ -80,11 +99,9 @@ def zwidth(
         ),
     ] = None,
     backend: Annotated[Backend, typer.Option(help="float64 algorithm, bit-accurate model, or RTL")] = "fixed",
-    workers: Annotated[int | None, typer.Option(min=1, help="processes [default: one a core]")] = None,
-    scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="of a Dask cluster that runs, in place of workers of its own")
-    ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="go on where an interrupted run was")] = False,
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
+    resume: ResumeOption = False,
     set_: SetOption = None,
     plot: PlotOption = None,
     as_json: JsonOption = False,
@@ -92,34 +109,18 @@ def zwidth(
     """Map the walls that are stable: for each estimator, the largest stiffness at every damping."""
     changes = scene_changes(set_)
     loaded = load(scene, changes)
-    from . import cluster, figures  # noqa: PLC0415  (kernels are loaded only where they run)
+    from . import figures  # noqa: PLC0415  (kernels are loaded only where they run)
     from . import zwidth as maps_of  # noqa: PLC0415
     from .figure_5 import facts  # noqa: PLC0415
     from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
     from .plot_zwidth import plot_zwidth  # noqa: PLC0415
-    from .store import Store, sources  # noqa: PLC0415
 
     _refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "see --estimators")
     _refuse(changes, ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m"), "see the scene's section zwidth")
-    if workers and scheduler:
-        raise BadInput(f"--scheduler {scheduler} has workers of its own: give it or --workers, not both")
-    try:
-        grid = maps_of.grid_of(loaded)
-    except ValueError as error:
-        raise SceneError(str(error)) from None
-    plot, curves = output_file(plot, "--plot", SUFFIXES), _curves(wanted)
-    for curve in curves:
-        load(scene, changes | maps_of.changes_of(curve))
-    common = {"scene": scene, "text": read(scene), "sources": sources(), "changes": changes, "backend": backend}
+    plot, text = output_file(plot, "--plot", SUFFIXES), read(scene)
+    cases = [maps_of.Case(curve.label, scene, text, changes | curve.changes) for curve in _curves(wanted)]
     began = time.perf_counter()
-    total = len(curves) * len(grid.dampings)
-    title, workers_of = f"{loaded.name} Z-width, {backend}", cluster.client(len(curves), workers, scheduler)
-    with progress(title, total) as advance, workers_of as client:
-
-        def columns_done(dampings: list[float | None]) -> None:
-            advance(sum(len(grid.dampings) if b is None else grid.dampings.index(b) for b in dampings))
-
-        maps = maps_of.run(curves, grid, common, Store("zwidth", resume), client, columns_done)
+    maps = make_maps(f"{loaded.name} Z-width, {backend}", cases, backend, workers, scheduler, resume)
     seconds = time.perf_counter() - began
     shown = facts(dict(zip(figures.methods(), maps, strict=True))) if wanted is None else []
     if as_json:
@@ -130,7 +131,7 @@ def zwidth(
     else:
         rows = [
             [
-                each.curve.label,
+                each.case.label,
                 f"{each.area / 1e3:.1f}",
                 f"{each.largest_n_per_m / 1e3:g}",
                 f"{each.damping_n_s_per_m:g}",
@@ -144,7 +145,8 @@ def zwidth(
             lines = [[fact.text, "held" if fact.held else "not held", fact.numbers] for fact in shown]
             show_table(dict.fromkeys(("the paper's Figure 5", "here", "numbers"), "left"), lines)
     if plot:
-        limits = _limits(scene, changes, maps, grid.dampings)
+        grid = maps_of.grid_of(loaded)
+        limits = _limits(maps, grid.dampings)
         save(plot_zwidth(maps, limits, loaded, grid, backend), plot)
         log.print(f"picture: {plot}")
 

@@ -11,6 +11,7 @@ Beside the estimators, Figure 2 has two lines that no run gives, for |f''| <= C 
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -48,6 +49,12 @@ class Curve:
     output: str
     gains: dict[str, float] = field(default_factory=dict)
     cutoff_of_rate: float | None = None
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """What it changes in a scene, by dotted key; without a cutoff as a share of the rate."""
+        gains = {f"controller.gains.{self.estimator}": self.gains} if self.gains else {}
+        return {"controller.estimator": self.estimator, "controller.output": self.output, **gains}
 
     def job(self, signal: str, sample_hz: int, **options) -> dict:
         """Return the arguments of `accuracy.measure`."""

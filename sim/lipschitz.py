@@ -16,7 +16,6 @@ import numpy as np
 from . import figures, hit
 from .scene import Scene, load
 from .sines import Sines, fit
-from .zwidth import changes_of
 
 METHOD = "fdm-500"
 POINTS = 500
@@ -91,7 +90,7 @@ def measure(scene: str, changes: dict[str, Any], before_s: float, after_s: float
         SceneError: if there is no such scene.
         RuntimeError: if the handle never reached the wall, or the record is too short.
     """
-    loaded = load(scene, changes | changes_of(figures.methods()[METHOD]))
+    loaded = load(scene, changes | figures.methods()[METHOD].changes)
     result = hit.run(loaded, "fixed", traces=True)
     if not (result.detail.position_m > 0).any():
         near = f"{hit.DETAIL_S:g} s of coming within {-hit.DETAIL_FROM_M * 1e3:g} mm"

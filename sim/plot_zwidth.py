@@ -32,7 +32,7 @@ def plot_zwidth(
     for index, (each, limit) in enumerate(zip(maps, limits, strict=True)):
         style = {"color": mpl.colormaps["tab10"](index % 10), "marker": MARKERS[index % len(MARKERS)], "ms": 4}
         edge = [(edge.damping_n_s_per_m, edge.stable_n_per_m / 1e3) for edge in each.edges]
-        axes.plot(*zip(*edge, strict=True), label=each.curve.label, lw=1.4, **style)
+        axes.plot(*zip(*edge, strict=True), label=each.case.label, lw=1.4, **style)
         if limit:
             axes.plot(dampings, np.array(limit) / 1e3, color=style["color"], ls="--", lw=0.9)
     if any(limits):

@@ -27,6 +27,11 @@ SetOption = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="change a key of the scene; an empty value takes it out"),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON on stdout, and nothing else")]
+WorkersOption = Annotated[int | None, typer.Option(min=1, help="processes [default: one a core]")]
+SchedulerOption = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="of a Dask cluster that runs, in place of workers of its own")
+]
+ResumeOption = Annotated[bool, typer.Option("--resume", help="go on where an interrupted run was")]
 PlotOption = Annotated[Path | None, typer.Option(metavar="FILE", help="draw it: .png, .svg or .pdf")]
 
 

@@ -1,8 +1,8 @@
-"""The Z-width of estimators: for each, the edge of the region of walls that its hits leave stable.
+"""Z-width: of each case, a scene with its changes, the edge of the region of walls that its hits leave stable.
 
-A map is a number of traces, one for each method, and a trace asks for one hit at a time. Hits of different traces run
-side by side on the workers of a Dask cluster; every verdict is kept as it comes. A verdict depends on the scene and the
-wall alone, so the map is the same whatever the number of workers, and an interrupted one goes on where it was.
+A map is a trace, and a trace asks for one hit at a time. Hits of different traces run side by side on the workers of a
+Dask cluster; every verdict is kept as it comes. A verdict depends on the scene and the wall alone, so the map is the
+same whatever the number of workers, and an interrupted one goes on where it was.
 """
 
 import platform
@@ -15,21 +15,45 @@ from distributed import Client, as_completed
 from . import hit, store
 from .boundary import Edge, Grid, area, trace
 from .cluster import result_of
-from .figures import Curve
 from .scene import Scene, parse
 
 
 @dataclass(frozen=True)
-class Map:
-    """The edge of one method's stable region.
+class Case:
+    """What a map is of.
 
     Attributes:
-        curve: the method.
+        label: in tables and legends.
+        scene, text: the scene's name or file, and what is in it: the file need not be where the worker runs.
+        changes: of the scene, by dotted key.
+    """
+
+    label: str
+    scene: str
+    text: str
+    changes: dict[str, Any]
+
+    @property
+    def parsed(self) -> Scene:
+        """The scene, changed.
+
+        Raises:
+            SceneError: if it cannot be.
+        """
+        return parse(self.scene, self.text, self.changes)
+
+
+@dataclass(frozen=True)
+class Map:
+    """The edge of one stable region.
+
+    Attributes:
+        case: what it is of.
         edges: by B.
         hits: walls that were hit for it.
     """
 
-    curve: Curve
+    case: Case
     edges: list[Edge]
     hits: int
 
@@ -59,10 +83,9 @@ class Map:
         The boundary is in [B (N s/m), K (N/m)], K the largest stable; it is larger than that where it leaves the map.
         """
         return {
-            "label": self.curve.label,
-            "estimator": self.curve.estimator,
-            "output": self.curve.output,
-            "gains": self.curve.gains,
+            "label": self.case.label,
+            "scene": self.case.scene,
+            "changes": self.case.changes,
             "boundary": [[edge.damping_n_s_per_m, edge.stable_n_per_m] for edge in self.edges],
             "leaves_the_map_at": [edge.damping_n_s_per_m for edge in self.edges if edge.marginal_n_per_m is None],
             "area_n2_s_per_m2": self.area,
@@ -82,23 +105,12 @@ def grid_of(scene: Scene) -> Grid:
     return Grid(**scene.zwidth.model_dump())
 
 
-def changes_of(curve: Curve) -> dict[str, Any]:
-    """Return what a method changes in a scene, by dotted key."""
-    gains = f"controller.gains.{curve.estimator}"
-    return {
-        "controller.estimator": curve.estimator,
-        "controller.output": curve.output,
-        **({gains: curve.gains} if curve.gains else {}),
-    }
-
-
 def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float, damping: float, backend: str) -> dict:
     """Hit a wall; return whether it is `stable`, and its `rms_mm` up to where that was sure.
 
     Args:
-        scene, text: of the scene, its name or file and what is in it: the file need not be where the worker runs.
+        scene, text, changes: of a `Case`.
         sources: what `store.sources` gives where the map is made: results are kept under it.
-        changes: of the scene, by dotted key.
         stiffness, damping: of the wall, N/m and N s/m.
         backend: one of `hit.BACKENDS`.
 
@@ -116,9 +128,11 @@ def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float
 class _Tracing:
     """One trace on its way: which wall it asks for, and what it found at the end."""
 
-    def __init__(self, curve: Curve, grid: Grid, job: Callable[[float, float], dict]):
-        self._steps: Generator = trace(grid)
-        self._curve, self._job = curve, job
+    def __init__(self, case: Case, backend: str):
+        self._case, self._grid = case, grid_of(case.parsed)
+        self._steps: Generator = trace(self._grid)
+        self._job = {"scene": case.scene, "text": case.text, "sources": store.sources(), "backend": backend}
+        self._job["changes"] = case.changes
         self._hits = 0
         self.wanted: dict | None = None
         self.found: Map | None = None
@@ -131,48 +145,46 @@ class _Tracing:
 
     def _send(self, stable: bool | None) -> None:
         try:
-            self.wanted = self._job(*self._steps.send(stable))
+            stiffness, damping = self._steps.send(stable)
+            self.wanted = self._job | {"stiffness": stiffness, "damping": damping}
         except StopIteration as end:
-            self.wanted, self.found = None, Map(self._curve, end.value, self._hits)
+            self.wanted, self.found = None, Map(self._case, end.value, self._hits)
 
     @property
-    def damping_n_s_per_m(self) -> float | None:
-        """B that the trace has come to; None at its end."""
-        return self.wanted and self.wanted["damping"]
+    def done(self) -> float:
+        """The part of the values of B that the trace is through with."""
+        dampings = self._grid.dampings
+        return dampings.index(self.wanted["damping"]) / len(dampings) if self.wanted else 1.0
 
 
 def run(
-    curves: list[Curve],
-    grid: Grid,
-    common: dict[str, Any],
+    cases: list[Case],
+    backend: str,
     known: store.Store,
     client: Client | None = None,
-    progress: Callable[[list[float | None]], None] | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> list[Map]:
-    """Return the map of each method.
+    """Return the map of each case.
 
     Args:
-        curves: the methods.
-        grid: steps and ends.
-        common: the arguments of `verdict` but for `changes` and the wall; `changes` of all methods, if any.
+        cases: what to map; the grid is each scene's own.
+        backend: one of `hit.BACKENDS`.
         known: where verdicts are kept, and looked for.
         client: of a Dask cluster; None for this process alone.
-        progress: called after every verdict with the B that each trace has come to, None for one that ended.
+        progress: called after every verdict with how many maps are done, parts of one counted too.
+
+    Raises:
+        SceneError: if a case cannot be.
+        ValueError: if a scene has no section `zwidth`.
     """
-    changes = common.get("changes", {})
-
-    def asks(curve: Curve) -> Callable[[float, float], dict]:
-        own = common | {"changes": changes | changes_of(curve)}
-        return lambda stiffness, damping: own | {"stiffness": stiffness, "damping": damping}
-
-    traces = [_Tracing(curve, grid, asks(curve)) for curve in curves]
+    traces = [_Tracing(case, backend) for case in cases]
 
     def forward(tracing: _Tracing) -> dict | None:
         """Answer what the store can; return the hit that is wanted next."""
         while tracing.wanted and tracing.wanted in known:
             tracing.answer(known.get(tracing.wanted))
         if progress:
-            progress([each.damping_n_s_per_m for each in traces])
+            progress(sum(each.done for each in traces))
         return tracing.wanted
 
     def taken(tracing: _Tracing, result: dict) -> dict | None:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ from test_cli import call
 
 from hardwall.sim import figures, hit, zwidth
 from hardwall.sim.scene import load, read
-from hardwall.sim.store import Store, sources
+from hardwall.sim.store import Store
 
 SMALL = {
     "zwidth.stiffness_step_n_per_m": 4e3,
@@ -25,10 +26,8 @@ SMALL = {
     "protocol.measure_s": 0.5,
 }
 SET = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
-COMMON = {
-    "scene": "seed-2011", "text": read("seed-2011"), "sources": sources(), "changes": SMALL, "backend": "fixed",
-}  # fmt: skip
-CURVES = [figures.methods()[name] for name in ("fdm-100", "adjusted")]
+METHODS = [figures.methods()[name] for name in ("fdm-100", "adjusted")]
+CASES = [zwidth.Case(each.label, "seed-2011", read("seed-2011"), SMALL | each.changes) for each in METHODS]
 
 
 @pytest.fixture(autouse=True)
@@ -37,15 +36,11 @@ def fresh(tmp_path, monkeypatch):
     monkeypatch.setattr("hardwall.sim.store.build_dir", lambda: tmp_path / "build")
 
 
-def grid():
-    return zwidth.grid_of(load("seed-2011", SMALL))
-
-
 @pytest.fixture(scope="module")
 def map_of_one_process(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("hardwall.sim.store.build_dir", lambda: tmp_path_factory.mktemp("one"))
-        return zwidth.run(CURVES, grid(), COMMON, Store("zwidth"))
+        return zwidth.run(CASES, "fixed", Store("zwidth"))
 
 
 @pytest.mark.parametrize("backend", ["float", "fixed"])
@@ -76,13 +71,13 @@ def test_a_wall_that_settles_late_is_not_ended_early():
 
 def test_a_worker_with_other_sources_is_refused():
     with pytest.raises(RuntimeError, match=r"has other sources of hardwall, or versions of its tools$"):
-        zwidth.verdict(**COMMON | {"sources": "0"}, stiffness=1e3, damping=10.0)
+        zwidth.verdict("seed-2011", read("seed-2011"), "0", {}, 1e3, 10.0, "fixed")
 
 
 def test_two_workers_give_the_map_of_one(map_of_one_process):
     options = {"threads_per_worker": 1, "dashboard_address": None}
     with LocalCluster(n_workers=2, **options) as cluster, Client(cluster) as client:
-        assert zwidth.run(CURVES, grid(), COMMON, Store("zwidth"), client) == map_of_one_process
+        assert zwidth.run(CASES, "fixed", Store("zwidth"), client) == map_of_one_process
 
 
 def test_a_map_goes_on_from_what_is_known(map_of_one_process, monkeypatch):
@@ -97,10 +92,10 @@ def test_a_map_goes_on_from_what_is_known(map_of_one_process, monkeypatch):
 
     monkeypatch.setattr(zwidth, "verdict", counted)
     with pytest.raises(KeyboardInterrupt):
-        zwidth.run(CURVES, grid(), COMMON, Store("zwidth"))
+        zwidth.run(CASES, "fixed", Store("zwidth"))
     before = list(hits)
     monkeypatch.setattr(zwidth, "verdict", lambda **job: hits.append(job) or real(**job))
-    assert zwidth.run(CURVES, grid(), COMMON, Store("zwidth")) == map_of_one_process
+    assert zwidth.run(CASES, "fixed", Store("zwidth")) == map_of_one_process
     assert len(hits) == sum(each.hits for each in map_of_one_process)
     assert all(job not in before for job in hits[5:])
 
@@ -161,9 +156,10 @@ def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, mes
 def test_a_scene_of_a_file_need_not_be_there_any_more(tmp_path, map_of_one_process):
     file = tmp_path / "mine.toml"
     file.write_text(read("seed-2011"))
-    common = COMMON | {"scene": str(file), "text": read(str(file))}
+    cases = [replace(case, scene=str(file), text=read(str(file))) for case in CASES]
     file.unlink()
-    assert zwidth.run(CURVES, grid(), common, Store("zwidth")) == map_of_one_process
+    maps = zwidth.run(cases, "fixed", Store("zwidth"))
+    assert [each.edges for each in maps] == [each.edges for each in map_of_one_process]
 
 
 def test_a_scheduler_without_workers_is_a_failure(monkeypatch, capsys):
