@@ -16,10 +16,11 @@ import numpy as np
 from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, ReadOnly, Timer
 
-from hardwall.sim import hit, loop
-from hardwall.sim.encoder import advance, level, locate
-from hardwall.sim.plant import Motion
+from hardwall.sim import loop
+from hardwall.sim.converter import converted
+from hardwall.sim.encoder import advance, level
 from hardwall.sim.scene import load
+from hardwall.sim.world import start_of, world_of
 
 PERIOD_NS = 10
 """Of the simulated clock; only its number of cycles matters."""
@@ -30,14 +31,13 @@ async def closed_loop(dut):
     """Close the loop for some samples; write the force words' digest and the seconds taken."""
     order = json.loads(os.environ["HARDWALL_LOOP"])
     scene = load(order["scene"])
-    world, edges = hit.world_of(scene), tuple(np.zeros(loop.EDGE_CAPACITY, np.int64) for _ in range(2))
-    motion = Motion(scene.protocol.start_m, 0.0)
-    cell = locate(world.encoder, motion.position_m)
+    world, edges = world_of(scene), tuple(np.zeros(loop.EDGE_CAPACITY, np.int64) for _ in range(2))
+    _, motion, cell, force_n, n_edges = start_of(scene, world)
     await _open(dut, scene, int(level(cell.number)))
     # `_open` has run clock 0. Half a period on, a pin is set between two rising edges: in clock n, for edge n to see.
     await Timer(PERIOD_NS // 2, "ns")
 
-    now, n_edges, force_n = 1, 0, world.push_n
+    now = 1
     late = [0] * scene.delay_samples
     words: list[int] = []
     began = time.perf_counter()
@@ -45,7 +45,7 @@ async def closed_loop(dut):
         strobe = (k + 1) * world.clocks_per_sample - 1
         until = strobe + world.latency
         motion, cell, n_edges = advance(
-            world.handle, world.coulomb, world.encoder, motion, cell, force_n, world.after,
+            world.plant, world.encoder, motion, cell, force_n, world.after,
             strobe, world.latency, *edges, n_edges,
         )  # fmt: skip
         taken = 0
@@ -65,10 +65,10 @@ async def closed_loop(dut):
         drive = dut.drive.value.to_signed()
         words.append(drive)
         late.append(drive)
-        force_n = world.push_n + world.force_lsb_n * late.pop(0)
+        force_n = converted(world.converter, world.push_n + world.force_lsb_n * late.pop(0))
         if world.clocks_per_sample > world.latency:
             motion, cell, n_edges = advance(
-                world.handle, world.coulomb, world.encoder, motion, cell, force_n, world.before,
+                world.plant, world.encoder, motion, cell, force_n, world.before,
                 until, world.clocks_per_sample - world.latency, *edges, n_edges,
             )  # fmt: skip
     seconds = time.perf_counter() - began

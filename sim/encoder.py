@@ -13,8 +13,8 @@ downwards floor(t clock_hz) + 1: at the very edge the position belongs to the up
 import math
 from typing import NamedTuple
 
-from ..model.compiled import compiled
-from .plant import glide, net_force, reach, resume, sticks, turn, turned
+from ..model.compiled import by_type, compiled
+from .plant import Rigid, glide, net_force, reach, resume, sticks, turn, turned
 
 # Counts by which each edge must follow the one before: less, and the pair is a glitch rather than quadrature.
 MARGIN = 0.05
@@ -89,13 +89,61 @@ def level(number):
 
 
 @compiled
-def advance_quietly(coulomb, motion, cell, force_n, interval):
-    """Return (motion, quiet): the same motion as `advance`, and whether it is certain that nothing happened meanwhile.
+def next_cell(encoder, cell, upwards):
+    """Return the cell above, or below."""
+    if upwards:
+        return Cell(cell.number + 1, cell.upper_m, edge(encoder, cell.number + 2))
+    return Cell(cell.number - 1, edge(encoder, cell.number - 1), cell.lower_m)
+
+
+@compiled
+def stamp(encoder, upwards, at_s, clocks):
+    """Return the clock of an edge passed `at_s` into an interval, from the interval's first: 1 to `clocks`.
+
+    Rounding may put it outside, but it is not.
+    """
+    at = at_s * encoder.clock_hz
+    return min(max(math.ceil(at) if upwards else math.floor(at) + 1, 1), clocks)
+
+
+@by_type
+def advance_quietly(plant, motion, cell, force_n, interval):
+    """Return (motion, quiet): the motion after an interval, and whether it is certain that nothing happened meanwhile.
 
     Where `quiet` is false (an edge or a turn is likely) the motion means nothing and the interval is for `advance`.
     This is the path of nearly every interval of a closed loop, so it handles no array: merely to pass an array to
     a compiled function costs more than to advance the handle.
     """
+
+
+@by_type
+def advance(plant, encoder, motion, cell, force_n, interval, clock, clocks, edge_clocks, edge_levels, n_edges):
+    """Advance plant and encoder together over one interval of constant applied force.
+
+    Args:
+        plant: a `plant.Rigid`, or a `drivetrain.Train`.
+        encoder: an `Encoder`.
+        motion: a `plant.Motion`, or a `drivetrain.State`.
+        cell: the `Cell` that holds the encoder's position at the start; `locate` gives the first.
+        force_n: motor and wall together (N), positive towards positive positions.
+        interval: the `plant.span` of its length, or for a `Train` its length (s).
+        clock: number of the clock at which the interval starts.
+        clocks: its length times `encoder.clock_hz`, at least 1.
+        edge_clocks: int64 array for the stamps, which never decrease: clock < stamp <= clock + clocks.
+        edge_levels: integer array for the pins after each edge, a | b << 1.
+        n_edges: edges that the arrays hold already; new ones are appended. Where several share one clock, the pins
+            show the last.
+
+    Returns:
+        (motion, cell, n_edges) at the end. Where the arrays are full n_edges is -1, and stays so: edges were lost, and
+        the cell is that of the last one kept.
+    """
+
+
+@advance_quietly.register(Rigid)
+@compiled
+def _advance_quietly(plant, motion, cell, force_n, interval):
+    coulomb = plant.coulomb
     if sticks(coulomb, motion, force_n):
         return motion, True
     end = glide(motion, net_force(coulomb, motion, force_n), interval)
@@ -109,27 +157,10 @@ def advance_quietly(coulomb, motion, cell, force_n, interval):
     return end, False
 
 
+@advance.register(Rigid)
 @compiled
-def advance(
-    handle, coulomb, encoder, motion, cell, force_n, interval, clock, clocks, edge_clocks, edge_levels, n_edges
-):
-    """Advance handle and encoder together over one interval of constant applied force.
-
-    Args:
-        handle, coulomb, motion, force_n, interval: as for `plant.advance`, whose motion this returns.
-        encoder: an `Encoder`.
-        cell: the `Cell` that holds the position at the start; `locate` gives the first.
-        clock: number of the clock at which the interval starts.
-        clocks: its length, `interval.seconds * encoder.clock_hz`, at least 1.
-        edge_clocks: int64 array for the stamps, which never decrease: clock < stamp <= clock + clocks.
-        edge_levels: integer array for the pins after each edge, a | b << 1.
-        n_edges: edges that the arrays hold already; new ones are appended. Where several share one clock, the pins
-            show the last.
-
-    Returns:
-        (motion, cell, n_edges) at the end. Where the arrays are full n_edges is -1, and stays so: edges were lost, and
-        the cell is that of the last one kept.
-    """
+def _advance(plant, encoder, motion, cell, force_n, interval, clock, clocks, edge_clocks, edge_levels, n_edges):
+    handle, coulomb = plant
     if sticks(coulomb, motion, force_n):
         return motion, cell, n_edges
     room = min(len(edge_clocks), len(edge_levels))
@@ -145,14 +176,9 @@ def advance(
         while not cell.lower_m <= end.position_m < cell.upper_m and 0 <= n_edges < room:
             upwards = end.position_m >= cell.upper_m
             travel_m = (cell.upper_m if upwards else cell.lower_m) - start.position_m
-            at = since_s + reach(handle, start, net_n, until_s - since_s, travel_m)
-            if upwards:
-                stamp = math.ceil(at * encoder.clock_hz)
-                cell = Cell(cell.number + 1, cell.upper_m, edge(encoder, cell.number + 2))
-            else:
-                stamp = math.floor(at * encoder.clock_hz) + 1
-                cell = Cell(cell.number - 1, edge(encoder, cell.number - 1), cell.lower_m)
-            edge_clocks[n_edges] = clock + min(max(stamp, 1), clocks)  # rounding may put it outside, but it is not
+            at_s = since_s + reach(handle, start, net_n, until_s - since_s, travel_m)
+            cell = next_cell(encoder, cell, upwards)
+            edge_clocks[n_edges] = clock + stamp(encoder, upwards, at_s, clocks)
             edge_levels[n_edges] = level(cell.number)
             n_edges += 1
         if not cell.lower_m <= end.position_m < cell.upper_m:

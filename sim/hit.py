@@ -15,10 +15,10 @@ import numpy as np
 from ..model import stamped
 from ..model.axis import Axis
 from . import loop, record
-from .encoder import Encoder, level, locate
-from .plant import Coulomb, Handle, Motion, span
+from .encoder import level
 from .scene import Scene
 from .whole_file import whole_file
+from .world import start_of, world_of
 
 BACKENDS = ("float", "fixed", "rtl")
 CHUNK = 1 << 16
@@ -92,7 +92,7 @@ class Hit:
             "scene": self.scene.name,
             "backend": self.backend,
             "estimator": self.scene.controller.estimator,
-            "output": self.scene.output,
+            "output": self.scene.estimator_output,
             "stiffness_n_per_m": self.scene.wall.stiffness_n_per_m,
             "damping_n_s_per_m": self.scene.wall.damping_n_s_per_m,
             "stable": self.stable,
@@ -106,23 +106,6 @@ class Hit:
             "flags": self.flags,
             "force_sha256": self.force_sha256,
         }
-
-
-def world_of(scene: Scene) -> loop.World:
-    """Return the loop's constants for a scene."""
-    spec, latency = scene.spec, scene.spec.design.latency_to_drive
-    handle = Handle(scene.handle.mass_kg, scene.handle.viscous_n_s_per_m)
-    return loop.World(
-        handle=handle,
-        coulomb=Coulomb(scene.handle.coulomb_n) if scene.handle.coulomb_n else None,
-        encoder=Encoder(spec.count_m, float(spec.clock_hz), scene.encoder.offsets),
-        push_n=scene.protocol.push_n,
-        force_lsb_n=spec.force_resolution_n,
-        clocks_per_sample=spec.clocks_per_sample,
-        latency=latency,
-        before=span(handle, (spec.clocks_per_sample - latency) / spec.clock_hz),
-        after=span(handle, latency / spec.clock_hz),
-    )
 
 
 class _Tally:
@@ -194,9 +177,8 @@ def run(
         RuntimeError: if the handle outran every decoder's limit by far, or the RTL could not be built.
     """
     floating, spec, world = backend == "float", scene.spec, world_of(scene)
-    start = Motion(scene.protocol.start_m, 0.0)
-    cell = locate(world.encoder, start.position_m)
-    start_level = int(level(cell.number))
+    at = start_of(scene, world)
+    start_level = int(level(at.cell.number))
     records = None, None
     if traces:
         stride = max(1, scene.samples // OVERVIEW_POINTS)
@@ -204,7 +186,6 @@ def run(
             record.new(spec, floating, -np.inf, stride, scene.samples // stride + 1),
             record.new(spec, floating, DETAIL_FROM_M, 1, round(DETAIL_S * spec.sample_hz)),
         )
-    at = loop.Progress(0, start, cell, scene.protocol.push_n, 0)
     if backend != "rtl":
         controller, state = stamped.controller(Axis(spec, floating, **scene.parameters), start_level)
         return _closed_loop(scene, backend, world, controller, state, at, records, progress, (), until_sure)

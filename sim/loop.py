@@ -4,7 +4,7 @@ Time is the FPGA's clock. Sample k is taken at the strobe, clock (k + 1) D - 1, 
 follows from it changes `latency` clocks later, on every backend. The plant is advanced exactly over the two intervals
 between those instants, under a constant force in each.
 
-What a scene lacks is None here (`coulomb`, `delay`, a record), and is not in the machine code.
+What a scene lacks is None here (`converter`, `delay`, a record), and is not in the machine code.
 """
 
 from typing import NamedTuple
@@ -13,8 +13,10 @@ import numpy as np
 
 from ..model.compiled import compiled
 from .controllers import sample, sample_quietly
+from .converter import Converter, converted
+from .drivetrain import State, Train
 from .encoder import Cell, Encoder, advance, advance_quietly
-from .plant import Coulomb, Handle, Motion, Span
+from .plant import Motion, Rigid, Span
 from .record import keep
 
 EDGE_CAPACITY = 1 << 14
@@ -27,15 +29,15 @@ class World(NamedTuple):
     `before` is the span from a changed drive to the next strobe, `after` that from the strobe to the changed drive.
     """
 
-    handle: Handle
-    coulomb: Coulomb | None
+    plant: Rigid | Train
     encoder: Encoder
+    converter: Converter | None
     push_n: float  # of the motor, besides the wall
     force_lsb_n: float
     clocks_per_sample: int
     latency: int  # clocks
-    before: Span
-    after: Span
+    before: Span | float  # of a `Train`: s
+    after: Span | float
 
 
 class Delay(NamedTuple):
@@ -48,7 +50,7 @@ class Progress(NamedTuple):
     """Where the loop stands: between the drive's change after sample `sample - 1`, and the strobe of `sample`."""
 
     sample: int
-    motion: Motion
+    motion: Motion | State
     cell: Cell
     force_n: float
     n_edges: int  # not yet taken by the controller; negative: edges were lost
@@ -89,12 +91,12 @@ def run(world, controller, state, progress, delay, records, edges, positions, dr
         positions[k - first] = motion.position_m
 
         # From the strobe until the drive changes, the old force acts.
-        moved, quiet = advance_quietly(world.coulomb, motion, cell, force_n, world.after)
+        moved, quiet = advance_quietly(world.plant, motion, cell, force_n, world.after)
         if quiet:
             motion = moved
         else:
             motion, cell, n_edges = advance(
-                world.handle, world.coulomb, world.encoder, motion, cell, force_n, world.after,
+                world.plant, world.encoder, motion, cell, force_n, world.after,
                 strobe, world.latency, edge_clocks, edge_levels, n_edges,
             )  # fmt: skip
 
@@ -107,16 +109,16 @@ def run(world, controller, state, progress, delay, records, edges, positions, dr
         else:
             state = sample_quietly(controller, state, strobe, strobe + world.latency)
         drives[k - first] = state.drive
-        force_n = world.push_n + world.force_lsb_n * _delayed(delay, k, state.drive)
+        force_n = converted(world.converter, world.push_n + world.force_lsb_n * _delayed(delay, k, state.drive))
         keep(records[0], k, at, state.velocity, state.drive)
         keep(records[1], k, at, state.velocity, state.drive)
 
-        moved, quiet = advance_quietly(world.coulomb, motion, cell, force_n, world.before)
+        moved, quiet = advance_quietly(world.plant, motion, cell, force_n, world.before)
         if quiet:
             motion = moved
         elif n_edges >= 0:
             motion, cell, n_edges = advance(
-                world.handle, world.coulomb, world.encoder, motion, cell, force_n, world.before,
+                world.plant, world.encoder, motion, cell, force_n, world.before,
                 strobe + world.latency, before_clocks, edge_clocks, edge_levels, n_edges,
             )  # fmt: skip
         k += 1

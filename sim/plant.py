@@ -35,6 +35,13 @@ class Coulomb(NamedTuple):
     level_n: float  # >= 0
 
 
+class Rigid(NamedTuple):
+    """A handle that is driven by the force itself: the device with the least in it."""
+
+    handle: Handle
+    coulomb: Coulomb | None
+
+
 class Motion(NamedTuple):
     """Position and velocity at one instant; a velocity of exactly zero is rest."""
 

@@ -68,7 +68,7 @@ def _title(hit: Hit) -> str:
     scene, spec = hit.scene, hit.scene.spec
     verdict = "stable" if hit.stable else "unstable"
     return (
-        f"{scene.name}: {scene.controller.estimator} (output {scene.output}), {hit.backend} backend, "
+        f"{scene.name}: {scene.controller.estimator} (output {scene.estimator_output}), {hit.backend} backend, "
         f"{spec.sample_hz / 1e3:g} kHz sampling, {spec.actuation_hz / 1e3:g} kHz actuation\n"
         f"wall {scene.wall.stiffness_n_per_m / 1e3:g} kN/m, {scene.wall.damping_n_s_per_m:g} N s/m: {verdict}, "
         f"RMS {hit.rms_m * 1e3:.5f} mm (threshold {scene.protocol.threshold_mm:g} mm)"
@@ -89,7 +89,9 @@ def _column(axes: np.ndarray, trace: Trace, time: np.ndarray, hit: Hit, zoomed: 
         difference = np.diff(np.floor(trace.position_m / q)) * (q * rate)
         velocity.plot(time[1:], difference, color=BASELINE, lw=0.6, label="finite difference of ideal counts", zorder=1)
     name = hit.scene.controller.estimator
-    velocity.plot(time, trace.estimate_m_per_s, color=ESTIMATE, lw=0.8, label=f"estimate ({name} {hit.scene.output})")
+    velocity.plot(
+        time, trace.estimate_m_per_s, color=ESTIMATE, lw=0.8, label=f"estimate ({name} {hit.scene.estimator_output})"
+    )
     velocity.plot(time, trace.velocity_m_per_s, color=TRUE, lw=1, label="true")
     velocity.set_ylabel("velocity (m/s)")
     _frame(velocity, trace.velocity_m_per_s, trace.estimate_m_per_s)

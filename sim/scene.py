@@ -94,9 +94,49 @@ class WallSection(Section):
 
 
 class AmplifierSection(Section):
-    """Without it the drive acts on the handle when it leaves the FPGA."""
+    """Of what it lacks it has none: no delay, no lag, no limit. A current's limit needs a motor and a bandwidth."""
 
-    delay_s: NotNegative
+    delay_s: NotNegative = 0.0
+    bandwidth_hz: Positive | None = None
+    current_limit_a: Positive | None = None
+
+
+class MotorSection(Section):
+    """A brushed DC motor. With an amplifier's bandwidth its current follows the force; else its voltage does."""
+
+    resistance_ohm: Positive
+    inductance_h: Positive
+    torque_constant_n_m_per_a: Positive
+    voltage_limit_v: Positive
+    pulley_radius_m: Positive
+
+
+class TransmissionSection(Section):
+    """A cable between motor and handle; the motor's mass is that of rotor and pulley as felt at the handle."""
+
+    stiffness_n_per_m: Positive
+    damping_n_s_per_m: NotNegative = 0.0
+    motor_mass_kg: Positive
+    motor_viscous_n_s_per_m: NotNegative = 0.0
+    encoder_at: Literal["handle", "motor"] = "handle"
+
+
+class HandSection(Section):
+    """It moves with the handle and holds it, with a spring to `rest_m` and a damper."""
+
+    mass_kg: NotNegative
+    damping_n_s_per_m: NotNegative
+    stiffness_n_per_m: NotNegative
+    rest_m: Finite = 0.0
+
+
+class OutputSection(Section):
+    """Steps of a converter (`dac_bits`), or pulses (`pwm_carrier_hz`, `pwm_steps` of a period); full scale is +-."""
+
+    full_scale_n: Positive
+    dac_bits: Annotated[int, Field(ge=2, le=32)] | None = None
+    pwm_carrier_hz: Rate | None = None
+    pwm_steps: Annotated[int, Field(ge=2)] | None = None
 
 
 class ProtocolSection(Section):
@@ -130,6 +170,10 @@ class Scene(Section):
     controller: ControllerSection
     wall: WallSection
     amplifier: AmplifierSection | None = None
+    motor: MotorSection | None = None
+    transmission: TransmissionSection | None = None
+    hand: HandSection | None = None
+    output: OutputSection | None = None
     protocol: ProtocolSection
     zwidth: ZWidthSection | None = None
 
@@ -145,7 +189,7 @@ class Scene(Section):
         return AxisSpec(count_m=self.encoder.count_m, gains=gains, **fields)
 
     @property
-    def output(self) -> str:
+    def estimator_output(self) -> str:
         """The estimator's output that the wall uses."""
         return self.controller.output or self.spec.model.OUTPUTS[0]
 
@@ -159,7 +203,7 @@ class Scene(Section):
             "wall_position": -self.protocol.start_m,
             "wall_forbid_pull": self.wall.forbid_pull,
         }
-        si |= estimators.choose(self.controller.estimator, self.output)
+        si |= estimators.choose(self.controller.estimator, self.estimator_output)
         if self.controller.slew_limit_n_per_s is not None:
             si["output_slew_limit"] = self.controller.slew_limit_n_per_s
         return si

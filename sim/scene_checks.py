@@ -40,7 +40,10 @@ def check(scene) -> None:
     _check_protocol(scene)
     _check_wall(scene)
     if scene.amplifier is not None:
-        _check_delay(scene)
+        _check_amplifier(scene)
+    if scene.output is not None:
+        _check_output(scene)
+    _check_device(scene)
     if scene.zwidth is not None:
         _check_map(scene)
 
@@ -49,8 +52,8 @@ def _check_axis(scene) -> None:
     controller = type(scene.controller).model_fields
     try:
         spec = scene.spec
-        if scene.output not in spec.model.OUTPUTS:
-            raise ValueError(f"output must be one of {', '.join(spec.model.OUTPUTS)}, not {scene.output!r}")
+        if scene.estimator_output not in spec.model.OUTPUTS:
+            raise ValueError(f"output must be one of {', '.join(spec.model.OUTPUTS)}, not {scene.estimator_output!r}")
         if -scene.protocol.start_m > spec.travel_m:
             raise ValueError(
                 f"start_m must be {-spec.travel_m:g} to 0, within travel_m, not {scene.protocol.start_m!r}"
@@ -94,12 +97,48 @@ def _check_wall(scene) -> None:
             )
 
 
-def _check_delay(scene) -> None:
+def _check_amplifier(scene) -> None:
+    if scene.amplifier.current_limit_a is not None and not (scene.motor and scene.amplifier.bandwidth_hz):
+        raise ValueError("amplifier.current_limit_a needs amplifier.bandwidth_hz and a section motor: a current loop")
     delay_s, settle_s, rate = scene.amplifier.delay_s, scene.protocol.settle_s, scene.spec.sample_hz
     if delay_s > settle_s:
         raise ValueError(f"amplifier.delay_s must be 0 to settle_s {settle_s:g}, not {delay_s!r}")
     if not math.isclose(delay_s * rate, scene.delay_samples, abs_tol=1e-6):
         raise ValueError(f"amplifier.delay_s must be a whole number of samples of {1 / rate:g} s, not {delay_s!r}")
+
+
+def _check_output(scene) -> None:
+    output, clock_hz = scene.output, scene.spec.clock_hz
+    pulses = output.pwm_carrier_hz is not None, output.pwm_steps is not None
+    if (output.dac_bits is not None) + any(pulses) != 1 or pulses[0] != pulses[1]:
+        raise ValueError("output must have dac_bits, or pwm_carrier_hz and pwm_steps, and not both")
+    if not pulses[0]:
+        return
+    period, rest = divmod(clock_hz, output.pwm_carrier_hz)
+    if rest or period < 2:
+        raise ValueError(
+            f"output.pwm_carrier_hz must be controller.clock_hz {clock_hz} divided by a whole number from 2, "
+            f"not {output.pwm_carrier_hz!r}"
+        )
+    if period % output.pwm_steps:
+        raise ValueError(
+            f"output.pwm_steps must divide the {period} clocks of a carrier's period, not {output.pwm_steps!r}"
+        )
+
+
+def _check_device(scene) -> None:
+    from . import device  # noqa: PLC0415  (most scenes have no such parts, and need no linear algebra)
+    from .world import device_of  # noqa: PLC0415
+
+    parts = device_of(scene)
+    if parts is None:
+        return
+    fastest, most = device.fastest_per_s(parts), device.LEGS_MAX * device.LEG_RATE * scene.spec.sample_hz
+    if not fastest <= most:
+        raise ValueError(
+            f"handle, amplifier, motor, transmission and hand must change at no more than {most:g} 1/s together, "
+            f"{device.LEGS_MAX} steps of the solver a sample, not {fastest:g}"
+        )
 
 
 def _check_map(scene) -> None:

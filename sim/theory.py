@@ -3,12 +3,12 @@
 - Colgate and Schenkel: a wall sampled every T is passive if b > K T / 2 + |B|. With the force d periods late their
   condition reads b > K (T / 2 + d T) + |B|: its supremum over frequency, sin((d + 1/2) w T) / sin(w T / 2), is 2 d + 1.
 - Abbott and Okamura: with B = 0, position quantised to q and Coulomb friction f_c, if also K <= 2 f_c / q.
-- Linear: without friction that sticks and without quantisation, in contact, the loop with a linear estimator is linear
+- Linear: without friction that sticks, limits and quantisation, in contact, the loop with a linear estimator is linear
   and periodic with the force's update. It is stable while every eigenvalue of what a period does to the state is
   within the unit circle. Nothing is approximated: the zero-order hold, the clocks from strobe to drive, those of the
-  decoder, the amplifier's delay and the estimator are all in the matrix.
+  decoder, the amplifier, motor, cable and hand, and the estimator are all in the matrix.
 
-A passive wall is stable with any hand, so the first two lie below the third; the linear loop has no hand.
+The first two are for a rigid handle. A passive wall is stable with any hand, so they lie below the third without one.
 """
 
 import numpy as np
@@ -17,12 +17,12 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from ..model.quadrature import latency
+from .device import Device, equations
 from .scene import Scene
+from .world import device_of
 
 LINEAR = ("fdm", "butterworth")
 """Estimators that the exact boundary is known for."""
-DRIVE = 3
-"""Index of the drive in the loop's state."""
 SEARCH = 100
 """Stiffnesses, spaced evenly in their logarithm, among which the first unstable one is looked for."""
 
@@ -61,17 +61,16 @@ def _estimator(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]
     return a, b[:, 0], c[0], float(d[0, 0])
 
 
-def _span(scene: Scene, seconds: float) -> np.ndarray:
-    """Return what a span does to (position, velocity, applied force), which stays."""
-    mass, viscous = scene.handle.mass_kg, scene.handle.viscous_n_s_per_m
-    return expm(np.array([[0, 1, 0], [0, -viscous / mass, 1 / mass], [0, 0, 0]]) * seconds)
+def _device(scene: Scene) -> Device:
+    """Return the scene's device, a rigid handle's too."""
+    return device_of(scene) or Device(scene.handle.mass_kg, scene.handle.viscous_n_s_per_m)
 
 
 class Loop:
     """The linear loop of a scene in contact, over one update period of the force.
 
-    The state, at the instant that the count of a sample stands for: position (m), velocity (m/s), applied force (N),
-    the drive (N) in force, those on their way through the amplifier, the estimator's own.
+    The state, at the instant that the count of a sample stands for: the device's own (`device.equations`), the command
+    to it (N), the drive (N) in force, those on their way through the amplifier, the estimator's own.
 
     Raises:
         ValueError: if the estimator is not linear.
@@ -79,23 +78,30 @@ class Loop:
 
     def __init__(self, scene: Scene):
         self._a, self._b, self._c, self._d = _estimator(scene)
-        spec, delay = scene.spec, scene.delay_samples
-        self._n_state = 4 + delay + len(self._a)
-        self._own = slice(4 + delay, self._n_state)
+        found = equations(_device(scene))
+        n, spec, delay = len(found.rates), scene.spec, scene.delay_samples
+        self._seen = np.array(found.seen[:n])
+        command, self._drive = n, n + 1
+        self._n_state = n + 2 + delay + len(self._a)
+        self._own = slice(n + 2 + delay, self._n_state)
+        # Constant forces move the equilibrium, and not what is stable.
+        rates = np.zeros((n + 1, n + 1))
+        rates[:n] = np.delete(found.rates, n, axis=1)
         seen_s = latency(scene.controller.glitch_clocks) / spec.clock_hz
         until_drive_s = spec.design.latency_to_drive / spec.clock_hz
         early, late, applied = (np.eye(self._n_state) for _ in range(3))
-        early[:3, :3] = _span(scene, seen_s + until_drive_s)
-        late[:3, :3] = _span(scene, 1 / spec.sample_hz - seen_s - until_drive_s)
-        applied[2] = 0
+        early[: n + 1, : n + 1] = expm(rates * (seen_s + until_drive_s))
+        late[: n + 1, : n + 1] = expm(rates * (1 / spec.sample_hz - seen_s - until_drive_s))
+        applied[command] = 0
         if delay:
             # The oldest leaves, the new one enters.
-            applied[2, 4] = 1
-            applied[4 : 4 + delay] = 0
-            applied[range(4, 3 + delay), range(5, 4 + delay)] = 1
-            applied[3 + delay, DRIVE] = 1
+            first = n + 2
+            applied[command, first] = 1
+            applied[first : first + delay] = 0
+            applied[range(first, first + delay - 1), range(first + 1, first + delay)] = 1
+            applied[first + delay - 1, self._drive] = 1
         else:
-            applied[2, DRIVE] = 1
+            applied[command, self._drive] = 1
         after = late @ applied @ early
         self._after_first = np.linalg.matrix_power(after @ self._sampled(), spec.samples_per_actuation - 1) @ after
 
@@ -103,15 +109,15 @@ class Loop:
         """Return what the estimator makes of a sample."""
         sampled = np.eye(self._n_state)
         sampled[self._own, self._own] = self._a
-        sampled[self._own, 0] = self._b
+        sampled[self._own, : len(self._seen)] = np.outer(self._b, self._seen)
         return sampled
 
     def radius(self, stiffness_n_per_m: float, damping_n_s_per_m: float) -> float:
         """Return the largest magnitude of a period's eigenvalues; below 1 the loop is stable."""
         updated = self._sampled()
-        updated[DRIVE] = 0
-        updated[DRIVE, 0] = -stiffness_n_per_m - damping_n_s_per_m * self._d
-        updated[DRIVE, self._own] = -damping_n_s_per_m * self._c
+        updated[self._drive] = 0
+        updated[self._drive, : len(self._seen)] = -(stiffness_n_per_m + damping_n_s_per_m * self._d) * self._seen
+        updated[self._drive, self._own] = -damping_n_s_per_m * self._c
         return float(np.abs(np.linalg.eigvals(self._after_first @ updated)).max())
 
 

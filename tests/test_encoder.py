@@ -10,7 +10,7 @@ import pytest
 
 from hardwall.sim import plant
 from hardwall.sim.encoder import MARGIN, Cell, Encoder, advance, advance_quietly, edge, level, locate, offsets
-from hardwall.sim.plant import Coulomb, Handle, Motion, span
+from hardwall.sim.plant import Coulomb, Handle, Motion, Rigid, span
 
 U = 2.0**-53
 CLOCK_HZ = 100.0
@@ -105,10 +105,10 @@ def test_pins_show_the_geometry_at_every_clock(dry):
             reach_m = (abs(motion.velocity_m_per_s) + (abs(force) + friction) * interval.seconds) * interval.seconds * 4
             scale = Scale(encoder, motion.position_m - reach_m, motion.position_m + reach_m)
             before, old = cell, n_edges
-            fast, quiet = advance_quietly(coulomb, motion, cell, force, interval)
+            fast, quiet = advance_quietly(Rigid(handle, coulomb), motion, cell, force, interval)
             expected_motion = plant.advance(handle, coulomb, motion, force, interval)
             motion, cell, n_edges = advance(
-                handle, coulomb, encoder, motion, cell, force, interval, clock, clocks, stamps, words, n_edges
+                Rigid(handle, coulomb), encoder, motion, cell, force, interval, clock, clocks, stamps, words, n_edges
             )
             assert motion == expected_motion
             assert cell.lower_m <= motion.position_m < cell.upper_m
@@ -174,9 +174,9 @@ def passages(encoder, motion, force, clocks, clock=1000, coulomb=None, handle=UN
     """Return the new motion, the new cell, and [(stamp, pins)] of one interval from `clock`."""
     stamps, words = buffers(100)
     start, interval = locate(encoder, motion.position_m), span(handle, clocks / encoder.clock_hz)
-    fast, quiet = advance_quietly(coulomb, motion, start, force, interval)
+    fast, quiet = advance_quietly(Rigid(handle, coulomb), motion, start, force, interval)
     motion, cell, n_edges = advance(
-        handle, coulomb, encoder, motion, start, force, interval, clock, clocks, stamps, words, 0
+        Rigid(handle, coulomb), encoder, motion, start, force, interval, clock, clocks, stamps, words, 0
     )
     if quiet:
         assert (fast, start, n_edges) == (motion, cell, 0)
@@ -235,23 +235,23 @@ def test_rounding_puts_no_edge_outside_its_interval(clock_hz):
 def test_an_interval_without_edges_or_turns_is_quiet():
     cell, interval = Cell(0, 0.0, 1.0), span(UNIT, 1.0)
     for coulomb in (None, Coulomb(0.0), Coulomb(0.125)):
-        assert advance_quietly(coulomb, Motion(0.25, 0.5), cell, 0.0, interval)[1]
-        assert advance_quietly(coulomb, Motion(0.75, -0.5), cell, 0.0, interval)[1]
-        assert not advance_quietly(coulomb, Motion(0.75, 0.5), cell, 0.0, interval)[1]
-    assert advance_quietly(None, Motion(0.5, -0.5), cell, 0.0, interval) == ((0.0, -0.5), True)
-    assert not advance_quietly(None, Motion(0.5, 0.5), cell, 0.0, interval)[1]
-    assert advance_quietly(Coulomb(0.5), Motion(0.5, 0.0), cell, -0.5, interval) == ((0.5, 0.0), True)
+        assert advance_quietly(Rigid(UNIT, coulomb), Motion(0.25, 0.5), cell, 0.0, interval)[1]
+        assert advance_quietly(Rigid(UNIT, coulomb), Motion(0.75, -0.5), cell, 0.0, interval)[1]
+        assert not advance_quietly(Rigid(UNIT, coulomb), Motion(0.75, 0.5), cell, 0.0, interval)[1]
+    assert advance_quietly(Rigid(UNIT, None), Motion(0.5, -0.5), cell, 0.0, interval) == ((0.0, -0.5), True)
+    assert not advance_quietly(Rigid(UNIT, None), Motion(0.5, 0.5), cell, 0.0, interval)[1]
+    assert advance_quietly(Rigid(UNIT, Coulomb(0.5)), Motion(0.5, 0.0), cell, -0.5, interval) == ((0.5, 0.0), True)
     # A turn: without friction it may lie where no edge can be; with friction it is an event.
-    assert advance_quietly(None, Motion(0.5, 0.25), cell, -0.5, interval) == ((0.5, -0.25), True)
-    assert not advance_quietly(None, Motion(0.5, 0.5), cell, -0.5, interval)[1]
-    assert not advance_quietly(Coulomb(0.0), Motion(0.5, 0.25), cell, -0.5, interval)[1]
+    assert advance_quietly(Rigid(UNIT, None), Motion(0.5, 0.25), cell, -0.5, interval) == ((0.5, -0.25), True)
+    assert not advance_quietly(Rigid(UNIT, None), Motion(0.5, 0.5), cell, -0.5, interval)[1]
+    assert not advance_quietly(Rigid(UNIT, Coulomb(0.0)), Motion(0.5, 0.25), cell, -0.5, interval)[1]
 
 
 @pytest.mark.parametrize("coulomb", [None, Coulomb(0.0)])
 def test_full_arrays_are_reported_and_never_overrun(coulomb):
     encoder = Encoder(1.0, 4.0)
     # 8 edges up to the turn after 2 s, 8 back, in 16 clocks.
-    fixed = (UNIT, coulomb, encoder, Motion(0.5, 8.0), locate(encoder, 0.5), -4.0, span(UNIT, 4.0), 0, 16)
+    fixed = (Rigid(UNIT, coulomb), encoder, Motion(0.5, 8.0), locate(encoder, 0.5), -4.0, span(UNIT, 4.0), 0, 16)
     for clocks_room, words_room in [(16, 16), (15, 15), (8, 8), (7, 9), (9, 3), (0, 0)]:
         stamps, words = np.full(32, -7), np.full(32, 77, np.uint8)
         room = min(clocks_room, words_room)
@@ -270,7 +270,7 @@ def test_edges_are_appended_to_those_already_there():
     encoder = Encoder(1.0, 4.0)
     stamps, words = buffers(4)
     stamps[:2] = 5, 9
-    arguments = (UNIT, None, encoder, Motion(0.5, 1.0), locate(encoder, 0.5), 0.0, span(UNIT, 1.0), 10, 4)
+    arguments = (Rigid(UNIT, None), encoder, Motion(0.5, 1.0), locate(encoder, 0.5), 0.0, span(UNIT, 1.0), 10, 4)
     assert advance(*arguments, stamps, words, 2)[2] == 3
     assert stamps.tolist() == [5, 9, 12, 0]
 
@@ -305,7 +305,7 @@ def replay() -> str:
             for clock in range(0, 400, 10):
                 stamps, words = buffers(1000)
                 motion, cell, n_edges = advance(
-                    *(handle, coulomb, encoder, motion, cell, float(rng.normal()), span(handle, 10 / CLOCK_HZ)),
+                    *(Rigid(handle, coulomb), encoder, motion, cell, float(rng.normal()), span(handle, 10 / CLOCK_HZ)),
                     *(clock, 10, stamps, words, 0),
                 )
                 lines.append(
