@@ -1,0 +1,136 @@
+"""What rate buys a stiff wall: maps from 1 kHz to 1 MHz, estimator and force at one rate, beside the scene's own rates.
+
+A rigid device flatters a fast loop. So the scene's is meant to have an amplifier and a cable, and the linear loop's
+limit without either, with one, and with both, tells which of them ends the gain.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from . import figures, theory
+from .scene import load
+from .zwidth import Case, Map, grid_of
+
+RATES_HZ = (1_000, 2_500, 10_000, 25_000, 100_000, 250_000, 1_000_000)
+METHODS = ("fdm", "fdm-500", "adjusted", "levant:u1", "kalman", "levant-edge")
+CLOCK_HZ = 50_000_000
+"""A clock that all of the rates divide."""
+FINE = {
+    "zwidth.stiffness_step_n_per_m": 10e3,
+    "zwidth.stiffness_to_n_per_m": 500e3,
+    "zwidth.damping_from_n_s_per_m": 10.0,
+    "zwidth.damping_to_n_s_per_m": 150.0,
+    "zwidth.damping_step_n_s_per_m": 20.0,
+    "controller.stiffness_max_n_per_m": 500e3,
+}
+"""Steps of the maps: finer in K than in B, for the largest K is what is asked."""
+SHORT = {"protocol.settle_s": 1.5, "protocol.mean_s": 0.25, "protocol.measure_s": 0.5}
+"""A third of the paper's protocol: the handle comes to the wall after half a second, and a hit at 1 MHz takes long."""
+GAINED = 0.95
+"""Of the largest K at any rate: at the first rate with so much, an estimator has as good as all that it gains."""
+
+
+def at_rate(rate_hz: int | None) -> dict[str, Any]:
+    """Return what a rate changes in a scene; None for the paper's rates, with the force an update late."""
+    if rate_hz is None:
+        return {}
+    rates = {"controller.sample_hz": rate_hz, "controller.actuation_hz": rate_hz}
+    return {"controller.clock_hz": CLOCK_HZ, "amplifier.delay_s": 0.0, **rates}
+
+
+def cases(scene: str, text: str, changes: dict[str, Any], curves: list[figures.Curve], rates_hz) -> list[Case]:
+    """Return the maps to make: every method at the paper's rates, then at each rate."""
+    common = FINE | SHORT | changes
+    return [
+        Case(curve.label, scene, text, common | at_rate(rate_hz) | curve.changes)
+        for curve in curves
+        for rate_hz in (None, *rates_hz)
+    ]
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What rate buys one method.
+
+    Attributes:
+        label: of the method.
+        rates_hz: in ascending order.
+        paper: the map at the paper's rates.
+        maps: at each of the rates.
+    """
+
+    label: str
+    rates_hz: list[int]
+    paper: Map
+    maps: list[Map]
+
+    @property
+    def largest_n_per_m(self) -> list[float]:
+        """The largest stable stiffness at each rate."""
+        return [each.largest_n_per_m for each in self.maps]
+
+    @property
+    def ends_at_hz(self) -> int:
+        """The lowest rate with as good as the largest stiffness of any."""
+        enough = GAINED * max(self.largest_n_per_m)
+        return next(rate for rate, value in zip(self.rates_hz, self.largest_n_per_m, strict=True) if value >= enough)
+
+    @property
+    def ratio(self) -> float | None:
+        """The largest stiffness at the highest rate over that at the paper's; None where nothing is stable there."""
+        return self.largest_n_per_m[-1] / self.paper.largest_n_per_m if self.paper.largest_n_per_m else None
+
+    def report(self) -> dict[str, Any]:
+        """Return the gain as the command line prints it."""
+        return {
+            "label": self.label,
+            "rates_hz": self.rates_hz,
+            "largest_stiffness_n_per_m": self.largest_n_per_m,
+            "area_n2_s_per_m2": [each.area for each in self.maps],
+            "largest_stiffness_at_the_papers_rates_n_per_m": self.paper.largest_n_per_m,
+            "ratio": self.ratio,
+            "gains_up_to_hz": self.ends_at_hz,
+        }
+
+
+def gains(maps: list[Map], rates_hz: list[int]) -> list[Gain]:
+    """Return the gains of maps of `cases`, in their order."""
+    size = 1 + len(rates_hz)
+    rows = [maps[first : first + size] for first in range(0, len(maps), size)]
+    return [Gain(row[0].case.label, list(rates_hz), row[0], row[1:]) for row in rows]
+
+
+WITHOUT = {
+    "handle, amplifier and cable": {},
+    "without the cable": {"transmission": None},
+    "without the amplifier's lag": {"amplifier.bandwidth_hz": None, "amplifier.current_limit_a": None, "motor": None},
+    "rigid": {
+        "transmission": None, "amplifier.bandwidth_hz": None, "amplifier.current_limit_a": None, "motor": None,
+    },
+}  # fmt: skip
+"""Parts that are taken out, by what is left."""
+
+
+def linear_limits(scene: str, changes: dict[str, Any], rates_hz: list[int]) -> dict[str, list[float]]:
+    """Return the linear loop's largest stiffness (N/m) over all dampings of the map, at each rate, by what is left.
+
+    The estimator is the plain difference; friction that sticks is left out.
+    """
+    limits = {}
+    for left, without in WITHOUT.items():
+        fdm = {"controller.estimator": "fdm", "controller.output": None}
+        row = []
+        for rate_hz in rates_hz:
+            loaded = load(scene, FINE | SHORT | changes | at_rate(rate_hz) | fdm | _rigid_mass(scene, changes, without))
+            loop = theory.Loop(loaded)
+            row.append(max(theory.linear_limit_n_per_m(loop, damping) for damping in grid_of(loaded).dampings))
+        limits[left] = row
+    return limits
+
+
+def _rigid_mass(scene: str, changes: dict[str, Any], without: dict[str, Any]) -> dict[str, Any]:
+    """Return what takes parts out of a scene; without a cable the motor's mass is the handle's."""
+    loaded = load(scene, changes)
+    if "transmission" not in without or loaded.transmission is None:
+        return without
+    return without | {"handle.mass_kg": loaded.handle.mass_kg + loaded.transmission.motor_mass_kg}
