@@ -23,7 +23,7 @@ import numpy as np
 from scipy.linalg import matrix_balance
 
 from .converter import AS_IT_IS, Pulse
-from .drivetrain import FIRST, GRIP, PHASES, SEEN, VOLTAGE, WATCHED, Train, phase_number
+from .drivetrain import FIRST, GRIP, PHASES, QUANTITIES, SEEN, STATES, VOLTAGE, Train, phase_number
 
 LEG_RATE = 1.0
 """Of a leg, the longest time that one Taylor polynomial serves: its length times the fastest rate."""
@@ -200,19 +200,21 @@ def train(device: Device, longest_s: float) -> Train:
         rest = reach**order / math.factorial(order + 1) / (1 - LEG_RATE / 2)
     free = equations(device)
     n = len(free.rates)
-    tables = np.zeros((PHASES, n + WATCHED, n + 2))
+    # Coefficients of the state, with room for states that it lacks; of 1, and of the command.
+    columns = [*range(n), STATES, STATES + 1]
+    tables = np.zeros((PHASES, QUANTITIES, STATES + 2))
     for along in (-1, 0, 1):
         for limited in (-1, 0, 1):
             table, here = tables[phase_number(along, limited)], equations(device, along, limited)
-            table[:n] = here.rates
-            table[n + SEEN] = here.seen
-            table[n + GRIP] = np.eye(n + 2)[1] if along else here.on_handle
-            table[n + VOLTAGE] = 0.0 if here.voltage is None else here.voltage
+            table[:n, columns] = here.rates
+            table[SEEN, columns] = here.seen
+            table[GRIP, columns] = np.eye(n + 2)[1] if along else here.on_handle
+            table[VOLTAGE, columns] = 0.0 if here.voltage is None else here.voltage
     motor = device.motor
     limit_n = device.force_limit_n if motor is None or device.bandwidth_hz is not None else motor.stall_n
     return Train(
         tables=tables,
-        series=np.zeros((n + WATCHED, FIRST + order + 1)),
+        series=np.zeros((FIRST + order + 1, QUANTITIES)),
         coulomb_n=-1.0 if device.coulomb_n is None else device.coulomb_n,
         voltage_limit_n=math.inf if free.voltage is None else motor.stall_n,
         command_limit_n=limit_n,

@@ -17,10 +17,12 @@ from .converter import Pulse, width_of
 from .encoder import advance, advance_quietly, level, next_cell, stamp
 
 PHASES = 9
-SEEN, GRIP, VOLTAGE, WATCHED = 0, 1, 2, 3
-"""Rows after the state's: the encoder's position; what decides on sticking; the voltage; and how many they are."""
+STATES = 5
+"""Room for the state; known when compiling, so that its loops are unrolled."""
+SEEN, GRIP, VOLTAGE, QUANTITIES = 5, 6, 7, 8
+"""After the state: the encoder's position; what decides on sticking; the voltage; and how many quantities there are."""
 END, BEND, STEEPENING, FIRST = 0, 1, 2, 3
-"""Columns of a polynomial: its value at the end; sums of its coefficients' sizes; and its first coefficient."""
+"""Of a polynomial: its value at the end; two sums of its coefficients' sizes; and its first coefficient."""
 HALVINGS = 40
 """Of a leg, before it is taken as decided: by then it is as short as rounding."""
 STALLED = 8
@@ -30,10 +32,10 @@ MOMENT = 1e-6
 
 
 class Train(NamedTuple):
-    """A device as `device.train` makes it; n states, of which the first two are the handle's position and velocity."""
+    """A device as `device.train` makes it."""
 
-    tables: np.ndarray  # by phase, (PHASES, n + WATCHED, n + 2): dy/dt and what is watched, of y, of 1, of the command
-    series: np.ndarray  # scratch, (n + WATCHED, FIRST + order + 1): the polynomials of the leg
+    tables: np.ndarray  # (PHASES, QUANTITIES, STATES + 2): dy/dt, and what is watched, of y, of 1, of the command
+    series: np.ndarray  # scratch, (FIRST + order + 1, QUANTITIES): the polynomials of the leg
     coulomb_n: float  # negative for none
     voltage_limit_n: float
     command_limit_n: float
@@ -46,7 +48,7 @@ class State(NamedTuple):
 
     position_m: float
     velocity_m_per_s: float
-    others: tuple[float, float, float]  # the rest of y, and zeros
+    others: tuple[float, float, float]  # the rest of y: what `device` has, then zeros
     width: int  # clocks that the pulse lasts
 
 
@@ -60,91 +62,97 @@ STUCK, SLIDING = phase_number(0, 0), phase_number(1, 0)
 
 
 @compiled
-def _row(tables, phase, row, state, command_n):
-    """Return the value of a row of a phase's table."""
-    n = tables.shape[2] - 2
-    result = tables[phase, row, n] + tables[phase, row, n + 1] * command_n
-    result += tables[phase, row, 0] * state.position_m + tables[phase, row, 1] * state.velocity_m_per_s
-    for i in range(n - 2):
-        result += tables[phase, row, 2 + i] * state.others[i]
+def _quantity(tables, phase, number, state, command_n):
+    """Return the value of a watched quantity in a phase."""
+    result = tables[phase, number, STATES] + tables[phase, number, STATES + 1] * command_n
+    result += tables[phase, number, 0] * state.position_m + tables[phase, number, 1] * state.velocity_m_per_s
+    for i in range(STATES - 2):
+        result += tables[phase, number, 2 + i] * state.others[i]
     return result
 
 
 @compiled
 def expand(tables, series, phase, state, command_n, seconds):
-    """Fill `series` with the polynomials of a leg in the time t / seconds, 0 to 1; `measure` does the rest."""
-    n, last = tables.shape[2] - 2, series.shape[1] - 1
-    series[0, FIRST] = state.position_m
-    series[1, FIRST] = state.velocity_m_per_s
-    for i in range(n - 2):
-        series[2 + i, FIRST] = state.others[i]
+    """Fill `series` with the polynomials of a leg in the time t / seconds, 0 to 1."""
+    last = len(series) - 1
+    series[FIRST, 0] = state.position_m
+    series[FIRST, 1] = state.velocity_m_per_s
+    for i in range(STATES - 2):
+        series[FIRST, 2 + i] = state.others[i]
     for j in range(FIRST, last + 1):
-        for row in range(n + WATCHED):
-            change = tables[phase, row, n] + tables[phase, row, n + 1] * command_n if j == FIRST else 0.0
-            for k in range(n):
-                change += tables[phase, row, k] * series[k, j]
-            if row >= n:
-                series[row, j] = change
+        y = series[j, 0], series[j, 1], series[j, 2], series[j, 3], series[j, 4]
+        share = seconds / (j - FIRST + 1)
+        for number in range(QUANTITIES):
+            change = tables[phase, number, STATES] + tables[phase, number, STATES + 1] * command_n
+            change = change if j == FIRST else 0.0
+            for k in range(STATES):
+                change += tables[phase, number, k] * y[k]
+            if number >= STATES:
+                series[j, number] = change
             elif j < last:
-                series[row, j + 1] = seconds / (j - FIRST + 1) * change
+                series[j + 1, number] = share * change
     if state.velocity_m_per_s == 0.0 and phase // 3 != STUCK // 3:
         # v / t has the sign of v, which begins at zero and so has none yet.
         for j in range(FIRST, last):
-            series[n + GRIP, j] = series[1, j + 1]
-        series[n + GRIP, last] = 0.0
+            series[j, GRIP] = series[j + 1, 1]
+        series[last, GRIP] = 0.0
+    measure(series)
 
 
 @compiled
 def measure(series):
-    """Fill the columns `END`, `BEND` and `STEEPENING`."""
-    for row in range(len(series)):
-        end = bend = steepening = 0.0
-        for j in range(series.shape[1] - 1, FIRST + 1, -1):
-            end += series[row, j]
-            bend += abs(series[row, j])
-            steepening += (j - FIRST) * abs(series[row, j])
-        series[row, END] = end + series[row, FIRST + 1] + series[row, FIRST]
-        series[row, BEND] = bend
-        series[row, STEEPENING] = steepening
+    """Fill `END`, `BEND` and `STEEPENING` of each polynomial; the last terms first, for they are the smallest."""
+    for row in range(FIRST):
+        for number in range(QUANTITIES):
+            series[row, number] = 0.0
+    for j in range(len(series) - 1, FIRST + 1, -1):
+        for number in range(QUANTITIES):
+            size = abs(series[j, number])
+            series[END, number] += series[j, number]
+            series[BEND, number] += size
+            series[STEEPENING, number] += (j - FIRST) * size
+    for number in range(QUANTITIES):
+        series[END, number] += series[FIRST + 1, number]
+        series[END, number] += series[FIRST, number]
 
 
 @compiled
 def halve(series):
     """Make the polynomials those of the leg's first half."""
     share = 1.0
-    for j in range(FIRST + 1, series.shape[1]):
+    for j in range(FIRST + 1, len(series)):
         share *= 0.5
-        for row in range(len(series)):
-            series[row, j] *= share
+        for number in range(QUANTITIES):
+            series[j, number] *= share
     measure(series)
 
 
 @compiled
-def value(series, row, at):
+def value(series, number, at):
     """Return a polynomial's value and its slope at a time of the leg, 0 to 1."""
     result = slope = 0.0
-    for j in range(series.shape[1] - 1, FIRST - 1, -1):
+    for j in range(len(series) - 1, FIRST - 1, -1):
         slope = slope * at + result
-        result = result * at + series[row, j]
+        result = result * at + series[j, number]
     return result, slope
 
 
 @compiled
-def stays(series, row, low, high):
+def stays(series, number, low, high):
     """Return whether a polynomial is sure to stay within low <= p < high, and whether it goes one way all the leg."""
-    start, slope, bend = series[row, FIRST], series[row, FIRST + 1], series[row, BEND]
+    start, slope, bend = series[FIRST, number], series[FIRST + 1, number], series[BEND, number]
     inside = low <= start + min(slope, 0.0) - bend and start + max(slope, 0.0) + bend < high
-    return inside, abs(slope) > series[row, STEEPENING]
+    return inside, abs(slope) > series[STEEPENING, number]
 
 
 @compiled
-def root(series, row, wanted, after):
+def root(series, number, wanted, after):
     """Return the time, `after` to 1, at which a polynomial that goes one way passes `wanted`: Newton's method."""
     low, high = after, 1.0
-    rising = series[row, FIRST + 1] > 0.0
+    rising = series[FIRST + 1, number] > 0.0
     at = 0.5 * (low + high)
     for _ in range(60):
-        here, slope = value(series, row, at)
+        here, slope = value(series, number, at)
         if here == wanted:
             break
         if (here > wanted) == rising:
@@ -164,20 +172,20 @@ NEVER, UNSURE = 2.0, -1.0
 
 
 @compiled
-def leaves(series, row, low, high, surely):
+def leaves(series, number, low, high, surely):
     """Return when (0 to 1) a polynomial leaves low <= p < high: `NEVER`, or `UNSURE`, which `surely` excludes."""
-    inside, one_way = stays(series, row, low, high)
+    inside, one_way = stays(series, number, low, high)
     if inside:
         return NEVER
     if not one_way and not surely:
         return UNSURE
-    start, end = series[row, FIRST], series[row, END]
+    start, end = series[FIRST, number], series[END, number]
     if low <= end < high:
         return NEVER
     bound = low if end < low else high
     if not low <= start < high:
         return 0.0
-    return root(series, row, bound, 0.0)
+    return root(series, number, bound, 0.0)
 
 
 @compiled
@@ -187,7 +195,7 @@ def along_of(train, state, command_n):
         return 1
     if state.velocity_m_per_s != 0.0:
         return 1 if state.velocity_m_per_s > 0.0 else -1
-    force_n = _row(train.tables, STUCK, train.tables.shape[2] - 2 + GRIP, state, command_n)
+    force_n = _quantity(train.tables, STUCK, GRIP, state, command_n)
     if abs(force_n) <= train.coulomb_n:
         return 0
     return 1 if force_n > 0.0 else -1
@@ -198,48 +206,44 @@ def limited_of(train, state, command_n):
     """Return at which limit the voltage is, -1 or 1, or 0."""
     if train.voltage_limit_n == np.inf:
         return 0
-    voltage_n = _row(train.tables, SLIDING, train.tables.shape[2] - 2 + VOLTAGE, state, command_n)
+    voltage_n = _quantity(train.tables, SLIDING, VOLTAGE, state, command_n)
     return 1 if voltage_n > train.voltage_limit_n else (-1 if voltage_n < -train.voltage_limit_n else 0)
 
 
 @compiled
 def _breaks(series, coulomb_n, along, surely):
     """Return when the handle comes to rest, or breaks loose: see `leaves`."""
-    row = len(series) - WATCHED + GRIP
     if coulomb_n < 0.0:
         return NEVER
     if along == 0:
-        return leaves(series, row, -coulomb_n, np.nextafter(coulomb_n, np.inf), surely)
-    return leaves(series, row, 0.0 if along > 0 else -np.inf, np.inf if along > 0 else 5e-324, surely)
+        return leaves(series, GRIP, -coulomb_n, np.nextafter(coulomb_n, np.inf), surely)
+    return leaves(series, GRIP, 0.0 if along > 0 else -np.inf, np.inf if along > 0 else 5e-324, surely)
 
 
 @compiled
 def _switches(series, most, limited, surely):
     """Return when the voltage meets its limit, or leaves it."""
-    row = len(series) - WATCHED + VOLTAGE
     if most == np.inf:
         return NEVER
     if limited == 0:
-        return leaves(series, row, -most, np.nextafter(most, np.inf), surely)
-    return leaves(series, row, most if limited > 0 else -np.inf, np.inf if limited > 0 else -most, surely)
+        return leaves(series, VOLTAGE, -most, np.nextafter(most, np.inf), surely)
+    return leaves(series, VOLTAGE, most if limited > 0 else -np.inf, np.inf if limited > 0 else -most, surely)
 
 
 @compiled
-def _at(series, row, at):
-    """Return a state at a time of the leg; 0 where it has no such state."""
-    if row >= len(series) - WATCHED:
-        return 0.0
-    return series[row, END] if at == 1.0 else value(series, row, at)[0]
+def _at(series, number, at):
+    """Return a quantity at a time of the leg."""
+    return series[END, number] if at == 1.0 else value(series, number, at)[0]
 
 
 @compiled
 def _emit(series, encoder, cell, now_s, seconds, end, clock, clocks, edge_clocks, edge_levels, n_edges):
     """Append the edges that the encoder passes in a leg until the time `end`, 0 to 1; return (cell, n_edges)."""
-    row, room = len(series) - WATCHED + SEEN, min(len(edge_clocks), len(edge_levels))
-    seen_m, passed = value(series, row, end)[0], 0.0
+    room = min(len(edge_clocks), len(edge_levels))
+    seen_m, passed = _at(series, SEEN, end), 0.0
     while not cell.lower_m <= seen_m < cell.upper_m and 0 <= n_edges < room:
         upwards = seen_m >= cell.upper_m
-        passed = root(series, row, cell.upper_m if upwards else cell.lower_m, passed)
+        passed = root(series, SEEN, cell.upper_m if upwards else cell.lower_m, passed)
         edge_clocks[n_edges] = clock + stamp(encoder, upwards, now_s + min(passed, end) * seconds, clocks)
         cell = next_cell(encoder, cell, upwards)
         edge_levels[n_edges] = level(cell.number)
@@ -250,8 +254,7 @@ def _emit(series, encoder, cell, now_s, seconds, end, clock, clocks, edge_clocks
 @compiled
 def stretch(train, encoder, state, cell, command_n, since_s, until_s, clock, clocks, edge_clocks, edge_levels, n_edges):
     """Advance device and encoder from `since_s` to `until_s` of an interval, the command constant: see `advance`."""
-    series, n = train.series, len(train.series) - WATCHED
-    now_s, stalled = since_s, 0
+    series, now_s, stalled = train.series, since_s, 0
     along, limited = along_of(train, state, command_n), limited_of(train, state, command_n)
     while now_s < until_s:
         seconds = min(until_s - now_s, train.leg_s)
@@ -259,10 +262,9 @@ def stretch(train, encoder, state, cell, command_n, since_s, until_s, clock, clo
         if blind:
             seconds *= MOMENT
         expand(train.tables, series, phase_number(along, limited), state, command_n, seconds)
-        measure(series)
         for halving in range(HALVINGS + 1):
             surely = halving == HALVINGS
-            inside, one_way = stays(series, n + SEEN, cell.lower_m, cell.upper_m)
+            inside, one_way = stays(series, SEEN, cell.lower_m, cell.upper_m)
             breaks = NEVER if blind else _breaks(series, train.coulomb_n, along, surely)
             switches = NEVER if blind else _switches(series, train.voltage_limit_n, limited, surely)
             if surely or ((inside or one_way) and UNSURE not in (breaks, switches)):
@@ -281,9 +283,9 @@ def stretch(train, encoder, state, cell, command_n, since_s, until_s, clock, clo
         if end == 1.0:
             continue
         if switches < breaks:
-            limited = 0 if limited != 0 else (1 if series[n + VOLTAGE, FIRST + 1] > 0.0 else -1)
+            limited = 0 if limited != 0 else (1 if series[FIRST + 1, VOLTAGE] > 0.0 else -1)
         elif along == 0:
-            along = 1 if value(series, n + GRIP, end)[0] > 0.0 else -1
+            along = 1 if value(series, GRIP, end)[0] > 0.0 else -1
         else:
             state = State(state.position_m, 0.0, others, state.width)
             along = along_of(train, state, command_n)
