@@ -21,13 +21,24 @@ COCOTB_SAMPLES = 2000
 
 
 def _parts(sample_s: float) -> dict[str, dict]:
-    """Return changes that leave a scene one optional part each, so slight that the motion is as without."""
+    """Return changes that leave a scene one optional part each, so slight that the motion is as without; then all."""
     bare = {"handle.coulomb_n": None, "amplifier": None}
+    cable = {"transmission.stiffness_n_per_m": 1e6, "transmission.damping_n_s_per_m": 10.0}
+    motor = {"resistance_ohm": 2.0, "inductance_h": 3e-4, "torque_constant_n_m_per_a": 0.04}
+    motor |= {"voltage_limit_v": 48.0, "pulley_radius_m": 0.01}
     return {
         "none": bare,
         "coulomb friction": bare | {"handle.coulomb_n": 1e-12},
         "amplifier delay": {"handle.coulomb_n": None, "amplifier.delay_s": sample_s},
         "encoder phase error": bare | {"encoder.phase_error_counts": 1e-9},
+        "converter": bare | {"output.full_scale_n": 64.0, "output.dac_bits": 32},
+        "amplifier lag": bare | {"amplifier.bandwidth_hz": 1e5},
+        "amplifier lag, motor, cable, friction": {
+            "amplifier.bandwidth_hz": 1e4,
+            **{f"motor.{key}": value for key, value in motor.items()},
+            **cable,
+            "transmission.motor_mass_kg": 0.05,
+        },
     }
 
 

@@ -92,7 +92,7 @@ def expand(tables, series, phase, state, command_n, seconds):
             elif j < last:
                 series[j + 1, number] = share * change
     if state.velocity_m_per_s == 0.0 and phase // 3 != STUCK // 3:
-        # v / t has the sign of v, which begins at zero and so has none yet.
+        # v / t has the sign of v, which begins at zero and has none yet: else a leg is halved and halved after a break.
         for j in range(FIRST, last):
             series[j, GRIP] = series[j + 1, 1]
         series[last, GRIP] = 0.0

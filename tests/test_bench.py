@@ -20,9 +20,10 @@ def test_the_benchmark_runs_on_a_scene_of_ones_own(tmp_path, monkeypatch):
     report = bench.bench("mine.toml", said.append)
     assert set(report["samples_per_s"]) == {"float", "fixed", "rtl", "cocotb"}
     assert set(report["ns_per_sample_of_parts"]) == {
-        "none", "coulomb friction", "amplifier delay", "encoder phase error",
+        "none", "coulomb friction", "amplifier delay", "encoder phase error", "converter", "amplifier lag",
+        "amplifier lag, motor, cable, friction",
     }  # fmt: skip
     assert all(value > 0 for value in report["samples_per_s"].values())
     assert report["rtl_over_cocotb"] == report["samples_per_s"]["rtl"] / report["samples_per_s"]["cocotb"]
     assert json.dumps(report)
-    assert len(said) == 1 + 4 + 4
+    assert len(said) == 1 + 4 + 7
