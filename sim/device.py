@@ -23,7 +23,8 @@ import numpy as np
 from scipy.linalg import matrix_balance
 
 from .converter import AS_IT_IS, Pulse
-from .drivetrain import FIRST, GRIP, PHASES, QUANTITIES, SEEN, STATES, VOLTAGE, Train, phase_number
+from .drivetrain import GRIP, PHASES, QUANTITIES, SEEN, STATES, VOLTAGE, Train, phase_number
+from .series import FIRST
 
 LEG_RATE = 1.0
 """Of a leg, the longest time that one Taylor polynomial serves: its length times the fastest rate."""

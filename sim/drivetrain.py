@@ -15,14 +15,13 @@ import numpy as np
 from ..model.compiled import compiled
 from .converter import Pulse, width_of
 from .encoder import advance, advance_quietly, level, next_cell, stamp
+from .series import FIRST, NEVER, UNSURE, at, halve, leaves, measure, root, stays
 
 PHASES = 9
 STATES = 5
 """Room for the state; known when compiling, so that its loops are unrolled."""
 SEEN, GRIP, VOLTAGE, QUANTITIES = 5, 6, 7, 8
 """After the state: the encoder's position; what decides on sticking; the voltage; and how many quantities there are."""
-END, BEND, STEEPENING, FIRST = 0, 1, 2, 3
-"""Of a polynomial: its value at the end; two sums of its coefficients' sizes; and its first coefficient."""
 HALVINGS = 40
 """Of a leg, before it is taken as decided: by then it is as short as rounding."""
 STALLED = 8
@@ -100,95 +99,6 @@ def expand(tables, series, phase, state, command_n, seconds):
 
 
 @compiled
-def measure(series):
-    """Fill `END`, `BEND` and `STEEPENING` of each polynomial; the last terms first, for they are the smallest."""
-    for row in range(FIRST):
-        for number in range(QUANTITIES):
-            series[row, number] = 0.0
-    for j in range(len(series) - 1, FIRST + 1, -1):
-        for number in range(QUANTITIES):
-            size = abs(series[j, number])
-            series[END, number] += series[j, number]
-            series[BEND, number] += size
-            series[STEEPENING, number] += (j - FIRST) * size
-    for number in range(QUANTITIES):
-        series[END, number] += series[FIRST + 1, number]
-        series[END, number] += series[FIRST, number]
-
-
-@compiled
-def halve(series):
-    """Make the polynomials those of the leg's first half."""
-    share = 1.0
-    for j in range(FIRST + 1, len(series)):
-        share *= 0.5
-        for number in range(QUANTITIES):
-            series[j, number] *= share
-    measure(series)
-
-
-@compiled
-def value(series, number, at):
-    """Return a polynomial's value and its slope at a time of the leg, 0 to 1."""
-    result = slope = 0.0
-    for j in range(len(series) - 1, FIRST - 1, -1):
-        slope = slope * at + result
-        result = result * at + series[j, number]
-    return result, slope
-
-
-@compiled
-def stays(series, number, low, high):
-    """Return whether a polynomial is sure to stay within low <= p < high, and whether it goes one way all the leg."""
-    start, slope, bend = series[FIRST, number], series[FIRST + 1, number], series[BEND, number]
-    inside = low <= start + min(slope, 0.0) - bend and start + max(slope, 0.0) + bend < high
-    return inside, abs(slope) > series[STEEPENING, number]
-
-
-@compiled
-def root(series, number, wanted, after):
-    """Return the time, `after` to 1, at which a polynomial that goes one way passes `wanted`: Newton's method."""
-    low, high = after, 1.0
-    rising = series[FIRST + 1, number] > 0.0
-    at = 0.5 * (low + high)
-    for _ in range(60):
-        here, slope = value(series, number, at)
-        if here == wanted:
-            break
-        if (here > wanted) == rising:
-            high = at
-        else:
-            low = at
-        following = at - (here - wanted) / slope if slope != 0.0 else low
-        if not low < following < high:
-            following = 0.5 * (low + high)
-        if abs(following - at) < 1e-15:
-            break
-        at = following
-    return at
-
-
-NEVER, UNSURE = 2.0, -1.0
-
-
-@compiled
-def leaves(series, number, low, high, surely):
-    """Return when (0 to 1) a polynomial leaves low <= p < high: `NEVER`, or `UNSURE`, which `surely` excludes."""
-    inside, one_way = stays(series, number, low, high)
-    if inside:
-        return NEVER
-    if not one_way and not surely:
-        return UNSURE
-    start, end = series[FIRST, number], series[END, number]
-    if low <= end < high:
-        return NEVER
-    bound = low if end < low else high
-    if not low <= start < high:
-        return 0.0
-    return root(series, number, bound, 0.0)
-
-
-@compiled
 def along_of(train, state, command_n):
     """Return which way the handle moves or is about to, -1 or 1, or 0 for stuck; 1 without Coulomb friction."""
     if train.coulomb_n < 0.0:
@@ -231,16 +141,13 @@ def _switches(series, most, limited, surely):
 
 
 @compiled
-def _at(series, number, at):
-    """Return a quantity at a time of the leg."""
-    return series[END, number] if at == 1.0 else value(series, number, at)[0]
-
-
-@compiled
 def _emit(series, encoder, cell, now_s, seconds, end, clock, clocks, edge_clocks, edge_levels, n_edges):
-    """Append the edges that the encoder passes in a leg until the time `end`, 0 to 1; return (cell, n_edges)."""
+    """Append the edges that the encoder passes in a leg until the time `end`, 0 to 1; return (cell, n_edges).
+
+    Where the arrays are full n_edges is -1.
+    """
     room = min(len(edge_clocks), len(edge_levels))
-    seen_m, passed = _at(series, SEEN, end), 0.0
+    seen_m, passed = at(series, SEEN, end), 0.0
     while not cell.lower_m <= seen_m < cell.upper_m and 0 <= n_edges < room:
         upwards = seen_m >= cell.upper_m
         passed = root(series, SEEN, cell.upper_m if upwards else cell.lower_m, passed)
@@ -276,16 +183,18 @@ def stretch(train, encoder, state, cell, command_n, since_s, until_s, clock, clo
             cell, n_edges = _emit(
                 series, encoder, cell, now_s, seconds, end, clock, clocks, edge_clocks, edge_levels, n_edges
             )
-        others = _at(series, 2, end), _at(series, 3, end), _at(series, 4, end)
+            if n_edges < 0:
+                break
+        others = at(series, 2, end), at(series, 3, end), at(series, 4, end)
         stalled = stalled + 1 if end < MOMENT and not blind else 0
         now_s = until_s if end == 1.0 and seconds == until_s - now_s else now_s + end * seconds
-        state = State(_at(series, 0, end), _at(series, 1, end), others, state.width)
+        state = State(at(series, 0, end), at(series, 1, end), others, state.width)
         if end == 1.0:
             continue
         if switches < breaks:
             limited = 0 if limited != 0 else (1 if series[FIRST + 1, VOLTAGE] > 0.0 else -1)
         elif along == 0:
-            along = 1 if value(series, GRIP, end)[0] > 0.0 else -1
+            along = 1 if at(series, GRIP, end) > 0.0 else -1
         else:
             state = State(state.position_m, 0.0, others, state.width)
             along = along_of(train, state, command_n)
@@ -309,12 +218,12 @@ def _advance(train, encoder, state, cell, force_n, interval, clock, clocks, edge
         )
     now, end = clock, clock + clocks
     while now < end:
-        at = now % pulse.period
-        if at == 0:
+        within = now % pulse.period
+        if within == 0:
             width = width_of(pulse, force_n)
             state = State(state.position_m, state.velocity_m_per_s, state.others, width)
-        high = at < state.width
-        until = min(end, now - at + (state.width if high else pulse.period))
+        high = within < state.width
+        until = min(end, now - within + (state.width if high else pulse.period))
         level_n = min(pulse.level_n, limit_n)
         since_s, until_s = (now - clock) / encoder.clock_hz, (until - clock) / encoder.clock_hz
         state, cell, n_edges = stretch(
