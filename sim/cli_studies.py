@@ -12,6 +12,7 @@ from .terminal import (
     JsonOption,
     PlotOption,
     ResumeOption,
+    SceneArgument,
     SchedulerOption,
     SetOption,
     WorkersOption,
@@ -102,6 +103,51 @@ def _show_cutoffs(devices: list) -> None:
     show_table(dict.fromkeys(("cutoff (Hz)", *(f"{each.scene.name}: area" for each in devices)), "right"), areas)
 
 
+def gains(
+    scene: SceneArgument = "seed-2011",
+    backend: BackendOption = "fixed",
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
+    resume: ResumeOption = False,
+    set_: SetOption = None,
+    plot: PlotOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Levant's gains, searched in full: the area of the stable region over lambda and alpha, for both outputs."""
+    from . import gains as gains_of  # noqa: PLC0415  (kernels are loaded only where they run)
+    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
+    from .plot_gains import plot_gains  # noqa: PLC0415
+
+    changes, plot = _changes(set_), output_file(plot, "--plot", SUFFIXES)
+    maps = _Maps(backend, workers, scheduler, resume)
+    try:
+        found = gains_of.study(scene, changes, maps)
+    except ValueError as error:
+        raise SceneError(str(error)) from None
+    if as_json:
+        print(json.dumps(maps.report() | found.report()))
+    else:
+        _show_gains(found)
+    if plot:
+        save(plot_gains(found, backend), plot)
+        log.print(f"picture: {plot}")
+
+
+def _show_gains(found) -> None:
+    numbers = ("lambda (m^.5/s)", "alpha (m/s^2)", "area (kN/m N s/m)", "of the paper's", "in place")
+    rows = []
+    for output, picks in found.picks.items():
+        for name, pick in picks.items():
+            multiple = found.of_papers(pick)
+            pair = f"{pick.gains.lambda_sqrt_m_per_s:.4g}", f"{pick.gains.alpha_m_per_s2:.4g}"
+            times = "" if multiple is None else f"{multiple:.2f}"
+            rows.append([output, name, *pair, _area(pick.map), times, f"{pick.map.area_in_place / 1e3:.0f}"])
+            if found.at_edge(pick.gains):
+                log.print(f"{output}, {name}: at the edge of what was tried; better gains may lie beyond")
+    show_table({"output": "left", "gains": "left"} | dict.fromkeys(numbers, "right"), rows)
+
+
 def add_commands(app: typer.Typer) -> None:
     """Add the commands of this file to the command line."""
-    app.command()(cutoff)
+    for command in (cutoff, gains):
+        app.command()(command)
