@@ -154,7 +154,7 @@ class _Tracing:
         self._job = {"scene": case.scene, "text": case.text, "sources": store.sources(), "backend": backend}
         self._job["changes"] = case.changes
         self._hits = 0
-        self._rests_m: dict[tuple[float, float], float] = {}
+        self._rests_m: dict[tuple[float, float], float | None] = {}
         self.wanted: dict | None = None
         self.found: Map | None = None
         self._send(None)

@@ -131,8 +131,8 @@ def test_a_filter_holds_the_handle_in_place_and_a_chatter_that_the_force_always_
     (chatters,) = zwidth.run([replace(CASES[1], changes=CASES[1].changes | large)], "fixed", Store("zwidth"))
     assert chatters.area > 0
     assert chatters.area_in_place == 0
-    # x goes from e to -e and back, 2 e = tau u, and u = lambda sqrt(e) - alpha tau / 2 where u1 is even about 0. It goes
-    # in steps of alpha tau, and may be one off.
+    # x goes from e to -e and back, 2 e = tau u, and u = lambda sqrt(e) - alpha tau / 2 where u1 is even about 0; it may
+    # be one of its steps off, alpha tau.
     root = lam * (tau / 2) ** 0.5
     speed = ((root + (root**2 - 2 * alpha * tau) ** 0.5) / 2) ** 2
     for edge, rest in zip(chatters.edges, chatters.rests_m, strict=True):
