@@ -27,7 +27,9 @@ from .terminal import (
 )
 
 COLUMNS = {"method": "left"}
-COLUMNS |= dict.fromkeys(("area (kN/m N s/m)", "largest K (kN/m)", "to B (N s/m)", "leaves the map", "hits"), "right")
+COLUMNS |= dict.fromkeys(
+    ("area (kN/m N s/m)", "in place", "largest K (kN/m)", "to B (N s/m)", "leaves the map", "hits"), "right"
+)
 
 
 def _curves(wanted: str | None) -> list:
@@ -50,7 +52,7 @@ def _curves(wanted: str | None) -> list:
     return curves
 
 
-def _refuse(changes: dict, keys: tuple[str, ...], instead: str) -> None:
+def refuse(changes: dict, keys: tuple[str, ...], instead: str) -> None:
     """Refuse changes of a scene that the command makes itself."""
     for key in changes:
         if key.startswith(keys):
@@ -115,8 +117,8 @@ def zwidth(
     from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
     from .plot_zwidth import plot_zwidth  # noqa: PLC0415
 
-    _refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "see --estimators")
-    _refuse(changes, ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m"), "see the scene's section zwidth")
+    refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "see --estimators")
+    refuse(changes, ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m"), "see the scene's section zwidth")
     plot, text = output_file(plot, "--plot", SUFFIXES), read(scene)
     cases = [maps_of.Case(curve.label, scene, text, changes | curve.changes) for curve in _curves(wanted)]
     began = time.perf_counter()
@@ -133,6 +135,7 @@ def zwidth(
             [
                 each.case.label,
                 f"{each.area / 1e3:.1f}",
+                f"{each.area_in_place / 1e3:.1f}",
                 f"{each.largest_n_per_m / 1e3:g}",
                 f"{each.damping_n_s_per_m:g}",
                 "yes" if each.leaves else "no",
@@ -163,7 +166,7 @@ def lipschitz(
     """The bound C on the acceleration, from sines fitted to a hit, and the gains that follow: the paper's Figure 4."""
     changes = scene_changes(set_)
     load(scene, changes)
-    _refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "it takes the paper's filter")
+    refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "it takes the paper's filter")
     from .lipschitz import measure  # noqa: PLC0415  (kernels are loaded only where they run)
     from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
     from .plot_lipschitz import plot_lipschitz  # noqa: PLC0415

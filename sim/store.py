@@ -1,8 +1,8 @@
 """Results that took time, kept on disk as they come: an interrupted run loses none, and its repetition none again.
 
-A store is a file of one JSON line a result, found by its key. It belongs to the exact sources of this project and the
-versions of its tools: any change begins a new one. Every line begins with its end, so that a piece of one, left by a
-process that was killed while it wrote, spoils no other.
+A store is a file of one JSON line a result, found by its job's digest. It belongs to the exact sources of this project
+and the versions of its tools: any change begins a new one. Every line begins with its end, so that a piece of one, left
+by a process that was killed while it wrote, spoils no other.
 """
 
 import hashlib
@@ -57,7 +57,8 @@ class Store:
 
     @staticmethod
     def _key(job: dict) -> str:
-        return json.dumps(job, sort_keys=True)
+        """Return a digest: a job may have a whole scene in it, and a study many thousands of jobs."""
+        return hashlib.sha256(json.dumps(job, sort_keys=True).encode()).hexdigest()[:32]
 
     def __contains__(self, job: dict) -> bool:
         """Whether there is a result of a job."""

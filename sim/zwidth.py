@@ -7,7 +7,8 @@ same whatever the number of workers, and an interrupted one goes on where it was
 
 import platform
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 from distributed import Client, as_completed
@@ -51,16 +52,34 @@ class Map:
         case: what it is of.
         edges: by B.
         hits: walls that were hit for it.
+        rests_m: where the handle rests in each edge's largest stable wall; None where no wall is stable.
     """
 
     case: Case
     edges: list[Edge]
     hits: int
+    rests_m: list[float | None]
 
     @property
     def area(self) -> float:
         """Of the stable region, N^2 s/m^2."""
         return area(self.edges)
+
+    @cached_property
+    def area_in_place(self) -> float:
+        """Of the stable region but for each B whose wall is felt in another place than it is, N^2 s/m^2.
+
+        At rest the velocity is 0, and the wall's spring alone carries the push, but for the friction that sticks. The
+        handle rests elsewhere, by more than a count, where the estimate is not 0: a force of B times that holds it.
+        """
+        scene = self.case.parsed
+        push, friction = scene.protocol.push_n, scene.handle.coulomb_n or 0.0
+        felt = []
+        for edge, rest in zip(self.edges, self.rests_m, strict=True):
+            spring, count = (edge.stable_n_per_m * each for each in (rest or 0.0, scene.encoder.count_m))
+            in_place = abs(spring - push) <= friction + count
+            felt.append(edge if in_place else replace(edge, stable_n_per_m=0.0))
+        return area(felt)
 
     @property
     def damping_n_s_per_m(self) -> float:
@@ -89,6 +108,7 @@ class Map:
             "boundary": [[edge.damping_n_s_per_m, edge.stable_n_per_m] for edge in self.edges],
             "leaves_the_map_at": [edge.damping_n_s_per_m for edge in self.edges if edge.marginal_n_per_m is None],
             "area_n2_s_per_m2": self.area,
+            "area_in_place_n2_s_per_m2": self.area_in_place,
             "largest_stiffness_n_per_m": self.largest_n_per_m,
             "hits": self.hits,
         }
@@ -106,7 +126,7 @@ def grid_of(scene: Scene) -> Grid:
 
 
 def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float, damping: float, backend: str) -> dict:
-    """Hit a wall; return whether it is `stable`, and its `rms_mm` up to where that was sure.
+    """Hit a wall; return whether it is `stable`, its `rms_mm` up to where that was sure, and where a stable one rests.
 
     Args:
         scene, text, changes: of a `Case`.
@@ -122,7 +142,7 @@ def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float
         raise RuntimeError(f"a worker, {platform.node()}, has other sources of hardwall, or versions of its tools")
     wall = {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": damping}
     result = hit.run(parse(scene, text, changes | wall), backend, until_sure=True)
-    return {"stable": result.stable, "rms_mm": result.rms_m * 1e3}
+    return {"stable": result.stable, "rms_mm": result.rms_m * 1e3, "rest_m": result.mean_m if result.stable else None}
 
 
 class _Tracing:
@@ -134,6 +154,7 @@ class _Tracing:
         self._job = {"scene": case.scene, "text": case.text, "sources": store.sources(), "backend": backend}
         self._job["changes"] = case.changes
         self._hits = 0
+        self._rests_m: dict[tuple[float, float], float | None] = {}
         self.wanted: dict | None = None
         self.found: Map | None = None
         self._send(None)
@@ -141,6 +162,7 @@ class _Tracing:
     def answer(self, result: dict) -> None:
         """Go on from the verdict on the wall that was wanted."""
         self._hits += 1
+        self._rests_m[self.wanted["stiffness"], self.wanted["damping"]] = result["rest_m"]
         self._send(result["stable"])
 
     def _send(self, stable: bool | None) -> None:
@@ -148,7 +170,8 @@ class _Tracing:
             stiffness, damping = self._steps.send(stable)
             self.wanted = self._job | {"stiffness": stiffness, "damping": damping}
         except StopIteration as end:
-            self.wanted, self.found = None, Map(self._case, end.value, self._hits)
+            rests = [self._rests_m.get((edge.stable_n_per_m, edge.damping_n_s_per_m)) for edge in end.value]
+            self.wanted, self.found = None, Map(self._case, end.value, self._hits, rests)
 
     @property
     def done(self) -> float:

@@ -1,0 +1,153 @@
+"""The commands of what the founding paper left open: studies of many maps."""
+
+import json
+import time
+from typing import Annotated, Literal
+
+import typer
+
+from .cli_zwidth import make_maps, refuse
+from .scene import SceneError, names
+from .terminal import (
+    JsonOption,
+    PlotOption,
+    ResumeOption,
+    SceneArgument,
+    SchedulerOption,
+    SetOption,
+    WorkersOption,
+    log,
+    output_file,
+    scene_changes,
+    show_table,
+)
+
+BackendOption = Annotated[Literal["float", "fixed"], typer.Option(help="float64 algorithm, or bit-accurate model")]
+
+
+class _Maps:
+    """Makes maps as the options say, and knows what they took."""
+
+    def __init__(self, backend: str, workers: int | None, scheduler: str | None, resume: bool):
+        self._options = (backend, workers, scheduler, resume)
+        self._hits, self._began = 0, time.perf_counter()
+
+    def __call__(self, title: str, cases: list) -> list:
+        maps = make_maps(title, cases, *self._options)
+        self._hits += sum(each.hits for each in maps)
+        return maps
+
+    def report(self) -> dict:
+        return {"backend": self._options[0], "hits": self._hits, "seconds": time.perf_counter() - self._began}
+
+
+def _changes(set_: list[str] | None) -> dict:
+    """Return the changes of scenes; bad input for those that a study makes itself."""
+    changes = scene_changes(set_)
+    refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "it is what is searched")
+    refuse(changes, ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m"), "see the scene's section zwidth")
+    return changes
+
+
+def cutoff(
+    scenes: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="SCENE...", help=f"of {', '.join(names())}, or .toml files [default: three devices]"),
+    ] = None,
+    backend: BackendOption = "fixed",
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
+    resume: ResumeOption = False,
+    set_: SetOption = None,
+    plot: PlotOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """The best cutoff of a filter behind a finite difference: the area of the stable region against it."""
+    from . import cutoff as cutoffs  # noqa: PLC0415  (kernels are loaded only where they run)
+    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
+    from .plot_cutoff import plot_cutoff  # noqa: PLC0415
+
+    changes, plot = _changes(set_), output_file(plot, "--plot", SUFFIXES)
+    maps = _Maps(backend, workers, scheduler, resume)
+    try:
+        devices = cutoffs.study(list(dict.fromkeys(scenes or cutoffs.SCENES)), changes, maps)
+    except ValueError as error:
+        raise SceneError(str(error)) from None
+    if as_json:
+        print(json.dumps(maps.report() | {"devices": [each.report() for each in devices]}))
+    else:
+        _show_cutoffs(devices)
+    if plot:
+        save(plot_cutoff(devices, backend), plot)
+        log.print(f"picture: {plot}")
+
+
+def _area(each) -> str:
+    """Return the area of a map in kN/m N s/m, with a + where the region leaves the map."""
+    return f"{each.area / 1e3:.0f}" + "+" * each.leaves
+
+
+def _show_cutoffs(devices: list) -> None:
+    numbers = ("best (Hz)", "its area (kN/m N s/m)", "within 5 %, from (Hz)", "to (Hz)", "no filter: area")
+    rows = []
+    for each in devices:
+        best = f"{each.best_hz:.0f}" + ", at the end" * each.at_end
+        low, high = each.level_hz
+        rows.append([each.scene.name, best, _area(each.best), f"{low:.0f}", f"{high:.0f}", _area(each.unfiltered)])
+    show_table({"device": "left"} | dict.fromkeys(numbers, "right"), rows)
+    cutoffs = sorted({cutoff_hz for each in devices for cutoff_hz in each.maps})
+    areas = [
+        [f"{cutoff_hz:g}", *(_area(each.maps[cutoff_hz]) if cutoff_hz in each.maps else "" for each in devices)]
+        for cutoff_hz in cutoffs
+    ]
+    show_table(dict.fromkeys(("cutoff (Hz)", *(f"{each.scene.name}: area" for each in devices)), "right"), areas)
+
+
+def gains(
+    scene: SceneArgument = "seed-2011",
+    backend: BackendOption = "fixed",
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
+    resume: ResumeOption = False,
+    set_: SetOption = None,
+    plot: PlotOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Levant's gains, searched in full: the area of the stable region over lambda and alpha, for both outputs."""
+    from . import gains as gains_of  # noqa: PLC0415  (kernels are loaded only where they run)
+    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
+    from .plot_gains import plot_gains  # noqa: PLC0415
+
+    changes, plot = _changes(set_), output_file(plot, "--plot", SUFFIXES)
+    maps = _Maps(backend, workers, scheduler, resume)
+    try:
+        found = gains_of.study(scene, changes, maps)
+    except ValueError as error:
+        raise SceneError(str(error)) from None
+    if as_json:
+        print(json.dumps(maps.report() | found.report()))
+    else:
+        _show_gains(found)
+    if plot:
+        save(plot_gains(found, backend), plot)
+        log.print(f"picture: {plot}")
+
+
+def _show_gains(found) -> None:
+    numbers = ("lambda (m^.5/s)", "alpha (m/s^2)", "area (kN/m N s/m)", "of the paper's", "in place")
+    rows = []
+    for output, picks in found.picks.items():
+        for name, pick in picks.items():
+            multiple = found.of_papers(pick)
+            pair = f"{pick.gains.lambda_sqrt_m_per_s:.4g}", f"{pick.gains.alpha_m_per_s2:.4g}"
+            times = "" if multiple is None else f"{multiple:.2f}"
+            rows.append([output, name, *pair, _area(pick.map), times, f"{pick.map.area_in_place / 1e3:.0f}"])
+            if found.at_edge(pick.gains):
+                log.print(f"{output}, {name}: at the edge of what was tried; better gains may lie beyond")
+    show_table({"output": "left", "gains": "left"} | dict.fromkeys(numbers, "right"), rows)
+
+
+def add_commands(app: typer.Typer) -> None:
+    """Add the commands of this file to the command line."""
+    for command in (cutoff, gains):
+        app.command()(command)
