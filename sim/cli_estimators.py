@@ -8,7 +8,19 @@ from typing import Annotated
 import typer
 
 from ..model import estimators
-from .terminal import Backend, BadInput, Device, JsonOption, PlotOption, log, output_file, progress, show_table
+from .terminal import (
+    Backend,
+    BadInput,
+    Device,
+    JsonOption,
+    PlotOption,
+    WorkersOption,
+    log,
+    output_file,
+    progress,
+    rates_of,
+    show_table,
+)
 
 COLUMNS = {"estimator": "left", "signal": "left"} | dict.fromkeys(("rate (Hz)", "RMS", "largest", "chatter"), "right")
 COLUMNS |= {"unit": "left", "delay (us)": "right", "flags": "left"}
@@ -18,22 +30,6 @@ DRAWN_HZ_MAX = 100_000
 EstimatorsOption = Annotated[
     str | None, typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="which [default: all]")
 ]
-WorkersOption = Annotated[int | None, typer.Option(min=1, help="processes [default: one a core]")]
-
-
-def _rates(text: str, option: str) -> list[int]:
-    from .accuracy import RATES_HZ  # noqa: PLC0415  (kernels are loaded only where they run)
-
-    rates = []
-    for word in text.split(","):
-        try:
-            rate = float(word)
-        except ValueError:
-            rate = 0.0
-        if not (RATES_HZ[0] <= rate <= RATES_HZ[1] and rate == int(rate)):
-            raise BadInput(f"{option} must be whole numbers of {RATES_HZ[0]:g} to {RATES_HZ[1]:g} Hz, not {word!r}")
-        rates.append(int(rate))
-    return list(dict.fromkeys(rates))
 
 
 def _line(row: dict) -> list[str]:
@@ -123,7 +119,7 @@ def accuracy(
         raise BadInput(f"--acceleration-max must be more than 0 and less than 1e6 m/s^2, not {acceleration_max!r}")
     if plot and (recordings or len(names) > 1):
         raise BadInput("--plot draws error against rate for one signal that is no recording: give one --signal")
-    at = figures.RATES_HZ[figure or 2] if rates is None else _rates(rates, "--rates")
+    at = figures.RATES_HZ[figure or 2] if rates is None else rates_of(rates, "--rates")
     if plot and figure == 1 and (len(at) > 1 or at[0] > DRAWN_HZ_MAX):
         raise BadInput(f"--figure 1 is drawn at one rate of at most {DRAWN_HZ_MAX:g} Hz, not {rates!r}")
     plot = output_file(plot, "--plot", SUFFIXES)
@@ -221,7 +217,7 @@ def choose(
     from .accuracy import measure  # noqa: PLC0415
     from .store import Store  # noqa: PLC0415
 
-    (sample_hz,) = _rates(str(rate), "--rate")
+    (sample_hz,) = rates_of(str(rate), "--rate")
     pairs = [(curve.estimator, curve.output) for curve in _curves(None, wanted)]
     jobs = situations.jobs(pairs, sample_hz, backend)
     try:
@@ -261,7 +257,7 @@ def bits(
     from .store import Store  # noqa: PLC0415
 
     plot = output_file(plot, "--plot", SUFFIXES)
-    (sample_hz,) = _rates(str(rate), "--rate")
+    (sample_hz,) = rates_of(str(rate), "--rate")
     jobs = [
         {"estimator": curve.estimator, "output": curve.output, "sample_hz": sample_hz, "bits_dropped": dropped}
         for curve in _curves(None, wanted)

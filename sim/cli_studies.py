@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from .cli_zwidth import make_maps, refuse
-from .scene import SceneError, names
+from .cli_zwidth import curves_of, make_maps, refuse
+from .scene import SceneError, load, names
 from .terminal import (
     JsonOption,
     PlotOption,
@@ -18,6 +18,7 @@ from .terminal import (
     WorkersOption,
     log,
     output_file,
+    rates_of,
     scene_changes,
     show_table,
 )
@@ -147,7 +148,56 @@ def _show_gains(found) -> None:
     show_table({"output": "left", "gains": "left"} | dict.fromkeys(numbers, "right"), rows)
 
 
+def rates(
+    scene: SceneArgument = "drive-2011",
+    wanted: Annotated[
+        str | None, typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="see zwidth [default: six of all]")
+    ] = None,
+    tried: Annotated[
+        str | None, typer.Option("--rates", metavar="HZ,...", help="ascending [default: 1e3 to 1e6]")
+    ] = None,
+    backend: BackendOption = "fixed",
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
+    resume: ResumeOption = False,
+    set_: SetOption = None,
+    plot: PlotOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """What rate buys a stiff wall, 1 kHz to 1 MHz, and which part of the device ends it."""
+    from . import rates as studied  # noqa: PLC0415  (kernels are loaded only where they run)
+    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
+    from .plot_rates import plot_rates  # noqa: PLC0415
+
+    changes, plot = _changes(set_), output_file(plot, "--plot", SUFFIXES)
+    refuse(changes, ("controller.sample_hz", "controller.actuation_hz", "controller.clock_hz"), "see --rates")
+    rates_hz = sorted(rates_of(tried, "--rates")) if tried else list(studied.RATES_HZ)
+    loaded, maps = load(scene, changes), _Maps(backend, workers, scheduler, resume)
+    limits = studied.linear_limits(scene, changes, rates_hz)
+    found = studied.study(scene, changes, curves_of(wanted or ",".join(studied.METHODS)), rates_hz, maps)
+    if as_json:
+        print(json.dumps(maps.report() | {"methods": [each.report() for each in found], "linear_limits": limits}))
+    else:
+        _show_rates(found, limits, rates_hz)
+    if plot:
+        save(plot_rates(found, limits, loaded, backend), plot)
+        log.print(f"picture: {plot}")
+
+
+def _show_rates(found: list, limits: dict, rates_hz: list[int]) -> None:
+    """Show the largest K (kN/m) by rate."""
+    columns = ("the scene's", *(f"{rate / 1e3:g} kHz" for rate in rates_hz), "ratio", "gains up to (kHz)")
+    rows = []
+    for each in found:
+        values = [each.own.largest_n_per_m, *each.largest_n_per_m]
+        ratio = "" if each.ratio is None else f"{each.ratio:.2f}"
+        rows.append([each.label, *(f"{value / 1e3:.0f}" for value in values), ratio, f"{each.ends_at_hz / 1e3:g}"])
+    for left, limit in limits.items():
+        rows.append([f"linear: {left}", "", *(f"{value / 1e3:.0f}" for value in limit), "", ""])
+    show_table({"largest K (kN/m)": "left"} | dict.fromkeys(columns, "right"), rows)
+
+
 def add_commands(app: typer.Typer) -> None:
     """Add the commands of this file to the command line."""
-    for command in (cutoff, gains):
+    for command in (cutoff, gains, rates):
         app.command()(command)

@@ -32,7 +32,7 @@ COLUMNS |= dict.fromkeys(
 )
 
 
-def _curves(wanted: str | None) -> list:
+def curves_of(wanted: str | None) -> list:
     """Return the methods of the paper's Figure 5, or those that are wanted: of these, or NAME[:OUTPUT]."""
     from . import figures  # noqa: PLC0415
     from .accuracy import outputs  # noqa: PLC0415
@@ -120,7 +120,7 @@ def zwidth(
     refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "see --estimators")
     refuse(changes, ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m"), "see the scene's section zwidth")
     plot, text = output_file(plot, "--plot", SUFFIXES), read(scene)
-    cases = [maps_of.Case(curve.label, scene, text, changes | curve.changes) for curve in _curves(wanted)]
+    cases = [maps_of.Case(curve.label, scene, text, changes | curve.changes) for curve in curves_of(wanted)]
     began = time.perf_counter()
     maps = make_maps(f"{loaded.name} Z-width, {backend}", cases, backend, workers, scheduler, resume)
     seconds = time.perf_counter() - began

@@ -8,8 +8,8 @@ from .rates import Gain
 from .scene import Scene
 
 STYLES = "-", "--", "-.", ":"
-PAPER = 0.55
-"""Where the stiffness at the paper's rates stands, as a share of the lowest rate."""
+OWN = 0.55
+"""Where the stiffness at the scene's own rates stands, as a share of the lowest rate."""
 
 
 def plot_rates(gains: list[Gain], limits: dict[str, list[float]], scene: Scene, backend: str) -> Figure:
@@ -30,16 +30,16 @@ def plot_rates(gains: list[Gain], limits: dict[str, list[float]], scene: Scene, 
         style = {"color": mpl.colormaps["tab10"](index % 10), "marker": MARKERS[index % len(MARKERS)], "ms": 6}
         largest = [k / 1e3 for k in gain.largest_n_per_m]
         axes.plot(rates_khz, largest, label=gain.label, lw=1.5, **style)
-        axes.plot(PAPER * rates_khz[0], gain.paper.largest_n_per_m / 1e3, mfc="none", ls="", **style)
+        axes.plot(OWN * rates_khz[0], gain.own.largest_n_per_m / 1e3, mfc="none", ls="", **style)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    paper = scene.controller
-    label = f"{paper.sample_hz / 1e3:g}/{paper.actuation_hz / 1e3:g},\nlate"
-    axes.set_xticks([PAPER * rates_khz[0], *rates_khz], [label, *(f"{rate:g}" for rate in rates_khz)], minor=False)
+    own = scene.controller
+    label = f"own:\n{own.sample_hz / 1e3:g}/{own.actuation_hz / 1e3:g}"
+    axes.set_xticks([OWN * rates_khz[0], *rates_khz], [label, *(f"{rate:g}" for rate in rates_khz)], minor=False)
     axes.minorticks_off()
     axes.set_yticks([10, 20, 50, 100, 200, 500, 1000], ["10", "20", "50", "100", "200", "500", "1000"])
     axes.set_ylim(10, 1500)
-    axes.set_xlabel("rate of estimator and force (kHz); open markers: the scene's own rates")
+    axes.set_xlabel("rate of estimator and force (kHz); open: the scene's own, estimator / force")
     axes.set_ylabel("largest stable stiffness K of the map (kN/m)")
     axes.set_title(f"{scene.name}, {backend}: what rate buys, and which part ends it")
     axes.grid(alpha=0.3)

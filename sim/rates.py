@@ -5,14 +5,16 @@ limit without either, with one, and with both, tells which of them ends the gain
 """
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from . import figures, theory
-from .scene import load
+from .scene import load, read
+from .study import Mapping
 from .zwidth import Case, Map, grid_of
 
 RATES_HZ = (1_000, 2_500, 10_000, 25_000, 100_000, 250_000, 1_000_000)
-METHODS = ("fdm", "fdm-500", "adjusted", "levant:u1", "kalman", "levant-edge")
+METHODS = ("fdm", "butterworth", "adjusted", "levant:u1", "kalman", "levant-edge")
 CLOCK_HZ = 50_000_000
 """A clock that all of the rates divide."""
 FINE = {
@@ -26,26 +28,16 @@ FINE = {
 """Steps of the maps: finer in K than in B, for the largest K is what is asked."""
 SHORT = {"protocol.settle_s": 1.5, "protocol.mean_s": 0.25, "protocol.measure_s": 0.5}
 """A third of the paper's protocol: the handle comes to the wall after half a second, and a hit at 1 MHz takes long."""
+FINER = 5
+"""So many times finer are the steps of K at the scene's own rates: its walls are softer."""
 GAINED = 0.95
 """Of the largest K at any rate: at the first rate with so much, an estimator has as good as all that it gains."""
 
 
-def at_rate(rate_hz: int | None) -> dict[str, Any]:
-    """Return what a rate changes in a scene; None for the paper's rates, with the force an update late."""
-    if rate_hz is None:
-        return {}
+def at_rate(rate_hz: int) -> dict[str, Any]:
+    """Return what a rate changes in a scene; no force is late any more but by its own path."""
     rates = {"controller.sample_hz": rate_hz, "controller.actuation_hz": rate_hz}
     return {"controller.clock_hz": CLOCK_HZ, "amplifier.delay_s": 0.0, **rates}
-
-
-def cases(scene: str, text: str, changes: dict[str, Any], curves: list[figures.Curve], rates_hz) -> list[Case]:
-    """Return the maps to make: every method at the paper's rates, then at each rate."""
-    common = FINE | SHORT | changes
-    return [
-        Case(curve.label, scene, text, common | at_rate(rate_hz) | curve.changes)
-        for curve in curves
-        for rate_hz in (None, *rates_hz)
-    ]
 
 
 @dataclass(frozen=True)
@@ -55,13 +47,13 @@ class Gain:
     Attributes:
         label: of the method.
         rates_hz: in ascending order.
-        paper: the map at the paper's rates.
+        own: the map at the scene's own rates.
         maps: at each of the rates.
     """
 
     label: str
     rates_hz: list[int]
-    paper: Map
+    own: Map
     maps: list[Map]
 
     @property
@@ -77,8 +69,8 @@ class Gain:
 
     @property
     def ratio(self) -> float | None:
-        """The largest stiffness at the highest rate over that at the paper's; None where nothing is stable there."""
-        return self.largest_n_per_m[-1] / self.paper.largest_n_per_m if self.paper.largest_n_per_m else None
+        """The largest stiffness at the highest rate over that at the scene's own; None where that is 0."""
+        return self.largest_n_per_m[-1] / self.own.largest_n_per_m if self.own.largest_n_per_m else None
 
     def report(self) -> dict[str, Any]:
         """Return the gain as the command line prints it."""
@@ -87,17 +79,33 @@ class Gain:
             "rates_hz": self.rates_hz,
             "largest_stiffness_n_per_m": self.largest_n_per_m,
             "area_n2_s_per_m2": [each.area for each in self.maps],
-            "largest_stiffness_at_the_papers_rates_n_per_m": self.paper.largest_n_per_m,
+            "largest_stiffness_at_the_scenes_rates_n_per_m": self.own.largest_n_per_m,
             "ratio": self.ratio,
             "gains_up_to_hz": self.ends_at_hz,
         }
 
 
-def gains(maps: list[Map], rates_hz: list[int]) -> list[Gain]:
-    """Return the gains of maps of `cases`, in their order."""
-    size = 1 + len(rates_hz)
-    rows = [maps[first : first + size] for first in range(0, len(maps), size)]
-    return [Gain(row[0].case.label, list(rates_hz), row[0], row[1:]) for row in rows]
+def study(
+    scene: str, changes: dict[str, Any], curves: list[figures.Curve], rates_hz: list[int], mapping: Mapping
+) -> list[Gain]:
+    """Return what rate buys each method.
+
+    Args:
+        scene: its name or file; it need not have a section `zwidth`.
+        changes: of it, by dotted key.
+        curves: the methods.
+        rates_hz: ascending.
+        mapping: makes the maps.
+
+    Raises:
+        SceneError: if a case cannot be.
+    """
+    text, common = read(scene), FINE | SHORT | changes
+    step = "zwidth.stiffness_step_n_per_m"
+    at = [{step: common[step] / FINER}, *(at_rate(rate_hz) for rate_hz in rates_hz)]
+    cases = [Case(curve.label, scene, text, common | each | curve.changes) for curve in curves for each in at]
+    maps = iter(mapping(f"{Path(scene).stem}, what rate buys", cases))
+    return [Gain(curve.label, rates_hz, next(maps), [next(maps) for _ in rates_hz]) for curve in curves]
 
 
 WITHOUT = {

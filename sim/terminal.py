@@ -54,6 +54,22 @@ def scene_changes(assignments: list[str] | None, **options: Any) -> dict[str, An
     return changes | named
 
 
+def rates_of(text: str, option: str) -> list[int]:
+    """Return the rates (Hz) of a list in an option."""
+    from .accuracy import RATES_HZ  # noqa: PLC0415  (kernels are loaded only where they run)
+
+    rates = []
+    for word in text.split(","):
+        try:
+            rate = float(word)
+        except ValueError:
+            rate = 0.0
+        if not (RATES_HZ[0] <= rate <= RATES_HZ[1] and rate == int(rate)):
+            raise BadInput(f"{option} must be whole numbers of {RATES_HZ[0]:g} to {RATES_HZ[1]:g} Hz, not {word!r}")
+        rates.append(int(rate))
+    return list(dict.fromkeys(rates))
+
+
 def output_file(path: Path | None, option: str, suffixes: tuple[str, ...]) -> Path | None:
     """Return the path, its folder made; bad input if nothing could be written there."""
     if path is None:
