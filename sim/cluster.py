@@ -68,7 +68,7 @@ def client(jobs: int, workers: int | None = None, scheduler: str | None = None) 
             signal.signal(signal.SIGINT, before)
             yield None
             return
-        options = {"threads_per_worker": 1, "dashboard_address": None, "silence_logs": logging.CRITICAL}
+        options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
         # No limit of memory: a hit needs little, and a share of it on many cores less than Python itself.
         options |= {"preload": [__name__], "memory_limit": 0}
         with LocalCluster(n_workers=workers, **options) as local, Client(local) as connected:

@@ -37,7 +37,8 @@ def _pulse(scene: Scene) -> Pulse:
     return Pulse(output.full_scale_n, period, period // output.pwm_steps)
 
 
-def _converter(scene: Scene) -> Converter | None:
+def converter_of(scene: Scene) -> Converter | None:
+    """Return the scene's converter; None without one."""
     output = scene.output
     if output is None or output.dac_bits is None:
         return None
@@ -59,7 +60,7 @@ def world_of(scene: Scene) -> loop.World:
     return loop.World(
         plant=plant,
         encoder=Encoder(spec.count_m, float(spec.clock_hz), scene.encoder.offsets),
-        converter=_converter(scene),
+        converter=converter_of(scene),
         push_n=scene.protocol.push_n,
         force_lsb_n=spec.force_resolution_n,
         clocks_per_sample=spec.clocks_per_sample,

@@ -17,6 +17,7 @@ from . import hit, store
 from .boundary import Edge, Grid, area, trace
 from .cluster import result_of
 from .scene import Scene, parse
+from .world import converter_of
 
 
 @dataclass(frozen=True)
@@ -69,15 +70,19 @@ class Map:
     def area_in_place(self) -> float:
         """Of the stable region but for each B whose wall is felt in another place than it is, N^2 s/m^2.
 
-        At rest the velocity is 0, and the wall's spring alone carries the push, but for the friction that sticks. The
-        handle rests elsewhere, by more than a count, where the estimate is not 0: a force of B times that holds it.
+        At rest the velocity is 0, and the wall's spring alone carries the push and the hand, but for the friction that
+        sticks. The handle rests elsewhere, by more than a count or a step of the output, where the estimate is not 0:
+        a force of B times that holds it.
         """
         scene = self.case.parsed
-        push, friction = scene.protocol.push_n, scene.handle.coulomb_n or 0.0
+        converter = converter_of(scene)
+        slack = (scene.handle.coulomb_n or 0.0) + (converter.step_n if converter else 0.0)
         felt = []
-        for edge, rest in zip(self.edges, self.rests_m, strict=True):
-            spring, count = (edge.stable_n_per_m * each for each in (rest or 0.0, scene.encoder.count_m))
-            in_place = abs(spring - push) <= friction + count
+        for edge, rest_m in zip(self.edges, self.rests_m, strict=True):
+            at_m = rest_m or 0.0
+            hand = scene.hand.stiffness_n_per_m * (scene.hand.rest_m - at_m) if scene.hand else 0.0
+            left = scene.protocol.push_n + hand - edge.stable_n_per_m * at_m
+            in_place = abs(left) <= slack + edge.stable_n_per_m * scene.encoder.count_m
             felt.append(edge if in_place else replace(edge, stable_n_per_m=0.0))
         return area(felt)
 

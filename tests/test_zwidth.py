@@ -76,7 +76,7 @@ def test_a_worker_with_other_sources_is_refused():
 
 
 def test_two_workers_give_the_map_of_one(map_of_one_process):
-    options = {"threads_per_worker": 1, "dashboard_address": None}
+    options = {"threads_per_worker": 1, "dashboard_address": ":0"}
     with LocalCluster(n_workers=2, **options) as cluster, Client(cluster) as client:
         assert zwidth.run(CASES, "fixed", Store("zwidth"), client) == map_of_one_process
 
@@ -194,7 +194,7 @@ def test_a_scene_of_a_file_need_not_be_there_any_more(tmp_path, map_of_one_proce
 
 def test_a_scheduler_without_workers_is_a_failure(monkeypatch, capsys):
     monkeypatch.setattr("hardwall.sim.cluster.TIMEOUT_S", 0.5)
-    with LocalCluster(n_workers=0, dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=0, dashboard_address=":0") as cluster:
         address = cluster.scheduler_address
         code, out, err = call(monkeypatch, capsys, "zwidth", *SET, "--scheduler", address)
     assert (code, out) == (1, "")
