@@ -62,6 +62,19 @@ class Hit:
         return self.rms_m * 1e3 < self.scene.protocol.threshold_mm
 
     @property
+    def in_place(self) -> bool:
+        """Whether the handle rests where the wall's spring alone would hold it.
+
+        At rest the velocity is 0, and the spring carries the push, but for the friction that sticks and what a count
+        hides. A wall may be stable and felt elsewhere: where the estimate is not 0 at rest, its damper carries a part.
+        The mean after the settling mark is not farther from the one before it than the RMS.
+        """
+        scene = self.scene
+        spring_n, friction_n = scene.wall.stiffness_n_per_m * self.mean_m, scene.handle.coulomb_n or 0.0
+        hidden_n = scene.wall.stiffness_n_per_m * (scene.encoder.count_m + self.rms_m)
+        return abs(spring_n - scene.protocol.push_n) <= friction_n + hidden_n
+
+    @property
     def contact_s(self) -> float:
         """Time of the first sample inside the wall, of those that `detail` has; else of the end."""
         inside = np.flatnonzero(self.detail.position_m > 0)
