@@ -8,7 +8,7 @@ from test_cli import call
 
 from hardwall.sim import cutoff
 from hardwall.sim.boundary import Edge
-from hardwall.sim.scene import load
+from hardwall.sim.scene import load, names
 from hardwall.sim.zwidth import Case, Map
 
 
@@ -136,7 +136,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     ("arguments", "message"),
     [
         (["mhz"], "mhz: zwidth is missing: a map needs its steps"),
-        (["nothing"], "scene must be one of desktop-arm, maglev, mhz, seed-2011, or a .toml file, not 'nothing'"),
+        (["nothing"], f"scene must be one of {', '.join(names())}, or a .toml file, not 'nothing'"),
         (["--set", "controller.estimator=fdm"], "--set controller.estimator is what this command sets itself"),
         (["--set", "wall.damping_n_s_per_m=1.0"], "--set wall.damping_n_s_per_m is what this command sets itself"),
         (["--set", "handle.mass_kg=0"], "seed-2011: handle.mass_kg must be more than 0"),
