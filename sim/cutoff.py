@@ -64,16 +64,17 @@ class Device:
 
         Between two maps the area is taken to be straight over the logarithm of the cutoff.
         """
-        logs, enough = np.log(list(self.maps)), (1 - LEVEL) * self.best.area
-        areas = [each.area for each in self.maps.values()]
+        cutoffs, areas = list(self.maps), [each.area for each in self.maps.values()]
+        enough = (1 - LEVEL) * self.best.area
 
         def end(direction: int) -> float:
-            inside = list(self.maps).index(self.best_hz)
+            inside = cutoffs.index(self.best_hz)
             while 0 <= (beyond := inside + direction) < len(areas) and areas[beyond] >= enough:
                 inside = beyond
             if not 0 <= beyond < len(areas):
-                return float(np.exp(logs[inside]))
-            return float(np.exp(np.interp(enough, (areas[beyond], areas[inside]), (logs[beyond], logs[inside]))))
+                return cutoffs[inside]
+            logs = np.log([cutoffs[beyond], cutoffs[inside]])
+            return float(np.exp(np.interp(enough, [areas[beyond], areas[inside]], logs)))
 
         return end(-1), end(+1)
 
@@ -115,8 +116,8 @@ class _Cases:
 
     def sweep(self) -> dict[float, Case]:
         """Return the sweep's cases by cutoff: those that the rate allows, the highest of them at its end."""
-        end = min(SWEEP_HZ[-1], CUTOFF_MAX * self.parsed.controller.sample_hz)
-        cutoffs = sorted({float(each) for each in SWEEP_HZ if each < end} | {end})
+        end = min(float(SWEEP_HZ[-1]), CUTOFF_MAX * self.parsed.controller.sample_hz)
+        cutoffs = [*(float(each) for each in SWEEP_HZ if each < end), end]
         return accepted({cutoff_hz: self.filtered(cutoff_hz) for cutoff_hz in cutoffs})
 
     def _case(self, label: str, changes: dict[str, Any]) -> Case:

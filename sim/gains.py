@@ -10,7 +10,7 @@ The sufficient condition for convergence is alpha > C and lambda^2 >= 4 C (alpha
 An area may mislead. At rest u chatters, with a period of two samples where the gains are large; a force that is updated
 every so many samples, an even number, always sees the same side of it: a velocity that is not there, whose force holds
 the handle still, but in another place than the wall's. So each pair has two areas, that of stable walls, which is the
-paper's, and that of those which are also in place (`zwidth.Map.area_in_place`).
+paper's, and that of those which are also in place (`hit.Hit.in_place`).
 """
 
 from dataclasses import asdict, dataclass

@@ -18,7 +18,7 @@ from . import loop, record
 from .encoder import level
 from .scene import Scene
 from .whole_file import whole_file
-from .world import start_of, world_of
+from .world import converter_of, start_of, world_of
 
 BACKENDS = ("float", "fixed", "rtl")
 CHUNK = 1 << 16
@@ -60,6 +60,22 @@ class Hit:
     def stable(self) -> bool:
         """Whether the RMS stays under the protocol's threshold."""
         return self.rms_m * 1e3 < self.scene.protocol.threshold_mm
+
+    @property
+    def in_place(self) -> bool:
+        """Whether the handle rests where the wall's spring alone would hold it.
+
+        At rest the velocity is 0, and the spring carries the push and the hand, but for the friction that sticks, a step
+        of the output and what a count hides. A wall may be stable and felt elsewhere: where the estimate is not 0 at
+        rest, its damper carries a part. The mean after the settling mark is not farther from the one before it than
+        the RMS.
+        """
+        scene, stiffness = self.scene, self.scene.wall.stiffness_n_per_m
+        hand, converter = scene.hand, converter_of(scene)
+        carried_n = scene.protocol.push_n + (hand.stiffness_n_per_m * (hand.rest_m - self.mean_m) if hand else 0.0)
+        slack_n = (scene.handle.coulomb_n or 0.0) + (converter.step_n if converter else 0.0)
+        slack_n += stiffness * (scene.encoder.count_m + self.rms_m)
+        return abs(stiffness * self.mean_m - carried_n) <= slack_n
 
     @property
     def contact_s(self) -> float:

@@ -8,7 +8,6 @@ same whatever the number of workers, and an interrupted one goes on where it was
 import platform
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 from distributed import Client, as_completed
@@ -17,7 +16,6 @@ from . import hit, store
 from .boundary import Edge, Grid, area, trace
 from .cluster import result_of
 from .scene import Scene, parse
-from .world import converter_of
 
 
 @dataclass(frozen=True)
@@ -53,38 +51,27 @@ class Map:
         case: what it is of.
         edges: by B.
         hits: walls that were hit for it.
-        rests_m: where the handle rests in each edge's largest stable wall; None where no wall is stable.
+        in_place: of each edge, whether its largest stable wall holds the handle there: see `hit.Hit.in_place`.
     """
 
     case: Case
     edges: list[Edge]
     hits: int
-    rests_m: list[float | None]
+    in_place: list[bool]
 
     @property
     def area(self) -> float:
         """Of the stable region, N^2 s/m^2."""
         return area(self.edges)
 
-    @cached_property
+    @property
     def area_in_place(self) -> float:
-        """Of the stable region but for each B whose wall is felt in another place than it is, N^2 s/m^2.
-
-        At rest the velocity is 0, and the wall's spring alone carries the push and the hand, but for the friction that
-        sticks. The handle rests elsewhere, by more than a count or a step of the output, where the estimate is not 0:
-        a force of B times that holds it.
-        """
-        scene = self.case.parsed
-        converter = converter_of(scene)
-        slack = (scene.handle.coulomb_n or 0.0) + (converter.step_n if converter else 0.0)
-        felt = []
-        for edge, rest_m in zip(self.edges, self.rests_m, strict=True):
-            at_m = rest_m or 0.0
-            hand = scene.hand.stiffness_n_per_m * (scene.hand.rest_m - at_m) if scene.hand else 0.0
-            left = scene.protocol.push_n + hand - edge.stable_n_per_m * at_m
-            in_place = abs(left) <= slack + edge.stable_n_per_m * scene.encoder.count_m
-            felt.append(edge if in_place else replace(edge, stable_n_per_m=0.0))
-        return area(felt)
+        """Of the stable region but for each B whose largest stable wall is not in place, N^2 s/m^2."""
+        kept = [
+            edge if in_place else replace(edge, stable_n_per_m=0.0)
+            for edge, in_place in zip(self.edges, self.in_place, strict=True)
+        ]
+        return area(kept)
 
     @property
     def damping_n_s_per_m(self) -> float:
@@ -131,7 +118,7 @@ def grid_of(scene: Scene) -> Grid:
 
 
 def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float, damping: float, backend: str) -> dict:
-    """Hit a wall; return whether it is `stable`, its `rms_mm` up to where that was sure, and where a stable one rests.
+    """Hit a wall; return whether it is `stable`, then `in_place` at rest, and its `rms_mm` up to where that was sure.
 
     Args:
         scene, text, changes: of a `Case`.
@@ -147,7 +134,8 @@ def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float
         raise RuntimeError(f"a worker, {platform.node()}, has other sources of hardwall, or versions of its tools")
     wall = {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": damping}
     result = hit.run(parse(scene, text, changes | wall), backend, until_sure=True)
-    return {"stable": result.stable, "rms_mm": result.rms_m * 1e3, "rest_m": result.mean_m if result.stable else None}
+    in_place = result.stable and result.in_place
+    return {"stable": result.stable, "in_place": in_place, "rms_mm": result.rms_m * 1e3}
 
 
 class _Tracing:
@@ -159,7 +147,7 @@ class _Tracing:
         self._job = {"scene": case.scene, "text": case.text, "sources": store.sources(), "backend": backend}
         self._job["changes"] = case.changes
         self._hits = 0
-        self._rests_m: dict[tuple[float, float], float | None] = {}
+        self._in_place: dict[tuple[float, float], bool] = {}
         self.wanted: dict | None = None
         self.found: Map | None = None
         self._send(None)
@@ -167,7 +155,7 @@ class _Tracing:
     def answer(self, result: dict) -> None:
         """Go on from the verdict on the wall that was wanted."""
         self._hits += 1
-        self._rests_m[self.wanted["stiffness"], self.wanted["damping"]] = result["rest_m"]
+        self._in_place[self.wanted["stiffness"], self.wanted["damping"]] = result["in_place"]
         self._send(result["stable"])
 
     def _send(self, stable: bool | None) -> None:
@@ -175,8 +163,9 @@ class _Tracing:
             stiffness, damping = self._steps.send(stable)
             self.wanted = self._job | {"stiffness": stiffness, "damping": damping}
         except StopIteration as end:
-            rests = [self._rests_m.get((edge.stable_n_per_m, edge.damping_n_s_per_m)) for edge in end.value]
-            self.wanted, self.found = None, Map(self._case, end.value, self._hits, rests)
+            walls = [(edge.stable_n_per_m, edge.damping_n_s_per_m) for edge in end.value]
+            in_place = [self._in_place.get(wall, False) for wall in walls]
+            self.wanted, self.found = None, Map(self._case, end.value, self._hits, in_place)
 
     @property
     def done(self) -> float:

@@ -28,8 +28,11 @@ def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["hit", "no-such"], "scene must be one of mhz, seed-2011, or a .toml file, not 'no-such'"),
-        (["hit", "no-such.toml"], "scene must be one of mhz, seed-2011, or a .toml file, not 'no-such.toml'"),
+        (["hit", "no-such"], f"scene must be one of {', '.join(scene.names())}, or a .toml file, not 'no-such'"),
+        (
+            ["hit", "no-such.toml"],
+            f"scene must be one of {', '.join(scene.names())}, or a .toml file, not 'no-such.toml'",
+        ),
         (
             ["hit", "--set", "handle.mas_kg=1"],
             "seed-2011: handle.mas_kg is not a key of a scene; did you mean mass_kg?",

@@ -24,7 +24,7 @@ def maps(others: dict[str, list[int]]) -> dict[str, Map]:
     def edges(stiffness: list[int]) -> list[Edge]:
         return [Edge(10.0 * (n + 1), 1e3 * k, 1e3 * (k + 1)) for n, k in enumerate(stiffness)]
 
-    return {name: Map(Case(name, "", "", {}), edges(k), 10, [None] * len(k)) for name, k in (PAPER | others).items()}
+    return {name: Map(Case(name, "", "", {}), edges(k), 10, [True] * len(k)) for name, k in (PAPER | others).items()}
 
 
 def lost(others: dict[str, list[int]]) -> set[int]:

@@ -37,8 +37,7 @@ class Known:
     def map_of(self, case: Case) -> Map:
         pair = case.changes["controller.gains.levant"]
         area = self.area(case.changes["controller.output"], pair["lambda_sqrt_m_per_s"], pair["alpha_m_per_s2"])
-        rest = case.parsed.protocol.push_n / area if pair["alpha_m_per_s2"] < 20 else 1.0
-        return Map(case, [Edge(b, area, 2 * area) for b in (0.0, 1.0)], 1, [rest, rest])
+        return Map(case, [Edge(b, area, 2 * area) for b in (0.0, 1.0)], 1, [pair["alpha_m_per_s2"] < 20] * 2)
 
 
 def hill(output: str, lam: float, alpha: float) -> float:

@@ -1,6 +1,7 @@
 """The protocol of a hit: what is reported of it, against plain numpy on every sample of the run."""
 
 import hashlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,6 +42,32 @@ def test_the_verdict_is_the_thresholds(run):
     for factor, stable in ((0.999, False), (1.001, True)):
         threshold = {"protocol.threshold_mm": run.rms_m * 1e3 * factor}
         assert hit.run(load("seed-2011", SCENE | threshold), "fixed").stable is stable
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_in_place_is_within_friction_a_count_and_the_rms(run, side):
+    """60 kN/m, a push of 0.3572 N, 0.1 N of friction, counts of 1 um, and an RMS of 2 um."""
+    farthest_n = 0.1 + 60e3 * 3e-6
+    for factor, in_place in ((0.999, True), (1.001, False)):
+        mean_m = (0.3572 + side * factor * farthest_n) / 60e3
+        assert replace(run, mean_m=mean_m, rms_m=2e-6).in_place is in_place
+
+
+@pytest.mark.parametrize(("sample_hz", "met"), [(10_000, True), (20_000, True), (15_000, False)])
+def test_a_chatter_that_the_force_always_meets_on_one_side_is_stable_and_out_of_place(sample_hz, met):
+    """Levant's u with large gains has a period of two samples; the force is updated every 10, 20 or 15 of them."""
+    lam, alpha, tau = 100.0, 560.0, 1 / sample_hz
+    gains = {"controller.gains.levant": {"lambda_sqrt_m_per_s": lam, "alpha_m_per_s2": alpha}}
+    wall = {"wall.stiffness_n_per_m": 20e3, "wall.damping_n_s_per_m": 100.0}
+    result = hit.run(load("seed-2011", gains | wall | {"controller.sample_hz": sample_hz}), "fixed")
+    assert result.stable is met
+    # x goes from e to -e and back, 2 e = tau u, and u = lambda sqrt(e) - alpha tau / 2 where u1 is even about 0; it may
+    # be one of its steps off, alpha tau.
+    root = lam * (tau / 2) ** 0.5
+    speed = ((root + (root**2 - 2 * alpha * tau) ** 0.5) / 2) ** 2
+    damper_n = 20e3 * result.mean_m - 0.3572
+    assert (abs(damper_n - 100.0 * speed) <= 100.0 * alpha * tau + 0.1 + 20e3 * 1e-6) is met
+    assert not (result.stable and result.in_place)
 
 
 def test_the_digest_is_of_the_drive_of_every_actuation(run):

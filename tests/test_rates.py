@@ -24,7 +24,7 @@ def mapping(stiffness):
 
     def make(title, cases):
         seen.extend(cases)
-        return [Map(case, [Edge(10.0, k := next(values), k + 1)], 1, [0.0]) for case in cases]
+        return [Map(case, [Edge(10.0, k := next(values), k + 1)], 1, [True]) for case in cases]
 
     return make, seen
 

@@ -113,32 +113,20 @@ def test_the_rtl_gives_the_map_of_fixed(monkeypatch, capsys):
 
 
 def test_walls_out_of_place_are_left_out_of_the_area_in_place():
-    """A push of 0.3572 N, 0.1 N of friction, counts of 1 um: K x is in place from 0.2572 - K q to 0.4572 + K q."""
     edges = [Edge(10.0 * n, 20e3, 21e3) for n in range(5)]
-    rests = [(0.4572 + 0.0199) / 20e3, (0.2572 - 0.0199) / 20e3, (0.4572 + 0.0201) / 20e3, 0.3572 / 20e3, 0.3572 / 20e3]
-    found = zwidth.Map(CASES[0], edges, 5, rests)
+    found = zwidth.Map(CASES[0], edges, 5, [True, True, False, True, True])
     assert found.area == 40 * 20e3
     # Two of four trapezoids lose half.
     assert found.area_in_place == 30 * 20e3
 
 
-def test_a_filter_holds_the_handle_in_place_and_a_chatter_that_the_force_always_meets_does_not(map_of_one_process):
+def test_a_map_knows_which_of_its_walls_are_in_place(map_of_one_process):
     filtered = map_of_one_process[0]
+    assert filtered.in_place == [edge.stable_n_per_m > 0 for edge in filtered.edges]
     assert filtered.area_in_place == filtered.area > 0
-    # Ten samples to an update of the force, and a chatter with a period of two.
-    lam, alpha, tau = 100.0, 560.0, 1e-4
-    large = {"controller.gains.levant": {"lambda_sqrt_m_per_s": lam, "alpha_m_per_s2": alpha}}
+    large = {"controller.gains.levant": {"lambda_sqrt_m_per_s": 100.0, "alpha_m_per_s2": 560.0}}
     (chatters,) = zwidth.run([replace(CASES[1], changes=CASES[1].changes | large)], "fixed", Store("zwidth"))
-    assert chatters.area > 0
-    assert chatters.area_in_place == 0
-    # x goes from e to -e and back, 2 e = tau u, and u = lambda sqrt(e) - alpha tau / 2 where u1 is even about 0; it may
-    # be one of its steps off, alpha tau.
-    root = lam * (tau / 2) ** 0.5
-    speed = ((root + (root**2 - 2 * alpha * tau) ** 0.5) / 2) ** 2
-    for edge, rest in zip(chatters.edges, chatters.rests_m, strict=True):
-        force = rest * edge.stable_n_per_m - 0.3572
-        held = 0.1 + 1e-6 * edge.stable_n_per_m
-        assert abs(force - edge.damping_n_s_per_m * speed) <= edge.damping_n_s_per_m * alpha * tau + held
+    assert chatters.area > chatters.area_in_place == 0
 
 
 def test_report_and_picture(monkeypatch, capsys, tmp_path, map_of_one_process):
