@@ -65,9 +65,9 @@ class Hit:
     def in_place(self) -> bool:
         """Whether the handle rests where the wall's spring alone would hold it.
 
-        At rest the velocity is 0, and the spring carries the push and the hand, but for the friction that sticks, a step
-        of the output and what a count hides. A wall may be stable and felt elsewhere: where the estimate is not 0 at
-        rest, its damper carries a part. The mean after the settling mark is not farther from the one before it than
+        At rest the velocity is 0, and the spring carries the push and the hand, but for the friction that sticks, a
+        step of the output and what a count hides. A wall may be stable and felt elsewhere: where the estimate is not 0
+        at rest, its damper carries a part. The mean after the settling mark is not farther from the one before it than
         the RMS.
         """
         scene, stiffness = self.scene, self.scene.wall.stiffness_n_per_m
