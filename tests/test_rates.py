@@ -13,8 +13,8 @@ from hardwall.sim.zwidth import Map
 
 CURVES = [figures.Curve("kalman", "kalman", "u"), figures.Curve("fdm", "fdm", "u")]
 FEW = {
-    "zwidth.damping_from_n_s_per_m": 30.0, "zwidth.damping_to_n_s_per_m": 40.0,
-    "zwidth.damping_step_n_s_per_m": 10.0, "zwidth.stiffness_step_n_per_m": 20e3,
+    "zwidth.damping_from_n_s_per_m": 30.0, "zwidth.damping_to_n_s_per_m": 30.0,
+    "zwidth.damping_step_n_s_per_m": 10.0, "zwidth.stiffness_step_n_per_m": 25e3,
 }  # fmt: skip
 
 
