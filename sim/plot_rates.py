@@ -43,5 +43,5 @@ def plot_rates(gains: list[Gain], limits: dict[str, list[float]], scene: Scene, 
     axes.set_ylabel("largest stable stiffness K of the map (kN/m)")
     axes.set_title(f"{scene.name}, {backend}: what rate buys, and which part ends it")
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, ncols=2, loc="upper left")
+    axes.legend(fontsize=8, ncols=2, loc="lower right")
     return picture
