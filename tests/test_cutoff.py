@@ -62,6 +62,13 @@ def test_the_top_of_a_staircase_is_found_between_the_sweep_s_cutoffs():
     assert (device.at_end, device.unfiltered.area) == (False, 7.0)
 
 
+@pytest.mark.parametrize("top_hz", [1200.0, 433.0, 77.0])
+def test_the_search_closes_in_on_the_top(top_hz):
+    known = Known(lambda cutoff_hz: 1e4 - 1e4 * math.log((cutoff_hz or 1.0) / top_hz) ** 2)
+    (device,) = cutoff.study(["seed-2011"], {}, known)
+    assert device.best_hz == pytest.approx(top_hz, rel=cutoff.TOLERANCE)
+
+
 def test_an_area_that_still_rises_where_the_rate_ends_is_said_to():
     (device,) = cutoff.study(["desktop-arm"], {}, Known(lambda cutoff_hz: cutoff_hz or 1e4))
     assert (device.best_hz, device.at_end) == (400.0, True)
