@@ -28,6 +28,14 @@ PICTURES := $(ESTIMATORS:%=build/hit-%.png)
 ON_ECP5 := --device ecp5-25k
 ON_ICE40 := --device ice40-up5k $(addprefix --set controller.,clock_hz=24000000 sample_hz=500000 actuation_hz=500000)
 
+# Every estimator on one map, which the best of them leave unless it is larger than the paper's.
+comma := ,
+ESTIMATORS_OF_ALL := fdm levant butterworth kalman period period-count levant-edge levant-semi-implicit levant-implicit \
+  levant-adaptive window foaw
+ALL_ON_THE_MAP := --estimators $(subst $() ,$(comma),$(strip $(ESTIMATORS_OF_ALL))) $(addprefix --set zwidth., \
+  stiffness_to_n_per_m=150e3 stiffness_step_n_per_m=2e3 damping_step_n_s_per_m=12.0)
+STUDIES := cutoff gains rates drop trade
+
 SEEDS ?= $(shell shuf -i 1-999999999 -n 3)
 SAMPLES ?= 1000000
 ENDURANCE ?= 1000000000
@@ -58,10 +66,12 @@ choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy,
 	@$(HARDWALL) costs
 	@$(HARDWALL) choose
 
-figures: $(VENV)/.synth | tools ## the founding paper's figures 1, 2, 4, 5, and what a bit buys, as pictures in build/ (half an hour)
+figures: $(VENV)/.synth | tools ## the founding paper's figures and every study of ours, as pictures in build/ (an hour)
 	@for number in 1 2; do $(HARDWALL) accuracy --figure $$number --plot build/figure-$$number.png; done
 	@$(HARDWALL) lipschitz --plot build/figure-4.png
 	@$(HARDWALL) zwidth --plot build/figure-5.png
+	@$(HARDWALL) zwidth --plot build/estimators.png $(ALL_ON_THE_MAP)
+	@for study in $(STUDIES); do $(HARDWALL) $$study --plot build/$$study.png; done
 	@$(HARDWALL) bits --plot build/bits.png
 
 verilog: $(VENV)/.sim | tools ## the axis of the scene as Verilog, in build/verilog/
@@ -130,8 +140,6 @@ $(VENV)/.test: pyproject.toml $(VENV)/.sim | tools
 
 $(VENV)/.synth: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)synth,place and route)
-
-comma := ,
 
 # ---- what only the system can give, named before anything starts ----------------------------------------------------
 
