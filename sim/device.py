@@ -28,8 +28,8 @@ from .series import FIRST
 
 LEG_RATE = 1.0
 """Of a leg, the longest time that one Taylor polynomial serves: its length times the fastest rate."""
-LEGS_MAX = 100_000
-"""Legs of a sample that the solver takes on."""
+LEGS_MAX = 25_000
+"""Legs of a sample that the solver takes on: 1 g on a damper of 1e4 N s/m for 1 ms, and a little more."""
 TRUNCATION = 2.0**-54
 
 

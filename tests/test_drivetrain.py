@@ -56,7 +56,7 @@ def test_motion_without_events_is_the_exponential_from_extreme_to_extreme():
     for device, seconds in cases:
         free = equations(device)
         legs = int(np.ceil(fastest_per_s(device) * seconds)) + 1
-        if legs > 100_000:
+        if legs > 25_000:
             continue
         y = rng.normal(size=5) * [0.1, 1.0, 0.0, 1.0, 1.0]
         y[2] = y[0] + rng.normal() * 1e-3

@@ -100,7 +100,7 @@ REFUSED = {
     "output.dac_bits must be at least 2": {"output.full_scale_n": 40.0, "output.dac_bits": 1},
     "output.pwm_carrier_hz must be controller.clock_hz 12000000 divided by": PULSES | {"output.pwm_carrier_hz": 7000},
     "output.pwm_steps must divide the 600 clocks of a carrier's period, not 7": PULSES | {"output.pwm_steps": 7},
-    "handle, amplifier, motor, transmission and hand must change at no more than 1e+09 1/s together":
+    "handle, amplifier, motor, transmission and hand must change at no more than 2.5e+08 1/s together":
         CABLE | {"transmission.motor_mass_kg": 1e-9, "transmission.damping_n_s_per_m": 1e4},
 }  # fmt: skip
 
