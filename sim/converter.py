@@ -33,13 +33,13 @@ def converted(converter, command_n):
     """Return what a converter makes of a command; without one, the command."""
     if converter is None:
         return command_n
-    code = math.floor(command_n / converter.step_n + 0.5)
-    return converter.step_n * min(max(code, converter.lowest), converter.highest)
+    code = min(max(command_n / converter.step_n + 0.5, converter.lowest), converter.highest)
+    return converter.step_n * math.floor(code)
 
 
 @compiled
 def width_of(pulse, command_n):
     """Return the width (clocks) of the pulse that stands for a command; what is beyond the level is all pulse."""
     steps = pulse.period // pulse.step
-    wanted = math.floor((command_n / pulse.level_n + 1.0) * 0.5 * steps + 0.5)
-    return pulse.step * int(min(max(wanted, 0), steps))
+    wanted = (command_n / pulse.level_n + 1.0) * 0.5 * steps + 0.5
+    return pulse.step * math.floor(min(max(wanted, 0.0), steps))

@@ -13,6 +13,8 @@ is in terms of the handle's straight line: with the pulley's radius r, the motor
 - Hand: a mass that moves with the handle, held by a spring and a damper: the force kh (rest - x) - bh v.
 - Handle: m dv/dt = c + hand - b v - Fc sign(v), and rests for as long as v = 0 and what acts on it is within Fc.
 
+A converter or pulses come before all of these, on the command; pulses are given to what follows as they are.
+
 The state is x, v; s, w with a transmission; f with a lag or a motor: a part that is absent has no row.
 """
 
@@ -106,6 +108,12 @@ class Device:
     hand: Hand | None = None
     encoder_at_motor: bool = False
     pulse: Pulse = AS_IT_IS
+
+    @property
+    def command_limit_n(self) -> float:
+        """What of a command is passed on: the amplifier's current, or a voltage drive's voltage, as a force."""
+        voltage_drive = self.motor is not None and self.bandwidth_hz is None
+        return self.motor.stall_n if voltage_drive else self.force_limit_n
 
 
 @dataclass(frozen=True)
@@ -211,14 +219,12 @@ def train(device: Device, longest_s: float) -> Train:
             table[SEEN, columns] = here.seen
             table[GRIP, columns] = np.eye(n + 2)[1] if along else here.on_handle
             table[VOLTAGE, columns] = 0.0 if here.voltage is None else here.voltage
-    motor = device.motor
-    limit_n = device.force_limit_n if motor is None or device.bandwidth_hz is not None else motor.stall_n
     return Train(
         tables=tables,
         series=np.zeros((FIRST + order + 1, QUANTITIES)),
         coulomb_n=-1.0 if device.coulomb_n is None else device.coulomb_n,
-        voltage_limit_n=math.inf if free.voltage is None else motor.stall_n,
-        command_limit_n=limit_n,
+        voltage_limit_n=math.inf if free.voltage is None else device.motor.stall_n,
+        command_limit_n=device.command_limit_n,
         pulse=device.pulse,
         leg_s=leg_s,
     )

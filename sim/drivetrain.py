@@ -186,13 +186,13 @@ def stretch(train, encoder, state, cell, command_n, since_s, until_s, clock, clo
             if n_edges < 0:
                 break
         others = at(series, 2, end), at(series, 3, end), at(series, 4, end)
-        stalled = stalled + 1 if end < MOMENT and not blind else 0
+        stalled = stalled + 1 if end * seconds < MOMENT * train.leg_s and not blind else 0
         now_s = until_s if end == 1.0 and seconds == until_s - now_s else now_s + end * seconds
         state = State(at(series, 0, end), at(series, 1, end), others, state.width)
         if end == 1.0:
             continue
         if switches < breaks:
-            limited = 0 if limited != 0 else (1 if series[FIRST + 1, VOLTAGE] > 0.0 else -1)
+            limited = 0 if limited != 0 else (1 if at(series, VOLTAGE, end) > 0.0 else -1)
         elif along == 0:
             along = 1 if at(series, GRIP, end) > 0.0 else -1
         else:
@@ -224,10 +224,9 @@ def _advance(train, encoder, state, cell, force_n, interval, clock, clocks, edge
             state = State(state.position_m, state.velocity_m_per_s, state.others, width)
         high = within < state.width
         until = min(end, now - within + (state.width if high else pulse.period))
-        level_n = min(pulse.level_n, limit_n)
         since_s, until_s = (now - clock) / encoder.clock_hz, (until - clock) / encoder.clock_hz
         state, cell, n_edges = stretch(
-            train, encoder, state, cell, level_n if high else -level_n, since_s, until_s,
+            train, encoder, state, cell, pulse.level_n if high else -pulse.level_n, since_s, until_s,
             clock, clocks, edge_clocks, edge_levels, n_edges,
         )  # fmt: skip
         now = until

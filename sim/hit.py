@@ -18,11 +18,11 @@ from . import loop, record
 from .encoder import level
 from .scene import Scene
 from .whole_file import whole_file
-from .world import converter_of, start_of, world_of
+from .world import output_step_n, start_of, work_of, world_of
 
 BACKENDS = ("float", "fixed", "rtl")
 CHUNK = 1 << 16
-"""Samples between two looks at progress."""
+"""Samples between two looks at progress, and at whether the user wants no more; fewer of those that take long."""
 LOOK_S = 0.1
 """Time between two looks at whether the verdict is sure."""
 OVERVIEW_POINTS = 6000
@@ -40,6 +40,7 @@ class Hit:
         seconds: wall time of the loop, compiling and building apart.
         mean_m: mean position before the settling mark, m; positive is inside the wall.
         rms_m: RMS distance from it after the mark, m.
+        touched: whether the handle ever was within the wall, or felt it.
         force_sha256: of the drive words of every actuation, little-endian int32; None for `float`.
         overview, detail: if asked for, samples of the whole run, and every one of the contact.
     """
@@ -50,6 +51,7 @@ class Hit:
     seconds: float
     mean_m: float
     rms_m: float
+    touched: bool
     max_force_n: float
     flags: list[str]
     force_sha256: str | None
@@ -58,8 +60,8 @@ class Hit:
 
     @property
     def stable(self) -> bool:
-        """Whether the RMS stays under the protocol's threshold."""
-        return self.rms_m * 1e3 < self.scene.protocol.threshold_mm
+        """Whether the handle touched the wall, and the RMS stays under the protocol's threshold."""
+        return self.touched and self.rms_m * 1e3 < self.scene.protocol.threshold_mm
 
     @property
     def in_place(self) -> bool:
@@ -71,10 +73,13 @@ class Hit:
         the RMS.
         """
         scene, stiffness = self.scene, self.scene.wall.stiffness_n_per_m
-        hand, converter = scene.hand, converter_of(scene)
+        hand, cable = scene.hand, scene.transmission
         carried_n = scene.protocol.push_n + (hand.stiffness_n_per_m * (hand.rest_m - self.mean_m) if hand else 0.0)
-        slack_n = (scene.handle.coulomb_n or 0.0) + (converter.step_n if converter else 0.0)
-        slack_n += stiffness * (scene.encoder.count_m + self.rms_m)
+        slack_n = (scene.handle.coulomb_n or 0.0) + output_step_n(scene)
+        hidden_m = scene.encoder.count_m + self.rms_m
+        if cable and cable.encoder_at == "motor":
+            hidden_m += (abs(carried_n) + slack_n) / cable.stiffness_n_per_m
+        slack_n += stiffness * hidden_m
         return abs(stiffness * self.mean_m - carried_n) <= slack_n
 
     @property
@@ -112,6 +117,7 @@ class Hit:
             "stiffness_n_per_m": self.scene.wall.stiffness_n_per_m,
             "damping_n_s_per_m": self.scene.wall.damping_n_s_per_m,
             "stable": self.stable,
+            "touched": self.touched,
             "rms_mm": self.rms_m * 1e3,
             "mean_mm": self.mean_m * 1e3,
             "samples": self.samples,
@@ -136,7 +142,7 @@ class _Tally:
         self._digest = hashlib.sha256() if exact else None
         self._sum = self._squares = 0.0
         self._measured = 0
-        self.largest_drive = 0
+        self.largest_drive, self.farthest_m = 0, -math.inf
 
     @property
     def mean_m(self) -> float:
@@ -166,6 +172,7 @@ class _Tally:
             self._squares += float(np.square(rest - self.mean_m).sum())
             self._measured += len(rest)
         self.largest_drive = max(self.largest_drive, float(np.abs(drives).max()))
+        self.farthest_m = max(self.farthest_m, float(positions.max()))
         if self._digest:
             self._digest.update(drives[-first % self._decimation :: self._decimation].astype("<i4").tobytes())
 
@@ -248,6 +255,7 @@ def _closed_loop(scene, backend, world, controller, state, at, records, progress
     delay = loop.Delay(np.zeros(scene.delay_samples, number)) if scene.delay_samples else None
     edges = np.zeros(loop.EDGE_CAPACITY, np.int64), np.zeros(loop.EDGE_CAPACITY, np.int64)
     chunk = max(round(LOOK_S * scene.spec.sample_hz), 1) if until_sure else CHUNK
+    chunk = max(1, min(chunk, CHUNK // work_of(world)))
     positions, drives = np.zeros(chunk), np.zeros(chunk, number)
     tally, actions = _Tally(scene, exact=not floating), dict(marks)
     # Compiling is not running: a call with nothing to do keeps it out of the time.
@@ -274,6 +282,7 @@ def _closed_loop(scene, backend, world, controller, state, at, records, progress
         seconds=time.perf_counter() - began,
         mean_m=tally.mean_m,
         rms_m=math.inf if at.n_edges < 0 else tally.rms_m,
+        touched=tally.farthest_m > 0 or tally.largest_drive > 0,
         max_force_n=tally.largest_drive * scene.spec.force_resolution_n,
         flags=scene.spec.design.flag_names(int(state.flags)),
         force_sha256=tally.force_sha256,

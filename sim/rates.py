@@ -137,8 +137,12 @@ def linear_limits(scene: str, changes: dict[str, Any], rates_hz: list[int]) -> d
 
 
 def _rigid_mass(scene: str, changes: dict[str, Any], without: dict[str, Any]) -> dict[str, Any]:
-    """Return what takes parts out of a scene; without a cable the motor's mass is the handle's."""
+    """Return what takes parts out of a scene; without a cable the motor's side is the handle's."""
     loaded = load(scene, changes)
     if "transmission" not in without or loaded.transmission is None:
         return without
-    return without | {"handle.mass_kg": loaded.handle.mass_kg + loaded.transmission.motor_mass_kg}
+    handle, cable = loaded.handle, loaded.transmission
+    return without | {
+        "handle.mass_kg": handle.mass_kg + cable.motor_mass_kg,
+        "handle.viscous_n_s_per_m": handle.viscous_n_s_per_m + cable.motor_viscous_n_s_per_m,
+    }

@@ -108,6 +108,8 @@ def _check_amplifier(scene) -> None:
 
 
 def _check_output(scene) -> None:
+    from .world import device_of  # noqa: PLC0415  (most scenes need no linear algebra)
+
     output, clock_hz = scene.output, scene.spec.clock_hz
     pulses = output.pwm_carrier_hz is not None, output.pwm_steps is not None
     if (output.dac_bits is not None) + any(pulses) != 1 or pulses[0] != pulses[1]:
@@ -119,6 +121,12 @@ def _check_output(scene) -> None:
         raise ValueError(
             f"output.pwm_carrier_hz must be controller.clock_hz {clock_hz} divided by a whole number from 2, "
             f"not {output.pwm_carrier_hz!r}"
+        )
+    parts = device_of(scene)
+    if output.full_scale_n > parts.command_limit_n:
+        raise ValueError(
+            f"output.full_scale_n must be at most {parts.command_limit_n:g} N with pulses, all that the amplifier's "
+            f"current or the motor's voltage gives: cut pulses are another force, not {output.full_scale_n!r}"
         )
     if period % output.pwm_steps:
         raise ValueError(

@@ -98,6 +98,7 @@ def leaves(series, number, low, high, surely):
     if low <= end < high:
         return NEVER
     bound = low if end < low else high
-    if not low <= start < high:
+    # A rounding may have begun it outside on that side; on the other, it crosses all of the range.
+    if (start < low and bound == low) or (start >= high and bound == high):
         return 0.0
     return root(series, number, bound, 0.0)

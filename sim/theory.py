@@ -1,12 +1,13 @@
 """What theory says of the largest stiffness: two bounds for passivity, and the exact boundary of the linear loop.
 
-- Colgate and Schenkel: a wall sampled every T is passive if b > K T / 2 + |B|. With the force d periods late their
-  condition reads b > K (T / 2 + d T) + |B|: its supremum over frequency, sin((d + 1/2) w T) / sin(w T / 2), is 2 d + 1.
+- Colgate and Schenkel: a wall of K and B sampled every T, its force d periods late, is passive on a rigid handle if at
+  every angle a = w T, b > K T / 2 sin((d + 1/2) a) / sin(a / 2) - B cos((d + 1) a): for d = 0, b > K T / 2 + |B|. It is
+  theirs for a plain difference at the force's rate; a d that is no whole number stands between its neighbours.
 - Abbott and Okamura: with B = 0, position quantised to q and Coulomb friction f_c, if also K <= 2 f_c / q.
-- Linear: without friction that sticks, limits and quantisation, in contact, the loop with a linear estimator is linear
-  and periodic with the force's update. It is stable while every eigenvalue of what a period does to the state is
-  within the unit circle. Nothing is approximated: the zero-order hold, the clocks from strobe to drive, those of the
-  decoder, the amplifier, motor, cable and hand, and the estimator are all in the matrix.
+- Linear: without friction that sticks, limits, quantisation and a carrier's pulses, in contact, the loop with a linear
+  estimator is linear and periodic with the force's update. It is stable while every eigenvalue of what a period does to
+  the state is within the unit circle. Nothing else is left out: the zero-order hold, the clocks from strobe to drive,
+  those of the decoder, the amplifier, motor, cable and hand, and the estimator are all in the matrix.
 
 The first two are for a rigid handle. A passive wall is stable with any hand, so they lie below the third without one.
 """
@@ -23,6 +24,7 @@ from .world import device_of
 
 LINEAR = ("fdm", "butterworth")
 """Estimators that the exact boundary is known for."""
+ANGLES = np.linspace(1e-5, np.pi, 20_001)
 SEARCH = 100
 """Stiffnesses, spaced evenly in their logarithm, among which the first unstable one is looked for."""
 
@@ -35,8 +37,13 @@ def delay_s(scene: Scene) -> float:
 
 def colgate_schenkel_n_per_m(scene: Scene, damping_n_s_per_m: float) -> float:
     """Return the largest stiffness that is passive with a wall's damping, N/m; 0 where none is."""
-    spare = scene.handle.viscous_n_s_per_m - abs(damping_n_s_per_m)
-    return max(spare / (0.5 / scene.controller.actuation_hz + delay_s(scene)), 0.0)
+    period_s = 1 / scene.controller.actuation_hz
+    late, angles = delay_s(scene) / period_s, ANGLES
+    stiffness_part = period_s / 2 * np.sin((late + 0.5) * angles) / np.sin(angles / 2)
+    spare = scene.handle.viscous_n_s_per_m + damping_n_s_per_m * np.cos((late + 1) * angles)
+    rises = stiffness_part > 0
+    largest = float((spare[rises] / stiffness_part[rises]).min())
+    return largest if largest > 0 and (spare[~rises] >= largest * stiffness_part[~rises]).all() else 0.0
 
 
 def abbott_okamura_n_per_m(scene: Scene) -> float:
@@ -130,7 +137,8 @@ def linear_limit_n_per_m(loop: Loop, damping_n_s_per_m: float, least: float = 1.
         least, most: the range that is searched, N/m.
 
     Returns:
-        That stiffness; 0 where even the least is unstable, `most` where none is.
+        That stiffness, found between the neighbours of a search: stable islands above it, and unstable ones between two
+        neighbours, are not looked for. 0 where even the least is unstable, `most` where none is found.
     """
     found = least
     for stiffness in np.geomspace(least, most, SEARCH):

@@ -37,13 +37,29 @@ def _pulse(scene: Scene) -> Pulse:
     return Pulse(output.full_scale_n, period, period // output.pwm_steps)
 
 
-def converter_of(scene: Scene) -> Converter | None:
-    """Return the scene's converter; None without one."""
+def _converter(scene: Scene) -> Converter | None:
     output = scene.output
     if output is None or output.dac_bits is None:
         return None
     codes = 1 << output.dac_bits
     return Converter(2 * output.full_scale_n / codes, -codes // 2, codes // 2 - 1)
+
+
+def output_step_n(scene: Scene) -> float:
+    """Return by how much a command must change to be sure to be felt; 0 where it leaves as it is."""
+    output = scene.output
+    if output is None:
+        return 0.0
+    return 2 * output.full_scale_n / (output.pwm_steps or 1 << output.dac_bits)
+
+
+def work_of(world: loop.World) -> int:
+    """Return how many steps of the solver a sample takes, about."""
+    if not isinstance(world.plant, Train):
+        return 1
+    seconds = world.clocks_per_sample / world.encoder.clock_hz
+    pulses = world.clocks_per_sample // world.plant.pulse.period if world.plant.pulse.period else 0
+    return 1 + int(seconds / world.plant.leg_s) + 2 * pulses
 
 
 def world_of(scene: Scene) -> loop.World:
@@ -60,7 +76,7 @@ def world_of(scene: Scene) -> loop.World:
     return loop.World(
         plant=plant,
         encoder=Encoder(spec.count_m, float(spec.clock_hz), scene.encoder.offsets),
-        converter=converter_of(scene),
+        converter=_converter(scene),
         push_n=scene.protocol.push_n,
         force_lsb_n=spec.force_resolution_n,
         clocks_per_sample=spec.clocks_per_sample,

@@ -128,12 +128,14 @@ def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float
 
     Raises:
         SceneError: if the scene cannot be.
-        RuntimeError: if the worker has other sources of the project.
+        RuntimeError: if the worker has other sources of the project, or the handle did not reach the wall.
     """
     if sources != store.sources():
         raise RuntimeError(f"a worker, {platform.node()}, has other sources of hardwall, or versions of its tools")
     wall = {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": damping}
     result = hit.run(parse(scene, text, changes | wall), backend, until_sure=True)
+    if not result.touched:
+        raise RuntimeError(f"the handle did not reach the wall: nothing is said of K {stiffness:g}, B {damping:g}")
     in_place = result.stable and result.in_place
     return {"stable": result.stable, "in_place": in_place, "rms_mm": result.rms_m * 1e3}
 

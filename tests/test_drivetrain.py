@@ -7,7 +7,7 @@ from scipy.linalg import matrix_balance
 
 from hardwall.model.compiled import compiled
 from hardwall.sim import plant
-from hardwall.sim.device import Device, Hand, Transmission, equations, fastest_per_s, train
+from hardwall.sim.device import Device, Hand, Motor, Transmission, equations, fastest_per_s, train
 from hardwall.sim.drivetrain import State, stretch
 from hardwall.sim.encoder import Encoder, advance, level, locate, offsets
 
@@ -50,7 +50,7 @@ def test_motion_without_events_is_the_exponential_from_extreme_to_extreme():
     """Each leg adds roundings of the balanced state's size: of its series, of n + 2 = 7 products a term, less than
     (7 + 2) e; of its tables' entries, a few each, no more again; in all under 64 halves of a unit."""
     rng = np.random.default_rng(1)
-    worst = 0.0
+    worst, compared = 0.0, 0
     cases = [(device, step) for device in CORNERS for step in (1e-7, 1e-5)]
     cases += [(random_device(rng, dry=False), between(rng, 1e-7, 1e-3)) for _ in range(150)]
     for device, seconds in cases:
@@ -76,8 +76,9 @@ def test_motion_without_events_is_the_exponential_from_extreme_to_extreme():
         sizes = scales * max(np.abs(each / scales).max() for each in (start, exact))
         sizes += np.abs(free.rates[:, n:] @ [1.0, given]) / fastest_per_s(device)
         error = (np.abs(end - exact) / (U * legs * sizes)).max()
-        worst = max(worst, error)
+        worst, compared = max(worst, error), compared + 1
     assert worst <= 64
+    assert compared > 140
 
 
 def test_sticking_and_limits_agree_with_numerical_integration():
@@ -107,6 +108,38 @@ def test_sticking_and_limits_agree_with_numerical_integration():
             expected[2:4] = expected[:2]
         assert found == pytest.approx(expected, rel=1e-7, abs=1e-8), (case, device, happened)
     assert min(seen.values()) >= 20, seen
+
+
+def test_a_voltage_that_crosses_all_of_its_range_in_a_leg_is_followed():
+    """Narrow limits, fast devices: whole legs against legs of another length, and one case against SciPy."""
+    motor = Motor(1.8173661069341358, 2.3265107419e-4, 0.4116723507997901, 0.5511340164319264, 0.010239159076919186)
+    device = Device(
+        0.0033818178039655943, bandwidth_hz=15.979827711410739, motor=motor,
+        hand=Hand(0.0, 0.0, 12015192.797688242, -7.833879805856382e-05),
+    )  # fmt: skip
+    state = State(-7.809452347391156e-05, -0.04945183797444533, (-2.2938110501431392, 0.0, 0.0), 0)
+    found = moved(device, state, 0.0116, 7.745856e-4)
+    expected, happened = integrated(device, laboratory(device, state), 0.0116, 7.745856e-4)
+    assert happened.count("limits") > 5
+    assert laboratory(device, found) == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    rng, apart = np.random.default_rng(6), 0
+    for _ in range(300):
+        motor = Motor(between(rng, 1, 20), between(rng, 1e-4, 1e-2), 0.2, between(rng, 0.01, 1), 0.01)
+        device = Device(
+            between(rng, 1e-3, 1), bandwidth_hz=between(rng, 10, 1000), motor=motor,
+            hand=Hand(0.0, 0.0, between(rng, 1e3, 1e7), 0.0),
+        )  # fmt: skip
+        state = State(float(rng.normal() * 1e-4), float(rng.normal() * 0.1), (float(rng.normal()), 0.0, 0.0), 0)
+        system, command = train(device, 1e-3), float(rng.normal())
+        cell = locate(COARSE, 0.5e9)._replace(lower_m=-1e18)
+        ends = [
+            advance(each, COARSE, state, cell, command, 1e-3, 0, 1, *NO_EDGES, 0)[0]
+            for each in (system, system._replace(leg_s=system.leg_s / 3.7))
+        ]
+        scale = max(abs(end.velocity_m_per_s) for end in ends) + 1e-3
+        assert abs(ends[0].velocity_m_per_s - ends[1].velocity_m_per_s) < 1e-7 * scale
+        apart += ends[0] != ends[1]
+    assert apart > 200, "legs of another length round otherwise"
 
 
 @pytest.mark.parametrize("coulomb", [None, 0.3])

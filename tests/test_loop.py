@@ -56,7 +56,7 @@ def test_rtl_gives_the_models_force_words_with_an_imperfect_encoder(estimator):
 @pytest.mark.parametrize("output", ["dac", "pwm"])
 def test_rtl_gives_the_models_force_words_on_a_device_of_every_part(output):
     """The plant advances between the same instants, whatever it is made of."""
-    parts = AMPLIFIER | CABLE | HAND | DRIVE | {"amplifier.current_limit_a": 8.0, "output.full_scale_n": 40.0}
+    parts = AMPLIFIER | CABLE | HAND | DRIVE | {"amplifier.current_limit_a": 10.0, "output.full_scale_n": 40.0}
     parts |= {"output.dac_bits": 12} if output == "dac" else {"output.pwm_carrier_hz": 20_000, "output.pwm_steps": 600}
     assert same_words("seed-2011", STABLE | ONE_SECOND | parts).max_force_n > 1
 

@@ -10,14 +10,16 @@ from hardwall.sim.converter import AS_IT_IS, Converter, Pulse
 from hardwall.sim.device import Device, Hand, Motor, Transmission
 from hardwall.sim.drivetrain import Train
 from hardwall.sim.plant import Rigid
-from hardwall.sim.scene import SceneError, load
+from hardwall.sim.scene import SceneError, load, read
+from hardwall.sim.store import sources
 from hardwall.sim.world import device_of, start_of, world_of
+from hardwall.sim.zwidth import verdict
 
 PULSES = {"output.full_scale_n": 50.0, "output.pwm_carrier_hz": 20_000, "output.pwm_steps": 300}
 
 
 def test_every_key_of_a_scene_reaches_the_device():
-    limits = {"amplifier.current_limit_a": 8.0, "transmission.motor_viscous_n_s_per_m": 0.5}
+    limits = {"amplifier.current_limit_a": 15.0, "transmission.motor_viscous_n_s_per_m": 0.5}
     sides = {"transmission.encoder_at": "motor", "handle.viscous_n_s_per_m": 0.7}
     parts = AMPLIFIER | CABLE | HAND | DRIVE | PULSES | limits | sides
     assert device_of(load("seed-2011", parts)) == Device(
@@ -25,7 +27,7 @@ def test_every_key_of_a_scene_reaches_the_device():
         viscous_n_s_per_m=0.7,
         coulomb_n=0.1,
         bandwidth_hz=400.0,
-        force_limit_n=32.0,
+        force_limit_n=60.0,
         motor=Motor(2.0, 1e-3, 0.04, 24.0, 0.01),
         transmission=Transmission(2e5, 10.0, 0.05, 0.5),
         hand=Hand(0.2, 3.0, 10.0, 1e-3),
@@ -87,6 +89,24 @@ def test_pulses_push_as_their_mean_does():
     assert 0 < apart.max() < 50.0 / 0.35 * 25e-6 * 1.01
 
 
+def test_a_handle_that_never_comes_to_the_wall_proves_no_wall_stable():
+    """A push that the converter rounds to nothing."""
+    changes = ONE_SECOND | {"output.full_scale_n": 40.0, "output.dac_bits": 4}
+    result = hit.run(load("seed-2011", changes), "fixed")
+    assert result.rms_m < 1e-15
+    assert not result.touched
+    assert not result.stable
+    job = {
+        "scene": "seed-2011",
+        "text": read("seed-2011"),
+        "sources": sources(),
+        "changes": changes,
+        "backend": "fixed",
+    }
+    with pytest.raises(RuntimeError, match=r"^the handle did not reach the wall: nothing is said of K 1000, B 10$"):
+        verdict(**job, stiffness=1e3, damping=10.0)
+
+
 REFUSED = {
     "amplifier.bandwidth_hz must be more than 0": {"amplifier.bandwidth_hz": 0.0},
     "amplifier.current_limit_a needs amplifier.bandwidth_hz and a section motor": {"amplifier.current_limit_a": 1.0},
@@ -99,6 +119,8 @@ REFUSED = {
     "output must have dac_bits, or pwm_carrier_hz and pwm_steps, and not both": PULSES | {"output.dac_bits": 8},
     "output.dac_bits must be at least 2": {"output.full_scale_n": 40.0, "output.dac_bits": 1},
     "output.pwm_carrier_hz must be controller.clock_hz 12000000 divided by": PULSES | {"output.pwm_carrier_hz": 7000},
+    "output.full_scale_n must be at most 32 N with pulses, all that the amplifier's current":
+        AMPLIFIER | DRIVE | PULSES | {"amplifier.current_limit_a": 8.0},
     "output.pwm_steps must divide the 600 clocks of a carrier's period, not 7": PULSES | {"output.pwm_steps": 7},
     "handle, amplifier, motor, transmission and hand must change at no more than 2.5e+08 1/s together":
         CABLE | {"transmission.motor_mass_kg": 1e-9, "transmission.damping_n_s_per_m": 1e4},
