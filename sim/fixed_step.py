@@ -88,7 +88,7 @@ def growth(device: Device, step_s: float) -> float:
 
 
 def longest_s(device: Device, most_s: float) -> float:
-    """Return the longest step, up to `most_s`, in which a device does not diverge of itself; the shortest such bound."""
+    """Return the longest step, up to `most_s`, in which a device does not diverge of itself, s."""
     if growth(device, most_s) <= 1 + ROUNDING:
         return most_s
     low, high = 0.0, most_s
