@@ -24,7 +24,7 @@ from .terminal import (
 
 
 class _Runs:
-    """Runs the hits of a study as the options say: see `trade.Runs`. What is timed runs alone, in this process."""
+    """Runs a study's hits as the options say: see `trade_study.Runs`. What is timed runs alone, in this process."""
 
     def __init__(self, workers: int | None, resume: bool):
         self._workers, self._resume = workers, resume
@@ -56,9 +56,9 @@ def trade(
     as_json: JsonOption = False,
 ) -> None:
     """Speed against accuracy: what a coarser backend, device, rate, solver or map saves, and what it gets wrong."""
-    from . import trade as trades  # noqa: PLC0415  (kernels are loaded only where they run)
-    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
+    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415  (kernels are loaded only where they run)
     from .plot_trade import plot_trade  # noqa: PLC0415
+    from .trade_study import study  # noqa: PLC0415
 
     changes, plot = scene_changes(set_), output_file(plot, "--plot", SUFFIXES)
     refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "it takes two of the paper's")
@@ -66,7 +66,7 @@ def trade(
     refuse(changes, ("solver",), "it is one of the settings")
     began = time.perf_counter()
     try:
-        found = trades.study(scene, changes, _Runs(workers, resume))
+        found = study(scene, changes, _Runs(workers, resume))
     except ValueError as error:
         raise SceneError(str(error)) from None
     if as_json:

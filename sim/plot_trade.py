@@ -90,7 +90,7 @@ def _number(axes: Axes, trade: Trade, question: Question, label: str) -> None:
         spot = _spot(point, question, label)
         right, up = axes.transData.transform(spot) * 72 / axes.figure.dpi
         for level in range(LEVELS):
-            at = right, up + (level + 1.3) * NUMBER_PT
+            at = right, up + (level + 1.7) * NUMBER_PT
             if all(abs(at[0] - x) > 1.4 * NUMBER_PT or abs(at[1] - y) > 0.95 * NUMBER_PT for x, y in taken):
                 break
         taken.append(at)

@@ -1,11 +1,12 @@
-"""Ways to make a simulation of a scene cheaper, by what they leave out, and what each changes in the scene.
+"""Ways to make a simulation cheaper, by what they leave out, and what each changes in a scene.
 
-Each axis has its boldest first, and these are also taken in pairs. Beside the shortcuts stand two changes that nobody
-could measure on a bench, `scatter`: what they do to a verdict is chance, and no shortcut can be judged finer.
+Each axis has its boldest first; these are also taken in pairs. Two more changes, `scatter`, are so slight that nobody
+could measure them on a bench: what they do to a verdict is chance, and no shortcut can be judged finer.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import chain, combinations
 from typing import Any
 
 from .rates import taken_out
@@ -30,7 +31,7 @@ COARSER = 5, 2
 UNKNOWN = 1e-3
 """Of the handle's mass."""
 SCATTER = "scatter"
-"""The axis of what nobody could measure on a bench."""
+"""Name of an axis."""
 
 
 @dataclass(frozen=True)
@@ -55,11 +56,17 @@ class Shortcut:
 REFERENCE = Shortcut("reference", "all parts, fixed, exact solver", {})
 
 
-def shortcuts(scene: Scene) -> list[Shortcut]:
-    """Return a scene's shortcuts; some may be no scene, or change nothing."""
-    axes = _parts(scene), _rates(scene), _steps(scene), _grids(scene)
-    pairs = [_together(*pair) for pair in combinations([axis[0] for axis in axes if axis], 2)]
-    return [REFERENCE, *_scatter(scene), *_backends(scene), *(each for axis in axes for each in axis), *pairs]
+def shortcuts(scene: Scene, accepted: Callable[[Shortcut], bool]) -> list[Shortcut]:
+    """Return the reference and what is held against it, of one axis after the other.
+
+    Args:
+        scene: with the grid of its maps.
+        accepted: whether a shortcut is one of this scene: all may be no scene, or change nothing.
+    """
+    beside = _scatter(scene), _backends(scene)
+    bold = [list(filter(accepted, axis)) for axis in (_parts(scene), _rates(scene), _steps(scene), _grids(scene))]
+    pairs = [_together(*pair) for pair in combinations([axis[0] for axis in bold if axis], 2)]
+    return [REFERENCE, *filter(accepted, chain(*beside)), *chain(*bold), *filter(accepted, pairs)]
 
 
 def _backends(scene: Scene) -> list[Shortcut]:
@@ -77,8 +84,9 @@ def _parts(scene: Scene) -> list[Shortcut]:
     found = []
     for label, without in PARTS.items():
         there = {key: value for key, value in without.items() if getattr(scene, key.split(".")[0]) is not None}
-        if there:
-            found.append(Shortcut("parts", label, taken_out(scene, there)))
+        changes = taken_out(scene, there)
+        if changes and all(changes != each.changes for each in found):
+            found.append(Shortcut("parts", label, changes))
     return found
 
 
