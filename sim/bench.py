@@ -7,7 +7,7 @@ slows them all.
 import json
 import statistics
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from pathlib import Path
 
 from ..model.compiled import build_dir
@@ -48,12 +48,14 @@ def _scene(name: str, changes: dict, seconds: float) -> Scene:
     return load(name, changes | half)
 
 
-def _medians(contestants: dict[str, Callable[[], float]], progress: Callable[[str], None]) -> dict[str, float]:
+def medians(
+    contestants: dict[Hashable, Callable[[], float]], rounds: int, progress: Callable[[str], None]
+) -> dict[Hashable, float]:
     """Return the median over the rounds of what each contestant gives, taken in turns."""
-    given: dict[str, list[float]] = {name: [] for name in contestants}
-    for number in range(ROUNDS):
+    given: dict[Hashable, list[float]] = {name: [] for name in contestants}
+    for number in range(rounds):
         for name, run in contestants.items():
-            progress(f"round {number + 1} of {ROUNDS}: {name}")
+            progress(f"round {number + 1} of {rounds}: {name}")
             given[name].append(run())
     return {name: statistics.median(values) for name, values in given.items()}
 
@@ -108,8 +110,8 @@ def bench(scene: str, progress: Callable[[str], None]) -> dict:
         name: _hits(_scene(scene, changes, SECONDS_OF_SCENE["fixed"]), "fixed")
         for name, changes in _parts(1 / load(scene).spec.sample_hz).items()
     }
-    samples_per_s = _medians(speeds, progress)
-    costs = {name: 1e9 / rate for name, rate in _medians(parts, progress).items()}
+    samples_per_s = medians(speeds, ROUNDS, progress)
+    costs = {name: 1e9 / rate for name, rate in medians(parts, ROUNDS, progress).items()}
     return {
         "scene": scene,
         "rounds": ROUNDS,

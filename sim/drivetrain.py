@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..model.compiled import compiled
+from ..model.compiled import by_type, compiled
 from .converter import Pulse, width_of
 from .encoder import advance, advance_quietly, level, next_cell, stamp
 from .series import FIRST, NEVER, UNSURE, at, halve, leaves, measure, root, stays
@@ -61,8 +61,8 @@ STUCK, SLIDING = phase_number(0, 0), phase_number(1, 0)
 
 
 @compiled
-def _quantity(tables, phase, number, state, command_n):
-    """Return the value of a watched quantity in a phase."""
+def quantity(tables, phase, number, state, command_n):
+    """Return the value in a phase of a quantity: of a state, its rate of change."""
     result = tables[phase, number, STATES] + tables[phase, number, STATES + 1] * command_n
     result += tables[phase, number, 0] * state.position_m + tables[phase, number, 1] * state.velocity_m_per_s
     for i in range(STATES - 2):
@@ -105,7 +105,7 @@ def along_of(train, state, command_n):
         return 1
     if state.velocity_m_per_s != 0.0:
         return 1 if state.velocity_m_per_s > 0.0 else -1
-    force_n = _quantity(train.tables, STUCK, GRIP, state, command_n)
+    force_n = quantity(train.tables, STUCK, GRIP, state, command_n)
     if abs(force_n) <= train.coulomb_n:
         return 0
     return 1 if force_n > 0.0 else -1
@@ -116,7 +116,7 @@ def limited_of(train, state, command_n):
     """Return at which limit the voltage is, -1 or 1, or 0."""
     if train.voltage_limit_n == np.inf:
         return 0
-    voltage_n = _quantity(train.tables, SLIDING, VOLTAGE, state, command_n)
+    voltage_n = quantity(train.tables, SLIDING, VOLTAGE, state, command_n)
     return 1 if voltage_n > train.voltage_limit_n else (-1 if voltage_n < -train.voltage_limit_n else 0)
 
 
@@ -158,9 +158,16 @@ def _emit(series, encoder, cell, now_s, seconds, end, clock, clocks, edge_clocks
     return cell, n_edges if cell.lower_m <= seen_m < cell.upper_m else -1
 
 
-@compiled
-def stretch(train, encoder, state, cell, command_n, since_s, until_s, clock, clocks, edge_clocks, edge_levels, n_edges):
+@by_type
+def stretch(plant, encoder, state, cell, command_n, since_s, until_s, clock, clocks, edge_clocks, edge_levels, n_edges):
     """Advance device and encoder from `since_s` to `until_s` of an interval, the command constant: see `advance`."""
+
+
+@stretch.register(Train)
+@compiled
+def _stretch(
+    train, encoder, state, cell, command_n, since_s, until_s, clock, clocks, edge_clocks, edge_levels, n_edges
+):
     series, now_s, stalled = train.series, since_s, 0
     along, limited = along_of(train, state, command_n), limited_of(train, state, command_n)
     while now_s < until_s:
@@ -203,18 +210,22 @@ def stretch(train, encoder, state, cell, command_n, since_s, until_s, clock, clo
 
 @advance_quietly.register(Train)
 @compiled
-def _advance_quietly(train, state, cell, force_n, interval):
+def never_quietly(plant, state, cell, force_n, interval):
+    """Leave every interval to `advance`."""
     return state, False
 
 
 @advance.register(Train)
 @compiled
-def _advance(train, encoder, state, cell, force_n, interval, clock, clocks, edge_clocks, edge_levels, n_edges):
-    pulse, limit_n = train.pulse, train.command_limit_n
+def advance_in_stretches(
+    plant, encoder, state, cell, force_n, interval, clock, clocks, edge_clocks, edge_levels, n_edges
+):
+    """Advance device and encoder by as many stretches as the interval has commands: of pulses, one for each level."""
+    pulse, limit_n = plant.pulse, plant.command_limit_n
     if pulse.period == 0:
         command_n = min(max(force_n, -limit_n), limit_n)
         return stretch(
-            train, encoder, state, cell, command_n, 0.0, interval, clock, clocks, edge_clocks, edge_levels, n_edges
+            plant, encoder, state, cell, command_n, 0.0, interval, clock, clocks, edge_clocks, edge_levels, n_edges
         )
     now, end = clock, clock + clocks
     while now < end:
@@ -226,7 +237,7 @@ def _advance(train, encoder, state, cell, force_n, interval, clock, clocks, edge
         until = min(end, now - within + (state.width if high else pulse.period))
         since_s, until_s = (now - clock) / encoder.clock_hz, (until - clock) / encoder.clock_hz
         state, cell, n_edges = stretch(
-            train, encoder, state, cell, pulse.level_n if high else -pulse.level_n, since_s, until_s,
+            plant, encoder, state, cell, pulse.level_n if high else -pulse.level_n, since_s, until_s,
             clock, clocks, edge_clocks, edge_levels, n_edges,
         )  # fmt: skip
         now = until

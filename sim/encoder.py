@@ -121,12 +121,12 @@ def advance(plant, encoder, motion, cell, force_n, interval, clock, clocks, edge
     """Advance plant and encoder together over one interval of constant applied force.
 
     Args:
-        plant: a `plant.Rigid`, or a `drivetrain.Train`.
+        plant: a `plant.Rigid`, a `drivetrain.Train` or a `fixed_step.Stepped`.
         encoder: an `Encoder`.
-        motion: a `plant.Motion`, or a `drivetrain.State`.
+        motion: a `plant.Motion` of a `Rigid`, else a `drivetrain.State`.
         cell: the `Cell` that holds the encoder's position at the start; `locate` gives the first.
         force_n: motor and wall together (N), positive towards positive positions.
-        interval: the `plant.span` of its length, or for a `Train` its length (s).
+        interval: the `plant.span` of its length, or for the others its length (s).
         clock: number of the clock at which the interval starts.
         clocks: its length times `encoder.clock_hz`, at least 1.
         edge_clocks: int64 array for the stamps, which never decrease: clock < stamp <= clock + clocks.

@@ -16,6 +16,7 @@ from .controllers import sample, sample_quietly
 from .converter import Converter, converted
 from .drivetrain import State, Train
 from .encoder import Cell, Encoder, advance, advance_quietly
+from .fixed_step import Stepped
 from .plant import Motion, Rigid, Span
 from .record import keep
 
@@ -29,14 +30,14 @@ class World(NamedTuple):
     `before` is the span from a changed drive to the next strobe, `after` that from the strobe to the changed drive.
     """
 
-    plant: Rigid | Train
+    plant: Rigid | Train | Stepped
     encoder: Encoder
     converter: Converter | None
     push_n: float  # of the motor, besides the wall
     force_lsb_n: float
     clocks_per_sample: int
     latency: int  # clocks
-    before: Span | float  # of a `Train`: s
+    before: Span | float  # a `Span` for a `Rigid`, else s
     after: Span | float
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from . import figures, theory
-from .scene import load, read
+from .scene import Scene, load, read
 from .study import Mapping
 from .zwidth import Case, Map, grid_of
 
@@ -129,19 +129,19 @@ def linear_limits(scene: str, changes: dict[str, Any], rates_hz: list[int]) -> d
         fdm = {"controller.estimator": "fdm", "controller.output": None}
         row = []
         for rate_hz in rates_hz:
-            loaded = load(scene, FINE | SHORT | changes | at_rate(rate_hz) | fdm | _rigid_mass(scene, changes, without))
+            left_out = taken_out(load(scene, changes), without)
+            loaded = load(scene, FINE | SHORT | changes | at_rate(rate_hz) | fdm | left_out)
             loop = theory.Loop(loaded)
             row.append(max(theory.linear_limit_n_per_m(loop, damping) for damping in grid_of(loaded).dampings))
         limits[left] = row
     return limits
 
 
-def _rigid_mass(scene: str, changes: dict[str, Any], without: dict[str, Any]) -> dict[str, Any]:
+def taken_out(scene: Scene, without: dict[str, Any]) -> dict[str, Any]:
     """Return what takes parts out of a scene; without a cable the motor's side is the handle's."""
-    loaded = load(scene, changes)
-    if "transmission" not in without or loaded.transmission is None:
+    handle, cable = scene.handle, scene.transmission
+    if "transmission" not in without or cable is None:
         return without
-    handle, cable = loaded.handle, loaded.transmission
     return without | {
         "handle.mass_kg": handle.mass_kg + cable.motor_mass_kg,
         "handle.viscous_n_s_per_m": handle.viscous_n_s_per_m + cable.motor_viscous_n_s_per_m,

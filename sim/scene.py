@@ -139,6 +139,13 @@ class OutputSection(Section):
     pwm_steps: Annotated[int, Field(ge=2)] | None = None
 
 
+class SolverSection(Section):
+    """The device in steps of semi-implicit Euler, no longer than `step_s`, as most simulations have it; without this
+    section it is advanced exactly from event to event."""
+
+    step_s: Positive
+
+
 class ProtocolSection(Section):
     """A hit: from rest at `start_m`, pushed towards the wall; the mean over `mean_s` before `settle_s` is held against
     the `measure_s` after it. A wall whose RMS is under the threshold is stable."""
@@ -174,6 +181,7 @@ class Scene(Section):
     transmission: TransmissionSection | None = None
     hand: HandSection | None = None
     output: OutputSection | None = None
+    solver: SolverSection | None = None
     protocol: ProtocolSection
     zwidth: ZWidthSection | None = None
 

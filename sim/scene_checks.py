@@ -11,7 +11,7 @@ from ..model import quadrature
 SAMPLES_MAX = 10**9
 """Of a run's settling or measuring: a minute or two of the model's time, hours of the RTL's."""
 STEPS_MAX = 10_000
-"""Of a map, in either direction."""
+"""Of a map, in either direction; of a fixed-step solver, a sample."""
 
 # Which scene key a message of the model speaks of, where the names differ.
 KEYS = {
@@ -146,6 +146,25 @@ def _check_device(scene) -> None:
         raise ValueError(
             f"handle, amplifier, motor, transmission and hand must change at no more than {most:g} 1/s together, "
             f"{device.LEGS_MAX} steps of the solver a sample, not {fastest:g}"
+        )
+    if scene.solver is not None:
+        _check_solver(scene, parts)
+
+
+def _check_solver(scene, parts) -> None:
+    from .fixed_step import longest_s  # noqa: PLC0415
+
+    step_s, sample_s = scene.solver.step_s, 1 / scene.spec.sample_hz
+    least, most = sample_s / STEPS_MAX, sample_s * (1 + 1e-9)
+    if not least <= step_s <= most:
+        raise ValueError(
+            f"solver.step_s must be {least:g} to {sample_s:g}, from {STEPS_MAX} steps a sample to one, not {step_s!r}"
+        )
+    stable_s = longest_s(parts, step_s)
+    if stable_s < step_s:
+        raise ValueError(
+            f"solver.step_s must be at most {stable_s:.4g}, in longer steps this device diverges of itself, "
+            f"not {step_s!r}"
         )
 
 

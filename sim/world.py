@@ -2,18 +2,19 @@
 
 from . import device, loop
 from .converter import AS_IT_IS, Converter, Pulse, converted, width_of
-from .drivetrain import State, Train
+from .drivetrain import State
 from .encoder import Encoder, locate
+from .fixed_step import Stepped, stepped
 from .plant import Coulomb, Handle, Motion, Rigid, span
 from .scene import Scene
 
 
 def device_of(scene: Scene) -> device.Device | None:
-    """Return the scene's device; None where it is a rigid handle that the drive's force acts on."""
+    """Return the scene's device; None where it is a rigid handle that the drive's force acts on, advanced exactly."""
     amplifier, motor, cable, hand = scene.amplifier, scene.motor, scene.transmission, scene.hand
     pulse = _pulse(scene)
     bandwidth_hz = amplifier and amplifier.bandwidth_hz
-    if not (bandwidth_hz or motor or cable or hand or pulse.period):
+    if not (bandwidth_hz or motor or cable or hand or pulse.period or scene.solver):
         return None
     parts = scene.handle.model_dump() | {"bandwidth_hz": bandwidth_hz, "pulse": pulse}
     parts["coulomb_n"] = scene.handle.coulomb_n or None
@@ -55,11 +56,12 @@ def output_step_n(scene: Scene) -> float:
 
 def work_of(world: loop.World) -> int:
     """Return how many steps of the solver a sample takes, about."""
-    if not isinstance(world.plant, Train):
+    plant = world.plant
+    if isinstance(plant, Rigid):
         return 1
-    seconds = world.clocks_per_sample / world.encoder.clock_hz
-    pulses = world.clocks_per_sample // world.plant.pulse.period if world.plant.pulse.period else 0
-    return 1 + int(seconds / world.plant.leg_s) + 2 * pulses
+    step_s = plant.step_s if isinstance(plant, Stepped) else plant.leg_s
+    pulses = world.clocks_per_sample // plant.pulse.period if plant.pulse.period else 0
+    return 1 + int(world.clocks_per_sample / world.encoder.clock_hz / step_s) + 2 * pulses
 
 
 def world_of(scene: Scene) -> loop.World:
@@ -73,6 +75,8 @@ def world_of(scene: Scene) -> loop.World:
         plant, before, after = Rigid(handle, coulomb), span(handle, before_s), span(handle, after_s)
     else:
         plant, before, after = device.train(parts, max(before_s, after_s)), before_s, after_s
+        if scene.solver:
+            plant = stepped(plant, parts.transmission is not None, scene.solver.step_s)
     return loop.World(
         plant=plant,
         encoder=Encoder(spec.count_m, float(spec.clock_hz), scene.encoder.offsets),
@@ -90,7 +94,7 @@ def start_of(scene: Scene, world: loop.World) -> loop.Progress:
     """Return where a run begins: at rest, under the push alone."""
     position_m, push_n = scene.protocol.start_m, converted(world.converter, world.push_n)
     motion = Motion(position_m, 0.0)
-    if isinstance(world.plant, Train):
+    if not isinstance(world.plant, Rigid):
         pulse = world.plant.pulse
         width = width_of(pulse, push_n) if pulse.period else 0
         motion = State(position_m, 0.0, (0.0, 0.0, 0.0), width)

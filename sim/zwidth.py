@@ -42,6 +42,11 @@ class Case:
         """
         return parse(self.scene, self.text, self.changes)
 
+    def job(self, backend: str) -> dict[str, Any]:
+        """Return the arguments of `verdict` but for the wall."""
+        keys = {"scene": self.scene, "text": self.text, "changes": self.changes}
+        return keys | {"sources": store.sources(), "backend": backend}
+
 
 @dataclass(frozen=True)
 class Map:
@@ -146,8 +151,7 @@ class _Tracing:
     def __init__(self, case: Case, backend: str):
         self._case, self._grid = case, grid_of(case.parsed)
         self._steps: Generator = trace(self._grid)
-        self._job = {"scene": case.scene, "text": case.text, "sources": store.sources(), "backend": backend}
-        self._job["changes"] = case.changes
+        self._job = case.job(backend)
         self._hits = 0
         self._in_place: dict[tuple[float, float], bool] = {}
         self.wanted: dict | None = None

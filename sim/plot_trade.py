@@ -1,0 +1,102 @@
+"""The picture of speed against accuracy: what each shortcut of a simulation costs, and how wrong it is."""
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from . import figures
+from .plot_zwidth import MARKERS
+from .trade import HIT, MAP, Point, Question, Trade
+
+NUMBER_PT = 8
+"""Size of a point's number."""
+LEVELS = 40
+"""Places for it, each above the last."""
+
+
+def plot_trade(trade: Trade) -> Figure:
+    """Return the picture: a row an estimator; on the left its verdicts on walls, on the right the edge of its map."""
+    picture = Figure(figsize=(14, 9.5), layout="constrained")
+    panels = picture.subplots(len(trade.walls), 2, sharex="col", squeeze=False)
+    for row, label in zip(panels, trade.walls, strict=True):
+        for axes, question in zip(row, (HIT, MAP), strict=True):
+            _draw(axes, trade, question, label)
+        name = figures.methods()[label].label
+        row[0].set_title(f"{name}: a hit, and {trade.walls[label]} walls around the edge", fontsize=10)
+        row[0].set_ylabel("verdicts that differ (%)")
+        row[1].set_title(f"{name}: a map, and its edge", fontsize=10)
+        row[1].set_ylabel("error of K at the edge, largest over B (%)")
+    panels[-1, 0].set_xlabel("time of a hit (ms)")
+    panels[-1, 1].set_xlabel("time of the maps of all estimators, in one process (s)")
+    controller, grid = trade.scene.controller, trade.scene.zwidth
+    picture.suptitle(
+        f"{trade.scene.name}: estimators at {controller.sample_hz / 1e3:g} kHz, force at "
+        f"{controller.actuation_hz / 1e3:g} kHz; B of {grid.damping_from_n_s_per_m:g} to "
+        f"{grid.damping_to_n_s_per_m:g} N s/m, K by {grid.stiffness_step_n_per_m / 1e3:g} kN/m"
+    )
+    keys = [
+        Line2D([], [], label=f"{number}  {point.shortcut.label}", ls="", **_style(trade, point))
+        for number, point in enumerate(trade.points, 1)
+    ]
+    keys += [
+        Line2D([], [], label="none faster is as right", color="black", lw=1.2),
+        Line2D([], [], label="within the scatter", color="0.88", lw=9),
+    ]
+    picture.legend(handles=keys, loc="outside right center", fontsize=8.5)
+    picture.draw_without_rendering()
+    for row, label in zip(panels, trade.walls, strict=True):
+        for axes, question in zip(row, (HIT, MAP), strict=True):
+            _number(axes, trade, question, label)
+    return picture
+
+
+def _style(trade: Trade, point: Point) -> dict:
+    """Return colour and shape of a point, those of its axis."""
+    index = list(dict.fromkeys(each.shortcut.axis for each in trade.points)).index(point.shortcut.axis)
+    return {"color": mpl.colormaps["tab10"](index % 10), "marker": MARKERS[index % len(MARKERS)], "ms": 6}
+
+
+def _spot(point: Point, question: Question, label: str) -> tuple[float, float]:
+    """Return where a point is: time (ms of a hit, s of maps) and error (%)."""
+    return question.cost_s(point) * (1e3 if question is HIT else 1.0), question.error(point, label) * 100
+
+
+def _shown(trade: Trade, question: Question) -> list[Point]:
+    """Return a panel's points: a map's steps are nothing to a hit."""
+    return [point for point in trade.points if question is MAP or point.shortcut.coarser == 1]
+
+
+def _draw(axes: Axes, trade: Trade, question: Question, label: str) -> None:
+    """Draw a panel's points, the line through the best, and the scatter."""
+    axes.axhspan(-100, trade.scatter(question, label) * 100, color="0.88", lw=0)
+    best = [_spot(point, question, label) for point in trade.best(question, label)]
+    axes.plot(*zip(*best, strict=True), color="black", lw=1.2, marker="o", ms=13, mfc="none")
+    shown = _shown(trade, question)
+    for point in shown:
+        axes.plot(*_spot(point, question, label), ls="", alpha=0.8, **_style(trade, point))
+    axes.set_xscale("log")
+    axes.grid(alpha=0.3, which="both")
+    most = max(_spot(point, question, label)[1] for point in shown)
+    axes.set_ylim(-0.05 * most - 0.5, 1.15 * most + 1)
+
+
+def _number(axes: Axes, trade: Trade, question: Question, label: str) -> None:
+    """Number a panel's points, each beside its own or in the first place above that is free."""
+    taken = []
+    for number, point in enumerate(trade.points, 1):
+        if point not in _shown(trade, question):
+            continue
+        spot = _spot(point, question, label)
+        right, up = axes.transData.transform(spot) * 72 / axes.figure.dpi
+        for level in range(LEVELS):
+            at = right, up + (level + 1.7) * NUMBER_PT
+            if all(abs(at[0] - x) > 1.4 * NUMBER_PT or abs(at[1] - y) > 0.95 * NUMBER_PT for x, y in taken):
+                break
+        taken.append(at)
+        offset = (0, at[1] - up)
+        colour = _style(trade, point)["color"]
+        axes.annotate(
+            str(number), spot, offset, textcoords="offset points", ha="center", va="center", fontsize=NUMBER_PT,
+            color=colour,
+        )  # fmt: skip
