@@ -76,36 +76,34 @@ def drop(
 
 
 def _show_drop(found) -> None:
-    rests = {each.method: each for each in found.laws if each.factor == "none"}
-    numbers = ("swing at rest (mm/s)", "mean (mm/s)", "rests to B: predicted", "measured (N s/m)")
-    numbers += ("region ends at B", "K before / largest", "area (kN/m N s/m)", "of the paper's best", "in place")
+    chatter = {"method": "left", "changed": "left"}
+    chatter |= dict.fromkeys(("swing at rest (mm/s)", "mean", "rests to B: predicted", "measured"), "right")
     rows = []
-    for name, each in found.chatters.items():
-        area, last = found.maps[name], found.before_the_end(name)
+    for each in found.laws:
+        own = found.chatters[each.method]
+        ends = f"{own.swing_m_per_s.max() * 1e3:.2f}", f"{abs(own.mean_m_per_s).max() * 1e3:.2f}"
+        rests = f"{each.predicted_n_s_per_m:.3g}", f"{each.measured_n_s_per_m:.3g}"
+        plain = each.factor == "none"
         rows.append(
-            [
-                area.case.label,
-                f"{each.swing_m_per_s.max() * 1e3:.2f}",
-                f"{abs(each.mean_m_per_s).max() * 1e3:.2f}",
-                f"{rests[name].predicted_n_s_per_m:.3g}",
-                f"{rests[name].measured_n_s_per_m:.3g}",
-                f"{area.damping_n_s_per_m:g}",
-                "" if last is None else f"{last:.2f}",
-                f"{area.area / 1e3:.0f}",
-                "" if found.of_papers(name) is None else f"{found.of_papers(name):.2f}",
-                f"{area.area_in_place / 1e3:.0f}",
-            ]
+            [each.method, "" if plain else f"{each.factor} {each.value}", *(ends if plain else ("", "")), *rests]
         )
-    show_table({"method": "left"} | dict.fromkeys(numbers, "right"), rows)
-    laws = [
-        [each.method, each.factor, each.value, f"{each.predicted_n_s_per_m:.3g}", f"{each.measured_n_s_per_m:.3g}"]
-        for each in found.laws
-        if each.factor != "none"
-    ]
-    columns = dict.fromkeys(("method", "changed", "to"), "left")
-    show_table(columns | dict.fromkeys(("rests to B: predicted", "measured (N s/m)"), "right"), laws)
-    ends = ", ".join(f"{each:.2f}" for each in found.agreement())
-    log.print(f"measured over predicted, least, quartiles and most: {ends}")
+    show_table(chatter, rows)
+    ratios = ", ".join(f"{each:.2f}" for each in found.agreement())
+    log.print(f"measured over predicted, least, quartiles and most: {ratios}")
+    columns = (
+        "area (kN/m N s/m)",
+        "of the paper's best",
+        "in place",
+        "to B (N s/m)",
+        "K near its end / largest",
+    )
+    rows = []
+    for name, each in found.maps.items():
+        times, before = found.of_papers(name), found.before_the_end(name)
+        areas = f"{each.area / 1e3:.0f}", "" if times is None else f"{times:.2f}", f"{each.area_in_place / 1e3:.0f}"
+        end = f"{each.damping_n_s_per_m:g}", "" if before is None else f"{before:.2f}"
+        rows.append([each.case.label, *areas, *end])
+    show_table({"method": "left"} | dict.fromkeys(columns, "right"), rows)
 
 
 def fit(
@@ -161,7 +159,7 @@ def _show_fit(found) -> None:
         for before, after, lack in zip(found.before.facts, best.facts, least, strict=True)
     ]
     columns = (f"the paper's Figure 5: {best.held} of {len(rows)}", "before", "fitted", "numbers")
-    show_table(dict.fromkeys(columns, "left") | {"least lack beside the others": "right"}, rows)
+    show_table(dict.fromkeys(columns, "left") | {"least, others held": "right"}, rows)
 
 
 def _held(fact) -> str:
