@@ -66,6 +66,23 @@ class Chatter:
         return np.minimum(swing, out)
 
 
+def motions(scene: Scene) -> np.ndarray:
+    """Return the counts of motions that came to rest, shape (motions, samples), after `SETTLING_S` constant.
+
+    An estimator that never saw a count change has nothing to chatter about, so there are none that did not move.
+    """
+    spec, dice = scene.spec, np.random.default_rng(SEED)
+    speed = np.exp(dice.uniform(*np.log(SPEEDS_M_PER_S), LANES)) * dice.choice((-1, 1), LANES)
+    fading = np.exp(dice.uniform(*np.log(FADING_S), LANES))
+    begin = dice.uniform(0, spec.count_m, LANES)
+    times = np.arange(round((SETTLING_S + SEEN_S) * spec.sample_hz)) / spec.sample_hz
+    positions = begin[:, None] + (speed * fading)[:, None] * -np.expm1(-times / fading[:, None])
+    counts = np.floor(positions / spec.count_m).astype(np.int64)
+    moved = (counts != counts[:, :1]).any(axis=1)
+    rested = (counts[:, times >= SETTLING_S] == counts[:, -1:]).all(axis=1)
+    return counts[moved & rested]
+
+
 def at_rest(scene: Scene, backend: str) -> Chatter:
     """Return the chatter of a scene's estimator.
 
@@ -76,19 +93,9 @@ def at_rest(scene: Scene, backend: str) -> Chatter:
     Raises:
         ValueError: if the estimator needs the stamps of edges.
     """
-    spec, dice = scene.spec, np.random.default_rng(SEED)
-    speed = np.exp(dice.uniform(*np.log(SPEEDS_M_PER_S), LANES)) * dice.choice((-1, 1), LANES)
-    fading = np.exp(dice.uniform(*np.log(FADING_S), LANES))
-    begin = dice.uniform(0, spec.count_m, LANES)
-    times = np.arange(round((SETTLING_S + SEEN_S) * spec.sample_hz)) / spec.sample_hz
-    positions = begin[:, None] + (speed * fading)[:, None] * -np.expm1(-times / fading[:, None])
-    counts = np.floor(positions / spec.count_m).astype(np.int64)
-    settling = round(SETTLING_S * spec.sample_hz)
-    # Of those that moved and came to rest: an estimator that never saw a count change has nothing to chatter about.
-    moved, rested = (counts != counts[:, :1]).any(axis=1), (counts[:, settling:] == counts[:, -1:]).all(axis=1)
-    velocity = Axis(spec, backend == "float", **scene.parameters).run(counts[moved & rested]).velocity_m_per_s
-    # The force is updated after every sample whose number its period divides.
-    updates = np.arange(len(times)) % spec.samples_per_actuation == 0
-    updates[:settling] = False
-    seen = velocity[:, updates]
+    spec = scene.spec
+    velocity = Axis(spec, backend == "float", **scene.parameters).run(motions(scene)).velocity_m_per_s
+    # The force follows the first sample, and then one of every so many.
+    seen = velocity[:, :: spec.samples_per_actuation]
+    seen = seen[:, round(SETTLING_S * spec.actuation_hz) :]
     return Chatter(seen.min(axis=1), seen.max(axis=1))

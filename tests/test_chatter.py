@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
+from hardwall.model.axis import Axis
 from hardwall.sim import figures
-from hardwall.sim.chatter import Chatter, at_rest
+from hardwall.sim.chatter import Chatter, at_rest, motions
 from hardwall.sim.scene import load
 
 ODD = {"controller.sample_hz": 11_000, "controller.clock_hz": 9_900_000}
@@ -52,6 +53,17 @@ def test_words_move_the_chatter_by_no_more_than_a_few_of_the_root_s_last_bits():
     fixed = at_rest(loaded, "fixed")
     assert np.abs(np.abs(fixed.mean_m_per_s) - two_cycle_m_per_s(loaded)).max() < 2 * bit
     assert 0 < fixed.swing_m_per_s.max() < 4 * bit
+
+
+def test_what_the_force_takes_is_what_the_drive_shows():
+    """In a wall that is nothing but a damper, and everywhere: the drive over B, to half its resolution."""
+    loaded = scene("proposed")
+    damper = {"wall_stiffness": 0.0, "wall_damping": 400.0, "wall_position": -1e-3}
+    drive = Axis(loaded.spec, **loaded.parameters | damper).run(motions(loaded)).drive_n[:, 3000:]
+    velocity = -drive / 400.0
+    chatter, half = at_rest(loaded, "fixed"), loaded.spec.force_resolution_n / 2 / 400.0
+    assert np.abs(velocity.max(axis=1) - chatter.most_m_per_s).max() <= half * (1 + 1e-9)
+    assert np.abs(velocity.min(axis=1) - chatter.least_m_per_s).max() <= half * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("estimator", ["fdm", "levant-implicit"])
