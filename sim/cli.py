@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from . import cli_estimators, cli_studies, cli_trade, cli_zwidth
+from . import cli_estimators, cli_figure_5, cli_studies, cli_trade, cli_zwidth
 from .scene import SceneError, load
 from .terminal import (
     Backend,
@@ -212,6 +212,7 @@ cli_estimators.add_commands(app)
 cli_zwidth.add_commands(app)
 cli_trade.add_commands(app)
 cli_studies.add_commands(app)
+cli_figure_5.add_commands(app)
 
 
 def _interrupted(*_: object) -> None:

@@ -26,7 +26,7 @@ from .terminal import (
 BackendOption = Annotated[Literal["float", "fixed"], typer.Option(help="float64 algorithm, or bit-accurate model")]
 
 
-class _Maps:
+class Maps:
     """Makes maps as the options say, and knows what they took."""
 
     def __init__(self, backend: str, workers: int | None, scheduler: str | None, resume: bool):
@@ -69,7 +69,7 @@ def cutoff(
     from .plot_cutoff import plot_cutoff  # noqa: PLC0415
 
     changes, plot = _changes(set_), output_file(plot, "--plot", SUFFIXES)
-    maps = _Maps(backend, workers, scheduler, resume)
+    maps = Maps(backend, workers, scheduler, resume)
     try:
         devices = cutoffs.study(list(dict.fromkeys(scenes or cutoffs.SCENES)), changes, maps)
     except ValueError as error:
@@ -120,7 +120,7 @@ def gains(
     from .plot_gains import plot_gains  # noqa: PLC0415
 
     changes, plot = _changes(set_), output_file(plot, "--plot", SUFFIXES)
-    maps = _Maps(backend, workers, scheduler, resume)
+    maps = Maps(backend, workers, scheduler, resume)
     try:
         found = gains_of.study(scene, changes, maps)
     except ValueError as error:
@@ -172,9 +172,9 @@ def rates(
     changes, plot = _changes(set_), output_file(plot, "--plot", SUFFIXES)
     refuse(changes, ("controller.sample_hz", "controller.actuation_hz", "controller.clock_hz"), "see --rates")
     rates_hz = sorted(rates_of(tried, "--rates")) if tried else list(studied.RATES_HZ)
-    loaded, maps = load(scene, changes), _Maps(backend, workers, scheduler, resume)
+    loaded, maps = load(scene, changes), Maps(backend, workers, scheduler, resume)
     limits = studied.linear_limits(scene, changes, rates_hz)
-    found = studied.study(scene, changes, curves_of(wanted or ",".join(studied.METHODS)), rates_hz, maps)
+    found = studied.study(scene, changes, curves_of(wanted or ",".join(studied.METHODS), loaded), rates_hz, maps)
     if as_json:
         print(json.dumps(maps.report() | {"methods": [each.report() for each in found], "linear_limits": limits}))
     else:

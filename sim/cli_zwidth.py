@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .scene import SceneError, load, read
+from .scene import Scene, SceneError, load, read
 from .terminal import (
     Backend,
     BadInput,
@@ -32,12 +32,12 @@ COLUMNS |= dict.fromkeys(
 )
 
 
-def curves_of(wanted: str | None) -> list:
-    """Return the methods of the paper's Figure 5, or those that are wanted: of these, or NAME[:OUTPUT]."""
+def curves_of(wanted: str | None, scene: Scene) -> list:
+    """Return the methods of the paper's Figure 5 on a scene, or those that are wanted: of these, or NAME[:OUTPUT]."""
     from . import figures  # noqa: PLC0415
     from .accuracy import outputs  # noqa: PLC0415
 
-    papers = figures.methods()
+    papers = figures.methods(scene)
     if wanted is None:
         return list(papers.values())
     curves = []
@@ -120,7 +120,7 @@ def zwidth(
     refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "see --estimators")
     refuse(changes, ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m"), "see the scene's section zwidth")
     plot, text = output_file(plot, "--plot", SUFFIXES), read(scene)
-    cases = [maps_of.Case(curve.label, scene, text, changes | curve.changes) for curve in curves_of(wanted)]
+    cases = [maps_of.Case(curve.label, scene, text, changes | curve.changes) for curve in curves_of(wanted, loaded)]
     began = time.perf_counter()
     maps = make_maps(f"{loaded.name} Z-width, {backend}", cases, backend, workers, scheduler, resume)
     seconds = time.perf_counter() - began

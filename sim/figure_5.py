@@ -2,9 +2,21 @@
 
 The paper's B axis is known but for zeros that may be missing. So the facts are judged over a range that the maps
 themselves give: from their first B to where Levant with adjusted gains ends, which in the figure is about all of it.
+
+Each fact has a shortfall: 0 where it is held, 1 where nothing of it is there, and between them how much is lacking:
+
+- a region that is to grow: the part by which it shrinks;
+- areas that are to be equal: the part by which they differ beyond `ABOUT`;
+- a region that is to enclose others: the part of their area in the range that is outside it;
+- a sharp drop: what its place is off beyond `ABOUT`, and what K a step before it lacks to half of the largest; where
+  the region has not ended, the last K over the largest;
+- 500 Hz that is to go on: the part of the range by which it ends early; where it goes on too stiff, the part by which K
+  exceeds the largest of Levant's;
+- K that is to rise and fall: a quarter for each rise or fall that is missing.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -14,13 +26,17 @@ ABOUT = 0.1
 """Areas that differ by no more than this part are about equal; so are places on the range."""
 FILTERS = ("fdm-30", "fdm-100", "fdm-500", "fdm-1000")
 
+Judged = tuple[bool, float, str]
+"""Whether a fact is held; its shortfall; the numbers that say so."""
+
 
 @dataclass(frozen=True)
 class Fact:
-    """Attributes: what the paper's figure shows; whether the maps do; the numbers that say so."""
+    """Attributes: what the paper's figure shows; whether the maps do; what they lack, 0 to 1; numbers that say so."""
 
     text: str
     held: bool
+    shortfall: float
     numbers: str
 
 
@@ -44,7 +60,9 @@ def facts(maps: dict[str, Map]) -> list[Fact]:
         ("500 Hz goes on to higher B at lower K", seen.goes_on()),
         ("for 500 and 1000 Hz, K first rises and then falls with B", seen.rises_and_falls()),
     )
-    return [Fact(text, bool(held) and seen.end > 0, numbers) for text, (held, numbers) in judged]
+    if not seen.end:
+        return [Fact(text, False, 1.0, numbers) for text, (_, _, numbers) in judged]
+    return [Fact(text, bool(held), min(float(lack), 1.0), numbers) for text, (held, lack, numbers) in judged]
 
 
 class _Regions:
@@ -63,15 +81,17 @@ class _Regions:
     def _area(self, name: str) -> float:
         return float(np.trapezoid(self.stiffness[name][self.inside], self.dampings[self.inside]))
 
-    def grows(self) -> tuple[bool, str]:
+    def grows(self) -> Judged:
         areas = [self._area(name) for name in FILTERS[:3]]
-        return areas[0] < areas[1] < areas[2], ", ".join(f"{area:.0f}" for area in areas) + " kN/m N s/m"
+        shrunk = sum(_part(before - after, before) for before, after in pairwise(areas))
+        return areas[0] < areas[1] < areas[2], shrunk, ", ".join(f"{area:.0f}" for area in areas) + " kN/m N s/m"
 
-    def about_equal(self) -> tuple[bool, str]:
+    def about_equal(self) -> Judged:
         slower, faster = self._area("fdm-500"), self._area("fdm-1000")
-        return abs(slower - faster) <= ABOUT * faster, f"{slower:.0f} and {faster:.0f} kN/m N s/m"
+        beyond = max(_part(abs(slower - faster), faster) - ABOUT, 0.0)
+        return abs(slower - faster) <= ABOUT * faster, beyond, f"{slower:.0f} and {faster:.0f} kN/m N s/m"
 
-    def encloses(self, outer: str, inner: tuple[str, ...], share: float = 1.0) -> tuple[bool, str]:
+    def encloses(self, outer: str, inner: tuple[str, ...], share: float = 1.0) -> Judged:
         where = self.dampings <= share * self.end
         within = np.max([self.stiffness[name] for name in inner], axis=0)
         short = np.flatnonzero(where & (self.stiffness[outer] < within))
@@ -80,32 +100,42 @@ class _Regions:
             first = short[0]
             pair = f"{self.stiffness[outer][first]:g} against {within[first]:g} kN/m"
             numbers += f", not at {self.dampings[first]:g} N s/m: {pair}"
-        return not len(short), numbers
+        outside = np.maximum(within - self.stiffness[outer], 0.0)[where].sum()
+        return not len(short), _part(outside, within[where].sum()), numbers
 
-    def drops(self) -> tuple[bool, str]:
+    def drops(self) -> Judged:
         """Sharp: a step of B before its last stable wall, K is half of its largest or more."""
-        held, numbers = True, []
+        held, lack, numbers = True, 0.0, []
         for name, wanted in (("proposed", 0.9), ("adjusted", 1.0)):
             values, place = self.stiffness[name], self.ends[name] / self.end if self.end else 0.0
             last = int(np.flatnonzero(values > 0)[-1]) if (values > 0).any() else 0
-            before = values[max(last - 1, 0)]
-            ended = last + 1 < len(values)
+            before, ended = values[max(last - 1, 0)], last + 1 < len(values)
             held = held and ended and before >= values.max() / 2 and abs(place - wanted) <= ABOUT
+            lack += max(abs(place - wanted) - ABOUT, 0.0) + _part(values.max() / 2 - before, values.max())
+            lack += 0.0 if ended else _part(values[last], values.max())
             numbers.append(f"{name}: {before:g}, {values[last]:g}, {'0' if ended else 'on'} kN/m at {place:.2f}")
-        return held, "; ".join(numbers)
+        return held, lack, "; ".join(numbers)
 
-    def goes_on(self) -> tuple[bool, str]:
+    def goes_on(self) -> Judged:
         beyond = self.stiffness["fdm-500"][~self.inside].max(initial=0.0)
         most = self.stiffness["adjusted"].max()
         numbers = f"to {self.ends['fdm-500']:g} N s/m, at up to {beyond:g} kN/m; adjusted at up to {most:g}"
-        return 0 < beyond < most, numbers
+        early, over = _part(self.end - self.ends["fdm-500"], self.end), _part(beyond - most, most)
+        return 0 < beyond < most, over if beyond else early, numbers
 
-    def rises_and_falls(self) -> tuple[bool, str]:
-        held, numbers = True, []
+    def rises_and_falls(self) -> Judged:
+        missing, numbers = 0, []
         for name in ("fdm-500", "fdm-1000"):
             values = self.stiffness[name]
             top = int(values.argmax())
-            held = held and values[0] < values[top] > values[-1]
+            missing += (values[0] >= values[top]) + (values[-1] >= values[top])
             at = f"{values[top]:g} at {self.dampings[top]:g} N s/m"
             numbers.append(f"{name}: {values[0]:g}, {at}, {values[-1]:g} kN/m")
-        return held, "; ".join(numbers)
+        return not missing, missing / 4, "; ".join(numbers)
+
+
+def _part(lack: float, whole: float) -> float:
+    """Return what is lacking as a part of a whole: 0 where nothing lacks, 1 where there is no whole."""
+    if lack <= 0:
+        return 0.0
+    return lack / whole if whole else 1.0

@@ -18,7 +18,7 @@ import numpy as np
 from ..model import estimators
 from . import signals
 from .accuracy import exact_velocity
-from .scene import load
+from .scene import Scene, load
 
 COUNT_M = load("mhz").encoder.count_m
 RATES_HZ = {
@@ -92,15 +92,21 @@ def curves(figure: int) -> list[Curve]:
     return papers + others
 
 
-def methods() -> dict[str, Curve]:
-    """Return the methods of the paper's Figure 5, by the name used on the command line."""
+def methods(scene: Scene | None = None) -> dict[str, Curve]:
+    """Return the methods of the paper's Figure 5, by the name used on the command line.
+
+    Args:
+        scene: its own gains of Levant's are the adjusted ones, if it has any: their alpha was lost, and is its to say.
+    """
+    own = scene and scene.controller.gains.levant
+    adjusted = own.model_dump() if own else ADJUSTED
     filtered = {
         f"fdm-{cutoff}": Curve(f"FDM + {cutoff} Hz", "butterworth", "u", {"cutoff_hz": float(cutoff)})
         for cutoff in (30, 100, 500, 1000)
     }
     return filtered | {
         "proposed": Curve("Levant u, proposed gains", "levant", "u", PROPOSED),
-        "adjusted": Curve("Levant u, adjusted gains", "levant", "u", ADJUSTED),
+        "adjusted": Curve("Levant u, adjusted gains", "levant", "u", adjusted),
     }
 
 
