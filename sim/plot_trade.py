@@ -1,9 +1,11 @@
 """The picture of speed against accuracy: what each shortcut of a simulation costs, and how wrong it is."""
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 
 from . import figures
 from .plot_zwidth import MARKERS
@@ -11,8 +13,12 @@ from .trade import HIT, MAP, Point, Question, Trade
 
 NUMBER_PT = 8
 """Size of a point's number."""
-LEVELS = 40
-"""Places for it, each above the last."""
+AROUND_PT = [
+    radius * NUMBER_PT * np.array([np.sin(angle), np.cos(angle)])
+    for radius in np.arange(1.5, 20.0, 0.5)
+    for angle in np.linspace(0, 2 * np.pi, 16, endpoint=False)
+]
+"""Places for it, seen from the point, the nearest first."""
 
 
 def plot_trade(trade: Trade) -> Figure:
@@ -78,25 +84,25 @@ def _draw(axes: Axes, trade: Trade, question: Question, label: str) -> None:
     axes.set_xscale("log")
     axes.grid(alpha=0.3, which="both")
     most = max(_spot(point, question, label)[1] for point in shown)
-    axes.set_ylim(-0.05 * most - 0.5, 1.15 * most + 1)
+    axes.set_ylim(-0.1 * most - 0.5, 1.15 * most + 1)
 
 
 def _number(axes: Axes, trade: Trade, question: Question, label: str) -> None:
-    """Number a panel's points, each beside its own or in the first place above that is free."""
-    taken = []
-    for number, point in enumerate(trade.points, 1):
-        if point not in _shown(trade, question):
-            continue
-        spot = _spot(point, question, label)
-        right, up = axes.transData.transform(spot) * 72 / axes.figure.dpi
-        for level in range(LEVELS):
-            at = right, up + (level + 1.7) * NUMBER_PT
-            if all(abs(at[0] - x) > 1.4 * NUMBER_PT or abs(at[1] - y) > 0.95 * NUMBER_PT for x, y in taken):
-                break
-        taken.append(at)
-        offset = (0, at[1] - up)
+    """Number a panel's points, each in the nearest place that is free, with a line to its own."""
+    numbered = [(number, point) for number, point in enumerate(trade.points, 1) if point in _shown(trade, question)]
+    spots = [_spot(point, question, label) for _, point in numbered]
+    places = [axes.transData.transform(spot) * 72 / axes.figure.dpi for spot in spots]
+    taken = list(places)
+    for (number, point), spot, own in zip(numbered, spots, places, strict=True):
+        offset = next(each for each in AROUND_PT if _free(own + each, taken))
+        taken.append(own + offset)
         colour = _style(trade, point)["color"]
-        axes.annotate(
-            str(number), spot, offset, textcoords="offset points", ha="center", va="center", fontsize=NUMBER_PT,
-            color=colour,
-        )  # fmt: skip
+        style = {"fontsize": NUMBER_PT, "color": colour, "ha": "center", "va": "center", "textcoords": "offset points"}
+        line = {"arrowstyle": "-", "color": colour, "lw": 0.5, "shrinkA": 0, "shrinkB": 0}
+        edge = [withStroke(linewidth=2, foreground="white")]
+        axes.annotate(str(number), spot, offset, arrowprops=line, path_effects=edge, **style)
+
+
+def _free(place: np.ndarray, taken: list[np.ndarray]) -> bool:
+    """Return whether a number has room at a place, points."""
+    return all(abs(place[0] - x) > 1.4 * NUMBER_PT or abs(place[1] - y) > 1.1 * NUMBER_PT for x, y in taken)
