@@ -58,6 +58,7 @@ def test_rtl_gives_the_models_force_words_on_a_device_of_every_part(output):
     """The plant advances between the same instants, whatever it is made of."""
     parts = AMPLIFIER | CABLE | HAND | DRIVE | {"amplifier.current_limit_a": 10.0, "output.full_scale_n": 40.0}
     parts |= {"output.dac_bits": 12} if output == "dac" else {"output.pwm_carrier_hz": 20_000, "output.pwm_steps": 600}
+    parts |= {"protocol.push_n": 2.0}  # pulses meet the voltage's limit, and push the less
     assert same_words("seed-2011", STABLE | ONE_SECOND | parts).max_force_n > 1
 
 
