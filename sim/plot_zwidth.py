@@ -44,7 +44,7 @@ def plot_zwidth(
         color="black",
         ls=":",
         lw=1.4,
-        label=f"passive: Colgate, Schenkel (none for B over {scene.handle.viscous_n_s_per_m:g} N s/m)",
+        label="passive: Colgate, Schenkel (0: none is)",
     )
     abbott = abbott_okamura_n_per_m(scene) / 1e3
     axes.plot(
