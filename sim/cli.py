@@ -22,6 +22,7 @@ from .terminal import (
     SetOption,
     log,
     output_file,
+    picture_file,
     progress,
     scene_changes,
     show,
@@ -63,9 +64,9 @@ def hit(
     )
     loaded = load(scene, changes)
     from . import hit as hits  # noqa: PLC0415  (compiled kernels are loaded only where they run)
-    from .plot import SUFFIXES, plot_hit  # noqa: PLC0415
+    from .plot import plot_hit  # noqa: PLC0415
 
-    plot = output_file(plot, "--plot", SUFFIXES)
+    plot = picture_file(plot)
     trace = output_file(trace, "--trace", (".fst", ".npz"))
     waveform = trace if trace and trace.suffix == ".fst" else None
     if waveform and backend != "rtl":
@@ -101,7 +102,7 @@ def replay(
     as_json: JsonOption = False,
 ) -> None:
     """Put recorded counts through an estimator; the RTL gets them through its pins."""
-    from .plot_replay import SUFFIXES, plot_replay  # noqa: PLC0415  (only replays need SciPy's filters)
+    from .plot_replay import plot_replay  # noqa: PLC0415  (only replays need SciPy's filters)
     from .recording import RecordingError  # noqa: PLC0415
     from .recording import load as load_recording  # noqa: PLC0415
     from .replay import ReplayError  # noqa: PLC0415
@@ -109,7 +110,7 @@ def replay(
 
     if out and out.exists() and file.exists() and out.samefile(file):
         raise BadInput(f"--out must be another file than the recording, not {str(out)!r}")
-    out, plot = output_file(out, "--out", (".csv",)), output_file(plot, "--plot", SUFFIXES)
+    out, plot = output_file(out, "--out", (".csv",)), picture_file(plot)
     try:
         recording = load_recording(file, column, rate)
         with progress(f"{file.name} {estimator} {backend}", len(recording.counts)) as advance:

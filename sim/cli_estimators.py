@@ -15,8 +15,8 @@ from .terminal import (
     JsonOption,
     PlotOption,
     WorkersOption,
-    log,
-    output_file,
+    draw,
+    picture_file,
     progress,
     rates_of,
     show_table,
@@ -100,7 +100,7 @@ def accuracy(
     from . import figures, parallel  # noqa: PLC0415
     from .accuracy import measure, measure_recording, spec_of  # noqa: PLC0415
     from .encoder import offsets  # noqa: PLC0415
-    from .plot_accuracy import SUFFIXES, against_rate, figure_1, save  # noqa: PLC0415
+    from .plot_accuracy import against_rate, figure_1  # noqa: PLC0415
     from .recording import RecordingError  # noqa: PLC0415
     from .recording import load as load_recording  # noqa: PLC0415
     from .replay import ReplayError  # noqa: PLC0415
@@ -122,7 +122,7 @@ def accuracy(
     at = figures.RATES_HZ[figure or 2] if rates is None else rates_of(rates, "--rates")
     if plot and figure == 1 and (len(at) > 1 or at[0] > DRAWN_HZ_MAX):
         raise BadInput(f"--figure 1 is drawn at one rate of at most {DRAWN_HZ_MAX:g} Hz, not {rates!r}")
-    plot = output_file(plot, "--plot", SUFFIXES)
+    plot = picture_file(plot)
     options = {"backend": backend, "phase_error_counts": encoder_phase_error}
     if acceleration_max is not None:
         options["acceleration_max_m_per_s2"] = acceleration_max
@@ -159,8 +159,7 @@ def accuracy(
         show_table(COLUMNS, [_line(row) for row in sorted(rows, key=lambda row: (row["signal"], row["sample_hz"]))])
     if plot:
         labels = [label for label, _ in jobs]
-        save(figure_1(curves, rows) if figure == 1 else against_rate(rows, labels), plot)
-        log.print(f"picture: {plot}")
+        draw(figure_1(curves, rows) if figure == 1 else against_rate(rows, labels), plot)
 
 
 COST_COLUMNS = {"estimator": "left", "device": "left"} | dict.fromkeys(
@@ -253,10 +252,10 @@ def bits(
     """What a bit buys: error and logic as the words of an estimator shrink bit by bit from the derived widths."""
     from . import parallel  # noqa: PLC0415
     from .bits import DROPPED, bit  # noqa: PLC0415
-    from .plot_accuracy import SUFFIXES, save, what_a_bit_buys  # noqa: PLC0415
+    from .plot_accuracy import what_a_bit_buys  # noqa: PLC0415
     from .store import Store  # noqa: PLC0415
 
-    plot = output_file(plot, "--plot", SUFFIXES)
+    plot = picture_file(plot)
     (sample_hz,) = rates_of(str(rate), "--rate")
     jobs = [
         {"estimator": curve.estimator, "output": curve.output, "sample_hz": sample_hz, "bits_dropped": dropped}
@@ -274,8 +273,7 @@ def bits(
         heads = ("bits dropped", "velocity bits", "RMS (mm/s)", "LUT4", "FF", "DSP")
         show_table({"estimator": "left"} | dict.fromkeys(heads, "right"), lines)
     if plot:
-        save(what_a_bit_buys(rows), plot)
-        log.print(f"picture: {plot}")
+        draw(what_a_bit_buys(rows), plot)
 
 
 def add_commands(app: typer.Typer) -> None:

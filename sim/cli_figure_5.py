@@ -7,10 +7,9 @@ from typing import Annotated, Literal
 import typer
 
 from .cli_studies import BackendOption, Maps
-from .cli_zwidth import refuse
-from .scene import SceneError, load
+from .cli_zwidth import cluster_of, refuse
+from .scene import load
 from .terminal import (
-    BadInput,
     JsonOption,
     PlotOption,
     ResumeOption,
@@ -18,8 +17,9 @@ from .terminal import (
     SchedulerOption,
     SetOption,
     WorkersOption,
+    draw,
     log,
-    output_file,
+    picture_file,
     progress,
     scene_changes,
     show_table,
@@ -51,10 +51,9 @@ def drop(
     """Why Levant's stable region ends at one damping, in a sharp drop; and estimators that have none."""
     from . import drop as studied  # noqa: PLC0415  (kernels are loaded only where they run)
     from . import parallel, store  # noqa: PLC0415
-    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
     from .plot_drop import plot_drop  # noqa: PLC0415
 
-    changes, plot = _changes(set_), output_file(plot, "--plot", SUFFIXES)
+    changes, plot = _changes(set_), picture_file(plot)
     load(scene, changes)
     maps, known = Maps(backend, workers, None, resume), store.Store("drop", resume)
 
@@ -62,17 +61,13 @@ def drop(
         with progress(title, len(jobs)) as advance:
             return parallel.run(studied.strike, jobs, known, workers, advance)
 
-    try:
-        found = studied.study(scene, changes, backend, striking, maps)
-    except ValueError as error:
-        raise SceneError(str(error)) from None
+    found = studied.study(scene, changes, backend, striking, maps)
     if as_json:
         print(json.dumps(maps.report() | found.report()))
     else:
         _show_drop(found)
     if plot:
-        save(plot_drop(found, backend), plot)
-        log.print(f"picture: {plot}")
+        draw(plot_drop(found, backend), plot)
 
 
 def _show_drop(found) -> None:
@@ -119,26 +114,21 @@ def fit(
     as_json: JsonOption = False,
 ) -> None:
     """Search what the paper does not give (mass, friction, delay ...) for a device that shows its Figure 5."""
-    from . import cluster, store, zwidth  # noqa: PLC0415  (kernels are loaded only where they run)
     from . import fit as studied  # noqa: PLC0415
+    from . import store, zwidth  # noqa: PLC0415  (kernels are loaded only where they run)
     from .figures import methods  # noqa: PLC0415
 
-    if workers and scheduler:
-        raise BadInput(f"--scheduler {scheduler} has workers of its own: give it or --workers, not both")
     changes = _changes(set_)
     loaded, known, fits = load(scene, changes), store.Store("fit", resume), []
     began = time.perf_counter()
-    try:
-        with cluster.client(len(methods()), workers, scheduler) as client:
+    with cluster_of(len(methods()), workers, scheduler) as client:
 
-            def mapping(_: str, cases: list) -> list:
-                return zwidth.run(cases, backend, known, client)
+        def mapping(_: str, cases: list) -> list:
+            return zwidth.run(cases, backend, known, client)
 
-            for each in [reading] if reading else studied.READINGS:
-                with progress(f"{loaded.name}, B axis {each}", evaluations) as advance:
-                    fits.append(studied.study(scene, changes, each, evaluations, seed, mapping, advance))
-    except ValueError as error:
-        raise SceneError(str(error)) from None
+        for each in [reading] if reading else studied.READINGS:
+            with progress(f"{loaded.name}, B axis {each}", evaluations) as advance:
+                fits.append(studied.study(scene, changes, each, evaluations, seed, mapping, advance))
     seconds = time.perf_counter() - began
     if as_json:
         report = {"scene": loaded.name, "backend": backend, "seed": seed, "seconds": seconds}

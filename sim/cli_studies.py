@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 import typer
 
-from .cli_zwidth import curves_of, make_maps, refuse
-from .scene import SceneError, load, names
+from .cli_zwidth import curves_of, make_maps, map_changes, refuse
+from .scene import load, names
 from .terminal import (
     JsonOption,
     PlotOption,
@@ -16,13 +16,14 @@ from .terminal import (
     SchedulerOption,
     SetOption,
     WorkersOption,
+    draw,
     log,
-    output_file,
+    picture_file,
     rates_of,
-    scene_changes,
     show_table,
 )
 
+SEARCHED = "it is what is searched"
 BackendOption = Annotated[Literal["float", "fixed"], typer.Option(help="float64 algorithm, or bit-accurate model")]
 
 
@@ -42,14 +43,6 @@ class Maps:
         return {"backend": self._options[0], "hits": self._hits, "seconds": time.perf_counter() - self._began}
 
 
-def _changes(set_: list[str] | None) -> dict:
-    """Return the changes of scenes; bad input for those that a study makes itself."""
-    changes = scene_changes(set_)
-    refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "it is what is searched")
-    refuse(changes, ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m"), "see the scene's section zwidth")
-    return changes
-
-
 def cutoff(
     scenes: Annotated[
         list[str] | None,
@@ -65,22 +58,17 @@ def cutoff(
 ) -> None:
     """The best cutoff of a filter behind a finite difference: the area of the stable region against it."""
     from . import cutoff as cutoffs  # noqa: PLC0415  (kernels are loaded only where they run)
-    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
     from .plot_cutoff import plot_cutoff  # noqa: PLC0415
 
-    changes, plot = _changes(set_), output_file(plot, "--plot", SUFFIXES)
+    changes, plot = map_changes(set_, SEARCHED), picture_file(plot)
     maps = Maps(backend, workers, scheduler, resume)
-    try:
-        devices = cutoffs.study(list(dict.fromkeys(scenes or cutoffs.SCENES)), changes, maps)
-    except ValueError as error:
-        raise SceneError(str(error)) from None
+    devices = cutoffs.study(list(dict.fromkeys(scenes or cutoffs.SCENES)), changes, maps)
     if as_json:
         print(json.dumps(maps.report() | {"devices": [each.report() for each in devices]}))
     else:
         _show_cutoffs(devices)
     if plot:
-        save(plot_cutoff(devices, backend), plot)
-        log.print(f"picture: {plot}")
+        draw(plot_cutoff(devices, backend), plot)
 
 
 def _area(each) -> str:
@@ -116,22 +104,17 @@ def gains(
 ) -> None:
     """Levant's gains, searched in full: the area of the stable region over lambda and alpha, for both outputs."""
     from . import gains as gains_of  # noqa: PLC0415  (kernels are loaded only where they run)
-    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
     from .plot_gains import plot_gains  # noqa: PLC0415
 
-    changes, plot = _changes(set_), output_file(plot, "--plot", SUFFIXES)
+    changes, plot = map_changes(set_, SEARCHED), picture_file(plot)
     maps = Maps(backend, workers, scheduler, resume)
-    try:
-        found = gains_of.study(scene, changes, maps)
-    except ValueError as error:
-        raise SceneError(str(error)) from None
+    found = gains_of.study(scene, changes, maps)
     if as_json:
         print(json.dumps(maps.report() | found.report()))
     else:
         _show_gains(found)
     if plot:
-        save(plot_gains(found, backend), plot)
-        log.print(f"picture: {plot}")
+        draw(plot_gains(found, backend), plot)
 
 
 def _show_gains(found) -> None:
@@ -166,10 +149,9 @@ def rates(
 ) -> None:
     """What rate buys a stiff wall, 1 kHz to 1 MHz, and which part of the device ends it."""
     from . import rates as studied  # noqa: PLC0415  (kernels are loaded only where they run)
-    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
     from .plot_rates import plot_rates  # noqa: PLC0415
 
-    changes, plot = _changes(set_), output_file(plot, "--plot", SUFFIXES)
+    changes, plot = map_changes(set_, SEARCHED), picture_file(plot)
     refuse(changes, ("controller.sample_hz", "controller.actuation_hz", "controller.clock_hz"), "see --rates")
     rates_hz = sorted(rates_of(tried, "--rates")) if tried else list(studied.RATES_HZ)
     loaded, maps = load(scene, changes), Maps(backend, workers, scheduler, resume)
@@ -180,8 +162,7 @@ def rates(
     else:
         _show_rates(found, limits, rates_hz)
     if plot:
-        save(plot_rates(found, limits, loaded, backend), plot)
-        log.print(f"picture: {plot}")
+        draw(plot_rates(found, limits, loaded, backend), plot)
 
 
 def _show_rates(found: list, limits: dict, rates_hz: list[int]) -> None:

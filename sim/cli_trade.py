@@ -6,8 +6,7 @@ from collections.abc import Callable, Hashable
 
 import typer
 
-from .cli_zwidth import make_maps, refuse
-from .scene import SceneError
+from .cli_zwidth import make_maps, map_changes, refuse
 from .terminal import (
     JsonOption,
     PlotOption,
@@ -15,10 +14,10 @@ from .terminal import (
     SceneArgument,
     SetOption,
     WorkersOption,
+    draw,
     log,
-    output_file,
+    picture_file,
     progress,
-    scene_changes,
     show_table,
 )
 
@@ -56,26 +55,19 @@ def trade(
     as_json: JsonOption = False,
 ) -> None:
     """Speed against accuracy: what a coarser backend, device, rate, solver or map saves, and what it gets wrong."""
-    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415  (kernels are loaded only where they run)
     from .plot_trade import plot_trade  # noqa: PLC0415
     from .trade_study import study  # noqa: PLC0415
 
-    changes, plot = scene_changes(set_), output_file(plot, "--plot", SUFFIXES)
-    refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "it takes two of the paper's")
-    refuse(changes, ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m"), "see the scene's section zwidth")
+    changes, plot = map_changes(set_, "it takes two of the paper's"), picture_file(plot)
     refuse(changes, ("solver",), "it is one of the settings")
     began = time.perf_counter()
-    try:
-        found = study(scene, changes, _Runs(workers, resume))
-    except ValueError as error:
-        raise SceneError(str(error)) from None
+    found = study(scene, changes, _Runs(workers, resume))
     if as_json:
         print(json.dumps(found.report() | {"seconds": time.perf_counter() - began}))
     else:
         _show(found)
     if plot:
-        save(plot_trade(found), plot)
-        log.print(f"picture: {plot}")
+        draw(plot_trade(found), plot)
 
 
 def _show(found) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .scene import Scene, SceneError, load, read
+from .scene import Scene, load, read
 from .terminal import (
     Backend,
     BadInput,
@@ -18,8 +18,8 @@ from .terminal import (
     SchedulerOption,
     SetOption,
     WorkersOption,
-    log,
-    output_file,
+    draw,
+    picture_file,
     progress,
     scene_changes,
     show,
@@ -52,6 +52,14 @@ def curves_of(wanted: str | None, scene: Scene) -> list:
     return curves
 
 
+def map_changes(set_: list[str] | None, estimators: str, walls: str = "see the scene's section zwidth") -> dict:
+    """Return the changes of a scene that is mapped; `refuse`s methods and walls, for which the reasons are given."""
+    changes = scene_changes(set_)
+    refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), estimators)
+    refuse(changes, ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m"), walls)
+    return changes
+
+
 def refuse(changes: dict, keys: tuple[str, ...], instead: str) -> None:
     """Refuse changes of a scene that the command makes itself."""
     for key in changes:
@@ -73,20 +81,23 @@ def _limits(maps: list, dampings: list[float]) -> list[list[float] | None]:
     return limits
 
 
-def make_maps(title: str, cases: list, backend: str, workers: int | None, scheduler: str | None, resume: bool) -> list:
-    """Return the map of each case, made on the cluster that the options ask for, with a bar of what is done."""
-    from . import cluster, store  # noqa: PLC0415  (kernels are loaded only where they run)
-    from . import zwidth as maps_of  # noqa: PLC0415
+def cluster_of(jobs: int, workers: int | None, scheduler: str | None):
+    """Return `cluster.client` as `--workers` or `--scheduler` ask for it."""
+    from . import cluster  # noqa: PLC0415  (Dask is loaded only where it runs)
 
     if workers and scheduler:
         raise BadInput(f"--scheduler {scheduler} has workers of its own: give it or --workers, not both")
-    try:
-        for case in cases:
-            maps_of.grid_of(case.parsed)
-    except ValueError as error:
-        raise SceneError(str(error)) from None
-    workers_of = cluster.client(len(cases), workers, scheduler)
-    with progress(title, len(cases)) as advance, workers_of as client:
+    return cluster.client(jobs, workers, scheduler)
+
+
+def make_maps(title: str, cases: list, backend: str, workers: int | None, scheduler: str | None, resume: bool) -> list:
+    """Return the map of each case, made on the cluster that the options ask for, with a bar of what is done."""
+    from . import store  # noqa: PLC0415  (kernels are loaded only where they run)
+    from . import zwidth as maps_of  # noqa: PLC0415
+
+    for case in cases:
+        maps_of.grid_of(case.parsed)  # before a cluster is started
+    with cluster_of(len(cases), workers, scheduler) as client, progress(title, len(cases)) as advance:
         return maps_of.run(cases, backend, store.Store("zwidth", resume), client, advance)
 
 
@@ -109,17 +120,14 @@ def zwidth(
     as_json: JsonOption = False,
 ) -> None:
     """Map the walls that are stable: for each estimator, the largest stiffness at every damping."""
-    changes = scene_changes(set_)
+    changes = map_changes(set_, "see --estimators")
     loaded = load(scene, changes)
     from . import figures  # noqa: PLC0415  (kernels are loaded only where they run)
     from . import zwidth as maps_of  # noqa: PLC0415
     from .figure_5 import facts  # noqa: PLC0415
-    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
     from .plot_zwidth import plot_zwidth  # noqa: PLC0415
 
-    refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "see --estimators")
-    refuse(changes, ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m"), "see the scene's section zwidth")
-    plot, text = output_file(plot, "--plot", SUFFIXES), read(scene)
+    plot, text = picture_file(plot), read(scene)
     cases = [maps_of.Case(curve.label, scene, text, changes | curve.changes) for curve in curves_of(wanted, loaded)]
     began = time.perf_counter()
     maps = make_maps(f"{loaded.name} Z-width, {backend}", cases, backend, workers, scheduler, resume)
@@ -150,8 +158,7 @@ def zwidth(
     if plot:
         grid = maps_of.grid_of(loaded)
         limits = _limits(maps, grid.dampings)
-        save(plot_zwidth(maps, limits, loaded, grid, backend), plot)
-        log.print(f"picture: {plot}")
+        draw(plot_zwidth(maps, limits, loaded, grid, backend), plot)
 
 
 def lipschitz(
@@ -168,15 +175,13 @@ def lipschitz(
     load(scene, changes)
     refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "it takes the paper's filter")
     from .lipschitz import measure  # noqa: PLC0415  (kernels are loaded only where they run)
-    from .plot_accuracy import SUFFIXES, save  # noqa: PLC0415
     from .plot_lipschitz import plot_lipschitz  # noqa: PLC0415
 
-    plot = output_file(plot, "--plot", SUFFIXES)
+    plot = picture_file(plot)
     found = measure(scene, changes, before, after, sines)
     show(found.report(), as_json)
     if plot:
-        save(plot_lipschitz(found), plot)
-        log.print(f"picture: {plot}")
+        draw(plot_lipschitz(found), plot)
 
 
 def add_commands(app: typer.Typer) -> None:

@@ -133,8 +133,7 @@ def study(scenes: list[str], changes: dict[str, Any], mapping: Mapping) -> list[
         mapping: makes the maps.
 
     Raises:
-        SceneError: if a scene cannot be.
-        ValueError: if a scene has no section `zwidth`.
+        SceneError: if a scene cannot be, or has no section `zwidth`.
     """
     devices = [_Cases(scene, changes) for scene in scenes]
     sweeps = [device.sweep() for device in devices]

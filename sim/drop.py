@@ -22,7 +22,7 @@ import numpy as np
 from . import hit
 from .chatter import Chatter, at_rest
 from .figures import PROPOSED, Curve, methods
-from .scene import Scene, parse, read
+from .scene import Scene, SceneError, parse, read
 from .study import Mapping, accepted, room
 from .zwidth import Case, Map
 
@@ -196,13 +196,12 @@ def study(scene: str, changes: dict[str, Any], backend: str, striking: Striking,
         mapping: makes maps, on the same backend.
 
     Raises:
-        SceneError: if the scene cannot be.
-        ValueError: if it has no section `zwidth`, or no Coulomb friction.
+        SceneError: if the scene cannot be, or has no section `zwidth`, or no Coulomb friction.
     """
     text = read(scene)
     plain = parse(scene, text, changes | {"wall.stiffness_n_per_m": STIFFNESS_N_PER_M})
     if not plain.handle.coulomb_n:
-        raise ValueError(f"{plain.name}: handle.coulomb_n must be more than 0: no friction holds against a chatter")
+        raise SceneError(f"{plain.name}: handle.coulomb_n must be more than 0: no friction holds against a chatter")
     compared = curves(plain)
     most = max(float(DAMPINGS_N_S_PER_M[-1]), plain.controller.damping_max_n_s_per_m)
     roomy = changes | {"wall.stiffness_n_per_m": STIFFNESS_N_PER_M, "controller.damping_max_n_s_per_m": most}

@@ -247,8 +247,7 @@ def study(
         progress: called after every evaluation with how many are done.
 
     Raises:
-        SceneError: if the scene cannot be.
-        ValueError: if it lacks a key that is searched.
+        SceneError: if the scene cannot be, or lacks a key that is searched.
     """
     judge = _Judge(scene, changes, reading, mapping)
     plain = judge.parsed()
@@ -276,11 +275,11 @@ def _value(scene: Scene, key: str) -> float:
     """Return the value of a key of a scene.
 
     Raises:
-        ValueError: if the scene has none.
+        SceneError: if the scene has none.
     """
     value: Any = scene
     for name in key.split("."):
         value = getattr(value, name, None)
     if value is None:
-        raise ValueError(f"{scene.name}: {key} is missing: the search begins from it")
+        raise SceneError(f"{scene.name}: {key} is missing: the search begins from it")
     return value

@@ -128,8 +128,7 @@ def study(scene: str, changes: dict[str, Any], mapping: Mapping) -> Search:
         mapping: makes the maps.
 
     Raises:
-        SceneError: if the scene cannot be, or with none of the gains.
-        ValueError: if the scene has no section `zwidth`.
+        SceneError: if the scene cannot be, with none of the gains either, or has no section `zwidth`.
     """
     text = read(scene)
     plain = parse(scene, text, changes)

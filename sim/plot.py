@@ -8,10 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .hit import Hit
+from .picture import save
 from .record import Trace
-from .whole_file import whole_file
 
-SUFFIXES = (".pdf", ".png", ".svg")
 ESTIMATE, TRUE, BASELINE, FORCE = "tab:blue", "black", "0.8", "tab:red"
 
 
@@ -22,13 +21,12 @@ def plot_hit(hit: Hit, path: Path) -> None:
 
     Args:
         hit: a run with traces.
-        path: ends in one of `SUFFIXES`.
+        path: ends in one of `picture.SUFFIXES`.
 
     Raises:
         OSError: if the file cannot be written.
     """
-    # Text as text, and nothing that varies from run to run.
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "hardwall", "font.size": 9}):
+    with mpl.rc_context({"font.size": 9}):
         figure = Figure(figsize=(11, 7.5), layout="constrained")
         axes = figure.subplots(3, 2, sharex="col", width_ratios=(1, 1.25))
         figure.suptitle(_title(hit))
@@ -49,8 +47,7 @@ def plot_hit(hit: Hit, path: Path) -> None:
             for axis in axes[:, 1]:
                 axis.set_axis_off()
             axes[0, 1].set_title("the handle never reached the wall")
-        with whole_file(path) as part:
-            figure.savefig(part, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
+        save(figure, path)
 
 
 def _first_contact(trace: Trace) -> Trace:

@@ -1,7 +1,5 @@
 """Pictures of accuracy: the founding paper's two figures, and error against rate."""
 
-from pathlib import Path
-
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,26 +9,13 @@ from . import signals
 from .accuracy import axis_spec, exact_velocity
 from .encoder import offsets
 from .figures import Curve, label, lower_bound_m_per_s, window_floor_m_per_s
+from .picture import MARKERS
 from .stream import velocities
-from .whole_file import whole_file
 
-SUFFIXES = (".pdf", ".png", ".svg")
-MARKERS = "osv^<>DPX*hpd"
 REACHING_S = (0.0, 0.06)
 TURNING_S = (1.2, 1.28)
 LEAST_MM_S = 1e-6
 """What is less is drawn as this: an axis of decades has no zero."""
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a picture: text as text, and nothing in it that varies from run to run.
-
-    Raises:
-        OSError: if the file cannot be written.
-    """
-    metadata = {".png": None, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[path.suffix]
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "hardwall"}), whole_file(path) as part:
-        figure.savefig(part, format=path.suffix[1:], dpi=150, metadata=metadata)
 
 
 def figure_1(curves: list[Curve], rows: list[dict]) -> Figure:

@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .drop import STIFFNESS_N_PER_M, Drop
+from .picture import MARKERS
 from .zwidth import grid_of
 
-MARKERS = "osv^<>DPX*hpd"
 LEAST_M, LEAST_N = 1e-9, 1e-5
 """What is less is drawn as this: an axis of decades has no zero."""
 FLED_M = 0.1

@@ -1,9 +1,8 @@
 """The picture of what rate buys: the largest stable stiffness against the rate, and what ends it."""
 
-import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from .plot_zwidth import MARKERS
+from .picture import line_style
 from .rates import Gain
 from .scene import Scene
 
@@ -27,7 +26,7 @@ def plot_rates(gains: list[Gain], limits: dict[str, list[float]], scene: Scene, 
     for style, (left, limit) in zip(STYLES, limits.items(), strict=True):
         axes.plot(rates_khz, [k / 1e3 for k in limit], color="0.55", ls=style, lw=1.2, label=f"linear loop, {left}")
     for index, gain in enumerate(gains):
-        style = {"color": mpl.colormaps["tab10"](index % 10), "marker": MARKERS[index % len(MARKERS)], "ms": 6}
+        style = line_style(index, 6)
         largest = [k / 1e3 for k in gain.largest_n_per_m]
         axes.plot(rates_khz, largest, label=gain.label, lw=1.5, **style)
         axes.plot(OWN * rates_khz[0], gain.own.largest_n_per_m / 1e3, mfc="none", ls="", **style)

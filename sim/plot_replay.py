@@ -2,15 +2,13 @@
 
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from .picture import SUFFIXES, save
 from .reference import judged_from
 from .replay import Replay, ReplayError
-from .whole_file import whole_file
 
-SUFFIXES = (".pdf", ".png", ".svg")
 DETAIL_S = 0.4
 BACKEND_NAMES = {"float": "float64", "fixed": "bit-accurate model", "rtl": "hardware, through its pins"}
 ESTIMATE, BASELINE, REFERENCE = "tab:blue", "0.75", "black"
@@ -92,10 +90,6 @@ def plot_replay(result: Replay, path: str | Path) -> None:
         ReplayError: for another ending.
         OSError: if the file cannot be written.
     """
-    suffix = Path(path).suffix
-    if suffix not in SUFFIXES:
+    if Path(path).suffix not in SUFFIXES:
         raise ReplayError(f"the name of a plot must end in {', '.join(SUFFIXES)}, not {str(path)!r}")
-    # Text as text, and nothing that varies from run to run.
-    metadata = {".png": None, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[suffix]
-    with whole_file(path) as part, mpl.rc_context({"svg.hashsalt": "hardwall", "svg.fonttype": "none"}):
-        figure(result).savefig(part, format=suffix[1:], dpi=150, metadata=metadata)
+    save(figure(result), Path(path))

@@ -1,6 +1,5 @@
 """The picture of speed against accuracy: what each shortcut of a simulation costs, and how wrong it is."""
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -8,7 +7,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
 from . import figures
-from .plot_zwidth import MARKERS
+from .picture import line_style
 from .trade import HIT, MAP, Point, Question, Trade
 
 NUMBER_PT = 8
@@ -60,7 +59,7 @@ def plot_trade(trade: Trade) -> Figure:
 def _style(trade: Trade, point: Point) -> dict:
     """Return colour and shape of a point, those of its axis."""
     index = list(dict.fromkeys(each.shortcut.axis for each in trade.points)).index(point.shortcut.axis)
-    return {"color": mpl.colormaps["tab10"](index % 10), "marker": MARKERS[index % len(MARKERS)], "ms": 6}
+    return line_style(index, 6)
 
 
 def _spot(point: Point, question: Question, label: str) -> tuple[float, float]:

@@ -2,16 +2,14 @@
 
 from collections.abc import Sequence
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
 from .boundary import Grid
+from .picture import line_style
 from .scene import Scene
 from .theory import abbott_okamura_n_per_m, colgate_schenkel_n_per_m
 from .zwidth import Map
-
-MARKERS = "osv^<>DPX*hpd"
 
 
 def plot_zwidth(
@@ -30,7 +28,7 @@ def plot_zwidth(
     axes = picture.subplots()
     dampings = grid.dampings
     for index, (each, limit) in enumerate(zip(maps, limits, strict=True)):
-        style = {"color": mpl.colormaps["tab10"](index % 10), "marker": MARKERS[index % len(MARKERS)], "ms": 4}
+        style = line_style(index, 4)
         edge = [(edge.damping_n_s_per_m, edge.stable_n_per_m / 1e3) for edge in each.edges]
         axes.plot(*zip(*edge, strict=True), label=each.case.label, lw=1.4, **style)
         if limit:

@@ -108,14 +108,14 @@ def study(
     return [Gain(curve.label, rates_hz, next(maps), [next(maps) for _ in rates_hz]) for curve in curves]
 
 
+LAG = {"amplifier.bandwidth_hz": None, "amplifier.current_limit_a": None, "motor": None}
+CABLE = {"transmission": None}
 WITHOUT = {
     "handle, amplifier and cable": {},
-    "without the cable": {"transmission": None},
-    "without the amplifier's lag": {"amplifier.bandwidth_hz": None, "amplifier.current_limit_a": None, "motor": None},
-    "rigid": {
-        "transmission": None, "amplifier.bandwidth_hz": None, "amplifier.current_limit_a": None, "motor": None,
-    },
-}  # fmt: skip
+    "without the cable": CABLE,
+    "without the amplifier's lag": LAG,
+    "rigid": CABLE | LAG,
+}
 """Parts that are taken out, by what is left."""
 
 

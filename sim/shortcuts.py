@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from itertools import chain, combinations
 from typing import Any
 
-from .rates import taken_out
+from .rates import CABLE, LAG, taken_out
 from .scene import Scene
 
-LAG = {"amplifier.bandwidth_hz": None, "amplifier.current_limit_a": None, "motor": None}
 PARTS = {
-    "rigid handle only": {**LAG, "transmission": None, "output": None},
-    "no cable": {"transmission": None},
+    "rigid handle only": LAG | CABLE | {"output": None},
+    "no cable": CABLE,
     "no motor, no amplifier's lag": LAG,
     "no motor": {"motor": None, "amplifier.current_limit_a": None},
     "no output steps": {"output": None},

@@ -18,7 +18,7 @@ def room(scene: Scene, coarser: float) -> dict[str, Any]:
     """Return changes of a scene, by dotted key: a larger grid of so much longer steps, on a controller made for it.
 
     Raises:
-        ValueError: if it has no section `zwidth`.
+        SceneError: if it has no section `zwidth`.
     """
     grid = grid_of(scene)
     stiffness, damping = ROOM * grid.stiffness_to_n_per_m, ROOM * grid.damping_to_n_s_per_m

@@ -87,6 +87,23 @@ def output_file(path: Path | None, option: str, suffixes: tuple[str, ...]) -> Pa
     return path
 
 
+def draw(figure, path: Path) -> None:
+    """Write a picture, and say where it is."""
+    from .picture import save  # noqa: PLC0415  (Matplotlib is loaded only where something is drawn)
+
+    save(figure, path)
+    log.print(f"picture: {path}")
+
+
+def picture_file(path: Path | None) -> Path | None:
+    """Return where `--plot` wants the picture: see `output_file`."""
+    if path is None:
+        return None
+    from .picture import SUFFIXES  # noqa: PLC0415  (Matplotlib is loaded only where something is drawn)
+
+    return output_file(path, "--plot", SUFFIXES)
+
+
 def show(report: dict[str, Any], as_json: bool) -> None:
     """Print a report: one JSON object, or a table of its keys."""
     if as_json:

@@ -121,8 +121,7 @@ def study(name: str, changes: dict[str, Any], runs: Runs) -> Trade:
         runs: what runs the hits.
 
     Raises:
-        SceneError: if the scene cannot be.
-        ValueError: if it has no section `zwidth`.
+        SceneError: if the scene cannot be, or has no section `zwidth`.
         RuntimeError: if none of its walls is stable, or the hardware's force words are not those of `fixed`.
     """
     cases = _Cases(name, changes)

@@ -15,7 +15,7 @@ from distributed import Client, as_completed
 from . import hit, store
 from .boundary import Edge, Grid, area, trace
 from .cluster import result_of
-from .scene import Scene, parse
+from .scene import Scene, SceneError, parse
 
 
 @dataclass(frozen=True)
@@ -115,10 +115,10 @@ def grid_of(scene: Scene) -> Grid:
     """Return the steps of a scene's maps.
 
     Raises:
-        ValueError: if it has no section `zwidth`.
+        SceneError: if it has no section `zwidth`.
     """
     if scene.zwidth is None:
-        raise ValueError(f"{scene.name}: zwidth is missing: a map needs its steps")
+        raise SceneError(f"{scene.name}: zwidth is missing: a map needs its steps")
     return Grid(**scene.zwidth.model_dump())
 
 
@@ -197,8 +197,7 @@ def run(
         progress: called after every verdict with how many maps are done, parts of one counted too.
 
     Raises:
-        SceneError: if a case cannot be.
-        ValueError: if a scene has no section `zwidth`.
+        SceneError: if a case cannot be, or its scene has no section `zwidth`.
     """
     traces = [_Tracing(case, backend) for case in cases]
 
