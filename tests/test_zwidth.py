@@ -203,12 +203,15 @@ def test_an_interrupted_map_says_how_to_go_on(tmp_path):
         command, env={**os.environ, "HARDWALL_BUILD": str(build)}, stderr=subprocess.PIPE, stdout=subprocess.PIPE,
         text=True, start_new_session=True,
     )  # fmt: skip
+
+    def kept() -> list[str]:
+        return [line for path in build.glob("results/zwidth-*.jsonl") for line in path.read_text().split()]
+
     deadline = time.monotonic() + 120
-    while time.monotonic() < deadline and not list(build.glob("results/zwidth-*.jsonl")):
+    while time.monotonic() < deadline and not kept():
         time.sleep(0.2)
     os.killpg(process.pid, signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (1, "")
     assert err == "hardwall: error: interrupted; --resume goes on from here\n"
-    kept = [line for line in next(build.glob("results/zwidth-*.jsonl")).read_text().splitlines() if line]
-    assert len(kept) > 0
+    assert len(kept()) > 0
