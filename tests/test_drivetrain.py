@@ -112,14 +112,17 @@ def test_sticking_and_limits_agree_with_numerical_integration():
 
 def test_a_voltage_that_crosses_all_of_its_range_in_a_leg_is_followed():
     """Narrow limits, fast devices: whole legs against legs of another length, and one case against SciPy."""
-    motor = Motor(1.8173661069341358, 2.3265107419e-4, 0.4116723507997901, 0.5511340164319264, 0.010239159076919186)
+    motor = Motor(
+        1.8173661069341358, 2.3265107419110975e-4, 0.4116723507997901, 0.5511340164319264, 0.010239159076919186
+    )
     device = Device(
         0.0033818178039655943, bandwidth_hz=15.979827711410739, motor=motor,
         hand=Hand(0.0, 0.0, 12015192.797688242, -7.833879805856382e-05),
     )  # fmt: skip
     state = State(-7.809452347391156e-05, -0.04945183797444533, (-2.2938110501431392, 0.0, 0.0), 0)
-    found = moved(device, state, 0.0116, 7.745856e-4)
-    expected, happened = integrated(device, laboratory(device, state), 0.0116, 7.745856e-4)
+    command, seconds = 0.011602462336783888, 7.745856374583966e-4
+    found = moved(device, state, command, seconds)
+    expected, happened = integrated(device, laboratory(device, state), command, seconds)
     assert happened.count("limits") > 5
     assert laboratory(device, found) == pytest.approx(expected, rel=1e-6, abs=1e-9)
     rng, apart = np.random.default_rng(6), 0

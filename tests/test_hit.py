@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from test_theory import CABLE, HAND
+from test_world import PULSES
 
 from hardwall.sim import hit
 from hardwall.sim.scene import load
@@ -51,6 +53,31 @@ def test_in_place_is_within_friction_a_count_and_the_rms(run, side):
     for factor, in_place in ((0.999, True), (1.001, False)):
         mean_m = (0.3572 + side * factor * farthest_n) / 60e3
         assert replace(run, mean_m=mean_m, rms_m=2e-6).in_place is in_place
+
+
+CODES = {"output.full_scale_n": 32.0, "output.dac_bits": 8}
+FIRM = HAND | {"hand.stiffness_n_per_m": 40e3, "hand.rest_m": 1e-4}
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize(
+    ("parts", "carried_n", "farthest_n", "spring_n_per_m"),
+    [
+        (PULSES, 0.3572, 0.1 + 2 * 50 / 300, 0.0),
+        (CODES, 0.3572, 0.1 + 2 * 32 / 2**8, 0.0),
+        (CABLE, 0.3572, 0.1, 0.0),
+        (CABLE | {"transmission.encoder_at": "motor"}, 0.3572, 0.1 + 60e3 / 2e5 * (0.3572 + 0.1), 0.0),
+        (FIRM, 0.3572 + 40e3 * 1e-4, 0.1, 40e3),
+    ],
+    ids=["pulses", "converter", "cable", "encoder at the motor", "hand"],
+)
+def test_in_place_allows_what_a_part_hides(run, side, parts, carried_n, farthest_n, spring_n_per_m):
+    """And counts of 1 um, and an RMS of 2 um. What a hand carries shrinks as it follows."""
+    scene = load("seed-2011", SCENE | parts)
+    for factor, in_place in ((0.999, True), (1.001, False)):
+        off_n = side * factor * (farthest_n + 60e3 * 3e-6)
+        mean_m = (carried_n + off_n) / (60e3 + spring_n_per_m)
+        assert replace(run, scene=scene, mean_m=mean_m, rms_m=2e-6).in_place is in_place
 
 
 @pytest.mark.parametrize(("sample_hz", "met"), [(10_000, True), (20_000, True), (15_000, False)])

@@ -55,6 +55,16 @@ def test_each_part_lowers_the_linear_limit_and_without_any_it_grows_with_the_rat
     assert rigid[0] == pytest.approx(largest, rel=1e-6), "the masses of handle and motor are those of the rigid device"
 
 
+def test_without_a_cable_mass_and_friction_of_the_motor_are_the_handle_s():
+    own = {"handle.mass_kg": 0.3, "handle.viscous_n_s_per_m": 0.25}
+    side = {"transmission.motor_mass_kg": 0.125, "transmission.motor_viscous_n_s_per_m": 0.5}
+    scene = load("drive-2011", own | side)
+    moved = {"handle.mass_kg": 0.425, "handle.viscous_n_s_per_m": 0.75}
+    assert rates.taken_out(scene, rates.CABLE) == rates.CABLE | moved
+    assert rates.taken_out(scene, rates.LAG) == rates.LAG
+    assert rates.taken_out(load("seed-2011"), rates.CABLE) == rates.CABLE
+
+
 def test_report_and_picture(monkeypatch, capsys, tmp_path):
     picture = tmp_path / "rates.svg"
     words = [word for key, value in FEW.items() for word in ("--set", f"{key}={value}")]

@@ -56,3 +56,12 @@ def test_what_is_sure_is_so_and_the_rest_is_found():
             said[left] += 1
         assert leaves(series, 1, low, high, True) != UNSURE
     assert min(said.values()) > 100, said
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_start_that_a_rounding_put_outside_does_not_hide_the_way_through(side):
+    """A range that is crossed from side to side is left at the far one; what turns back at once is left at once."""
+    outside = -np.nextafter(1.0, 2.0)
+    for slope, left in ((4.0, 0.5), (-1.0, 0.0)):
+        series = series_of(side * np.array([outside, slope, 0.0]))
+        assert leaves(series, 1, -1.0, 1.0, True) == pytest.approx(left, abs=1e-12)

@@ -7,12 +7,12 @@ from test_theory import AMPLIFIER, CABLE, DRIVE, HAND
 
 from hardwall.sim import hit
 from hardwall.sim.converter import AS_IT_IS, Converter, Pulse
-from hardwall.sim.device import Device, Hand, Motor, Transmission
+from hardwall.sim.device import Device, Hand, Motor, Transmission, train
 from hardwall.sim.drivetrain import Train
 from hardwall.sim.plant import Rigid
 from hardwall.sim.scene import SceneError, load, read
 from hardwall.sim.store import sources
-from hardwall.sim.world import device_of, start_of, world_of
+from hardwall.sim.world import device_of, start_of, work_of, world_of
 from hardwall.sim.zwidth import verdict
 
 PULSES = {"output.full_scale_n": 50.0, "output.pwm_carrier_hz": 20_000, "output.pwm_steps": 300}
@@ -105,6 +105,16 @@ def test_a_handle_that_never_comes_to_the_wall_proves_no_wall_stable():
     }
     with pytest.raises(RuntimeError, match=r"^the handle did not reach the wall: nothing is said of K 1000, B 10$"):
         verdict(**job, stiffness=1e3, damping=10.0)
+
+
+def test_a_chunk_shrinks_by_the_work_of_a_sample():
+    """12 MHz, 10 kHz samples, a carrier of 20 kHz: its two periods a sample begin and end a pulse each."""
+    assert work_of(world_of(load("seed-2011", {}))) == 1
+    legs = work_of(world_of(load("seed-2011", CABLE)))
+    leg_s = train(device_of(load("seed-2011", CABLE)), 1e-4).leg_s
+    assert legs == 1 + int(1e-4 / leg_s) > 1
+    assert work_of(world_of(load("seed-2011", CABLE | PULSES))) == legs + 2 * 2
+    assert work_of(world_of(load("seed-2011", CABLE | {"solver.step_s": 2e-6}))) == 1 + 50
 
 
 REFUSED = {
