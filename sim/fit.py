@@ -25,7 +25,7 @@ from . import figures
 from .figure_5 import ABOUT, Fact, facts
 from .scene import Scene, SceneError, parse, read
 from .study import Mapping
-from .zwidth import Case, Map
+from .zwidth import Case, Map, NeverReached
 
 READINGS = {"3-30": (3.0, 30.0), "30-300": (30.0, 300.0)}
 """Ends of the paper's B axis, N s/m."""
@@ -39,7 +39,7 @@ SHORT = {"protocol.settle_s": 2.5, "protocol.mean_s": 0.25, "protocol.measure_s"
 MISSED = 0.05
 FAR = math.log(1.5)
 HOPELESS = math.log(1e3)
-"""How far off the axes maps are taken to be where there are none."""
+"""How far off the axes maps are taken to be where there are none: no such scene, or the handle does not reach walls."""
 EIGHT = 8
 FINALISTS = 4
 MEMBERS = 4
@@ -193,9 +193,9 @@ class _Judge:
         changes = self._changes | self._grid(COARSE) | SHORT | values
         try:
             methods = figures.methods(parse(self._scene, self._text, changes))
-        except SceneError:
+            (adjusted,) = self._maps(methods, changes, ["adjusted"]).values()
+        except (SceneError, NeverReached):
             return Trial(values, [], HOPELESS, 0.0, {})
-        (adjusted,) = self._maps(methods, changes, ["adjusted"]).values()
         off = self._off(adjusted)
         if off[0] > FAR:
             return Trial(values, [], *off, {"adjusted": adjusted})
@@ -248,6 +248,7 @@ def study(
 
     Raises:
         SceneError: if the scene cannot be, or lacks a key that is searched.
+        zwidth.NeverReached: if its handle, with its own values, does not come to the wall.
     """
     judge = _Judge(scene, changes, reading, mapping)
     plain = judge.parsed()

@@ -122,6 +122,10 @@ def grid_of(scene: Scene) -> Grid:
     return Grid(**scene.zwidth.model_dump())
 
 
+class NeverReached(RuntimeError):
+    """The handle did not come to the wall in the time of the protocol: such a hit says nothing of the wall."""
+
+
 def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float, damping: float, backend: str) -> dict:
     """Hit a wall; return whether it is `stable`, then `in_place` at rest, and its `rms_mm` up to where that was sure.
 
@@ -133,14 +137,15 @@ def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float
 
     Raises:
         SceneError: if the scene cannot be.
-        RuntimeError: if the worker has other sources of the project, or the handle did not reach the wall.
+        NeverReached: if the handle did not come to the wall.
+        RuntimeError: if the worker has other sources of the project.
     """
     if sources != store.sources():
         raise RuntimeError(f"a worker, {platform.node()}, has other sources of hardwall, or versions of its tools")
     wall = {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": damping}
     result = hit.run(parse(scene, text, changes | wall), backend, until_sure=True)
     if not result.touched:
-        raise RuntimeError(f"the handle did not reach the wall: nothing is said of K {stiffness:g}, B {damping:g}")
+        raise NeverReached(f"the handle did not reach the wall: nothing is said of K {stiffness:g}, B {damping:g}")
     in_place = result.stable and result.in_place
     return {"stable": result.stable, "in_place": in_place, "rms_mm": result.rms_m * 1e3}
 
@@ -198,6 +203,7 @@ def run(
 
     Raises:
         SceneError: if a case cannot be, or its scene has no section `zwidth`.
+        NeverReached: if in one of them the handle does not come to the wall.
     """
     traces = [_Tracing(case, backend) for case in cases]
 

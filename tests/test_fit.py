@@ -11,7 +11,7 @@ from test_figure_5 import PAPER
 from hardwall.sim import figures, fit
 from hardwall.sim.boundary import Edge
 from hardwall.sim.figure_5 import Fact
-from hardwall.sim.zwidth import Case, Map, grid_of
+from hardwall.sim.zwidth import Case, Map, NeverReached, grid_of
 
 MASS_KG, DELAY_S = 0.2, 1.4e-3
 NAMES = {curve.label: name for name, curve in figures.methods().items()}
@@ -176,3 +176,17 @@ def test_nothing_stable_is_far_off():
     assert all(trial.off_b == fit.HOPELESS for trial in result.trials)
     assert result.finalists[0].score == pytest.approx(8 + 8 * fit.MISSED + fit.HOPELESS)
     assert math.isfinite(result.finalists[0].score)
+
+
+def test_a_device_that_does_not_reach_the_wall_ends_no_search():
+    class Rough(Known):
+        def _map(self, case: Case) -> Map:
+            if case.parsed.handle.coulomb_n > 0.1:
+                raise NeverReached("the handle did not reach the wall: nothing is said of K 1000, B 3")
+            return super()._map(case)
+
+    result = found(48, Rough())
+    rough = [trial for trial in result.trials if trial.values["handle.coulomb_n"] > 0.1]
+    assert 0 < len(rough) < len(result.trials)
+    assert all((trial.off_b, trial.facts, trial.maps) == (fit.HOPELESS, [], {}) for trial in rough)
+    assert all(each.values["handle.coulomb_n"] <= 0.1 for each in result.finalists)
