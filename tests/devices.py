@@ -119,6 +119,13 @@ def _event(function, wanted, direction):
     return event
 
 
+def asked_v(device: Device, y, command: float) -> float:
+    """Return the voltage that a current loop asks of a laboratory state."""
+    r, inductance, kt, _, radius = vars(device.motor).values()
+    kf, w = kt / radius, 2 * math.pi * device.bandwidth_hz
+    return (r * y[4] + kf**2 * y[3] + inductance * w * (command - y[4])) / kf
+
+
 def integrated(device: Device, y, command: float, seconds: float) -> tuple[np.ndarray, list[str]]:
     """Return the laboratory state after an interval, by numerical integration with events, and what happened."""
     y, left, happened = np.array(y, float), seconds, []
@@ -131,11 +138,11 @@ def integrated(device: Device, y, command: float, seconds: float) -> tuple[np.nd
         return float(rates(device)[1] @ [*state, *inputs]) * mass
 
     def voltage(state):
-        r, inductance, kt, _, radius = vars(device.motor).values()
-        kf, w = kt / radius, 2 * math.pi * device.bandwidth_hz
-        return (r * state[4] + kf**2 * state[3] + inductance * w * (command - state[4])) / kf
+        return asked_v(device, state, command)
 
     limit = device.motor.voltage_limit_v if volts else math.inf
+    asked = voltage(y) if volts else 0.0
+    limited = int(np.sign(asked)) if abs(asked) > limit else 0
     while left > 0:
         assert len(happened) < 100
         force = on_handle(y)
@@ -143,16 +150,12 @@ def integrated(device: Device, y, command: float, seconds: float) -> tuple[np.nd
         along = 0 if stuck or device.coulomb_n is None else float(np.sign(y[1] if y[1] != 0 else force))
         if along and y[1] == 0:
             y[1] = along * 1e-15  # an event that begins at its own value is not found
-        tables = {limited: rates(device, limited, stuck) for limited in (-1, 0, 1)}
+        table = rates(device, limited, stuck)
         friction = np.zeros(5)
         friction[1 if device.transmission else slice(1, 4, 2)] = -along * level / mass
 
-        def limited_at(state):
-            asked = voltage(state) if volts else 0.0
-            return 0 if abs(asked) <= limit else int(np.sign(asked))
-
-        def change(_, state, tables=tables, friction=friction, limited_at=limited_at):
-            return tables[limited_at(state)] @ [*state, *inputs] + friction
+        def change(_, state, table=table, friction=friction):
+            return table @ [*state, *inputs] + friction
 
         # (what is watched, the value at which it happens, from which side, its name)
         watched = []
@@ -160,17 +163,24 @@ def integrated(device: Device, y, command: float, seconds: float) -> tuple[np.nd
             watched = [(lambda s: s[1], 0.0, -along, "rests")]
         elif stuck:
             watched = [(on_handle, side * level, side, "breaks") for side in (-1, 1)]
+        if limited:
+            watched.append((voltage, limited * limit, -limited, "recovers"))
+        elif volts:
+            watched += [(voltage, side * limit, side, "limits") for side in (-1, 1)]
         events = [_event(*each[:3]) for each in watched]
-        solution = solve_ivp(change, (0, left), y, "DOP853", events=events, rtol=1e-11, atol=1e-13)
+        # An event is found by its sign at the ends of a step: two in one are missed, so none may be long.
+        options = {"events": events, "rtol": 1e-11, "atol": 1e-13, "max_step": seconds / 50}
+        solution = solve_ivp(change, (0, left), y, "DOP853", **options)
         y, left = solution.y[:, -1], left - solution.t[-1]
-        at_limit = [limited_at(state) != 0 for state in solution.y.T]
-        changes = np.diff(np.array(at_limit, int))
-        happened += ["limits"] * int((changes > 0).sum()) + ["recovers"] * int((changes < 0).sum())
-        for times, (*_, name) in zip(solution.t_events or [], watched, strict=True):
+        for times, (_, _, side, name) in zip(solution.t_events or [], watched, strict=True):
             if len(times):
                 happened.append(name)
                 if name == "rests":
                     y[1] = 0.0
                     if not device.transmission:
                         y[3] = 0.0
+                elif name == "limits":
+                    limited = side
+                elif name == "recovers":
+                    limited = 0
     return y, happened
