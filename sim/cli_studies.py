@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from .cli_zwidth import curves_of, make_maps, map_changes, refuse
+from .cli_zwidth import area_text, curves_of, explain_areas, make_maps, map_changes, refuse
 from .scene import load, names
 from .terminal import (
     JsonOption,
@@ -71,25 +71,23 @@ def cutoff(
         draw(plot_cutoff(devices, backend), plot)
 
 
-def _area(each) -> str:
-    """Return the area of a map in kN/m N s/m, with a + where the region leaves the map."""
-    return f"{each.area / 1e3:.0f}" + "+" * each.leaves
-
-
 def _show_cutoffs(devices: list) -> None:
     numbers = ("best (Hz)", "its area (kN/m N s/m)", "within 5 %, from (Hz)", "to (Hz)", "no filter: area")
     rows = []
     for each in devices:
         best = f"{each.best_hz:.0f}" + ", at the end" * each.at_end
         low, high = each.level_hz
-        rows.append([each.scene.name, best, _area(each.best), f"{low:.0f}", f"{high:.0f}", _area(each.unfiltered)])
+        rows.append(
+            [each.scene.name, best, area_text(each.best), f"{low:.0f}", f"{high:.0f}", area_text(each.unfiltered)]
+        )
     show_table({"device": "left"} | dict.fromkeys(numbers, "right"), rows)
     cutoffs = sorted({cutoff_hz for each in devices for cutoff_hz in each.maps})
     areas = [
-        [f"{cutoff_hz:g}", *(_area(each.maps[cutoff_hz]) if cutoff_hz in each.maps else "" for each in devices)]
+        [f"{cutoff_hz:g}", *(area_text(each.maps[cutoff_hz]) if cutoff_hz in each.maps else "" for each in devices)]
         for cutoff_hz in cutoffs
     ]
     show_table(dict.fromkeys(("cutoff (Hz)", *(f"{each.scene.name}: area" for each in devices)), "right"), areas)
+    explain_areas(found for each in devices for found in (*each.maps.values(), each.unfiltered))
 
 
 def gains(
@@ -125,10 +123,11 @@ def _show_gains(found) -> None:
             multiple = found.of_papers(pick)
             pair = f"{pick.gains.lambda_sqrt_m_per_s:.4g}", f"{pick.gains.alpha_m_per_s2:.4g}"
             times = "" if multiple is None else f"{multiple:.2f}"
-            rows.append([output, name, *pair, _area(pick.map), times, f"{pick.map.area_in_place / 1e3:.0f}"])
+            rows.append([output, name, *pair, area_text(pick.map), times, f"{pick.map.area_in_place / 1e3:.0f}"])
             if found.at_edge(pick.gains):
                 log.print(f"{output}, {name}: at the edge of what was tried; better gains may lie beyond")
     show_table({"output": "left", "gains": "left"} | dict.fromkeys(numbers, "right"), rows)
+    explain_areas(pick.map for picks in found.picks.values() for pick in picks.values())
 
 
 def rates(

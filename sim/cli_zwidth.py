@@ -2,6 +2,7 @@
 
 import json
 import time
+from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Annotated
 
@@ -19,6 +20,7 @@ from .terminal import (
     SetOption,
     WorkersOption,
     draw,
+    log,
     picture_file,
     progress,
     scene_changes,
@@ -27,9 +29,7 @@ from .terminal import (
 )
 
 COLUMNS = {"method": "left"}
-COLUMNS |= dict.fromkeys(
-    ("area (kN/m N s/m)", "in place", "largest K (kN/m)", "to B (N s/m)", "leaves the map", "hits"), "right"
-)
+COLUMNS |= dict.fromkeys(("area (kN/m N s/m)", "in place", "largest K (kN/m)", "to B (N s/m)", "hits", "s"), "right")
 
 
 def curves_of(wanted: str | None, scene: Scene) -> list:
@@ -65,6 +65,17 @@ def refuse(changes: dict, keys: tuple[str, ...], instead: str) -> None:
     for key in changes:
         if key.startswith(keys):
             raise BadInput(f"--set {key} is what this command sets itself: {instead}")
+
+
+def area_text(each) -> str:
+    """Return the area of a map in kN/m N s/m, with a + where the region leaves the map."""
+    return f"{each.area / 1e3:.0f}" + "+" * each.leaves
+
+
+def explain_areas(maps: Iterable) -> None:
+    """Say what the + of `area_text` is, if there was one."""
+    if any(each.leaves for each in maps):
+        log.print("+: the region goes on beyond the map")
 
 
 def _limits(maps: list, dampings: list[float]) -> list[list[float] | None]:
@@ -142,16 +153,17 @@ def zwidth(
         rows = [
             [
                 each.case.label,
-                f"{each.area / 1e3:.1f}",
-                f"{each.area_in_place / 1e3:.1f}",
+                area_text(each),
+                f"{each.area_in_place / 1e3:.0f}",
                 f"{each.largest_n_per_m / 1e3:g}",
                 f"{each.damping_n_s_per_m:g}",
-                "yes" if each.leaves else "no",
                 str(each.hits),
+                f"{each.seconds:.1f}",
             ]
             for each in maps
         ]
         show_table(COLUMNS, rows)
+        explain_areas(maps)
         if shown:
             lines = [[fact.text, "held" if fact.held else "not held", fact.numbers] for fact in shown]
             show_table(dict.fromkeys(("the paper's Figure 5", "here", "numbers"), "left"), lines)

@@ -7,7 +7,7 @@ same whatever the number of workers, and an interrupted one goes on where it was
 
 import platform
 from collections.abc import Callable, Generator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from distributed import Client, as_completed
@@ -57,12 +57,14 @@ class Map:
         edges: by B.
         hits: walls that were hit for it.
         in_place: of each edge, whether its largest stable wall holds the handle there: see `hit.Hit.in_place`.
+        seconds: wall time of its hits, wherever and whenever they were run; no part of what a map is.
     """
 
     case: Case
     edges: list[Edge]
     hits: int
     in_place: list[bool]
+    seconds: float = field(default=0.0, compare=False)
 
     @property
     def area(self) -> float:
@@ -108,6 +110,7 @@ class Map:
             "area_in_place_n2_s_per_m2": self.area_in_place,
             "largest_stiffness_n_per_m": self.largest_n_per_m,
             "hits": self.hits,
+            "seconds": self.seconds,
         }
 
 
@@ -127,7 +130,8 @@ class NeverReached(RuntimeError):
 
 
 def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float, damping: float, backend: str) -> dict:
-    """Hit a wall; return whether it is `stable`, then `in_place` at rest, and its `rms_mm` up to where that was sure.
+    """Hit a wall; return whether it is `stable`, then `in_place` at rest, its `rms_mm` up to where that was sure, and
+    the `seconds` it took.
 
     Args:
         scene, text, changes: of a `Case`.
@@ -147,7 +151,8 @@ def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float
     if not result.touched:
         raise NeverReached(f"the handle did not reach the wall: nothing is said of K {stiffness:g}, B {damping:g}")
     in_place = result.stable and result.in_place
-    return {"stable": result.stable, "in_place": in_place, "rms_mm": result.rms_m * 1e3}
+    rms_mm = result.rms_m * 1e3
+    return {"stable": result.stable, "in_place": in_place, "rms_mm": rms_mm, "seconds": result.seconds}
 
 
 class _Tracing:
@@ -157,7 +162,7 @@ class _Tracing:
         self._case, self._grid = case, grid_of(case.parsed)
         self._steps: Generator = trace(self._grid)
         self._job = case.job(backend)
-        self._hits = 0
+        self._hits, self._seconds = 0, 0.0
         self._in_place: dict[tuple[float, float], bool] = {}
         self.wanted: dict | None = None
         self.found: Map | None = None
@@ -166,6 +171,7 @@ class _Tracing:
     def answer(self, result: dict) -> None:
         """Go on from the verdict on the wall that was wanted."""
         self._hits += 1
+        self._seconds += result["seconds"]
         self._in_place[self.wanted["stiffness"], self.wanted["damping"]] = result["in_place"]
         self._send(result["stable"])
 
@@ -176,7 +182,7 @@ class _Tracing:
         except StopIteration as end:
             walls = [(edge.stable_n_per_m, edge.damping_n_s_per_m) for edge in end.value]
             in_place = [self._in_place.get(wall, False) for wall in walls]
-            self.wanted, self.found = None, Map(self._case, end.value, self._hits, in_place)
+            self.wanted, self.found = None, Map(self._case, end.value, self._hits, in_place, self._seconds)
 
     @property
     def done(self) -> float:
