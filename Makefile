@@ -34,6 +34,7 @@ ESTIMATORS_OF_ALL := fdm levant butterworth kalman period period-count levant-ed
   levant-adaptive window foaw
 ALL_ON_THE_MAP := --estimators $(subst $() ,$(comma),$(strip $(ESTIMATORS_OF_ALL))) $(addprefix --set zwidth., \
   stiffness_to_n_per_m=150e3 stiffness_step_n_per_m=2e3 damping_step_n_s_per_m=12.0)
+MAPPED := seed-2011 fit-2011 drive-2011
 STUDIES := cutoff gains rates drop trade
 
 SEEDS ?= $(shell shuf -i 1-999999999 -n 3)
@@ -69,9 +70,9 @@ choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy,
 figures: $(VENV)/.synth | tools ## the founding paper's figures and every study of ours, as pictures in build/ (an hour)
 	@for number in 1 2; do $(HARDWALL) accuracy --figure $$number --plot build/figure-$$number.png; done
 	@$(HARDWALL) lipschitz --plot build/figure-4.png
-	@$(HARDWALL) zwidth --plot build/figure-5.png
-	@$(HARDWALL) zwidth --plot build/estimators.png $(ALL_ON_THE_MAP)
-	@for study in $(STUDIES); do $(HARDWALL) $$study --plot build/$$study.png; done
+	@for scene in $(MAPPED); do $(HARDWALL) zwidth $$scene --resume --plot build/$$scene.png; done
+	@$(HARDWALL) zwidth --resume --plot build/estimators.png $(ALL_ON_THE_MAP)
+	@for study in $(STUDIES); do $(HARDWALL) $$study --resume --plot build/$$study.png; done
 	@$(HARDWALL) bits --plot build/bits.png
 
 verilog: $(VENV)/.sim | tools ## the axis of the scene as Verilog, in build/verilog/
