@@ -2,7 +2,10 @@
 
 Stiffness K and damping B go in steps. From a stable wall, raise K until one is unstable; then raise B by a step, and
 from that K go down to the first stable wall if it is unstable, else up to the first unstable one. At each B the lowest
-unstable K found so is the marginal one. The end is where no K is stable, or the last B.
+unstable K found so is the marginal one. The end is where no K is stable, or the last B. The stable wall to start from
+is the softest of the first B; where that one is not, K is doubled, then B raised, until one is.
+
+The edge is the upper one. Walls below it may be unstable all the same, which a trace does not see: `below` hits some.
 
 Nothing here hits a wall: `trace` is a generator that yields walls and is sent verdicts, so the map does not depend on
 who answers, or in which order several maps are answered.
@@ -10,19 +13,23 @@ who answers, or in which order several maps are answered.
 
 import math
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Steps and ends of a map; B from `damping_from_n_s_per_m` to `damping_to_n_s_per_m`, K from a step to its end."""
+    """Steps and ends of a map; B from `damping_from_n_s_per_m` to `damping_to_n_s_per_m`, K from a step to its end.
+
+    Of each B, `walls_below` the edge are hit as well.
+    """
 
     stiffness_step_n_per_m: float
     stiffness_to_n_per_m: float
     damping_from_n_s_per_m: float
     damping_to_n_s_per_m: float
     damping_step_n_s_per_m: float
+    walls_below: int = 0
 
     @property
     def dampings(self) -> list[float]:
@@ -49,21 +56,31 @@ class Edge:
         damping_n_s_per_m: B.
         stable_n_per_m: the largest stable K under the marginal one; 0 where none is.
         marginal_n_per_m: the lowest unstable K above it; None where the largest K of the map is still stable.
+        held: of the walls below that were hit as well, the part that is stable; None where none was.
     """
 
     damping_n_s_per_m: float
     stable_n_per_m: float
     marginal_n_per_m: float | None
+    held: float | None = None
 
 
 def trace(grid: Grid) -> Generator[tuple[float, float], bool, list[Edge]]:
     """Yield walls (K, B) to be hit, be sent whether each is stable, and return the edge, by B.
 
-    The first wall is the softest of the first B.
+    The walls below the edge that the grid asks for come last.
     """
-    step, edges, row = grid.stiffness_step_n_per_m, [], 1
+    step, edges, row = grid.stiffness_step_n_per_m, [], 0
     for damping in grid.dampings:
-        if (yield row * step, damping):
+        if row == 0:
+            row = yield from _first(grid, damping)
+            if row == 0:
+                edges.append(Edge(damping, 0.0, step))
+                continue
+            found = True
+        else:
+            found = yield row * step, damping
+        if found:
             stable = row
             while stable < grid.rows and (yield (stable + 1) * step, damping):
                 stable += 1
@@ -75,7 +92,30 @@ def trace(grid: Grid) -> Generator[tuple[float, float], bool, list[Edge]]:
         if stable == 0:
             break
         row = min(stable + 1, grid.rows)
-    return edges
+    return (yield from below(edges, grid)) if grid.walls_below else edges
+
+
+def _first(grid: Grid, damping: float) -> Generator[tuple[float, float], bool, int]:
+    """Yield walls of one B, K doubled each time; return the number of the first stable one, 0 if none is."""
+    row = 1
+    while row <= grid.rows:
+        if (yield row * grid.stiffness_step_n_per_m, damping):
+            return row
+        row *= 2
+    return 0
+
+
+def below(edges: list[Edge], grid: Grid) -> Generator[tuple[float, float], bool, list[Edge]]:
+    """Yield as many walls below each edge as the grid asks for, even in K; return the edges with what `held`."""
+    step, found = grid.stiffness_step_n_per_m, []
+    for edge in edges:
+        top = round(edge.stable_n_per_m / step)
+        rows = sorted({round(top * n / (grid.walls_below + 1)) for n in range(1, grid.walls_below + 1)} - {0, top})
+        stable = 0
+        for row in rows:
+            stable += yield row * step, edge.damping_n_s_per_m
+        found.append(replace(edge, held=stable / len(rows)) if rows else edge)
+    return found
 
 
 def area(edges: list[Edge]) -> float:

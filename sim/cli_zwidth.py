@@ -29,7 +29,9 @@ from .terminal import (
 )
 
 COLUMNS = {"method": "left"}
-COLUMNS |= dict.fromkeys(("area (kN/m N s/m)", "in place", "largest K (kN/m)", "to B (N s/m)", "hits", "s"), "right")
+COLUMNS |= dict.fromkeys(
+    ("area (kN/m N s/m)", "held", "in place", "largest K (kN/m)", "to B (N s/m)", "hits", "s"), "right"
+)
 
 
 def curves_of(wanted: str | None, scene: Scene) -> list:
@@ -154,6 +156,7 @@ def zwidth(
             [
                 each.case.label,
                 area_text(each),
+                "" if each.area_held is None else f"{each.area_held / 1e3:.0f}",
                 f"{each.area_in_place / 1e3:.0f}",
                 f"{each.largest_n_per_m / 1e3:g}",
                 f"{each.damping_n_s_per_m:g}",

@@ -159,13 +159,14 @@ class ProtocolSection(Section):
 
 
 class ZWidthSection(Section):
-    """Steps of a map of stable walls: see `hardwall.sim.boundary`."""
+    """Steps of a map of stable walls, and how many below its edge are hit too: see `hardwall.sim.boundary`."""
 
     stiffness_step_n_per_m: Positive
     stiffness_to_n_per_m: Positive
     damping_from_n_s_per_m: NotNegative
     damping_to_n_s_per_m: NotNegative
     damping_step_n_s_per_m: Positive
+    walls_below: Annotated[int, Field(ge=0, le=1000)] = 0
 
 
 class Scene(Section):

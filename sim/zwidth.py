@@ -68,12 +68,21 @@ class Map:
 
     @property
     def area(self) -> float:
-        """Of the stable region, N^2 s/m^2."""
+        """Under the edge, N^2 s/m^2, whether or not all walls there are stable."""
         return area(self.edges)
 
     @property
+    def area_held(self) -> float | None:
+        """Under the edge, N^2 s/m^2, as far as the walls below it that were hit are stable; None where none was."""
+        if all(edge.held is None for edge in self.edges):
+            return None
+        parts = [1.0 if edge.held is None else edge.held for edge in self.edges]
+        pairs = zip(self.edges, parts, strict=True)
+        return area([replace(edge, stable_n_per_m=edge.stable_n_per_m * part) for edge, part in pairs])
+
+    @property
     def area_in_place(self) -> float:
-        """Of the stable region but for each B whose largest stable wall is not in place, N^2 s/m^2."""
+        """Under the edge but for each B whose largest stable wall is not in place, N^2 s/m^2."""
         kept = [
             edge if in_place else replace(edge, stable_n_per_m=0.0)
             for edge, in_place in zip(self.edges, self.in_place, strict=True)
@@ -107,6 +116,7 @@ class Map:
             "boundary": [[edge.damping_n_s_per_m, edge.stable_n_per_m] for edge in self.edges],
             "leaves_the_map_at": [edge.damping_n_s_per_m for edge in self.edges if edge.marginal_n_per_m is None],
             "area_n2_s_per_m2": self.area,
+            "area_held_n2_s_per_m2": self.area_held,
             "area_in_place_n2_s_per_m2": self.area_in_place,
             "largest_stiffness_n_per_m": self.largest_n_per_m,
             "hits": self.hits,

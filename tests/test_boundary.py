@@ -1,5 +1,7 @@
 """Tracing of a stable region: on regions that are known, what is asked and what is found."""
 
+from dataclasses import replace
+
 import pytest
 
 from hardwall.sim.boundary import Edge, Grid, area, trace
@@ -50,8 +52,25 @@ def test_a_region_that_leaves_the_map_has_no_marginal_wall_there():
     assert len(asked) == 10 + len(GRID.dampings) - 1
 
 
-def test_nothing_stable_is_one_hit():
-    assert traced(lambda *_: False) == ([Edge(1.0, 0.0, 10.0)], [(10.0, 1.0)])
+def test_nothing_stable_is_looked_for_at_every_damping():
+    edges, asked = traced(lambda *_: False)
+    assert edges == [Edge(damping, 0.0, 10.0) for damping in GRID.dampings]
+    assert asked == [(stiffness, damping) for damping in GRID.dampings for stiffness in (10.0, 20.0, 40.0, 80.0)]
+
+
+def test_a_region_that_begins_at_a_stiffer_wall_of_a_larger_damping_is_found():
+    edges, asked = traced(lambda stiffness, damping: 30 <= stiffness <= 70 and damping >= 2)
+    assert [edge.stable_n_per_m for edge in edges] == [0.0, 0.0, *[70.0] * 9]
+    assert asked[8:15] == [(10, 2), (20, 2), (40, 2), (50, 2), (60, 2), (70, 2), (80, 2)]
+
+
+def test_walls_below_the_edge_are_hit_last_and_counted():
+    """Of four a fifth apart, those under 30 are not stable."""
+    edges, asked = traced(lambda stiffness, _: 30 <= stiffness <= 70, replace(GRID, walls_below=4))
+    assert {edge.held for edge in edges} == {0.75}
+    assert asked[-4:] == [(10, 6), (30, 6), (40, 6), (60, 6)]
+    soft, _ = traced(lambda stiffness, _: stiffness <= 10, replace(GRID, walls_below=4))
+    assert {edge.held for edge in soft} == {None}, "there is no wall below the softest"
 
 
 def test_rows_go_to_the_last_whole_step():
