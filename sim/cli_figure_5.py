@@ -119,6 +119,7 @@ def fit(
     from .figures import methods  # noqa: PLC0415
 
     changes = _changes(set_)
+    refuse(changes, ("zwidth",), "its maps go a little beyond the paper's axes")
     loaded, known, fits = load(scene, changes), store.Store("fit", resume), []
     began = time.perf_counter()
     with cluster_of(len(methods()), workers, scheduler) as client:

@@ -169,12 +169,15 @@ def _show_rates(found: list, limits: dict, rates_hz: list[int]) -> None:
     columns = ("the scene's", *(f"{rate / 1e3:g} kHz" for rate in rates_hz), "ratio", "gains up to (kHz)")
     rows = []
     for each in found:
-        values = [each.own.largest_n_per_m, *each.largest_n_per_m]
+        values = [f"{a_map.largest_n_per_m / 1e3:.0f}" + "+" * a_map.clipped for a_map in (each.own, *each.maps)]
         ratio = "" if each.ratio is None else f"{each.ratio:.2f}"
-        rows.append([each.label, *(f"{value / 1e3:.0f}" for value in values), ratio, f"{each.ends_at_hz / 1e3:g}"])
+        ends = "" if each.ends_at_hz is None else f"{each.ends_at_hz / 1e3:g}"
+        rows.append([each.label, *values, ratio, ends])
     for left, limit in limits.items():
         rows.append([f"linear: {left}", "", *(f"{value / 1e3:.0f}" for value in limit), "", ""])
     show_table({"largest K (kN/m)": "left"} | dict.fromkeys(columns, "right"), rows)
+    if any(each.clipped for gain in found for each in (gain.own, *gain.maps)):
+        log.print("+: K goes on beyond the map")
 
 
 def add_commands(app: typer.Typer) -> None:

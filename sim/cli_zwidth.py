@@ -98,7 +98,7 @@ def cluster_of(jobs: int, workers: int | None, scheduler: str | None):
     """Return `cluster.client` as `--workers` or `--scheduler` ask for it."""
     from . import cluster  # noqa: PLC0415  (Dask is loaded only where it runs)
 
-    if workers and scheduler:
+    if workers and scheduler is not None:
         raise BadInput(f"--scheduler {scheduler} has workers of its own: give it or --workers, not both")
     return cluster.client(jobs, workers, scheduler)
 

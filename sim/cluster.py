@@ -50,7 +50,7 @@ def client(jobs: int, workers: int | None = None, scheduler: str | None = None) 
     # This process only waits, so that here an interrupt may be raised: compiled code would not survive it.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        if scheduler:
+        if scheduler is not None:
             try:
                 connected = Client(scheduler, timeout=TIMEOUT_S)
             except (OSError, ValueError) as error:

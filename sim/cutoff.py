@@ -138,15 +138,16 @@ def study(scenes: list[str], changes: dict[str, Any], mapping: Mapping) -> list[
     devices = [_Cases(scene, changes) for scene in scenes]
     sweeps = [device.sweep() for device in devices]
     # The largest regions take longest: they go first.
-    cases = [case for sweep in sweeps for case in reversed(sweep.values())] + [each.unfiltered() for each in devices]
-    found = {case.label: each for case, each in zip(cases, mapping("sweep of cutoffs", cases), strict=True)}
+    cases = {(place, cutoff): sweep[cutoff] for place, sweep in enumerate(sweeps) for cutoff in reversed(sweep)}
+    cases |= {(place, None): device.unfiltered() for place, device in enumerate(devices)}
+    found = dict(zip(cases, mapping("sweep of cutoffs", list(cases.values())), strict=True))
     return [
-        _searched(device, {cutoff_hz: found[case.label] for cutoff_hz, case in sweep.items()}, found, mapping)
-        for device, sweep in zip(devices, sweeps, strict=True)
+        _searched(device, {cutoff: found[place, cutoff] for cutoff in sweeps[place]}, found[place, None], mapping)
+        for place, device in enumerate(devices)
     ]
 
 
-def _searched(device: _Cases, sweep: dict[float, Map], found: dict[str, Map], mapping: Mapping) -> Device:
+def _searched(device: _Cases, sweep: dict[float, Map], unfiltered: Map, mapping: Mapping) -> Device:
     """Return the areas of a device, those around the sweep's best one searched."""
     maps = dict(sweep)
 
@@ -164,4 +165,4 @@ def _searched(device: _Cases, sweep: dict[float, Map], found: dict[str, Map], ma
     if areas[top] > 0 and bounds[0] < bounds[1]:
         options = {"xatol": math.log1p(TOLERANCE), "maxiter": EVALUATIONS}
         minimize_scalar(loss, bounds=bounds, method="bounded", options=options)
-    return Device(device.parsed, dict(sorted(maps.items())), found[device.unfiltered().label])
+    return Device(device.parsed, dict(sorted(maps.items())), unfiltered)

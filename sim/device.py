@@ -32,6 +32,8 @@ LEG_RATE = 1.0
 """Of a leg, the longest time that one Taylor polynomial serves: its length times the fastest rate."""
 LEGS_MAX = 25_000
 """Legs of a sample that the solver takes on: 1 g on a damper of 1e4 N s/m for 1 ms, and a little more."""
+BEYOND = 1e100
+"""A rate of change, 1/s or N/s or whatever, with which no matrix can be balanced any more."""
 TRUNCATION = 2.0**-54
 
 
@@ -179,13 +181,13 @@ def equations(device: Device, along: int | None = None, limited: int = 0) -> Equ
 
 def fastest_per_s(device: Device) -> float:
     """Return a bound on how fast the device changes: the largest 1-norm of its balanced matrices, 1/s;
-    infinite where a matrix has no finite numbers."""
+    infinite where a matrix has no numbers to balance."""
     norms = []
     for along in (0, 1):
         for limited in (0, 1):
             with np.errstate(over="ignore", invalid="ignore"):
                 rates = equations(device, along, limited).rates
-            if not np.isfinite(rates).all():
+            if not (np.abs(rates) < BEYOND).all():
                 return math.inf
             balanced = matrix_balance(rates[:, : len(rates)], permute=False)[0]
             norms.append(np.abs(balanced).sum(axis=0).max())

@@ -133,7 +133,9 @@ def study(scene: str, changes: dict[str, Any], mapping: Mapping) -> Search:
     text = read(scene)
     plain = parse(scene, text, changes)
     bound = plain.controller.acceleration_max_m_per_s2
-    papers = dict(zip(PAPERS, (Gains.default(plain.controller), Gains(**figures.ADJUSTED)), strict=True))
+    papers = dict(
+        zip(PAPERS, (Gains.default(plain.controller), Gains(**figures.methods(plain)["adjusted"].gains)), strict=True)
+    )
     lambdas, alphas = LAMBDAS * np.sqrt(bound), ALPHAS * bound
     tried = [Gains(lam, alpha) for lam in lambdas.tolist() for alpha in alphas.tolist()]
 

@@ -62,15 +62,22 @@ class Gain:
         return [each.largest_n_per_m for each in self.maps]
 
     @property
-    def ends_at_hz(self) -> int:
-        """The lowest rate with as good as the largest stiffness of any."""
+    def ends_at_hz(self) -> int | None:
+        """The lowest rate with as good as the largest stiffness of any; None where a map is clipped."""
+        if any(each.clipped for each in self.maps):
+            return None
         enough = GAINED * max(self.largest_n_per_m)
         return next(rate for rate, value in zip(self.rates_hz, self.largest_n_per_m, strict=True) if value >= enough)
 
     @property
     def ratio(self) -> float | None:
-        """The largest stiffness at the highest rate over that at the scene's own; None where that is 0."""
-        return self.largest_n_per_m[-1] / self.own.largest_n_per_m if self.own.largest_n_per_m else None
+        """The largest stiffness at the highest rate over that at the scene's own.
+
+        None where that is 0, or a map is clipped.
+        """
+        if not self.own.largest_n_per_m or self.own.clipped or self.maps[-1].clipped:
+            return None
+        return self.largest_n_per_m[-1] / self.own.largest_n_per_m
 
     def report(self) -> dict[str, Any]:
         """Return the gain as the command line prints it."""
@@ -78,6 +85,7 @@ class Gain:
             "label": self.label,
             "rates_hz": self.rates_hz,
             "largest_stiffness_n_per_m": self.largest_n_per_m,
+            "clipped": [each.clipped for each in self.maps],
             "area_n2_s_per_m2": [each.area for each in self.maps],
             "largest_stiffness_at_the_scenes_rates_n_per_m": self.own.largest_n_per_m,
             "ratio": self.ratio,

@@ -155,7 +155,7 @@ class ProtocolSection(Section):
     settle_s: Positive
     mean_s: Positive
     measure_s: Positive
-    threshold_mm: Positive
+    threshold_mm: Annotated[float, Field(gt=0, le=1e3, allow_inf_nan=False)]
 
 
 class ZWidthSection(Section):

@@ -60,7 +60,7 @@ class _Cases:
         self._name, self._text, self._changes = name, read(name), GRID | changes
         self.scene = load(name, self._changes)
         self._grid = grid_of(self.scene)
-        self.curves = [replace(figures.methods()[method], label=method) for method in METHODS]
+        self.curves = [replace(figures.methods(self.scene)[method], label=method) for method in METHODS]
         self.shortcuts = shortcuts(self.scene, self._differs)
         self.computed = [each for each in self.shortcuts if each.backend != "rtl"]
         self.hardware = [each for each in self.shortcuts if each.backend == "rtl"]

@@ -40,7 +40,10 @@ class Case:
         Raises:
             SceneError: if it cannot be.
         """
-        return parse(self.scene, self.text, self.changes)
+        try:
+            return parse(self.scene, self.text, self.changes)
+        except SceneError as error:
+            raise SceneError(f"{error} ({self.label})") from None
 
     def job(self, backend: str) -> dict[str, Any]:
         """Return the arguments of `verdict` but for the wall."""
@@ -97,11 +100,16 @@ class Map:
     @property
     def leaves(self) -> bool:
         """Whether K or B goes on beyond the map."""
-        return self.edges[-1].stable_n_per_m > 0 or any(edge.marginal_n_per_m is None for edge in self.edges)
+        return self.edges[-1].stable_n_per_m > 0 or self.clipped
+
+    @property
+    def clipped(self) -> bool:
+        """Whether K goes on beyond the map."""
+        return any(edge.marginal_n_per_m is None for edge in self.edges)
 
     @property
     def largest_n_per_m(self) -> float:
-        """The largest stable stiffness."""
+        """The largest stable stiffness; larger than that where the map is `clipped`."""
         return max(edge.stable_n_per_m for edge in self.edges)
 
     def report(self) -> dict[str, Any]:

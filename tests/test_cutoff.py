@@ -8,7 +8,7 @@ from test_cli import call
 
 from hardwall.sim import cutoff
 from hardwall.sim.boundary import Edge
-from hardwall.sim.scene import load, names
+from hardwall.sim.scene import load, names, read
 from hardwall.sim.zwidth import Case, Map
 
 
@@ -157,3 +157,18 @@ def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, mes
     assert (code, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1
+
+
+def test_two_files_of_one_name_are_two_devices(tmp_path):
+    """And their maps are told apart by what was asked, not by what they are called."""
+    paths = [tmp_path / folder / "device.toml" for folder in "ab"]
+    for path, mass in zip(paths, ("0.35", "0.7"), strict=True):
+        path.parent.mkdir()
+        path.write_text(read("seed-2011").replace("mass_kg = 0.35", f"mass_kg = {mass}"))
+
+    def of_mass(title: str, cases: list[Case]) -> list[Map]:
+        return [map_of(case, 100 * case.parsed.handle.mass_kg) for case in cases]
+
+    devices = cutoff.study([str(path) for path in paths], {}, of_mass)
+    assert [round(device.best.area) for device in devices] == [35, 70]
+    assert [round(device.unfiltered.area) for device in devices] == [35, 70]

@@ -16,6 +16,7 @@ def test_report_and_picture(monkeypatch, capsys, tmp_path):
     report = json.loads(out)
     bound = report["c_m_per_s2"]
     assert 0 < bound < report["true_peak_m_per_s2"]
+    assert len(report["amplitudes_mm"]) == 7
     assert len(report["frequencies_hz"]) == report["sines"] == 7
     assert report["proposed_lambda_sqrt_m_per_s"] == math.sqrt(bound)
     assert report["proposed_alpha_m_per_s2"] == 1.1 * bound

@@ -55,6 +55,16 @@ def test_each_part_lowers_the_linear_limit_and_without_any_it_grows_with_the_rat
     assert rigid[0] == pytest.approx(largest, rel=1e-6), "the masses of handle and motor are those of the rigid device"
 
 
+def test_a_map_that_k_leaves_has_no_ratio_and_no_end():
+    edge, clipped = Edge(10.0, 50e3, 60e3), Edge(10.0, 500e3, None)
+    for own, last in ((clipped, edge), (edge, clipped)):
+        maps = [Map(None, [each], 1, [True]) for each in (own, edge, last)]
+        gain = rates.Gain("fdm", [1_000, 10_000], maps[0], maps[1:])
+        assert gain.ratio is None
+        assert gain.report()["clipped"] == [False, last is clipped]
+        assert (gain.ends_at_hz is None) == (last is clipped)
+
+
 def test_without_a_cable_mass_and_friction_of_the_motor_are_the_handle_s():
     own = {"handle.mass_kg": 0.3, "handle.viscous_n_s_per_m": 0.25}
     side = {"transmission.motor_mass_kg": 0.125, "transmission.motor_viscous_n_s_per_m": 0.5}

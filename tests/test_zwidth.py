@@ -113,6 +113,18 @@ def test_the_rtl_gives_the_map_of_fixed(monkeypatch, capsys):
     assert fixed[0]["hits"] > 2
 
 
+def test_walls_below_the_edge_are_hit_where_the_scene_asks():
+    """At 90 N s/m and more, Levant's chatter shakes soft walls, not stiff ones."""
+    changes = {**METHODS[1].changes, "zwidth.walls_below": 8, "zwidth.stiffness_step_n_per_m": 4e3}
+    changes |= {"zwidth.damping_from_n_s_per_m": 90.0, "zwidth.damping_to_n_s_per_m": 100.0}
+    changes |= {"zwidth.damping_step_n_s_per_m": 10.0}
+    (found,) = zwidth.run([replace(CASES[1], changes=changes)], "fixed", Store("zwidth"))
+    left, right = (edge.held * edge.stable_n_per_m for edge in found.edges)
+    assert all(0 < edge.held < 1 for edge in found.edges)
+    assert found.report()["area_held_n2_s_per_m2"] == found.area_held == pytest.approx(10 * (left + right) / 2)
+    assert replace(found, edges=[replace(edge, held=None) for edge in found.edges]).area_held is None
+
+
 def test_walls_out_of_place_are_left_out_of_the_area_in_place():
     edges = [Edge(10.0 * n, 20e3, 21e3) for n in range(5)]
     found = zwidth.Map(CASES[0], edges, 5, [True, True, False, True, True])
@@ -152,6 +164,13 @@ def test_report_and_picture(monkeypatch, capsys, tmp_path, map_of_one_process):
     ("arguments", "message"),
     [
         (["mhz"], "mhz: zwidth is missing: a map needs its steps"),
+        (
+            ["desktop-arm"],
+            "butterworth.cutoff_hz must be 4.52346e-12 to 400 at these rates, not 500.0 (FDM + 500 Hz)",
+        ),
+        (["--set", "zwidth.walls_below=-1"], "zwidth.walls_below must be at least 0"),
+        (["--set", "protocol.threshold_mm=1e300"], "protocol.threshold_mm must be at most 1000"),
+        (["--workers", "2", "--scheduler", ""], "--scheduler  has workers of its own"),
         (["--estimators", "nobody"], "--estimators: estimator must be one of fdm, "),
         (
             ["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"],
