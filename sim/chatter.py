@@ -13,7 +13,7 @@ There is such an x if and only if
     B (max u - min u) <= 2 f_c     friction holds against the swing
     B max u < P + f_c              and the mean does not hold the handle out of the wall.
 
-K is not in it: where it ends a region, it ends that at one B for every K.
+K is not in it. That a handle cannot rest does not make a wall unstable: it may be shaken by less than the threshold.
 """
 
 from dataclasses import dataclass

@@ -83,6 +83,7 @@ def _show_drop(found) -> None:
             [each.method, "" if plain else f"{each.factor} {each.value}", *(ends if plain else ("", "")), *rests]
         )
     show_table(chatter, rows)
+    _show_ends(found)
     ratios = ", ".join(f"{each:.2f}" for each in found.agreement())
     log.print(f"measured over predicted, least, quartiles and most: {ratios}")
     columns = (
@@ -99,6 +100,20 @@ def _show_drop(found) -> None:
         end = f"{each.damping_n_s_per_m:g}", "" if before is None else f"{before:.2f}"
         rows.append([each.case.label, *areas, *end])
     show_table({"method": "left"} | dict.fromkeys(columns, "right"), rows)
+
+
+def _show_ends(found) -> None:
+    numbers = ("K (kN/m)", "rests to B (N s/m)", "stable to B (N s/m)")
+    rows = [
+        [
+            each.method,
+            f"{each.stiffness_n_per_m / 1e3:g}",
+            f"{each.rests_n_s_per_m:.3g}",
+            f"{each.stable_n_s_per_m:.3g}",
+        ]
+        for each in found.ends
+    ]
+    show_table({"method": "left"} | dict.fromkeys(numbers, "right"), rows)
 
 
 def fit(

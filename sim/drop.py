@@ -1,10 +1,12 @@
 """Why the stable region of Levant's differentiator ends at one B, in a sharp drop, and what has none.
 
 The explanation under test is `chatter`: at rest its u goes on chattering, and times B that is a force which friction
-holds, or not, whatever the stiffness. Three experiments:
+holds, or not, whatever the stiffness. Four experiments:
 
-- *Shaken.* One wall, B ever larger: RMS of position and of force after the settling mark, for Levant's u, for the same
+- *Shaken.* One wall, B ever larger: RMS of position after the settling mark, for Levant's u, for the same
   differentiator with the same gains whose implicit Euler does not chatter at rest, and for others.
+- *Ends.* The B up to which three of four hits come to rest, and up to which they are stable, from soft walls to stiff
+  ones: a handle that is shaken by less than the threshold is stable, too.
 - *Laws.* The B up to which three of four hits come to rest, measured in the closed loop, against that up to which
   `chatter` lets three of four cycles rest, predicted from the estimator alone: where friction, push, gains and the
   number of samples a force change, which are in the law; and mass, count, delay and stiffness, which are not.
@@ -12,7 +14,7 @@ holds, or not, whatever the stiffness. Three experiments:
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -51,6 +53,10 @@ TIMES = {
 """What is changed, by how many times."""
 GAINS = {"lambda": ("lambda_sqrt_m_per_s", (0.7, 1.5)), "alpha": ("alpha_m_per_s2", (0.4, 2.0, 4.0))}
 SAMPLES_A_FORCE = (8, 9, 11, 20)
+PAPERS = ("proposed", "adjusted")
+"""What the ends and the laws are of, by the names of `curves`."""
+STIFFNESSES_N_PER_M = (2.5e3, 5e3, 10e3, 20e3, 30e3)
+"""Of the walls whose ends are looked for; stiffer ones are not stable at the least of the dampings either."""
 
 Striking = Callable[[str, list[dict]], list[dict]]
 """What makes the result of `strike` for each job; the text is for the one who waits."""
@@ -58,12 +64,21 @@ Striking = Callable[[str, list[dict]], list[dict]]
 
 @dataclass(frozen=True)
 class Shaken:
-    """One hit of the first experiment: RMS of position and force after the settling mark; None if the handle fled."""
+    """One hit of the first experiment: RMS of position after the settling mark; None if the handle fled."""
 
     method: str
     damping_n_s_per_m: float
     rms_m: float | None
-    force_rms_n: float | None
+
+
+@dataclass(frozen=True)
+class End:
+    """Up to which B enough of the hits of a wall came to rest, and were stable; each 0 or infinite as in a `Law`."""
+
+    method: str
+    stiffness_n_per_m: float
+    rests_n_s_per_m: float
+    stable_n_s_per_m: float
 
 
 @dataclass(frozen=True)
@@ -92,13 +107,14 @@ class Drop:
     Attributes:
         scene: as it was hit.
         chatters: by the names of `curves`.
-        shaken, laws: of the first two experiments.
+        shaken, ends, laws: of the first three experiments.
         maps: by the names of `curves`.
     """
 
     scene: Scene
     chatters: dict[str, Chatter]
     shaken: list[Shaken]
+    ends: list[End]
     laws: list[Law]
     maps: dict[str, Map]
 
@@ -141,11 +157,14 @@ class Drop:
                 for name, chatter in self.chatters.items()
             },
             "shaken": [vars(each) for each in self.shaken],
+            "ends": [_finite(each) for each in self.ends],
             "measured_over_predicted": self.agreement(),
-            "laws": [
-                {key: None if value == math.inf else value for key, value in vars(each).items()} for each in self.laws
-            ],
+            "laws": [_finite(each) for each in self.laws],
         }
+
+
+def _finite(found: End | Law) -> dict[str, Any]:
+    return {key: None if value == math.inf else value for key, value in vars(found).items()}
 
 
 def curves(scene: Scene) -> dict[str, Curve]:
@@ -166,7 +185,7 @@ def curves(scene: Scene) -> dict[str, Curve]:
 
 
 def strike(scene: str, text: str, changes: dict[str, Any], damping: float, start: int, backend: str) -> dict:
-    """Hit a scene's wall; return `rests`, `rms_m` and `force_rms_n`, null where the handle fled.
+    """Hit a scene's wall; return whether it `rests` and is `stable`, and its `rms_m`, null where the handle fled.
 
     Args:
         scene, text, changes: of a `Case`.
@@ -177,16 +196,15 @@ def strike(scene: str, text: str, changes: dict[str, Any], damping: float, start
     plain = parse(scene, text, changes)
     own = {"wall.damping_n_s_per_m": damping}
     own["protocol.start_m"] = plain.protocol.start_m - start * APART * plain.encoder.count_m
-    result = hit.run(parse(scene, text, changes | own), backend, traces=True, until_sure=True)
-    measured = result.overview.time_s >= plain.protocol.settle_s
-    if not measured.any():
-        return {"rests": False, "rms_m": None, "force_rms_n": None}
+    result = hit.run(parse(scene, text, changes | own), backend, until_sure=True)
+    if result.samples <= plain.protocol.settle_s * plain.spec.sample_hz:
+        return {"rests": False, "stable": False, "rms_m": None}
     rests = result.rms_m < REST_COUNTS * plain.encoder.count_m and result.mean_m > 0
-    return {"rests": rests, "rms_m": result.rms_m, "force_rms_n": float(result.overview.force_n[measured].std())}
+    return {"rests": rests, "stable": result.stable, "rms_m": result.rms_m}
 
 
 def study(scene: str, changes: dict[str, Any], backend: str, striking: Striking, mapping: Mapping) -> Drop:
-    """Return the three experiments on a scene.
+    """Return the four experiments on a scene.
 
     Args:
         scene: its name or file.
@@ -207,7 +225,7 @@ def study(scene: str, changes: dict[str, Any], backend: str, striking: Striking,
     roomy = changes | {"wall.stiffness_n_per_m": STIFFNESS_N_PER_M, "controller.damping_max_n_s_per_m": most}
     cases = {name: Case(curve.label, scene, text, roomy | curve.changes) for name, curve in compared.items()}
     changed = {("none", "", name): case for name, case in cases.items()}
-    for name in ("proposed", "adjusted"):
+    for name in PAPERS:
         for (factor, value), change in _changes(plain, compared[name]).items():
             changed[factor, value, name] = replace(cases[name], changes=cases[name].changes | change)
     changed = accepted(changed)
@@ -217,6 +235,7 @@ def study(scene: str, changes: dict[str, Any], backend: str, striking: Striking,
         plain,
         {name: at_rest(case.parsed, backend) for name, case in cases.items()},
         _shaken(cases, backend, striking),
+        _ends(cases, backend, striking),
         _laws(changed, backend, striking),
         dict(zip(compared, maps, strict=True)),
     )
@@ -250,33 +269,42 @@ def _shaken(cases: dict[str, Case], backend: str, striking: Striking) -> list[Sh
     walls = list(product(cases, DAMPINGS_N_S_PER_M.tolist(), range(2)))
     jobs = [_job(cases[name], damping, start, backend) for name, damping, start in walls]
     results = striking("shaken", jobs)
-    return [
-        Shaken(name, damping, result["rms_m"], result["force_rms_n"])
-        for (name, damping, _), result in zip(walls, results, strict=True)
-    ]
+    return [Shaken(name, damping, result["rms_m"]) for (name, damping, _), result in zip(walls, results, strict=True)]
+
+
+def _up_to(cases: dict[Hashable, Case], what: str, backend: str, striking: Striking) -> dict[Hashable, float]:
+    """Return up to which B enough of the hits of each case rest, or are stable: by bisection, a step of all at once."""
+    least, most = DAMPINGS_N_S_PER_M[[0, -1]].tolist()
+    low, high = dict.fromkeys(cases, least), dict.fromkeys(cases, most)
+    for step in range(HALVINGS):
+        middle = {key: float(f"{math.sqrt(low[key] * high[key]):.4g}") for key in cases}
+        asked = list(product(cases, range(STARTS)))
+        jobs = [_job(cases[key], middle[key], start, backend) for key, start in asked]
+        counts = dict.fromkeys(cases, 0)
+        for (key, _), result in zip(asked, striking(f"{what}, {step + 1} of {HALVINGS}", jobs), strict=True):
+            counts[key] += result[what]
+        for key, count in counts.items():
+            side = low if count >= ENOUGH * STARTS else high
+            side[key] = middle[key]
+    ends = {key: math.sqrt(low[key] * high[key]) for key in cases}
+    return (
+        ends | {key: 0.0 for key in cases if low[key] == least} | {key: math.inf for key in cases if high[key] == most}
+    )
+
+
+def _ends(cases: dict[str, Case], backend: str, striking: Striking) -> list[End]:
+    walls = {}
+    for name, stiffness in product(PAPERS, STIFFNESSES_N_PER_M):
+        wall = {"wall.stiffness_n_per_m": stiffness}
+        walls[name, stiffness] = replace(cases[name], changes=cases[name].changes | wall)
+    rests, stable = (_up_to(walls, what, backend, striking) for what in ("rests", "stable"))
+    return [End(*key, rests[key], stable[key]) for key in walls]
 
 
 def _laws(changed: dict[tuple[str, str, str], Case], backend: str, striking: Striking) -> list[Law]:
-    """Return what is predicted and what is measured for every change: by bisection, a step of all of them at once."""
-    least, most = DAMPINGS_N_S_PER_M[[0, -1]].tolist()
-    low, high = dict.fromkeys(changed, least), dict.fromkeys(changed, most)
-    for step in range(HALVINGS):
-        middle = {key: float(f"{math.sqrt(low[key] * high[key]):.4g}") for key in changed}
-        asked = list(product(changed, range(STARTS)))
-        jobs = [_job(changed[key], middle[key], start, backend) for key, start in asked]
-        resting = dict.fromkeys(changed, 0)
-        for (key, _), result in zip(asked, striking(f"laws, {step + 1} of {HALVINGS}", jobs), strict=True):
-            resting[key] += result["rests"]
-        for key, count in resting.items():
-            side = low if count >= ENOUGH * STARTS else high
-            side[key] = middle[key]
-    laws = []
-    for key, case in changed.items():
-        measured = math.sqrt(low[key] * high[key])
-        if low[key] == least or high[key] == most:
-            measured = 0.0 if low[key] == least else math.inf
-        laws.append(Law(*key, _predicted(case.parsed, backend), measured))
-    return laws
+    """Return what is predicted and what is measured for every change."""
+    measured = _up_to(changed, "rests", backend, striking)
+    return [Law(*key, _predicted(case.parsed, backend), measured[key]) for key, case in changed.items()]
 
 
 def _predicted(scene: Scene, backend: str) -> float:

@@ -7,15 +7,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .drop import STIFFNESS_N_PER_M, Drop
+from .drop import PAPERS, STIFFNESS_N_PER_M, Drop
 from .picture import MARKERS
 from .zwidth import grid_of
 
-LEAST_M, LEAST_N = 1e-9, 1e-5
+LEAST_M = 1e-9
 """What is less is drawn as this: an axis of decades has no zero."""
 FLED_M = 0.1
 """A handle that fled the encoder is drawn here."""
-PAPERS = ("proposed", "adjusted")
 OUTSIDE = ("mass", "count", "delay", "stiffness")
 """What was changed that is not in the law."""
 
@@ -28,9 +27,10 @@ def plot_drop(found: Drop, backend: str) -> Figure:
         backend: that it was made on.
     """
     picture = Figure(figsize=(14, 11), layout="constrained")
-    (position, law), (force, maps) = picture.subplots(2, 2)
+    (position, law), (ends, maps) = picture.subplots(2, 2)
     colours = {name: mpl.colormaps["tab10"](index) for index, name in enumerate(found.chatters)}
-    _draw_shaken(position, force, found, colours)
+    _draw_shaken(position, found, colours)
+    _draw_ends(ends, found, colours)
     _draw_laws(law, found, colours)
     _draw_maps(maps, found, colours)
     controller = found.scene.controller
@@ -43,34 +43,52 @@ def plot_drop(found: Drop, backend: str) -> Figure:
     return picture
 
 
-def _draw_shaken(position: Axes, force: Axes, found: Drop, colours: dict) -> None:
+def _draw_shaken(axes: Axes, found: Drop, colours: dict) -> None:
     for index, (name, colour) in enumerate(colours.items()):
         own = [each for each in found.shaken if each.method == name]
-        dampings = [each.damping_n_s_per_m for each in own]
         # The first on top: what is at rest lies on one line.
         style = {"color": colour, "marker": MARKERS[index], "ls": "", "ms": 6, "alpha": 0.8, "zorder": 3 - index / 10}
         moved = [FLED_M if each.rms_m is None else max(each.rms_m, LEAST_M) for each in own]
-        position.plot(dampings, np.array(moved) * 1e6, **style)
-        kept = [each for each in own if each.force_rms_n is not None]
-        pushed = [max(each.force_rms_n, LEAST_N) for each in kept]
-        force.plot([each.damping_n_s_per_m for each in kept], pushed, **style)
+        axes.plot([each.damping_n_s_per_m for each in own], np.array(moved) * 1e6, **style)
     threshold = found.scene.protocol.threshold_mm * 1e3
-    position.axhline(threshold, color="black", lw=1, ls="--", label=f"threshold, {threshold:g} µm")
-    force.axhline(found.scene.handle.coulomb_n, color="black", lw=1, ls="--", label="Coulomb friction")
+    axes.axhline(threshold, color="black", lw=1, ls="--", label=f"threshold, {threshold:g} µm")
+    _draw_predicted(axes, found, colours)
+    axes.set_title(f"after the settling mark, K = {STIFFNESS_N_PER_M / 1e3:g} kN/m, two hits each")
+    axes.set_ylabel(f"RMS of position (µm; {LEAST_M * 1e6:g}: at rest)")
+    axes.set_xlabel("damping B of the wall (N s/m)")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.grid(alpha=0.3, which="both")
+    axes.legend(fontsize=8, loc="upper left")
+
+
+def _draw_predicted(axes: Axes, found: Drop, colours: dict) -> None:
     for each in found.laws:
         if each.factor == "none" and each.predicted_n_s_per_m < math.inf:
-            for axes in (position, force):
-                axes.axvline(each.predicted_n_s_per_m, color=colours[each.method], lw=1.2, ls=":")
-    position.plot([], [], color="0.4", ls=":", lw=1.2, label="predicted to rest up to here (same colour)")
-    position.set_title(f"after the settling mark, K = {STIFFNESS_N_PER_M / 1e3:g} kN/m, two hits each")
-    position.set_ylabel(f"RMS of position (µm; {LEAST_M * 1e6:g}: at rest)")
-    force.set_ylabel(f"RMS of force (N; {LEAST_N:g}: less)")
-    force.set_xlabel("damping B of the wall (N s/m)")
-    for axes in (position, force):
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.grid(alpha=0.3, which="both")
-        axes.legend(fontsize=8, loc="upper left")
+            axes.axvline(each.predicted_n_s_per_m, color=colours[each.method], lw=1.2, ls=":")
+    axes.plot([], [], color="0.4", ls=":", lw=1.2, label="predicted to rest up to here (same colour)")
+
+
+def _draw_ends(axes: Axes, found: Drop, colours: dict) -> None:
+    for name in PAPERS:
+        own, colour = [each for each in found.ends if each.method == name], colours[name]
+        stiffness = [each.stiffness_n_per_m / 1e3 for each in own]
+        edges = found.maps[name].edges
+        upper = [edge.stable_n_per_m / 1e3 for edge in edges]
+        axes.plot([edge.damping_n_s_per_m for edge in edges], upper, color=colour, lw=1, label="upper edge of the map")
+        for style, ends in (("o", [e.stable_n_s_per_m for e in own]), ("x", [e.rests_n_s_per_m for e in own])):
+            what = "stable up to here" if style == "o" else "comes to rest up to here"
+            # What has no end within the dampings that were tried is not drawn.
+            known = [(end, k) for end, k in zip(ends, stiffness, strict=True) if 0 < end < math.inf]
+            axes.plot(*zip(*known, strict=True) if known else ([], []), style, color=colour, ms=7, label=what)
+    _draw_predicted(axes, found, colours)
+    axes.set_title("where three of four hits still come to rest, and where they are still stable")
+    axes.set_xlabel("damping B of the wall (N s/m)")
+    axes.set_ylabel("stiffness K of the wall (kN/m)")
+    axes.set_xlim(0, None)
+    axes.set_ylim(0, None)
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8, loc="upper right")
 
 
 def _draw_laws(axes: Axes, found: Drop, colours: dict) -> None:
