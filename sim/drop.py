@@ -14,7 +14,8 @@ holds, or not, whatever the stiffness. Four experiments:
 """
 
 import math
-from collections.abc import Callable, Hashable
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -56,7 +57,8 @@ SAMPLES_A_FORCE = (8, 9, 11, 20)
 PAPERS = ("proposed", "adjusted")
 """What the ends and the laws are of, by the names of `curves`."""
 STIFFNESSES_N_PER_M = (2.5e3, 5e3, 10e3, 20e3, 30e3)
-"""Of the walls whose ends are looked for; stiffer ones are not stable at the least of the dampings either."""
+ENDS_N_S_PER_M = np.geomspace(20, 240, 14).round(1)
+"""Of the walls whose ends are looked for."""
 
 Striking = Callable[[str, list[dict]], list[dict]]
 """What makes the result of `strike` for each job; the text is for the one who waits."""
@@ -73,7 +75,7 @@ class Shaken:
 
 @dataclass(frozen=True)
 class End:
-    """Up to which B enough of the hits of a wall came to rest, and were stable; each 0 or infinite as in a `Law`."""
+    """The largest B of `ENDS_N_S_PER_M` with which enough of the hits come to rest, and are stable; 0 without any."""
 
     method: str
     stiffness_n_per_m: float
@@ -157,14 +159,12 @@ class Drop:
                 for name, chatter in self.chatters.items()
             },
             "shaken": [vars(each) for each in self.shaken],
-            "ends": [_finite(each) for each in self.ends],
+            "ends": [vars(each) for each in self.ends],
             "measured_over_predicted": self.agreement(),
-            "laws": [_finite(each) for each in self.laws],
+            "laws": [
+                {key: None if value == math.inf else value for key, value in vars(each).items()} for each in self.laws
+            ],
         }
-
-
-def _finite(found: End | Law) -> dict[str, Any]:
-    return {key: None if value == math.inf else value for key, value in vars(found).items()}
 
 
 def curves(scene: Scene) -> dict[str, Curve]:
@@ -272,39 +272,47 @@ def _shaken(cases: dict[str, Case], backend: str, striking: Striking) -> list[Sh
     return [Shaken(name, damping, result["rms_m"]) for (name, damping, _), result in zip(walls, results, strict=True)]
 
 
-def _up_to(cases: dict[Hashable, Case], what: str, backend: str, striking: Striking) -> dict[Hashable, float]:
-    """Return up to which B enough of the hits of each case rest, or are stable: by bisection, a step of all at once."""
-    least, most = DAMPINGS_N_S_PER_M[[0, -1]].tolist()
-    low, high = dict.fromkeys(cases, least), dict.fromkeys(cases, most)
-    for step in range(HALVINGS):
-        middle = {key: float(f"{math.sqrt(low[key] * high[key]):.4g}") for key in cases}
-        asked = list(product(cases, range(STARTS)))
-        jobs = [_job(cases[key], middle[key], start, backend) for key, start in asked]
-        counts = dict.fromkeys(cases, 0)
-        for (key, _), result in zip(asked, striking(f"{what}, {step + 1} of {HALVINGS}", jobs), strict=True):
-            counts[key] += result[what]
-        for key, count in counts.items():
-            side = low if count >= ENOUGH * STARTS else high
-            side[key] = middle[key]
-    ends = {key: math.sqrt(low[key] * high[key]) for key in cases}
-    return (
-        ends | {key: 0.0 for key in cases if low[key] == least} | {key: math.inf for key in cases if high[key] == most}
-    )
-
-
 def _ends(cases: dict[str, Case], backend: str, striking: Striking) -> list[End]:
+    """Return the ends: every damping is tried, for a stiff wall has a least one, too."""
     walls = {}
     for name, stiffness in product(PAPERS, STIFFNESSES_N_PER_M):
         wall = {"wall.stiffness_n_per_m": stiffness}
         walls[name, stiffness] = replace(cases[name], changes=cases[name].changes | wall)
-    rests, stable = (_up_to(walls, what, backend, striking) for what in ("rests", "stable"))
-    return [End(*key, rests[key], stable[key]) for key in walls]
+    asked = list(product(walls, ENDS_N_S_PER_M.tolist(), range(STARTS)))
+    results = striking("ends", [_job(walls[key], damping, start, backend) for key, damping, start in asked])
+    counts = {"rests": Counter(), "stable": Counter()}
+    for (key, damping, _), result in zip(asked, results, strict=True):
+        for what, count in counts.items():
+            count[key, damping] += result[what]
+
+    def last(what: str, key: tuple) -> float:
+        enough = [damping for damping in ENDS_N_S_PER_M.tolist() if counts[what][key, damping] >= ENOUGH * STARTS]
+        return max(enough, default=0.0)
+
+    return [End(*key, last("rests", key), last("stable", key)) for key in walls]
 
 
 def _laws(changed: dict[tuple[str, str, str], Case], backend: str, striking: Striking) -> list[Law]:
-    """Return what is predicted and what is measured for every change."""
-    measured = _up_to(changed, "rests", backend, striking)
-    return [Law(*key, _predicted(case.parsed, backend), measured[key]) for key, case in changed.items()]
+    """Return what is predicted and what is measured for every change: by bisection, a step of all of them at once."""
+    least, most = DAMPINGS_N_S_PER_M[[0, -1]].tolist()
+    low, high = dict.fromkeys(changed, least), dict.fromkeys(changed, most)
+    for step in range(HALVINGS):
+        middle = {key: float(f"{math.sqrt(low[key] * high[key]):.4g}") for key in changed}
+        asked = list(product(changed, range(STARTS)))
+        jobs = [_job(changed[key], middle[key], start, backend) for key, start in asked]
+        resting = dict.fromkeys(changed, 0)
+        for (key, _), result in zip(asked, striking(f"laws, {step + 1} of {HALVINGS}", jobs), strict=True):
+            resting[key] += result["rests"]
+        for key, count in resting.items():
+            side = low if count >= ENOUGH * STARTS else high
+            side[key] = middle[key]
+    laws = []
+    for key, case in changed.items():
+        measured = math.sqrt(low[key] * high[key])
+        if low[key] == least or high[key] == most:
+            measured = 0.0 if low[key] == least else math.inf
+        laws.append(Law(*key, _predicted(case.parsed, backend), measured))
+    return laws
 
 
 def _predicted(scene: Scene, backend: str) -> float:

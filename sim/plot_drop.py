@@ -15,6 +15,8 @@ LEAST_M = 1e-9
 """What is less is drawn as this: an axis of decades has no zero."""
 FLED_M = 0.1
 """A handle that fled the encoder is drawn here."""
+STABLE = {"color": "0.4", "marker": "o", "ls": "", "ms": 9, "mfc": "none"}
+RESTS = {"color": "0.4", "marker": "x", "ls": "", "ms": 6}
 OUTSIDE = ("mass", "count", "delay", "stiffness")
 """What was changed that is not in the law."""
 
@@ -71,24 +73,25 @@ def _draw_predicted(axes: Axes, found: Drop, colours: dict) -> None:
 
 def _draw_ends(axes: Axes, found: Drop, colours: dict) -> None:
     for name in PAPERS:
-        own, colour = [each for each in found.ends if each.method == name], colours[name]
-        stiffness = [each.stiffness_n_per_m / 1e3 for each in own]
         edges = found.maps[name].edges
         upper = [edge.stable_n_per_m / 1e3 for edge in edges]
-        axes.plot([edge.damping_n_s_per_m for edge in edges], upper, color=colour, lw=1, label="upper edge of the map")
-        for style, ends in (("o", [e.stable_n_s_per_m for e in own]), ("x", [e.rests_n_s_per_m for e in own])):
-            what = "stable up to here" if style == "o" else "comes to rest up to here"
-            # What has no end within the dampings that were tried is not drawn.
-            known = [(end, k) for end, k in zip(ends, stiffness, strict=True) if 0 < end < math.inf]
-            axes.plot(*zip(*known, strict=True) if known else ([], []), style, color=colour, ms=7, label=what)
+        axes.plot([edge.damping_n_s_per_m for edge in edges], upper, color=colours[name], lw=1)
+        own = [each for each in found.ends if each.method == name]
+        stable = [(each.stable_n_s_per_m, each.stiffness_n_per_m / 1e3) for each in own if each.stable_n_s_per_m]
+        rests = [(each.rests_n_s_per_m, each.stiffness_n_per_m / 1e3) for each in own if each.rests_n_s_per_m]
+        for ends, style in ((stable, STABLE), (rests, RESTS)):
+            axes.plot(*np.array(ends).reshape(-1, 2).T, **style | {"color": colours[name]})
+    axes.plot([], [], color="0.4", lw=1, label="upper edge of the map")
+    axes.plot([], [], **STABLE, label="stable up to here")
+    axes.plot([], [], **RESTS, label="comes to rest up to here")
     _draw_predicted(axes, found, colours)
     axes.set_title("where three of four hits still come to rest, and where they are still stable")
     axes.set_xlabel("damping B of the wall (N s/m)")
     axes.set_ylabel("stiffness K of the wall (kN/m)")
     axes.set_xlim(0, None)
-    axes.set_ylim(0, None)
+    axes.set_ylim(0, 1.3 * axes.get_ylim()[1])
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, loc="upper right")
+    axes.legend(fontsize=8, loc="upper left", ncols=2)
 
 
 def _draw_laws(axes: Axes, found: Drop, colours: dict) -> None:
