@@ -33,7 +33,7 @@ comma := ,
 ESTIMATORS_OF_ALL := fdm levant butterworth kalman period period-count levant-edge levant-semi-implicit levant-implicit \
   levant-adaptive window foaw
 ALL_ON_THE_MAP := --estimators $(subst $() ,$(comma),$(strip $(ESTIMATORS_OF_ALL))) $(addprefix --set zwidth., \
-  stiffness_to_n_per_m=150e3 stiffness_step_n_per_m=2e3 damping_step_n_s_per_m=12.0)
+  stiffness_to_n_per_m=150e3 stiffness_step_n_per_m=2e3 damping_step_n_s_per_m=12.0 walls_below=8)
 MAPPED := seed-2011 fit-2011 drive-2011
 STUDIES := cutoff gains rates drop trade
 

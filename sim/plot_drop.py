@@ -15,8 +15,8 @@ LEAST_M = 1e-9
 """What is less is drawn as this: an axis of decades has no zero."""
 FLED_M = 0.1
 """A handle that fled the encoder is drawn here."""
-STABLE = {"color": "0.4", "marker": "o", "ls": "", "ms": 9, "mfc": "none"}
-RESTS = {"color": "0.4", "marker": "x", "ls": "", "ms": 6}
+STABLE = {"color": "0.4", "marker": "o", "ls": "", "mfc": "none"}
+RESTS = {"color": "0.4", "marker": "x", "ls": ""}
 OUTSIDE = ("mass", "count", "delay", "stiffness")
 """What was changed that is not in the law."""
 
@@ -72,7 +72,7 @@ def _draw_predicted(axes: Axes, found: Drop, colours: dict) -> None:
 
 
 def _draw_ends(axes: Axes, found: Drop, colours: dict) -> None:
-    for name in PAPERS:
+    for size, name in zip((13, 9), PAPERS, strict=True):
         edges = found.maps[name].edges
         upper = [edge.stable_n_per_m / 1e3 for edge in edges]
         axes.plot([edge.damping_n_s_per_m for edge in edges], upper, color=colours[name], lw=1)
@@ -80,7 +80,7 @@ def _draw_ends(axes: Axes, found: Drop, colours: dict) -> None:
         stable = [(each.stable_n_s_per_m, each.stiffness_n_per_m / 1e3) for each in own if each.stable_n_s_per_m]
         rests = [(each.rests_n_s_per_m, each.stiffness_n_per_m / 1e3) for each in own if each.rests_n_s_per_m]
         for ends, style in ((stable, STABLE), (rests, RESTS)):
-            axes.plot(*np.array(ends).reshape(-1, 2).T, **style | {"color": colours[name]})
+            axes.plot(*np.array(ends).reshape(-1, 2).T, **style | {"color": colours[name], "ms": size})
     axes.plot([], [], color="0.4", lw=1, label="upper edge of the map")
     axes.plot([], [], **STABLE, label="stable up to here")
     axes.plot([], [], **RESTS, label="comes to rest up to here")
