@@ -11,6 +11,9 @@ from .scene import Scene
 from .theory import abbott_okamura_n_per_m, colgate_schenkel_n_per_m
 from .zwidth import Map
 
+ROOM = 8
+"""For the names of so many maps; those of more stand beside the picture."""
+
 
 def plot_zwidth(
     maps: Sequence[Map], limits: Sequence[list[float] | None], scene: Scene, grid: Grid, backend: str
@@ -58,5 +61,8 @@ def plot_zwidth(
     axes.set_xlim(0, None)
     axes.set_ylim(0, None)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, loc="upper left")
+    if len(maps) > ROOM:
+        picture.legend(fontsize=8, loc="outside right upper")
+    else:
+        axes.legend(fontsize=8, loc="upper left")
     return picture
