@@ -11,7 +11,8 @@ from replays import BOUND, COARSEN, EVERY, recording, reference_of, swing
 
 from bench import rng
 from hardwall.model.estimators import ESTIMATORS, uses_stamps
-from hardwall.sim.plot_replay import SUFFIXES, plot_replay
+from hardwall.sim.picture import SUFFIXES
+from hardwall.sim.plot_replay import plot_replay
 from hardwall.sim.recording import Recording, load
 from hardwall.sim.replay import ReplayError, replay
 

@@ -1,5 +1,6 @@
 """The table to choose by, and the picture of what a bit buys, from made-up results."""
 
+from hardwall.sim import picture as pictures
 from hardwall.sim import plot_accuracy, situations
 
 COST = {"device": "some", "lut4": 10, "ff": 20, "dsp": 1, "bram": 0, "latency_clocks": 7, "board": {"max_sample_hz": 5}}
@@ -37,5 +38,5 @@ def test_a_curve_a_output_and_a_circle_at_the_derived_width(tmp_path):
     ]
     assert by_width.lines[0].get_xdata().tolist() == [20, 19, 18]
     assert by_logic.lines[1].get_xdata() == [500]
-    plot_accuracy.save(picture, tmp_path / "bits.svg")
+    pictures.save(picture, tmp_path / "bits.svg")
     assert "bits of the velocity" in (tmp_path / "bits.svg").read_text()
