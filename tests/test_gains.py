@@ -179,3 +179,8 @@ def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, mes
     assert (code, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1
+
+
+def test_the_adjusted_gains_are_the_scene_s():
+    search = gains.study("fit-2011", {}, Known(hill))
+    assert [search.picks[output]["adjusted"].gains.alpha_m_per_s2 for output in ("u", "u1")] == [75.8, 75.8]
