@@ -67,7 +67,7 @@ choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy,
 	@$(HARDWALL) costs
 	@$(HARDWALL) choose
 
-figures: $(VENV)/.synth | tools ## the founding paper's figures and every study of ours, as pictures in build/ (an hour)
+figures: $(VENV)/.synth | tools ## the founding paper's figures and every study of ours, as pictures in build/ (an hour and more)
 	@for number in 1 2; do $(HARDWALL) accuracy --figure $$number --plot build/figure-$$number.png; done
 	@$(HARDWALL) lipschitz --plot build/figure-4.png
 	@for scene in $(MAPPED); do $(HARDWALL) zwidth $$scene --resume --plot build/$$scene.png; done
