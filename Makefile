@@ -17,7 +17,7 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python -m
 HARDWALL := $(VENV)/bin/hardwall
-SOURCES := $(wildcard hdl/*.py model/*.py sim/*.py sim/*.cpp sim/scenes/*.toml)
+SOURCES := $(shell find hdl model sim -name "*.py" -o -name "*.cpp" -o -name "*.toml")
 
 SCENE := seed-2011
 ESTIMATORS := levant fdm

@@ -4,11 +4,11 @@ from amaranth.hdl import Cat, Module, Mux, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from hardwall.model import estimators
 from hardwall.model.axis import GLITCH_WIDTH, ILLEGAL_WIDTH
+from hardwall.model.estimators import registry
 from hardwall.model.spec import AxisSpec
 
-from .fixed import shape
+from .arithmetic.fixed import shape
 from .output import Output
 from .quadrature import Quadrature
 from .wall import Wall
@@ -122,7 +122,7 @@ class Axis(wiring.Component):
         m = Module()
         spec, design = self._spec, self._spec.design
         m.submodules.decoder = decoder = Quadrature(spec.count_width, spec.stamp_width, GLITCH_WIDTH, ILLEGAL_WIDTH)
-        hdl = estimators.load(spec.estimator, __package__)
+        hdl = registry.load(spec.estimator, f"{__package__}.estimators")
         m.submodules.estimator = estimator = hdl.Estimator(design.estimator)
         m.submodules.wall = wall = Wall(design.wall)
         m.submodules.output_stage = output = Output(design.output)

@@ -13,12 +13,12 @@ from amaranth.back import verilog
 from amaranth.hdl import Shape
 from amaranth.lib import wiring
 
+from hardwall.model.arithmetic.fixed import SQ, UQ, Format
 from hardwall.model.axis import ILLEGAL_WIDTH
-from hardwall.model.fixed import SQ, UQ, Format
 from hardwall.model.spec import AxisSpec
 
 from .axis import Axis
-from .boards import Board
+from .board import Board
 
 COLUMNS = ("port", "direction", "width", "format", "one LSB", "range", "reset", "what it is")
 MEANINGS = {

@@ -5,8 +5,8 @@ from amaranth.lib.wiring import In, Out
 
 from hardwall.model.output import Design
 
-from . import Block
-from .fixed import shape
+from .arithmetic.fixed import shape
+from .block import Block
 
 
 class Output(Block):

@@ -7,7 +7,7 @@ from amaranth.lib.wiring import In, Out
 
 from hardwall.model import quadrature as model
 
-from . import check_int
+from .checks import check_int
 
 
 class Quadrature(wiring.Component):

@@ -5,8 +5,8 @@ from amaranth.lib.wiring import In, Out
 
 from hardwall.model.wall import Design
 
-from . import Block
-from .fixed import shape, shift_floor
+from .arithmetic.fixed import shape, shift_floor
+from .block import Block
 
 
 class Wall(Block):

@@ -10,16 +10,19 @@ The kernels below it (`step` for a sample, `run` for records) are what the close
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from . import estimators, output, quadrature, wall
+from . import output, quadrature, wall
+from .arithmetic.fixed import UQ
 from .compiled import compiled
-from .estimators import estimate
-from .fixed import UQ
-from .spec import AxisSpec
+from .estimators import registry
+from .estimators.estimate import estimate
 from .words import Word
+
+if TYPE_CHECKING:
+    from .spec import AxisSpec
 
 GLITCH_WIDTH = 4
 """Bits of the glitch filter's length: up to 15 clocks."""
@@ -57,7 +60,7 @@ class Design:
         latency_to_drive: clocks from the sample strobe to the changed drive.
     """
 
-    def __init__(self, spec: AxisSpec):
+    def __init__(self, spec: "AxisSpec"):
         gains = spec.gains if spec.gains is not None else spec.model.Gains.default(spec)
         self.spec = spec
         self.gains = gains
@@ -103,7 +106,7 @@ class Design:
     def float_params(self, words: dict[str, int], si: dict[str, float]) -> Params:
         """Return the float64 kernel's parameters: gains as given in `si`, by word's name, not as rounded to `words`."""
         outputs = self.spec.model.OUTPUTS
-        selected = outputs[words.get(estimators.output_word(self.spec.estimator), 0)]
+        selected = outputs[words.get(registry.output_word(self.spec.estimator), 0)]
         return Params(
             self.estimator.float_params(self.gains, selected, si),
             self.wall.float_params(si.get("wall_stiffness", 0.0), si.get("wall_damping", 0.0), words),
@@ -253,7 +256,7 @@ class Axis:
         ValueError: for an unknown name or a value out of range.
     """
 
-    def __init__(self, spec: AxisSpec, floating: bool = False, **si: float):
+    def __init__(self, spec: "AxisSpec", floating: bool = False, **si: float):
         self.design = spec.design
         self.words = words = self.design.encode(**si)
         self.floating = floating
@@ -271,7 +274,7 @@ class Axis:
             ValueError: if they have not one or two dimensions; or if the estimator needs more than counts, the stamps
                 of edges: `hardwall.model.stamped.run` has them.
         """
-        if estimators.uses_stamps(self.design.spec.estimator):
+        if registry.uses_stamps(self.design.spec.estimator):
             raise ValueError(f"estimator must be one that needs only counts, not {self.design.spec.estimator!r}")
         counts = np.asarray(counts)
         if not np.issubdtype(counts.dtype, np.integer):

@@ -39,8 +39,8 @@ def source_digest() -> str:
     digest = hashlib.sha256()
     here = Path(__file__).absolute().parent
     for room in ("model", "sim"):
-        for path in sorted((here.parent / room).glob("*.py")):
-            digest.update(path.name.encode() + b"\0" + path.read_bytes())
+        for path in sorted((here.parent / room).rglob("*.py")):
+            digest.update(str(path.relative_to(here.parent)).encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()[:16]
 
 

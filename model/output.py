@@ -10,8 +10,8 @@ again from zero. The force limit is the last thing done to it.
 
 from typing import NamedTuple
 
+from .arithmetic.fixed import UQ, saturate
 from .compiled import compiled
-from .fixed import UQ, saturate
 from .words import Word
 
 FLAGS = ("slew_limited", "force_limited")

@@ -28,8 +28,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .arithmetic.fixed import wrap
 from .compiled import compiled
-from .fixed import wrap
 
 
 class Params(NamedTuple):

@@ -22,8 +22,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from types import ModuleType
 
-from . import estimators
-from .fixed import SQ, bits_for
+from .arithmetic.fixed import SQ, bits_for
+from .estimators import registry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -161,7 +161,7 @@ class AxisSpec:
     @property
     def model(self) -> ModuleType:
         """The estimator's module."""
-        return estimators.load(self.estimator)
+        return registry.load(self.estimator)
 
     @cached_property
     def design(self):

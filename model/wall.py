@@ -19,8 +19,8 @@ Together: fixed point differs from the exact equation on the same words by at mo
 
 from typing import NamedTuple
 
+from .arithmetic.fixed import SQ, UQ, saturate, shift_floor, shift_round_half_up, wrap
 from .compiled import by_type, compiled
-from .fixed import SQ, UQ, saturate, shift_floor, shift_round_half_up, wrap
 from .words import Word, gain_format
 
 LATENCY = 6

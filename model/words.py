@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from .fixed import UQ, Format, bits_for
+from .arithmetic.fixed import UQ, Format, bits_for
 
 GAIN_BITS = 16
 """Bits of a gain word: the part of a multiplier's operand that iCE40UP (16 x 16) and ECP5 (18 x 18) both have."""

@@ -42,3 +42,9 @@ def recordings() -> Path:
     if not folder.is_dir():
         pytest.skip("the recordings, ../shared/data, are not here")
     return folder
+
+
+@pytest.fixture
+def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Send results to an empty folder; what is compiled stays where it is."""
+    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")

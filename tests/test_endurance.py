@@ -9,14 +9,15 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from specs import spec
 
-from hardwall.model import estimators, quadrature
+from hardwall.model import quadrature
+from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.axis import Axis
 from hardwall.model.compiled import compiled
-from hardwall.model.estimators import estimate
-from hardwall.model.fixed import wrap
+from hardwall.model.estimators import registry
+from hardwall.model.estimators.estimate import estimate
 from hardwall.model.quadrature import RUN_MAX, Seen
+from stimuli.specs import spec
 
 SAMPLES = int(os.environ.get("HARDWALL_ENDURANCE", "1000000"))
 WINDOWS, SETTLED = 10, 4
@@ -94,7 +95,7 @@ def test_what_is_made_up_is_what_a_decoder_shows():
 
 
 @pytest.mark.parametrize("speed", STEADY)
-@pytest.mark.parametrize("estimator", estimators.ESTIMATORS)
+@pytest.mark.parametrize("estimator", registry.ESTIMATORS)
 def test_it_neither_drifts_nor_stops_short(estimator, speed):
     """No tenth of a steady run reaches further than the fourth; it settles before, from rest at full speed too."""
     axis_spec = spec("mhz", estimator)

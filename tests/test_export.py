@@ -6,12 +6,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from specs import spec
 
 from hardwall.hdl.axis import Axis
-from hardwall.hdl.boards import Board
+from hardwall.hdl.board import Board
 from hardwall.hdl.export import COLUMNS, port_table, to_verilog, write
-from hardwall.sim.verilator import LINT_OPTIONS, environment
+from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
+from stimuli.specs import spec
 
 TOPS = {"axis": Axis, "board": Board}
 # Whoever instantiates the axis depends on these names; the words are those of its estimator.

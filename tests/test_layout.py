@@ -6,26 +6,37 @@ import re
 import subprocess
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).absolute().parent.parent
 ROOMS = ("hdl", "model", "sim")
-SOURCES = sorted(path for room in ROOMS for path in (ROOT / room).glob("*.py"))
-TESTS = sorted((ROOT / "tests").glob("*.py"))
-# Of sim, only what generates Verilog; of hdl, what is no block of the data path and has no arithmetic to twin.
-GENERATES_VERILOG = {"bench", "cli", "cocotb_runner", "export", "rtl", "synthesis"}
-NOT_TWINNED = {"__init__", "boards", "export"}
+SOURCES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
+TESTS = sorted((ROOT / "tests").rglob("*.py"))
+# The rooms of sim/, each importing only from those before it; of them, `rtl` alone imports hdl.
+FLOORS = ("world", "jobs", "rtl", "loop", "scene", "walls", "estimates", "studies", "pictures", "commands")
+# Of hdl, what is no block of the data path and has no arithmetic to twin; of model, what has no hardware.
+NOT_TWINNED = {"block", "board", "checks", "export", "estimators/estimate"}
 CONFIG = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS = CONFIG["project"]["optional-dependencies"]
 PROVIDERS = importlib.metadata.packages_distributions()
 
 
+def module_of(path: Path) -> str:
+    """Return the dotted name of a source; a package's is that of its folder."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(("hardwall", *(parts[:-1] if parts[-1] == "__init__" else parts)))
+
+
 def identity(path: Path) -> str:
     """Return how a source is called in the tests' names."""
-    return f"{path.parent.name}/{path.stem}"
+    return str(path.relative_to(ROOT).with_suffix(""))
+
+
+MODULES = {module_of(path): path for path in SOURCES}
 
 
 def plain(name: str) -> str:
@@ -34,46 +45,87 @@ def plain(name: str) -> str:
 
 
 def imports(path: Path) -> Iterator[str]:
-    """Yield the absolute name of every module that a source imports, at any depth; names imported from it too."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    """Yield the absolute name of every module that a source imports, at any depth; names imported from it too.
+
+    What only a type checker imports is left out.
+    """
+    waiting: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
+    while waiting:
+        node = waiting.pop()
+        if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            waiting += ast.iter_child_nodes(node)
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            package = ("hardwall", path.parent.name)[: 3 - node.level] if node.level else ()
+            folder = ("hardwall", *path.relative_to(ROOT).parts[:-1])
+            package = folder[: len(folder) + 1 - node.level] if node.level else ()
             module = ".".join([*package, *filter(None, [node.module])])
             yield module
             yield from (f"{module}.{alias.name}" for alias in node.names)
 
 
-def of(names: Iterator[str], *packages: str) -> set[str]:
+def of(names: Iterable[str], *packages: str) -> set[str]:
     """Return those names that are of one of the packages."""
     return {name for name in names if any(name == each or name.startswith(f"{each}.") for each in packages)}
 
 
+def of_the_project(path: Path) -> set[str]:
+    """Return the modules of the project that a source imports: of names in a module, the module."""
+    return {name for name in imports(path) if name in MODULES and MODULES[name].stem != "__init__"}
+
+
 def test_imports_are_seen():
-    assert {"hardwall.hdl.axis", "hardwall.model.spec", "numpy"} <= set(imports(ROOT / "sim" / "rtl.py"))
+    assert {"hardwall.hdl.axis", "hardwall.model.spec", "numpy"} <= set(imports(ROOT / "sim/rtl/library.py"))
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=identity)
 def test_imports_go_one_way(path):
-    room, seen = path.parent.name, set(imports(path))
-    barred = {"tests", *(test.stem for test in TESTS)}
-    barred |= {
-        "hdl": {"hardwall.sim"},
-        "model": {"hardwall.hdl", "hardwall.sim", "amaranth"},
-        "sim": set() if path.stem in GENERATES_VERILOG else {"hardwall.hdl", "amaranth"},
-    }[room]
-    assert of(seen, *barred) == set()
+    room, *inner = path.relative_to(ROOT).parts
+    barred = {"tests", "hardwall.testing", *(test.stem for test in TESTS if test.stem.startswith("test_"))}
+    if room == "hdl":
+        barred |= {"hardwall.sim"}
+    elif room == "model":
+        barred |= {"hardwall.hdl", "hardwall.sim", "amaranth"}
+    elif len(inner) > 1:
+        barred |= {f"hardwall.sim.{above}" for above in FLOORS[FLOORS.index(inner[0]) + 1 :]}
+        if inner[0] != "rtl":
+            barred |= {"hardwall.hdl", "amaranth"}
+    assert of(set(imports(path)), *barred) == set()
 
 
-@pytest.mark.parametrize("name", sorted({path.stem for path in (ROOT / "hdl").glob("*.py")} - NOT_TWINNED))
-def test_a_block_is_three_files_of_one_name(name):
-    expected = [ROOT / "hdl" / f"{name}.py", ROOT / "model" / f"{name}.py", ROOT / "tests" / f"test_{name}.py"]
+def test_every_room_of_sim_has_a_floor():
+    rooms = {path.parent.name for path in (ROOT / "sim").rglob("*.py")} - {"sim"}
+    assert rooms == set(FLOORS)
+
+
+def test_imports_make_no_circle():
+    arrows = {name: of_the_project(path) for name, path in MODULES.items()}
+    try:
+        tuple(TopologicalSorter(arrows).static_order())
+    except CycleError as error:
+        pytest.fail(f"a circle of imports: {' -> '.join(error.args[1])}")
+
+
+def paths_below(folder: Path) -> set[str]:
+    """Return the paths of sources below a folder, without their ends."""
+    return {str(path.relative_to(folder).with_suffix("")) for path in folder.rglob("*.py") if path.stem != "__init__"}
+
+
+@pytest.mark.parametrize("name", sorted(paths_below(ROOT / "hdl") - NOT_TWINNED))
+def test_a_block_is_three_files_of_one_path(name):
+    folder, _, stem = name.rpartition("/")
+    expected = [ROOT / "hdl" / f"{name}.py", ROOT / "model" / f"{name}.py", ROOT / "tests" / folder / f"test_{stem}.py"]
     assert [path for path in expected if not path.exists()] == []
 
 
+def test_a_picture_is_of_a_module_of_its_name():
+    drawn = {path.stem for path in (ROOT / "sim/pictures").glob("*.py")} - {"__init__", "style"}
+    shown = {path.stem for room in ("walls", "estimates", "studies") for path in (ROOT / "sim" / room).glob("*.py")}
+    assert drawn - shown == set()
+
+
 def test_the_model_needs_only_numpy_and_numba():
-    modules = [f"hardwall.model.{path.stem}" for path in (ROOT / "model").glob("[!_]*.py")]
+    modules = sorted(name for name in MODULES if name.startswith("hardwall.model"))
     program = f"import sys, {', '.join(modules)}; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     loaded = {name.partition(".")[0] for name in done.stdout.split()}
@@ -92,11 +144,11 @@ def test_versions_are_pinned():
 @pytest.mark.parametrize("path", [*SOURCES, *TESTS], ids=identity)
 def test_what_is_imported_is_what_its_extra_installs(path):
     for_tests = path in TESTS or path.stem.startswith("cocotb_")
-    extras = [] if path.parent.name == "model" else ["sim", "test"] if for_tests else ["sim"]
+    extras = [] if path.is_relative_to(ROOT / "model") else ["sim", "test"] if for_tests else ["sim"]
     pinned = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in extras)]
     installed = {plain(requirement.partition("==")[0]) for one in pinned for requirement in one}
     installed.add("llvmlite")  # which Numba is made of
-    ours = {"hardwall", *(test.stem for test in TESTS)}
+    ours = {"hardwall", *(test.stem for test in TESTS), *(test.parent.name for test in TESTS)}
     foreign = {name.partition(".")[0] for name in imports(path)} - ours - set(sys.stdlib_module_names)
     assert {name for name in foreign if not installed & {plain(each) for each in PROVIDERS.get(name, [])}} == set()
 

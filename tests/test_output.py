@@ -4,11 +4,11 @@ import cocotb
 import numpy as np
 import pytest
 from cocotb.triggers import ClockCycles, RisingEdge
-from specs import spec
 
-from bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from hardwall.hdl.output import Output
 from hardwall.model import output
+from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from stimuli.specs import spec
 
 NAMES = ("output_force_limit", "output_slew_limit")
 

@@ -15,12 +15,12 @@ from cocotb.triggers import RisingEdge
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bench import SAMPLES, SEED, Bench, Packing, Record, check, packing_of, parameters, rng, simulate
 from hardwall.hdl.quadrature import Quadrature
 from hardwall.model import quadrature as model
+from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.compiled import compiled
-from hardwall.model.fixed import wrap
 from hardwall.model.quadrature import START, Params, State, advance, run, step
+from hardwall.testing.bench import SAMPLES, SEED, Bench, Packing, Record, check, packing_of, parameters, rng, simulate
 
 INPUTS = ("a", "b", "z", "glitch_clocks", "invert", "preload", "preload_count", "arm", "clear")
 OUTPUTS = (*State._fields[: model.N_OUTPUTS], "fault")

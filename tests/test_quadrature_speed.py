@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from bench import rng
+from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.compiled import compiled
-from hardwall.model.fixed import wrap
 from hardwall.model.quadrature import START, Params, advance, clocks_to_fault, max_edge_rate, step
+from hardwall.testing.bench import rng
 
 
 def test_max_edge_rate():

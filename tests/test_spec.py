@@ -8,14 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from papers_signal import axis_at, swing
-from specs import ADJUSTED, MHZ, PAPER, SPECS, spec
 
-from hardwall.model import levant
 from hardwall.model.axis import Axis
-from hardwall.model.estimators import ESTIMATORS, estimate
+from hardwall.model.estimators import levant
+from hardwall.model.estimators.estimate import estimate
+from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.model.quadrature import seen_count
 from hardwall.model.spec import AxisSpec
+from stimuli.papers_signal import axis_at, swing
+from stimuli.specs import ADJUSTED, MHZ, PAPER, SPECS, spec
 
 
 @pytest.mark.parametrize("name", SPECS)
@@ -164,7 +165,7 @@ def test_the_same_spec_at_two_rates_has_the_same_si_gains():
 def test_plain_python_gives_the_same_words():
     """With the JIT off, the same kernels run as ordinary Python, on numpy's scalars too."""
     code = (
-        "import sys, numpy as np; sys.path.insert(0, sys.argv[1]); from specs import spec; "
+        "import sys, numpy as np; sys.path.insert(0, sys.argv[1]); from stimuli.specs import spec; "
         "from hardwall.model.axis import Axis; "
         "counts = np.cumsum(np.random.default_rng(1).integers(-300, 301, 400)); "
         "r = Axis(spec('paper', sys.argv[2]), wall_stiffness=1e3, wall_damping=5.0).run(counts); "

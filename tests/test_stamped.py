@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from specs import spec
 
-from bench import rng
 from hardwall.model import axis, quadrature, stamped
 from hardwall.model.axis import Axis
+from hardwall.testing.bench import rng
+from stimuli.specs import spec
 
 SPEC = spec("mhz", "fdm")
 UPWARDS = [0b00, 0b01, 0b11, 0b10]

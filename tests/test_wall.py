@@ -6,11 +6,11 @@ from fractions import Fraction
 import cocotb
 import numpy as np
 import pytest
-from specs import spec
 
-from bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from hardwall.hdl.wall import Wall
 from hardwall.model import wall
+from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from stimuli.specs import spec
 
 NAMES = ("wall_stiffness", "wall_damping", "wall_position", "wall_left", "wall_forbid_pull")
 

@@ -1,0 +1,47 @@
+"""Fixed-point formats as Amaranth shapes, and the named ways a value may narrow."""
+
+from amaranth.hdl import Const, Mux, Shape, Value
+
+from hardwall.model.arithmetic.fixed import Format
+
+
+def shape(fmt: Format) -> Shape:
+    """Return the shape that holds a word of `fmt`."""
+    return Shape(fmt.width, signed=fmt.signed)
+
+
+def saturate(value: Value, low: int, high: int) -> Value:
+    """Return `value` held within the constants `low` to `high`; as wide as the wider of the three."""
+    return Mux(value < low, Const(low), Mux(value > high, Const(high), value))
+
+
+def shift_floor(value: Value, shift: int) -> Value:
+    """Return floor(value * 2**-shift); a negative shift is exact."""
+    return value >> shift if shift >= 0 else value << -shift
+
+
+def shift_round_half_up(value: Value, shift: int) -> Value:
+    """Return floor(value * 2**-shift + 1/2); a negative shift is exact."""
+    return (value + (1 << (shift - 1))) >> shift if shift > 0 else value << -shift
+
+
+def length_of(value: Value) -> Value:
+    """Return the bits of an unsigned `value`: the least n with value < 2**n."""
+    if len(value) == 1:
+        return value
+    half = len(value) // 2
+    return Mux(value[half:].any(), half + length_of(value[half:]), length_of(value[:half]))
+
+
+def at_most(value: Value, bits: int) -> Value:
+    """Return an unsigned `value`, or the largest word of `bits` where it is more."""
+    return Mux(value[bits:].any(), (1 << bits) - 1, value[:bits])
+
+
+def fitted(value: Value, bits: int) -> Value:
+    """Return a signed `value` held within `bits` of two's complement: its top bits tell, no comparison is needed."""
+    if len(value) <= bits:
+        return value
+    top = value[bits - 1 :]
+    held = Mux(value[-1], -1 << (bits - 1), (1 << (bits - 1)) - 1)
+    return Mux(top.any() & ~top.all(), held, value[:bits].as_signed())

@@ -1,0 +1,117 @@
+"""All-integrator Kalman filter with steady-state gains."""
+
+from amaranth.hdl import Module, Mux, Signal, signed
+
+from hardwall.model.estimators.kalman import Design
+
+from ..arithmetic.fixed import saturate, shape, shift_floor, shift_round_half_up
+from .estimate import EstimatorBlock
+
+
+class Estimator(EstimatorBlock):
+    """Position, velocity and acceleration tracked with constant gains, one sample at a time.
+
+    Equation, per sample, in counts and sample periods:
+
+        v <- v + a,  x <- x + v - a / 2
+        r  = count - x
+        x <- x + K_x r,  v <- v + K_v r,  a <- a + K_a r        a = 0 while K_a = 0
+
+    The velocity is v. Start: at the first sample, and with `restart`, x = count, v = 0 and a = 0.
+
+    Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier serves
+    the three products.
+
+    Rounding and overflow: r, the products and narrowed sums round down, the velocity half up; the difference of counts,
+    x - count, v and a saturate, with flags; the last three only under gains of no noise model. The count may wrap.
+
+    Parameters
+    ----------
+    design : hardwall.model.estimators.kalman.Design
+        Formats; its module derives them.
+
+    Source: Belanger, Dobrovolny, Helmy, Zhang, International Journal of Robotics Research 17 (1998), 1225.
+    """
+
+    def __init__(self, design: Design):
+        super().__init__(design, Design)
+
+    def elaborate(self, platform):
+        m = Module()
+        design = self._design
+        velocity, v_max = design.velocity, design.velocity.max << (design.v.f - design.velocity.f)
+
+        running = Signal()
+        last = Signal.like(self.count)
+        moved = Signal.like(self.count)
+        d = Signal(range(-design.step_max, design.step_max + 1))
+        # With a gain just below 2, lead may turn to its own opposite and a little beyond.
+        lead = Signal(signed(design.lead.width + 1))
+        v, a = Signal(shape(design.v)), Signal(shape(design.a))
+        predicted = Signal(signed(max(len(v), len(a) - design.a.f + design.v.f) + 1))
+        twice_moved = Signal(signed(len(predicted) + 1))
+        behind = Signal(signed(max(len(lead), len(d) + design.lead.f) + 1))
+        distance = Signal(signed(max(len(behind), len(twice_moved) - (design.v.f - design.lead.f + 1)) + 1))
+
+        operand = Signal(signed(design.operand.width + 1))
+        gain = Signal(max(word.format.width for word in design.words))
+        product = Signal(signed(len(operand) + len(gain)))
+        term = Signal(signed(len(product) - min(0, *design.shifts)))
+        total = Signal(signed(max(len(term), len(predicted), len(a)) + 1))
+
+        def scaled(shift):
+            return term.eq(shift_floor(product, shift))
+
+        limited = saturate(moved, -design.step_max, design.step_max)
+        held = saturate(distance, -design.lead.max, design.lead.max)
+        held_v = saturate(total, -v_max, v_max)
+        held_a = saturate(total, -design.a.max, design.a.max)
+        for_x, for_v, for_a = design.shifts
+
+        m.d.sync += [self.valid.eq(0), product.eq(operand * gain)]
+        # One clock each. A product takes a clock, its shift another, while the next one follows behind.
+        sequence = {
+            "DIFFERENCE": [
+                d.eq(limited),
+                self.saturated[0].eq(limited != moved),
+                predicted.eq(v + (a >> (design.a.f - design.v.f))),
+            ],
+            "PREDICT": [behind.eq(lead - (d << design.lead.f)), twice_moved.eq(v + predicted)],
+            "DISTANCE": [distance.eq(behind + (twice_moved >> (design.v.f - design.lead.f + 1)))],
+            "LIMIT LEAD": [lead.eq(held), self.saturated[1].eq(held != distance)],
+            "INNOVATION": [
+                operand.eq(-lead >> (design.lead.f - design.operand.f)),
+                gain.eq(self.kalman_position),
+            ],
+            "POSITION": [gain.eq(self.kalman_velocity)],
+            "VELOCITY": [scaled(for_x), gain.eq(self.kalman_acceleration)],
+            "CORRECT POSITION": [lead.eq(lead + term), scaled(for_v)],
+            "CORRECT VELOCITY": [total.eq(predicted + term), scaled(for_a)],
+            "LIMIT VELOCITY": [v.eq(held_v), self.saturated[2].eq(held_v != total), total.eq(a + term)],
+            "OUTPUT": [
+                a.eq(held_a),
+                self.saturated[2].eq(self.saturated[2] | (held_a != total)),
+                self.velocity.eq(shift_round_half_up(v, design.v.f - velocity.f)),
+                self.valid.eq(1),
+            ],
+        }
+        following = [*list(sequence)[1:], "SAMPLE"]
+        with m.FSM():
+            with m.State("SAMPLE"), m.If(self.strobe):
+                fresh = self.restart | ~running
+                # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
+                m.d.sync += [
+                    moved.eq(Mux(fresh, 0, (self.count - last)[: len(moved)].as_signed())),
+                    last.eq(self.count),
+                    running.eq(1),
+                ]
+                with m.If(fresh):
+                    m.d.sync += [lead.eq(0), v.eq(0)]
+                with m.If(fresh | (self.kalman_acceleration == 0)):
+                    m.d.sync += a.eq(0)
+                m.next = "DIFFERENCE"
+            for (name, statements), after in zip(sequence.items(), following, strict=True):
+                with m.State(name):
+                    m.d.sync += statements
+                    m.next = after
+        return m

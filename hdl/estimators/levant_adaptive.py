@@ -1,0 +1,110 @@
+"""Levant's differentiator with gains that adapt to the signal."""
+
+from amaranth.hdl import Mux, Signal, Value, signed
+
+from hardwall.model.estimators.levant_adaptive import LOST, Design
+
+from ..arithmetic.fixed import shift_floor, shift_round_half_up
+from . import levant_semi_implicit
+
+
+class Estimator(levant_semi_implicit.Estimator):
+    """Levant's differentiator without numerical chatter, its gains between 1 and 2**-levels of the axis's.
+
+    Equation, per sample, in counts and sample periods, at level j:
+
+        b  = x + u1 - count
+        u1 <- u1 - sign(b) near,    near = min(|b|, alpha 2**-j)
+        u  = u1 - sign(b) g,        g = min(lambda 2**(-j/2) sqrt(beyond), beyond),    beyond = |b| - near
+        x  <- x + u
+
+    j falls as soon as |b| is more than quantisation explains, to what the time since b changed its sign asks for; it
+    rises by one after a time of calm. The module of the design has the law.
+
+    Start: at the first sample, and with `restart`, x = count, u1 = 0 and j = 0, so u = 0: from rest, no false
+    transient.
+
+    Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
+    `valid`.
+
+    Rounding and overflow: alpha 2**-j rounds down; the root rounds down and half of its LSB is added back; g rounds
+    half up, and the rest is exact; b, u and u1 saturate, with flags. The count may wrap; no counter of the law can.
+
+    Parameters
+    ----------
+    design : hardwall.model.estimators.levant_adaptive.Design
+        Formats and thresholds; its module derives them.
+
+    Source: ours, on Levant 1998 and the projection of `levant_semi_implicit`.
+    """
+
+    def __init__(self, design: Design):
+        super().__init__(design, Design)
+
+    def elaborate(self, platform):
+        self._level = Signal(range(max(self.design.levels, 1) + 1))
+        self._slowed = Signal(len(super()._alpha()))
+        return super().elaborate(platform)
+
+    def _alpha(self):
+        return self._slowed
+
+    def _radicand(self, beyond):
+        # For odd levels, 1 / sqrt(2) of the root.
+        shift = self.design.velocity.f - self.design.radicand.f
+        return Mux(self._level[0], shift_floor(beyond, shift + 1), shift_floor(beyond, shift))
+
+    def _correction(self, product):
+        slowed = (product << self.design.spare) >> (self._level >> 1)
+        return shift_round_half_up(slowed, self.design.product + self.design.spare - self.design.velocity.f)
+
+    def _adapt(self, m, first, e, size):
+        design, level = self.design, self._level
+        whole = size[design.velocity.f :]
+        # Thresholds of time, whole samples: to reach the level after a level, and to leave a level.
+        reach = [design.reach_samples(n + 1) for n in range(design.levels)]
+        hold = [design.hold_samples(n) for n in range(design.levels)]
+        side = Signal(signed(2))
+        elapsed, calm = Signal(range(max(reach, default=0) + 1)), Signal(range(max(hold, default=0) + 1))
+        reached = Signal.like(level)
+        limit = Signal(len(whole) + 2, init=LOST)
+
+        with m.State("SIDE"):
+            sign = Mux(e < 0, -1, e > 0)
+            with m.If(first | (e != 0) & (sign != side)):
+                m.d.sync += [side.eq(sign), elapsed.eq(0), reached.eq(0), limit.eq(LOST)]
+            with m.If(first):
+                m.d.sync += [level.eq(0), calm.eq(0)]
+            m.next = "REACH"
+        with m.State("REACH"):
+            longer = elapsed + 1
+            with m.If(reached < design.levels):
+                m.d.sync += [elapsed.eq(longer), reached.eq(reached + (longer >= _choose(m, reached, reach)))]
+            m.next = "LEVEL"
+        with m.State("LEVEL"):
+            lower = Mux(limit == LOST, level, Mux(level < 2, 0, level - 2))
+            with m.If(whole >= limit):
+                m.d.sync += [level.eq(Mux(lower < reached, lower, reached)), limit.eq(limit << 1)]
+            m.next = "CALM"
+        with m.State("CALM"):
+            longer = calm + 1
+            with m.If(whole >= LOST):
+                m.d.sync += calm.eq(0)
+            with m.Elif(level < design.levels):
+                risen = longer >= _choose(m, level, hold)
+                m.d.sync += [calm.eq(Mux(risen, 0, longer)), level.eq(level + risen)]
+            m.next = "SHIFT"
+        with m.State("SHIFT"):
+            m.d.sync += self._slowed.eq(super()._alpha() >> level)
+            m.next = "BAND"
+        return "SIDE"
+
+
+def _choose(m, index, values) -> Value:
+    """Return the value of that index."""
+    chosen = Signal(range(max(values, default=0) + 1))
+    with m.Switch(index):
+        for n, value in enumerate(values):
+            with m.Case(n):
+                m.d.comb += chosen.eq(value)
+    return chosen

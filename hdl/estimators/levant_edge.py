@@ -1,0 +1,340 @@
+"""A sliding-mode differentiator driven by the clock-stamped edges of the encoder."""
+
+from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, signed, unsigned
+
+from hardwall.model.arithmetic.sqrt import latency as sqrt_latency
+from hardwall.model.estimators.levant_edge import REST_BITS, Design
+from hardwall.model.estimators.levant_edge_design import QUOTIENT_BITS
+from hardwall.model.quadrature import RUN_MAX
+
+from ..arithmetic.divide import Divide
+from ..arithmetic.fixed import at_most, fitted, length_of, shape, shift_floor, shift_round_half_up
+from ..arithmetic.sqrt import Sqrt
+from .estimate import EstimatorBlock
+
+
+class Estimator(EstimatorBlock):
+    """Levant's idea on edges: the error is that of the place predicted for an edge at the moment it came.
+
+    Equation, at an edge T clocks and n edges after the last one used, 2**(L-1) <= T < 2**L, in counts, samples, clocks:
+
+        E = (v + a T/2) T - (n + the difference of the two edges' places) D
+        v <- v + a T - min(|E| / T, lambda sqrt(|E| 2**L)) sign(E)
+        a <- a - min(|E| / T / 2**L, alpha 2**L) sign(E)
+
+    and at every sample, s clocks after it, velocity = v + a s, held to what no further edge allows; 0 at rest. The
+    places of the four edges of a cycle are learnt from E. `hardwall.model.estimators.levant_edge` says all of it.
+
+    Start: at the first sample, and with `restart`, v = a = 0 and no edge is known; the first to come is an anchor, the
+    second gives a velocity.
+
+    Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
+    `valid`.
+
+    Rounding and overflow: as the model says; times of more than `mantissa` bits are cut to that many. Velocity and
+    error saturate, with flags; acceleration and places saturate without: that is part of the algorithm. The count may
+    wrap.
+
+    Parameters
+    ----------
+    design : hardwall.model.estimators.levant_edge.Design
+        Formats; its module derives them.
+
+    Source: Levant 1998 for the law; its use on edges is this project's.
+    """
+
+    def __init__(self, design: Design):
+        super().__init__(design, Design)
+
+    def elaborate(self, platform):
+        m = Module()
+        s = _Signals(self)
+        self._measure(m, s)
+        self._solve(m, s)
+        self._learn(m, s)
+        m.d.sync += self.valid.eq(0)
+        with m.FSM():
+            self._states_of_the_sample(m, s)
+            self._states_of_the_error(m, s)
+            self._states_of_the_correction(m, s)
+            self._states_of_the_line(m, s)
+        return m
+
+    def _measure(self, m, s):
+        """A time as it multiplies: its top bits. The multiplier, and what it makes of an acceleration."""
+        d, p = self._design, s.params
+        m.d.sync += [s.size.eq(length_of(s.measure)), s.product.eq(s.left * s.right)]
+        m.d.comb += [
+            s.cut.eq(Mux(s.size > d.mantissa, s.size - d.mantissa, 0)),
+            s.time.eq(s.measure >> s.cut),
+            # A time with its top bit set is cut by one bit more; but then the acceleration is 0.
+            s.kept.eq(d.turn_span - s.cut),
+            s.turned.eq(fitted(shift_floor(s.product, p.turn_shift) >> s.drop, len(s.turned))),
+        ]
+
+    def _solve(self, m, s):
+        """Root and quotient of the error, and the limits of what they change, ready well before they are asked for."""
+        d, p = self._design, s.params
+        error, velocity = d.error, d.velocity
+        m.submodules.root = root = Sqrt(d.radicand.width + 1)
+        m.submodules.quotient = quotient = Divide(
+            error.width - 1 + p.error_shift, d.mantissa, velocity.width - 1, QUOTIENT_BITS
+        )
+        magnitude = Mux(s.e < 0, -s.e, s.e)[: error.width - 1]
+        radicand = shift_floor(magnitude, p.radicand_shift)
+        root_is_last = sqrt_latency(d.radicand.width + 1) >= d.quotient_latency
+        m.d.comb += [
+            root.start.eq(s.start),
+            root.radicand.eq(Mux(s.length[0], radicand << 1, radicand)),
+            quotient.start.eq(s.start),
+            quotient.dividend.eq(magnitude << p.error_shift),
+            quotient.divisor.eq(s.right),
+            s.root.eq(root.root),
+            s.solved.eq(root.done if root_is_last else quotient.done),
+        ]
+        first = d.shortest + 1
+        most, steepest = len(s.slope), len(s.bent)
+        # Bits of the interval beyond the fewest; `few` where it is not cut.
+        more = Signal(range(max(d.stamp_width - first, 2)))
+        few = Signal(range(max(d.mantissa - first, 0) + 1))
+        halves = Signal(range(max((d.mantissa >> 1) - (first >> 1), 0) + 1))
+        m.d.sync += [
+            more.eq(s.length - first),
+            few.eq(s.length - first),
+            halves.eq((s.length >> 1) - (first >> 1)),
+            s.slope.eq(quotient.quotient),
+            s.far_slope.eq(quotient.saturated),
+            s.bent.eq(at_most(shift_floor(s.slope, p.slope_shift + first) >> more, steepest)),
+            s.limit.eq(at_most(_shifted(s.root_product, p.limit_shift - (first >> 1), halves), most)),
+            s.relay.eq(at_most(_shifted(self.levant_edge_alpha, p.alpha_shift - first, few), steepest)),
+        ]
+
+    def _learn(self, m, s):
+        """The places learn while the root is drawn."""
+        p, place = s.params, self._design.place
+        residual = Signal(signed(p.learn_max.bit_length() + 1))
+        learnt = Signal(signed(max(len(residual) - p.learn_shift, 1) + 1))
+        m.d.comb += [s.here.eq(s.places[s.to_kind]), s.there.eq(s.places[s.kind])]
+        m.d.sync += [
+            residual.eq(fitted(s.e, len(residual))),
+            learnt.eq(shift_round_half_up(residual, p.learn_shift)),
+            s.next_here.eq(fitted(s.here + learnt, place.width)),
+            s.next_there.eq(fitted(s.there - learnt, place.width)),
+        ]
+
+    def _states_of_the_sample(self, m, s):
+        """What the sample is: which edge came last, and what is to be done with it."""
+        d = self._design
+        with m.State("SAMPLE"), m.If(self.strobe):
+            stamps = Array([self.stamp_a_rise, self.stamp_b_rise, self.stamp_a_fall, self.stamp_b_fall])
+            m.d.sync += [
+                s.fresh.eq(self.restart | ~s.running),
+                s.running.eq(1),
+                s.now.eq(self.stamp),
+                s.at.eq(stamps[self.edge]),
+                s.to.eq(self.count + self.down),
+                s.to_kind.eq(self.edge ^ Cat(0, self.down)),
+                s.full_run.eq(self.run == RUN_MAX),
+            ]
+            m.next = "DIFFERENCE"
+        with m.State("DIFFERENCE"):
+            m.d.sync += [
+                s.measure.eq(Mux(s.fresh, 0, s.at - s.stamp)),
+                s.waited.eq(((s.now - s.stamp)[: d.stamp_width] >> (d.shortest + 1)) != 0),
+                # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
+                s.passed.eq(Mux(s.fresh, 0, (s.to - s.number)[: len(s.passed)].as_signed())),
+            ]
+            with m.If(s.fresh):
+                m.d.sync += [s.known.eq(0), s.v.eq(0), s.a.eq(0), s.length.eq(0)]
+                m.d.sync += [s.number.eq(s.to), s.stamp.eq(s.at), s.kind.eq(s.to_kind)]
+                m.d.sync += [s.places[n].eq(0) for n in range(4)]
+            m.next = "DECISION"
+        with m.State("DECISION"):
+            came = (s.measure != 0) | (s.passed != 0)
+            unknown = ~s.known | s.measure[-1]
+            timed = (s.measure >> d.shortest) != 0
+            held = fitted(s.passed, d.distance.width)
+            m.d.sync += [
+                s.correct.eq(came & ~unknown & timed),
+                s.carry.eq(came & ~unknown & ~timed & s.waited),
+                s.anchor.eq(came & (unknown | timed | s.waited)),
+                s.loose.eq(came & ~(unknown | timed | s.waited)),
+                s.distance.eq(held),
+                s.beyond.eq(held != s.passed),
+                s.apart.eq(s.here - s.there),
+            ]
+            with m.If(came & unknown):
+                m.d.sync += [s.known.eq(1), s.v.eq(0), s.a.eq(0)]
+            m.next = "TIME"
+
+    def _states_of_the_error(self, m, s):
+        """The velocity predicted for the edge, and the error of the place predicted for it, over its interval."""
+        d, p = self._design, s.params
+        with m.State("TIME"):
+            m.d.sync += [
+                s.left.eq(s.a),
+                s.right.eq(s.time),
+                s.e_cut.eq(s.cut),
+                s.drop.eq(s.kept),
+                s.way.eq(((s.distance * d.clocks) << d.place.f) + s.apart),
+                s.measure.eq(s.now - Mux(s.anchor, s.at, s.stamp)),
+            ]
+            with m.If(s.correct):
+                m.d.sync += s.length.eq(s.size)
+            m.next = "TURN PRODUCT"
+        with m.State("TURN PRODUCT"):
+            m.d.sync += s.moved.eq(shift_floor(s.way, -p.place_shift) >> s.e_cut)
+            m.next = "TURN"
+        with m.State("TURN"):
+            gone = ~s.loose & s.measure[-1]
+            since = Mux(s.size == 0, 0, s.size - 1)[: len(s.size)]
+            m.d.sync += [
+                s.turn.eq(s.turned),
+                s.age_time.eq(s.time),
+                s.age_drop.eq(s.kept),
+                s.bound.eq(at_most(Const(p.bound) >> since, len(s.bound))),
+                s.rest.eq(gone | ~s.loose & (s.size > s.length + REST_BITS)),
+                s.known.eq(s.known & ~gone),
+            ]
+            m.next = "MEAN"
+        with m.State("MEAN"):
+            m.d.sync += [
+                s.left.eq(fitted(s.v + (s.turn >> 1), len(s.left))),
+                s.ahead.eq(Mux(s.correct | s.carry, s.v + s.turn, s.v)),
+            ]
+            m.next = "PLACE PRODUCT"
+        with m.State("PLACE PRODUCT"):
+            m.next = "ERROR"
+        with m.State("ERROR"):
+            m.d.sync += s.e.eq(shift_floor(s.product, p.error_shift) - s.moved)
+            m.next = "START"
+
+    def _states_of_the_correction(self, m, s):
+        """Root and quotient; the changes that they make, limited; the new anchor."""
+        d = self._design
+        with m.State("START"):
+            m.d.comb += s.start.eq(1)
+            m.next = "SOLVE"
+        with m.State("SOLVE"), m.If(s.solved):
+            m.d.sync += s.root_product.eq(self.levant_edge_lambda * s.root)
+            m.next = "LIMIT"
+        with m.State("LIMIT"):
+            m.next = "CHANGE"
+        with m.State("CHANGE"):
+            limited = s.e_cut == 0
+            change = Mux(limited & (s.limit < s.slope), s.limit, s.slope)
+            bend = Mux(limited & (s.relay < s.bent), s.relay, s.bent)
+            m.d.sync += [
+                s.change.eq(Mux(s.correct, change, 0)),
+                s.bend.eq(Mux(s.correct, bend, 0)),
+                s.flags[0].eq(s.correct & (s.beyond | s.far_slope)),
+            ]
+            m.next = "SIGN"
+        with m.State("SIGN"):
+            with m.If(s.e < 0):
+                m.d.sync += [s.change.eq(-s.change), s.bend.eq(-s.bend)]
+            m.next = "UPDATE"
+        with m.State("UPDATE"):
+            far_v = s.ahead - s.change
+            v = fitted(far_v, d.velocity.width)
+            a = Mux(s.rest, 0, fitted(s.a - s.bend, d.acceleration.width))
+            m.d.sync += [
+                s.v.eq(Mux(s.rest, 0, v)),
+                s.a.eq(a),
+                s.left.eq(a),
+                s.right.eq(s.age_time),
+                s.drop.eq(s.age_drop),
+                s.flags[1].eq(v != far_v),
+            ]
+            with m.If(s.anchor):
+                m.d.sync += [s.number.eq(s.to), s.stamp.eq(s.at), s.kind.eq(s.to_kind)]
+            with m.If(s.correct & s.full_run & (s.to_kind != s.kind)):
+                m.d.sync += [s.places[s.to_kind].eq(s.next_here), s.places[s.kind].eq(s.next_there)]
+            m.next = "LINE PRODUCT"
+
+    def _states_of_the_line(self, m, s):
+        """The velocity now, on a line from the anchor, held to what no further edge allows."""
+        d = self._design
+        with m.State("LINE PRODUCT"):
+            room = Mux(s.v < 0, s.bound + s.v, s.bound - s.v)
+            m.d.sync += s.onward.eq(Mux(room < 0, 0, room))
+            m.next = "LINE TURN"
+        with m.State("LINE TURN"):
+            m.d.sync += s.turn.eq(s.turned)
+            m.next = "LINE"
+        with m.State("LINE"):
+            straight = s.v + s.turn
+            line = fitted(straight, d.velocity.width)
+            m.d.sync += [s.line.eq(line), s.flags[1].eq(s.flags[1] | (line != straight))]
+            m.next = "END"
+        with m.State("END"):
+            # Only the end on the line's own side of 0 can hold it.
+            m.d.sync += s.end.eq(Mux((s.line < 0) == (s.v < 0), _signed(s.onward, s.v < 0), -s.v))
+            m.next = "OUTPUT"
+        with m.State("OUTPUT"):
+            past_end = ((s.line - s.end) < 0) == (s.line < 0)
+            m.d.sync += [
+                self.velocity.eq(Mux(~s.loose & past_end, s.end, s.line)),
+                self.saturated.eq(s.flags),
+                self.valid.eq(1),
+            ]
+            m.next = "SAMPLE"
+
+
+class _Signals:
+    """The registers and wires of an estimator, by the names of the model's."""
+
+    def __init__(self, block: Estimator):
+        d = block.design
+        self.params = d.params({word.name: word.reset for word in d.words})
+        count, clocks, velocity = signed(d.count_width), unsigned(d.stamp_width), shape(d.velocity)
+
+        # Held from sample to sample: the anchor, the motion there, the places of the four edges.
+        self.running, self.known = Signal(), Signal()
+        self.number, self.stamp, self.kind = Signal(count), Signal(clocks), Signal(2)
+        self.length = Signal(range(d.stamp_width + 1))
+        self.v, self.a = Signal(velocity), Signal(shape(d.acceleration))
+        self.places = Array(Signal(shape(d.place), name=f"place_{n}") for n in range(4))
+
+        # Of the sample. `anchor`: its edge is the new anchor; `loose`: it is not yet.
+        self.fresh, self.full_run, self.rest, self.beyond = Signal(), Signal(), Signal(), Signal()
+        self.correct, self.carry, self.anchor, self.loose = Signal(), Signal(), Signal(), Signal()
+        self.now, self.at, self.waited = Signal(clocks), Signal(clocks), Signal()
+        self.to, self.to_kind, self.passed = Signal(count), Signal(2), Signal(count)
+        self.flags = Signal(2)
+
+        # A time and its length, as it multiplies, and what it makes of an acceleration.
+        self.measure, self.size = Signal(clocks), Signal(range(d.stamp_width + 1))
+        self.cut, self.kept = Signal(range(d.turn_span + 2)), Signal(range(d.turn_span + 1))
+        self.time, self.age_time = Signal(d.mantissa), Signal(d.mantissa)
+        self.drop, self.age_drop = Signal.like(self.kept), Signal.like(self.kept)
+        self.left, self.right = Signal(velocity), Signal(d.mantissa)
+        self.product = Signal(signed(d.velocity.width + d.mantissa))
+        self.turned, self.turn = (Signal(signed(d.velocity.width + 1)) for _ in range(2))
+        self.ahead = Signal(signed(d.velocity.width + 2))
+
+        # The error of place, and what it changes.
+        self.distance, self.apart = Signal(shape(d.distance)), Signal(signed(d.place.width + 1))
+        bits = max(d.distance.width + d.clocks.bit_length() + d.place.f, d.place.width + 1) + 1
+        self.way, self.moved = Signal(signed(bits)), Signal(shape(d.error))
+        self.e, self.e_cut = Signal(shape(d.error)), Signal.like(self.cut)
+        self.start, self.solved, self.root = Signal(), Signal(), Signal(d.root.width)
+        self.root_product = Signal(d.lambda_.width + d.root.width)
+        self.slope, self.far_slope, self.limit = Signal(d.velocity.width - 1), Signal(), Signal(d.velocity.width - 1)
+        self.bent, self.relay = Signal(d.acceleration.width - 1), Signal(d.acceleration.width - 1)
+        self.change, self.bend = Signal(velocity), Signal(shape(d.acceleration))
+        self.here, self.there = Signal(shape(d.place)), Signal(shape(d.place))
+        self.next_here, self.next_there = Signal(shape(d.place)), Signal(shape(d.place))
+
+        # What no further edge allows.
+        self.bound, self.onward = Signal(d.velocity.width - 1), Signal(d.velocity.width - 1)
+        self.line, self.end = Signal(velocity), Signal(signed(d.velocity.width + 1))
+
+
+def _shifted(value, right: int, left):
+    """Return floor(value * 2**(left - right)), `left` a signal."""
+    return (value << left) >> right if right > 0 else value << -right << left
+
+
+def _signed(value, negative):
+    return Mux(negative, -value, value)

@@ -1,0 +1,145 @@
+"""Levant's differentiator with an implicit sign and an explicit square root."""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value, signed
+
+from hardwall.model.estimators.levant_semi_implicit import Design
+
+from ..arithmetic.fixed import saturate, shape, shift_floor, shift_round_half_up
+from ..arithmetic.sqrt import Sqrt
+from .estimate import EstimatorBlock
+from .levant import arrive
+
+
+class Estimator(EstimatorBlock):
+    """Levant's differentiator without numerical chatter, one sample at a time.
+
+    Equation, per sample, in counts and sample periods:
+
+        b  = x + u1 - count
+        u1 <- u1 - sign(b) near,    near = min(|b|, alpha)
+        u  = u1 - sign(b) g,        g = min(lambda sqrt(beyond), beyond),    beyond = |b| - near
+        x  <- x + u
+
+    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: from rest, no false transient.
+
+    Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
+    `valid`.
+
+    Rounding and overflow: the root rounds down and half of its LSB is added back; g rounds half up, and the rest is
+    exact; b, u and u1 saturate, with flags. The count may wrap.
+
+    Parameters
+    ----------
+    design : hardwall.model.estimators.levant_semi_implicit.Design
+        Formats; its module derives them.
+
+    Source: Acary, Brogliato, Orlov 2012; Michel et al. 2021; the module of the design says what is our own.
+    """
+
+    def __init__(self, design: Design, kind: type = Design):
+        super().__init__(design, kind)
+
+    # What those of the family that project do in their own way.
+
+    def _word(self, number: int) -> Value:
+        """Return a run-time word: 0 for lambda, 1 for alpha, 2 for the output."""
+        return getattr(self, self.design.words[number].name)
+
+    def _alpha(self) -> Value:
+        """Return alpha, as from state BAND on."""
+        return self._word(1)
+
+    def _adapt(self, m, fresh, e, size) -> str:
+        """Add states between MAGNITUDE and BAND; return the name of the first of them, or BAND."""
+        return "BAND"
+
+    def _factor(self, root) -> Value:
+        """Return what lambda is multiplied by, in states MAGNITUDE and PRODUCT."""
+        return Cat(Const(1, 1), root.root)
+
+    def _square(self, m, product) -> None:
+        """Use the product of state MAGNITUDE, in state BAND."""
+
+    def _radicand(self, beyond) -> Value:
+        """Return what the root is taken of, in state ROOT."""
+        return shift_floor(beyond, self.design.velocity.f - self.design.radicand.f)
+
+    def _correction(self, product) -> Value:
+        """Return g before its limits, from the product of state PRODUCT."""
+        return shift_round_half_up(product, self.design.product - self.design.velocity.f)
+
+    def elaborate(self, platform):
+        m = Module()
+        velocity, error = self.design.velocity, self.design.error
+        most = velocity.max
+
+        lead = Signal(signed(max(error.width, velocity.width) + 1))
+        u1 = Signal(shape(velocity))
+
+        # One clock a step, one carry chain a clock.
+        e = Signal(shape(error))
+        negative = Signal()
+        size, near, beyond, rest = (Signal(error.width - 1) for _ in range(4))
+        difference = Signal(signed(max(len(size), self.design.alpha.width) + 1))
+        far_u1, far_u = (Signal(signed(max(len(size), len(u1)) + 2)) for _ in range(2))
+        next_u1 = Signal.like(u1)
+        # `near` is there long before u1 is wanted.
+        m.d.sync += [far_u1.eq(Mux(negative, u1 + near, u1 - near)), next_u1.eq(saturate(far_u1, -most, most))]
+
+        m.submodules.root = root = Sqrt(self.design.radicand.width)
+        factor = self._factor(root)
+        product = Signal(len(self._word(0)) + len(factor))
+
+        m.d.sync += self.valid.eq(0)
+        with m.FSM():
+            first = arrive(m, self, lead, u1, e, "MAGNITUDE")
+            after = self._adapt(m, first, e, size)
+            with m.State("MAGNITUDE"):
+                m.d.sync += [size.eq(Mux(e < 0, -e, e)), negative.eq(e < 0), product.eq(self._word(0) * factor)]
+                m.next = after
+            with m.State("BAND"):
+                m.d.sync += difference.eq(size - self._alpha())
+                self._square(m, product)
+                m.next = "SPLIT"
+            with m.State("SPLIT"):
+                within = difference < 0
+                m.d.sync += [near.eq(Mux(within, size, self._alpha())), beyond.eq(Mux(within, 0, difference))]
+                m.next = "ROOT"
+            correction = self._correct(m, root, factor, product, beyond)
+            with m.State("OUTPUT"):
+                m.d.sync += far_u.eq(Mux(negative, next_u1 + correction, next_u1 - correction))
+                m.d.sync += rest.eq(beyond - correction)
+                m.next = "UPDATE"
+            with m.State("UPDATE"):
+                u = saturate(far_u, -most, most)
+                m.d.sync += [
+                    lead.eq(Mux(negative, next_u1 - rest, next_u1 + rest)),
+                    u1.eq(next_u1),
+                    self.velocity.eq(Mux(self._word(2), next_u1, u)),
+                    self.saturated[1].eq((u != far_u) | (next_u1 != far_u1)),
+                    self.valid.eq(1),
+                ]
+                m.next = "SAMPLE"
+        return m
+
+    def _correct(self, m, root, factor, product, beyond) -> Value:
+        """Add the states from ROOT to OUTPUT, not included; return g. The root takes its own time before PRODUCT."""
+        full, correction = Signal.like(self._correction(product)), Signal.like(beyond)
+        below, above = Signal(), Signal()
+        m.d.comb += root.radicand.eq(self._radicand(beyond))
+        with m.State("ROOT"):
+            m.d.comb += root.start.eq(1)
+            m.next = "PRODUCT"
+        with m.State("PRODUCT"), m.If(root.done):
+            m.d.sync += product.eq(self._word(0) * factor)
+            m.next = "CORRECTION"
+        with m.State("CORRECTION"):
+            m.d.sync += full.eq(self._correction(product))
+            m.next = "COMPARE"
+        with m.State("COMPARE"):
+            m.d.sync += [below.eq(full[-1] & full.shape().signed), above.eq(full > beyond)]
+            m.next = "LIMIT"
+        with m.State("LIMIT"):
+            m.d.sync += correction.eq(Mux(below, 0, Mux(above, beyond, full)))
+            m.next = "OUTPUT"
+        return correction

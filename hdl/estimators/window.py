@@ -1,0 +1,59 @@
+"""The finite difference over a chosen window."""
+
+from amaranth.hdl import Module, Mux, Signal
+
+from hardwall.model.estimators.window import Design
+
+from ..arithmetic.signed_divide import SignedDivide
+from .estimate import EstimatorBlock
+from .history import History
+
+
+class Estimator(EstimatorBlock):
+    """The mean velocity over the last `window_length` stored positions.
+
+    Equation: velocity = (count - count n samples ago) / n; in the first n samples the axis counts as having stood at
+    the first one before, so velocity is 0 at the first. Where the history stores every M-th sample only, n is a
+    multiple of M, and the velocity is held between.
+
+    Latency: `latency` clocks from `strobe` to `valid`, most of them the division's; the next `strobe` may come with
+    `valid`.
+
+    Rounding and overflow: rounds toward zero. The change of a sample is limited to the velocity format, with a flag;
+    the velocity then always fits. The count may wrap.
+
+    Parameters
+    ----------
+    design : hardwall.model.estimators.window.Design
+        Formats; its module derives them.
+
+    Source: the minimax window; see the model.
+    """
+
+    def __init__(self, design: Design):
+        super().__init__(design, Design)
+
+    def elaborate(self, platform):
+        m = Module()
+        design = self._design
+        m.submodules.history = history = History(design.history)
+        length = Signal.like(self.window_length)
+        m.submodules.division = division = SignedDivide(
+            design.history.width, len(length), design.fraction, design.velocity.width - 1
+        )
+        # No window is shorter than a sample.
+        m.d.sync += length.eq(Mux(self.window_length == 0, 1, self.window_length))
+        m.d.comb += [
+            history.strobe.eq(self.strobe),
+            history.restart.eq(self.restart),
+            history.count.eq(self.count),
+            history.age.eq(length),
+            division.dividend.eq(history.change),
+            division.divisor.eq(length),
+        ]
+        m.d.sync += [division.start.eq(history.valid), self.valid.eq(division.done)]
+        with m.If(division.done):
+            m.d.sync += self.saturated.eq(history.limited)
+            with m.If(history.stored):
+                m.d.sync += self.velocity.eq(division.quotient)
+        return m

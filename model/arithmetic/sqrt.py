@@ -1,0 +1,28 @@
+"""Integer square root, rounded down."""
+
+import math
+
+from ..compiled import compiled
+
+
+@compiled
+def isqrt(radicand):
+    """Return floor(sqrt(radicand)) for 0 <= radicand < 2**62, exactly.
+
+    The float64 root of a 62-bit integer is within one of the answer (its relative error is at most 2**-53, and the
+    root has at most 31 bits), so one comparison each way makes it exact.
+    """
+    root = int(math.sqrt(radicand))
+    if root * root > radicand:
+        root -= 1
+    if (root + 1) * (root + 1) <= radicand:
+        root += 1
+    return root
+
+
+def latency(width: int) -> int:
+    """Return the clocks from `start` to `done` of the hardware root of a `width`-bit radicand.
+
+    One to load, and one for each of the ceil(width / 2) bits of the result.
+    """
+    return 1 + (width + 1) // 2

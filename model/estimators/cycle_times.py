@@ -1,0 +1,104 @@
+"""Times of whole encoder cycles from the clock stamps of their edges: what a sample's stamps say, exactly.
+
+An encoder's four edges of a cycle (A rise, B rise, A fall, B fall) may be out of place, each by its own error, but an
+edge is exactly 4 counts from the one of its kind in the next cycle: so a cycle is the time between two of one kind.
+`observe` subtracts the stamp of the last edge and the one of its kind that the sample before knew. That is a number of
+cycles only if all edges between went one way, as far as samples tell: the direction did not change, and the decoder's
+run covers the counts between.
+
+A stamp wraps after 2**stamp_width clocks. An edge is forgotten in the last quarter of that time (AGE_LIMIT of it: the
+two top bits of its age), for which a sample must be no longer than such a quarter; older ones cannot alias. At the
+first sample, and with a restart, all are forgotten: an edge is known once its stamp has changed since. An illegal
+transition ends the run of known edges; one that is followed within its sample by four more edges is known by the
+decoder's flag alone.
+
+Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992, fixed-position methods.
+"""
+
+from typing import NamedTuple
+
+from ..arithmetic.fixed import wrap
+from ..compiled import compiled
+from ..quadrature import RUN_MAX, stamp_of
+
+AGE_LIMIT = 0.75
+"""Part of the stamp's range after which an edge is forgotten: its two top bits set."""
+LATENCY = 6
+"""Clocks from a strobe to its `Times`: see `hardwall.hdl.estimators.cycle_times`."""
+
+
+class Memory(NamedTuple):
+    """What is kept of the last sample's `Seen`, and which kinds' stamps are known (bit k: kind k) and not too old."""
+
+    running: int
+    count: int
+    down: int
+    run: int
+    stamp_a_rise: int
+    stamp_b_rise: int
+    stamp_a_fall: int
+    stamp_b_fall: int
+    fresh: int
+
+
+class Times(NamedTuple):
+    """What a sample's stamps say: times in clocks, numbers of edges and cycles; 0 where there is none."""
+
+    news: int  # whether there is a new edge
+    cycles: int  # in `cycle`
+    cycle: int
+    gap: int
+    age: int  # of the last edge
+    cycle_age: int  # of the edge three before it
+
+
+NOTHING = Memory(0, 0, 0, 0, 0, 0, 0, 0, 0)
+
+
+@compiled
+def observe(params, memory, seen, restart):
+    """Take the stamps of a sample, a `quadrature.Seen`: return (memory, `Times`).
+
+    Of `params`, `count_width` and `stamp_width` are used.
+    """
+    modulus = (1 << params.stamp_width) - 1
+    first = restart or not memory.running
+    fresh = 0
+    for kind in range(4):
+        stamp = stamp_of(seen, kind)
+        old = (seen.stamp - stamp) & modulus >= modulus - (modulus >> 2)
+        if not first and (stamp != stamp_of(memory, kind) or (memory.fresh >> kind & 1 and not old)):
+            fresh |= 1 << kind
+    kind, left, right = seen.edge, (seen.edge - 1) & 3, (seen.edge + 1) & 3
+    period = (stamp_of(seen, kind) - stamp_of(memory, kind)) & modulus
+    age = (seen.stamp - stamp_of(seen, kind)) & modulus
+    left_age = (seen.stamp - stamp_of(seen, left)) & modulus
+    right_age = (seen.stamp - stamp_of(seen, right)) & modulus
+    left_known, right_known = fresh >> left & 1, fresh >> right & 1
+
+    # A neighbour of the last edge's kind is the edge before it, or the one three before; which, their ages tell.
+    left_first = left_known and not (right_known and right_age < left_age)
+    before = left_age if left_first else right_age
+    run = seen.run if fresh >> kind & 1 else 0
+    gap = (before - age) & modulus if run >= 2 and (left_known or right_known) else 0
+    cycle_age = max(left_age, right_age) if run == RUN_MAX and left_known and right_known else 0
+
+    moved = wrap(seen.count - memory.count, params.count_width)
+    forward = -moved if seen.down else moved
+    one_way = seen.down == memory.down and forward > 0 and (run == RUN_MAX or run == memory.run + forward)
+    # The edge of this kind that the last sample knew stands so many counts before the last one that it saw.
+    known = memory.fresh >> kind & 1 and -forward & 3 < memory.run
+    cycles = (forward + 3) >> 2 if one_way and known else 0
+
+    memory = Memory(
+        1,
+        seen.count,
+        seen.down,
+        seen.run,
+        seen.stamp_a_rise,
+        seen.stamp_b_rise,
+        seen.stamp_a_fall,
+        seen.stamp_b_fall,
+        fresh,
+    )
+    return memory, Times(int(period != 0), cycles, period, gap, age if run else 0, cycle_age)

@@ -1,0 +1,84 @@
+"""Velocity as the difference of successive counts: the baseline that every estimator is held against.
+
+Ends. The difference is taken modulo the count's width, so the count may wrap. A step, or a speed, of more than twice
+the largest speed saturates for that sample alone. The first sample, and one with `restart`, reads 0, and so does
+standstill; a reset in motion is right from the second sample on.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
+from ..compiled import compiled
+from .estimate import estimate
+
+OUTPUTS = ("u",)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """A finite difference has no gains."""
+
+    @classmethod
+    def default(cls, axis) -> "Gains":
+        return cls()
+
+
+class Params(NamedTuple):
+    count_width: int
+    velocity_max: int
+
+
+class State(NamedTuple):
+    running: int
+    count: int
+
+
+class FloatParams(NamedTuple):
+    count_width: int
+
+
+START = State(0, 0)
+FLOAT_START = START
+
+
+class Design:
+    """Formats of the finite difference for an axis.
+
+    The velocity is a whole number of counts a sample; its range is twice the axis's largest speed, so that a loop that
+    overshoots still reads true. It saturates beyond, with the flag `velocity_saturated`.
+    """
+
+    inputs = ("count",)
+    flags = ("velocity_saturated",)
+    words = ()
+    latency = 2
+
+    def __init__(self, axis, gains: Gains):
+        self.count_width = axis.count_width
+        self.velocity = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), axis.shrunk(0))
+
+    def params(self, words: dict[str, int]) -> Params:
+        return Params(self.count_width, self.velocity.max)
+
+    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+        return FloatParams(self.count_width)
+
+
+@compiled
+def _difference(width, state, count, restart):
+    return wrap(count - state.count, width) if state.running and not restart else 0
+
+
+@estimate.register(Params)
+@compiled
+def step(params, state, seen, restart):
+    difference = _difference(params.count_width, state, seen.count, restart)
+    velocity = saturate(difference, -params.velocity_max - 1, params.velocity_max)
+    return State(1, seen.count), velocity, int(velocity != difference)
+
+
+@estimate.register(FloatParams)
+@compiled
+def float_step(params, state, seen, restart):
+    return State(1, seen.count), float(_difference(params.count_width, state, seen.count, restart)), 0

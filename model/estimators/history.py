@@ -1,0 +1,156 @@
+"""The positions of the past, in block RAM: what an estimator over a window differences.
+
+A position is the sum of the count's changes since the start, each limited to +-`change.max`:
+
+    position_k = position_{k-1} + limit(count_k - count_{k-1})         modulo 2**width; 0 at the first sample
+
+Every `every`-th position is stored, the first one first. Whoever asks for the one `age` stored positions before the
+newest gets 0, the position at the start, where there is none yet: **before the start the axis counts as standing where
+it was first seen**. A window that begins before the start so estimates too little, never too much, and there is no
+transient in a start from rest.
+
+Formats, derived:
+
+- `change` SQ(i, 0), i.e. what a sample may change: twice the largest speed (a loop that overshoots still reads true),
+  and one count at least, for however slow an axis is, its count steps by one. Beyond, the change is limited (flag
+  `velocity_saturated`) and the rest of that step is forgotten. So the change over a window always fits, and what is too
+  fast reads as the largest velocity, not as an alias.
+- `age_bits`: the fewest that count the wanted window in stored positions. The memory has 2**age_bits words.
+- `width`: the change over the longest window is less than 2**(i-1) 2**age_bits every, so one more bit, the sign, makes
+  the difference of two positions exact modulo 2**width: i + age_bits + log2(every). How far the axis goes in all, and
+  how often its count wraps, does not matter.
+- `every`, a power of two: 1, unless 2**age_bits words of `width` bits are more than `MEMORY_BITS`. Then estimates are
+  made every `every` samples, and held between, so that a window remains a whole number of stored positions, and a
+  difference over it exact. The hold adds at most every - 1 samples to the age of a window of thousands.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
+from ..compiled import compiled
+
+MEMORY_BITS = 1 << 16
+"""Largest memory: 16 of the 30 blocks of 4 kbit in an iCE40UP5K, 4 of the 56 of 18 kbit in an ECP5-25F."""
+LATENCY = 3
+"""Clocks from strobe to valid: see `hardwall.hdl.estimators.history`."""
+WIDTH_MAX = 48
+"""Largest `width`: leaves int64 the fraction bits, weights and sums that an estimator adds to a position."""
+UNLIMITED = 1 << 40
+"""More than any change of a 32-bit count, for the float64 algorithm."""
+
+
+class Params(NamedTuple):
+    count_width: int
+    change_max: int
+    every: int
+    width: int
+
+
+class State(NamedTuple):
+    """`head` is where the newest stored position is, `known` how many there are before it (saturates).
+
+    `positions` belongs to one run, and is written in place.
+    """
+
+    running: int
+    count: int
+    position: int
+    phase: int
+    head: int
+    known: int
+    positions: np.ndarray
+
+
+class Design:
+    """Formats of the history for an axis and a window.
+
+    Args:
+        axis: the `spec.AxisSpec`.
+        window_s: longest time to look back, s.
+        steps: the window is to be a multiple of so many samples.
+
+    Attributes:
+        change, every, age_bits, width: as the module says.
+        longest: the window in stored positions.
+
+    Raises:
+        ValueError: if int64 does not hold what is computed from so long a window, with the accepted range.
+    """
+
+    latency = LATENCY
+
+    def __init__(self, axis, window_s: float, steps: int = 1):
+        self.count_width = axis.count_width
+        self.change = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), 0)
+        # Rounded to whole steps, a window may grow by half, or to the one step that it has at least.
+        most = 2.0 ** (WIDTH_MAX - 1 - self.change.i) / axis.sample_hz
+        if not 0 < window_s <= most:
+            raise ValueError(f"window_s must be more than 0 and at most {most:g} at these rates, not {window_s!r}")
+        samples = steps * max(1, round(window_s * axis.sample_hz / steps))
+        for shift in range(WIDTH_MAX):
+            self.every = 1 << shift
+            self.longest = max(1, round(samples / self.every))
+            self.age_bits = self.longest.bit_length()
+            self.width = self.change.i + self.age_bits + shift
+            if self.width << self.age_bits <= MEMORY_BITS:
+                break
+
+    @property
+    def age_max(self) -> int:
+        """Largest age that can be asked for, in stored positions."""
+        return (1 << self.age_bits) - 1
+
+    @property
+    def fraction(self) -> int:
+        """Fraction bits with which an LSB is less than one count over the longest window, in counts a sample."""
+        return self.age_bits + self.every.bit_length() - 1
+
+    def params(self, floating: bool = False) -> Params:
+        """Return the kernels' parameters; floating: nothing is limited, and no word is too narrow."""
+        if floating:
+            return Params(self.count_width, UNLIMITED, self.every, 62)
+        return Params(self.count_width, self.change.max, self.every, self.width)
+
+    def start(self) -> State:
+        """Return the state before the first sample, with a memory of its own."""
+        return State(0, 0, 0, 0, 0, 0, np.zeros(1 << self.age_bits, np.int64))
+
+
+@compiled
+def take(params, state, count, restart):
+    """Take one sample: return (state, whether its position was stored, whether its change was limited).
+
+    Args:
+        params, state: of `Design`.
+        count: a signed word that may have wrapped.
+        restart: true to forget the past: this sample counts as the first.
+    """
+    # Taken out once: each mention of an array in a state costs the compiled closed loop its reference counting.
+    running, last_count, position, phase, head, known, positions = state
+    last = len(positions) - 1
+    limited = False
+    if restart or not running:
+        position, phase, known = 0, 0, 0
+    else:
+        moved = wrap(count - last_count, params.count_width)
+        change = saturate(moved, -params.change_max, params.change_max)
+        position = wrap(position + change, params.width)
+        phase = (phase + 1) & (params.every - 1)
+        known = min(known + 1, last) if phase == 0 else known
+        limited = change != moved
+    if phase == 0:
+        head = (head + 1) & last
+        positions[head] = position
+    return State(1, count, position, phase, head, known, positions), phase == 0, limited
+
+
+@compiled
+def change_over(params, state, age):
+    """Return the change of position since `age` stored positions ago, 1 to `Design.age_max`; from a stored one."""
+    if age > state.known:
+        return state.position
+    positions = state.positions
+    older = positions[(state.head - age) & (len(positions) - 1)]
+    return wrap(state.position - older, params.width)

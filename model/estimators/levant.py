@@ -1,0 +1,310 @@
+"""Levant's first-order sliding-mode differentiator, explicit Euler, in fixed point.
+
+Per sample, with f the count, x its tracked value, u1 the integral state, all in counts and sample periods:
+
+    e  = x - f
+    u  = u1 - lambda sqrt(|e|) sign(e)
+    x  <- x + u
+    u1 <- u1 - alpha sign(e)                 sign(0) = 0
+
+The tracked x is held as its distance to the last count, `lead = x - f`, so that the count may wrap: e = lead - (new
+count - last count). Selectable outputs: `u`, the paper's, and `u1`, the integral state after this sample's update.
+
+Source: Chawda, Celik, O'Malley, World Haptics 2011, equations of the first-order differentiator; Levant 1998.
+
+Formats, derived. Let lam = lambda tau / sqrt(q) and alp = alpha tau^2 / q be the gains per sample.
+
+- `velocity` SQ(i, f): i holds twice the largest speed, since u swings about the true velocity.
+- f, the fraction bits of e, u and u1 alike (x + u and u1 - alpha are then exact): alpha's word is at least
+  2**ALPHA_BITS, so it is off by at most 2**-(ALPHA_BITS+1); and rounding u to f bits costs no more position than below.
+- `root`, the format of sqrt(|e|), and f. The integer root rounds down, so half of its LSB is added back (a constant
+  bit below it): no bias, and an error of at most half an LSB. With half an LSB of u, rounding moves u by at most
+  delta = lam 2**-(root.f+1) + 2**-(f+1). The same u follows exactly from an e smaller or larger by
+  eta <= 2 sqrt(|e|) delta / lam + (delta / lam)^2: *the fixed-point estimator is the exact one on a position perturbed
+  by eta*. At |e| = 1 count, where quantisation keeps it, each of the two parts is held to POSITION_BUDGET / 2 counts.
+- `error` SQ(i, f): lam sqrt(e_max) is at least twice the largest speed, so a velocity step from end to end is still
+  caught; but never more than the count can tell. Beyond, e saturates (flag `error_saturated`), which drags x along.
+- `lambda` UQ, GAIN_BITS wide, with two bits of headroom above the designed gain for changes at run time;
+  `alpha` likewise.
+
+Both states saturate at the velocity format (flag `velocity_saturated`).
+
+Ends. The count may wrap. The first sample, and one with `restart`, begins with x = count and u1 = 0: from rest there is
+no transient; out of a motion u0 it is that of a step of u0, which u overshoots by about 40 % and follows in about
+2 u0 / alpha, as it does the largest step (0.3 m/s with C = 12 m/s^2: 0.42 m/s at most, 43 ms). Up to the largest speed
+nothing saturates once that is over. At standstill u and u1 never come to rest but chatter by lambda sqrt(alpha tau^2)
+and alpha tau: see `levant_semi_implicit` for what does.
+
+`levant_semi_implicit`, `levant_implicit` and `levant_adaptive` take from here what they have in common with it.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ..arithmetic.fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
+from ..arithmetic.sqrt import isqrt
+from ..arithmetic.sqrt import latency as sqrt_latency
+from ..compiled import compiled
+from ..words import GAIN_BITS, Word, check_positive
+from .estimate import estimate
+from .registry import output_word
+
+OUTPUTS = ("u", "u1")
+ALPHA_BITS = 9
+"""The designed alpha's word has at least this many bits below its top one: it is off by 0.1 % at most."""
+POSITION_BUDGET = 2.0**-5
+"""How far, in counts, all rounding may displace the position at |e| = 1 count."""
+HEADROOM_BITS = 2
+"""A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
+STEPS = 7
+"""Clocks of the sequence besides the root: see `hardwall.hdl.estimators.levant`."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains in SI units: lambda in m^(1/2)/s, alpha in m/s^2.
+
+    Raises:
+        ValueError: if either is not finite and more than 0.
+    """
+
+    lambda_sqrt_m_per_s: float
+    alpha_m_per_s2: float
+
+    def __post_init__(self):
+        check_positive(self)
+
+    @classmethod
+    def default(cls, axis) -> "Gains":
+        """Return the paper's proposed gains for |f''| <= C, the axis's bound: lambda = sqrt(C), alpha = 1.1 C."""
+        bound = axis.acceleration_max_m_per_s2
+        return cls(math.sqrt(bound), 1.1 * bound)
+
+
+class Params(NamedTuple):
+    """Words and shifts of the integer kernel; see `Design` for the formats."""
+
+    lambda_: int
+    alpha: int
+    output: int
+    count_width: int
+    fraction: int
+    radicand_shift: int
+    product_shift: int
+    error_max: int
+    velocity_max: int
+
+
+class State(NamedTuple):
+    """`lead` and `u1` have the fraction bits of the velocity format (float: counts); `count` is the last one."""
+
+    running: int
+    count: int
+    lead: float
+    u1: float
+
+
+class FloatParams(NamedTuple):
+    lambda_: float
+    alpha: float
+    output: int
+    count_width: int
+
+
+START = State(0, 0, 0, 0)
+FLOAT_START = State(0, 0, 0.0, 0.0)
+
+
+class Design:
+    """Formats, run-time words and latency of the differentiator for an axis: the module says how they follow.
+
+    Its kin of other kernels differ in the attributes of the class and in the methods that begin with one underscore.
+
+    Attributes:
+        name: in the registry; the words begin with it.
+        kinds: `Params` and `FloatParams` of the kernels.
+        steps: clocks of the sequence besides the root.
+        roundings: how often u is rounded to its fraction bits.
+        velocity, error, root, radicand: formats of u and u1, e, sqrt(|e|) and its integer radicand.
+        product: fraction bits of lambda times twice the root.
+        words: `levant_lambda`, `levant_alpha`, `levant_output`.
+
+    Raises:
+        ValueError: if the gains do not fit any format that int64 can hold, with the accepted range.
+    """
+
+    inputs = ("count",)
+    flags = ("error_saturated", "velocity_saturated")
+    name = "levant"
+    kinds = (Params, FloatParams)
+    steps = STEPS
+    roundings = 1
+
+    def __init__(self, axis, gains: Gains):
+        tau, q = 1 / axis.sample_hz, axis.count_m
+        lam = gains.lambda_sqrt_m_per_s * tau / math.sqrt(q)
+        alpha = gains.alpha_m_per_s2 * tau**2 / q
+        speed = axis.speed_max_counts_per_sample
+
+        self.count_width = axis.count_width
+        i = 1 + bits_for(max(2 * speed, 2.0))
+        # A gain that moves u across its whole range in a sample is no gain; one too small needs more than int64.
+        f_max = 60 - max(axis.count_width, i)
+        largest = 2.0 ** (i - 1)
+        least_lam, least_alpha = self._least(f_max)
+        _check(gains.lambda_sqrt_m_per_s, "lambda_sqrt_m_per_s", least_lam, largest, lam)
+        _check(gains.alpha_m_per_s2, "alpha_m_per_s2", least_alpha, largest, alpha)
+
+        lam_i = HEADROOM_BITS + bits_for(lam)
+        self.lambda_ = UQ(lam_i, GAIN_BITS - lam_i)
+        error_i = 1 + min(max(bits_for(self._catch(2 * speed, lam)), 1), axis.count_width - 1)
+        radicand_i = self._radicand_i(error_i)
+        # A radicand is one of 62 bits at most.
+        root_f = min(bits_for(self._position_per_root(lam) / POSITION_BUDGET), (62 - radicand_i) // 2)
+        root_f = max(root_f - axis.estimator_bits_dropped, 0)
+        self.product = self.lambda_.f + root_f + 1
+        f = axis.shrunk(self._fraction(axis, lam, alpha, f_max))
+        self.velocity = SQ(i, f)
+        self.alpha = UQ(HEADROOM_BITS + bits_for(alpha), f)
+        self.error = SQ(error_i, f)
+        self.radicand = UQ(radicand_i, 2 * root_f)
+        self.root = UQ((self.radicand.width + 1) // 2 - root_f, root_f)
+        # The step of u before it is limited, and one bit: in int64.
+        _check(
+            gains.lambda_sqrt_m_per_s,
+            "lambda_sqrt_m_per_s",
+            least_lam,
+            2.0 ** (61 - f - self.root.i - HEADROOM_BITS),
+            lam,
+        )
+
+        prefix = self.name.replace("-", "_")
+        self.words = (
+            Word(
+                f"{prefix}_lambda",
+                self.lambda_,
+                math.sqrt(q) / tau,
+                "m^(1/2)/s",
+                self.lambda_.from_real(lam),
+                "gain of the square-root term",
+            ),
+            Word(
+                f"{prefix}_alpha", self.alpha, q / tau**2, "m/s^2", self.alpha.from_real(alpha), "gain of the sign term"
+            ),
+            Word(output_word(self.name), UQ(1, 0), 1.0, "", 0, "velocity output: 0 for u, 1 for u1"),
+        )
+
+    def _least(self, f_max: int) -> tuple[float, float]:
+        """Return the least lambda and alpha, per sample, that `f_max` fraction bits can hold."""
+        return self.roundings * 2 / (2.0**f_max * POSITION_BUDGET), 2.0 ** (ALPHA_BITS - f_max)
+
+    def _position_per_root(self, lam: float) -> float:
+        """Return by how many counts a root's error of 1 displaces the position at |e| = 1 count."""
+        return 2.0
+
+    def _fraction(self, axis, lam: float, alpha: float, f_max: int) -> int:
+        """Return the fraction bits of e, u and u1."""
+        rounding = self.roundings * self._position_per_root(lam) / (lam * POSITION_BUDGET)
+        return max(ALPHA_BITS - math.floor(math.log2(alpha)), bits_for(rounding), 0)
+
+    def _catch(self, step: float, lam: float) -> float:
+        """Return the error, in counts, that makes u step by `step`."""
+        return (step / lam) ** 2
+
+    def _radicand_i(self, error_i: int) -> int:
+        """Return the integer bits of the radicand, with those of the error."""
+        return error_i - 1
+
+    @property
+    def latency(self) -> int:
+        """Clocks from strobe to valid."""
+        return self.steps + sqrt_latency(self.radicand.width)
+
+    def params(self, words: dict[str, int]) -> Params:
+        """Return the kernel's parameters for the given run-time words."""
+        lam, alpha, output = (words[word.name] for word in self.words)
+        return self.kinds[0](
+            lambda_=lam,
+            alpha=alpha,
+            output=output,
+            count_width=self.count_width,
+            fraction=self.velocity.f,
+            radicand_shift=self.velocity.f - self.radicand.f,
+            product_shift=self.product - self.velocity.f,
+            error_max=self.error.max,
+            velocity_max=self.velocity.max,
+            **self._more(),
+        )
+
+    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+        """Return the float64 algorithm's parameters, per sample: gains unrounded, those of `si` before the designed."""
+        lam, alpha, _ = self.words
+        return self.kinds[1](
+            lambda_=si.get(lam.name, gains.lambda_sqrt_m_per_s) / lam.si_per_unit,
+            alpha=si.get(alpha.name, gains.alpha_m_per_s2) / alpha.si_per_unit,
+            output=OUTPUTS.index(output),
+            count_width=self.count_width,
+            **self._more_float(),
+        )
+
+    def _more(self) -> dict[str, int]:
+        """Return what the parameters of the integer kernel have beyond `Params`."""
+        return {}
+
+    def _more_float(self) -> dict[str, int]:
+        """Return what the parameters of the float64 kernel have beyond `FloatParams`."""
+        return {}
+
+
+def _check(value: float, name: str, low: float, high: float, scaled: float) -> None:
+    """Raise ValueError, in the units of `value`, unless `scaled` (the gain per sample) is within `low` to `high`."""
+    if not low <= scaled <= high:
+        unit = value / scaled
+        raise ValueError(f"{name} must be {low * unit:g} to {high * unit:g} at these rates, not {value!r}")
+
+
+@compiled
+def sign_of(value):
+    """Return -1, 0 or 1."""
+    # int() for plain Python on numpy scalars, whose truths do not subtract.
+    return int(value > 0) - int(value < 0)
+
+
+@compiled
+def arrive(params, state, seen, restart):
+    """Return (counts moved since the last sample, lead, u1), all 0 at the first sample; of either kernel."""
+    fresh = restart or not state.running
+    moved = 0 if fresh else wrap(seen.count - state.count, params.count_width)
+    return moved, 0 if fresh else state.lead, 0 if fresh else state.u1
+
+
+@estimate.register(Params)
+@compiled
+def step(params, state, seen, restart):
+    moved, lead, u1 = arrive(params, state, seen, restart)
+
+    distance = lead - (moved << params.fraction)
+    error = saturate(distance, -params.error_max, params.error_max)
+    sign = sign_of(error)
+    root = isqrt(shift_floor(abs(error), params.radicand_shift))
+    far_u = u1 - sign * shift_round_half_up(params.lambda_ * (2 * root + 1), params.product_shift)
+    u = saturate(far_u, -params.velocity_max, params.velocity_max)
+    far_u1 = u1 - sign * params.alpha
+    u1 = saturate(far_u1, -params.velocity_max, params.velocity_max)
+
+    flags = int(error != distance) | int(u != far_u or u1 != far_u1) << 1
+    return State(1, seen.count, error + u, u1), u1 if params.output else u, flags
+
+
+@estimate.register(FloatParams)
+@compiled
+def float_step(params, state, seen, restart):
+    """The paper's algorithm in float64, unsaturated: the reference for what fixed point costs."""
+    moved, lead, u1 = arrive(params, state, seen, restart)
+
+    error = lead - moved
+    sign = sign_of(error)
+    u = u1 - params.lambda_ * math.sqrt(abs(error)) * sign
+    u1 = u1 - params.alpha * sign
+    return State(1, seen.count, error + u, u1), u1 if params.output else u, 0

@@ -1,0 +1,260 @@
+"""Gains, formats and run-time words of `levant_edge`, derived from the axis; that module says the law.
+
+Symbols as there: v, a, E, T, L, D, C; q is a count, u the velocity out.
+
+- `velocity` SQ(i, f): i holds twice the largest speed; f resolves sqrt(C q), the speed that C gives within half a
+  count, to 2**-SPEED_BITS, and at least the slowest edges. `acceleration` has the same width, so that one multiplier
+  serves, and i for 2**ACCELERATION_BITS C. Both at most WIDTH_MAX bits, and so wide that their product with a time
+  fits int64.
+- `mantissa`: a time multiplies and divides by so many top bits. A T cut to them is off by 2**(1 - mantissa) of itself,
+  and the speed of a count in it, D/T, is then moved by no more than 4 LSB of velocity; at least four samples and four
+  shortest intervals are exact.
+- `error`, E over 2**k where k bits are cut: i for |v| 2**mantissa and the place it is held against, f as many less than
+  velocity's as the shortest interval has bits, less one: half an LSB of velocity after the division.
+- `place`: half a count, in steps of 2**-PLACE_BITS. `distance`: edges at twice the largest speed in two samples and two
+  shortest intervals; more saturate.
+- `radicand`, `root`: the least error that lambda limits, lambda^2 T^3 at the shortest T, is resolved in its root to
+  2**-ROOT_BITS.
+- `lambda`, `alpha` UQ, GAIN_BITS wide, with HEADROOM_BITS above the designed gain for changes at run time.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ..arithmetic.divide import latency as divide_latency
+from ..arithmetic.fixed import SQ, UQ, bits_for, shift_floor
+from ..arithmetic.sqrt import latency as sqrt_latency
+from ..quadrature import Seen
+from ..words import GAIN_BITS, Word, check_positive
+
+HEADROOM_BITS = 2
+"""A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
+SPEED_BITS = 18
+"""The velocity resolves sqrt(C q), the speed that C gives within half a count, to 2**-SPEED_BITS."""
+WIDTH_MAX = 40
+"""Most bits of velocity and acceleration."""
+ACCELERATION_BITS = 3
+"""The acceleration may reach 2**ACCELERATION_BITS C: an impact exceeds the C of a motion."""
+ROOT_BITS = 5
+"""The root resolves the least error that it limits to 2**-ROOT_BITS."""
+LEARN_SHIFT = 5
+"""An edge's residual moves the two places that it depends on by 2**-LEARN_SHIFT of it."""
+PLACE_BITS = 21
+"""Places of edges resolve 2**-PLACE_BITS counts."""
+QUOTIENT_BITS = 2
+"""Bits of the quotient that a clock brings."""
+STEPS = 19
+"""Clocks of the sequence besides the root's or the quotient's: see `hardwall.hdl.estimators.levant_edge`."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains in SI units: lambda in m^(1/2)/s^(3/2), alpha in m/s^3.
+
+    Raises:
+        ValueError: if either is not finite and more than 0.
+    """
+
+    lambda_sqrt_m_per_s3: float
+    alpha_m_per_s3: float
+
+    def __post_init__(self):
+        check_positive(self)
+
+    @classmethod
+    def default(cls, axis) -> "Gains":
+        """Return alpha = 2 C / sqrt(q / C) and Levant's lambda = 1.5 sqrt(alpha), with C and q the axis's."""
+        bound = axis.acceleration_max_m_per_s2
+        alpha = 2 * bound * math.sqrt(bound / axis.count_m)
+        return cls(1.5 * math.sqrt(alpha), alpha)
+
+
+class Params(NamedTuple):
+    """Words and shifts of the integer kernel; see `Design` for the formats."""
+
+    lambda_: int
+    alpha: int
+    count_width: int
+    stamp_width: int
+    clocks: int
+    shortest: int
+    mantissa: int
+    distance_max: int
+    place_fraction: int
+    place_shift: int
+    turn_shift: int
+    turn_span: int
+    error_shift: int
+    quotient_width: int
+    radicand_shift: int
+    limit_shift: int
+    slope_shift: int
+    alpha_shift: int
+    learn_shift: int
+    learn_max: int
+    place_max: int
+    bound: int
+    velocity_max: int
+    acceleration_max: int
+
+
+class FloatParams(NamedTuple):
+    lambda_: float
+    alpha: float
+    count_width: int
+    stamp_width: int
+    clocks: int
+    shortest: int
+    mantissa: int
+    steepest: float
+    learn_max: float
+    place_max: float
+
+
+class Design:
+    """Formats, run-time words and latency of the differentiator for an axis: the module says how they follow.
+
+    Attributes:
+        velocity, acceleration, error, place: formats of v, of a, of E over 2**k, of an edge's place times D.
+        mantissa: bits of a time as it multiplies and divides.
+        shortest: bits below those of the shortest interval used, 2**shortest clocks.
+        distance: format of the edges passed in an interval.
+        root, radicand: formats of the root and its integer radicand.
+        lambda_, alpha: gain formats.
+        words: `levant_edge_lambda`, `levant_edge_alpha`.
+
+    Raises:
+        ValueError: if the gains or the rates do not fit any format that int64 can hold, with the accepted range.
+    """
+
+    inputs = Seen._fields
+    flags = ("error_saturated", "velocity_saturated")
+
+    def __init__(self, axis, gains: Gains):
+        tau, q, clock, clocks = 1 / axis.sample_hz, axis.count_m, axis.clock_hz, axis.clocks_per_sample
+        bound, speed = axis.acceleration_max_m_per_s2, axis.speed_max_counts_per_sample
+        self.count_width, self.stamp_width, self.clocks = axis.count_width, axis.stamp_width, clocks
+        if 4 * clocks > 1 << axis.stamp_width:
+            raise ValueError(f"sample_hz must be 4 or more for stamps that last a second, not {axis.sample_hz!r}")
+
+        # Times, clocks.
+        window = clock * min(math.sqrt(axis.speed_max_m_per_s / (clock * bound)), math.sqrt(q / bound) / 4)
+        self.shortest = min(max(math.floor(math.log2(max(window, 2.0))), 1), axis.stamp_width - 3)
+        within_count = clock * math.sqrt(q / bound)
+        exact = bits_for(math.sqrt(within_count * 2.0 ** (SPEED_BITS - 2)))
+        self.mantissa = min(max(exact, bits_for(4 * max(clocks, 1 << self.shortest))), axis.stamp_width - 1)
+        span = max(axis.stamp_width - 1 - self.mantissa, 0)
+
+        # Velocity and acceleration.
+        i = 1 + bits_for(max(2 * speed, 2.0))
+        least = math.sqrt(bound / q) * tau
+        slowest = clocks * 2.0 ** (1 - axis.stamp_width)
+        f = max(SPEED_BITS - math.floor(math.log2(least)), 1 - math.floor(math.log2(slowest)), 0)
+        f = min(f, WIDTH_MAX - i, 60 - self.mantissa - i)
+        self.velocity = SQ(i, axis.shrunk(f))
+        f = self.velocity.f
+        largest = bound * tau / q / clock
+        i = 1 + ACCELERATION_BITS + bits_for(largest)
+        self.acceleration = SQ(i, self.velocity.width - i)
+
+        # Errors of place, in counts times D.
+        self.error = SQ(self.velocity.i + self.mantissa + 2, f - min(max(self.shortest - 1, 0), f))
+        fine = PLACE_BITS - math.floor(math.log2(clocks))
+        self.place = SQ(max(bits_for(clocks / 2), 0) + 1, max(fine, 0))
+        passed = 2 * speed * (2 + (2 << self.shortest) / clocks) + 1
+        self.distance = SQ(min(1 + bits_for(passed), axis.count_width), 0)
+
+        # Gains.
+        alpha = gains.alpha_m_per_s3 * tau / q / clock**2
+        lam = gains.lambda_sqrt_m_per_s3 * math.sqrt(tau / q) / clock
+        self.alpha = _gain("alpha_m_per_s3", gains.alpha_m_per_s3, alpha)
+        self.lambda_ = _gain("lambda_sqrt_m_per_s3", gains.lambda_sqrt_m_per_s3, lam)
+        limited = lam**2 * 8.0**self.shortest
+        root_f = max(bits_for(2.0**ROOT_BITS / math.sqrt(limited)), 0)
+        self.radicand = UQ(self.error.i - 1, 2 * min(root_f, (self.error.f + 1) // 2))
+        self.root = UQ((self.radicand.width + 2) // 2 - self.radicand.f // 2, self.radicand.f // 2)
+        self.words = (
+            Word(
+                "levant_edge_lambda",
+                self.lambda_,
+                math.sqrt(q / tau) * clock,
+                "m^(1/2)/s^(3/2)",
+                self.lambda_.from_real(lam),
+                "gain of the square-root term",
+            ),
+            Word(
+                "levant_edge_alpha",
+                self.alpha,
+                q / tau * clock**2,
+                "m/s^3",
+                self.alpha.from_real(alpha),
+                "gain of the sign term",
+            ),
+        )
+        self.turn_span = span
+
+    @property
+    def latency(self) -> int:
+        """Clocks from strobe to valid."""
+        return STEPS + max(self.quotient_latency, sqrt_latency(self.radicand.width + 1))
+
+    @property
+    def quotient_latency(self) -> int:
+        """Clocks of the division."""
+        return divide_latency(self.velocity.width - 1, QUOTIENT_BITS)
+
+    def params(self, words: dict[str, int]) -> Params:
+        """Return the kernel's parameters for the given run-time words."""
+        f, a_f, e_f = self.velocity.f, self.acceleration.f, self.error.f
+        return Params(
+            lambda_=words["levant_edge_lambda"],
+            alpha=words["levant_edge_alpha"],
+            count_width=self.count_width,
+            stamp_width=self.stamp_width,
+            clocks=self.clocks,
+            shortest=self.shortest,
+            mantissa=self.mantissa,
+            distance_max=self.distance.max,
+            place_fraction=self.place.f,
+            place_shift=e_f - self.place.f,
+            turn_shift=a_f - f - self.turn_span,
+            turn_span=self.turn_span,
+            error_shift=f - e_f,
+            quotient_width=self.velocity.width - 1,
+            radicand_shift=e_f - self.radicand.f,
+            limit_shift=self.lambda_.f + self.root.f - f,
+            slope_shift=f - a_f,
+            alpha_shift=self.alpha.f - a_f,
+            learn_shift=e_f - self.place.f + LEARN_SHIFT,
+            learn_max=(1 << bits_for(self.clocks / 4) + e_f) - 1,
+            place_max=self.place.max,
+            bound=shift_floor(5 * self.clocks, 1 - f),
+            velocity_max=self.velocity.max,
+            acceleration_max=self.acceleration.max,
+        )
+
+    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+        """Return the float64 algorithm's parameters: gains unrounded, those of `si` before the designed."""
+        lam, alpha = self.words
+        return FloatParams(
+            si.get("levant_edge_lambda", gains.lambda_sqrt_m_per_s3) / lam.si_per_unit,
+            si.get("levant_edge_alpha", gains.alpha_m_per_s3) / alpha.si_per_unit,
+            self.count_width,
+            self.stamp_width,
+            self.clocks,
+            self.shortest,
+            self.mantissa,
+            2.0 ** (self.acceleration.i - 1),
+            2.0 ** bits_for(self.clocks / 4),
+            2.0 ** (self.place.i - 1),
+        )
+
+
+def _gain(name: str, value: float, scaled: float) -> UQ:
+    """Return the format of a gain of `value` SI and `scaled` in counts, samples and clocks."""
+    if not 2.0**-60 <= scaled <= 2.0**20:
+        unit = value / scaled
+        raise ValueError(f"{name} must be {2.0**-60 * unit:g} to {2.0**20 * unit:g} at these rates, not {value!r}")
+    i = HEADROOM_BITS + bits_for(scaled)
+    return UQ(i, GAIN_BITS - i)

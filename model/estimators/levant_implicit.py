@@ -1,0 +1,130 @@
+"""Levant's differentiator by implicit Euler, sign and square root both, in fixed point.
+
+As `levant_semi_implicit`, but with the root, too, that of the error after the step. Per sample, with f the count, x its
+tracked value, u1 the integral state, in counts and sample periods, and a plus for after the sample:
+
+    e+  =  x + u1 - f  -  lambda sqrt(|e+|) sign(e+)  -  alpha S,      S in SGN(e+)
+    u1+ =  u1 - alpha S
+    u   =  u1+ - lambda sqrt(|e+|) sign(e+),      x+ = x + u = f + e+
+
+SGN is set-valued at 0: anything in [-1, 1]. With b = x + u1 - f, the closed form has two cases. Within |b| <= alpha,
+e+ = 0 and alpha S = b solve it: S is a linear function of b, which is why nothing chatters. Beyond, e+ has the sign of
+b, and z = sqrt(|e+|) is the positive root of z^2 + lambda z = |b| - alpha. Together, as in `levant_semi_implicit`,
+
+    near = min(|b|, alpha),  beyond = |b| - near,      g = lambda z = lambda (sqrt(beyond + lambda^2/4) - lambda/2)
+    u1+ = u1 - sign(b) near,   u = u1+ - sign(b) g,    e+ = sign(b) (beyond - g)
+
+a continuous map of b, whose g never exceeds beyond. The outputs are u, the corrected velocity, and u1, the integral
+state. What is said there of standstill, constant speed, low and high rates holds here word for word: in the band both
+outputs are exactly the finite difference; beyond it g is smaller, so it is the smoother of the two between 1 and
+100 kHz. (It keeps an e+ of its own where the other has none, so a count that stands takes some samples more.)
+
+Source: implicit Euler for the super-twisting algorithm, Acary, Brogliato 2010 and 2012; Brogliato, Polyakov, Efimov,
+IEEE Trans. Automatic Control 2020; closed form for the differentiator, Mojallizadeh, Brogliato, Acary, Int. J. Robust
+and Nonlinear Control 2021; Koch, Reichhartinger 2018 for the class that it belongs to.
+
+Formats are those of `levant_semi_implicit`, and differ thus:
+
+- g = lambda root - lambda^2/2, root = sqrt(beyond + lambda^2/4): lambda^2, once for all, is a product of the same
+  multiplier as lambda times the root. `radicand` has room for lambda^2/4 at the largest word. There lambda^2/4 is
+  rounded down to the radicand's LSB, a position of 2**-(2 root.f); in g, lambda^2/2 is rounded to f bits.
+- With the root's half LSB as in `levant`, g is off by at most delta = lambda 2**-(root.f+1) + 2 * 2**-(f+1), and the
+  same u follows exactly from a beyond displaced by at most
+  eta = 2 sqrt(beyond + lambda^2/4) delta / lambda + (delta / lambda)^2 + 2**-(2 root.f).
+  At beyond = 1 count the slope is sqrt(4 + lambda^2): each of the two parts of delta is held to POSITION_BUDGET / 2
+  there, which at low rates takes a root of more bits than the explicit one. (Where lambda is thousands, the radicand
+  would exceed int64: the root then has the bits that are left, and delta grows.) g is held within 0 to beyond.
+"""
+
+import math
+from typing import NamedTuple
+
+from ..arithmetic.fixed import saturate, shift_floor, shift_round_half_up
+from ..arithmetic.sqrt import isqrt
+from ..compiled import compiled
+from . import levant_semi_implicit
+from .estimate import estimate
+from .levant import FLOAT_START, OUTPUTS, START, Gains, State, arrive
+from .levant_semi_implicit import band, float_settle, settle
+
+__all__ = ["FLOAT_START", "OUTPUTS", "START", "Design", "FloatParams", "Gains", "Params", "State"]
+
+
+class Params(NamedTuple):
+    """As `levant.Params`; and by how much lambda^2 is shifted to the radicand's and to the velocity's fraction bits."""
+
+    lambda_: int
+    alpha: int
+    output: int
+    count_width: int
+    fraction: int
+    radicand_shift: int
+    product_shift: int
+    error_max: int
+    velocity_max: int
+    quarter_shift: int
+    half_shift: int
+
+
+class FloatParams(NamedTuple):
+    lambda_: float
+    alpha: float
+    output: int
+    count_width: int
+
+
+class Design(levant_semi_implicit.Design):
+    """Formats, run-time words and latency for an axis, as `levant.Design`: the module says what differs.
+
+    Attributes:
+        quarter_shift, half_shift: bits that lambda^2 / 4 has more than the radicand, and lambda^2 / 2 than u.
+    """
+
+    name = "levant-implicit"
+    kinds = (Params, FloatParams)
+    roundings = 2
+
+    def _position_per_root(self, lam: float) -> float:
+        return math.sqrt(4 + lam**2)
+
+    def _radicand_i(self, error_i: int) -> int:
+        return max(error_i - 1, 2 * self.lambda_.i - 2) + 1
+
+    @property
+    def quarter_shift(self) -> int:
+        return 2 * self.lambda_.f + 2 - self.radicand.f
+
+    @property
+    def half_shift(self) -> int:
+        return 2 * self.lambda_.f + 1 - self.velocity.f
+
+    def _more(self) -> dict[str, int]:
+        return {"quarter_shift": self.quarter_shift, "half_shift": self.half_shift}
+
+
+@estimate.register(Params)
+@compiled
+def step(params, state, seen, restart):
+    moved, lead, u1 = arrive(params, state, seen, restart)
+    distance = lead - (moved << params.fraction)
+    error = saturate(distance, -params.error_max, params.error_max)
+    sign, near, beyond = band(error, params.alpha)
+    square = params.lambda_ * params.lambda_
+    root = isqrt(shift_floor(beyond, params.radicand_shift) + shift_floor(square, params.quarter_shift))
+    full = shift_round_half_up(params.lambda_ * (2 * root + 1), params.product_shift)
+    correction = saturate(full - shift_round_half_up(square, params.half_shift), 0, beyond)
+    lead, u1, velocity, far = settle(params, u1, sign, near, beyond, correction)
+    return State(1, seen.count, lead, u1), velocity, int(error != distance) | far << 1
+
+
+@estimate.register(FloatParams)
+@compiled
+def float_step(params, state, seen, restart):
+    """The same in float64, unsaturated."""
+    moved, lead, u1 = arrive(params, state, seen, restart)
+    sign, near, beyond = band(lead - moved, params.alpha)
+    half = params.lambda_ / 2
+    # The difference of the two roots, without their cancellation.
+    correction = params.lambda_ * beyond / (math.sqrt(beyond + half * half) + half)
+    lead, u1, velocity = float_settle(params, u1, sign, near, beyond, correction)
+    return State(1, seen.count, lead, u1), velocity, 0

@@ -1,0 +1,241 @@
+"""Velocity by the time of one encoder cycle when slow, by the counts of a window when fast: the classical switching.
+
+With c clocks a sample, velocities in counts a sample and times in clocks:
+
+    slow    v = 4 c / max(D, B)     D: from the last edge back to the one of its kind a cycle before, all of it one way
+                                    B: from now back to the edge three before the last; the next completes a cycle
+    fast    v = n / w               n: counts moved in the last full window of w = 2**k samples, held for the next
+
+D needs no multiplication: one division of a constant, by the larger of D and B. It is immune to misplaced edges as
+`period` is, for it subtracts stamps of one kind alone; but after a turn it reads 0 until there is a cycle in the new
+direction.
+
+Errors, with |f''| <= C in counts and samples. A cycle's stamps are late by less than a clock, v^2 / 4 c, and it is of
+D / 2 and up to a gap ago, 3 C / v. A window's counts are off by less than one, 1 / w, and it is of w / 2 to 3 w / 2
+ago, 3 C w / 2. So w = sqrt(2 / 3 C) is the best window, and above the v at which v^2 / 4 c is what it then costs,
+1 / w + 3 C w / 2, counting is the better of the two: the switching speed. It is also at most CYCLE_SPEED, as an axis
+that does more than a cycle in a sample leaves no single cycle to be timed.
+
+It counts from the window on that has more than `switch` counts, and times again from one with fewer than `switch` - 1:
+a hysteresis of two counts, by which windows at constant speed do not differ (the floor of a length takes two values,
+a quarter count of misplacement makes it three). At a switch v jumps by at most the sum of both errors.
+
+`period` uses all cycles in a sample, so its stamps cost v / c at most where a window of one sample is off by 1: with
+the same stamps it beats counting at all speeds (v <= c), unless the window is longer than its mean over a sample or a
+cycle. This is the published scheme to hold it against.
+
+Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992: fixed time, fixed position, switching.
+
+Formats. `velocity` as that of `period`, with at least k fraction bits, so that n / w is exact. A window may be no
+longer than half the counter's range at twice the largest speed, so that n does not alias. D, B and ages are as in
+`period`: v = 0, exactly, when B is AGE_LIMIT of the stamp's range. Count and stamps may wrap; the largest step is a
+fast window, and no cycle. Both speeds saturate at the format, with the flag `velocity_saturated`. First sample and
+restart: 0 until there are five edges in one direction, or a fast window.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ..arithmetic.divide import divide
+from ..arithmetic.divide import latency as divide_latency
+from ..arithmetic.fixed import UQ, bits_for, saturate, wrap
+from ..compiled import compiled
+from ..quadrature import Seen
+from ..words import Word, check_positive
+from . import cycle_times
+from .cycle_times import NOTHING, Memory, observe
+from .estimate import estimate
+from .period import check_stamps, velocity_format
+
+OUTPUTS = ("u",)
+CYCLE_SPEED = 3.0
+"""Counts a sample at which switching is due: with a misplaced edge still no more than the four of a cycle."""
+SWITCH_MIN = 2
+"""Counts a window to switch at: with fewer the hysteresis would hold it in counting for good."""
+STEPS = cycle_times.LATENCY + 2
+"""Clocks of the sequence besides the division: see `hardwall.hdl.estimators.period_count`."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """The window to count over, held to a power of two of samples; and the speed above which to count.
+
+    Raises:
+        ValueError: if either is not finite and more than 0.
+    """
+
+    window_s: float
+    switch_m_per_s: float
+
+    def __post_init__(self):
+        check_positive(self)
+
+    @classmethod
+    def default(cls, axis) -> "Gains":
+        """Return the best window for the axis's bound on the acceleration, and where it beats a cycle."""
+        acceleration = axis.acceleration_max_m_per_s2 / (axis.count_m * axis.sample_hz**2)
+        window = 1 << min(max(round(math.log2(2 / (3 * acceleration)) / 2), 0), _window_bits_max(axis))
+        error = 1 / window + 1.5 * acceleration * window
+        speed = min(math.sqrt(4 * axis.clocks_per_sample * error), CYCLE_SPEED)
+        switch = min(max(round(speed * window), SWITCH_MIN), (1 << (axis.count_width - 1)) - 1)
+        return cls(window / axis.sample_hz, switch / window * axis.velocity_unit_m_per_s)
+
+
+class Params(NamedTuple):
+    count_width: int
+    stamp_width: int
+    window: int
+    switch: int
+    dividend: int
+    quotient_width: int
+    shift: int  # of a window's counts to the velocity's format
+    velocity_max: int
+
+
+class FloatParams(NamedTuple):
+    count_width: int
+    stamp_width: int
+    window: int
+    switch: int
+    clocks: int
+
+
+class State(NamedTuple):
+    """`cycle`: D, clocks, 0 for none; `first`: the count as the window began; `moved`: counts of the last full one."""
+
+    memory: Memory
+    cycle: int
+    samples: int
+    first: int
+    moved: int
+    counting: int
+
+
+START = State(NOTHING, 0, 0, 0, 0, 0)
+FLOAT_START = START
+
+
+def _window_bits_max(axis) -> int:
+    """Return log2 of the longest window, samples, in which the count cannot alias."""
+    return max(axis.count_width - 1 - bits_for(2 * max(axis.speed_max_counts_per_sample, 1.0)), 0)
+
+
+class Design:
+    """Formats, run-time word and latency for an axis: the module says how they follow.
+
+    Attributes:
+        window_bits: log2 of the window, samples.
+        words: `period_count_switch`.
+
+    Raises:
+        ValueError: if the gains, or the axis, do not fit formats that int64 can hold, with the accepted range.
+    """
+
+    inputs = Seen._fields
+    flags = ("velocity_saturated",)
+    cycles_max = 2
+    """More than one cycle in a sample is not timed; how many there are is all the same."""
+
+    def __init__(self, axis, gains: Gains):
+        check_stamps(axis)
+        tau, most = 1 / axis.sample_hz, _window_bits_max(axis)
+        self.window_bits = round(math.log2(gains.window_s / tau))
+        if not 0 <= self.window_bits <= most:
+            raise ValueError(f"window_s must be {tau:g} to {tau * 2**most:g} at these rates, not {gains.window_s!r}")
+        self.count_width, self.stamp_width = axis.count_width, axis.stamp_width
+        self.clocks = axis.clocks_per_sample
+        self.velocity = velocity_format(axis, self.window_bits)
+        fmt = UQ(axis.count_width - 1, 0)
+        unit = axis.velocity_unit_m_per_s / 2**self.window_bits
+        if not SWITCH_MIN <= round(gains.switch_m_per_s / unit) <= fmt.max:
+            raise ValueError(
+                f"switch_m_per_s must be {SWITCH_MIN * unit:g} to {fmt.max * unit:g} with this window, "
+                f"not {gains.switch_m_per_s!r}"
+            )
+        self.switch = Word(
+            "period_count_switch",
+            fmt,
+            unit,
+            "m/s",
+            fmt.from_real(gains.switch_m_per_s / unit),
+            "speed above which counts of a window are taken rather than the time of a cycle",
+        )
+        self.words = (self.switch,)
+
+    @property
+    def dividend(self) -> int:
+        """The constant that D or B divides: 4 c, with a fraction bit more than the velocity."""
+        return 4 * self.clocks << (self.velocity.f + 1)
+
+    @property
+    def latency(self) -> int:
+        """Clocks from strobe to valid."""
+        return STEPS + divide_latency(self.velocity.width)
+
+    def params(self, words: dict[str, int]) -> Params:
+        """Return the kernel's parameters for the given run-time words."""
+        return Params(
+            count_width=self.count_width,
+            stamp_width=self.stamp_width,
+            window=1 << self.window_bits,
+            switch=words["period_count_switch"],
+            dividend=self.dividend,
+            quotient_width=self.velocity.width,
+            shift=self.velocity.f - self.window_bits,
+            velocity_max=self.velocity.max,
+        )
+
+    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+        """Return the float64 algorithm's parameters; it counts as the integer one does, so switches at whole counts."""
+        switch = self.switch.from_si(si.get("period_count_switch", gains.switch_m_per_s))
+        return FloatParams(self.count_width, self.stamp_width, 1 << self.window_bits, switch, self.clocks)
+
+
+@compiled
+def _count(params, state, seen, restart):
+    """Return (samples of the window so far, count as it began, counts of the last full one, whether to count)."""
+    if restart or not state.memory.running:
+        return 0, seen.count, 0, 0
+    if state.samples < params.window - 1:
+        return state.samples + 1, state.first, state.moved, state.counting
+    moved = wrap(seen.count - state.first, params.count_width)
+    counting = abs(moved) > params.switch or (state.counting and abs(moved) >= params.switch - 1)
+    return 0, seen.count, moved, int(counting)
+
+
+@compiled
+def _sample(params, state, seen, restart):
+    """Take a sample: return (state, the time of a cycle by which v is bound; 0 for none)."""
+    samples, first, moved, counting = _count(params, state, seen, restart)
+    memory, times = observe(params, state.memory, seen, restart)
+    # More than one cycle in a sample: the last one timed stands, until it is counted.
+    cycle = state.cycle if times.age and (not times.news or times.cycles > 1) else 0
+    if times.age and times.news and times.cycles == 1:
+        cycle = times.cycle
+    state = State(memory, cycle, samples, first, moved, counting)
+    return state, max(cycle, times.cycle_age) if cycle and times.cycle_age else 0
+
+
+@estimate.register(Params)
+@compiled
+def step(params, state, seen, restart):
+    state, clocks = _sample(params, state, seen, restart)
+    if state.counting:
+        far = state.moved << params.shift
+    else:
+        far = (divide(params.dividend, clocks, params.quotient_width) + 1) >> 1 if clocks else 0
+        far = -far if seen.down else far
+    velocity = saturate(far, -params.velocity_max, params.velocity_max)
+    return state, velocity, int(velocity != far)
+
+
+@estimate.register(FloatParams)
+@compiled
+def float_step(params, state, seen, restart):
+    """The same in float64, unsaturated."""
+    state, clocks = _sample(params, state, seen, restart)
+    if state.counting:
+        return state, state.moved / params.window, 0
+    speed = 4.0 * params.clocks / clocks if clocks else 0.0
+    return state, -speed if seen.down else speed, 0

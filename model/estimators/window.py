@@ -1,0 +1,168 @@
+"""The finite difference over a chosen window, in fixed point: no multiplier, no square root.
+
+    v = (f_k - f_{k-n}) / n                  counts a sample; f the count, n the window in samples
+
+What it guarantees. Let |f''| <= c counts/sample^2 and let the count be the position displaced by at most eps either
+way. Then v errs by at most
+
+    c n / 2 + 2 eps / n                      least, 2 sqrt(c eps), at n = 2 sqrt(eps / c)
+
+and no causal estimator can promise less than that least. **A count is the position rounded down**, in [0, 1) below it:
+a constant half count, of which no velocity comes, and eps = 1/2 count either way. So the designed window, `window_s`,
+is 2 sqrt(eps / C) = sqrt(2 q / C), rounded to n >= 1 whole samples. An encoder whose edges are displaced by h counts
+has eps = (1 + h) / 2, where h is the largest difference of two displacements.
+
+Past counts come from `history`, which says what happens before the first n samples are there, at a wrap of the count,
+and beyond the largest speed. Where it stores every M-th only, n is a multiple of M and v is held between: that adds
+at most c (M - 1) to the error, a fraction 1 / (n / M) of it or less, and n / M is a thousand or more.
+
+Formats, derived:
+
+- `window_length`, n / M, is a run-time word; `history.age_max` is its largest value, and 0 counts as 1. v is *divided*
+  by n (`divide`), so this one word changes the window: no reciprocal has to follow it.
+- `velocity` SQ(i, f): i that of `history.change`, which no average of changes can leave, so v cannot overflow.
+- f: v is rounded toward zero, so it errs by less than an LSB, in RMS 0.58 of it. Quantisation alone makes v err by
+  0.41 / n in RMS (two independent errors of a uniform count). An LSB of 2**-ROUNDING_BITS / n_max, with n_max the
+  longest window that the word can set, keeps rounding below 0.6 % of that for every n. A count of motion over the
+  window is never less than 2**ROUNDING_BITS LSB, so there is no dead zone; standing for n samples gives exactly 0.
+
+Ends. v never leaves its format. A step shows as its counts / n for n samples, then is gone; of one beyond twice the
+largest speed the part up to that. After the first sample or a restart in motion v is too small for n samples, in
+proportion to the motion seen.
+
+Source: elementary; the bound is Taylor's formula and the triangle inequality.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from ..arithmetic.fixed import SQ, UQ
+from ..arithmetic.signed_divide import divide
+from ..arithmetic.signed_divide import latency as divide_latency
+from ..compiled import compiled
+from ..words import Word, check_positive
+from . import history
+from .estimate import estimate
+from .history import change_over, take
+
+OUTPUTS = ("u",)
+EPS_COUNTS = 0.5
+"""Largest distance between a count and the position, half a count apart."""
+ROUNDING_BITS = 8
+"""An LSB of the velocity is less than 2**-ROUNDING_BITS counts over the longest window."""
+STEPS = 2
+"""Clocks of the sequence besides history and division: see `hardwall.hdl.estimators.window`."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """The window, s.
+
+    Raises:
+        ValueError: if it is not finite and more than 0.
+    """
+
+    window_s: float
+
+    def __post_init__(self):
+        check_positive(self)
+
+    @classmethod
+    def default(cls, axis) -> "Gains":
+        """Return the minimax window for |f''| <= C, the axis's bound: 2 sqrt(eps / C)."""
+        return cls(2 * math.sqrt(EPS_COUNTS * axis.count_m / axis.acceleration_max_m_per_s2))
+
+
+class Params(NamedTuple):
+    """`length` in stored positions; `fraction` bits of the quotient by it."""
+
+    history: history.Params
+    length: int
+    fraction: int
+
+
+class State(NamedTuple):
+    history: history.State
+    velocity: float
+
+
+class FloatParams(NamedTuple):
+    """`length` in stored positions, `samples` the same in samples."""
+
+    history: history.Params
+    length: int
+    samples: float
+
+
+class Design:
+    """Formats, run-time word and latency of the window for an axis: the module says how they follow.
+
+    Attributes:
+        history: the `history.Design`.
+        velocity: format of v.
+        fraction: fraction bits of the quotient of a change by `window_length`.
+        words: `window_length`.
+
+    Raises:
+        ValueError: if the window is too long for int64, with the accepted range.
+    """
+
+    inputs = ("count",)
+    flags = ("velocity_saturated",)
+
+    def __init__(self, axis, gains: Gains):
+        self.count_width = axis.count_width
+        self.history = history.Design(axis, gains.window_s)
+        self.velocity = SQ(self.history.change.i, axis.shrunk(self.history.fraction + ROUNDING_BITS))
+        self.fraction = axis.shrunk(self.history.age_bits + ROUNDING_BITS)
+        self.words = (
+            Word(
+                "window_length",
+                UQ(self.history.age_bits, 0),
+                self.history.every / axis.sample_hz,
+                "s",
+                self.history.longest,
+                "length of the window",
+            ),
+        )
+
+    @property
+    def latency(self) -> int:
+        """Clocks from strobe to valid."""
+        return STEPS + self.history.latency + divide_latency(self.velocity.width - 1)
+
+    def start(self, floating: bool = False) -> State:
+        """Return the state before the first sample, with a memory of its own."""
+        return State(self.history.start(), 0.0 if floating else 0)
+
+    def params(self, words: dict[str, int]) -> Params:
+        """Return the kernel's parameters for the given run-time words."""
+        return Params(self.history.params(), max(words["window_length"], 1), self.fraction)
+
+    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+        """Return the float64 algorithm's parameters: the same whole number of samples, `si` before the designed."""
+        (word,) = self.words
+        length = max(word.from_si(si["window_length"]) if "window_length" in si else word.reset, 1)
+        return FloatParams(self.history.params(floating=True), length, float(length * self.history.every))
+
+
+@estimate.register(Params)
+@compiled
+def step(params, state, seen, restart):
+    past, stored, limited = take(params.history, state.history, seen.count, restart)
+    velocity = state.velocity
+    if stored:
+        velocity = divide(change_over(params.history, past, params.length), params.length, params.fraction)
+    return State(past, velocity), velocity, int(limited)
+
+
+@estimate.register(FloatParams)
+@compiled
+def float_step(params, state, seen, restart):
+    """The same in float64, unlimited and unrounded."""
+    past, stored, _ = take(params.history, state.history, seen.count, restart)
+    velocity = state.velocity
+    if stored:
+        velocity = change_over(params.history, past, params.length) / params.samples
+    return State(past, velocity), velocity, 0

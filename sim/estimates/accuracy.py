@@ -1,0 +1,203 @@
+"""How accurate a velocity estimator is: known motions at any rate, on any backend, held against the exact derivative.
+
+Gains are the estimator's default ones for the signal's own bound C on the acceleration, unless others are given. The
+clock is the slowest multiple of the rate that is 50 MHz or more and leaves 50 clocks a sample, enough for every
+estimator's path; above 1 MHz it is faster than that of a real part, and so the stamps are finer. The row says which it
+was.
+"""
+
+import math
+from dataclasses import asdict, replace
+
+import numpy as np
+
+from ...model.compiled import compiled
+from ...model.estimators import registry
+from ...model.spec import AxisSpec
+from ..scene.load import load as load_scene
+from ..world.encoder import offsets
+from . import signals
+from .errors import Judge
+from .motions import velocity
+from .playback import velocities
+from .recording import load as load_recording
+from .replay import replay
+
+RATES_HZ = (1_000, 10_000_000)
+"""The slowest and the fastest rate that is measured."""
+CLOCK_HZ = 50_000_000
+CLOCKS = 50
+DELAY_MAX_S = 0.1
+COARSEN = 16
+"""A recording's counts are made so much coarser, and judged against the full ones."""
+
+
+def outputs(text: str) -> list[tuple[str, str]]:
+    """Return the (estimator, output) that `NAME` (every output of it) or `NAME:OUTPUT` stands for.
+
+    Raises:
+        ValueError: if there is none.
+    """
+    name, _, output = text.partition(":")
+    available = registry.load(name).OUTPUTS
+    if output:
+        registry.choose(name, output)
+    return [(name, each) for each in ([output] if output else available)]
+
+
+def axis_spec(
+    estimator: str,
+    sample_hz: int,
+    acceleration_max_m_per_s2: float,
+    gains: dict[str, float] | None = None,
+    bits_dropped: int = 0,
+) -> AxisSpec:
+    """Return the axis: the device of the scene `mhz` at another rate.
+
+    Raises:
+        ValueError: if it cannot be; the message names the field.
+    """
+    return replace(
+        load_scene("mhz").spec,
+        clock_hz=sample_hz * max(-(-CLOCK_HZ // sample_hz), CLOCKS),
+        sample_hz=sample_hz,
+        actuation_hz=sample_hz,
+        acceleration_max_m_per_s2=acceleration_max_m_per_s2,
+        estimator=estimator,
+        gains=gains and registry.load(estimator).Gains(**gains),
+        estimator_bits_dropped=bits_dropped,
+    )
+
+
+def spec_of(job: dict) -> AxisSpec:
+    """Return the axis that `measure` would measure for these arguments.
+
+    Raises:
+        ValueError: if there is no such axis; the message names the field.
+    """
+    bound = job.get("acceleration_max_m_per_s2") or signals.load(job["signal"]).acceleration_max_m_per_s2
+    name, rate = job["estimator"], job["sample_hz"]
+    try:
+        return axis_spec(name, rate, bound, job.get("gains"), job.get("bits_dropped", 0))
+    except ValueError as error:
+        raise ValueError(f"{name} at {rate} Hz with C {bound:g} m/s^2: {error}") from None
+
+
+@compiled
+def _velocities(motion, times, out):
+    """Fill `out` with the exact velocities at times, s."""
+    for i in range(len(out)):
+        out[i] = velocity(motion, times[i])
+
+
+def exact_velocity(motion, times: np.ndarray) -> np.ndarray:
+    """Return the exact velocities (m/s) of a motion at times (s)."""
+    out = np.empty(len(times))
+    _velocities(motion, times, out)
+    return out
+
+
+def measure(
+    estimator: str,
+    output: str,
+    signal: str,
+    sample_hz: int,
+    backend: str = "float",
+    phase_error_counts: float = 0.0,
+    acceleration_max_m_per_s2: float | None = None,
+    gains: dict[str, float] | None = None,
+    bits_dropped: int = 0,
+) -> dict:
+    """Return one row: what was measured, units in the keys; `judge` says what the figures are.
+
+    Args:
+        estimator, output: their names.
+        signal: as for `signals.load`.
+        sample_hz: rate of the estimator.
+        backend: `float`, `fixed` or `rtl`.
+        phase_error_counts: by how much the encoder's channel B is late.
+        acceleration_max_m_per_s2: C for the default gains; None for the signal's own.
+        gains: others, by the names of the estimator's `Gains`.
+        bits_dropped: fraction bits that the estimator's words are to lack.
+
+    Raises:
+        ValueError: if the axis cannot be; the message names the field.
+        RuntimeError: if the RTL could not be built.
+    """
+    known = signals.load(signal)
+    spec = spec_of(
+        {
+            "estimator": estimator,
+            "signal": signal,
+            "sample_hz": sample_hz,
+            "acceleration_max_m_per_s2": acceleration_max_m_per_s2,
+            "gains": gains,
+            "bits_dropped": bits_dropped,
+        }
+    )
+    begin = math.ceil(known.judged_from_s * sample_hz)
+    judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
+    for first, words, flags in velocities(known, spec, output, backend, offsets(phase_error_counts)):
+        raised |= flags
+        estimate = words[max(begin - first, 0) :]
+        since = first + len(words) - len(estimate)
+        times = np.arange(since, since + len(estimate)) / sample_hz
+        judge.add(since - begin, estimate, exact_velocity(known.motion, times))
+    return {
+        "estimator": estimator,
+        "output": output,
+        "backend": backend,
+        "sample_hz": sample_hz,
+        "signal": signal,
+        "rms_mm_s": judge.rms * 1e3,
+        "max_mm_s": judge.largest * 1e3,
+        "delay_s": judge.delay_s(
+            lambda times: exact_velocity(known.motion, times + begin / sample_hz), known.delay_max_s
+        ),
+        "chatter_mm_s": judge.chatter * 1e3,
+        "clock_hz": spec.clock_hz,
+        "velocity_bits": spec.design.estimator.velocity.width,
+        "encoder_phase_error_counts": phase_error_counts,
+        "acceleration_max_mm_s2": spec.acceleration_max_m_per_s2 * 1e3,
+        "gains": asdict(spec.design.gains),
+        "flags": spec.design.flag_names(raised),
+    }
+
+
+def measure_recording(
+    estimator: str, output: str, file: str, column: str, backend: str = "float", content: str = ""
+) -> dict:
+    """Return one row of a recording at its own rate, its counts `COARSEN` times coarser, in recorded counts.
+
+    What a count is in mm the file does not say, so the keys of figures end in `_counts_s`. Held against the zero-phase
+    derivative of the full counts; a recording has no clock stamps, so edges are spread evenly over each sample.
+
+    Args:
+        estimator, output, backend: as for `measure`.
+        file, column: of the recording.
+        content: a digest of the file, for a result that is kept to belong to.
+
+    Raises:
+        RecordingError, ReplayError: in one line, what cannot be and what is accepted.
+        RuntimeError: if the RTL could not be built.
+    """
+    result = replay(load_recording(file, column), estimator, output, backend, coarsen=COARSEN)
+    rate, begin = result.recording.rate_hz, result.judged_from
+    estimate, exact = result.velocity_counts_per_s[begin:], result.reference_counts_per_s[begin:]
+    judge = Judge(len(estimate), rate)
+    judge.add(0, estimate, exact)
+    times = np.arange(len(exact)) / rate
+    return {
+        "estimator": estimator,
+        "output": output,
+        "backend": backend,
+        "sample_hz": rate,
+        "signal": f"{file}:{column}",
+        "rms_counts_s": judge.rms,
+        "max_counts_s": judge.largest,
+        "delay_s": judge.delay_s(lambda wanted: np.interp(wanted, times, exact), DELAY_MAX_S),
+        "chatter_counts_s": judge.chatter,
+        "acceleration_max_counts_s2": result.acceleration_max_counts_per_s2,
+        "gains": result.gains,
+        "flags": result.flags,
+    }

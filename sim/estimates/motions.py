@@ -1,0 +1,261 @@
+"""Known motions of the handle: position and velocity at any time, and the edges that an encoder makes of them.
+
+What an estimator makes of the edges can then be held against the exact derivative. A motion is a tuple of numbers or
+arrays whose class has a `position` and a `velocity`; both compile into the loops that use them.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...model.compiled import by_type, compiled
+from ..world.encoder import Cell, Encoder, edge, level, locate
+
+BISECTIONS = 200
+"""Most halvings in search of a turn or a passage; stops where float64 does."""
+
+
+class DecayingSine(NamedTuple):
+    """amplitude exp(-decay t) sin(2 pi f t): the motion of the founding paper's figures."""
+
+    amplitude_m: float
+    decay_per_s: float
+    frequency_hz: float
+
+
+class Steady(NamedTuple):
+    """Constant speed, from an arbitrary place in a count."""
+
+    speed_m_per_s: float
+    start_m: float
+
+
+class Sweep(NamedTuple):
+    """A sine of constant amplitude whose frequency grows exponentially with time."""
+
+    amplitude_m: float
+    first_hz: float
+    growth_per_s: float  # of the frequency's logarithm
+
+
+class Stop(NamedTuple):
+    """Constant speed until it is braked at a constant deceleration, and rest."""
+
+    speed_m_per_s: float
+    brake_s: float
+    deceleration_m_per_s2: float
+
+
+class Track(NamedTuple):
+    """A recorded path: cubic between samples of position and velocity, constant speed before and after."""
+
+    start_s: float
+    step_s: float
+    position_m: np.ndarray
+    velocity_m_per_s: np.ndarray
+
+
+@by_type
+def position(motion, time_s):
+    """Return the position at a time, m."""
+
+
+@by_type
+def velocity(motion, time_s):
+    """Return the exact velocity at a time, m/s."""
+
+
+@position.register(DecayingSine)
+@compiled
+def _decaying_position(motion, time_s):
+    return (
+        motion.amplitude_m * math.exp(-motion.decay_per_s * time_s) * math.sin(math.tau * motion.frequency_hz * time_s)
+    )
+
+
+@velocity.register(DecayingSine)
+@compiled
+def _decaying_velocity(motion, time_s):
+    omega = math.tau * motion.frequency_hz
+    turning = omega * math.cos(omega * time_s) - motion.decay_per_s * math.sin(omega * time_s)
+    return motion.amplitude_m * math.exp(-motion.decay_per_s * time_s) * turning
+
+
+@position.register(Steady)
+@compiled
+def _steady_position(motion, time_s):
+    return motion.start_m + motion.speed_m_per_s * time_s
+
+
+@velocity.register(Steady)
+@compiled
+def _steady_velocity(motion, time_s):
+    return motion.speed_m_per_s
+
+
+@position.register(Sweep)
+@compiled
+def _sweep_position(motion, time_s):
+    cycles = motion.first_hz * math.expm1(motion.growth_per_s * time_s) / motion.growth_per_s
+    return motion.amplitude_m * math.sin(math.tau * cycles)
+
+
+@velocity.register(Sweep)
+@compiled
+def _sweep_velocity(motion, time_s):
+    cycles = motion.first_hz * math.expm1(motion.growth_per_s * time_s) / motion.growth_per_s
+    omega = math.tau * motion.first_hz * math.exp(motion.growth_per_s * time_s)
+    return motion.amplitude_m * omega * math.cos(math.tau * cycles)
+
+
+@position.register(Stop)
+@compiled
+def _stop_position(motion, time_s):
+    braked = min(max(time_s - motion.brake_s, 0.0), motion.speed_m_per_s / motion.deceleration_m_per_s2)
+    free = min(time_s, motion.brake_s)
+    return motion.speed_m_per_s * (free + braked) - motion.deceleration_m_per_s2 * braked**2 / 2
+
+
+@velocity.register(Stop)
+@compiled
+def _stop_velocity(motion, time_s):
+    braked = max(time_s - motion.brake_s, 0.0)
+    return max(motion.speed_m_per_s - motion.deceleration_m_per_s2 * braked, 0.0)
+
+
+@compiled
+def _piece(motion, time_s):
+    """Return the number of the piece of a track that a time is in, and the fraction of the piece that has passed."""
+    at = (time_s - motion.start_s) / motion.step_s
+    piece = min(max(int(at), 0), len(motion.position_m) - 2)
+    return piece, at - piece
+
+
+@position.register(Track)
+@compiled
+def _track_position(motion, time_s):
+    i, s = _piece(motion, time_s)
+    x, v, h = motion.position_m, motion.velocity_m_per_s, motion.step_s
+    if s < 0:
+        return x[0] + v[0] * s * h
+    if s > 1:
+        return x[-1] + v[-1] * (s - 1) * h
+    rise = x[i + 1] - x[i]
+    # Hermite's cubic, from its value and slope at both ends.
+    return x[i] + s * (h * v[i] + s * (3 * rise - h * (2 * v[i] + v[i + 1]) + s * (h * (v[i] + v[i + 1]) - 2 * rise)))
+
+
+@velocity.register(Track)
+@compiled
+def _track_velocity(motion, time_s):
+    i, s = _piece(motion, time_s)
+    x, v, h = motion.position_m, motion.velocity_m_per_s, motion.step_s
+    if s < 0:
+        return v[0]
+    if s > 1:
+        return v[-1]
+    rise = (x[i + 1] - x[i]) / h
+    return v[i] + s * (2 * (3 * rise - 2 * v[i] - v[i + 1]) + s * 3 * (v[i] + v[i + 1] - 2 * rise))
+
+
+@compiled
+def _turn(motion, begin_s, end_s):
+    """Return when, between two times with velocities of different signs, the motion turns."""
+    upwards = velocity(motion, begin_s) > 0
+    for _ in range(BISECTIONS):
+        middle = (begin_s + end_s) / 2
+        if not begin_s < middle < end_s:
+            break
+        if (velocity(motion, middle) > 0) == upwards:
+            begin_s = middle
+        else:
+            end_s = middle
+    return end_s
+
+
+@compiled
+def _passage(motion, begin_s, end_s, at_m, upwards):
+    """Return when the motion, in one direction from `begin_s` to `end_s`, passes a place: the first float64 beyond."""
+    for _ in range(BISECTIONS):
+        # A secant's guess, moved into the middle half: a few halvings for a smooth path, and never many.
+        here, there = position(motion, begin_s), position(motion, end_s)
+        guess = begin_s + (end_s - begin_s) * min(max((at_m - here) / (there - here), 0.02), 0.98)
+        if not begin_s < guess < end_s:
+            break
+        beyond = position(motion, guess) >= at_m if upwards else position(motion, guess) < at_m
+        if beyond:
+            end_s = guess
+        else:
+            begin_s = guess
+    return end_s
+
+
+@compiled
+def _edges(motion, encoder, step_s, steps, room):
+    """Return (times s, cells entered, how many): the passages over `steps` steps; one more than `room`: too many."""
+    times, cells = np.empty(room), np.empty(room, np.int64)
+    cell, found = locate(encoder, position(motion, 0.0)), 0
+    for k in range(steps):
+        begin_s, stop_s = k * step_s, (k + 1) * step_s
+        while begin_s < stop_s:
+            end_s = stop_s
+            if velocity(motion, begin_s) * velocity(motion, end_s) < 0:
+                end_s = _turn(motion, begin_s, end_s)
+            target = position(motion, end_s)
+            since_s = begin_s
+            while not cell.lower_m <= target < cell.upper_m:
+                upwards = target >= cell.upper_m
+                if found == room:
+                    return times, cells, room + 1
+                since_s = _passage(motion, since_s, end_s, cell.upper_m if upwards else cell.lower_m, upwards)
+                number = cell.number + (1 if upwards else -1)
+                cell = Cell(number, edge(encoder, number), edge(encoder, number + 1))
+                times[found], cells[found] = since_s, number
+                found += 1
+            begin_s = end_s
+    return times, cells, found
+
+
+class Edges(NamedTuple):
+    """The edges of a motion, on a clock.
+
+    Attributes:
+        clocks: int64, the clock at which a register at the pins first holds the new level.
+        levels: int64, the pins from then on, a | b << 1.
+        start_level: the pins before the first.
+        start_cell: the count at time 0, which a decoder calls 0.
+    """
+
+    clocks: np.ndarray
+    levels: np.ndarray
+    start_level: int
+    start_cell: int
+
+
+def edges(motion, encoder: Encoder, seconds: float, step_s: float, offset_clocks: int) -> Edges:
+    """Return the edges of a motion from time 0 on, in their order.
+
+    An edge that is passed at time t is stamped ceil(t clock_hz) + offset_clocks moving up, floor(t clock_hz) + 1 +
+    offset_clocks moving down, as everywhere (`sim.world.encoder`).
+
+    Args:
+        motion: one of this module's.
+        encoder: the scale and its clock.
+        seconds: how long; up to the next whole step.
+        step_s: so short that the motion turns at most once in it.
+        offset_clocks: added to every stamp.
+    """
+    room = 1 << 16
+    while True:
+        times, cells, found = _edges(motion, encoder, step_s, math.ceil(seconds / step_s), room)
+        if found <= room:
+            break
+        room *= 4
+    times, cells = times[:found], cells[:found]
+    start = locate(encoder, position(motion, 0.0)).number
+    upwards = np.diff(cells, prepend=start) > 0
+    at = times * encoder.clock_hz
+    clocks = np.where(upwards, np.ceil(at), np.floor(at) + 1).astype(np.int64) + offset_clocks
+    quarter = (cells + 1) & 3
+    return Edges(clocks, quarter ^ (quarter >> 1), int(level(start)), int(start))

@@ -1,0 +1,186 @@
+"""The Verilated axis as a shared library: generated and built once a spec, cached by content, and opened for a run."""
+
+import ctypes
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from amaranth.hdl import Shape
+from amaranth.lib.wiring import In
+
+from ...hdl.axis import Axis
+from ...hdl.export import to_verilog
+from ...model.compiled import build_dir
+from ...model.spec import AxisSpec
+from .verilated import Rtl, RtlState
+from .verilator import LINT_OPTIONS, environment
+
+SHIM = Path(__file__).with_name("library.cpp")
+OPTIONS = [
+    *LINT_OPTIONS,
+    *("--prefix", "Vaxis", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--noassert"),
+    # The clocks of one call are iterations of one evaluation.
+    *("--converge-limit", str(1 << 30)),
+]
+
+
+# A closed loop runs long enough to be worth a compiler's best; a recording does not.
+FAST_TO_RUN = ["-CFLAGS", "-O3", "-MAKEFLAGS", "OPT_FAST=-O3"]
+FAST_TO_BUILD = ["-CFLAGS", "-O1", "-MAKEFLAGS", "OPT_FAST=-O1"]
+
+
+class BuildError(RuntimeError):
+    """Verilator or the C++ compiler failed; the message names the log."""
+
+
+def _ports(spec: AxisSpec) -> str:
+    """Return the header that tells the shim this axis's ports."""
+    words = " ".join(f"WORD({index}, {word.name})" for index, word in enumerate(spec.design.words))
+    return (
+        f"#define DRIVE_WIDTH {spec.force.width}\n"
+        f"#define VELOCITY_WIDTH {spec.design.estimator.velocity.width}\n"
+        f"#define AXIS_WORDS {words}\n"
+    )
+
+
+def _harness(component: Axis) -> str:
+    """Return Verilog that gives the axis any number of clocks for one change of `go`.
+
+    Verilator evaluates what depends on the inputs anew at every call, and with a synchronous reset among them that is
+    all of the next-state logic. Clocked from within, the axis pays for it once a call, not twice a clock.
+    """
+    members = component.signature.members
+    ports = [("input", 1, "rst")]
+    ports += [
+        ("input" if member.flow == In else "output", Shape.cast(member.shape).width, name)
+        for name, member in members.items()
+    ]
+    declared = "".join(f",\n  {way} [{width - 1}:0] {name}" for way, width, name in ports)
+    connected = "".join(f", .{name}({name})" for _, _, name in ports)
+    return f"""module harness(input go, input [31:0] clocks{declared});
+  reg clk = 0, gone = 0;
+  reg [31:0] left = 0;
+  axis axis(.clk(clk){connected});
+  always @(go or posedge clk or negedge clk)
+    if (clk) clk <= 0;
+    else if (go != gone) begin
+      gone <= go;
+      left <= clocks - 1;
+      clk <= 1;
+    end else if (left != 0) begin
+      left <= left - 1;
+      clk <= 1;
+    end
+endmodule
+"""
+
+
+def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
+    """Return the shared library of the axis, building it if it is not there.
+
+    It is found by the content of the Verilog, the shim and the tools' versions. It is built in a folder of its own and
+    moved into place when whole, so that an interrupted build, or two at once, leave nothing broken behind.
+
+    Args:
+        spec: the axis.
+        traced: with the code that records waveforms; slower.
+        short: for a run so short that building is most of it.
+
+    Raises:
+        BuildError: if the build fails.
+    """
+    component = Axis(spec)
+    files = {"axis.v": to_verilog(component, "axis"), "axis_ports.h": _ports(spec), "library.cpp": SHIM.read_text()}
+    if traced:
+        options = ["--trace-vcd", "--top-module", "axis"]
+    else:
+        files["harness.v"] = _harness(component)
+        options = ["--top-module", "harness"]
+    options = [*OPTIONS, *(FAST_TO_BUILD if short else FAST_TO_RUN), *options]
+    content = "\0".join([*files.values(), version("verilator"), *options])
+    folder = build_dir() / "rtl" / hashlib.sha256(content.encode()).hexdigest()[:16]
+    library = folder / "libaxis.so"
+    if library.exists():
+        return library
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as scratch:
+        work = Path(scratch)
+        for name, text in files.items():
+            (work / name).write_text(text)
+        command = ["verilator", "--cc", "--build", "-j", str(os.cpu_count() or 1), *options]
+        command += ["-CFLAGS", f"-fPIC -I{work}", "--lib-create", "axis", "--Mdir", str(work / "obj")]
+        command += [name for name in files if not name.endswith(".h")]
+        done = subprocess.run(command, cwd=work, env=environment(), capture_output=True, text=True, check=False)
+        if done.returncode:
+            log = folder.parent / "failed.log"
+            log.write_text(" ".join(command) + "\n" + done.stdout + done.stderr)
+            raise BuildError(f"the Verilated library could not be built: see {log}")
+        ready = work / "ready"
+        ready.mkdir()
+        for name in files:
+            shutil.move(work / name, ready / name)
+        shutil.move(work / "obj" / "libaxis.so", ready / library.name)
+        try:
+            ready.rename(folder)
+        except OSError:
+            # Another process was first, with the same content.
+            if not library.exists():
+                raise
+    return library
+
+
+@dataclass
+class Hardware:
+    """A reset axis, simulated clock by clock; a context manager that frees it.
+
+    Args:
+        spec: the axis.
+        words: run-time parameters, by port name.
+        level: of the encoder's pins at reset, a | b << 1.
+        traced: build it such that `trace` works.
+        short: build it quickly rather than for speed.
+    """
+
+    spec: AxisSpec
+    words: dict[str, int]
+    level: int = 0
+    traced: bool = False
+    short: bool = False
+
+    def __enter__(self) -> "Hardware":
+        self._library = ctypes.CDLL(str(build(self.spec, self.traced, self.short)))
+        self._library.axis_open.restype = ctypes.c_void_p
+        self._library.axis_open.argtypes = [ctypes.c_int64, ctypes.c_void_p]
+        words = np.array([self.words[word.name] for word in self.spec.design.words], np.int64)
+        self._context = self._library.axis_open(self.level, words.ctypes.data)
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._library.axis_close(ctypes.c_void_p(self._context))
+
+    def trace(self, path: Path) -> None:
+        """Record a VCD waveform of every signal from here until `end_trace`."""
+        self._library.axis_trace(
+            ctypes.c_void_p(self._context), str(path).encode(), ctypes.c_double(self.spec.clock_hz)
+        )
+
+    def end_trace(self) -> None:
+        """Close the waveform."""
+        self._library.axis_end_trace(ctypes.c_void_p(self._context))
+
+    @property
+    def controller(self) -> Rtl:
+        """The addresses by which the compiled loop calls it."""
+
+        def address(name: str) -> int:
+            return ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value
+
+        return Rtl(address("axis_advance"), address("axis_read"), self._context)
+
+    start = RtlState(0, 0, 0)

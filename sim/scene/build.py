@@ -1,0 +1,102 @@
+"""What a scene says of the world, as the loop takes it: parts that it lacks are not there."""
+
+from ..loop import loop
+from ..world import device
+from ..world.converter import AS_IT_IS, Converter, Pulse, converted, width_of
+from ..world.encoder import Encoder, locate
+from ..world.euler import Stepped, stepped
+from ..world.rigid import Coulomb, Handle, Motion, Rigid, span
+from ..world.taylor import State
+from .schema import Scene
+
+
+def device_of(scene: Scene) -> device.Device | None:
+    """Return the scene's device; None where it is a rigid handle that the drive's force acts on, advanced exactly."""
+    amplifier, motor, cable, hand = scene.amplifier, scene.motor, scene.transmission, scene.hand
+    pulse = _pulse(scene)
+    bandwidth_hz = amplifier and amplifier.bandwidth_hz
+    if not (bandwidth_hz or motor or cable or hand or pulse.period or scene.solver):
+        return None
+    parts = scene.handle.model_dump() | {"bandwidth_hz": bandwidth_hz, "pulse": pulse}
+    parts["coulomb_n"] = scene.handle.coulomb_n or None
+    if motor:
+        parts["motor"] = device.Motor(**motor.model_dump())
+        if amplifier and amplifier.current_limit_a:
+            parts["force_limit_n"] = amplifier.current_limit_a * parts["motor"].newtons_per_ampere
+    if cable:
+        parts["transmission"] = device.Transmission(**cable.model_dump(exclude={"encoder_at"}))
+        parts["encoder_at_motor"] = cable.encoder_at == "motor"
+    if hand:
+        parts["hand"] = device.Hand(**hand.model_dump())
+    return device.Device(**parts)
+
+
+def _pulse(scene: Scene) -> Pulse:
+    output = scene.output
+    if output is None or output.pwm_carrier_hz is None:
+        return AS_IT_IS
+    period = scene.spec.clock_hz // output.pwm_carrier_hz
+    return Pulse(output.full_scale_n, period, period // output.pwm_steps)
+
+
+def _converter(scene: Scene) -> Converter | None:
+    output = scene.output
+    if output is None or output.dac_bits is None:
+        return None
+    codes = 1 << output.dac_bits
+    return Converter(2 * output.full_scale_n / codes, -codes // 2, codes // 2 - 1)
+
+
+def output_step_n(scene: Scene) -> float:
+    """Return by how much a command must change to be sure to be felt; 0 where it leaves as it is."""
+    output = scene.output
+    if output is None:
+        return 0.0
+    return 2 * output.full_scale_n / (output.pwm_steps or 1 << output.dac_bits)
+
+
+def work_of(world: loop.World) -> int:
+    """Return how many steps of the solver a sample takes, about."""
+    plant = world.plant
+    if isinstance(plant, Rigid):
+        return 1
+    step_s = plant.step_s if isinstance(plant, Stepped) else plant.leg_s
+    pulses = world.clocks_per_sample // plant.pulse.period if plant.pulse.period else 0
+    return 1 + int(world.clocks_per_sample / world.encoder.clock_hz / step_s) + 2 * pulses
+
+
+def world_of(scene: Scene) -> loop.World:
+    """Return the loop's constants for a scene."""
+    spec, latency = scene.spec, scene.spec.design.latency_to_drive
+    before_s, after_s = (spec.clocks_per_sample - latency) / spec.clock_hz, latency / spec.clock_hz
+    parts = device_of(scene)
+    if parts is None:
+        handle = Handle(scene.handle.mass_kg, scene.handle.viscous_n_s_per_m)
+        coulomb = Coulomb(scene.handle.coulomb_n) if scene.handle.coulomb_n else None
+        plant, before, after = Rigid(handle, coulomb), span(handle, before_s), span(handle, after_s)
+    else:
+        plant, before, after = device.train(parts, max(before_s, after_s)), before_s, after_s
+        if scene.solver:
+            plant = stepped(plant, parts.transmission is not None, scene.solver.step_s)
+    return loop.World(
+        plant=plant,
+        encoder=Encoder(spec.count_m, float(spec.clock_hz), scene.encoder.offsets),
+        converter=_converter(scene),
+        push_n=scene.protocol.push_n,
+        force_lsb_n=spec.force_resolution_n,
+        clocks_per_sample=spec.clocks_per_sample,
+        latency=latency,
+        before=before,
+        after=after,
+    )
+
+
+def start_of(scene: Scene, world: loop.World) -> loop.Progress:
+    """Return where a run begins: at rest, under the push alone."""
+    position_m, push_n = scene.protocol.start_m, converted(world.converter, world.push_n)
+    motion = Motion(position_m, 0.0)
+    if not isinstance(world.plant, Rigid):
+        pulse = world.plant.pulse
+        width = width_of(pulse, push_n) if pulse.period else 0
+        motion = State(position_m, 0.0, (0.0, 0.0, 0.0), width)
+    return loop.Progress(0, motion, locate(world.encoder, position_m), push_n, 0)

@@ -1,0 +1,229 @@
+"""Scenes: TOML files that say what is modelled. A section or key that is absent is not modelled.
+
+Units are in the keys. Every error is one line that names the file, the key and what is accepted.
+"""
+
+from functools import cached_property
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+from ...model.estimators import registry
+from ...model.spec import AxisSpec
+from ..world.encoder import offsets
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Rate = Annotated[int, Field(gt=0, le=10**9)]
+
+
+class SceneError(ValueError):
+    """A scene that cannot be: one line, naming the file, the key and what is accepted."""
+
+
+class Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class HandleSection(Section):
+    """The moving mass; without `coulomb_n` it has no dry friction."""
+
+    mass_kg: Positive
+    viscous_n_s_per_m: NotNegative = 0.0
+    coulomb_n: NotNegative | None = None
+
+
+class EncoderSection(Section):
+    """The scale; without errors its edges are where they should be."""
+
+    count_m: Positive
+    phase_error_counts: Finite | Annotated[list[Finite], Field(min_length=4, max_length=4)] = 0.0
+    duty_error_counts: Finite = 0.0
+
+    @cached_property
+    def offsets(self) -> tuple[float, float, float, float]:
+        """Where the edges of the four kinds are, counts from their ideal places."""
+        return offsets(self.phase_error_counts, self.duty_error_counts)
+
+
+def _gains_section(name: str) -> type[Section]:
+    """Return a section with the fields of an estimator's gains."""
+    fields = dict.fromkeys(registry.load(name).Gains.__annotations__, (Positive, ...))
+    return create_model(f"{name.title()}Section", __base__=Section, **fields)
+
+
+GainsSection = create_model(
+    "GainsSection",
+    __base__=Section,
+    **{name: (_gains_section(name) | None, None) for name in registry.ESTIMATORS},
+)
+
+
+class ControllerSection(Section):
+    """The axis: see `hardwall.model.spec.AxisSpec`. Gains go by estimator, `[controller.gains.levant]`."""
+
+    clock_hz: Rate
+    sample_hz: Rate
+    actuation_hz: Rate
+    travel_m: Positive
+    speed_max_m_per_s: Positive
+    acceleration_max_m_per_s2: Positive
+    force_max_n: Positive
+    force_resolution_n: Positive
+    stiffness_max_n_per_m: Positive
+    damping_max_n_s_per_m: Positive
+    estimator: Literal[tuple(registry.ESTIMATORS)] = "levant"
+    output: str | None = None
+    glitch_clocks: Annotated[int, Field(ge=0, le=15)] = 0
+    slew_limit_n_per_s: Positive | None = None
+    gains: GainsSection = GainsSection()
+
+
+class WallSection(Section):
+    """The wall, its surface at position 0; without `forbid_pull` its damper may hold the leaving handle back."""
+
+    stiffness_n_per_m: NotNegative
+    damping_n_s_per_m: NotNegative
+    forbid_pull: bool = False
+
+
+class AmplifierSection(Section):
+    """Of what it lacks it has none: no delay, no lag, no limit. A current's limit needs a motor and a bandwidth."""
+
+    delay_s: NotNegative = 0.0
+    bandwidth_hz: Positive | None = None
+    current_limit_a: Positive | None = None
+
+
+class MotorSection(Section):
+    """A brushed DC motor. With an amplifier's bandwidth its current follows the force; else its voltage does."""
+
+    resistance_ohm: Positive
+    inductance_h: Positive
+    torque_constant_n_m_per_a: Positive
+    voltage_limit_v: Positive
+    pulley_radius_m: Positive
+
+
+class TransmissionSection(Section):
+    """A cable between motor and handle; the motor's mass is that of rotor and pulley as felt at the handle."""
+
+    stiffness_n_per_m: Positive
+    damping_n_s_per_m: NotNegative = 0.0
+    motor_mass_kg: Positive
+    motor_viscous_n_s_per_m: NotNegative = 0.0
+    encoder_at: Literal["handle", "motor"] = "handle"
+
+
+class HandSection(Section):
+    """It moves with the handle and holds it, with a spring to `rest_m` and a damper."""
+
+    mass_kg: NotNegative
+    damping_n_s_per_m: NotNegative
+    stiffness_n_per_m: NotNegative
+    rest_m: Finite = 0.0
+
+
+class OutputSection(Section):
+    """Steps of a converter (`dac_bits`), or pulses (`pwm_carrier_hz`, `pwm_steps` of a period); full scale is +-."""
+
+    full_scale_n: Positive
+    dac_bits: Annotated[int, Field(ge=2, le=32)] | None = None
+    pwm_carrier_hz: Rate | None = None
+    pwm_steps: Annotated[int, Field(ge=2)] | None = None
+
+
+class SolverSection(Section):
+    """The device in steps of semi-implicit Euler, no longer than `step_s`, as most simulations have it; without this
+    section it is advanced exactly from event to event."""
+
+    step_s: Positive
+
+
+class ProtocolSection(Section):
+    """A hit: from rest at `start_m`, pushed towards the wall; the mean over `mean_s` before `settle_s` is held against
+    the `measure_s` after it. A wall whose RMS is under the threshold is stable."""
+
+    start_m: Annotated[float, Field(lt=0, allow_inf_nan=False)]
+    push_n: Positive
+    settle_s: Positive
+    mean_s: Positive
+    measure_s: Positive
+    threshold_mm: Annotated[float, Field(gt=0, le=1e3, allow_inf_nan=False)]
+
+
+class ZWidthSection(Section):
+    """Steps of a map of stable walls, and how many below its edge are hit too: see `hardwall.sim.walls.boundary`."""
+
+    stiffness_step_n_per_m: Positive
+    stiffness_to_n_per_m: Positive
+    damping_from_n_s_per_m: NotNegative
+    damping_to_n_s_per_m: NotNegative
+    damping_step_n_s_per_m: Positive
+    walls_below: Annotated[int, Field(ge=0, le=1000)] = 0
+
+
+class Scene(Section):
+    """One scene; `load` reads it, and checks what the sections cannot check alone."""
+
+    name: str
+    handle: HandleSection
+    encoder: EncoderSection
+    controller: ControllerSection
+    wall: WallSection
+    amplifier: AmplifierSection | None = None
+    motor: MotorSection | None = None
+    transmission: TransmissionSection | None = None
+    hand: HandSection | None = None
+    output: OutputSection | None = None
+    solver: SolverSection | None = None
+    protocol: ProtocolSection
+    zwidth: ZWidthSection | None = None
+
+    @cached_property
+    def spec(self) -> AxisSpec:
+        """The axis."""
+        fields = self.controller.model_dump(
+            include=set(AxisSpec.__annotations__) - {"count_m", "gains"}, exclude_unset=False
+        )
+        gains = getattr(self.controller.gains, self.controller.estimator)
+        if gains is not None:
+            gains = registry.load(self.controller.estimator).Gains(**gains.model_dump())
+        return AxisSpec(count_m=self.encoder.count_m, gains=gains, **fields)
+
+    @property
+    def estimator_output(self) -> str:
+        """The estimator's output that the wall uses."""
+        return self.controller.output or self.spec.model.OUTPUTS[0]
+
+    @cached_property
+    def parameters(self) -> dict[str, float]:
+        """Run-time parameters in SI units, by word; the count is 0 at the start, so the wall is so far from there."""
+        si = {
+            "encoder_glitch_clocks": self.controller.glitch_clocks,
+            "wall_stiffness": self.wall.stiffness_n_per_m,
+            "wall_damping": self.wall.damping_n_s_per_m,
+            "wall_position": -self.protocol.start_m,
+            "wall_forbid_pull": self.wall.forbid_pull,
+        }
+        si |= registry.choose(self.controller.estimator, self.estimator_output)
+        if self.controller.slew_limit_n_per_s is not None:
+            si["output_slew_limit"] = self.controller.slew_limit_n_per_s
+        return si
+
+    @cached_property
+    def words(self) -> dict[str, int]:
+        """The same as the hardware takes them."""
+        return self.spec.design.encode(**self.parameters)
+
+    @property
+    def delay_samples(self) -> int:
+        """Samples by which the amplifier is late."""
+        return 0 if self.amplifier is None else round(self.amplifier.delay_s * self.controller.sample_hz)
+
+    @property
+    def samples(self) -> int:
+        """Samples of the protocol: those to settle, and those to measure."""
+        rate = self.controller.sample_hz
+        return round(self.protocol.settle_s * rate) + round(self.protocol.measure_s * rate)

@@ -1,0 +1,57 @@
+"""The table to choose an estimator by: its error in each situation, with one set of gains, beside what it costs.
+
+The gains are those for the bound C on the acceleration that the impact asks for: a device has to live with its gains in
+every situation. Errors are RMS, mm/s.
+"""
+
+from ...model.estimators import registry
+from ..estimates import signals
+
+PHASE_ERROR_COUNTS = 0.25
+SITUATIONS = {
+    "slow": {"signal": "steady:1.037"},
+    "fast": {"signal": "steady:301.7"},
+    "moving": {"signal": "paper"},
+    "impact": {"signal": "hit"},
+    "standstill": {"signal": "flicker"},
+    "bad encoder": {"signal": "paper", "phase_error_counts": PHASE_ERROR_COUNTS},
+}
+"""What a handle does: about 1 and 300 mm/s (no round speeds, whose counts lock to the samples), the paper's swing, a
+wall, a count that flickers, the swing seen badly."""
+
+
+def jobs(pairs: list[tuple[str, str]], sample_hz: int, backend: str) -> list[dict]:
+    """Return the arguments of `accuracy.measure`, situation by situation for each (estimator, output)."""
+    bound = signals.load("hit").acceleration_max_m_per_s2
+    common = {"sample_hz": sample_hz, "backend": backend, "acceleration_max_m_per_s2": bound}
+    return [
+        {"estimator": estimator, "output": output, **common, **situation}
+        for estimator, output in pairs
+        for situation in SITUATIONS.values()
+    ]
+
+
+def table(pairs: list[tuple[str, str]], measured: list[dict], costs: list[dict]) -> list[dict]:
+    """Return a row for each (estimator, output): its errors by situation, its delay and its cost.
+
+    Args:
+        pairs: estimators and outputs.
+        measured: what `accuracy.measure` gave for `jobs`, in that order.
+        costs: what `costs.cost` gave, one for each estimator.
+    """
+    by_name = {row["estimator"]: row for row in costs}
+    rows, each = [], len(SITUATIONS)
+    for index, (estimator, output) in enumerate(pairs):
+        own = dict(zip(SITUATIONS, measured[index * each : (index + 1) * each], strict=True))
+        cost = by_name[estimator]
+        rows.append(
+            {
+                "estimator": estimator,
+                "output": output if len(registry.load(estimator).OUTPUTS) > 1 else "",
+                "rms_mm_s": {name: row["rms_mm_s"] for name, row in own.items()},
+                "impact_delay_s": own["impact"]["delay_s"],
+                **{name: cost[name] for name in ("device", "lut4", "ff", "dsp", "bram", "latency_clocks")},
+                "max_sample_hz": cost["board"]["max_sample_hz"],
+            }
+        )
+    return rows

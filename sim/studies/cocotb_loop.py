@@ -1,0 +1,97 @@
+"""The closed loop with the RTL under cocotb: what the compiled loop is measured against, and must agree with.
+
+The plant is the same compiled code, called sample by sample; the RTL is clocked by cocotb's own clock in C++ and
+waited for with timers, one for every change of a pin and two for a sample, which is the least Python that cocotb can
+do with. Runs inside the simulator; `sim.studies.bench` starts it.
+"""
+
+import hashlib
+import json
+import os
+import time
+from pathlib import Path
+
+import cocotb
+import numpy as np
+from cocotb.clock import Clock
+from cocotb.triggers import ClockCycles, ReadOnly, Timer
+
+from ..loop import loop
+from ..scene.build import start_of, world_of
+from ..scene.load import load
+from ..world.advance import advance
+from ..world.converter import converted
+from ..world.encoder import level
+
+PERIOD_NS = 10
+"""Of the simulated clock; only its number of cycles matters."""
+
+
+@cocotb.test()
+async def closed_loop(dut):
+    """Close the loop for some samples; write the force words' digest and the seconds taken."""
+    order = json.loads(os.environ["HARDWALL_LOOP"])
+    scene = load(order["scene"])
+    world, edges = world_of(scene), tuple(np.zeros(loop.EDGE_CAPACITY, np.int64) for _ in range(2))
+    _, motion, cell, force_n, n_edges = start_of(scene, world)
+    await _open(dut, scene, int(level(cell.number)))
+    # `_open` has run clock 0. Half a period on, a pin is set between two rising edges: in clock n, for edge n to see.
+    await Timer(PERIOD_NS // 2, "ns")
+
+    now = 1
+    late = [0] * scene.delay_samples
+    words: list[int] = []
+    began = time.perf_counter()
+    for k in range(order["samples"]):
+        strobe = (k + 1) * world.clocks_per_sample - 1
+        until = strobe + world.latency
+        motion, cell, n_edges = advance(
+            world.plant, world.encoder, motion, cell, force_n, world.after,
+            strobe, world.latency, *edges, n_edges,
+        )  # fmt: skip
+        taken = 0
+        while taken < n_edges and edges[0][taken] < until:
+            if edges[0][taken] > now:
+                await Timer(int(edges[0][taken] - now) * PERIOD_NS, "ns")
+                now = int(edges[0][taken])
+            dut.encoder_a.value = int(edges[1][taken]) & 1
+            dut.encoder_b.value = int(edges[1][taken]) >> 1
+            taken += 1
+        for array in edges:
+            array[: n_edges - taken] = array[taken:n_edges]
+        n_edges -= taken
+        if until > now:
+            await Timer((until - now) * PERIOD_NS, "ns")
+            now = until
+        drive = dut.drive.value.to_signed()
+        words.append(drive)
+        late.append(drive)
+        force_n = converted(world.converter, world.push_n + world.force_lsb_n * late.pop(0))
+        if world.clocks_per_sample > world.latency:
+            motion, cell, n_edges = advance(
+                world.plant, world.encoder, motion, cell, force_n, world.before,
+                until, world.clocks_per_sample - world.latency, *edges, n_edges,
+            )  # fmt: skip
+    seconds = time.perf_counter() - began
+    actuations = np.array(words[:: scene.spec.samples_per_actuation], "<i4")
+    report = {"seconds": seconds, "force_sha256": hashlib.sha256(actuations.tobytes()).hexdigest()}
+    Path(order["report"]).write_text(json.dumps(report))
+
+
+async def _open(dut, scene, start_level: int) -> None:
+    """Reset the axis with the pins at `start_level`, commit the scene's words, and run clock 0."""
+    dut.rst.value = 1
+    for name in ("encoder_z", "clear_flags", "preload", "preload_count", "index_arm", "commit"):
+        getattr(dut, name).value = 0
+    dut.encoder_a.value, dut.encoder_b.value = start_level & 1, start_level >> 1
+    dut.drive_enable.value = 1
+    for word in scene.spec.design.words:
+        getattr(dut, word.name).value = scene.words[word.name] & ((1 << word.format.width) - 1)
+    Clock(dut.clk, PERIOD_NS, "ns").start()
+    await ClockCycles(dut.clk, 2)
+    await ReadOnly()
+    await Timer(PERIOD_NS // 2, "ns")
+    dut.rst.value = 0
+    dut.commit.value = 1
+    await ClockCycles(dut.clk, 1)
+    dut.commit.value = 0

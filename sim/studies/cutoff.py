@@ -1,0 +1,169 @@
+"""The best cutoff of the filter behind a finite difference: area of the stable region against it, device by device.
+
+First a sweep, the founding paper's cutoffs among it; its maps are independent, so they run side by side. Then bounded
+minimisation (SciPy: golden section and parabolas) of minus the area over the logarithm of the cutoff, between the
+neighbours of the sweep's best. It asks for no derivative, which a staircase has not: every area is a sum of steps of
+the map. For the same reason it ends early: nearer to each other than `TOLERANCE`, cutoffs differ by chance. The best is
+the best of all maps, those of the sweep too.
+
+The grid is wider than the scene's, and coarser: see `study`.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ...model.estimators.butterworth import CUTOFF_MAX
+from ..scene.load import parse, read
+from ..scene.schema import Scene
+from ..walls.case import Case, accepted, room
+from ..walls.zwidth import Map, Mapping
+
+SCENES = ("seed-2011", "desktop-arm", "maglev")
+"""The paper's device, and two that differ from it in mass, friction, count and rates."""
+PAPERS_HZ = (30.0, 100.0, 500.0, 1000.0)
+SWEEP_HZ = (30, 40, 50, 70, 100, 140, 200, 300, 400, 500, 700, 1000, 1400, 2000, 2800, 4000)
+COARSER = 2.0
+"""Steps of the maps, of the scene's."""
+TOLERANCE = 0.03
+EVALUATIONS = 10
+LEVEL = 0.05
+"""Cutoffs whose areas are less by no more than this part of the best are as good."""
+
+
+@dataclass(frozen=True)
+class Device:
+    """The areas of one scene.
+
+    Attributes:
+        scene: as it was mapped.
+        maps: by cutoff in Hz, ascending; of the sweep and of the search.
+        unfiltered: of the finite difference alone.
+    """
+
+    scene: Scene
+    maps: dict[float, Map]
+    unfiltered: Map
+
+    @cached_property
+    def best_hz(self) -> float:
+        """The cutoff with the largest region; the lowest of several."""
+        return max(self.maps, key=lambda cutoff_hz: self.maps[cutoff_hz].area)
+
+    @property
+    def best(self) -> Map:
+        """The largest region behind a filter."""
+        return self.maps[self.best_hz]
+
+    @cached_property
+    def level_hz(self) -> tuple[float, float]:
+        """From where to where, around the best cutoff, the others are as good; the ends where it does not end before.
+
+        Between two maps the area is taken to be straight over the logarithm of the cutoff.
+        """
+        cutoffs, areas = list(self.maps), [each.area for each in self.maps.values()]
+        enough = (1 - LEVEL) * self.best.area
+
+        def end(direction: int) -> float:
+            inside = cutoffs.index(self.best_hz)
+            while 0 <= (beyond := inside + direction) < len(areas) and areas[beyond] >= enough:
+                inside = beyond
+            if not 0 <= beyond < len(areas):
+                return cutoffs[inside]
+            logs = np.log([cutoffs[beyond], cutoffs[inside]])
+            return float(np.exp(np.interp(enough, [areas[beyond], areas[inside]], logs)))
+
+        return end(-1), end(+1)
+
+    @property
+    def at_end(self) -> bool:
+        """Whether the best cutoff is the first or the last: a better one may be beyond."""
+        return self.best_hz in (next(iter(self.maps)), next(reversed(self.maps)))
+
+    def report(self) -> dict[str, Any]:
+        """Return what the command line prints, units in the keys."""
+        return {
+            "scene": self.scene.name,
+            "best_cutoff_hz": self.best_hz,
+            "best_area_n2_s_per_m2": self.best.area,
+            "best_is_at_the_end": self.at_end,
+            "best_leaves_the_map": self.best.leaves,
+            "as_good_within": LEVEL,
+            "as_good_from_hz": self.level_hz[0],
+            "as_good_to_hz": self.level_hz[1],
+            "unfiltered": self.unfiltered.report(),
+            "maps": [{"cutoff_hz": cutoff_hz} | each.report() for cutoff_hz, each in self.maps.items()],
+        }
+
+
+class _Cases:
+    """The cases of one scene."""
+
+    def __init__(self, scene: str, changes: dict[str, Any]):
+        self._scene, self._text = scene, read(scene)
+        self._changes = changes | room(parse(scene, self._text, changes), COARSER)
+        self.parsed = parse(scene, self._text, self._changes)
+
+    def unfiltered(self) -> Case:
+        return self._case("unfiltered", {"controller.estimator": "fdm"})
+
+    def filtered(self, cutoff_hz: float) -> Case:
+        gains = {"controller.gains.butterworth": {"cutoff_hz": cutoff_hz}}
+        return self._case(f"{cutoff_hz:g} Hz", {"controller.estimator": "butterworth", **gains})
+
+    def sweep(self) -> dict[float, Case]:
+        """Return the sweep's cases by cutoff: those that the rate allows, the highest of them at its end."""
+        end = min(float(SWEEP_HZ[-1]), CUTOFF_MAX * self.parsed.controller.sample_hz)
+        cutoffs = [*(float(each) for each in SWEEP_HZ if each < end), end]
+        return accepted({cutoff_hz: self.filtered(cutoff_hz) for cutoff_hz in cutoffs})
+
+    def _case(self, label: str, changes: dict[str, Any]) -> Case:
+        return Case(f"{self.parsed.name}, {label}", self._scene, self._text, self._changes | changes)
+
+
+def study(scenes: list[str], changes: dict[str, Any], mapping: Mapping) -> list[Device]:
+    """Return the areas of every scene against the cutoff, the best cutoff of each among them.
+
+    Args:
+        scenes: names or files.
+        changes: of all of them, by dotted key.
+        mapping: makes the maps.
+
+    Raises:
+        SceneError: if a scene cannot be, or has no section `zwidth`.
+    """
+    devices = [_Cases(scene, changes) for scene in scenes]
+    sweeps = [device.sweep() for device in devices]
+    # The largest regions take longest: they go first.
+    cases = {(place, cutoff): sweep[cutoff] for place, sweep in enumerate(sweeps) for cutoff in reversed(sweep)}
+    cases |= {(place, None): device.unfiltered() for place, device in enumerate(devices)}
+    found = dict(zip(cases, mapping("sweep of cutoffs", list(cases.values())), strict=True))
+    return [
+        _searched(device, {cutoff: found[place, cutoff] for cutoff in sweeps[place]}, found[place, None], mapping)
+        for place, device in enumerate(devices)
+    ]
+
+
+def _searched(device: _Cases, sweep: dict[float, Map], unfiltered: Map, mapping: Mapping) -> Device:
+    """Return the areas of a device, those around the sweep's best one searched."""
+    maps = dict(sweep)
+
+    def loss(log_cutoff: float) -> float:
+        # What is tried is what is printed.
+        cutoff_hz = float(f"{math.exp(log_cutoff):.4g}")
+        if cutoff_hz not in maps:
+            case = device.filtered(cutoff_hz)
+            (maps[cutoff_hz],) = mapping(f"search: {case.label}", [case])
+        return -maps[cutoff_hz].area
+
+    cutoffs, areas = list(sweep), [each.area for each in sweep.values()]
+    top = areas.index(max(areas))
+    bounds = [math.log(cutoffs[min(max(place, 0), len(cutoffs) - 1)]) for place in (top - 1, top + 1)]
+    if areas[top] > 0 and bounds[0] < bounds[1]:
+        options = {"xatol": math.log1p(TOLERANCE), "maxiter": EVALUATIONS}
+        minimize_scalar(loss, bounds=bounds, method="bounded", options=options)
+    return Device(device.parsed, dict(sorted(maps.items())), unfiltered)

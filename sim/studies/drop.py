@@ -1,0 +1,322 @@
+"""Why the stable region of Levant's differentiator ends at one B, in a sharp drop, and what has none.
+
+The explanation under test is `chatter`: at rest its u goes on chattering, and times B that is a force which friction
+holds, or not, whatever the stiffness. Four experiments:
+
+- *Shaken.* One wall, B ever larger: RMS of position after the settling mark, for Levant's u, for the same
+  differentiator with the same gains whose implicit Euler does not chatter at rest, and for others.
+- *Ends.* The B up to which three of four hits come to rest, and up to which they are stable, from soft walls to stiff
+  ones: a handle that is shaken by less than the threshold is stable, too.
+- *Laws.* The B up to which three of four hits come to rest, measured in the closed loop, against that up to which
+  `chatter` lets three of four cycles rest, predicted from the estimator alone: where friction, push, gains and the
+  number of samples a force change, which are in the law; and mass, count, delay and stiffness, which are not.
+- *Maps.* The stable region of each, as the founding paper traces it.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ..scene.load import parse, read
+from ..scene.schema import Scene, SceneError
+from ..walls import hit
+from ..walls.case import Case, accepted, room
+from ..walls.chatter import Chatter, at_rest
+from ..walls.methods import PROPOSED, Curve, methods
+from ..walls.zwidth import Map, Mapping
+
+STIFFNESS_N_PER_M = 5e3
+"""Of the walls that are hit one by one: soft enough that without chatter they are stable by far."""
+DAMPINGS_N_S_PER_M = np.geomspace(3, 400, 18).round(1)
+STARTS = 8
+"""Hits of one wall. Each starts by `APART` counts farther off: which cycle the chatter falls into is chance."""
+APART = 13.7
+REST_COUNTS = 0.1
+"""A handle whose RMS is less has come to rest."""
+ENOUGH = 0.75
+"""The part of hits, and of cycles, that is to rest."""
+HALVINGS = 5
+"""Of the range of B, to find where that ends."""
+COARSER = 4.0
+"""Steps of the maps, of the scene's."""
+TIMES = {
+    "Coulomb friction": ("handle.coulomb_n", (0.3, 0.5, 2.0, 3.0)),
+    "push": ("protocol.push_n", (0.7, 1.5, 2.0)),
+    "mass": ("handle.mass_kg", (0.5, 2.0)),
+    "count": ("encoder.count_m", (0.5, 2.0)),
+    "delay": ("amplifier.delay_s", (0.0, 2.0)),
+    "stiffness": ("wall.stiffness_n_per_m", (0.5, 2.0, 3.0)),
+}
+"""What is changed, by how many times."""
+GAINS = {"lambda": ("lambda_sqrt_m_per_s", (0.7, 1.5)), "alpha": ("alpha_m_per_s2", (0.4, 2.0, 4.0))}
+SAMPLES_A_FORCE = (8, 9, 11, 20)
+PAPERS = ("proposed", "adjusted")
+"""What the ends and the laws are of, by the names of `curves`."""
+STIFFNESSES_N_PER_M = (2.5e3, 5e3, 10e3, 20e3, 30e3)
+ENDS_N_S_PER_M = np.geomspace(20, 240, 14).round(1)
+"""Of the walls whose ends are looked for."""
+
+Striking = Callable[[str, list[dict]], list[dict]]
+"""What makes the result of `strike` for each job; the text is for the one who waits."""
+
+
+@dataclass(frozen=True)
+class Shaken:
+    """One hit of the first experiment: RMS of position after the settling mark; None if the handle fled."""
+
+    method: str
+    damping_n_s_per_m: float
+    rms_m: float | None
+
+
+@dataclass(frozen=True)
+class End:
+    """The largest B of `ENDS_N_S_PER_M` with which enough of the hits come to rest, and are stable; 0 without any."""
+
+    method: str
+    stiffness_n_per_m: float
+    rests_n_s_per_m: float
+    stable_n_s_per_m: float
+
+
+@dataclass(frozen=True)
+class Law:
+    """One change of the scene, and up to which B the handle comes to rest.
+
+    Attributes:
+        factor, value: what was changed, and how.
+        method: by name.
+        predicted_n_s_per_m: up to which enough of the cycles let it rest; infinite without end.
+        measured_n_s_per_m: up to which enough of the hits came to rest; 0 if under the least B tried, infinite if
+            beyond the largest.
+    """
+
+    factor: str
+    value: str
+    method: str
+    predicted_n_s_per_m: float
+    measured_n_s_per_m: float
+
+
+@dataclass(frozen=True)
+class Drop:
+    """What was found.
+
+    Attributes:
+        scene: as it was hit.
+        chatters: by the names of `curves`.
+        shaken, ends, laws: of the first three experiments.
+        maps: by the names of `curves`.
+    """
+
+    scene: Scene
+    chatters: dict[str, Chatter]
+    shaken: list[Shaken]
+    ends: list[End]
+    laws: list[Law]
+    maps: dict[str, Map]
+
+    def agreement(self) -> list[float]:
+        """Return what was measured over what was predicted where both are known: least, quartiles and most."""
+        ratios = [
+            each.measured_n_s_per_m / each.predicted_n_s_per_m
+            for each in self.laws
+            if 0 < each.measured_n_s_per_m < math.inf and each.predicted_n_s_per_m < math.inf
+        ]
+        return np.quantile(ratios, (0, 0.25, 0.5, 0.75, 1)).tolist() if ratios else []
+
+    def before_the_end(self, name: str) -> float | None:
+        """Return K a step of B before a map's last stable wall, over its largest: a sharp drop has half or more.
+
+        None where the region leaves the map, or has no two dampings.
+        """
+        edges = self.maps[name].edges
+        stable = [edge.stable_n_per_m for edge in edges if edge.stable_n_per_m]
+        return None if edges[-1].stable_n_per_m or len(stable) < 2 else stable[-2] / max(stable)
+
+    def of_papers(self, name: str) -> float | None:
+        """Return a map's area as a multiple of the paper's best, that of Levant with adjusted gains; None without."""
+        papers = self.maps["adjusted"].area
+        return self.maps[name].area / papers if papers else None
+
+    def report(self) -> dict[str, Any]:
+        """Return what the command line prints; null for what is infinite."""
+        return {
+            "scene": self.scene.name,
+            "stiffness_n_per_m": STIFFNESS_N_PER_M,
+            "methods": {
+                name: {
+                    "swing_m_per_s": [float(chatter.swing_m_per_s.min()), float(chatter.swing_m_per_s.max())],
+                    "mean_m_per_s": float(np.abs(chatter.mean_m_per_s).max()),
+                    "of_papers_best": self.of_papers(name),
+                    "before_the_end": self.before_the_end(name),
+                    **self.maps[name].report(),
+                }
+                for name, chatter in self.chatters.items()
+            },
+            "shaken": [vars(each) for each in self.shaken],
+            "ends": [vars(each) for each in self.ends],
+            "measured_over_predicted": self.agreement(),
+            "laws": [
+                {key: None if value == math.inf else value for key, value in vars(each).items()} for each in self.laws
+            ],
+        }
+
+
+def curves(scene: Scene) -> dict[str, Curve]:
+    """Return what is compared: the paper's methods, the same gains without chatter, and other estimators."""
+    papers = methods(scene)
+    adjusted = papers["adjusted"].gains
+    return {
+        "proposed": papers["proposed"],
+        "adjusted": papers["adjusted"],
+        "adjusted u1": Curve("Levant u1, adjusted gains", "levant", "u1", adjusted),
+        "implicit proposed": Curve("implicit Levant u, proposed gains", "levant-implicit", "u", PROPOSED),
+        "implicit adjusted": Curve("implicit Levant u, adjusted gains", "levant-implicit", "u", adjusted),
+        "semi-implicit adjusted": Curve("semi-implicit u, adjusted gains", "levant-semi-implicit", "u", adjusted),
+        "kalman": Curve("Kalman", "kalman", "u"),
+        "window": Curve("minimax window", "window", "u"),
+        "fdm-500": papers["fdm-500"],
+    }
+
+
+def strike(scene: str, text: str, changes: dict[str, Any], damping: float, start: int, backend: str) -> dict:
+    """Hit a scene's wall; return whether it `rests` and is `stable`, and its `rms_m`, null where the handle fled.
+
+    Args:
+        scene, text, changes: of a `Case`.
+        damping: of the wall, N s/m.
+        start: which of the starts.
+        backend: `float` or `fixed`.
+    """
+    plain = parse(scene, text, changes)
+    own = {"wall.damping_n_s_per_m": damping}
+    own["protocol.start_m"] = plain.protocol.start_m - start * APART * plain.encoder.count_m
+    result = hit.run(parse(scene, text, changes | own), backend, until_sure=True)
+    if result.samples <= plain.protocol.settle_s * plain.spec.sample_hz:
+        return {"rests": False, "stable": False, "rms_m": None}
+    rests = result.rms_m < REST_COUNTS * plain.encoder.count_m and result.mean_m > 0
+    return {"rests": rests, "stable": result.stable, "rms_m": result.rms_m}
+
+
+def study(scene: str, changes: dict[str, Any], backend: str, striking: Striking, mapping: Mapping) -> Drop:
+    """Return the four experiments on a scene.
+
+    Args:
+        scene: its name or file.
+        changes: of it, by dotted key.
+        backend: `float` or `fixed`.
+        striking: makes single hits.
+        mapping: makes maps, on the same backend.
+
+    Raises:
+        SceneError: if the scene cannot be, or has no section `zwidth`, or no Coulomb friction.
+    """
+    text = read(scene)
+    plain = parse(scene, text, changes | {"wall.stiffness_n_per_m": STIFFNESS_N_PER_M})
+    if not plain.handle.coulomb_n:
+        raise SceneError(f"{plain.name}: handle.coulomb_n must be more than 0: no friction holds against a chatter")
+    compared = curves(plain)
+    most = max(float(DAMPINGS_N_S_PER_M[-1]), plain.controller.damping_max_n_s_per_m)
+    roomy = changes | {"wall.stiffness_n_per_m": STIFFNESS_N_PER_M, "controller.damping_max_n_s_per_m": most}
+    cases = {name: Case(curve.label, scene, text, roomy | curve.changes) for name, curve in compared.items()}
+    changed = {("none", "", name): case for name, case in cases.items()}
+    for name in PAPERS:
+        for (factor, value), change in _changes(plain, compared[name]).items():
+            changed[factor, value, name] = replace(cases[name], changes=cases[name].changes | change)
+    changed = accepted(changed)
+    wider = changes | room(plain, COARSER)
+    maps = mapping("maps", [replace(cases[name], changes=wider | curve.changes) for name, curve in compared.items()])
+    return Drop(
+        plain,
+        {name: at_rest(case.parsed, backend) for name, case in cases.items()},
+        _shaken(cases, backend, striking),
+        _ends(cases, backend, striking),
+        _laws(changed, backend, striking),
+        dict(zip(compared, maps, strict=True)),
+    )
+
+
+def _changes(scene: Scene, curve: Curve) -> dict[tuple[str, str], dict[str, Any]]:
+    """Return what is changed of a scene, by factor and value."""
+    found = {}
+    for factor, (key, values) in TIMES.items():
+        section, name = key.split(".")
+        own = getattr(getattr(scene, section), name, None)
+        if own is not None:
+            found |= {(factor, f"x {times:g}"): {key: own * times} for times in values}
+    for factor, (gain, values) in GAINS.items():
+        for times in values:
+            gains = {**curve.gains, gain: curve.gains[gain] * times}
+            found[factor, f"x {times:g}"] = replace(curve, gains=gains).changes
+    for samples in SAMPLES_A_FORCE:
+        rate = samples * scene.controller.actuation_hz
+        clock = rate * round(scene.controller.clock_hz / rate)
+        found["samples a force", f"{samples}"] = {"controller.sample_hz": rate, "controller.clock_hz": clock}
+    return found
+
+
+def _job(case: Case, damping: float, start: int, backend: str) -> dict:
+    of_case = {"scene": case.scene, "text": case.text, "changes": case.changes}
+    return of_case | {"damping": damping, "start": start, "backend": backend}
+
+
+def _shaken(cases: dict[str, Case], backend: str, striking: Striking) -> list[Shaken]:
+    walls = list(product(cases, DAMPINGS_N_S_PER_M.tolist(), range(2)))
+    jobs = [_job(cases[name], damping, start, backend) for name, damping, start in walls]
+    results = striking("shaken", jobs)
+    return [Shaken(name, damping, result["rms_m"]) for (name, damping, _), result in zip(walls, results, strict=True)]
+
+
+def _ends(cases: dict[str, Case], backend: str, striking: Striking) -> list[End]:
+    """Return the ends: every damping is tried, for a stiff wall has a least one, too."""
+    walls = {}
+    for name, stiffness in product(PAPERS, STIFFNESSES_N_PER_M):
+        wall = {"wall.stiffness_n_per_m": stiffness}
+        walls[name, stiffness] = replace(cases[name], changes=cases[name].changes | wall)
+    asked = list(product(walls, ENDS_N_S_PER_M.tolist(), range(STARTS)))
+    results = striking("ends", [_job(walls[key], damping, start, backend) for key, damping, start in asked])
+    counts = {"rests": Counter(), "stable": Counter()}
+    for (key, damping, _), result in zip(asked, results, strict=True):
+        for what, count in counts.items():
+            count[key, damping] += result[what]
+
+    def last(what: str, key: tuple) -> float:
+        enough = [damping for damping in ENDS_N_S_PER_M.tolist() if counts[what][key, damping] >= ENOUGH * STARTS]
+        return max(enough, default=0.0)
+
+    return [End(*key, last("rests", key), last("stable", key)) for key in walls]
+
+
+def _laws(changed: dict[tuple[str, str, str], Case], backend: str, striking: Striking) -> list[Law]:
+    """Return what is predicted and what is measured for every change: by bisection, a step of all of them at once."""
+    least, most = DAMPINGS_N_S_PER_M[[0, -1]].tolist()
+    low, high = dict.fromkeys(changed, least), dict.fromkeys(changed, most)
+    for step in range(HALVINGS):
+        middle = {key: float(f"{math.sqrt(low[key] * high[key]):.4g}") for key in changed}
+        asked = list(product(changed, range(STARTS)))
+        jobs = [_job(changed[key], middle[key], start, backend) for key, start in asked]
+        resting = dict.fromkeys(changed, 0)
+        for (key, _), result in zip(asked, striking(f"laws, {step + 1} of {HALVINGS}", jobs), strict=True):
+            resting[key] += result["rests"]
+        for key, count in resting.items():
+            side = low if count >= ENOUGH * STARTS else high
+            side[key] = middle[key]
+    laws = []
+    for key, case in changed.items():
+        measured = math.sqrt(low[key] * high[key])
+        if low[key] == least or high[key] == most:
+            measured = 0.0 if low[key] == least else math.inf
+        laws.append(Law(*key, _predicted(case.parsed, backend), measured))
+    return laws
+
+
+def _predicted(scene: Scene, backend: str) -> float:
+    """Return the B up to which enough of the cycles let the handle rest."""
+    ends = np.sort(at_rest(scene, backend).rests_up_to(scene.handle.coulomb_n, scene.protocol.push_n))
+    return float(ends[math.floor((1 - ENOUGH) * len(ends))])

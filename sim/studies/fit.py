@@ -1,0 +1,287 @@
+"""What the founding paper does not give, searched for what shows the eight facts of its Figure 5: a fit.
+
+The search is SciPy's differential evolution, seeded, over the ranges of `PARAMETERS`. What it makes small is a sum: the
+shortfalls of the facts (`figure_5`), `MISSED` for each that is not held, and how far the maps are off the paper's axes:
+
+- Levant with adjusted gains is to end where the B axis does. Zeros of that may have been lost, so it has two readings,
+  each searched on its own. Off by the logarithm of the ratio, less what counts as about equal;
+- its largest K is to be on the K axis. Off by the logarithm of the ratio.
+
+The scene's own values are one of the first trials, so a fit can go on from a fit. Trials are mapped in coarse steps, on
+a protocol cut short. Where Levant with adjusted gains ends far (`FAR`) from where the B axis does, the other maps are
+not made, and no fact is held. The `FINALISTS` with the least sum are then judged in full: in fine steps, on the scene's
+own protocol.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from ..scene.load import parse, read
+from ..scene.schema import Scene, SceneError
+from ..walls.case import Case
+from ..walls.figure_5 import ABOUT, Fact, facts
+from ..walls.methods import Curve, methods
+from ..walls.zwidth import Map, Mapping, NeverReached
+
+READINGS = {"3-30": (3.0, 30.0), "30-300": (30.0, 300.0)}
+"""Ends of the paper's B axis, N s/m."""
+STIFFNESS_AXIS_N_PER_M = 60e3
+BEYOND = 1.3
+"""Maps go so much farther than the axes: a region is to be seen to end."""
+COARSE, FULL = 12, 54
+"""Steps of B of a map."""
+STIFFNESS_STEP_N_PER_M = 1e3
+SHORT = {"protocol.settle_s": 2.5, "protocol.mean_s": 0.25, "protocol.measure_s": 0.5}
+MISSED = 0.05
+FAR = math.log(1.5)
+HOPELESS = math.log(1e3)
+"""How far off the axes maps are taken to be where there are none: no such scene, or the handle does not reach walls."""
+EIGHT = 8
+FINALISTS = 4
+MEMBERS = 4
+"""Of the population, for each parameter."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """Where a parameter is searched: from `low` to `high`; `scale` is log, linear, or samples, linear in whole ones."""
+
+    low: float
+    high: float
+    scale: str
+
+    def at(self, part: float, sample_hz: int) -> float:
+        """Return the value at a part, 0 to 1, of the range; of three digits, for what is tried is what is printed."""
+        if self.scale == "log":
+            return float(f"{self.low * (self.high / self.low) ** part:.3g}")
+        value = self.low + (self.high - self.low) * part
+        return round(value * sample_hz) / sample_hz if self.scale == "samples" else float(f"{value:.3g}")
+
+    def part(self, value: float) -> float:
+        """Return at which part of the range a value is, 0 or 1 if beyond it."""
+        inside = min(max(value, self.low), self.high)
+        if self.scale == "log":
+            return math.log(inside / self.low) / math.log(self.high / self.low)
+        return (inside - self.low) / (self.high - self.low)
+
+
+PARAMETERS = {
+    "handle.mass_kg": Range(0.02, 2.0, "log"),
+    "handle.viscous_n_s_per_m": Range(0.1, 10.0, "log"),
+    "handle.coulomb_n": Range(0.005, 0.33, "log"),
+    "amplifier.delay_s": Range(0.0, 6e-3, "samples"),
+    "protocol.threshold_mm": Range(0.3e-3, 0.1, "log"),
+    "controller.gains.levant.alpha_m_per_s2": Range(17.7, 400.0, "log"),
+}
+"""What is searched, by key of the scene."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Values of the parameters, and what Figure 5 is like with them.
+
+    Attributes:
+        values: by key of the scene.
+        facts: the eight; none where nothing but Levant with adjusted gains was mapped, or nothing could be.
+        off_b, off_k: how far the maps are off the axes, logarithms of ratios.
+        maps: by the names of `figures.methods`.
+    """
+
+    values: dict[str, float]
+    facts: list[Fact]
+    off_b: float
+    off_k: float
+    maps: dict[str, Map]
+
+    @property
+    def held(self) -> int:
+        """How many facts are held."""
+        return sum(fact.held for fact in self.facts)
+
+    @property
+    def score(self) -> float:
+        """What the search makes small."""
+        lacking = sum(fact.shortfall for fact in self.facts) if self.facts else EIGHT
+        return lacking + MISSED * (EIGHT - self.held) + self.off_b + self.off_k
+
+    def report(self) -> dict[str, Any]:
+        """Return the trial as the command line prints it."""
+        return {
+            "values": self.values,
+            "score": self.score,
+            "held": self.held,
+            "off_b_axis": self.off_b,
+            "off_k_axis": self.off_k,
+            "facts": [asdict(fact) for fact in self.facts],
+        }
+
+
+@dataclass(frozen=True)
+class Fit:
+    """What a search found for one reading of the B axis.
+
+    Attributes:
+        reading: of `READINGS`.
+        own: values of the scene as it is, by key.
+        before: the scene as it is, judged in full.
+        trials: of the search, in their order.
+        finalists: judged in full, the best first.
+    """
+
+    reading: str
+    own: dict[str, float]
+    before: Trial
+    trials: list[Trial]
+    finalists: list[Trial]
+
+    def least_shortfalls(self) -> list[float | None]:
+        """Return for each fact how little it lacked in any trial that held all the others; None if none did.
+
+        A fact with more than 0 there stood against the others.
+        """
+        found: list[float | None] = []
+        for number in range(EIGHT):
+            among = [trial.facts for trial in self.trials if trial.facts]
+            lacks = [
+                each[number].shortfall
+                for each in among
+                if all(fact.held for index, fact in enumerate(each) if index != number)
+            ]
+            found.append(min(lacks, default=None))
+        return found
+
+    def report(self) -> dict[str, Any]:
+        """Return the fit as the command line prints it."""
+        return {
+            "b_axis": self.reading,
+            "values_before": self.own,
+            "before": self.before.report(),
+            "evaluations": len(self.trials),
+            "evaluations_of_all_methods": sum(bool(trial.facts) for trial in self.trials),
+            "least_shortfalls_of_trials": self.least_shortfalls(),
+            "finalists": [trial.report() for trial in self.finalists],
+        }
+
+
+class _Judge:
+    """Maps a scene with some values, and judges the maps."""
+
+    def __init__(self, scene: str, changes: dict[str, Any], reading: str, mapping: Mapping):
+        self._scene, self._text, self._changes, self._mapping = scene, read(scene), changes, mapping
+        self._low, self._end = READINGS[reading]
+
+    def parsed(self) -> Scene:
+        """The scene as it is."""
+        return parse(self._scene, self._text, self._changes)
+
+    def _grid(self, steps: int) -> dict[str, Any]:
+        end = BEYOND * self._end
+        return {
+            "zwidth.damping_from_n_s_per_m": self._low,
+            "zwidth.damping_to_n_s_per_m": end,
+            "zwidth.damping_step_n_s_per_m": (end - self._low) / steps,
+            "zwidth.stiffness_step_n_per_m": STIFFNESS_STEP_N_PER_M,
+            "zwidth.stiffness_to_n_per_m": BEYOND * STIFFNESS_AXIS_N_PER_M,
+        }
+
+    def coarsely(self, values: dict[str, float]) -> Trial:
+        """Return a trial of the search."""
+        changes = self._changes | self._grid(COARSE) | SHORT | values
+        try:
+            papers = methods(parse(self._scene, self._text, changes))
+            (adjusted,) = self._maps(papers, changes, ["adjusted"]).values()
+        except (SceneError, NeverReached):
+            return Trial(values, [], HOPELESS, 0.0, {})
+        off = self._off(adjusted)
+        if off[0] > FAR:
+            return Trial(values, [], *off, {"adjusted": adjusted})
+        return self._judged(values, papers, changes)
+
+    def fully(self, values: dict[str, float]) -> Trial:
+        """Return a trial in fine steps, on the scene's own protocol.
+
+        Raises:
+            SceneError: if the scene cannot be.
+        """
+        changes = self._changes | self._grid(FULL) | values
+        return self._judged(values, methods(parse(self._scene, self._text, changes)), changes)
+
+    def _judged(self, values: dict[str, float], methods: dict[str, Curve], changes: dict[str, Any]) -> Trial:
+        maps = self._maps(methods, changes, list(methods))
+        return Trial(values, facts(maps), *self._off(maps["adjusted"]), maps)
+
+    def _maps(self, methods: dict[str, Curve], changes: dict[str, Any], names: list[str]) -> dict[str, Map]:
+        cases = [Case(methods[name].label, self._scene, self._text, changes | methods[name].changes) for name in names]
+        return dict(zip(names, self._mapping("fit", cases), strict=True))
+
+    def _off(self, adjusted: Map) -> tuple[float, float]:
+        """Return how far the map of Levant with adjusted gains is off the B axis' end, and off the K axis."""
+        if not adjusted.damping_n_s_per_m:
+            return HOPELESS, 0.0
+        along = abs(math.log(adjusted.damping_n_s_per_m / self._end)) - math.log1p(ABOUT)
+        return max(along, 0.0), max(math.log(adjusted.largest_n_per_m / STIFFNESS_AXIS_N_PER_M), 0.0)
+
+
+def study(
+    scene: str,
+    changes: dict[str, Any],
+    reading: str,
+    evaluations: int,
+    seed: int,
+    mapping: Mapping,
+    progress: Callable[[int], None],
+) -> Fit:
+    """Return the fit of a scene for one reading of the B axis.
+
+    Args:
+        scene: its name or file.
+        changes: of it, by dotted key; a key that is searched has the searched value.
+        reading: of `READINGS`.
+        evaluations: of the search, about so many: whole generations.
+        seed: of the search.
+        mapping: makes the maps, and keeps what it made.
+        progress: called after every evaluation with how many are done.
+
+    Raises:
+        SceneError: if the scene cannot be, or lacks a key that is searched.
+        zwidth.NeverReached: if its handle, with its own values, does not come to the wall.
+    """
+    judge = _Judge(scene, changes, reading, mapping)
+    plain = judge.parsed()
+    own = {key: _value(plain, key) for key in PARAMETERS}
+    before = judge.fully({})
+    trials: list[Trial] = []
+
+    def score(parts: np.ndarray) -> float:
+        ranges = zip(PARAMETERS.items(), parts, strict=True)
+        values = {key: where.at(part, plain.controller.sample_hz) for (key, where), part in ranges}
+        trials.append(judge.coarsely(values))
+        progress(len(trials))
+        return trials[-1].score
+
+    generations = max(round(evaluations / (MEMBERS * len(PARAMETERS))) - 1, 0)
+    options = {"popsize": MEMBERS, "maxiter": generations, "rng": seed, "tol": 0, "polish": False}
+    begin = [PARAMETERS[key].part(value) for key, value in own.items()]
+    differential_evolution(score, [(0.0, 1.0)] * len(PARAMETERS), x0=begin, **options)
+    best = {tuple(trial.values.items()): trial for trial in sorted(trials, key=lambda each: -each.score)}
+    finalists = [judge.fully(trial.values) for trial in list(best.values())[::-1][:FINALISTS]]
+    return Fit(reading, own, before, trials, sorted(finalists, key=lambda each: each.score))
+
+
+def _value(scene: Scene, key: str) -> float:
+    """Return the value of a key of a scene.
+
+    Raises:
+        SceneError: if the scene has none.
+    """
+    value: Any = scene
+    for name in key.split("."):
+        value = getattr(value, name, None)
+    if value is None:
+        raise SceneError(f"{scene.name}: {key} is missing: the search begins from it")
+    return value

@@ -1,0 +1,175 @@
+"""A full search of Levant's gains: area of the stable region over lambda and alpha, for both outputs.
+
+The gains go in equal ratios around those that the founding paper derives from C, the bound on the acceleration:
+lambda = sqrt(C) and alpha = 1.1 C. Pairs that no words can be derived for are left out. The paper's two pairs and the
+best of what was searched are then mapped again in finer steps: the best of hundreds of coarse maps owes some of its
+area to chance.
+
+The sufficient condition for convergence is alpha > C and lambda^2 >= 4 C (alpha + C) / (alpha - C).
+
+An area may mislead. At rest u chatters, with a period of two samples where the gains are large; a force that is updated
+every so many samples, an even number, always sees the same side of it: a velocity that is not there, whose force holds
+the handle still, but in another place than the wall's. So each pair has two areas, that of stable walls, which is the
+paper's, and that of those which are also in place (`hit.Hit.in_place`).
+"""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ...model.estimators.levant import OUTPUTS, Gains
+from ..scene.load import parse, read
+from ..scene.schema import Scene
+from ..walls import methods
+from ..walls.boundary import Grid
+from ..walls.case import Case, accepted, grid_of, room
+from ..walls.zwidth import Map, Mapping
+from .lipschitz import least_alpha_m_per_s2
+
+LAMBDAS = np.geomspace(0.3, 100, 16)
+"""Of sqrt(C)."""
+ALPHAS = np.geomspace(0.03, 300, 17)
+"""Of C."""
+COARSER, FINER = 4.0, 2.0
+"""Steps of the maps, of the scene's: of the search, and of those that are mapped again."""
+PAPERS = ("proposed", "adjusted")
+
+
+@dataclass(frozen=True)
+class Pick:
+    """Gains that are worth a name, and their map in finer steps."""
+
+    gains: Gains
+    map: Map
+
+
+@dataclass(frozen=True)
+class Search:
+    """What was found.
+
+    Attributes:
+        scene: as it was searched.
+        lambdas, alphas: that were tried, ascending, m^(1/2)/s and m/s^2.
+        maps: in coarse steps, by output and gains; without those that no words can be derived for.
+        picks: the paper's gains and the best, by output and by what they are.
+    """
+
+    scene: Scene
+    lambdas: np.ndarray
+    alphas: np.ndarray
+    maps: dict[str, dict[Gains, Map]]
+    picks: dict[str, dict[str, Pick]]
+
+    @property
+    def coarse_grid(self) -> Grid:
+        """Of the search."""
+        return grid_of(next(iter(self.maps["u"].values())).case.parsed)
+
+    @property
+    def bound_m_per_s2(self) -> float:
+        """C."""
+        return self.scene.controller.acceleration_max_m_per_s2
+
+    def areas(self, output: str, in_place: bool) -> np.ndarray:
+        """Return an output's areas, N^2 s/m^2, shape (alphas, lambdas); NaN where gains were refused."""
+        found = self.maps[output]
+        rows = [[found.get(Gains(lam, alpha)) for lam in self.lambdas.tolist()] for alpha in self.alphas.tolist()]
+        return np.array([[_area(each, in_place) if each else np.nan for each in row] for row in rows])
+
+    def at_edge(self, gains: Gains) -> bool:
+        """Whether gains are at the edge of what was tried: better ones may be beyond."""
+        ends = (self.lambdas[[0, -1]], gains.lambda_sqrt_m_per_s), (self.alphas[[0, -1]], gains.alpha_m_per_s2)
+        return any(value in pair for pair, value in ends)
+
+    def of_papers(self, pick: Pick) -> float | None:
+        """Return an area as a multiple of that of the paper's better pair with the paper's output, u; None without."""
+        papers = max((self.picks["u"][name].map.area for name in PAPERS if name in self.picks["u"]), default=0.0)
+        return pick.map.area / papers if papers else None
+
+    def report(self) -> dict[str, Any]:
+        """Return what the command line prints, units in the keys; rows of areas go by alpha."""
+        return {
+            "scene": self.scene.name,
+            "c_m_per_s2": self.bound_m_per_s2,
+            "lambda_sqrt_m_per_s": self.lambdas.tolist(),
+            "alpha_m_per_s2": self.alphas.tolist(),
+            "outputs": {output: self._report(output) for output in self.maps},
+        }
+
+    def _report(self, output: str) -> dict[str, Any]:
+        def rows(in_place: bool) -> list[list[float | None]]:
+            return [[None if np.isnan(each) else each for each in row] for row in self.areas(output, in_place).tolist()]
+
+        picks = {
+            name: {
+                **asdict(pick.gains),
+                "meets_the_condition": converges(pick.gains, self.bound_m_per_s2),
+                "at_the_edge": self.at_edge(pick.gains),
+                "of_papers_best": self.of_papers(pick),
+                **pick.map.report(),
+            }
+            for name, pick in self.picks[output].items()
+        }
+        return {"area_n2_s_per_m2": rows(False), "area_in_place_n2_s_per_m2": rows(True), "picks": picks}
+
+
+def converges(gains: Gains, bound_m_per_s2: float) -> bool:
+    """Return whether gains satisfy the sufficient condition for signals whose acceleration has a bound."""
+    least = least_alpha_m_per_s2(gains.lambda_sqrt_m_per_s, bound_m_per_s2)
+    return least is not None and gains.alpha_m_per_s2 >= least
+
+
+def study(scene: str, changes: dict[str, Any], mapping: Mapping) -> Search:
+    """Return the areas of a scene over Levant's gains.
+
+    Args:
+        scene: its name or file.
+        changes: of it, by dotted key.
+        mapping: makes the maps.
+
+    Raises:
+        SceneError: if the scene cannot be, with none of the gains either, or has no section `zwidth`.
+    """
+    text = read(scene)
+    plain = parse(scene, text, changes)
+    bound = plain.controller.acceleration_max_m_per_s2
+    papers = dict(
+        zip(PAPERS, (Gains.default(plain.controller), Gains(**methods.methods(plain)["adjusted"].gains)), strict=True)
+    )
+    lambdas, alphas = LAMBDAS * np.sqrt(bound), ALPHAS * bound
+    tried = [Gains(lam, alpha) for lam in lambdas.tolist() for alpha in alphas.tolist()]
+
+    def maps(title: str, coarser: float, wanted: list[tuple[str, Gains]]) -> dict[tuple[str, Gains], Map]:
+        cases = {}
+        for output, gains in wanted:
+            levant = {"controller.estimator": "levant", "controller.output": output}
+            levant["controller.gains.levant"] = asdict(gains)
+            label = f"{output}, lambda {gains.lambda_sqrt_m_per_s:.4g}, alpha {gains.alpha_m_per_s2:.4g}"
+            cases[output, gains] = Case(label, scene, text, changes | room(plain, coarser) | levant)
+        possible = accepted(cases)
+        return dict(zip(possible, mapping(title, list(possible.values())), strict=True))
+
+    coarse = maps("search of gains", COARSER, [(output, gains) for output in OUTPUTS for gains in tried])
+    by_output = {out: {gains: each for (of, gains), each in coarse.items() if of == out} for out in OUTPUTS}
+    chosen = {output: papers | _best(found, bound) for output, found in by_output.items()}
+    pairs = dict.fromkeys((output, gains) for output in OUTPUTS for gains in chosen[output].values())
+    finer = maps("the best again, in finer steps", FINER, list(pairs))
+    picks = {
+        output: {name: Pick(gains, finer[output, gains]) for name, gains in named.items() if (output, gains) in finer}
+        for output, named in chosen.items()
+    }
+    return Search(next(iter(finer.values())).case.parsed, lambdas, alphas, by_output, picks)
+
+
+def _area(each: Map, in_place: bool) -> float:
+    return each.area_in_place if in_place else each.area
+
+
+def _best(found: dict[Gains, Map], bound_m_per_s2: float) -> dict[str, Gains]:
+    """Return the gains with the largest areas, by what is asked of them."""
+    sure = [gains for gains in found if converges(gains, bound_m_per_s2)]
+    best = {"best": max(found, key=lambda gains: found[gains].area)}
+    if sure:
+        best["best within the condition"] = max(sure, key=lambda gains: found[gains].area)
+    return best | {"best in place": max(found, key=lambda gains: found[gains].area_in_place)}

@@ -1,0 +1,113 @@
+"""The bound C on the acceleration from a recorded hit, as the founding paper estimates it for Levant's gains.
+
+The wall is hit with a finite difference filtered at 500 Hz; a sum of seven sines is fitted to the recorded positions,
+and C is the largest magnitude of its second derivative (Figure 4).
+
+What that is worth: seven sines cannot follow an impact, so C is less than the acceleration that the handle really had,
+and falls with the length of the record that they have to share. Both are reported, and the amplitudes: two sines of
+almost one frequency may be metres large and cancel, which is a curve that fits and no spectrum.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..scene.load import read
+from ..scene.schema import Scene
+from ..walls import hit, methods
+from ..walls.case import Case
+from .sines import Sines, fit
+
+METHOD = "fdm-500"
+POINTS = 500
+"""At most so many positions are fitted; sines of a record this long need no more."""
+
+
+@dataclass(frozen=True)
+class Lipschitz:
+    """What a hit says of C.
+
+    Attributes:
+        scene: that was hit.
+        times_s: of the record, 0 at the contact.
+        positions_m: recorded, whole counts.
+        velocities_m_per_s: of the handle, as they truly were.
+        sines: fitted to them, in time from the record's begin.
+        peak_m_per_s2: the largest acceleration that the handle had, over a sample.
+    """
+
+    scene: Scene
+    times_s: np.ndarray
+    positions_m: np.ndarray
+    velocities_m_per_s: np.ndarray
+    sines: Sines
+    peak_m_per_s2: float
+
+    def fitted(self, order: int) -> np.ndarray:
+        """Return the fit at the record's times, or its derivative of an order."""
+        return self.sines.derivative(self.times_s - self.times_s[0], order)
+
+    @property
+    def bound_m_per_s2(self) -> float:
+        """C."""
+        return float(np.abs(self.fitted(2)).max())
+
+    def report(self) -> dict[str, Any]:
+        """Return what the command line prints: C, how good it is, and the gains that follow."""
+        bound, adjusted = self.bound_m_per_s2, methods.ADJUSTED["lambda_sqrt_m_per_s"]
+        return {
+            "scene": self.scene.name,
+            "stiffness_n_per_m": self.scene.wall.stiffness_n_per_m,
+            "damping_n_s_per_m": self.scene.wall.damping_n_s_per_m,
+            "from_s": float(self.times_s[0]),
+            "to_s": float(self.times_s[-1]),
+            "sines": len(self.sines.rad_per_s),
+            "frequencies_hz": (self.sines.rad_per_s / (2 * math.pi)).tolist(),
+            "amplitudes_mm": (np.hypot(self.sines.sine, self.sines.cosine) * 1e3).tolist(),
+            "residual_rms_mm": float(np.sqrt(np.mean((self.fitted(0) - self.positions_m) ** 2)) * 1e3),
+            "c_m_per_s2": bound,
+            "true_peak_m_per_s2": self.peak_m_per_s2,
+            "proposed_lambda_sqrt_m_per_s": math.sqrt(bound),
+            "proposed_alpha_m_per_s2": 1.1 * bound,
+            "adjusted_lambda_sqrt_m_per_s": adjusted,
+            "adjusted_alpha_least_m_per_s2": least_alpha_m_per_s2(adjusted, bound),
+        }
+
+
+def least_alpha_m_per_s2(lambda_sqrt_m_per_s: float, bound_m_per_s2: float) -> float | None:
+    """Return the least alpha that satisfies lambda^2 >= 4 C (alpha + C) / (alpha - C), or None where none does."""
+    square, four = lambda_sqrt_m_per_s**2, 4 * bound_m_per_s2
+    return bound_m_per_s2 * (square + four) / (square - four) if square > four else None
+
+
+def measure(scene: str, changes: dict[str, Any], before_s: float, after_s: float, count: int) -> Lipschitz:
+    """Hit the wall of a scene, and fit sines to what was recorded around the contact.
+
+    Args:
+        scene, changes: see `scene.load`; the estimator is the paper's for this, a difference filtered at 500 Hz.
+        before_s, after_s: how much of the record is fitted, before and after the first contact.
+        count: of sines.
+
+    Raises:
+        SceneError: if there is no such scene.
+        RuntimeError: if the handle never reached the wall, or the record is too short.
+    """
+    method = methods.methods()[METHOD]
+    loaded = Case(method.label, scene, read(scene), changes | method.changes).parsed
+    result = hit.run(loaded, "fixed", traces=True)
+    if not (result.detail.position_m > 0).any():
+        near = f"{hit.DETAIL_S:g} s of coming within {-hit.DETAIL_FROM_M * 1e3:g} mm"
+        raise RuntimeError(f"the handle did not reach the wall, or not within {near}: there is no impact to fit")
+    whole, contact = result.overview, result.detail
+    times = whole.time_s - result.contact_s
+    inside = np.flatnonzero((times >= -before_s) & (times <= after_s))
+    kept = inside[:: max(-(-len(inside) // POINTS), 1)]
+    positions = np.floor(whole.position_m[kept] / loaded.encoder.count_m) * loaded.encoder.count_m
+    try:
+        sines = fit(times[kept] - times[kept][0] if len(kept) else times[kept], positions, count)
+    except ValueError as error:
+        raise RuntimeError(f"the record is too short: {error}") from None
+    peak = np.abs(np.diff(contact.velocity_m_per_s)).max() * loaded.spec.sample_hz
+    return Lipschitz(loaded, times[kept], positions, whole.velocity_m_per_s[kept], sines, float(peak))

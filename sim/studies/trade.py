@@ -1,0 +1,102 @@
+"""Speed against accuracy: what each shortcut of a simulation costs and gets wrong, and which are best for what."""
+
+import math
+import statistics
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from itertools import product
+from typing import Any, NamedTuple
+
+from ..scene.schema import Scene
+from .shortcuts import SCATTER, Shortcut
+
+
+@dataclass(frozen=True)
+class Point:
+    """What a shortcut costs, and how wrong it is; by estimator where it says so.
+
+    Attributes:
+        shortcut: what it is.
+        hit_s: of a hit, the mean over the estimators.
+        hits: of the estimators' maps.
+        map_s: of these maps, in one process.
+        differ: by estimator, the share of the walls whose verdict is another than the reference's.
+        errors: by estimator, those of K at the edge at each B, relative to the reference's.
+    """
+
+    shortcut: Shortcut
+    hit_s: float
+    hits: int
+    map_s: float
+    differ: dict[str, float]
+    errors: dict[str, list[float]]
+
+    def of_stiffness(self, label: str) -> dict[str, float]:
+        """Return the `median` and the `largest` error of K with an estimator."""
+        return {"median": statistics.median(self.errors[label]), "largest": max(self.errors[label])}
+
+    def report(self) -> dict[str, Any]:
+        """Return the point as the command line prints it."""
+        ends = {label: self.of_stiffness(label) for label in self.errors}
+        keys = {"hit_s": self.hit_s, "map_hits": self.hits, "map_s": self.map_s}
+        return asdict(self.shortcut) | keys | {"verdicts_that_differ": self.differ, "stiffness_error": ends}
+
+
+class Question(NamedTuple):
+    """What a simulation is for: its cost, s, and how wrong it is with an estimator."""
+
+    name: str
+    cost_s: Callable[[Point], float]
+    error: Callable[[Point, str], float]
+
+
+HIT = Question("hit", lambda point: point.hit_s, lambda point, label: point.differ[label])
+MAP = Question("map", lambda point: point.map_s, lambda point, label: max(point.errors[label]))
+QUESTIONS = HIT, MAP
+
+
+@dataclass(frozen=True)
+class Trade:
+    """What was found.
+
+    Attributes:
+        scene: with the grid of the maps.
+        points: the reference first.
+        walls: by estimator, how many verdicts were compared.
+        words_checked: hits of the hardware, each with the force words of `fixed`.
+    """
+
+    scene: Scene
+    points: list[Point]
+    walls: dict[str, int]
+    words_checked: int
+
+    def scatter(self, question: Question, label: str) -> float:
+        """Return the larger error of the two changes that nobody could measure: less than this is none."""
+        return max(question.error(point, label) for point in self.points if point.shortcut.axis == SCATTER)
+
+    def best(self, question: Question, label: str) -> list[Point]:
+        """Return the points than which none is as fast and as right for an estimator, within the scatter."""
+        none = self.scatter(question, label)
+        return best(self.points, question.cost_s, lambda point: max(question.error(point, label), none))
+
+    def report(self) -> dict[str, Any]:
+        """Return the trade as the command line prints it."""
+        marks = [{f"best_for_{question.name}s": [] for question in QUESTIONS} for _ in self.points]
+        for question, label in product(QUESTIONS, self.walls):
+            found = self.best(question, label)
+            for point, mark in zip(self.points, marks, strict=True):
+                mark[f"best_for_{question.name}s"] += [label] * (point in found)
+        points = [point.report() | mark for point, mark in zip(self.points, marks, strict=True)]
+        keys = {"scene": self.scene.name, "walls": self.walls, "rtl_hits_with_the_words_of_fixed": self.words_checked}
+        return keys | {"settings": points}
+
+
+def best(points: list[Point], cost: Callable[[Point], float], error: Callable[[Point], float]) -> list[Point]:
+    """Return the points than which no other is as good in both, by rising cost and falling error."""
+    found, least = [], math.inf
+    for point in sorted(points, key=lambda each: (cost(each), error(each))):
+        if error(point) < least:
+            found.append(point)
+            least = error(point)
+    return found

@@ -1,0 +1,223 @@
+"""Z-width: of each case, a scene with its changes, the edge of the region of walls that its hits leave stable.
+
+A map is a trace, and a trace asks for one hit at a time. Hits of different traces run side by side on the workers of a
+Dask cluster; every verdict is kept as it comes. A verdict depends on the scene and the wall alone, so the map is the
+same whatever the number of workers, and an interrupted one goes on where it was.
+"""
+
+import platform
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from distributed import Client, as_completed
+
+from ..jobs import store
+from ..jobs.cluster import result_of
+from ..scene.load import parse
+from . import hit
+from .boundary import Edge, area, trace
+from .case import Case, grid_of
+
+
+@dataclass(frozen=True)
+class Map:
+    """The edge of one stable region.
+
+    Attributes:
+        case: what it is of.
+        edges: by B.
+        hits: walls that were hit for it.
+        in_place: of each edge, whether its largest stable wall holds the handle there: see `hit.Hit.in_place`.
+        seconds: wall time of its hits, wherever and whenever they were run; no part of what a map is.
+    """
+
+    case: Case
+    edges: list[Edge]
+    hits: int
+    in_place: list[bool]
+    seconds: float = field(default=0.0, compare=False)
+
+    @property
+    def area(self) -> float:
+        """Under the edge, N^2 s/m^2, whether or not all walls there are stable."""
+        return area(self.edges)
+
+    @property
+    def area_held(self) -> float | None:
+        """Under the edge, N^2 s/m^2, as far as the walls below it that were hit are stable; None where none was."""
+        if all(edge.held is None for edge in self.edges):
+            return None
+        parts = [1.0 if edge.held is None else edge.held for edge in self.edges]
+        pairs = zip(self.edges, parts, strict=True)
+        return area([replace(edge, stable_n_per_m=edge.stable_n_per_m * part) for edge, part in pairs])
+
+    @property
+    def area_in_place(self) -> float:
+        """Under the edge but for each B whose largest stable wall is not in place, N^2 s/m^2."""
+        kept = [
+            edge if in_place else replace(edge, stable_n_per_m=0.0)
+            for edge, in_place in zip(self.edges, self.in_place, strict=True)
+        ]
+        return area(kept)
+
+    @property
+    def damping_n_s_per_m(self) -> float:
+        """The largest B with a stable K; 0 where none has."""
+        return max((edge.damping_n_s_per_m for edge in self.edges if edge.stable_n_per_m), default=0.0)
+
+    @property
+    def leaves(self) -> bool:
+        """Whether K or B goes on beyond the map."""
+        return self.edges[-1].stable_n_per_m > 0 or self.clipped
+
+    @property
+    def clipped(self) -> bool:
+        """Whether K goes on beyond the map."""
+        return any(edge.marginal_n_per_m is None for edge in self.edges)
+
+    @property
+    def largest_n_per_m(self) -> float:
+        """The largest stable stiffness; larger than that where the map is `clipped`."""
+        return max(edge.stable_n_per_m for edge in self.edges)
+
+    def report(self) -> dict[str, Any]:
+        """Return the map as the command line prints it.
+
+        The boundary is in [B (N s/m), K (N/m)], K the largest stable; it is larger than that where it leaves the map.
+        """
+        return {
+            "label": self.case.label,
+            "scene": self.case.scene,
+            "changes": self.case.changes,
+            "boundary": [[edge.damping_n_s_per_m, edge.stable_n_per_m] for edge in self.edges],
+            "leaves_the_map_at": [edge.damping_n_s_per_m for edge in self.edges if edge.marginal_n_per_m is None],
+            "area_n2_s_per_m2": self.area,
+            "area_held_n2_s_per_m2": self.area_held,
+            "area_in_place_n2_s_per_m2": self.area_in_place,
+            "largest_stiffness_n_per_m": self.largest_n_per_m,
+            "hits": self.hits,
+            "seconds": self.seconds,
+        }
+
+
+Mapping = Callable[[str, list[Case]], list[Map]]
+"""What makes the map of each case; the text is for the one who waits."""
+
+
+class NeverReached(RuntimeError):
+    """The handle did not come to the wall in the time of the protocol: such a hit says nothing of the wall."""
+
+
+def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float, damping: float, backend: str) -> dict:
+    """Hit a wall; return whether it is `stable`, then `in_place` at rest, its `rms_mm` up to where that was sure, and
+    the `seconds` it took.
+
+    Args:
+        scene, text, changes: of a `Case`.
+        sources: what `store.sources` gives where the map is made: results are kept under it.
+        stiffness, damping: of the wall, N/m and N s/m.
+        backend: one of `hit.BACKENDS`.
+
+    Raises:
+        SceneError: if the scene cannot be.
+        NeverReached: if the handle did not come to the wall.
+        RuntimeError: if the worker has other sources of the project.
+    """
+    if sources != store.sources():
+        raise RuntimeError(f"a worker, {platform.node()}, has other sources of hardwall, or versions of its tools")
+    wall = {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": damping}
+    result = hit.run(parse(scene, text, changes | wall), backend, until_sure=True)
+    if not result.touched:
+        raise NeverReached(f"the handle did not reach the wall: nothing is said of K {stiffness:g}, B {damping:g}")
+    in_place = result.stable and result.in_place
+    rms_mm = result.rms_m * 1e3
+    return {"stable": result.stable, "in_place": in_place, "rms_mm": rms_mm, "seconds": result.seconds}
+
+
+class _Tracing:
+    """One trace on its way: which wall it asks for, and what it found at the end."""
+
+    def __init__(self, case: Case, backend: str):
+        self._case, self._grid = case, grid_of(case.parsed)
+        self._steps: Generator = trace(self._grid)
+        self._job = case.job(backend)
+        self._hits, self._seconds = 0, 0.0
+        self._in_place: dict[tuple[float, float], bool] = {}
+        self.wanted: dict | None = None
+        self.found: Map | None = None
+        self._send(None)
+
+    def answer(self, result: dict) -> None:
+        """Go on from the verdict on the wall that was wanted."""
+        self._hits += 1
+        self._seconds += result["seconds"]
+        self._in_place[self.wanted["stiffness"], self.wanted["damping"]] = result["in_place"]
+        self._send(result["stable"])
+
+    def _send(self, stable: bool | None) -> None:
+        try:
+            stiffness, damping = self._steps.send(stable)
+            self.wanted = self._job | {"stiffness": stiffness, "damping": damping}
+        except StopIteration as end:
+            walls = [(edge.stable_n_per_m, edge.damping_n_s_per_m) for edge in end.value]
+            in_place = [self._in_place.get(wall, False) for wall in walls]
+            self.wanted, self.found = None, Map(self._case, end.value, self._hits, in_place, self._seconds)
+
+    @property
+    def done(self) -> float:
+        """The part of the values of B that the trace is through with."""
+        dampings = self._grid.dampings
+        return dampings.index(self.wanted["damping"]) / len(dampings) if self.wanted else 1.0
+
+
+def run(
+    cases: list[Case],
+    backend: str,
+    known: store.Store,
+    client: Client | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> list[Map]:
+    """Return the map of each case.
+
+    Args:
+        cases: what to map; the grid is each scene's own.
+        backend: one of `hit.BACKENDS`.
+        known: where verdicts are kept, and looked for.
+        client: of a Dask cluster; None for this process alone.
+        progress: called after every verdict with how many maps are done, parts of one counted too.
+
+    Raises:
+        SceneError: if a case cannot be, or its scene has no section `zwidth`.
+        NeverReached: if in one of them the handle does not come to the wall.
+    """
+    traces = [_Tracing(case, backend) for case in cases]
+
+    def forward(tracing: _Tracing) -> dict | None:
+        """Answer what the store can; return the hit that is wanted next."""
+        while tracing.wanted and tracing.wanted in known:
+            tracing.answer(known.get(tracing.wanted))
+        if progress:
+            progress(sum(each.done for each in traces))
+        return tracing.wanted
+
+    def taken(tracing: _Tracing, result: dict) -> dict | None:
+        known.put(tracing.wanted, result)
+        return forward(tracing)
+
+    if client is None:
+        for tracing in traces:
+            job = forward(tracing)
+            while job:
+                job = taken(tracing, verdict(**job))
+    else:
+        # Every hit is a run of its own, also one that another trace has asked for.
+        waiting = {client.submit(verdict, **job, pure=False): each for each in traces if (job := forward(each))}
+        queue = as_completed(waiting)
+        for future in queue:
+            tracing = waiting.pop(future)
+            if job := taken(tracing, result_of(future)):
+                following = client.submit(verdict, **job, pure=False)
+                waiting[following] = tracing
+                queue.add(following)
+    return [tracing.found for tracing in traces]

@@ -1,0 +1,232 @@
+"""The device of a scene with more than a rigid handle: its parts as matrices, for `drivetrain` to advance.
+
+From the command u (N), what the controller asks of the motor with the steady push, to the handle, in that order. All
+is in terms of the handle's straight line: with the pulley's radius r, the motor's torque constant gives kf = Kt / r.
+
+- Amplifier: |u| <= kf I. Of bandwidth w (1/s): df/dt = w (u - f). Without a bandwidth and a motor, f = u.
+- Motor of resistance R, inductance L and voltage limit V, its force f. With a voltage given as the force that it would
+  hold at standstill, e = kf V / R, and the motor's speed vm: L/R df/dt = e - f - (kf^2 / R) vm. An amplifier with a
+  bandwidth is a current loop that asks for the e that makes df/dt = w (u - f), and gets no more than its limit; one
+  without asks for e = u, whatever the current is then: a voltage drive, damped by the motor.
+- Transmission: a cable of stiffness k and damping d. The motor's side is a mass of its own: with s its position less
+  the handle's, and w = ds/dt, mm d(v + w)/dt = f - c - bm (v + w), c = k s + d w. Without it c = f.
+- Hand: a mass that moves with the handle, held by a spring and a damper: the force kh (rest - x) - bh v.
+- Handle: m dv/dt = c + hand - b v - Fc sign(v), and rests for as long as v = 0 and what acts on it is within Fc.
+
+A converter or pulses come before all of these, on the command; pulses are given to what follows as they are.
+
+The state is x, v; s, w with a transmission; f with a lag or a motor: a part that is absent has no row.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import matrix_balance
+
+from .converter import AS_IT_IS, Pulse
+from .polynomials import FIRST
+from .taylor import GRIP, PHASES, QUANTITIES, SEEN, STATES, VOLTAGE, Train, phase_number
+
+LEG_RATE = 1.0
+"""Of a leg, the longest time that one Taylor polynomial serves: its length times the fastest rate."""
+LEGS_MAX = 25_000
+"""Legs of a sample that the solver takes on: 1 g on a damper of 1e4 N s/m for 1 ms, and a little more."""
+BEYOND = 1e100
+"""A rate of change, 1/s or N/s or whatever, with which no matrix can be balanced any more."""
+TRUNCATION = 2.0**-54
+
+
+@dataclass(frozen=True)
+class Motor:
+    """A brushed DC motor and its pulley; Attributes: by their names, as on its data sheet."""
+
+    resistance_ohm: float
+    inductance_h: float
+    torque_constant_n_m_per_a: float
+    voltage_limit_v: float
+    pulley_radius_m: float
+
+    @property
+    def newtons_per_ampere(self) -> float:
+        """Force at the handle of each ampere."""
+        return self.torque_constant_n_m_per_a / self.pulley_radius_m
+
+    @property
+    def stall_n(self) -> float:
+        """Force at standstill at the voltage's limit."""
+        return self.newtons_per_ampere * self.voltage_limit_v / self.resistance_ohm
+
+    @property
+    def electrical_per_s(self) -> float:
+        """Rate at which the current settles, R / L."""
+        return self.resistance_ohm / self.inductance_h
+
+    @property
+    def damping_n_s_per_m(self) -> float:
+        """What the motor's own voltage takes of its force as it moves, with the winding shorted."""
+        return self.newtons_per_ampere**2 / self.resistance_ohm
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """A cable between motor and handle."""
+
+    stiffness_n_per_m: float
+    damping_n_s_per_m: float
+    motor_mass_kg: float  # rotor and pulley, as felt at the handle
+    motor_viscous_n_s_per_m: float
+
+
+@dataclass(frozen=True)
+class Hand:
+    """What holds the handle."""
+
+    mass_kg: float
+    damping_n_s_per_m: float
+    stiffness_n_per_m: float
+    rest_m: float
+
+
+@dataclass(frozen=True)
+class Device:
+    """The parts; None for those that are absent.
+
+    Attributes:
+        mass_kg, viscous_n_s_per_m, coulomb_n: of the handle; `coulomb_n` is None without dry friction.
+        bandwidth_hz, force_limit_n: of the amplifier.
+        motor, transmission, hand: see their classes.
+        encoder_at_motor: whether the encoder is on the motor's side of the transmission.
+        pulse: what a pulse-width output makes of the command.
+    """
+
+    mass_kg: float
+    viscous_n_s_per_m: float = 0.0
+    coulomb_n: float | None = None
+    bandwidth_hz: float | None = None
+    force_limit_n: float = math.inf
+    motor: Motor | None = None
+    transmission: Transmission | None = None
+    hand: Hand | None = None
+    encoder_at_motor: bool = False
+    pulse: Pulse = AS_IT_IS
+
+    @property
+    def command_limit_n(self) -> float:
+        """What of a command is passed on: the amplifier's current, or a voltage drive's voltage, as a force."""
+        voltage_drive = self.motor is not None and self.bandwidth_hz is None
+        return self.motor.stall_n if voltage_drive else self.force_limit_n
+
+
+@dataclass(frozen=True)
+class Equations:
+    """A device in one phase; every quantity is a row, its coefficients of the state, of 1, and of the command.
+
+    Attributes:
+        rates: of change of the state.
+        on_handle: what acts on the handle, N, without Coulomb friction.
+        voltage: that the current loop asks for, N at standstill; None without one that has a limit.
+        seen: the encoder's position, m.
+    """
+
+    rates: np.ndarray
+    on_handle: np.ndarray
+    voltage: np.ndarray | None
+    seen: np.ndarray
+
+
+def equations(device: Device, along: int | None = None, limited: int = 0) -> Equations:
+    """Return the device's equations, those of this file's beginning.
+
+    Args:
+        device: its parts.
+        along: which way the handle moves, -1 or 1, or 0 where friction holds it; None for no Coulomb friction.
+        limited: -1 or 1 where a current loop's voltage is at that limit, else 0.
+    """
+    cable, hand, motor = device.transmission, device.hand, device.motor
+    lagging = device.bandwidth_hz is not None or motor is not None
+    n = 2 + 2 * (cable is not None) + lagging
+    unit = np.eye(n + 2)
+    nothing, position, one, command = np.zeros(n + 2), unit[0], unit[n], unit[n + 1]
+    velocity = nothing if along == 0 else unit[1]
+    force = unit[n - 1] if lagging else command
+    stretch, stretching = (unit[2], unit[3]) if cable else (nothing, nothing)
+
+    pull = cable.stiffness_n_per_m * stretch + cable.damping_n_s_per_m * stretching if cable else force
+    on_handle, mass = pull - device.viscous_n_s_per_m * velocity, device.mass_kg
+    if hand:
+        on_handle = on_handle + hand.stiffness_n_per_m * (hand.rest_m * one - position)
+        on_handle = on_handle - hand.damping_n_s_per_m * velocity
+        mass += hand.mass_kg
+    friction = (along or 0) * (device.coulomb_n or 0.0) * one
+    acceleration = nothing if along == 0 else (on_handle - friction) / mass
+    rates, motor_velocity = [velocity, acceleration], velocity + stretching
+    if cable:
+        on_motor = force - pull - cable.motor_viscous_n_s_per_m * motor_velocity
+        rates += [stretching, on_motor / cable.motor_mass_kg - acceleration]
+
+    voltage = asked = None
+    if device.bandwidth_hz is not None:
+        asked = 2 * math.pi * device.bandwidth_hz * (command - force)
+    if motor:
+        settled = force + motor.damping_n_s_per_m * motor_velocity
+        voltage = None if asked is None else settled + asked / motor.electrical_per_s
+        if asked is None or limited:
+            given = command if asked is None else limited * motor.stall_n * one
+            asked = motor.electrical_per_s * (given - settled)
+    if asked is not None:
+        rates.append(asked)
+    return Equations(np.array(rates), on_handle, voltage, position + stretch * device.encoder_at_motor)
+
+
+def fastest_per_s(device: Device) -> float:
+    """Return a bound on how fast the device changes: the largest 1-norm of its balanced matrices, 1/s;
+    infinite where a matrix has no numbers to balance."""
+    norms = []
+    for along in (0, 1):
+        for limited in (0, 1):
+            with np.errstate(over="ignore", invalid="ignore"):
+                rates = equations(device, along, limited).rates
+            if not (np.abs(rates) < BEYOND).all():
+                return math.inf
+            balanced = matrix_balance(rates[:, : len(rates)], permute=False)[0]
+            norms.append(np.abs(balanced).sum(axis=0).max())
+    return float(max(norms))
+
+
+def train(device: Device, longest_s: float) -> Train:
+    """Return the device as `drivetrain` advances it.
+
+    Args:
+        device: its parts.
+        longest_s: the longest interval of constant command.
+
+    A leg's polynomial ends where the rest of its series is under 2^-54 of what it moves.
+    """
+    fastest = fastest_per_s(device)
+    leg_s = min(longest_s, LEG_RATE / fastest) if fastest else longest_s
+    reach, order, rest = fastest * leg_s, 1, math.inf
+    while rest > TRUNCATION or order < 2:
+        order += 1
+        rest = reach**order / math.factorial(order + 1) / (1 - LEG_RATE / 2)
+    free = equations(device)
+    n = len(free.rates)
+    # Coefficients of the state, with room for states that it lacks; of 1, and of the command.
+    columns = [*range(n), STATES, STATES + 1]
+    tables = np.zeros((PHASES, QUANTITIES, STATES + 2))
+    for along in (-1, 0, 1):
+        for limited in (-1, 0, 1):
+            table, here = tables[phase_number(along, limited)], equations(device, along, limited)
+            table[:n, columns] = here.rates
+            table[SEEN, columns] = here.seen
+            table[GRIP, columns] = np.eye(n + 2)[1] if along else here.on_handle
+            table[VOLTAGE, columns] = 0.0 if here.voltage is None else here.voltage
+    return Train(
+        tables=tables,
+        series=np.zeros((FIRST + order + 1, QUANTITIES)),
+        coulomb_n=-1.0 if device.coulomb_n is None else device.coulomb_n,
+        voltage_limit_n=math.inf if free.voltage is None else device.motor.stall_n,
+        command_limit_n=device.command_limit_n,
+        pulse=device.pulse,
+        leg_s=leg_s,
+    )

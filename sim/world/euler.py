@@ -1,0 +1,155 @@
+"""A linear device in fixed steps of semi-implicit Euler: the ordinary way, to hold `drivetrain` against.
+
+From the same tables, in steps of `step_s`; the last before the command changes is what is left:
+
+- velocities, and the motor's force, go by their rates of change at the step's beginning;
+- positions go by the new velocities, straight over the step, and edges are passed where that line passes them (all at
+  the step's end would be an illegal transition of the pins for a handle that passes two in a step);
+- Coulomb friction is clamped: where a step would turn the handle, and friction could hold it, it rests; it breaks
+  loose with the first step whose force is beyond friction;
+- the voltage is within its limits, or at one, for a whole step.
+
+The error is of the order of a step. Steps in which a device diverges of itself are no scene (`longest_s`). In others a
+force that is limited moves it by no more than a bounded amount, so that a run has numbers to its end: a wall that is
+unstable is a verdict, as ever.
+"""
+
+import math
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from ...model.compiled import compiled
+from .advance import advance, advance_quietly
+from .converter import Pulse
+from .device import Device, equations
+from .encoder import level, next_cell, stamp
+from .taylor import (
+    GRIP,
+    SEEN,
+    STUCK,
+    State,
+    Train,
+    advance_in_stretches,
+    along_of,
+    limited_of,
+    never_quietly,
+    phase_number,
+    quantity,
+    stretch,
+)
+
+ROUNDING = 1e-6
+"""By which an eigenvalue of 1 may seem larger: where it is double, the root of a unit in the last place, and more."""
+BISECTIONS = 50
+
+
+class Stepped(NamedTuple):
+    """A device as `stepped` makes it; fields as those of `drivetrain.Train`."""
+
+    tables: np.ndarray
+    coulomb_n: float
+    voltage_limit_n: float
+    command_limit_n: float
+    pulse: Pulse
+    cable: bool  # whether the state has a stretch and its rate
+    step_s: float
+
+
+advance_quietly.register(Stepped)(never_quietly)
+advance.register(Stepped)(advance_in_stretches)
+
+
+def stepped(train: Train, cable: bool, step_s: float) -> Stepped:
+    """Return a device as this file advances it.
+
+    Args:
+        train: as `device.train` makes it.
+        cable: whether it has a transmission.
+        step_s: length of a step.
+    """
+    return Stepped(
+        train.tables, train.coulomb_n, train.voltage_limit_n, train.command_limit_n, train.pulse, cable, step_s
+    )
+
+
+def growth(device: Device, step_s: float) -> float:
+    """Return by how much a step may grow the state of a device left alone: its largest eigenvalue in any phase."""
+    places, largest = ([0, 2] if device.transmission else [0]), 0.0
+    for along, limited in product((0, 1), (0, 1)):
+        rates = equations(device, along, limited).rates
+        n = len(rates)
+        with_velocity = np.zeros((n, n))
+        with_velocity[places] = rates[places, :n]
+        rest = rates[:, :n] - with_velocity
+        step = (np.eye(n) + step_s * with_velocity) @ (np.eye(n) + step_s * rest)
+        largest = max(largest, float(np.abs(np.linalg.eigvals(step)).max()))
+    return largest
+
+
+def longest_s(device: Device, most_s: float) -> float:
+    """Return the longest step, up to `most_s`, in which a device does not diverge of itself, s."""
+    if growth(device, most_s) <= 1 + ROUNDING:
+        return most_s
+    low, high = 0.0, most_s
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if growth(device, middle) <= 1 + ROUNDING else (low, middle)
+    return low
+
+
+@compiled
+def step(plant, state, command_n, seconds):
+    """Return the `State` after one step."""
+    tables = plant.tables
+    along, limited = along_of(plant, state, command_n), limited_of(plant, state, command_n)
+    phase = phase_number(along, limited)
+    velocity = state.velocity_m_per_s + seconds * quantity(tables, phase, 1, state, command_n)
+    # Without friction its level is negative, and holds nothing.
+    held = velocity * along <= 0.0 and abs(quantity(tables, STUCK, GRIP, state, command_n)) <= plant.coulomb_n
+    stopped = velocity if held else 0.0
+    velocity -= stopped
+    first, second, third = state.others
+    if plant.cable:
+        # The motor's side is not stopped with the handle.
+        second += seconds * quantity(tables, phase, 3, state, command_n) + stopped
+        first += seconds * second
+        third += seconds * quantity(tables, phase, 4, state, command_n)
+    else:
+        first += seconds * quantity(tables, phase, 2, state, command_n)
+    return State(state.position_m + seconds * velocity, velocity, (first, second, third), state.width)
+
+
+@compiled
+def _seen(plant, state):
+    """Return the encoder's position: that of the handle, or with the stretch that of the motor's side."""
+    return state.position_m + plant.tables[STUCK, SEEN, 2] * state.others[0]
+
+
+@stretch.register(Stepped)
+@compiled
+def _stretch(
+    plant, encoder, state, cell, command_n, since_s, until_s, clock, clocks, edge_clocks, edge_levels, n_edges
+):
+    room = min(len(edge_clocks), len(edge_levels))
+    # A whole number of steps has no rest, whatever rounding says.
+    steps = math.ceil((until_s - since_s) / plant.step_s * (1 - 1e-9))
+    for number in range(steps):
+        begin_s = since_s + number * plant.step_s
+        seconds = (until_s if number == steps - 1 else begin_s + plant.step_s) - begin_s
+        before_m = _seen(plant, state)
+        state = step(plant, state, command_n, seconds)
+        after_m = _seen(plant, state)
+        while not cell.lower_m <= after_m < cell.upper_m and 0 <= n_edges < room:
+            upwards = after_m >= cell.upper_m
+            edge_m = cell.upper_m if upwards else cell.lower_m
+            at_s = begin_s + seconds * (edge_m - before_m) / (after_m - before_m)
+            edge_clocks[n_edges] = clock + stamp(encoder, upwards, at_s, clocks)
+            cell = next_cell(encoder, cell, upwards)
+            edge_levels[n_edges] = level(cell.number)
+            n_edges += 1
+        if not cell.lower_m <= after_m < cell.upper_m:
+            n_edges = -1
+            break
+    return state, cell, n_edges

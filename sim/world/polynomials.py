@@ -1,0 +1,104 @@
+"""Polynomials over a leg, its time 0 to 1: what is sure of them without looking closer, and where they pass a value.
+
+An array holds a polynomial a column: three sums, then the coefficients. It is filled by who expands a motion.
+"""
+
+from ...model.compiled import compiled
+
+END, BEND, STEEPENING, FIRST = 0, 1, 2, 3
+"""Of a polynomial: its value at the end; two sums of its coefficients' sizes; and its first coefficient."""
+NEVER, UNSURE = 2.0, -1.0
+"""In place of a time."""
+
+
+@compiled
+def measure(series):
+    """Fill `END`, `BEND` and `STEEPENING` of each polynomial; the last terms first, for they are the smallest."""
+    for row in range(FIRST):
+        for number in range(series.shape[1]):
+            series[row, number] = 0.0
+    for j in range(len(series) - 1, FIRST + 1, -1):
+        for number in range(series.shape[1]):
+            size = abs(series[j, number])
+            series[END, number] += series[j, number]
+            series[BEND, number] += size
+            series[STEEPENING, number] += (j - FIRST) * size
+    for number in range(series.shape[1]):
+        series[END, number] += series[FIRST + 1, number]
+        series[END, number] += series[FIRST, number]
+
+
+@compiled
+def halve(series):
+    """Make the polynomials those of the leg's first half."""
+    share = 1.0
+    for j in range(FIRST + 1, len(series)):
+        share *= 0.5
+        for number in range(series.shape[1]):
+            series[j, number] *= share
+    measure(series)
+
+
+@compiled
+def value(series, number, time):
+    """Return a polynomial's value and its slope at a time of the leg, 0 to 1."""
+    result = slope = 0.0
+    for j in range(len(series) - 1, FIRST - 1, -1):
+        slope = slope * time + result
+        result = result * time + series[j, number]
+    return result, slope
+
+
+@compiled
+def at(series, number, time):
+    """Return a polynomial's value at a time of the leg, 0 to 1."""
+    return series[END, number] if time == 1.0 else value(series, number, time)[0]
+
+
+@compiled
+def stays(series, number, low, high):
+    """Return whether a polynomial is sure to stay within low <= p < high, and whether it goes one way all the leg."""
+    start, slope, bend = series[FIRST, number], series[FIRST + 1, number], series[BEND, number]
+    inside = low <= start + min(slope, 0.0) - bend and start + max(slope, 0.0) + bend < high
+    return inside, abs(slope) > series[STEEPENING, number]
+
+
+@compiled
+def root(series, number, wanted, after):
+    """Return the time, `after` to 1, at which a polynomial that goes one way passes `wanted`: Newton's method."""
+    low, high = after, 1.0
+    rising = series[FIRST + 1, number] > 0.0
+    time = 0.5 * (low + high)
+    for _ in range(60):
+        here, slope = value(series, number, time)
+        if here == wanted:
+            break
+        if (here > wanted) == rising:
+            high = time
+        else:
+            low = time
+        following = time - (here - wanted) / slope if slope != 0.0 else low
+        if not low < following < high:
+            following = 0.5 * (low + high)
+        if abs(following - time) < 1e-15:
+            break
+        time = following
+    return time
+
+
+@compiled
+def leaves(series, number, low, high, surely):
+    """Return when (0 to 1) a polynomial leaves low <= p < high: `NEVER`, or `UNSURE`, which `surely` excludes."""
+    inside, one_way = stays(series, number, low, high)
+    if inside:
+        return NEVER
+    if not one_way and not surely:
+        return UNSURE
+    start, end = series[FIRST, number], series[END, number]
+    if low <= end < high:
+        return NEVER
+    bound = low if end < low else high
+    # A rounding may have begun it outside on that side; on the other, it crosses all of the range.
+    if (start < low and bound == low) or (start >= high and bound == high):
+        return 0.0
+    return root(series, number, bound, 0.0)

@@ -1,0 +1,200 @@
+"""The handle: a rigid mass with one degree of freedom, viscous friction, and Coulomb friction that really sticks.
+
+    m dv/dt = F - b v - Fc sign(v),   dx/dt = v,   and v = 0 for as long as the handle rests and |F| <= Fc
+
+The applied force F is constant over an interval (zero-order hold), so the motion is not integrated but known. With
+z = -b t / m, phi1(z) = (e^z - 1) / z and phi2(z) = (phi1(z) - 1) / z (the first columns of the matrix exponential),
+and `net` the force left after Coulomb friction,
+
+    v(t) = v0 + v0 (e^z - 1) + net t phi1(z) / m
+    x(t) = x0 + v0 t phi1(z) + net t^2 phi2(z) / m
+
+All terms of a row are computed to a few units in the last place for every z, b = 0 included. The velocity is monotone
+while `net` is constant, so an interval holds at most one turn (an instant of zero velocity), and its time is known too.
+
+Intervals of equal length share their coefficients: a `Span` is computed once, and only an interval that is cut by an
+event (a turn, an encoder edge) evaluates exponentials and logarithms.
+"""
+
+import math
+from typing import NamedTuple
+
+from ...model.compiled import compiled
+
+
+class Handle(NamedTuple):
+    """The moving mass."""
+
+    mass_kg: float  # > 0
+    viscous_n_s_per_m: float  # >= 0
+
+
+class Coulomb(NamedTuple):
+    """Dry friction of one level, at rest and in motion. Where a handle has none, pass None and it is not compiled."""
+
+    level_n: float  # >= 0
+
+
+class Rigid(NamedTuple):
+    """A handle that is driven by the force itself: the device with the least in it."""
+
+    handle: Handle
+    coulomb: Coulomb | None
+
+
+class Motion(NamedTuple):
+    """Position and velocity at one instant; a velocity of exactly zero is rest."""
+
+    position_m: float
+    velocity_m_per_s: float
+
+
+class Span(NamedTuple):
+    """What a length of time does to a motion: the coefficients of the two equations of this file."""
+
+    seconds: float
+    decay: float  # e^z - 1: the part of the velocity that viscous friction takes, from 0 to -1
+    coast_s: float  # t phi1(z): travel per unit of initial velocity
+    velocity_per_newton: float  # t phi1(z) / m
+    position_per_newton: float  # t^2 phi2(z) / m
+
+
+@compiled
+def span(handle, seconds):
+    """Return the `Span` of `seconds` >= 0 of this handle.
+
+    Below |z| = 1/4 the difference in phi2 would cancel, so its Taylor series 2 phi2 = 1 + z/3 (1 + z/4 (1 + ...)) is
+    summed to where the next term is under 2**-53; and a short series serves the microseconds between events.
+    """
+    z = -handle.viscous_n_s_per_m * seconds / handle.mass_kg
+    if z > -0.25:
+        series = 1.0
+        for n in range(6 if z > -1e-3 else 12, 2, -1):
+            series = 1.0 + z * series / n
+        phi2 = 0.5 * series
+        phi1 = 1.0 + z * phi2
+        decay = z * phi1
+    else:
+        decay = math.expm1(z)
+        phi1 = decay / z
+        phi2 = (phi1 - 1.0) / z
+    coast = seconds * phi1
+    return Span(seconds, decay, coast, coast / handle.mass_kg, seconds * seconds * phi2 / handle.mass_kg)
+
+
+@compiled
+def glide(motion, net_n, interval):
+    """Return the `Motion` after the span `interval` under a constant net force, whatever its velocity passes through.
+
+    The change of velocity is added to the old one: multiplying by e^z instead would repeat that factor's rounding in
+    every interval, a bias of the friction by up to 2**-53 / |z| of itself.
+    """
+    change = motion.velocity_m_per_s * interval.decay + net_n * interval.velocity_per_newton
+    travel = motion.velocity_m_per_s * interval.coast_s + net_n * interval.position_per_newton
+    return Motion(motion.position_m + travel, motion.velocity_m_per_s + change)
+
+
+@compiled
+def sticks(coulomb, motion, force_n):
+    """Return whether the handle rests and the applied force cannot move it."""
+    if coulomb is None:
+        return False
+    return motion.velocity_m_per_s == 0.0 and abs(force_n) <= coulomb.level_n
+
+
+@compiled
+def net_force(coulomb, motion, force_n):
+    """Return the applied force (N) less Coulomb friction, for a handle that does not stick.
+
+    Friction opposes the velocity, or at rest the motion about to begin, which is along the force.
+    """
+    if coulomb is None:
+        return force_n
+    along = motion.velocity_m_per_s if motion.velocity_m_per_s != 0.0 else force_n
+    return force_n - coulomb.level_n if along > 0.0 else force_n + coulomb.level_n
+
+
+@compiled
+def turned(before, after):
+    """Return whether a motion under one net force came to rest or turned back between `before` and `after`."""
+    if before.velocity_m_per_s > 0.0:
+        return after.velocity_m_per_s <= 0.0
+    return before.velocity_m_per_s < 0.0 and after.velocity_m_per_s >= 0.0
+
+
+@compiled
+def turn(handle, motion, net_n, seconds):
+    """Return the time (s) and the `Motion` at which the velocity reaches zero, for a motion that has `turned`.
+
+    v = 0 at t = (m / b) log(1 + b w) with w = -v0 / net; the time is held within 0 to `seconds`, the interval in which
+    the turn was found, against the rounding of either.
+    """
+    velocity = motion.velocity_m_per_s
+    at = seconds
+    if net_n < 0.0 < velocity or velocity < 0.0 < net_n:  # else it was fading to nothing, and is taken to have done so
+        slowness = -velocity / net_n
+        growth = handle.viscous_n_s_per_m * slowness
+        if growth < 1e-17:
+            at = handle.mass_kg * slowness
+        else:
+            at = handle.mass_kg * math.log1p(growth) / handle.viscous_n_s_per_m
+        at = min(at, seconds)
+    return at, Motion(glide(motion, net_n, span(handle, at)).position_m, 0.0)
+
+
+@compiled
+def reach(handle, motion, net_n, seconds, travel_m):
+    """Return the time (s, 0 to `seconds`) at which a motion in one direction has travelled `travel_m` (signed).
+
+    Newton's method on the exact travel, from the root of its second-order expansion (which is the answer for b = 0).
+    The velocity is monotone, so from its second step on Newton's method approaches from one side and needs no bracket.
+    It ends when the travel is met to its own rounding.
+    """
+    velocity = motion.velocity_m_per_s
+    acceleration = (net_n - handle.viscous_n_s_per_m * velocity) / handle.mass_kg
+    final = math.sqrt(max(velocity * velocity + 2.0 * acceleration * travel_m, 0.0))
+    speed = abs(velocity) + final
+    at = 2.0 * abs(travel_m) / speed if speed > 0.0 else seconds
+    for _ in range(64):
+        now = glide(Motion(0.0, velocity), net_n, span(handle, at))
+        short = travel_m - now.position_m
+        if abs(short) <= 1e-14 * abs(travel_m):
+            break
+        if now.velocity_m_per_s * travel_m > 0.0:
+            at += short / now.velocity_m_per_s
+        else:
+            at = 0.0  # at a turn the slope is lost: approach it from the start, where there is one
+    return min(max(at, 0.0), seconds)
+
+
+@compiled
+def resume(handle, coulomb, rest, force_n, seconds):
+    """Return the `Motion` `seconds` after the turn at `rest`: stuck there, or slipping along the force."""
+    if sticks(coulomb, rest, force_n):
+        return rest
+    return glide(rest, net_force(coulomb, rest, force_n), span(handle, seconds))
+
+
+@compiled
+def advance(handle, coulomb, motion, force_n, interval):
+    """Return the `Motion` at the end of an interval of constant applied force.
+
+    Stick and slip are events at their exact time. A handle that sticks keeps its `Motion` bit for bit.
+
+    Args:
+        handle: a `Handle`.
+        coulomb: a `Coulomb`, or None for a handle without dry friction.
+        motion: the `Motion` at the start.
+        force_n: motor and wall together (N), positive towards positive positions.
+        interval: `span(handle, seconds)` of the length of the interval.
+    """
+    if sticks(coulomb, motion, force_n):
+        return motion
+    net_n = net_force(coulomb, motion, force_n)
+    end = glide(motion, net_n, interval)
+    if coulomb is None:
+        return end
+    if turned(motion, end):
+        at_s, rest = turn(handle, motion, net_n, interval.seconds)
+        return resume(handle, coulomb, rest, force_n, interval.seconds - at_s)
+    return end

@@ -1,0 +1,70 @@
+"""The integer square root: RTL against model, and both against exact integers."""
+
+import math
+
+import cocotb
+import numpy as np
+import pytest
+from cocotb.triggers import ClockCycles, RisingEdge
+
+from hardwall.hdl.arithmetic.sqrt import Sqrt
+from hardwall.model.arithmetic.sqrt import isqrt
+from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+
+
+def around_squares(width: int) -> list[int]:
+    """Return the radicands at which a root changes, and its neighbours, over all magnitudes; and the extremes."""
+    top = (1 << width) - 1
+    roots = {r for k in range((width + 1) // 2 + 1) for r in (1 << k, (1 << k) - 1, math.isqrt(top >> k))}
+    return sorted({0, 1, top} | {v for r in roots for v in (r * r - 1, r * r, r * r + 1) if 0 <= v <= top})
+
+
+@pytest.mark.parametrize("width", [8, 16, 17, 36, 53, 62])
+def test_model_is_the_exact_root(width):
+    radicands = around_squares(width) + rng().integers(0, 1 << width, 20_000).tolist()
+    assert [isqrt(r) for r in radicands] == [math.isqrt(r) for r in radicands]
+
+
+def test_model_is_exhaustively_exact_below_two_to_the_18():
+    assert all(isqrt(r) == math.isqrt(r) for r in range(1 << 18))
+
+
+@cocotb.test(**CAMPAIGN)
+async def follows_model(dut):
+    width = parameters()["width"]
+    component = Sqrt(width)
+    bench = Bench(dut, component)
+    await bench.reset()
+    # Exhaustive where that is less than the random campaign.
+    radicands = range(1 << width) if 1 << width <= SAMPLES else rng().integers(0, 1 << width, SAMPLES).tolist()
+    rows = [(radicand,) for radicand in [*around_squares(width), *radicands]]
+    starts, roots = await bench.campaign("start", "done", ("radicand",), ("root",), rows)
+    expected = np.array([isqrt(r) for r in starts.column("radicand").tolist()])
+    check(starts, roots, {"root": expected}, component.latency)
+
+
+@cocotb.test()
+async def a_new_start_abandons_the_old_one(dut):
+    component = Sqrt(**parameters())
+    bench = Bench(dut, component)
+    await bench.reset()
+    roots = bench.monitor("done", "root")
+    top = (1 << component.width) - 1
+    for clocks in range(1, component.latency):
+        bench.drive(start=1, radicand=0)
+        await RisingEdge(dut.clk)
+        bench.drive(start=0)
+        await ClockCycles(dut.clk, clocks - 1) if clocks > 1 else None
+        await bench.transact("start", "done", radicand=top)
+    assert roots.rows == [(math.isqrt(top),)] * (component.latency - 1)
+
+
+@pytest.mark.parametrize("width", [1, 2, 3, 16, 35])
+def test_rtl(width):
+    simulate(__file__, Sqrt, width=width)
+
+
+@pytest.mark.parametrize(("width", "error"), [(0, ValueError), (-3, ValueError), (8.0, TypeError), ("8", TypeError)])
+def test_bad_width_is_refused(width, error):
+    with pytest.raises(error, match=f"not {width!r}$"):
+        Sqrt(width)

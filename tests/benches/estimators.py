@@ -1,0 +1,46 @@
+"""What the test of every velocity estimator does alike: rows of inputs through the model, and through the RTL."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from hardwall.hdl.estimators.estimate import EstimatorBlock
+from hardwall.model.estimators.estimate import estimate
+from hardwall.model.quadrature import seen_count
+from hardwall.testing.bench import Bench, check
+
+
+def names(design) -> tuple[str, ...]:
+    """Return what a row holds, in order: what the estimator sees of the decoder, the restart, the run-time words."""
+    return (*design.inputs, "restart", *(word.name for word in design.words))
+
+
+def reset_words(design) -> list[int]:
+    """Return the run-time words after reset, in a row's order."""
+    return [word.reset for word in design.words]
+
+
+def model(design, rows: Iterable[tuple[int, ...]], start) -> dict[str, np.ndarray]:
+    """Return velocity and flags for rows as `names`, from the state `start`."""
+    state, out, n_seen = start, [], len(design.inputs)
+    params, held = None, None
+    for row in rows:
+        restart, words = row[n_seen], row[n_seen + 1 :]
+        if words != held:
+            params = design.params(dict(zip(names(design)[n_seen + 1 :], words, strict=True)))
+            held = words
+        seen = seen_count(0)._replace(**dict(zip(design.inputs, row, strict=False)))
+        state, velocity, flags = estimate(params, state, seen, restart)
+        out.append((velocity, flags))
+    velocity, flags = zip(*out, strict=True)
+    return {"velocity": np.array(velocity), "saturated": np.array(flags)}
+
+
+async def follow(dut, component: EstimatorBlock, rows: Iterable[tuple[int, ...]], start) -> dict[str, np.ndarray]:
+    """Put rows through the RTL and hold it to the model, exactly; return what the model made of them."""
+    design, bench = component.design, Bench(dut, component)
+    await bench.reset()
+    inputs, outputs = await bench.campaign("strobe", "valid", names(design), ("velocity", "saturated"), rows)
+    expected = model(design, inputs.rows, start)
+    check(inputs, outputs, expected, component.latency)
+    return expected

@@ -1,0 +1,173 @@
+"""The command line: what it prints, and that every bad input is one line that says what, where and what is accepted."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hardwall.sim.scene import load
+from stimuli.command_line import call
+
+SEED = (load.FOLDER / "seed-2011.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["hit", "no-such"], f"scene must be one of {', '.join(load.names())}, or a .toml file, not 'no-such'"),
+        (
+            ["hit", "no-such.toml"],
+            f"scene must be one of {', '.join(load.names())}, or a .toml file, not 'no-such.toml'",
+        ),
+        (
+            ["hit", "--set", "handle.mas_kg=1"],
+            "seed-2011: handle.mas_kg is not a key of a scene; did you mean mass_kg?",
+        ),
+        (["hit", "--set", "handel.mass_kg=1"], "handel is not a key of a scene; did you mean handle?"),
+        (["hit", "--set", "handle.mass_kg=-1"], "seed-2011: handle.mass_kg must be more than 0, not -1"),
+        (["hit", "--set", "handle.mass_kg=heavy"], "handle.mass_kg must be a number, not 'heavy'"),
+        (["hit", "--set", "handle.mass_kg=nan"], "handle.mass_kg must be a finite number, not nan"),
+        (["hit", "--set", "handle.mass_kg="], "handle.mass_kg is missing"),
+        (["hit", "--set", "handle"], "--set must be KEY=VALUE, not 'handle'"),
+        (["hit", "--set", "controller.sample_hz=7000"], "controller.sample_hz must divide clock_hz 12000000, not 7000"),
+        (["hit", "--set", "controller.sample_hz=0.5"], "controller.sample_hz must be a whole number, not 0.5"),
+        (
+            ["hit", "--set", "controller.gains.levant.alpha_m_per_s2=1e9"],
+            "controller.gains.levant.alpha_m_per_s2 must be 9.31323e-08 to 51200 at these rates, not 1000000000.0",
+        ),
+        (["hit", "--stiffness", "1e9"], "wall.stiffness_n_per_m must be 0 to 255996 N/m, not 1000000000.0"),
+        (["hit", "--stiffness", "250e3"], "wall.stiffness_n_per_m must be 0 to 200000, what the controller is for"),
+        (["hit", "--set", "protocol.settle_s=1e308"], "protocol.settle_s must be a sample of 0.0001 s to 100000"),
+        (["hit", "--set", "protocol.measure_s=1e-9"], "protocol.measure_s must be a sample of 0.0001 s to 100000"),
+        (["hit", "--set", "amplifier.delay_s=1e300"], "amplifier.delay_s must be 0 to settle_s 4, not 1e+300"),
+        (
+            ["hit", "--set", "controller.gains.fdm.x=1"],
+            "controller.gains.fdm.x is not a key of a scene; its section has",
+        ),
+        (["hit", "--stiffness", "-5"], "wall.stiffness_n_per_m must be at least 0, not -5.0"),
+        (["hit", "--damping", "1e6"], "wall.damping_n_s_per_m must be 0 to 409"),
+        (
+            ["hit", "--set", "controller.speed_max_m_per_s=20.0"],
+            "controller.speed_max_m_per_s must be at most 8, the decoder's limit",
+        ),
+        (["hit", "--set", "encoder.phase_error_counts=0.99"], "encoder.phase_error_counts and duty_error_counts must"),
+        (
+            ["hit", "--set", "encoder.phase_error_counts=[1,2]"],
+            "encoder.phase_error_counts must be a finite number, or a list of four",
+        ),
+        (["hit", "--output", "u7"], "controller.output must be one of u, u1, not 'u7'"),
+        (["hit", "--estimator", "fdm", "--output", "u1"], "controller.output must be one of u, not 'u1'"),
+        (["hit", "--estimator", "nobody"], "'nobody' is not one of 'fdm', 'levant'"),
+        (["hit", "--backend", "vhdl"], "'vhdl' is not one of 'float', 'fixed', 'rtl'"),
+        (["hit", "--stiffness", "stiff"], "--stiffness"),
+        (["hit", "--plot", "hit.bmp"], "--plot must end in .pdf or .png or .svg, not 'hit.bmp'"),
+        (["hit", "--trace", "hit.vcd"], "--trace must end in .fst or .npz, not 'hit.vcd'"),
+        (["hit", "--plot", "/proc/none/hit.png"], "--plot '/proc/none/hit.png' cannot be written"),
+        (["hit", "--trace", "hit.fst", "--backend", "fixed"], "--trace hit.fst needs --backend rtl"),
+        (["hit", "--set", "amplifier.delay_s=1.5e-5"], "amplifier.delay_s must be a whole number of samples"),
+        (["hit", "--set", "protocol.start_m=-9.0"], "protocol.start_m must be -0.15 to 0"),
+        (
+            ["hit", "--set", "protocol.mean_s=9.0"],
+            "protocol.mean_s must be a sample of 0.0001 s to settle_s 4, not 9.0",
+        ),
+        (["table", "no-such.json"], "no-such.json: no such file"),
+        (["shoot"], "No such command 'shoot'"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(monkeypatch, capsys, tmp_path, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = call(monkeypatch, capsys, *arguments)
+    assert message in err
+    assert err.startswith("hardwall: error: ")
+    assert err.count("\n") == 1
+    assert out == ""
+    assert code == 2
+    assert not list(tmp_path.iterdir()), "nothing is left behind"
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "scene.toml: handle is missing"),
+        (b"[handle\n", "scene.toml: not a readable TOML file"),
+        (b"\xff\xfe", "scene.toml: not a readable TOML file"),
+        (SEED.replace("mass_kg", "mass").encode(), "scene.toml: handle.mass is not a key of a scene"),
+        (
+            SEED.replace("mass_kg = 0.35", "mass_kg = 'a'").encode(),
+            "scene.toml: handle.mass_kg must be a number, not 'a'",
+        ),
+        (b"handle = 3\n", "scene.toml: handle must be a section, not 3"),
+    ],
+)
+def test_bad_scene_files_are_named(monkeypatch, capsys, tmp_path, content, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_bytes(content)
+    code, out, err = call(monkeypatch, capsys, "hit", "scene.toml")
+    assert message in err
+    assert err.count("\n") == 1
+    assert (code, out) == (2, "")
+
+
+def test_a_replay_does_not_overwrite_its_recording(monkeypatch, capsys, tmp_path):
+    file = tmp_path / "recording.csv"
+    file.write_text("counts\n" + "0\n" * 9)
+    code, out, err = call(monkeypatch, capsys, "replay", file, "--column", "counts", "--rate", "1000", "--out", file)
+    assert "--out must be another file than the recording" in err
+    assert (code, out) == (2, "")
+    assert file.read_text().startswith("counts\n")
+    code, _, err = call(monkeypatch, capsys, "replay", file, "--column", "counts", "--rate", "1e-300")
+    assert (code, err.count("\n")) == (2, 1)
+
+
+def test_a_name_with_markup_is_only_a_name(monkeypatch, capsys, tmp_path):
+    file = tmp_path / "[red]x.toml"
+    file.write_text(SEED)
+    code, out, _ = call(monkeypatch, capsys, "hit", file, "--backend", "float")
+    assert code == 0
+    assert "[red]x" in out
+
+
+def test_a_scene_file_of_ones_own_runs(monkeypatch, capsys, tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(SEED)
+    code, out, _ = call(monkeypatch, capsys, "hit", file, "--json", "--backend", "float")
+    report = json.loads(out)
+    assert code == 0
+    assert report["scene"] == "mine"
+
+
+def test_json_has_the_promised_keys_and_nothing_else_is_on_stdout(monkeypatch, capsys):
+    code, out, _ = call(monkeypatch, capsys, "hit", "--json", "--estimator", "levant", "--output", "u1")
+    report = json.loads(out)
+    assert code == 0
+    assert set(report) == {
+        "scene", "backend", "estimator", "output", "stiffness_n_per_m", "damping_n_s_per_m", "stable", "touched",
+        "rms_mm",
+        "mean_mm", "samples", "seconds", "samples_per_s", "max_force_n", "estimate_rms_mm_per_s", "flags",
+        "force_sha256",
+    }  # fmt: skip
+    assert (report["output"], report["backend"], report["samples"]) == ("u1", "fixed", 60_000)
+
+
+def test_table_puts_reports_side_by_side(monkeypatch, capsys, tmp_path):
+    files = []
+    for estimator in ("fdm", "levant"):
+        _, out, _ = call(monkeypatch, capsys, "hit", "--json", "--estimator", estimator)
+        files.append(tmp_path / f"{estimator}.json")
+        files[-1].write_text(out)
+    code, out, _ = call(monkeypatch, capsys, "table", *files)
+    assert code == 0
+    assert "fdm u" in out
+    assert "levant u" in out
+    files[0].write_text("{}")
+    code, _, err = call(monkeypatch, capsys, "table", *files)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "not a JSON report" in err
+
+
+def test_the_console_command_is_installed():
+    script = Path(sys.executable).with_name("hardwall")
+    done = subprocess.run([script, "hit", "nowhere"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")

@@ -1,0 +1,118 @@
+"""The commands that compare estimators: what they print, what they refuse, and that nothing computed is lost."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from hardwall.model.compiled import build_dir
+from stimuli.command_line import call
+
+KEYS = {
+    "estimator", "output", "backend", "sample_hz", "signal", "rms_mm_s", "max_mm_s", "delay_s", "chatter_mm_s",
+}  # fmt: skip
+SHORT = ["--estimators", "fdm,levant:u1", "--rates", "1e3,2000"]
+
+
+@pytest.fixture(autouse=True)
+def fresh(tmp_path, monkeypatch):
+    """Results go to an empty folder; what is compiled stays where it is."""
+    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
+
+
+def test_rows_as_json_and_as_a_table(monkeypatch, capsys):
+    arguments = ["accuracy", *SHORT, "--workers", 1, "--signal", "hit", "--signal", "steady:10"]
+    code, out, err = call(monkeypatch, capsys, *arguments, "--json")
+    assert (code, err) == (0, "")
+    rows = json.loads(out)
+    assert len(rows) == 8
+    assert all(set(row) >= KEYS for row in rows)
+    assert {(row["estimator"], row["output"]) for row in rows} == {("fdm", "u"), ("levant", "u1")}
+    assert [row["delay_s"] is None for row in rows] == [row["signal"] == "steady:10" for row in rows]
+    code, out, err = call(monkeypatch, capsys, *arguments)
+    assert (code, err) == (0, "")
+    assert "levant u1" in out
+    assert "mm/s" in out
+
+
+def test_fixed_is_rtl(monkeypatch, capsys):
+    arguments = ["accuracy", "--estimators", "fdm", "--rates", "1e4", "--signal", "hit", "--workers", 1, "--json"]
+    fixed, rtl = (
+        json.loads(call(monkeypatch, capsys, *arguments, "--backend", each)[1])[0] for each in ("fixed", "rtl")
+    )
+    assert {**fixed, "backend": "rtl"} == rtl
+
+
+@pytest.mark.parametrize("figure", [1, 2])
+def test_figures_are_drawn(monkeypatch, capsys, tmp_path, figure):
+    picture = tmp_path / "figure.svg"
+    few = [] if figure == 1 else ["--rates", "1e3,1e4"]
+    arguments = ["accuracy", "--figure", figure, *few, "--plot", picture, "--workers", 1, "--json"]
+    code, out, _ = call(monkeypatch, capsys, *arguments)
+    assert code == 0
+    rows, text = json.loads(out), picture.read_text()
+    if figure == 1:
+        assert {row["sample_hz"] for row in rows} == {10_000}
+        wanted = ("velocity (mm/s)", "time (s)", "exact derivative", "Levant u, adjusted gains")
+    else:
+        assert {row["sample_hz"] for row in rows} == {1_000, 10_000}
+        wanted = ("RMS error (mm/s)", "sample rate (Hz)", "butterworth, 0.1 fs", "levant u, proposed gains", "2√(ε/C)")
+    assert [label for label in wanted if label not in text] == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["accuracy", "--signal", "noise"], "--signal: signal must be one of paper, "),
+        (["accuracy", "--figure", "3"], "Invalid value for '--figure': "),
+        (["accuracy", "--figure", "2", "--signal", "hit"], "--figure 2 has a signal of its own"),
+        (["accuracy", "--estimators", "nobody"], "--estimators: estimator must be one of fdm, "),
+        (["accuracy", "--estimators", "levant:v"], "--estimators: output of levant must be one of u, u1, not 'v'"),
+        (["accuracy", "--rates", "1e2"], "--rates must be whole numbers of 1000 to 1e+07 Hz, not '1e2'"),
+        (["accuracy", "--rates", "1e3,fast"], "--rates must be whole numbers of 1000 to 1e+07 Hz, not 'fast'"),
+        (["accuracy", "--rates", ""], "--rates must be whole numbers of 1000 to 1e+07 Hz, not ''"),
+        (["accuracy", "--rates", "nan"], "--rates must be whole numbers of 1000 to 1e+07 Hz, not 'nan'"),
+        (["accuracy", "--encoder-phase-error", "2"], "phase_error_counts and duty_error_counts must leave each edge"),
+        (["accuracy", "--acceleration-max", "0"], "--acceleration-max must be more than 0 and less than 1e6 m/s^2"),
+        (["accuracy", "--acceleration-max", "nan"], "--acceleration-max must be more than 0 and less than 1e6 m/s^2"),
+        (["accuracy", "--acceleration-max", "1e-9", *SHORT], "levant at 2000 Hz with C 1e-09 m/s^2: "),
+        (["accuracy", "--signal", "none.csv:a:b", "--estimators", "fdm"], "none.csv: there is no such file"),
+        (["accuracy", "--signal", "none.csv:counts", "--rates", "1e3"], "--rates, --encoder-phase-error and --acceler"),
+        (["accuracy", "--figure", "1", "--rates", "1e3,1e4", "--plot", "a.png"], "--figure 1 is drawn at one rate of"),
+        (["accuracy", "--signal", "none.csv:counts", "--plot", "a.png"], "--plot draws error against rate for one"),
+        (["accuracy", "--plot", "a.gif"], "--plot must end in .pdf or .png or .svg, not 'a.gif'"),
+        (["choose", "--rate", "1"], "--rate must be whole numbers of 1000 to 1e+07 Hz, not '1.0'"),
+        (["bits", "--estimators", ""], "--estimators: estimator must be one of fdm, "),
+        (["costs", "--device", "z80"], "Invalid value for '--device'"),
+    ],
+)
+def test_bad_input_is_one_line(monkeypatch, capsys, tmp_path, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = call(monkeypatch, capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"hardwall: error: {message}")
+    assert err.count("\n") == 1
+
+
+def test_an_interrupted_run_loses_nothing_and_ends_its_workers(tmp_path):
+    program = Path(sys.executable).with_name("hardwall")
+    command = [program, "accuracy", "--estimators", "fdm,levant", "--rates", "1e3,1e4,1e5,1e6,1e7", "--workers", "2"]
+    environment = os.environ | {"HARDWALL_BUILD": str(tmp_path)}
+    (tmp_path / "numba").symlink_to(build_dir() / "numba")
+    run = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    results = tmp_path / "results"
+    deadline = time.monotonic() + 300
+    while not (results.exists() and any(path.stat().st_size for path in results.iterdir())):
+        assert time.monotonic() < deadline
+        assert run.poll() is None
+        time.sleep(0.05)
+    run.send_signal(signal.SIGINT)
+    out, err = run.communicate(timeout=60)
+    assert (run.returncode, out, err) == (1, "", "hardwall: error: interrupted\n")
+    (kept,) = results.iterdir()
+    assert all(len(json.loads(line)) == 2 for line in kept.read_text().split("\n") if line)

@@ -1,0 +1,270 @@
+"""Replays: recordings on every backend, the paper's equations, units, what is refused and what is written."""
+
+import csv
+import json
+import math
+import re
+
+import numpy as np
+import pytest
+
+from hardwall.model.estimators.registry import ESTIMATORS, uses_stamps
+from hardwall.sim.estimates.recording import Recording, load
+from hardwall.sim.estimates.replay import ReplayError, replay
+from hardwall.sim.pictures.replay import plot_replay
+from hardwall.sim.pictures.style import SUFFIXES
+from hardwall.testing.bench import rng
+from stimuli.replays import BOUND, COARSEN, EVERY, recording, reference_of, swing
+
+FILES = ["davinci_L2_02.csv", "davinci_L2_22.csv", "davinci_R5_42.csv"]
+
+
+@EVERY
+@pytest.mark.parametrize("name", FILES)
+def test_recordings_on_every_backend(recordings, name, estimator, output):
+    recorded = load(recordings / name, "motor_counts")
+    results = {
+        backend: replay(recorded, estimator, output, backend, COARSEN, BOUND) for backend in ("float", "fixed", "rtl")
+    }
+    fixed, rtl = results["fixed"], results["rtl"]
+    assert np.flatnonzero(fixed.velocity_counts_per_s != rtl.velocity_counts_per_s).tolist() == []
+    assert fixed.velocity_sha256 == rtl.velocity_sha256
+    assert fixed.flags == rtl.flags == results["float"].flags == []
+    derivative = reference_of(recorded)
+    for result in results.values():
+        error = (result.velocity_counts_per_s - derivative)[1000:]
+        assert result.rms_counts_per_s == pytest.approx(math.sqrt(np.mean(error**2)), rel=1e-9)
+        if estimator == "fdm":
+            assert result.rms_counts_per_s == result.rms_fdm_counts_per_s
+        else:
+            assert result.rms_counts_per_s < result.rms_fdm_counts_per_s / 2
+    if estimator == "levant":
+        check_equations(recorded, BOUND)
+
+
+# ---- float against the paper's algorithm ----------------------------------------------------------------------------
+
+
+def check_equations(recorded: Recording, bound: float) -> None:
+    """Assert that u and u1 of every sample are those of the paper's equations, written in SI and absolute position.
+
+    Position is summed in extended precision, so what is left is the rounding of the kernel's own sum, half an ulp a
+    sample of what is a few counts at most. An error of d in e is one of at most lambda sqrt(d) in u, and can turn the
+    sign of an e within d.
+    """
+    rate, tau = recorded.rate_hz, 1 / recorded.rate_hz
+    u, u1 = (
+        replay(recorded, "levant", output, "float", COARSEN, bound).velocity_counts_per_s.astype(np.longdouble)
+        for output in ("u", "u1")
+    )
+    f = (recorded.counts // COARSEN * COARSEN).astype(np.longdouble)
+    lam, alpha = np.sqrt(np.longdouble(bound)), 1.1 * np.longdouble(bound)
+    x = f[0] + np.concatenate([[0], np.cumsum(tau * u)[:-1]])
+    e = x - f
+    before = np.concatenate([[0], u1[:-1]])
+    d = len(f) * np.spacing(np.abs(e).max() + np.abs(u).max() * tau)
+    assert np.abs(u - (before - lam * np.sqrt(np.abs(e)) * np.sign(e))).max() <= 2 * lam * np.sqrt(d)
+    sure = np.abs(e) > d
+    assert sure.mean() > 0.9
+    off = np.abs(u1 - (before - tau * alpha * np.sign(e)))
+    assert off[sure].max() <= len(f) * np.spacing(np.abs(u1).max())
+    assert np.abs(u).max() > rate
+
+
+def test_float_is_the_algorithm_of_the_paper():
+    check_equations(swing(), BOUND)
+
+
+def test_float_finite_difference_is_the_difference():
+    made = swing()
+    result = replay(made, "fdm", backend="float", coarsen=COARSEN)
+    exact = np.diff(made.counts // 16, prepend=made.counts[0] // 16) * 16 * 1000.0
+    assert (result.velocity_counts_per_s == exact).all()
+    assert (result.difference_counts_per_s == exact).all()
+
+
+# ---- units and ranges ------------------------------------------------------------------------------------------------
+
+
+@EVERY
+@pytest.mark.parametrize("backend", ["float", "fixed"])
+def test_coarse_counts_are_judged_in_recorded_counts(estimator, output, backend):
+    """What lies between coarse counts is not seen: the same velocity, to the word, in units of the recorded counts."""
+    fine, random = swing(), rng()
+    coarse = recording(fine.counts // COARSEN)
+    other = recording(fine.counts // COARSEN * COARSEN + random.integers(0, COARSEN, len(fine.counts)))
+    assert (coarse.counts < 0).any()
+    seen = replay(fine, estimator, output, backend, COARSEN, BOUND)
+    same = replay(other, estimator, output, backend, COARSEN, BOUND)
+    small = replay(coarse, estimator, output, backend, None, BOUND / COARSEN)
+    assert (seen.velocity_counts_per_s == same.velocity_counts_per_s).all()
+    assert np.allclose(seen.velocity_counts_per_s, COARSEN * small.velocity_counts_per_s, rtol=1e-12, atol=1e-9)
+    assert seen.velocity_sha256 == same.velocity_sha256 == small.velocity_sha256
+    assert (seen.velocity_sha256 is None) == (backend == "float")
+
+
+@pytest.mark.parametrize("rate", [50.0, 1 / 0.003])
+def test_any_rate_will_do(rate):
+    """A ramp is followed to its slope; the reference's cutoff stays well below half the rate."""
+    slope = 3.0 * rate
+    made = recording(np.floor(slope * np.arange(2000) / rate), rate)
+    for backend in ("float", "fixed"):
+        result = replay(made, "levant", "u1", backend, acceleration_max_counts_per_s2=0.05 * rate**2)
+        assert result.reference_hz == min(40.0, rate / 4)
+        assert np.median(result.velocity_counts_per_s[1000:]) == pytest.approx(slope, rel=0.1)
+
+
+@EVERY
+@pytest.mark.parametrize("counts", [[5, 5], [5, 6], [0] * 300, [-(2**62)] * 40], ids=["still", "step", "rest", "far"])
+def test_the_shortest_and_the_stillest(estimator, output, counts):
+    for backend in ("float", "fixed"):
+        result = replay(recording(counts), estimator, output, backend)
+        assert len(result.velocity_counts_per_s) == len(counts)
+        assert result.flags == []
+        if len(set(counts)) == 1:
+            assert not result.velocity_counts_per_s.any()
+
+
+@EVERY
+def test_the_widest(estimator, output):
+    """All of 32 bits: the count wraps, and no word is too narrow to be made."""
+    slope = 2**32 // 4000
+    counts = -(2**31) + slope * np.arange(4000)
+    if uses_stamps(estimator):  # no clock counts so many edges
+        with pytest.raises(ReplayError, match="the count must change by at most 100000 in a sample"):
+            replay(recording(counts), estimator, output, "fixed")
+        return
+    result = replay(recording(counts), estimator, output, "fixed", acceleration_max_counts_per_s2=slope * 1e5)
+    assert result.spec.count_width == 32
+    assert np.median(result.velocity_counts_per_s[2000:]) == pytest.approx(slope * 1000.0, rel=0.1)
+    # From no acceleration at all, too.
+    assert replay(recording(counts), estimator, output, "fixed").acceleration_max_counts_per_s2 > 0
+    jump = np.zeros(1000, np.int64)
+    jump[500:] = 2**31 - 1
+    assert np.isfinite(replay(recording(jump), estimator, output, "fixed").velocity_counts_per_s).all()
+
+
+# ---- what is refused ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"estimator": "nobody"}, f"estimator must be one of {', '.join(ESTIMATORS)}, not 'nobody'"),
+        ({"output": "u2"}, "output of levant must be one of u, u1, not 'u2'"),
+        ({"estimator": "fdm", "output": "u1"}, "output of fdm must be one of u, not 'u1'"),
+        ({"backend": "gpu"}, "backend must be one of float, fixed, rtl, not 'gpu'"),
+        ({"coarsen": 0}, "coarsen must be a whole number of 1 to 2**31 - 1, not 0"),
+        ({"coarsen": 1.5}, "coarsen must be a whole number of 1 to 2**31 - 1, not 1.5"),
+        ({"reference_hz": 500.0}, "reference_hz must be more than 0 and less than 500, half the rate, not 500.0"),
+        ({"reference_hz": math.nan}, "reference_hz must be more than 0 and less than 500, half the rate, not nan"),
+        ({"acceleration_max_counts_per_s2": 0.0}, "acceleration_max_counts_per_s2 must be finite and more than 0, not"),
+        ({"acceleration_max_counts_per_s2": math.inf}, "acceleration_max_counts_per_s2 must be finite and more than 0"),
+        (
+            {"acceleration_max_counts_per_s2": 1e12},
+            "acceleration_max_counts_per_s2 must give gains that fit this recording (as if 1024 samples were a second",
+        ),
+        (
+            {"acceleration_max_counts_per_s2": 1e-12},
+            "acceleration_max_counts_per_s2 must give gains that fit this recording (as if 1024 samples were a second",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused(arguments, message):
+    with pytest.raises(ReplayError, match=rf"^{re.escape(message)}[^\n]*$"):
+        replay(swing(), **arguments)
+
+
+def test_a_recording_too_short_to_be_judged_is_refused():
+    with pytest.raises(ReplayError, match=r"^made.csv: with coarsen a recording must be longer than 1 s, .* not 1000 "):
+        replay(swing(1000), coarsen=COARSEN)
+    assert replay(swing(1001), coarsen=COARSEN).rms_counts_per_s > 0
+
+
+def test_a_change_too_fast_for_any_clock_is_refused_on_rtl_alone():
+    counts = np.zeros(50, np.int64)
+    counts[33:] = 100_001
+    message = r"^made.csv, column counts: on rtl the count must change by at most 100000 in a sample at 1000 Hz "
+    with pytest.raises(ReplayError, match=message + r"\(a clock of 100 MHz\), not by 100001 at sample 33, 0.033 s$"):
+        replay(recording(counts), "fdm", backend="rtl")
+    assert replay(recording(counts), "fdm", backend="fixed").velocity_counts_per_s.max() == 100_001_000.0
+
+
+# ---- what is written ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("coarsen", [None, COARSEN])
+def test_the_report_is_json_with_units(coarsen):
+    report = json.loads(json.dumps(replay(swing(), coarsen=coarsen).report(), allow_nan=False))
+    assert report["samples"] == 3000
+    assert (report["estimator"], report["output"], report["backend"]) == ("levant", "u", "fixed")
+    assert (report["coarsen"], report["rate_hz"], report["clock_hz"]) == (coarsen, 1000.0, None)
+    assert (report["file"], report["column"], report["flags"]) == ("made.csv", "counts", [])
+    assert (report["rms_counts_per_s"] is None) == (report["rms_fdm_counts_per_s"] is None) == (coarsen is None)
+    assert re.fullmatch("[0-9a-f]{64}", report["velocity_sha256"])
+    assert report["samples_per_s"] == pytest.approx(3000 / report["seconds"])
+    assert 0 < report["max_abs_counts_per_s"] < 1e6
+
+
+@pytest.mark.parametrize("coarsen", [None, COARSEN])
+def test_samples_are_saved(tmp_path, coarsen):
+    made = recording(swing().counts, start_s=0.25)
+    result = replay(made, coarsen=coarsen)
+    path = tmp_path / "out.csv"
+    path.write_text("what was there")
+    result.save(path)
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    names = ["time_s", "count", "velocity_counts_per_s", *(["reference_counts_per_s"] if coarsen else [])]
+    assert list(rows[0]) == names
+    assert [int(row["count"]) for row in rows] == made.counts.tolist()
+    assert [float(row["time_s"]) for row in rows] == pytest.approx(made.time_s.tolist(), abs=1e-9)
+    assert [float(row["velocity_counts_per_s"]) for row in rows] == pytest.approx(
+        result.velocity_counts_per_s.tolist(), rel=1e-11
+    )
+    if coarsen:
+        saved = [float(row["reference_counts_per_s"]) for row in rows]
+        assert saved == pytest.approx(result.reference_counts_per_s.tolist(), rel=1e-11)
+    # What was saved can be replayed.
+    again = replay(load(path, "count"), coarsen=coarsen)
+    assert again.velocity_sha256 == result.velocity_sha256
+    assert [each.name for each in tmp_path.iterdir()] == ["out.csv"]
+
+
+def test_a_file_that_cannot_be_written_is_refused_and_leaves_nothing(tmp_path):
+    result = replay(swing())
+    for write, name in ((result.save, "out.csv"), (lambda path: plot_replay(result, path), "out.png")):
+        with pytest.raises(OSError, match=rf"^{re.escape(str(tmp_path))}/none/{name}: cannot be written \(No such"):
+            write(tmp_path / "none" / name)
+        (tmp_path / name).mkdir()
+        with pytest.raises(OSError, match=r"cannot be written \(Is a directory\)$"):
+            write(tmp_path / name)
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["out.csv", "out.png"]
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_picture_is_drawn(tmp_path, suffix):
+    path = tmp_path / f"replay{suffix}"
+    result = replay(swing(), coarsen=COARSEN, acceleration_max_counts_per_s2=BOUND)
+    plot_replay(result, path)
+    content = path.read_bytes()
+    assert content.startswith({".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}[suffix])
+    if suffix == ".svg":
+        text = content.decode()
+        shown = ("counts (counts)", "velocity (counts/s)", "time (s)", "finite difference", "zero-phase reference")
+        for label in (*shown, f"RMS error {result.rms_counts_per_s:.0f} counts/s", "levant, output u"):
+            assert label in text
+    plot_replay(result, path)
+    assert path.read_bytes() == content
+
+
+@EVERY
+def test_a_picture_of_little_is_drawn(tmp_path, estimator, output):
+    plot_replay(replay(recording([3, 4]), estimator, output), tmp_path / "little.png")
+    assert (tmp_path / "little.png").stat().st_size > 1000
+
+
+def test_a_picture_of_another_kind_is_refused(tmp_path):
+    with pytest.raises(ReplayError, match=r"^the name of a plot must end in .pdf, .png, .svg, not '.*replay.gif'$"):
+        plot_replay(replay(swing()), tmp_path / "replay.gif")
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,44 @@
+"""What the tests of the linear filters share: whole records through a kernel, impulse responses."""
+
+import numpy as np
+
+from hardwall.model.compiled import compiled
+from hardwall.model.estimators.estimate import estimate
+from hardwall.model.quadrature import seen_count
+
+SECONDS = {1_000: 5.0, 10_000: 5.0, 100_000: 2.0, 1_000_000: 1.25, 10_000_000: 0.5}
+"""How much of the paper's signal is run at each rate, s; it is judged from a fifth on."""
+
+
+@compiled
+def _run(params, state, counts, velocity, flags):
+    for k in range(len(counts)):
+        state, velocity[k], flags[k] = estimate(params, state, seen_count(counts[k]), 0)
+    return state
+
+
+def run(params, state, counts: np.ndarray):
+    """Return (state, velocity, flags) of a record through a kernel, from `state`; counts wrap."""
+    width = params.count_width
+    half = 1 << (width - 1)
+    wrapped = ((np.asarray(counts, np.int64) + half) & (2 * half - 1)) - half
+    velocity = np.zeros(len(wrapped), np.float64 if isinstance(params[0], float) else np.int64)
+    flags = np.zeros(len(wrapped), np.int64)
+    return _run(params, state, wrapped, velocity, flags), velocity, flags
+
+
+def impulse(a: np.ndarray, b, samples: int) -> np.ndarray:
+    """Return the states b, a b, a^2 b, ... of a linear system, one a column, at least `samples` of them."""
+    states, power = np.array(b, float).reshape(-1, 1), np.array(a, float)
+    while states.shape[1] < samples:
+        states, power = np.concatenate([states, power @ states], 1), power @ power
+    return states
+
+
+def norms(a: np.ndarray, b, samples: int) -> np.ndarray:
+    """Return the sum of absolute values of each state's impulse response."""
+    return np.abs(impulse(a, b, samples)).sum(1)
+
+
+def rms(error: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(error**2)))

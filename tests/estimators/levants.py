@@ -1,0 +1,208 @@
+"""What the tests of Levant's differentiator and of its kin share: their campaigns, promises, and word-length error."""
+
+import math
+from collections.abc import Iterator
+from fractions import Fraction
+
+import cocotb
+import numpy as np
+
+from hardwall.model.axis import Axis
+from hardwall.model.estimators import levant, registry
+from hardwall.model.estimators.estimate import estimate
+from hardwall.model.quadrature import seen_count
+from hardwall.model.spec import AxisSpec
+from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng
+from hardwall.testing.estimators import follow, reset_words
+from stimuli.papers_signal import axis_at, swing
+
+TURN_S = 1 + math.atan(2 * math.pi) / (2 * math.pi)
+"""When the paper's signal turns: its velocity is 0."""
+REFUSED = [
+    ({"lambda_sqrt_m_per_s": -1.0, "alpha_m_per_s2": 1.0}, "lambda_sqrt_m_per_s"),
+    ({"lambda_sqrt_m_per_s": 1.0, "alpha_m_per_s2": math.nan}, "alpha_m_per_s2"),
+    ({"lambda_sqrt_m_per_s": 1e9, "alpha_m_per_s2": 1.0}, "lambda_sqrt_m_per_s must be .* to .*, not"),
+    ({"lambda_sqrt_m_per_s": 1.0, "alpha_m_per_s2": 1e12}, "alpha_m_per_s2 must be .* to .*, not"),
+    ({"lambda_sqrt_m_per_s": 1.0, "alpha_m_per_s2": 1e-12}, "alpha_m_per_s2 must be .* to .*, not"),
+    ({"lambda_sqrt_m_per_s": 1e-12, "alpha_m_per_s2": 1.0}, "lambda_sqrt_m_per_s must be .* to .*, not"),
+]
+"""Gains that cannot be held, and how the message begins."""
+
+
+def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
+    """Yield rows that visit the track, its saturations, the wrap of the count and the ends of the gains."""
+    random = rng()
+    half, fast = 1 << (d.count_width - 1), d.velocity.max >> d.velocity.f
+    reset = reset_words(d)[:2]
+    top = [d.lambda_.max, d.alpha.max]
+    # Nominal gains follow a smooth motion, through the wrap of the count.
+    t = np.arange(samples // 4)
+    smooth = np.floor(half * (1 + 0.5 * np.sin(t * min(1, fast / half) / 2)) + random.random(len(t))).astype(np.int64)
+    for count in smooth.tolist():
+        yield count, 0, *reset, 0
+    # The worst signs for overflow: full swings of the count at the largest gains, held until everything saturates.
+    for period in (1, 2, 3, 7, 50):
+        for k in range(samples // 50):
+            yield (-half, half // 2 - 1, half - 1)[k // period % 3], 0, *top, k & 1
+    # A ramp faster than the velocity format, long enough for alpha alone to carry u1 to its end.
+    for k in range(d.velocity.max // top[1] + 50):
+        yield -k * (fast + 1), 0, *top, 0
+    # A walk with jumps, gains anywhere, restarts.
+    count = 0
+    for _ in range(samples - samples // 4 - samples // 10):
+        count += int(
+            random.integers(-half, half) if random.random() < 0.01 else random.integers(-2 * fast, 2 * fast + 1)
+        )
+        gains = reset if random.random() < 0.5 else [int(random.integers(0, m + 1)) for m in top]
+        yield count, int(random.random() < 0.002), *gains, int(random.integers(0, 2))
+
+
+def wrapped(d: levant.Design, rows) -> list[tuple[int, ...]]:
+    """Return rows with their counts as the port carries them."""
+    half = 1 << (d.count_width - 1)
+    return [((count + half) % (2 * half) - half, *rest) for count, *rest in rows]
+
+
+def campaign(make, start, rows=stimulus, fewer: tuple[str, ...] = ("narrow",)):
+    """Return the two cocotb tests of an estimator that `make` makes for a named axis; a tenth of the rows for `fewer`.
+
+    Where words are a few bits wide, everything saturates and wraps so often that a tenth sees it all.
+    """
+
+    @cocotb.test(**CAMPAIGN)
+    async def follows_model(dut):
+        name = parameters()["name"]
+        component = make(name)
+        samples = SAMPLES // 10 if name in fewer else SAMPLES
+        expected = await follow(dut, component, rows(component.design, samples), start)
+        # The campaign is worth its name only if it reached both saturations, and the quiet track too.
+        assert 0 in expected["saturated"]
+        assert np.bitwise_or.reduce(expected["saturated"]) == 0b11
+
+    @cocotb.test()
+    async def reset_mid_stream_starts_afresh(dut):
+        component = make(parameters()["name"])
+        bench = Bench(dut, component)
+        await bench.reset()
+        reset = dict(zip((word.name for word in component.design.words), reset_words(component.design), strict=True))
+        await bench.transact("strobe", "valid", count=0, **reset)
+        await bench.transact("strobe", "valid", count=1, **reset)
+        assert bench.reader("velocity")() != 0
+        await bench.reset()
+        await bench.transact("strobe", "valid", count=-1, **reset)
+        assert bench.reader("velocity")() == 0
+
+    return follows_model, reset_mid_stream_starts_afresh
+
+
+def axis(axis_spec: AxisSpec, output: str = "u", floating: bool = False) -> Axis:
+    """Return an axis with that output selected."""
+    return Axis(axis_spec, floating, **registry.choose(axis_spec.estimator, output))
+
+
+def rms_errors(axis_spec: AxisSpec, output: str, seconds: float, runs: int = 1) -> tuple[float, float]:
+    """Return the RMS errors on the paper's signal, m/s, in float64 and in fixed point, over runs of differing phase."""
+    random, squares = rng(), np.zeros(2)
+    both = [axis(axis_spec, output, floating) for floating in (True, False)]
+    for _ in range(runs):
+        counts, truth = swing(axis_spec.sample_hz, seconds, TURN_S, random.random())
+        squares += [np.mean((one.run(counts).velocity_m_per_s - truth) ** 2) for one in both]
+    exact, fixed = np.sqrt(squares / runs)
+    return exact, fixed
+
+
+def displacements(axis_spec: AxisSpec, counts: np.ndarray) -> Iterator[tuple[float, float, float]]:
+    """Yield (sign, |b|, u - u1) of each sample in which b is not 0, in counts; of the kin that project."""
+    d = axis_spec.design.estimator
+    params, state = d.params({word.name: word.reset for word in d.words}), axis_spec.model.START
+    for count in counts.tolist():
+        moved = count - state.count if state.running else 0
+        b = (state.lead - (moved << d.velocity.f)) * d.velocity.lsb
+        state, velocity, flags = estimate(params, state, seen_count(count), 0)
+        assert flags == 0
+        if b:
+            yield math.copysign(1, b), abs(b), (velocity - state.u1) * d.velocity.lsb
+
+
+def oracle_run(d: levant.Design, rows, step) -> Iterator[tuple[int, int]]:
+    """Yield (velocity word, flags) of the projecting kin in exact rationals, on the unwrapped position.
+
+    `step(lambda, alpha, b, first)` returns (near, g): what alpha and the root take of |b|, rounded as documented.
+    """
+    lsb = Fraction(1, 2**d.velocity.f)
+    v_max, e_max = d.velocity.max * lsb, d.error.max * lsb
+    modulus, half = 2**d.count_width, 2 ** (d.count_width - 1)
+    last = position = x = u1 = None
+    for count, restart, lambda_word, alpha_word, output in rows:
+        lam, alpha = Fraction(lambda_word, 2**d.lambda_.f), alpha_word * lsb
+        first = x is None or bool(restart)
+        if first:
+            position, x, u1 = 0, Fraction(0), Fraction(0)
+        else:
+            position += (count - last + half) % modulus - half
+        last = count
+        far_b = x + u1 - position
+        b = max(-e_max, min(e_max, far_b))
+        sign = (b > 0) - (b < 0)
+        near, g = step(lam, alpha, b, first)
+        far_u1 = u1 - sign * near
+        u1 = max(-v_max, min(v_max, far_u1))
+        far_u = u1 - sign * g
+        u = max(-v_max, min(v_max, far_u))
+        x = position + b - sign * (near + g)
+        yield (u1 if output else u) / lsb, int(b != far_b) | (u != far_u or u1 != far_u1) << 1
+
+
+def check_wrap_and_restart(axis_spec: AxisSpec) -> None:
+    """The count may wrap anywhere, and a restart in mid-motion is a start."""
+    counts, _ = swing(axis_spec.sample_hz, 0.2, TURN_S)
+    one, half = axis(axis_spec), 1 << (axis_spec.count_width - 1)
+    expected = one.run(counts).velocity
+    assert expected.any()
+    assert (one.run(counts + half - counts[0] - 1000).velocity == expected).all()
+    params, states = one.params.estimator, [axis_spec.model.START] * 2
+    for k, count in enumerate(counts[: len(counts) // 2].tolist()):
+        states[0], *_ = estimate(params, states[0], seen_count(count), int(k == 700))
+        if k >= 700:
+            states[1], *_ = estimate(params, states[1], seen_count(count), 0)
+            assert states[0] == states[1]
+
+
+def check_no_drift(axis_spec: AxisSpec) -> None:
+    """From standstill to the largest speed, and at the smallest, the velocities sum up to the counts moved."""
+    rate, tau = axis_spec.sample_hz, 1 / axis_spec.sample_hz
+    top, steep = axis_spec.speed_max_m_per_s / axis_spec.count_m, axis_spec.acceleration_max_m_per_s2 / 2
+    ramp = np.minimum(np.arange(rate) * tau * steep / axis_spec.count_m, top)
+    for speed in (ramp, -ramp, np.full(rate, 3.0), np.full(rate, -3.0)):
+        counts = np.floor(np.cumsum(speed) * tau + 0.25).astype(np.int64)
+        record = axis(axis_spec).run(counts)
+        assert record.flags[-1] == 0
+        total = int(record.velocity.sum()) * record.design.estimator.velocity.lsb
+        assert abs(total - (counts[-1] - counts[0])) <= 2
+
+
+def check_finite_difference_in_the_band(estimator: str) -> None:
+    """At 1 kHz alpha is 13 counts: where the count's second difference is less, there is no memory and no chatter."""
+    axis_spec = axis_at(estimator, 1_000, 12.0)
+    d = axis_spec.design.estimator
+    assert d.alpha.to_real(d.words[1].reset) > 12
+    moved = np.cumsum(rng().integers(-6, 7, 5000))
+    for output in axis_spec.model.OUTPUTS:
+        for floating in (False, True):
+            record = axis(axis_spec, output, floating).run(np.cumsum(moved))
+            lsb = 1.0 if floating else d.velocity.lsb
+            assert (record.velocity[1:] * lsb == moved[1:]).all()
+
+
+def check_standstill(estimator: str, rate: int) -> None:
+    """A count that stands after 30 mm/s gives exactly 0 on both outputs, after 0.1 s at the latest; `levant` never."""
+    axis_spec = axis_at(estimator, rate)
+    ramp = np.floor(np.arange(rate // 20) * 0.03 / rate / axis_spec.count_m)
+    counts = np.concatenate([ramp, np.full(rate // 4, ramp[-1])]).astype(np.int64)
+    until = len(ramp) + rate // 10
+    explicit = axis(axis_at("levant", rate)).run(counts).velocity
+    assert (np.abs(explicit[until:]) > 0).mean() > 0.99
+    for output in axis_spec.model.OUTPUTS:
+        velocity = axis(axis_spec, output).run(counts).velocity
+        assert velocity[: len(ramp)].any()
+        assert not velocity[until:].any()

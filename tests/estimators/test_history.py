@@ -1,0 +1,119 @@
+"""The positions of the past: RTL against model, and the model against lists of plain integers."""
+
+import cocotb
+import pytest
+from cocotb.triggers import ClockCycles
+
+from hardwall.hdl.estimators.history import History
+from hardwall.model.estimators import history
+from hardwall.model.estimators.history import change_over, take
+from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from stimuli.specs import spec
+
+WINDOWS = {"paper": 2e-3, "narrow": 40e-6, "mhz": 20e-3}
+"""In s: 20, 20 and 20000 samples, of which the last are too many for the memory."""
+
+
+def design(name: str) -> history.Design:
+    return history.Design(spec(name), WINDOWS[name])
+
+
+def make(name: str) -> History:
+    return History(design(name))
+
+
+def rows(d: history.Design, samples: int):
+    """Yield (count, restart, age): motion, jumps, wraps, restarts; ages from all of the memory."""
+    random, half, fast = rng(), 1 << (d.count_width - 1), d.change.max
+    count = 0
+    for k in range(samples):
+        way = (k // 500) % 4
+        if way < 2:
+            count += (fast, -fast - 1)[way]
+        elif way == 2:
+            count += int(random.integers(-2 * fast, 2 * fast + 1))
+        elif k % 50 == 0:
+            count = int(random.choice([-half, half - 1, 0]))
+        age = int(random.choice([1, 2, d.age_max - 1, d.age_max, random.integers(1, d.age_max + 1)]))
+        yield (count + half) % (2 * half) - half, int(random.random() < 0.001), max(age, 1)
+
+
+@cocotb.test(**CAMPAIGN)
+async def follows_model(dut):
+    component = make(**parameters())
+    d, bench = component.design, Bench(dut, component)
+    await bench.reset()
+    seen = bench.monitor("valid", "stored", "limited")
+    change, params, state = bench.reader("change"), d.params(), d.start()
+    limited_ever = set()
+    for count, restart, age in rows(d, SAMPLES // 25):
+        await bench.transact("strobe", "valid", count=count, restart=restart, age=age)
+        await ClockCycles(dut.clk, 1)
+        state, stored, limited = take(params, state, count, restart)
+        assert seen.rows[-1] == (stored, limited)
+        limited_ever.add(limited)
+        if stored:
+            assert change() == change_over(params, state, age)
+    assert len(seen.rows) == SAMPLES // 25
+    assert limited_ever == {True, False}
+
+
+@pytest.mark.parametrize("name", ["narrow", "mhz"])
+def test_rtl(name):
+    simulate(__file__, make, name=name)
+
+
+@pytest.mark.parametrize("name", WINDOWS)
+def test_model_is_a_list_of_the_limited_sums(name):
+    d = design(name)
+    params, state, half = d.params(), d.start(), 1 << (d.count_width - 1)
+    positions, last, most = [], None, 0
+    for count, restart, age in rows(d, 100_000):
+        state, stored, limited = take(params, state, count, restart)
+        if restart or last is None:
+            positions = [0]
+        else:
+            moved = (count - last + half) % (2 * half) - half
+            change = max(-d.change.max, min(moved, d.change.max))
+            assert limited == (change != moved)
+            positions.append(positions[-1] + change)
+        last, most = count, max(most, len(positions))
+        assert stored == ((len(positions) - 1) % d.every == 0)
+        if stored:
+            back = len(positions) - 1 - age * d.every
+            assert change_over(params, state, age) == positions[-1] - (positions[back] if back > 0 else 0)
+    assert most > 2000
+
+
+def test_memory_is_within_its_limit():
+    sizes = {name: (design(name).every, design(name).age_bits, design(name).width) for name in WINDOWS}
+    assert [every for every, _, _ in sizes.values()] == [1, 1, 16]
+    for name, (every, age_bits, width) in sizes.items():
+        assert width << age_bits <= history.MEMORY_BITS
+        # It was not thinned out without need.
+        assert every == 1 or (width << age_bits) * 4 > history.MEMORY_BITS
+        window = WINDOWS[name] * spec(name).sample_hz
+        assert abs(design(name).longest * every - window) <= every / 2
+
+
+def test_runs_do_not_share_their_memory():
+    d = design("paper")
+    assert d.start().positions is not d.start().positions
+
+
+@pytest.mark.parametrize("window_s", [1e9, 0.0, -1.0])
+def test_a_window_that_cannot_be_held_is_refused(window_s):
+    with pytest.raises(ValueError, match=r"^window_s must be more than 0 and at most .* at these rates, not"):
+        history.Design(spec("paper"), window_s)
+
+
+def test_the_longest_window_is_accepted():
+    with pytest.raises(ValueError, match="at most") as caught:
+        history.Design(spec("paper"), 1e9)
+    most = float(str(caught.value).split("at most ")[1].split()[0])
+    assert history.Design(spec("paper"), most * (1 - 1e-5), 12).width <= history.WIDTH_MAX + 1
+
+
+def test_wrong_design_is_refused():
+    with pytest.raises(TypeError, match=r"not 3$"):
+        History(3)

@@ -1,0 +1,90 @@
+"""The implicit sign: RTL against model, model against exact rationals, the projection against what it solves."""
+
+import math
+from fractions import Fraction
+
+import levants
+import numpy as np
+import pytest
+
+from hardwall.hdl.estimators.levant_semi_implicit import Estimator
+from hardwall.model.estimators import levant_semi_implicit
+from hardwall.model.estimators.estimate import estimate
+from hardwall.model.estimators.levant import POSITION_BUDGET
+from hardwall.model.estimators.levant_semi_implicit import FLOAT_START, START
+from hardwall.model.quadrature import seen_count
+from hardwall.testing.bench import rng, simulate
+from hardwall.testing.estimators import model
+from stimuli.specs import spec
+
+NAME = "levant-semi-implicit"
+
+
+def design(name: str) -> levant_semi_implicit.Design:
+    return spec(name, NAME).design.estimator
+
+
+def make(name: str) -> Estimator:
+    return Estimator(design(name))
+
+
+follows_model, reset_mid_stream_starts_afresh = levants.campaign(make, START)
+
+
+@pytest.mark.parametrize("name", ["mhz", "narrow"])
+def test_rtl(name):
+    simulate(__file__, make, name=name)
+
+
+@pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
+def test_model_is_the_exact_equation_rounded_as_documented(name):
+    d = design(name)
+    scale, lsb = 2**d.root.f, Fraction(1, 2**d.velocity.f)
+
+    def step(lam, alpha, b, first):
+        near = min(abs(b), alpha)
+        beyond = abs(b) - near
+        root = Fraction(math.isqrt(math.floor(beyond * scale**2)), scale) + Fraction(1, 2 * scale)
+        return near, min(math.floor(lam * root / lsb + Fraction(1, 2)) * lsb, beyond)
+
+    rows = levants.wrapped(d, levants.stimulus(d, 20_000))
+    seen = model(d, rows, START)
+    for k, (velocity, flags) in enumerate(levants.oracle_run(d, rows, step)):
+        assert (velocity, flags) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {rows[k]}"
+
+
+def test_the_projection_solves_the_generalised_equation():
+    """With rationals whose root is one: e+ and a selection S of the set-valued sign, for every b."""
+    random = rng()
+    for _ in range(2000):
+        lam, alpha = (float(2.0 ** random.integers(-6, 6)) for _ in range(2))
+        root = float(random.integers(0, 200)) / 16
+        b = float(random.choice([-1, 1])) * (
+            alpha * float(random.integers(0, 17)) / 16 if root == 0 else alpha + root**2
+        )
+        params = levant_semi_implicit.FloatParams(lam, alpha, 0, 40)
+        # From e+ + u1 = b with the count at rest, u1 = 0.
+        state, u, _ = estimate(params, FLOAT_START._replace(running=1, lead=b), seen_count(0), 0)
+        after, selection, g = state.lead - state.u1, -state.u1 / alpha, state.u1 - u
+        assert abs(selection) <= 1
+        assert after == b - g - alpha * selection
+        assert after == 0 or (after * b > 0 and selection == math.copysign(1, b) and abs(g) == lam * root)
+
+
+@pytest.mark.parametrize("name", ["paper", "mhz"])
+def test_rounding_is_a_small_change_of_position(name):
+    """Every u follows exactly, without rounding, from a beyond changed by no more than the derived eta."""
+    d, axis = design(name), spec(name, NAME)
+    lam, alpha = d.lambda_.to_real(d.words[0].reset), d.alpha.to_real(d.words[1].reset)
+    delta = lam * 2.0 ** -(d.root.f + 1) + 2.0 ** -(d.velocity.f + 1)
+    t = np.arange(20_000) / axis.sample_hz
+    counts = np.floor(0.01 / axis.count_m * np.sin(2 * np.pi * 4 * t)).astype(np.int64)
+    largest = 0.0
+    for sign, size, step in levants.displacements(axis, counts):
+        beyond, g = max(size - alpha, 0.0), -sign * step
+        eta = abs(max((g / lam) ** 2, g) - beyond)
+        assert eta <= max(2 * math.sqrt(beyond) * delta / lam + (delta / lam) ** 2, delta) + 1e-9
+        if beyond <= 1:
+            largest = max(largest, eta)
+    # The bound is no luxury: a good part of the budget is used.
+    assert POSITION_BUDGET / 8 < largest <= max(POSITION_BUDGET, delta) + (delta / lam) ** 2

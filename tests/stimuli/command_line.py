@@ -1,0 +1,16 @@
+"""The command line, called in this process."""
+
+from hardwall.sim.commands import app
+
+
+def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
+    """Return exit code, stdout and stderr of `hardwall ARGUMENTS`."""
+    monkeypatch.setattr("sys.argv", ["hardwall", *map(str, arguments)])
+    monkeypatch.setattr("signal.signal", lambda *_: None)  # the signals are pytest's
+    try:
+        app.main()
+        code = 0
+    except SystemExit as exit_:
+        code = exit_.code
+    out, err = capsys.readouterr()
+    return code, out, err

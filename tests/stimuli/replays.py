@@ -1,0 +1,31 @@
+"""Recordings to replay: made ones with the ranges of a real drive's; and the reference, found another way."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from hardwall.sim.estimates.recording import Recording
+from stimuli.specs import EVERY_OUTPUT
+
+COARSEN = 16
+# About the largest of the recordings' own. One for all, so that one piece of hardware an estimator serves every test.
+BOUND = 1e6
+EVERY = pytest.mark.parametrize(("estimator", "output"), EVERY_OUTPUT)
+
+
+def recording(counts, rate_hz=1000.0, start_s=0.0) -> Recording:
+    return Recording("made.csv", "counts", np.asarray(counts, np.int64), float(rate_hz), start_s)
+
+
+def swing(samples=3000, amplitude=700 * COARSEN) -> Recording:
+    """Return a sine with the ranges of the recordings of a real drive."""
+    return recording(np.floor(amplitude * np.sin(np.pi * np.arange(samples) / 1000)))
+
+
+def reference_of(recorded: Recording) -> np.ndarray:
+    """Return the derivative that estimates are held against, by the filter's polynomials instead of its sections."""
+    b, a = signal.butter(4, 40.0, fs=recorded.rate_hz)
+    counts = recorded.counts.astype(float)
+    central = (np.roll(counts, -1) - np.roll(counts, 1)) / 2
+    central[0], central[-1] = counts[1] - counts[0], counts[-1] - counts[-2]
+    return signal.filtfilt(b, a, central * recorded.rate_hz)

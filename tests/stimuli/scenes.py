@@ -1,0 +1,14 @@
+"""Changes of scenes that more than one test makes: the parts of a device, and short protocols."""
+
+AMPLIFIER = {"amplifier.bandwidth_hz": 400.0}
+CABLE = {
+    "transmission.stiffness_n_per_m": 2e5, "transmission.damping_n_s_per_m": 10.0, "transmission.motor_mass_kg": 0.05,
+}  # fmt: skip
+HAND = {"hand.mass_kg": 0.2, "hand.damping_n_s_per_m": 3.0, "hand.stiffness_n_per_m": 10.0, "hand.rest_m": 1e-3}
+DRIVE = {
+    "motor.resistance_ohm": 2.0, "motor.inductance_h": 1e-3, "motor.torque_constant_n_m_per_a": 0.04,
+    "motor.voltage_limit_v": 24.0, "motor.pulley_radius_m": 0.01,
+}  # fmt: skip
+PULSES = {"output.full_scale_n": 50.0, "output.pwm_carrier_hz": 20_000, "output.pwm_steps": 300}
+ONE_SECOND = {"protocol.settle_s": 0.7, "protocol.mean_s": 0.1, "protocol.measure_s": 0.3}
+ODD = {"controller.sample_hz": 11_000, "controller.clock_hz": 9_900_000}

@@ -1,0 +1,29 @@
+"""The benchmark: it runs on any scene, its cocotb loop makes the model's words, and it reports what it promises."""
+
+import json
+import shutil
+
+import pytest
+
+from hardwall.sim.scene.load import FOLDER
+from hardwall.sim.studies import bench
+
+
+@pytest.mark.rtl
+def test_the_benchmark_runs_on_a_scene_of_ones_own(tmp_path, monkeypatch):
+    monkeypatch.setattr(bench, "ROUNDS", 1)
+    monkeypatch.setattr(bench, "COCOTB_SAMPLES", 40)
+    monkeypatch.setattr(bench, "SECONDS_OF_SCENE", {"float": 0.1, "fixed": 0.1, "rtl": 0.02})
+    shutil.copy(FOLDER / "seed-2011.toml", tmp_path / "mine.toml")
+    monkeypatch.chdir(tmp_path)
+    said = []
+    report = bench.bench("mine.toml", said.append)
+    assert set(report["samples_per_s"]) == {"float", "fixed", "rtl", "cocotb"}
+    assert set(report["ns_per_sample_of_parts"]) == {
+        "none", "coulomb friction", "amplifier delay", "encoder phase error", "converter", "amplifier lag",
+        "amplifier lag, motor, cable, friction",
+    }  # fmt: skip
+    assert all(value > 0 for value in report["samples_per_s"].values())
+    assert report["rtl_over_cocotb"] == report["samples_per_s"]["rtl"] / report["samples_per_s"]["cocotb"]
+    assert json.dumps(report)
+    assert len(said) == 1 + 4 + 7

@@ -1,0 +1,175 @@
+"""The best cutoff: found on areas that are known, and what is printed and drawn of areas that are measured."""
+
+import json
+import math
+
+import pytest
+
+from hardwall.sim.scene.load import load, names, read
+from hardwall.sim.studies import cutoff
+from hardwall.sim.walls.boundary import Edge
+from hardwall.sim.walls.case import Case
+from hardwall.sim.walls.zwidth import Map
+from stimuli.command_line import call
+
+
+@pytest.fixture(autouse=True)
+def fresh(tmp_path, monkeypatch):
+    """Results go to an empty folder; what is compiled stays where it is."""
+    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
+
+
+def map_of(case: Case, area: float, leaves: bool = False) -> Map:
+    """Return a map of an area."""
+    return Map(
+        case, [Edge(0.0, area, None if leaves else 2 * area), Edge(1.0, area, 1.0), Edge(1.0, 0.0, 1.0)], 1, [None] * 3
+    )
+
+
+def cutoff_of(case: Case) -> float | None:
+    gains = case.changes.get("controller.gains.butterworth")
+    return gains and gains["cutoff_hz"]
+
+
+class Known:
+    """Maps of areas that are a function of the cutoff; None for no filter."""
+
+    def __init__(self, area):
+        self.area, self.calls = area, []
+
+    def __call__(self, title: str, cases: list[Case]) -> list[Map]:
+        self.calls.append([cutoff_of(case) for case in cases])
+        return [map_of(case, self.area(cutoff_of(case))) for case in cases]
+
+
+def staircase(cutoff_hz: float | None) -> float:
+    """A hill around 1200 Hz, in steps of a 50th of its height."""
+    return 50 * math.exp(-(math.log(cutoff_hz / 1200) ** 2)) // 1 if cutoff_hz else 7.0
+
+
+def test_the_top_of_a_staircase_is_found_between_the_sweep_s_cutoffs():
+    known = Known(staircase)
+    (device,) = cutoff.study(["seed-2011"], {}, known)
+    sweep, *search = known.calls
+    assert set(cutoff.PAPERS_HZ) < set(sweep)
+    assert (min(sweep[:-1]), max(sweep[:-1]), sweep[-1]) == (30.0, 4000.0, None)
+    assert [len(each) for each in search] == [1] * len(search)
+    assert 2 < len(search) <= cutoff.EVALUATIONS
+    assert device.best.area == 49 > max(staircase(each) for each in sweep[:-1])
+    # 1000 and 1400 Hz are on the same step, and the lower one is taken.
+    assert staircase(1000) == staircase(1400) == max(staircase(each) for each in sweep[:-1])
+    assert all(700 < each < 1400 for (each,) in search)
+    assert list(device.maps) == sorted({*sweep[:-1], *(each for (each,) in search)})
+    assert (device.at_end, device.unfiltered.area) == (False, 7.0)
+
+
+@pytest.mark.parametrize("top_hz", [1200.0, 433.0, 77.0])
+def test_the_search_closes_in_on_the_top(top_hz):
+    known = Known(lambda cutoff_hz: 1e4 - 1e4 * math.log((cutoff_hz or 1.0) / top_hz) ** 2)
+    (device,) = cutoff.study(["seed-2011"], {}, known)
+    assert device.best_hz == pytest.approx(top_hz, rel=cutoff.TOLERANCE)
+
+
+def test_an_area_that_still_rises_where_the_rate_ends_is_said_to():
+    (device,) = cutoff.study(["desktop-arm"], {}, Known(lambda cutoff_hz: cutoff_hz or 1e4))
+    assert (device.best_hz, device.at_end) == (400.0, True)
+    assert device.report()["best_is_at_the_end"] is True
+
+
+def test_nothing_stable_is_not_searched():
+    known = Known(lambda _: 0.0)
+    (device,) = cutoff.study(["maglev"], {}, known)
+    assert (len(known.calls), device.best.area) == (1, 0.0)
+
+
+def test_every_scene_is_swept_at_once_and_has_its_own():
+    known = Known(staircase)
+    devices = cutoff.study(list(cutoff.SCENES), {"handle.mass_kg": 0.5}, known)
+    assert [(each.scene.name, each.scene.handle.mass_kg) for each in devices] == [(name, 0.5) for name in cutoff.SCENES]
+    assert len(known.calls[0]) == sum(len(each.maps) + 1 for each in devices) - len(known.calls[1:])
+
+
+@pytest.mark.parametrize(
+    ("areas", "low", "high"),
+    [
+        # A tenth of the way down, in the logarithm, to half of the best.
+        ({100.0: 50, 200.0: 100, 400.0: 50}, 200 / 2**0.1, 200 * 2**0.1),
+        ({100.0: 96, 200.0: 100, 400.0: 0}, 100.0, 200 * 2**0.05),
+        ({100.0: 97, 150.0: 20, 200.0: 97, 300.0: 100, 400.0: 99}, 200 * 0.75 ** (2 / 77), 400.0),
+    ],
+)
+def test_as_good_is_what_is_within_a_twentieth(areas, low, high):
+    maps = {cutoff_hz: map_of(Case("", "seed-2011", "", {}), area) for cutoff_hz, area in areas.items()}
+    device = cutoff.Device(load("seed-2011"), maps, maps[200.0])
+    assert device.level_hz == pytest.approx((low, high), rel=1e-12)
+
+
+def verdict(changes: dict, stiffness: float, damping: float, **_) -> dict:
+    """Stable up to a stiffness that rises with the cutoff to 450 Hz, and falls beyond."""
+    gains = changes.get("controller.gains.butterworth", {"cutoff_hz": 4e3})
+    stable = stiffness < 100 * min(gains["cutoff_hz"], 900 - gains["cutoff_hz"])
+    return {"stable": stable, "in_place": stable, "rms_mm": 0.0, "seconds": 0.0}
+
+
+def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", verdict)
+    picture = tmp_path / "cutoff.svg"
+    code, out, _ = call(monkeypatch, capsys, "cutoff", "seed-2011", "--workers", 1, "--json", "--plot", picture)
+    assert code == 0
+    report = json.loads(out)
+    (device,) = report["devices"]
+    areas = {each["cutoff_hz"]: each["area_n2_s_per_m2"] for each in device["maps"]}
+    assert device["best_cutoff_hz"] in areas
+    # All of B, from 6 to 894 N s/m, times one of the steps of 2 kN/m under 45 kN/m; 38 is that of 400 and 500 Hz.
+    assert device["best_area_n2_s_per_m2"] == max(areas.values())
+    assert max(areas.values()) in [888 * stiffness for stiffness in (40e3, 42e3, 44e3)]
+    assert (device["best_leaves_the_map"], device["unfiltered"]["area_n2_s_per_m2"]) == (True, 0)
+    hits = sum(each["hits"] for each in device["maps"]) + device["unfiltered"]["hits"]
+    assert (report["backend"], report["hits"]) == ("fixed", hits)
+    text = picture.read_text()
+    wanted = (
+        "cutoff of the second-order",
+        "area (kN/m N s/m)",
+        "seed-2011: 0.35 kg, 0.1 N dry friction",
+        "no filter: 0",
+    )
+    assert [label for label in wanted if label not in text] == []
+    monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
+    code, out, _ = call(monkeypatch, capsys, "cutoff", "seed-2011", "--workers", 1, "--resume")
+    assert code == 0
+    assert f"{max(areas.values()) / 1e3:.0f}+" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["mhz"], "mhz: zwidth is missing: a map needs its steps"),
+        (["nothing"], f"scene must be one of {', '.join(names())}, or a .toml file, not 'nothing'"),
+        (["--set", "controller.estimator=fdm"], "--set controller.estimator is what this command sets itself"),
+        (["--set", "wall.damping_n_s_per_m=1.0"], "--set wall.damping_n_s_per_m is what this command sets itself"),
+        (["--set", "handle.mass_kg=0"], "seed-2011: handle.mass_kg must be more than 0"),
+        (["--backend", "rtl"], "'rtl' is not one of 'float', 'fixed'"),
+        (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "give it or --workers, not both"),
+        (["--plot", "area.gif"], "--plot must end in .pdf or .png or .svg"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, message):
+    code, out, err = call(monkeypatch, capsys, "cutoff", *arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_two_files_of_one_name_are_two_devices(tmp_path):
+    """And their maps are told apart by what was asked, not by what they are called."""
+    paths = [tmp_path / folder / "device.toml" for folder in "ab"]
+    for path, mass in zip(paths, ("0.35", "0.7"), strict=True):
+        path.parent.mkdir()
+        path.write_text(read("seed-2011").replace("mass_kg = 0.35", f"mass_kg = {mass}"))
+
+    def of_mass(title: str, cases: list[Case]) -> list[Map]:
+        return [map_of(case, 100 * case.parsed.handle.mass_kg) for case in cases]
+
+    devices = cutoff.study([str(path) for path in paths], {}, of_mass)
+    assert [round(device.best.area) for device in devices] == [35, 70]
+    assert [round(device.unfiltered.area) for device in devices] == [35, 70]

@@ -1,0 +1,154 @@
+"""Why a region ends in a drop: what is measured on walls whose answer is known, a hit each way, what is printed."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from hardwall.sim.scene.load import load, read
+from hardwall.sim.studies import drop
+from hardwall.sim.walls.boundary import Edge
+from hardwall.sim.walls.case import Case
+from hardwall.sim.walls.chatter import Chatter
+from hardwall.sim.walls.methods import methods
+from hardwall.sim.walls.zwidth import Map
+from stimuli.command_line import call
+from stimuli.scenes import ODD
+
+
+@pytest.fixture(autouse=True)
+def fresh(tmp_path, monkeypatch):
+    """Results go to an empty folder; what is compiled stays where it is."""
+    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
+
+
+def strike(scene: str, text: str, changes: dict, damping: float, start: int, backend: str) -> dict:
+    """Three of four hits rest up to B = 1000 times the friction, all up to half of it; but none under 10 N s/m.
+
+    All are stable up to a B that grows with K.
+    """
+    friction = changes.get("handle.coulomb_n", 0.1)
+    rests = 10 < damping < (1000 if start % 4 else 500) * friction
+    stable = damping < changes["wall.stiffness_n_per_m"] / 100
+    return {"rests": rests, "stable": stable, "rms_m": 0.0 if rests else 1e-5}
+
+
+def verdict(changes: dict, stiffness: float, damping: float, **_) -> dict:
+    """Stable up to 40 kN/m and to B = 100 N s/m, for Kalman 200."""
+    stable = stiffness <= 40e3 and damping <= (200 if changes["controller.estimator"] == "kalman" else 100)
+    return {"stable": stable, "rms_mm": 0.0, "in_place": stable, "seconds": 0.0}
+
+
+def at_rest(scene, backend: str) -> Chatter:
+    """Levant's u swings by 2 mm/s, nothing else does."""
+    swing = np.full(8, 2e-3 if (scene.controller.estimator, scene.estimator_output) == ("levant", "u") else 0.0)
+    return Chatter(-swing / 2, swing / 2)
+
+
+def test_the_chatter_shakes_the_handle_where_the_force_sees_both_sides_of_it():
+    text, adjusted = read("seed-2011"), methods()["adjusted"].changes
+    wall = adjusted | {"wall.stiffness_n_per_m": 5e3}
+    hidden, seen = (drop.strike("seed-2011", text, wall | rates, 60.0, 0, "fixed") for rates in ({}, ODD))
+    assert hidden["rests"]
+    assert hidden["stable"]
+    assert not seen["rests"]
+    assert seen["rms_m"] > 1e-6
+    assert drop.strike("seed-2011", text, wall | ODD, 10.0, 0, "fixed")["rests"]
+    # Shaken by less than the threshold, it is stable and not at rest.
+    proposed = methods()["proposed"].changes | {"wall.stiffness_n_per_m": 30e3}
+    shaken = drop.strike("seed-2011", text, proposed, 90.0, 0, "fixed")
+    assert (shaken["rests"], shaken["stable"]) == (False, True)
+    # A handle that friction keeps from ever moving has not come to rest in the wall.
+    held = wall | {"handle.coulomb_n": 1.0}
+    assert not drop.strike("seed-2011", text, held, 10.0, 0, "fixed")["rests"]
+
+
+def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
+    monkeypatch.setattr("hardwall.sim.studies.drop.strike", strike)
+    monkeypatch.setattr("hardwall.sim.studies.drop.at_rest", at_rest)
+    monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", verdict)
+    picture = tmp_path / "drop.svg"
+    code, out, _ = call(monkeypatch, capsys, "drop", "--workers", 1, "--json", "--plot", picture)
+    assert code == 0
+    report = json.loads(out)
+    measured = {(each["method"], each["factor"], each["value"]): each["measured_n_s_per_m"] for each in report["laws"]}
+    # By five halvings of the logarithm of 3 to 400.
+    step = (400 / 3) ** (1 / 32)
+    for friction, value in ((0.03, "x 0.3"), (0.05, "x 0.5"), (0.2, "x 2"), (0.3, "x 3")):
+        found = measured["proposed", "Coulomb friction", value]
+        assert found / step < 1000 * friction < found * step
+    for key, value in measured.items():
+        assert key[1] == "Coulomb friction" or value / step < 100 < value * step
+    predicted = {(each["method"], each["value"]): each["predicted_n_s_per_m"] for each in report["laws"]}
+    assert predicted["proposed", ""] == predicted["adjusted", ""] == pytest.approx(2 * 0.1 / 2e-3)
+    assert predicted["proposed", "x 0.3"] == pytest.approx(30)
+    assert predicted["kalman", ""] is None
+    ends = {(each["method"], each["stiffness_n_per_m"]): each for each in report["ends"]}
+    assert len(ends) == 2 * len(drop.STIFFNESSES_N_PER_M)
+    for (_, stiffness), each in ends.items():
+        tried = drop.ENDS_N_S_PER_M
+        assert each["rests_n_s_per_m"] == tried[tried < 100].max()
+        assert each["stable_n_s_per_m"] == tried[tried < stiffness / 100].max()
+    kalman, adjusted = report["methods"]["kalman"], report["methods"]["adjusted"]
+    # Steps of 24 N s/m from 6 on: the last stable ones are 198 and 78, and then a step down to none.
+    assert adjusted["area_n2_s_per_m2"] == pytest.approx((78 - 6) * 40e3 + 24 * 20e3)
+    assert kalman["of_papers_best"] == pytest.approx((198 - 6 + 12) / (78 - 6 + 12))
+    assert kalman["before_the_end"] == 1.0
+    text = picture.read_text()
+    wanted = (
+        "damping B of the wall (N s/m)",
+        "measured = predicted",
+        "threshold, 3 µm",
+        "Kalman: ",
+        "stable up to here",
+    )
+    assert [label for label in wanted if label not in text] == []
+    monkeypatch.setattr("hardwall.sim.studies.drop.strike", None)
+    monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
+    code, out, _ = call(monkeypatch, capsys, "drop", "--workers", 1, "--resume")
+    assert code == 0
+    assert "Coulomb friction x 0.3" in out
+
+
+@pytest.mark.parametrize(
+    ("edges", "part"),
+    [
+        ([40, 50, 10, 0], 1.0),
+        ([50, 30, 20, 10, 0], 0.4),
+        ([50, 30, 20, 10], None),
+        ([50, 0], None),
+        ([0], None),
+    ],
+)
+def test_k_before_the_end_is_that_of_the_last_wall_but_one(edges, part):
+    case = Case("", "seed-2011", "", {})
+    found = Map(case, [Edge(10.0 * n, 1e3 * k, None) for n, k in enumerate(edges)], 1, [None] * len(edges))
+    assert drop.Drop(load("seed-2011"), {}, [], [], [], {"adjusted": found}).before_the_end("adjusted") == part
+
+
+def test_agreement_leaves_out_what_has_no_end():
+    pairs = ((10.0, 20.0), (10.0, math.inf), (math.inf, 5.0), (10.0, 0.0), (40.0, 20.0))
+    laws = [drop.Law("mass", "x 2", "proposed", *pair) for pair in pairs]
+    assert drop.Drop(load("seed-2011"), {}, [], [], laws, {}).agreement() == pytest.approx(
+        [0.5, 0.875, 1.25, 1.625, 2.0]
+    )
+    assert drop.Drop(load("seed-2011"), {}, [], [], [], {}).agreement() == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["mhz"], "mhz: zwidth is missing: a map needs its steps"),
+        (["--set", "handle.coulomb_n="], "seed-2011: handle.coulomb_n must be more than 0: no friction holds"),
+        (["--set", "controller.estimator=fdm"], "--set controller.estimator is what this command sets itself"),
+        (["--set", "wall.damping_n_s_per_m=1.0"], "--set wall.damping_n_s_per_m is what this command sets itself"),
+        (["--backend", "rtl"], "'rtl' is not one of 'float', 'fixed'"),
+        (["--plot", "drop.gif"], "--plot must end in .pdf or .png or .svg"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, message):
+    code, out, err = call(monkeypatch, capsys, "drop", *arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1

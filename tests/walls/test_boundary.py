@@ -1,0 +1,89 @@
+"""Tracing of a stable region: on regions that are known, what is asked and what is found."""
+
+from dataclasses import replace
+
+import pytest
+
+from hardwall.sim.walls.boundary import Edge, Grid, area, trace
+
+GRID = Grid(10.0, 100.0, 1.0, 6.0, 0.5)
+
+
+def traced(stable, grid: Grid = GRID) -> tuple[list[Edge], list[tuple[float, float]]]:
+    """Return the edges, and the walls that were hit, of a region given by a function of K and B."""
+    steps, asked = trace(grid), []
+    try:
+        wall = next(steps)
+        while True:
+            asked.append(wall)
+            wall = steps.send(stable(*wall))
+    except StopIteration as end:
+        return end.value, asked
+
+
+def limit(damping: float) -> float:
+    """Rises, falls, and ends."""
+    return 5 + 30 * damping - 5.5 * damping**2
+
+
+def test_the_edge_is_found_on_the_grid_and_no_wall_is_hit_twice():
+    edges, asked = traced(lambda stiffness, damping: stiffness <= limit(damping))
+    assert len(asked) == len(set(asked))
+    assert edges[-1].stable_n_per_m == 0
+    assert [edge.damping_n_s_per_m for edge in edges] == GRID.dampings[: len(edges)]
+    for edge in edges:
+        exact = max(limit(edge.damping_n_s_per_m), 0)
+        assert edge.stable_n_per_m == exact // 10 * 10
+        assert edge.marginal_n_per_m == edge.stable_n_per_m + 10
+
+
+def test_the_walls_are_hit_in_the_order_of_the_paper():
+    """Up from the softest; then a step of B, and from the marginal K up or down."""
+    _, asked = traced(lambda stiffness, damping: stiffness <= (30 if damping < 2 else 10))
+    assert asked[:4] == [(10, 1), (20, 1), (30, 1), (40, 1)]
+    assert asked[4:8] == [(40, 1.5), (30, 1.5), (40, 2), (30, 2)]
+    assert asked[8:11] == [(20, 2), (10, 2), (20, 2.5)]
+
+
+def test_a_region_that_leaves_the_map_has_no_marginal_wall_there():
+    edges, asked = traced(lambda *_: True)
+    assert {edge.stable_n_per_m for edge in edges} == {100.0}
+    assert {edge.marginal_n_per_m for edge in edges} == {None}
+    assert len(asked) == 10 + len(GRID.dampings) - 1
+
+
+def test_nothing_stable_is_looked_for_at_every_damping():
+    edges, asked = traced(lambda *_: False)
+    assert edges == [Edge(damping, 0.0, 10.0) for damping in GRID.dampings]
+    assert asked == [(stiffness, damping) for damping in GRID.dampings for stiffness in (10.0, 20.0, 40.0, 80.0)]
+
+
+def test_a_region_that_begins_at_a_stiffer_wall_of_a_larger_damping_is_found():
+    edges, asked = traced(lambda stiffness, damping: 30 <= stiffness <= 70 and damping >= 2)
+    assert [edge.stable_n_per_m for edge in edges] == [0.0, 0.0, *[70.0] * 9]
+    assert asked[8:15] == [(10, 2), (20, 2), (40, 2), (50, 2), (60, 2), (70, 2), (80, 2)]
+
+
+def test_walls_below_the_edge_are_hit_last_and_counted():
+    """Of four a fifth apart, those under 30 are not stable."""
+    edges, asked = traced(lambda stiffness, _: 30 <= stiffness <= 70, replace(GRID, walls_below=4))
+    assert {edge.held for edge in edges} == {0.75}
+    assert asked[-4:] == [(10, 6), (30, 6), (40, 6), (60, 6)]
+    soft, _ = traced(lambda stiffness, _: stiffness <= 10, replace(GRID, walls_below=4))
+    assert {edge.held for edge in soft} == {None}, "there is no wall below the softest"
+
+
+def test_rows_go_to_the_last_whole_step():
+    assert Grid(35e3, 100e3, 1.0, 2.0, 1.0).rows == 2
+    assert Grid(0.1, 0.3, 1.0, 2.0, 1.0).rows == 3
+
+
+def test_area_is_that_of_trapezoids():
+    edges = [Edge(1.0, 10.0, None), Edge(3.0, 30.0, None), Edge(4.0, 0.0, None)]
+    assert area(edges) == 2 * 20 + 15
+    assert area(edges[:1]) == 0
+
+
+@pytest.mark.parametrize(("last", "count"), [(1.0, 1), (1.2, 1), (1.4999, 1), (1.5, 2), (6.0, 11)])
+def test_dampings_go_to_the_last_whole_step(last, count):
+    assert len(Grid(10.0, 100.0, 1.0, last, 0.5).dampings) == count

@@ -1,0 +1,134 @@
+"""The protocol of a hit: what is reported of it, against plain numpy on every sample of the run."""
+
+import hashlib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hardwall.sim.scene.load import load
+from hardwall.sim.walls import hit
+from stimuli.scenes import CABLE, HAND, PULSES
+
+# An unstable wall, so that means and distances are large; and times that are no whole number of chunks or actuations.
+SCENE = {
+    "protocol.settle_s": 0.8503,
+    "protocol.mean_s": 0.1207,
+    "protocol.measure_s": 0.2111,
+    "wall.stiffness_n_per_m": 60e3,
+}
+
+
+@pytest.fixture(scope="module")
+def run():
+    """Return a run and all of its samples: an overview of every one."""
+    scene = load("seed-2011", SCENE)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(hit, "OVERVIEW_POINTS", scene.samples)
+        patch.setattr(hit, "CHUNK", 1000)
+        return hit.run(scene, "fixed", traces=True)
+
+
+def test_mean_and_rms_are_those_of_the_positions(run):
+    x, settled = run.overview.position_m, 8503
+    assert len(x) == run.samples == 8503 + 2111
+    mean = x[settled - 1207 : settled].mean()
+    assert run.mean_m == pytest.approx(mean, rel=1e-12)
+    assert run.rms_m == pytest.approx(np.sqrt(np.mean((x[settled:] - mean) ** 2)), rel=1e-12)
+    assert run.rms_m > 1e-4
+
+
+def test_the_verdict_is_the_thresholds(run):
+    assert not run.stable
+    for factor, stable in ((0.999, False), (1.001, True)):
+        threshold = {"protocol.threshold_mm": run.rms_m * 1e3 * factor}
+        assert hit.run(load("seed-2011", SCENE | threshold), "fixed").stable is stable
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_in_place_is_within_friction_a_count_and_the_rms(run, side):
+    """60 kN/m, a push of 0.3572 N, 0.1 N of friction, counts of 1 um, and an RMS of 2 um."""
+    farthest_n = 0.1 + 60e3 * 3e-6
+    for factor, in_place in ((0.999, True), (1.001, False)):
+        mean_m = (0.3572 + side * factor * farthest_n) / 60e3
+        assert replace(run, mean_m=mean_m, rms_m=2e-6).in_place is in_place
+
+
+CODES = {"output.full_scale_n": 32.0, "output.dac_bits": 8}
+FIRM = HAND | {"hand.stiffness_n_per_m": 40e3, "hand.rest_m": 1e-4}
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize(
+    ("parts", "carried_n", "farthest_n", "spring_n_per_m"),
+    [
+        (PULSES, 0.3572, 0.1 + 2 * 50 / 300, 0.0),
+        (CODES, 0.3572, 0.1 + 2 * 32 / 2**8, 0.0),
+        (CABLE, 0.3572, 0.1, 0.0),
+        (CABLE | {"transmission.encoder_at": "motor"}, 0.3572, 0.1 + 60e3 / 2e5 * (0.3572 + 0.1), 0.0),
+        (FIRM, 0.3572 + 40e3 * 1e-4, 0.1, 40e3),
+    ],
+    ids=["pulses", "converter", "cable", "encoder at the motor", "hand"],
+)
+def test_in_place_allows_what_a_part_hides(run, side, parts, carried_n, farthest_n, spring_n_per_m):
+    """And counts of 1 um, and an RMS of 2 um. What a hand carries shrinks as it follows."""
+    scene = load("seed-2011", SCENE | parts)
+    for factor, in_place in ((0.999, True), (1.001, False)):
+        off_n = side * factor * (farthest_n + 60e3 * 3e-6)
+        mean_m = (carried_n + off_n) / (60e3 + spring_n_per_m)
+        assert replace(run, scene=scene, mean_m=mean_m, rms_m=2e-6).in_place is in_place
+
+
+@pytest.mark.parametrize(("sample_hz", "met"), [(10_000, True), (20_000, True), (15_000, False)])
+def test_a_chatter_that_the_force_always_meets_on_one_side_is_stable_and_out_of_place(sample_hz, met):
+    """Levant's u with large gains has a period of two samples; the force is updated every 10, 20 or 15 of them."""
+    lam, alpha, tau = 100.0, 560.0, 1 / sample_hz
+    gains = {"controller.gains.levant": {"lambda_sqrt_m_per_s": lam, "alpha_m_per_s2": alpha}}
+    wall = {"wall.stiffness_n_per_m": 20e3, "wall.damping_n_s_per_m": 100.0}
+    result = hit.run(load("seed-2011", gains | wall | {"controller.sample_hz": sample_hz}), "fixed")
+    assert result.stable is met
+    # x goes from e to -e and back, 2 e = tau u, and u = lambda sqrt(e) - alpha tau / 2 where u1 is even about 0; it may
+    # be one of its steps off, alpha tau.
+    root = lam * (tau / 2) ** 0.5
+    speed = ((root + (root**2 - 2 * alpha * tau) ** 0.5) / 2) ** 2
+    damper_n = 20e3 * result.mean_m - 0.3572
+    assert (abs(damper_n - 100.0 * speed) <= 100.0 * alpha * tau + 0.1 + 20e3 * 1e-6) is met
+    assert not (result.stable and result.in_place)
+
+
+def test_the_digest_is_of_the_drive_of_every_actuation(run):
+    words = np.round(run.overview.force_n / run.scene.spec.force_resolution_n)[::10].astype("<i4")
+    assert run.force_sha256 == hashlib.sha256(words.tobytes()).hexdigest()
+    assert run.max_force_n == pytest.approx(np.abs(run.overview.force_n).max())
+
+
+def test_the_estimates_error_is_that_of_the_contact(run):
+    error = run.detail.estimate_m_per_s - run.detail.velocity_m_per_s
+    assert run.estimate_rms_m_per_s == pytest.approx(error.std(), rel=0.1)
+    assert hit.run(run.scene, "fixed").estimate_rms_m_per_s is None
+
+
+def test_scene_keys_reach_the_hardwares_words():
+    spec = load("seed-2011").spec
+    words = {word.name: word for word in spec.design.words}
+    changed = load("seed-2011", {"controller.slew_limit_n_per_s": 500.0, "wall.forbid_pull": True}).words
+    assert words["output_slew_limit"].to_si(changed["output_slew_limit"]) == 500.0
+    assert changed["wall_forbid_pull"] == 1
+    assert load("seed-2011").words["wall_forbid_pull"] == 0
+
+
+def test_a_slew_limit_limits_and_a_wall_that_may_not_pull_does_not():
+    free, slow, pushing = (
+        hit.run(load("seed-2011", change), "fixed", traces=True)
+        for change in ({}, {"controller.slew_limit_n_per_s": 500.0}, {"wall.forbid_pull": True})
+    )
+    assert "slew_limited" in slow.flags
+    assert "slew_limited" not in free.flags
+    assert np.abs(np.diff(slow.detail.force_n)).max() <= 0.5 + 1e-9 < np.abs(np.diff(free.detail.force_n)).max()
+    assert free.detail.force_n.max() > 0.1
+    assert pushing.detail.force_n.max() == 0
+
+
+def test_half_samples_in_the_protocol_are_no_trouble():
+    times = {"protocol.settle_s": 3.5e-4, "protocol.mean_s": 1e-4, "protocol.measure_s": 1e-4, "amplifier": None}
+    assert hit.run(load("seed-2011", times), "fixed").samples == 5

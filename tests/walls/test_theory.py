@@ -1,0 +1,112 @@
+"""Theory of stiff walls: the closed forms, and the linear loop against the simulation that it leaves nothing out of."""
+
+import numpy as np
+import pytest
+
+from hardwall.model.quadrature import latency
+from hardwall.sim.scene.load import load
+from hardwall.sim.walls import hit, theory
+from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND
+
+# No friction that sticks, fine counts, a threshold of fifty; slow enough for the decoder; long enough for what grows.
+LINEAR = {
+    "handle.coulomb_n": None,
+    "encoder.count_m": 1e-7,
+    "controller.travel_m": 0.02,
+    "controller.speed_max_m_per_s": 0.05,
+    "controller.glitch_clocks": 0,
+    "protocol.start_m": -2e-4,
+    "protocol.settle_s": 40.0,
+    "protocol.threshold_mm": 5e-3,
+    "controller.output": "u",
+}
+# What grows here bounces off a stiffer wall, and no higher.
+PROMPT = {
+    "amplifier": None, "controller.actuation_hz": 10_000, "controller.stiffness_max_n_per_m": 1e6,
+    "encoder.count_m": 1e-8, "protocol.threshold_mm": 5e-4,
+}  # fmt: skip
+CASES = {
+    "fdm, soft": ("fdm", {}, 10.0, {}),
+    "fdm, damped": ("fdm", {}, 60.0, {}),
+    "filter of 100 Hz": ("butterworth", {"cutoff_hz": 100.0}, 20.0, {}),
+    "filter of 1 kHz": ("butterworth", {"cutoff_hz": 1000.0}, 100.0, {}),
+    "force at every sample": ("fdm", {}, 10.0, PROMPT),
+    "filter, force at every sample": ("butterworth", {"cutoff_hz": 300.0}, 30.0, PROMPT),
+    "amplifier with a bandwidth": ("fdm", {}, 20.0, AMPLIFIER),
+    "cable, encoder at the handle": ("fdm", {}, 20.0, CABLE),
+    "cable, encoder at the motor": ("fdm", {}, 7.0, CABLE | {"transmission.encoder_at": "motor"}),
+    "hand": ("fdm", {}, 10.0, HAND),
+    "voltage drive": ("fdm", {}, 10.0, DRIVE),
+    "all of them": ("butterworth", {"cutoff_hz": 500.0}, 20.0, AMPLIFIER | CABLE | HAND | DRIVE),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_simulation_turns_unstable_within_2_percent_of_the_linear_limit(case):
+    name, gains, damping, others = CASES[case]
+    changes = LINEAR | others | {"controller.estimator": name, "wall.damping_n_s_per_m": damping}
+    changes |= {f"controller.gains.{name}": gains} if gains else {}
+    limit = theory.linear_limit_n_per_m(theory.Loop(load("seed-2011", changes)), damping)
+    assert limit > 1000
+    for share, stable in ((0.98, True), (1.02, False)):
+        result = hit.run(
+            load("seed-2011", changes | {"wall.stiffness_n_per_m": share * limit}), "float", until_sure=True
+        )
+        assert result.flags == [] or not result.stable
+        assert result.stable == stable, f"{share} of {limit} N/m: RMS {result.rms_m} m"
+
+
+def test_a_loop_without_damping_anywhere_is_unstable_at_every_stiffness():
+    scene = load("seed-2011", {"handle.viscous_n_s_per_m": 0.0, "controller.estimator": "fdm"})
+    assert theory.linear_limit_n_per_m(theory.Loop(scene), 0.0) == 0.0
+
+
+def test_a_fast_undelayed_loop_has_the_limit_of_gil_and_hulin():
+    """K < (b + B) / (T / 2 + delay), linear stability's first order in T; the estimator's half sample is beyond it."""
+    changes = {"controller.estimator": "fdm", "handle.viscous_n_s_per_m": 5.0}
+    scene = load("mhz", changes)
+    delay_s = (scene.spec.design.latency_to_drive + latency(scene.controller.glitch_clocks)) / scene.spec.clock_hz
+    expected = 5.0 / (0.5e-6 + delay_s)
+    assert theory.linear_limit_n_per_m(theory.Loop(scene), 0.0) == pytest.approx(expected, rel=0.01)
+
+
+def test_other_estimators_are_refused():
+    with pytest.raises(ValueError, match=r"^estimator must be one of fdm, butterworth .*, not 'levant'$"):
+        theory.Loop(load("seed-2011"))
+
+
+def test_passivity():
+    prompt = {"amplifier": None, "controller.clock_hz": 1_000_000_000, "handle.viscous_n_s_per_m": 3.0}
+    scene = load("seed-2011", prompt)
+    assert 0 < theory.delay_s(scene) < 1e-7
+    # As good as prompt: b > K T / 2 + |B|.
+    for damping in (1.0, -1.0):
+        assert theory.colgate_schenkel_n_per_m(scene, damping) == pytest.approx((3 - 1) / 0.5e-3, rel=1e-3)
+    assert theory.colgate_schenkel_n_per_m(scene, 4.0) == 0
+    assert theory.abbott_okamura_n_per_m(scene) == pytest.approx(2 * 3 * 1000, rel=1e-3)
+    damped = load("seed-2011", prompt | {"handle.viscous_n_s_per_m": 300.0})
+    assert theory.abbott_okamura_n_per_m(damped) == pytest.approx(2 * 0.1 / 1e-6)
+
+
+@pytest.mark.parametrize("damping", [0.0, 1.0, 3.0])
+def test_a_late_wall_is_passive_as_colgate_and_schenkel_s_own_condition_has_it(damping):
+    """b > T/2 sup Re((1 - z^-1) H(z)) / (1 - cos), H the wall itself a period late; by numbers."""
+    scene = load("seed-2011", {"controller.clock_hz": 1_000_000_000, "handle.viscous_n_s_per_m": 8.0})
+    period_s, z = 1e-3, np.exp(1j * np.linspace(1e-3, np.pi, 100_001))
+
+    def needed(stiffness):
+        wall = (stiffness + damping / period_s * (1 - 1 / z)) / z
+        return period_s / 2 * np.max(((1 - 1 / z) * wall).real / (1 - z.real))
+
+    largest = theory.colgate_schenkel_n_per_m(scene, damping)
+    assert largest > 1000
+    assert needed(0.999 * largest) < 8.0 < needed(1.001 * largest)
+
+
+@pytest.mark.parametrize("amplifier", ["as it is", None])
+def test_a_passive_wall_is_within_the_linear_limit(amplifier):
+    changes = {"handle.viscous_n_s_per_m": 8.0, "controller.estimator": "fdm"}
+    scene = load("seed-2011", changes | ({"amplifier": None} if amplifier is None else {}))
+    loop = theory.Loop(scene)
+    for damping in np.linspace(0, 7, 8):
+        assert 0 < theory.colgate_schenkel_n_per_m(scene, damping) < theory.linear_limit_n_per_m(loop, damping)

@@ -1,0 +1,235 @@
+"""Maps of stable walls: early ends, any number of workers, interrupts, what is printed and what is refused."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from distributed import Client, LocalCluster
+
+from hardwall.sim.jobs.store import Store
+from hardwall.sim.scene.load import load, read
+from hardwall.sim.walls import hit, methods, zwidth
+from hardwall.sim.walls.boundary import Edge
+from stimuli.command_line import call
+
+pytestmark = pytest.mark.usefixtures("fresh")
+
+SMALL = {
+    "zwidth.stiffness_step_n_per_m": 4e3,
+    "zwidth.damping_from_n_s_per_m": 10.0,
+    "zwidth.damping_to_n_s_per_m": 20.0,
+    "zwidth.damping_step_n_s_per_m": 10.0,
+    "protocol.settle_s": 2.0,
+    "protocol.measure_s": 0.5,
+}
+SET = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
+METHODS = [methods.methods()[name] for name in ("fdm-100", "adjusted")]
+CASES = [zwidth.Case(each.label, "seed-2011", read("seed-2011"), SMALL | each.changes) for each in METHODS]
+
+
+@pytest.fixture(scope="module")
+def map_of_one_process(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path_factory.mktemp("one"))
+        return zwidth.run(CASES, "fixed", Store("zwidth"))
+
+
+@pytest.mark.parametrize("backend", ["float", "fixed"])
+@pytest.mark.parametrize("estimator", ["fdm", "levant"])
+def test_an_early_end_changes_no_verdict(backend, estimator):
+    ended = 0
+    for stiffness in (5e3, 15e3, 40e3, 150e3):
+        for damping in (10.0, 120.0, 300.0):
+            wall = {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": damping}
+            scene = load("seed-2011", wall | {"controller.estimator": estimator})
+            whole, early = hit.run(scene, backend), hit.run(scene, backend, until_sure=True)
+            assert early.stable == whole.stable, wall
+            ended += early.samples < whole.samples
+            if whole.stable:
+                assert (early.samples, early.force_sha256) == (whole.samples, whole.force_sha256)
+                # Sums in other pieces round otherwise.
+                assert early.rms_m == pytest.approx(whole.rms_m, rel=1e-9, abs=1e-15)
+    assert ended >= 3
+
+
+def test_a_wall_that_settles_late_is_not_ended_early():
+    """The force is at its limit for a sample now and then, and the handle rests in the end all the same."""
+    changes = {"controller.estimator": "fdm", "protocol.push_n": 0.138, "wall.stiffness_n_per_m": 10e3}
+    result = hit.run(load("mhz", changes | {"wall.damping_n_s_per_m": 40.0}), "float", until_sure=True)
+    assert result.stable
+    assert result.samples == result.scene.samples
+
+
+def test_a_worker_with_other_sources_is_refused():
+    with pytest.raises(RuntimeError, match=r"has other sources of hardwall, or versions of its tools$"):
+        zwidth.verdict("seed-2011", read("seed-2011"), "0", {}, 1e3, 10.0, "fixed")
+
+
+def test_two_workers_give_the_map_of_one(map_of_one_process):
+    options = {"threads_per_worker": 1, "dashboard_address": ":0"}
+    with LocalCluster(n_workers=2, **options) as cluster, Client(cluster) as client:
+        assert zwidth.run(CASES, "fixed", Store("zwidth"), client) == map_of_one_process
+
+
+def test_a_map_goes_on_from_what_is_known(map_of_one_process, monkeypatch):
+    """Ended after five hits, then gone on: none of the five is hit again, and the map is the same."""
+    real, hits = zwidth.verdict, []
+
+    def counted(**job):
+        if len(hits) == 5:
+            raise KeyboardInterrupt
+        hits.append(job)
+        return real(**job)
+
+    monkeypatch.setattr(zwidth, "verdict", counted)
+    with pytest.raises(KeyboardInterrupt):
+        zwidth.run(CASES, "fixed", Store("zwidth"))
+    before = list(hits)
+    monkeypatch.setattr(zwidth, "verdict", lambda **job: hits.append(job) or real(**job))
+    assert zwidth.run(CASES, "fixed", Store("zwidth")) == map_of_one_process
+    assert len(hits) == sum(each.hits for each in map_of_one_process)
+    assert all(job not in before for job in hits[5:])
+
+
+@pytest.mark.rtl
+def test_the_rtl_gives_the_map_of_fixed(monkeypatch, capsys):
+    few = [*SET, "--set", "zwidth.stiffness_to_n_per_m=20e3", "--set", "zwidth.damping_to_n_s_per_m=10.0"]
+    few += ["--set", "controller.clock_hz=6000000", "--estimators", "adjusted", "--workers", 1, "--json"]
+    fixed, rtl = (
+        json.loads(call(monkeypatch, capsys, "zwidth", *few, "--backend", each)[1])["maps"] for each in ("fixed", "rtl")
+    )
+    assert all(each[0].pop("seconds") > 0 for each in (fixed, rtl))
+    assert fixed == rtl
+    assert fixed[0]["hits"] > 2
+
+
+def test_walls_below_the_edge_are_hit_where_the_scene_asks():
+    """At 90 N s/m and more, Levant's chatter shakes soft walls, not stiff ones."""
+    changes = {**METHODS[1].changes, "zwidth.walls_below": 8, "zwidth.stiffness_step_n_per_m": 4e3}
+    changes |= {"zwidth.damping_from_n_s_per_m": 90.0, "zwidth.damping_to_n_s_per_m": 100.0}
+    changes |= {"zwidth.damping_step_n_s_per_m": 10.0}
+    (found,) = zwidth.run([replace(CASES[1], changes=changes)], "fixed", Store("zwidth"))
+    left, right = (edge.held * edge.stable_n_per_m for edge in found.edges)
+    assert all(0 < edge.held < 1 for edge in found.edges)
+    assert found.report()["area_held_n2_s_per_m2"] == found.area_held == pytest.approx(10 * (left + right) / 2)
+    assert replace(found, edges=[replace(edge, held=None) for edge in found.edges]).area_held is None
+
+
+def test_walls_out_of_place_are_left_out_of_the_area_in_place():
+    edges = [Edge(10.0 * n, 20e3, 21e3) for n in range(5)]
+    found = zwidth.Map(CASES[0], edges, 5, [True, True, False, True, True])
+    assert found.area == 40 * 20e3
+    # Two of four trapezoids lose half.
+    assert found.area_in_place == 30 * 20e3
+
+
+def test_a_map_knows_which_of_its_walls_are_in_place(map_of_one_process):
+    filtered = map_of_one_process[0]
+    assert filtered.in_place == [edge.stable_n_per_m > 0 for edge in filtered.edges]
+    assert filtered.area_in_place == filtered.area > 0
+    large = {"controller.gains.levant": {"lambda_sqrt_m_per_s": 100.0, "alpha_m_per_s2": 560.0}}
+    (chatters,) = zwidth.run([replace(CASES[1], changes=CASES[1].changes | large)], "fixed", Store("zwidth"))
+    assert chatters.area > chatters.area_in_place == 0
+
+
+def test_report_and_picture(monkeypatch, capsys, tmp_path, map_of_one_process):
+    picture = tmp_path / "map.svg"
+    names = ["--estimators", "fdm-100,adjusted", "--workers", 1]
+    code, out, _ = call(monkeypatch, capsys, "zwidth", *SET, *names, "--json", "--plot", picture)
+    assert code == 0
+    report = json.loads(out)
+    expected = [each.report() for each in map_of_one_process]
+    assert all(each.pop("seconds") > 0 for each in expected + report["maps"])
+    assert report["maps"] == expected
+    assert report["hits"] == sum(each["hits"] for each in report["maps"])
+    text = picture.read_text()
+    wanted = ("damping B of the wall (N s/m)", "largest stable stiffness K (kN/m)", "FDM + 100 Hz", "linear loop")
+    assert [label for label in wanted if label not in text] == []
+    code, out, _ = call(monkeypatch, capsys, "zwidth", *SET, *names, "--resume")
+    assert code == 0
+    assert "Levant u, adjusted gains" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["mhz"], "mhz: zwidth is missing: a map needs its steps"),
+        (
+            ["desktop-arm"],
+            "butterworth.cutoff_hz must be 4.52346e-12 to 400 at these rates, not 500.0 (FDM + 500 Hz)",
+        ),
+        (["--set", "zwidth.walls_below=-1"], "zwidth.walls_below must be at least 0"),
+        (["--set", "protocol.threshold_mm=1e300"], "protocol.threshold_mm must be at most 1000"),
+        (["--workers", "2", "--scheduler", ""], "--scheduler  has workers of its own"),
+        (["--estimators", "nobody"], "--estimators: estimator must be one of fdm, "),
+        (
+            ["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"],
+            "--scheduler tcp://127.0.0.1:1 has workers",
+        ),
+        (["--set", "zwidth.stiffness_step_n_per_m=0"], "zwidth.stiffness_step_n_per_m must be more than 0"),
+        (["--set", "zwidth.stiffness_to_n_per_m=1e9"], "zwidth.stiffness_to_n_per_m must be 1000 to 200000"),
+        (["--set", "zwidth.damping_to_n_s_per_m=1.0"], "zwidth.damping_to_n_s_per_m must be 6 to 400"),
+        (["--set", "zwidth.damping_step_n_s_per_m=1e-9"], "zwidth.damping_step_n_s_per_m must be at least 0.0294"),
+        (["--set", "zwidth.stiffness_step_n_per_m=1e-3"], "zwidth.stiffness_step_n_per_m must be at least 10, 10000"),
+        (["--set", "controller.estimator=fdm"], "--set controller.estimator is what this command sets itself: see"),
+        (["--set", "wall.damping_n_s_per_m=1.0"], "--set wall.damping_n_s_per_m is what this command sets itself"),
+        (["--plot", "map.gif"], "--plot must end in .pdf or .png or .svg"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, message):
+    code, out, err = call(monkeypatch, capsys, "zwidth", *arguments)
+    assert (code, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_a_scene_of_a_file_need_not_be_there_any_more(tmp_path, map_of_one_process):
+    file = tmp_path / "mine.toml"
+    file.write_text(read("seed-2011"))
+    cases = [replace(case, scene=str(file), text=read(str(file))) for case in CASES]
+    file.unlink()
+    maps = zwidth.run(cases, "fixed", Store("zwidth"))
+    assert [each.edges for each in maps] == [each.edges for each in map_of_one_process]
+
+
+def test_a_scheduler_without_workers_is_a_failure(monkeypatch, capsys):
+    monkeypatch.setattr("hardwall.sim.jobs.cluster.TIMEOUT_S", 0.5)
+    with LocalCluster(n_workers=0, dashboard_address=":0") as cluster:
+        address = cluster.scheduler_address
+        code, out, err = call(monkeypatch, capsys, "zwidth", *SET, "--scheduler", address)
+    assert (code, out) == (1, "")
+    assert f"the Dask scheduler at {address} has no workers" in err
+
+
+def test_a_scheduler_that_is_not_there_is_a_failure(monkeypatch, capsys):
+    monkeypatch.setattr("hardwall.sim.jobs.cluster.TIMEOUT_S", 0.5)
+    code, out, err = call(monkeypatch, capsys, "zwidth", *SET, "--scheduler", "tcp://127.0.0.1:1")
+    assert (code, out) == (1, "")
+    assert "no Dask scheduler answers at tcp://127.0.0.1:1" in err
+
+
+def test_an_interrupted_map_says_how_to_go_on(tmp_path):
+    command = [Path(sys.executable).with_name("hardwall"), "zwidth", "--workers", "2", "--json"]
+    build = tmp_path / "results"
+    process = subprocess.Popen(
+        command, env={**os.environ, "HARDWALL_BUILD": str(build)}, stderr=subprocess.PIPE, stdout=subprocess.PIPE,
+        text=True, start_new_session=True,
+    )  # fmt: skip
+
+    def kept() -> list[str]:
+        return [line for path in build.glob("results/zwidth-*.jsonl") for line in path.read_text().split()]
+
+    deadline = time.monotonic() + 120
+    while time.monotonic() < deadline and not kept():
+        time.sleep(0.2)
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (1, "")
+    assert err == "hardwall: error: interrupted; --resume goes on from here\n"
+    assert len(kept()) > 0
