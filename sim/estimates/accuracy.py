@@ -14,13 +14,12 @@ import numpy as np
 from ...model.compiled import compiled
 from ...model.estimators import registry
 from ...model.spec import AxisSpec
-from ..scene.load import load as load_scene
+from ..scene.case import Case
 from ..world.encoder import offsets
-from . import signals
+from . import recording, signals
 from .errors import Judge
 from .motions import velocity
 from .playback import velocities
-from .recording import load as load_recording
 from .replay import replay
 
 RATES_HZ = (1_000, 10_000_000)
@@ -58,7 +57,7 @@ def axis_spec(
         ValueError: if it cannot be; the message names the field.
     """
     return replace(
-        load_scene("mhz").spec,
+        Case.of("mhz").scene.spec,
         clock_hz=sample_hz * max(-(-CLOCK_HZ // sample_hz), CLOCKS),
         sample_hz=sample_hz,
         actuation_hz=sample_hz,
@@ -181,7 +180,7 @@ def measure_recording(
         RecordingError, ReplayError: in one line, what cannot be and what is accepted.
         RuntimeError: if the RTL could not be built.
     """
-    result = replay(load_recording(file, column), estimator, output, backend, coarsen=COARSEN)
+    result = replay(recording.load(file, column), estimator, output, backend, coarsen=COARSEN)
     rate, begin = result.recording.rate_hz, result.judged_from
     estimate, exact = result.velocity_counts_per_s[begin:], result.reference_counts_per_s[begin:]
     judge = Judge(len(estimate), rate)

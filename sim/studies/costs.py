@@ -1,7 +1,10 @@
 """What a velocity estimator costs in logic: alone, as synthesised, and as part of a board, placed and routed."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
 
+from ..jobs.result import Table, table_of
 from ..rtl.synthesis import estimator_cells, synthesise
 from ..scene.load import load
 
@@ -14,6 +17,42 @@ RATES = {
     },
 }
 """By device: what differs from the scene `mhz`, which is too fast for the slower one."""
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What estimators take of devices: rows of `cost`."""
+
+    rows: list[dict[str, Any]]
+
+    def report(self) -> list[dict[str, Any]]:
+        """Return the rows."""
+        return self.rows
+
+    def tables(self) -> list[Table]:
+        """Return a table for each device: the estimator alone, and the board with it."""
+        return [
+            table_of((device,), NUMBERS, [_line(row) for row in self.rows if row["device"] == device])
+            for device in dict.fromkeys(row["device"] for row in self.rows)
+        ]
+
+    def notes(self) -> list[str]:
+        return []
+
+
+NUMBERS = ("LUT4", "FF", "DSP", "BRAM", "clocks", "board LUT4", "board FF", "board DSP", "fmax (MHz)", "samples/s")
+
+
+def _line(row: dict[str, Any]) -> list[str]:
+    board = row["board"]
+    own = [row["lut4"], row["ff"], row["dsp"], row["bram"], row["latency_clocks"]]
+    whole = [board["lut4"], board["ff"], board["dsp"], f"{board['fmax_mhz']:.1f}", f"{board['max_sample_hz']:,}"]
+    return [row["estimator"], *map(str, own), *map(str, whole)]
+
+
+def jobs(estimators: list[str], device: str, seeds: int) -> list[dict[str, Any]]:
+    """Return the arguments of `cost` for each estimator."""
+    return [{"estimator": name, "device": device, "seeds": list(range(1, seeds + 1))} for name in estimators]
 
 
 def cost(estimator: str, device: str, seeds: Iterable[int]) -> dict:

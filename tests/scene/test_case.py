@@ -3,7 +3,7 @@
 import pytest
 
 from hardwall.sim.scene.load import load, read
-from hardwall.sim.scene.schema import SceneError
+from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.walls.case import Case, accepted, grid_of, room
 
 
