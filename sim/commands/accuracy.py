@@ -26,7 +26,9 @@ def command(
     figure: Annotated[int | None, typer.Option(min=1, max=2, help="reproduce the founding paper's figure")] = None,
     signal: Annotated[
         list[str] | None,
-        typer.Option(help="paper, sweep, stop, flicker, hit, steady:MM_PER_S, or FILE.csv:COLUMN [default: paper]"),
+        typer.Option(
+            help="paper, sweep, stop, flicker, hit, steady:MM_PER_S, or FILE.csv:COLUMN", show_default="paper"
+        ),
     ] = None,
     wanted: EstimatorsOption = None,
     rates: Annotated[str | None, typer.Option(metavar="HZ,...", help="sample rates, e.g. 1e3,10e3,1e6")] = None,
@@ -35,7 +37,7 @@ def command(
         float, typer.Option(metavar="COUNTS", help="channel B late by so much, -0.95 to 0.95")
     ] = 0.0,
     acceleration_max: Annotated[
-        float | None, typer.Option(metavar="C", help="m/s^2, sets the gains [default: the signal's own]")
+        float | None, typer.Option(metavar="C", help="m/s^2, sets the gains", show_default="the signal's own")
     ] = None,
 ) -> None:
     if figure and signal:

@@ -17,7 +17,9 @@ def command(
     options: StudyOptions,
     scenes: Annotated[
         list[str] | None,
-        typer.Argument(metavar="SCENE...", help=f"of {', '.join(names())}, or .toml files [default: three devices]"),
+        typer.Argument(
+            metavar="SCENE...", help=f"of {', '.join(names())}, or .toml files", show_default="three devices"
+        ),
     ] = None,
     backend: ModelOption = "fixed",
 ) -> None:

@@ -21,7 +21,7 @@ def command(
     scene: SceneArgument = "seed-2011",
     reading: Annotated[
         Literal["3-30", "30-300"] | None,
-        typer.Option("--axis", metavar="B", help="of the paper's B axis, N s/m: 3-30 or 30-300 [default: both]"),
+        typer.Option("--axis", metavar="B", help="of the paper's B axis, N s/m: 3-30 or 30-300", show_default="both"),
     ] = None,
     evaluations: Annotated[int, typer.Option(min=1, help="of a search, about so many")] = 576,
     seed: Annotated[int, typer.Option(min=0, help="of a search")] = 1,

@@ -17,10 +17,10 @@ Backend = Literal["float", "fixed", "rtl"]
 Device = Literal["ecp5-25k", "ice40-up5k"]
 
 SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help=f"{', '.join(names())}, or a .toml file")]
-EstimatorOption = Annotated[Estimator | None, typer.Option(help="velocity estimator [default: the scene's]")]
-OutputOption = Annotated[str | None, typer.Option(help="its output, e.g. u or u1 [default: its first]")]
+EstimatorOption = Annotated[Estimator | None, typer.Option(help="velocity estimator", show_default="the scene's")]
+OutputOption = Annotated[str | None, typer.Option(help="its output, e.g. u or u1", show_default="its first")]
 EstimatorsOption = Annotated[
-    str | None, typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="which [default: all]")
+    str | None, typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="which", show_default="all")
 ]
 BackendOption = Annotated[Backend, typer.Option(help="float64 algorithm, bit-accurate model, or the Verilated RTL")]
 ModelOption = Annotated[Literal["float", "fixed"], typer.Option(help="float64 algorithm, or bit-accurate model")]
@@ -28,7 +28,7 @@ DeviceOption = Annotated[Device, typer.Option(help="the part to place and route 
 SeedsOption = Annotated[int, typer.Option(min=1, max=99, help="how many placements; fmax is their median")]
 RateOption = Annotated[float, typer.Option(metavar="HZ", help="sample rate")]
 
-WorkersOption = Annotated[int | None, typer.Option(min=1, help="processes [default: one a core]")]
+WorkersOption = Annotated[int | None, typer.Option(min=1, help="processes", show_default="one a core")]
 SchedulerOption = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="of a Dask cluster that runs, in place of workers of its own")
 ]

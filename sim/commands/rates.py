@@ -19,10 +19,11 @@ def command(
     options: StudyOptions,
     scene: SceneArgument = "drive-2011",
     wanted: Annotated[
-        str | None, typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="see zwidth [default: six of all]")
+        str | None,
+        typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="see zwidth", show_default="six of all"),
     ] = None,
     tried: Annotated[
-        str | None, typer.Option("--rates", metavar="HZ,...", help="ascending [default: 1e3 to 1e6]")
+        str | None, typer.Option("--rates", metavar="HZ,...", help="ascending", show_default="1e3 to 1e6")
     ] = None,
     backend: ModelOption = "fixed",
 ) -> None:

@@ -17,14 +17,16 @@ def command(
     options: StudyOptions,
     file: Annotated[Path, typer.Argument(metavar="FILE.csv", help="a recording, its first line the columns' names")],
     column: Annotated[str, typer.Option(help="the column of encoder counts")],
-    rate: Annotated[float | None, typer.Option(metavar="HZ", help="sample rate [default: from column time_s]")] = None,
+    rate: Annotated[
+        float | None, typer.Option(metavar="HZ", help="sample rate", show_default="from column time_s")
+    ] = None,
     coarsen: Annotated[int | None, typer.Option(help="divide the counts, and judge against the full ones")] = None,
     estimator: Annotated[Estimator, typer.Option(help="velocity estimator")] = "levant",
     output: OutputOption = None,
     backend: BackendOption = "fixed",
     acceleration_max: Annotated[
         float | None,
-        typer.Option(metavar="C", help="counts/s^2, sets the gains [default: the recording's]"),
+        typer.Option(metavar="C", help="counts/s^2, sets the gains", show_default="the recording's"),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="write the velocities")] = None,
 ) -> None:

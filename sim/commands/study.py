@@ -69,8 +69,8 @@ class StudyOptions:
             for note in result.notes():
                 log.print(note)
         if self.plot:
-            _picture("style").save(_picture(self.study).draw(result), self.plot)
-            log.print(f"picture: {self.plot}")
+            for written in _picture("style").save_all(_picture(self.study).draw(result), self.plot):
+                log.print(f"picture: {written}")
 
 
 def _picture(name: str) -> Any:

@@ -21,8 +21,8 @@ def command(
         typer.Option(
             "--estimators",
             metavar="NAME[:OUTPUT],...",
-            help="of all estimators, or fdm-30, fdm-100, fdm-500, fdm-1000, proposed, adjusted [default: these six]; "
-            "or `all`",
+            help="`all`, some of all, or fdm-30, fdm-100, fdm-500, fdm-1000, proposed, adjusted",
+            show_default="these six",
         ),
     ] = None,
     backend: BackendOption = "fixed",

@@ -5,8 +5,9 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..studies.drop import PAPERS, STARTS, STIFFNESS_N_PER_M, STIFFNESSES_N_PER_M, Drop, Law
-from ..walls.case import grid_of
+from ..studies.drop import PAPERS, STARTS, STIFFNESSES_N_PER_M
+from ..studies.drop_result import STIFFNESS_N_PER_M, Drop, Law
+from ..walls.grid import grid_of
 from .labels import label_points
 from .style import AT_REST_M, COLOURS, THEORY, ink, length_text, looks, new_figure, page
 
@@ -24,14 +25,14 @@ def draw(drop: Drop) -> dict[str, Figure]:
 
 def _styles(drop: Drop) -> dict[str, dict]:
     """Return the line style of each method, by name."""
-    scenes = {name: each.case.parsed.controller for name, each in drop.maps.items()}
+    scenes = {name: each.case.scene.controller for name, each in drop.maps.items()}
     styles = looks([(one.estimator, one.output) for one in scenes.values()])
     return dict(zip(scenes, styles, strict=True))
 
 
 def _inks(drop: Drop) -> dict[str, str]:
     """Return the colour in which each method is written, by name."""
-    return {name: ink(each.case.parsed.controller.estimator) for name, each in drop.maps.items()}
+    return {name: ink(each.case.scene.controller.estimator) for name, each in drop.maps.items()}
 
 
 def _setting(drop: Drop) -> str:
@@ -174,7 +175,7 @@ def _ends(drop: Drop) -> Figure:
 
 def _maps(drop: Drop) -> Figure:
     """Return the picture of the stable region of each method."""
-    grid = grid_of(next(iter(drop.maps.values())).case.parsed)
+    grid = grid_of(next(iter(drop.maps.values())).case.scene)
     title = (
         f"The stable region of each method, its area as a multiple of the paper's best\n{drop.scene.name}, "
         f"maps in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, {grid.damping_step_n_s_per_m:.3g} N s/m"

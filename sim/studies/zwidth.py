@@ -2,16 +2,12 @@
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
-from functools import cached_property
 from typing import Any
 
 from ..jobs.result import Table, table_of
 from ..scene.case import Case
 from ..scene.schema import Scene
-from ..walls import theory
-from ..walls.boundary import Grid
 from ..walls.figure_5 import Fact, facts
-from ..walls.grid import grid_of
 from ..walls.methods import Curve, methods
 from ..walls.zwidth import Effort, Map, Mapping
 
@@ -31,16 +27,6 @@ class ZWidth:
     maps: list[Map]
     facts: list[Fact]
     effort: Effort
-
-    @property
-    def grid(self) -> Grid:
-        """The steps of the maps."""
-        return grid_of(self.scene)
-
-    @cached_property
-    def limits(self) -> list[list[float] | None]:
-        """For each map, the linear loop's limit (N/m) at every B of the grid; None where there is none."""
-        return [_limit(each.case.scene, self.grid.dampings) for each in self.maps]
 
     def report(self) -> dict[str, Any]:
         """Return what the command line prints, units in the keys."""
@@ -91,14 +77,6 @@ def study(case: Case, curves: list[Curve] | None, mapping: Mapping) -> ZWidth:
     maps = mapping(f"{scene.name} Z-width", cases)
     shown = facts(dict(zip(papers, maps, strict=True))) if curves is None else []
     return ZWidth(scene, maps, shown, mapping.effort())
-
-
-def _limit(scene: Scene, dampings: list[float]) -> list[float] | None:
-    """Return the linear loop's limit at every B, if the estimator is linear."""
-    if scene.controller.estimator not in theory.LINEAR:
-        return None
-    loop = theory.Loop(scene)
-    return [theory.linear_limit_n_per_m(loop, damping) for damping in dampings]
 
 
 def area_text(each: Map) -> str:
