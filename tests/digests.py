@@ -198,16 +198,23 @@ def whole(text: str) -> dict[str, Any]:
 
 
 def parts(text: str) -> dict[str, Any]:
-    """Return a report as an entry for what it says itself, and one for each part of its lists and tables."""
-    report, entries = timeless(json.loads(text)), {"": {}}
+    """Return a report as an entry for what it says itself, and one for each part of its lists and of its tables."""
+    return _parts(timeless(json.loads(text)), "")
+
+
+def _parts(report: dict, name: str) -> dict[str, Any]:
+    own, entries = {}, {}
     for key, value in report.items():
-        if isinstance(value, dict):
-            entries |= {f"{key}/{name}": each for name, each in value.items()}
-        elif isinstance(value, list) and value and isinstance(value[0], dict):
-            entries |= {f"{key}/{number:02}": each for number, each in enumerate(value)}
-        else:
-            entries[""][key] = value
-    return entries
+        inner = {}
+        if isinstance(value, list) and value and isinstance(value[0], dict):
+            inner = {f"{number:02}": each for number, each in enumerate(value)}
+        elif isinstance(value, dict) and not name:
+            inner = value
+        for each, part in inner.items():
+            entries |= _parts(part, f"{name}{key}/{each}/")
+        if not inner:
+            own[key] = value
+    return {name.rstrip("/"): own} | entries
 
 
 def rows(text: str) -> dict[str, Any]:
