@@ -86,6 +86,6 @@ def run() -> None:
         BadInput: for a command, an option or an argument that cannot be; without words where help was all that came.
     """
     try:
-        app(standalone_mode=False)
+        app(prog_name="hardwall", standalone_mode=False)
     except typer.TyperException as error:
         raise BadInput(" ".join(error.format_message().split())) from None

@@ -128,7 +128,7 @@ def _constraints(device: Device) -> str:
     try:
         lines = files("hardwall.constraints").joinpath(name).read_text(encoding="utf-8").splitlines()
     except (ModuleNotFoundError, FileNotFoundError):
-        raise SynthesisError(f"constraints/{name} is not installed: without its pins the placement is another") from None
+        raise SynthesisError(f"constraints/{name} is not installed, and without pins nothing is placed") from None
     return "".join(f"{line}\n" for line in lines if not line.startswith(device.frequency))
 
 
