@@ -10,8 +10,8 @@ from ..jobs.result import table_of
 from .errors import BadInput
 from .terminal import show
 
-REST_MM = 1e-5
-"""A handle whose RMS is less is at rest: of a count of 1 um it has moved by less than a hundredth."""
+REST_MM = 1e-6
+"""A handle whose RMS is less is at rest: it has moved by a nanometre."""
 WORDS = ("scene", "estimator", "backend")
 NUMBERS = ("K (N/m)", "B (N s/m)", "wall", "RMS (mm)", "peak force (N)", "samples/s", "force words")
 
@@ -38,7 +38,7 @@ def _row(report: dict) -> list[str]:
         f"{report['stiffness_n_per_m']:g}",
         f"{report['damping_n_s_per_m']:g}",
         "stable" if report["stable"] else "unstable",
-        "at rest" if report["rms_mm"] < REST_MM else f"{report['rms_mm']:.5f}",
+        "at rest" if report["rms_mm"] < REST_MM else f"{report['rms_mm']:.3g}",
         f"{report['max_force_n']:.3f}",
         f"{report['samples_per_s']:.3g}",
         (report["force_sha256"] or "")[:8],

@@ -1,10 +1,10 @@
 """What people see: tables on stdout, everything else on stderr."""
 
+import rich.table
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table as RichTable
 from rich.text import Text
 
 from ..jobs.result import Table
@@ -14,7 +14,9 @@ log = Console(stderr=True, highlight=False)
 
 def show(table: Table) -> None:
     """Print a table, as wide as the terminal is; words and headings may take several lines, numbers do not."""
-    drawn = RichTable(box=SIMPLE_HEAD if table.columns else None, show_header=bool(table.columns), pad_edge=False)
+    drawn = rich.table.Table(
+        box=SIMPLE_HEAD if table.columns else None, show_header=bool(table.columns), pad_edge=False
+    )
     if table.columns:
         for place, (heading, justify) in enumerate(table.columns.items()):
             words = [row[place] for row in table.rows] + heading.split()

@@ -7,6 +7,7 @@ was.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -135,13 +136,8 @@ def measure(
         }
     )
     begin = math.ceil(known.judged_from_s * sample_hz)
-    judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
-    for first, words, flags in velocities(known, spec, output, backend, offsets(phase_error_counts)):
-        raised |= flags
-        estimate = words[max(begin - first, 0) :]
-        since = first + len(words) - len(estimate)
-        times = np.arange(since, since + len(estimate)) / sample_hz
-        judge.add(since - begin, estimate, exact_velocity(known.motion, times))
+    chunks = velocities(known, spec, output, backend, offsets(phase_error_counts))
+    judge, raised = _judged(known, begin, sample_hz, chunks)
     return {
         "estimator": estimator,
         "output": output,
@@ -161,6 +157,20 @@ def measure(
         "gains": asdict(spec.design.gains),
         "flags": spec.design.flag_names(raised),
     }
+
+
+def _judged(
+    known: signals.Signal, begin: int, sample_hz: int, chunks: Iterator[tuple[int, np.ndarray, int]]
+) -> tuple[Judge, int]:
+    """Return the errors of an estimate from sample `begin` on, and the flags that were raised."""
+    judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
+    for first, words, flags in chunks:
+        raised |= flags
+        estimate = words[max(begin - first, 0) :]
+        since = first + len(words) - len(estimate)
+        times = np.arange(since, since + len(estimate)) / sample_hz
+        judge.add(since - begin, estimate, exact_velocity(known.motion, times))
+    return judge, raised
 
 
 def measure_recording(

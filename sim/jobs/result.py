@@ -48,9 +48,15 @@ class Values(Summary):
 
 
 def text_of(value: Any) -> str:
-    """Return a value of a report as people read it: numbers of six digits, lists in a row."""
+    """Return a value of a report as people read it: numbers of six digits, lists in a row, a dash for what is not."""
+    if value is None or value == []:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
     if isinstance(value, float):
         return f"0 (< {NOTHING:g})" if 0 < abs(value) < NOTHING else f"{value:.6g}"
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {text_of(each)}" for key, each in value.items())
     return ", ".join(map(text_of, value)) if isinstance(value, list) else str(value)
 
 

@@ -121,6 +121,7 @@ def test_a_summary_reads_well(capsys):
     (table,) = result.tables()
     assert dict(table.rows)["rms_mm"] == "0 (< 1e-12)"
     assert dict(table.rows)["gains"] == "1, 0.5"
+    assert dict(table.rows)["flags"] == "-"
     show(table)
     out, _ = capsys.readouterr()
     assert max(map(len, out.splitlines())) <= 80
