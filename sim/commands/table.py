@@ -12,7 +12,6 @@ from .terminal import show
 
 REST_MM = 1e-6
 """A handle whose RMS is less is at rest: it has moved by a nanometre."""
-WORDS = ("scene", "estimator", "backend")
 NUMBERS = ("K (N/m)", "B (N s/m)", "wall", "RMS (mm)", "peak force (N)", "samples/s", "force words")
 
 
@@ -27,14 +26,12 @@ def command(
             raise BadInput(f"{file}: no such file") from None
         except (OSError, ValueError, KeyError, TypeError):
             raise BadInput(f"{file}: not a JSON report of `hardwall hit --json`") from None
-    show(table_of(WORDS, NUMBERS, rows))
+    show(table_of(("run",), NUMBERS, rows))
 
 
 def _row(report: dict) -> list[str]:
     return [
-        report["scene"],
-        f"{report['estimator']} {report['output']}",
-        report["backend"],
+        f"{report['estimator']} {report['output']}, {report['backend']}, {report['scene']}",
         f"{report['stiffness_n_per_m']:g}",
         f"{report['damping_n_s_per_m']:g}",
         "stable" if report["stable"] else "unstable",

@@ -48,8 +48,7 @@ def _table(rows: list[dict[str, Any]], unit: str) -> Table:
         lines.append([name, row["signal"], f"{row['sample_hz']:g}", *errors, delay, *flags])
     written = unit.replace("_", "/")
     numbers = ("rate (Hz)", f"RMS ({written})", "largest", "chatter", "delay (us)")
-    table = table_of(("estimator", "signal"), numbers, lines)
-    return Table(table.columns | {"flags": "left"}, lines) if flagged else table
+    return table_of(("estimator", "signal"), (*numbers, *["flags"] * flagged), lines)
 
 
 def jobs(curves: list[Curve], names: list[str], rates_hz: list[int], options: dict) -> list[tuple[str, dict]]:

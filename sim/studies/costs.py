@@ -30,24 +30,30 @@ class Costs:
         return self.rows
 
     def tables(self) -> list[Table]:
-        """Return a table for each device: the estimator alone, and the board with it."""
-        return [
-            table_of((device,), NUMBERS, [_line(row) for row in self.rows if row["device"] == device])
-            for device in dict.fromkeys(row["device"] for row in self.rows)
-        ]
+        """Return two tables for each device: of the estimators alone, and of the board with each."""
+        tables = []
+        for device in dict.fromkeys(row["device"] for row in self.rows):
+            own = [row for row in self.rows if row["device"] == device]
+            tables.append(table_of((f"{device}: alone",), ALONE, [_alone(row) for row in own]))
+            tables.append(table_of((f"{device}: board",), BOARD, [_board(row) for row in own]))
+        return tables
 
     def notes(self) -> list[str]:
         return []
 
 
-NUMBERS = ("LUT4", "FF", "DSP", "BRAM", "clocks", "board LUT4", "board FF", "board DSP", "fmax (MHz)", "samples/s")
+ALONE = ("LUT4", "FF", "DSP", "BRAM", "clocks")
+BOARD = ("LUT4", "FF", "DSP", "fmax (MHz)", "samples/s")
 
 
-def _line(row: dict[str, Any]) -> list[str]:
+def _alone(row: dict[str, Any]) -> list[str]:
+    return [row["estimator"], *(str(row[name]) for name in ("lut4", "ff", "dsp", "bram", "latency_clocks"))]
+
+
+def _board(row: dict[str, Any]) -> list[str]:
     board = row["board"]
-    own = [row["lut4"], row["ff"], row["dsp"], row["bram"], row["latency_clocks"]]
-    whole = [board["lut4"], board["ff"], board["dsp"], f"{board['fmax_mhz']:.1f}", f"{board['max_sample_hz']:,}"]
-    return [row["estimator"], *map(str, own), *map(str, whole)]
+    cells = [str(board[name]) for name in ("lut4", "ff", "dsp")]
+    return [row["estimator"], *cells, f"{board['fmax_mhz']:.1f}", f"{board['max_sample_hz']:,}"]
 
 
 def jobs(estimators: list[str], device: str, seeds: int) -> list[dict[str, Any]]:
