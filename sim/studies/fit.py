@@ -177,7 +177,7 @@ class Fit:
             [before.text, _held(before), _held(after), after.numbers, "" if lack is None else f"{lack:.3f}"]
             for before, after, lack in zip(self.before.facts, best.facts, lacks, strict=True)
         ]
-        columns = (f"the paper's Figure 5: {best.held} of {len(judged)}", "before", "fitted", "numbers")
+        columns = ("the paper's Figure 5", "before", f"fitted: {best.held} of {len(judged)}", "numbers")
         return [
             table_of((f"B axis {self.reading}",), ("before", "fitted"), values),
             table_of(columns, ("least, others held",), judged),
