@@ -21,6 +21,7 @@ from .options import (
     PlotOption,
     SceneArgument,
     SetOption,
+    draw,
     log,
     output_file,
     picture_file,
@@ -64,7 +65,7 @@ def hit(
         wall__damping_n_s_per_m=damping,
     )
     loaded = load(scene, changes)
-    from ..pictures.hit import plot_hit  # noqa: PLC0415
+    from ..pictures.hit import draw as draw_hit  # noqa: PLC0415
     from ..walls import hit as hits  # noqa: PLC0415  (compiled kernels are loaded only where they run)
 
     plot = picture_file(plot)
@@ -77,8 +78,7 @@ def hit(
     # Whatever becomes of the files, what was computed is out.
     show(result.report(), as_json)
     if plot:
-        plot_hit(result, plot)
-        log.print(f"picture: {plot}")
+        draw(draw_hit(result), plot)
     if trace and not waveform:
         result.save(trace)
     if trace:
@@ -107,7 +107,7 @@ def replay(
     from ..estimates.recording import load as load_recording  # noqa: PLC0415
     from ..estimates.replay import ReplayError  # noqa: PLC0415
     from ..estimates.replay import replay as run  # noqa: PLC0415
-    from ..pictures.replay import plot_replay  # noqa: PLC0415  (only replays need SciPy's filters)
+    from ..pictures.replay import draw as draw_replay  # noqa: PLC0415  (only replays need SciPy's filters)
 
     if out and out.exists() and file.exists() and out.samefile(file):
         raise BadInput(f"--out must be another file than the recording, not {str(out)!r}")
@@ -123,8 +123,7 @@ def replay(
         result.save(out)
         log.print(f"velocities: {out}")
     if plot:
-        plot_replay(result, plot)
-        log.print(f"picture: {plot}")
+        draw(draw_replay(result), plot)
 
 
 @app.command()

@@ -105,7 +105,8 @@ def accuracy(
     from ..estimates.replay import ReplayError  # noqa: PLC0415
     from ..jobs import parallel  # noqa: PLC0415
     from ..jobs.store import Store  # noqa: PLC0415
-    from ..pictures.accuracy import against_rate, figure_1  # noqa: PLC0415
+    from ..pictures.accuracy import draw as draw_rows  # noqa: PLC0415
+    from ..pictures.accuracy import draw_figure_1  # noqa: PLC0415
     from ..world.encoder import offsets  # noqa: PLC0415
 
     if figure and signal:
@@ -161,7 +162,7 @@ def accuracy(
         show_table(COLUMNS, [_line(row) for row in sorted(rows, key=lambda row: (row["signal"], row["sample_hz"]))])
     if plot:
         labels = [label for label, _ in jobs]
-        draw(figure_1(curves, rows) if figure == 1 else against_rate(rows, labels), plot)
+        draw(draw_figure_1(curves, rows) if figure == 1 else draw_rows(rows, labels), plot)
 
 
 COST_COLUMNS = {"estimator": "left", "device": "left"} | dict.fromkeys(
@@ -255,7 +256,7 @@ def bits(
     """What a bit buys: error and logic as the words of an estimator shrink bit by bit from the derived widths."""
     from ..jobs import parallel  # noqa: PLC0415
     from ..jobs.store import Store  # noqa: PLC0415
-    from ..pictures.accuracy import what_a_bit_buys  # noqa: PLC0415
+    from ..pictures.bits import draw as draw_bits  # noqa: PLC0415
     from ..studies.bits import DROPPED, bit  # noqa: PLC0415
 
     plot = picture_file(plot)
@@ -276,7 +277,7 @@ def bits(
         heads = ("bits dropped", "velocity bits", "RMS (mm/s)", "LUT4", "FF", "DSP")
         show_table({"estimator": "left"} | dict.fromkeys(heads, "right"), lines)
     if plot:
-        draw(what_a_bit_buys(rows), plot)
+        draw(draw_bits(rows), plot)
 
 
 def add_commands(app: typer.Typer) -> None:

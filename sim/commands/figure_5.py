@@ -50,7 +50,7 @@ def drop(
 ) -> None:
     """Why Levant's stable region ends at one damping, in a sharp drop; and estimators that have none."""
     from ..jobs import parallel, store  # noqa: PLC0415
-    from ..pictures.drop import plot_drop  # noqa: PLC0415
+    from ..pictures.drop import draw as draw_drop  # noqa: PLC0415
     from ..studies import drop as studied  # noqa: PLC0415  (kernels are loaded only where they run)
 
     changes, plot = _changes(set_), picture_file(plot)
@@ -67,7 +67,7 @@ def drop(
     else:
         _show_drop(found)
     if plot:
-        draw(plot_drop(found, backend), plot)
+        draw(draw_drop(found), plot)
 
 
 def _show_drop(found) -> None:

@@ -87,12 +87,12 @@ def output_file(path: Path | None, option: str, suffixes: tuple[str, ...]) -> Pa
     return path
 
 
-def draw(figure, path: Path) -> None:
-    """Write a picture, and say where it is."""
-    from ..pictures.style import save  # noqa: PLC0415  (Matplotlib is loaded only where something is drawn)
+def draw(drawn, path: Path) -> None:
+    """Write the pictures that a study has, and say where they are."""
+    from ..pictures.style import save_all  # noqa: PLC0415  (Matplotlib is loaded only where something is drawn)
 
-    save(figure, path)
-    log.print(f"picture: {path}")
+    for written in save_all(drawn, path):
+        log.print(f"picture: {written}")
 
 
 def picture_file(path: Path | None) -> Path | None:

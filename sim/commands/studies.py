@@ -57,7 +57,7 @@ def cutoff(
     as_json: JsonOption = False,
 ) -> None:
     """The best cutoff of a filter behind a finite difference: the area of the stable region against it."""
-    from ..pictures.cutoff import plot_cutoff  # noqa: PLC0415
+    from ..pictures.cutoff import draw as draw_cutoff  # noqa: PLC0415
     from ..studies import cutoff as cutoffs  # noqa: PLC0415  (kernels are loaded only where they run)
 
     changes, plot = map_changes(set_, SEARCHED), picture_file(plot)
@@ -68,7 +68,7 @@ def cutoff(
     else:
         _show_cutoffs(devices)
     if plot:
-        draw(plot_cutoff(devices, backend), plot)
+        draw(draw_cutoff(devices), plot)
 
 
 def _show_cutoffs(devices: list) -> None:
@@ -101,7 +101,7 @@ def gains(
     as_json: JsonOption = False,
 ) -> None:
     """Levant's gains, searched in full: the area of the stable region over lambda and alpha, for both outputs."""
-    from ..pictures.gains import plot_gains  # noqa: PLC0415
+    from ..pictures.gains import draw as draw_gains  # noqa: PLC0415
     from ..studies import gains as gains_of  # noqa: PLC0415  (kernels are loaded only where they run)
 
     changes, plot = map_changes(set_, SEARCHED), picture_file(plot)
@@ -112,7 +112,7 @@ def gains(
     else:
         _show_gains(found)
     if plot:
-        draw(plot_gains(found, backend), plot)
+        draw(draw_gains(found), plot)
 
 
 def _show_gains(found) -> None:
@@ -147,7 +147,7 @@ def rates(
     as_json: JsonOption = False,
 ) -> None:
     """What rate buys a stiff wall, 1 kHz to 1 MHz, and which part of the device ends it."""
-    from ..pictures.rates import plot_rates  # noqa: PLC0415
+    from ..pictures.rates import draw as draw_rates  # noqa: PLC0415
     from ..studies import rates as studied  # noqa: PLC0415  (kernels are loaded only where they run)
 
     changes, plot = map_changes(set_, SEARCHED), picture_file(plot)
@@ -161,7 +161,7 @@ def rates(
     else:
         _show_rates(found, limits, rates_hz)
     if plot:
-        draw(plot_rates(found, limits, loaded, backend), plot)
+        draw(draw_rates(found, limits), plot)
 
 
 def _show_rates(found: list, limits: dict, rates_hz: list[int]) -> None:

@@ -56,7 +56,7 @@ def trade(
     as_json: JsonOption = False,
 ) -> None:
     """Speed against accuracy: what a coarser backend, device, rate, solver or map saves, and what it gets wrong."""
-    from ..pictures.trade import plot_trade  # noqa: PLC0415
+    from ..pictures.trade import draw as draw_trade  # noqa: PLC0415
     from ..studies.trade_runs import study  # noqa: PLC0415
 
     changes, plot = map_changes(set_, "it takes two of the paper's"), picture_file(plot)
@@ -68,7 +68,7 @@ def trade(
     else:
         _show(found)
     if plot:
-        draw(plot_trade(found), plot)
+        draw(draw_trade(found), plot)
 
 
 def _show(found) -> None:

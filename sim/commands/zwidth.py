@@ -81,20 +81,6 @@ def explain_areas(maps: Iterable) -> None:
         log.print("+: the region goes on beyond the map")
 
 
-def _limits(maps: list, dampings: list[float]) -> list[list[float] | None]:
-    """Return the linear loop's limits at every B, for the methods that are linear."""
-    from ..walls import theory  # noqa: PLC0415
-
-    limits = []
-    for each in maps:
-        limit, scene = None, each.case.parsed
-        if scene.controller.estimator in theory.LINEAR:
-            loop = theory.Loop(scene)
-            limit = [theory.linear_limit_n_per_m(loop, damping) for damping in dampings]
-        limits.append(limit)
-    return limits
-
-
 def cluster_of(jobs: int, workers: int | None, scheduler: str | None):
     """Return `cluster.client` as `--workers` or `--scheduler` ask for it."""
     from ..jobs import cluster  # noqa: PLC0415  (Dask is loaded only where it runs)
@@ -136,7 +122,7 @@ def zwidth(
     """Map the walls that are stable: for each estimator, the largest stiffness at every damping."""
     changes = map_changes(set_, "see --estimators")
     loaded = load(scene, changes)
-    from ..pictures.zwidth import plot_zwidth  # noqa: PLC0415
+    from ..pictures.zwidth import draw as draw_maps  # noqa: PLC0415
     from ..walls import methods  # noqa: PLC0415  (kernels are loaded only where they run)
     from ..walls import zwidth as maps_of  # noqa: PLC0415
     from ..walls.figure_5 import facts  # noqa: PLC0415
@@ -172,9 +158,7 @@ def zwidth(
             lines = [[fact.text, "held" if fact.held else "not held", fact.numbers] for fact in shown]
             show_table(dict.fromkeys(("the paper's Figure 5", "here", "numbers"), "left"), lines)
     if plot:
-        grid = maps_of.grid_of(loaded)
-        limits = _limits(maps, grid.dampings)
-        draw(plot_zwidth(maps, limits, loaded, grid, backend), plot)
+        draw(draw_maps(maps), plot)
 
 
 def lipschitz(
@@ -190,14 +174,14 @@ def lipschitz(
     changes = scene_changes(set_)
     load(scene, changes)
     refuse(changes, ("controller.estimator", "controller.output", "controller.gains"), "it takes the paper's filter")
-    from ..pictures.lipschitz import plot_lipschitz  # noqa: PLC0415
+    from ..pictures.lipschitz import draw as draw_lipschitz  # noqa: PLC0415
     from ..studies.lipschitz import measure  # noqa: PLC0415  (kernels are loaded only where they run)
 
     plot = picture_file(plot)
     found = measure(scene, changes, before, after, sines)
     show(found.report(), as_json)
     if plot:
-        draw(plot_lipschitz(found), plot)
+        draw(draw_lipschitz(found), plot)
 
 
 def add_commands(app: typer.Typer) -> None:
