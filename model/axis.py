@@ -61,11 +61,15 @@ class Design:
     """
 
     def __init__(self, spec: "AxisSpec"):
-        gains = spec.gains if spec.gains is not None else spec.model.Gains.default(spec)
+        estimator = registry.design_of(spec.estimator)
+        gains = estimator.gains_class.default(spec) if spec.gains is None else spec.gains
+        if not isinstance(gains, estimator.gains_class):
+            kind = f"{estimator.gains_class.__module__.rpartition('.')[2]}.Gains"
+            raise TypeError(f"gains of {spec.estimator} must be {kind} or None, not {gains!r}")
         self.spec = spec
         self.gains = gains
         self.decoder = quadrature.Params(spec.count_width, spec.stamp_width, ILLEGAL_WIDTH)
-        self.estimator = spec.model.Design(spec, gains)
+        self.estimator = estimator(spec, gains)
         self.wall = wall.Design(spec, self.estimator.velocity)
         self.output = output.Design(spec)
         self.words = (
@@ -105,8 +109,7 @@ class Design:
 
     def float_params(self, words: dict[str, int], si: dict[str, float]) -> Params:
         """Return the float64 kernel's parameters: gains as given in `si`, by word's name, not as rounded to `words`."""
-        outputs = self.spec.model.OUTPUTS
-        selected = outputs[words.get(registry.output_word(self.spec.estimator), 0)]
+        selected = self.estimator.outputs[words.get(self.estimator.output_word(), 0)]
         return Params(
             self.estimator.float_params(self.gains, selected, si),
             self.wall.float_params(si.get("wall_stiffness", 0.0), si.get("wall_damping", 0.0), words),
@@ -116,11 +119,7 @@ class Design:
 
     def start(self, floating: bool = False) -> State:
         """Return the state before the first sample, for one run: it may hold arrays that the run writes to."""
-        if hasattr(self.estimator, "start"):
-            estimator = self.estimator.start(floating)
-        else:
-            estimator = self.spec.model.FLOAT_START if floating else self.spec.model.START
-        return State(estimator, output.FLOAT_START if floating else output.START, 0)
+        return State(self.estimator.start(floating), output.FLOAT_START if floating else output.START, 0)
 
     def flag_names(self, flags: int) -> list[str]:
         """Return the names of the flags raised in `flags`."""
@@ -274,7 +273,7 @@ class Axis:
             ValueError: if they have not one or two dimensions; or if the estimator needs more than counts, the stamps
                 of edges: `hardwall.model.stamped.run` has them.
         """
-        if registry.uses_stamps(self.design.spec.estimator):
+        if self.design.estimator.uses_stamps():
             raise ValueError(f"estimator must be one that needs only counts, not {self.design.spec.estimator!r}")
         counts = np.asarray(counts)
         if not np.issubdtype(counts.dtype, np.integer):

@@ -1,6 +1,5 @@
 """Run-time parameters of the hardware: a word on a port, and what it means in SI units."""
 
-import math
 from dataclasses import dataclass
 
 from .arithmetic.fixed import UQ, Format, bits_for
@@ -15,13 +14,6 @@ def gain_format(largest: float) -> UQ:
     fmt = UQ(i, GAIN_BITS - i)
     # A largest value just under a power of two may round up to it.
     return fmt if largest <= fmt.to_real(fmt.max) else UQ(i + 1, GAIN_BITS - i - 1)
-
-
-def check_positive(gains: object) -> None:
-    """Raise ValueError, naming it, for a field of a dataclass of gains that is not finite and more than 0."""
-    for name, value in vars(gains).items():
-        if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
 
 
 @dataclass(frozen=True)

@@ -52,8 +52,9 @@ def _check_axis(scene) -> None:
     controller = type(scene.controller).model_fields
     try:
         spec = scene.spec
-        if scene.estimator_output not in spec.model.OUTPUTS:
-            raise ValueError(f"output must be one of {', '.join(spec.model.OUTPUTS)}, not {scene.estimator_output!r}")
+        outputs = spec.design.estimator.outputs
+        if scene.estimator_output not in outputs:
+            raise ValueError(f"output must be one of {', '.join(outputs)}, not {scene.estimator_output!r}")
         if -scene.protocol.start_m > spec.travel_m:
             raise ValueError(
                 f"start_m must be {-spec.travel_m:g} to 0, within travel_m, not {scene.protocol.start_m!r}"

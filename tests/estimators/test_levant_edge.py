@@ -13,7 +13,7 @@ from hardwall.hdl.estimators.levant_edge import Estimator
 from hardwall.model.compiled import compiled
 from hardwall.model.estimators import levant_edge
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.estimators.levant_edge import FLOAT_START, START
+from hardwall.model.estimators.levant_edge_design import FLOAT_START, START
 from hardwall.model.estimators.levant_edge_design import LEARN_SHIFT
 from hardwall.model.quadrature import Seen
 from hardwall.sim.estimates import accuracy, signals

@@ -24,9 +24,9 @@ def test_word_length_costs_a_hundredth_at_every_rate(name, rate, bound, output):
 @pytest.mark.parametrize(("gains", "named"), levants.REFUSED)
 @pytest.mark.parametrize("name", [*FIXED_GAINS, ADAPTIVE])
 def test_gains_that_cannot_be_held_are_refused(name, gains, named):
-    module = registry.load(name)
+    design = registry.design_of(name)
     with pytest.raises(ValueError, match=f"^{named}"):
-        module.Design(spec("paper", name), module.Gains(**gains))
+        design(spec("paper", name), design.gains_class(**gains))
 
 
 @pytest.mark.parametrize("name", [*FIXED_GAINS, ADAPTIVE])
