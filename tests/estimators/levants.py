@@ -85,11 +85,11 @@ def campaign(make, start, rows=stimulus, fewer: tuple[str, ...] = ("narrow",)):
         bench = Bench(dut, component)
         await bench.reset()
         reset = dict(zip((word.name for word in component.design.words), reset_words(component.design), strict=True))
-        await bench.transact("strobe", "valid", count=0, **reset)
-        await bench.transact("strobe", "valid", count=1, **reset)
+        await bench.transact("strobe", "valid", seen__count=0, **reset)
+        await bench.transact("strobe", "valid", seen__count=1, **reset)
         assert bench.reader("velocity")() != 0
         await bench.reset()
-        await bench.transact("strobe", "valid", count=-1, **reset)
+        await bench.transact("strobe", "valid", seen__count=-1, **reset)
         assert bench.reader("velocity")() == 0
 
     return follows_model, reset_mid_stream_starts_afresh

@@ -3,6 +3,7 @@
 import levants
 import pytest
 
+from hardwall.hdl.estimators.registry import ESTIMATORS
 from hardwall.model.estimators import registry
 from stimuli.papers_signal import BOUND, RATES, axis_at
 from stimuli.specs import spec
@@ -32,7 +33,7 @@ def test_gains_that_cannot_be_held_are_refused(name, gains, named):
 @pytest.mark.parametrize("name", [*FIXED_GAINS, ADAPTIVE])
 def test_wrong_design_is_refused(name):
     with pytest.raises(TypeError, match=r"not 3$"):
-        registry.load(name, "hardwall.hdl").Estimator(3)
+        ESTIMATORS[name](3)
 
 
 @pytest.mark.parametrize("name", PROJECTING)
