@@ -9,8 +9,7 @@ from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model import quadrature as model
-
-from .checks import check_int
+from hardwall.model.checks import check_int
 
 
 class Seen(wiring.Signature):

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from . import output, quadrature, wall
+from . import checks, output, quadrature, wall
 from .arithmetic.fixed import UQ
 from .compiled import compiled
 from .estimators import registry
@@ -94,6 +95,7 @@ class Design:
         """Return every run-time word by name: from SI where given, else as after reset.
 
         Raises:
+            TypeError: for a value that is not a number.
             ValueError: for a name that is not a word, or a value that does not fit; with what is accepted.
         """
         known = {word.name: word for word in self.words}
@@ -252,41 +254,39 @@ class Axis:
         params: parameters of `step`.
 
     Raises:
+        TypeError: if `spec` is not an AxisSpec, or a value not a number.
         ValueError: for an unknown name or a value out of range.
     """
 
     def __init__(self, spec: "AxisSpec", floating: bool = False, **si: float):
+        if not isinstance(getattr(spec, "design", None), Design):
+            raise TypeError(f"spec must be an AxisSpec, not {spec!r}")
         self.design = spec.design
         self.words = words = self.design.encode(**si)
         self.floating = floating
         self.params = self.design.float_params(words, si) if floating else self.design.params(words)
 
-    def run(self, counts: np.ndarray) -> Record:
+    def run(self, counts: ArrayLike) -> Record:
         """Run records of counts from the start state.
 
         Args:
             counts: integers, shape (samples,), or (lanes, samples) for independent axes side by side. A count may
-                exceed the count's width: it wraps, as the hardware's does.
+                exceed the count's width: it wraps, as the hardware's does; it may not jump by half of its range.
 
         Raises:
             TypeError: if the counts are not integers.
-            ValueError: if they have not one or two dimensions; or if the estimator needs more than counts, the stamps
-                of edges: `hardwall.model.stamped.run` has them.
+            ValueError: if they have not one or two dimensions, or jump; or if the estimator needs more than counts,
+                the stamps of edges: `hardwall.model.stamped.run` has them.
         """
         if self.design.estimator.uses_stamps():
             raise ValueError(f"estimator must be one that needs only counts, not {self.design.spec.estimator!r}")
-        counts = np.asarray(counts)
-        if not np.issubdtype(counts.dtype, np.integer):
-            raise TypeError(f"counts must be integers, not {counts.dtype!r}")
-        if counts.ndim not in (1, 2):
-            raise ValueError(f"counts must have 1 or 2 dimensions, not {counts.ndim!r}")
-        half = 1 << (self.design.spec.count_width - 1)
-        lanes = np.atleast_2d(((counts.astype(np.int64) + half) & (2 * half - 1)) - half)
+        spec = self.design.spec
+        checked = checks.lanes_of_counts(counts, spec.count_width, spec.clocks_per_sample)
+        lanes = np.atleast_2d(checked)
         number = np.float64 if self.floating else np.int64
         velocity, force, drive = (np.zeros(lanes.shape, number) for _ in range(3))
         flags = np.zeros(lanes.shape, np.int64)
         for lane in range(len(lanes)):
             start = self.design.start(self.floating)
             run(self.params, start, lanes[lane], velocity[lane], force[lane], drive[lane], flags[lane])
-        shape = counts.shape
-        return Record(self.design, *(array.reshape(shape) for array in (velocity, force, drive, flags)))
+        return Record(self.design, *(array.reshape(checked.shape) for array in (velocity, force, drive, flags)))

@@ -70,8 +70,10 @@ class AxisSpec:
     def __post_init__(self):
         for name, kind in self.__annotations__.items():
             value = getattr(self, name)
-            if kind is int and not isinstance(value, int):
+            if kind is int and (isinstance(value, bool) or not isinstance(value, int)):
                 raise TypeError(f"{name} must be an int, not {value!r}")
+            if kind is str and not isinstance(value, str):
+                raise TypeError(f"{name} must be a str, not {value!r}")
             if kind is float and (isinstance(value, bool) or not isinstance(value, int | float)):
                 raise TypeError(f"{name} must be a number, not {value!r}")
             if kind in (int, float) and name != "estimator_bits_dropped" and not (math.isfinite(value) and value > 0):

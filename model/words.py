@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from .arithmetic.fixed import UQ, Format, bits_for
+from .checks import check_number
 
 GAIN_BITS = 16
 """Bits of a gain word: the part of a multiplier's operand that iCE40UP (16 x 16) and ECP5 (18 x 18) both have."""
@@ -58,8 +59,10 @@ class Word:
         """Return the word nearest to `value` (SI).
 
         Raises:
+            TypeError: if it is not a number.
             ValueError: if it does not fit, with the accepted range in SI units.
         """
+        check_number(self.name, value)
         try:
             return self.format.from_real(value / self.si_per_unit)
         except ValueError:

@@ -4,10 +4,10 @@ from amaranth.hdl import Array, Module, Mux, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from hardwall.model.checks import check_int
 from hardwall.model.estimators import cycle_times as model
 from hardwall.model.quadrature import RUN_MAX
 
-from ..checks import check_int
 from ..quadrature import Seen
 
 
