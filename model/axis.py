@@ -36,8 +36,8 @@ class Params(NamedTuple):
     """Parameters of the three blocks, all integer words or all float64; and where their flags stand."""
 
     estimator: tuple
-    wall: tuple
-    output: tuple
+    wall: wall.Params | wall.FloatParams
+    output: output.Params
     estimator_bit: int
     output_bit: int
 
@@ -46,7 +46,7 @@ class State(NamedTuple):
     """States of the blocks, and the sticky flags (bits as `Design.flags`, after the encoder's)."""
 
     estimator: tuple
-    output: tuple
+    output: output.State
     flags: int
 
 
@@ -60,6 +60,9 @@ class Design:
         flags: names of the sticky flags, bit 0 first.
         latency_to_drive: clocks from the sample strobe to the changed drive.
     """
+
+    words: tuple[Word, ...]
+    flags: tuple[str, ...]
 
     def __init__(self, spec: "AxisSpec"):
         estimator = registry.design_of(spec.estimator)
@@ -129,7 +132,9 @@ class Design:
 
 
 @compiled
-def step(params, state, seen, restart, fault, enable):
+def step(
+    params: Params, state: State, seen: quadrature.Seen, restart: int, fault: int, enable: int
+) -> tuple[State, float, float]:
     """Take one sample: return (state, velocity, force); the drive is `state.output.drive`.
 
     Args:

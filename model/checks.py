@@ -37,10 +37,11 @@ def integers(name: str, values: ArrayLike, least: int = -LARGEST, most: int = LA
         raise TypeError(f"{name} must be an array of integers, not {values!r}") from None
     if array.size and not np.issubdtype(array.dtype, np.integer):
         raise TypeError(f"{name} must be integers, not {array.dtype}")
-    wrong = np.flatnonzero((array < least) | (array > most)) if array.size else []
-    if len(wrong):
-        first = int(wrong[0])
-        raise ValueError(f"{name} must be {least} to {most}, not {array.reshape(-1)[first]} at element {first}")
+    if array.size:
+        wrong = np.flatnonzero((array < least) | (array > most))
+        if len(wrong):
+            first = int(wrong[0])
+            raise ValueError(f"{name} must be {least} to {most}, not {array.reshape(-1)[first]} at element {first}")
     return array.astype(np.int64)
 
 

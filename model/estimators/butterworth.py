@@ -117,7 +117,7 @@ class State(NamedTuple):
     """`w` and `y` have the fraction bits of the accumulators (float: counts a sample); `d1`, `d2` are differences."""
 
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     d1: int
     d2: int
     w: float

@@ -33,7 +33,7 @@ class Params(NamedTuple):
 
 class State(NamedTuple):
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
 
 
 class FloatParams(NamedTuple):

@@ -171,7 +171,7 @@ class State(NamedTuple):
     """Words of the formats of `Design` (float: counts and sample periods); `count` is the last one."""
 
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     lead: float
     v: float
     a: float
@@ -260,25 +260,32 @@ class Design(EstimatorDesign):
         return {"kalman_position": k_x, "kalman_velocity": k_v * rate, "kalman_acceleration": k_a * rate**2}
 
     def params(self, words: Mapping[str, int]) -> Params:
+        k_x, k_v, k_a = (words[word.name] for word in self.words)
+        x_shift, v_shift, a_shift = self.shifts
         return Params(
-            *(words[word.name] for word in self.words),
-            *self.shifts,
-            self.count_width,
-            self.step_max,
-            self.lead.f,
-            self.v.f - self.lead.f + 1,
-            self.a.f - self.v.f,
-            self.lead.f - self.operand.f,
-            self.v.f - self.velocity.f,
-            self.lead.max,
-            self.velocity.max << (self.v.f - self.velocity.f),
-            self.a.max,
+            k_x=k_x,
+            k_v=k_v,
+            k_a=k_a,
+            x_shift=x_shift,
+            v_shift=v_shift,
+            a_shift=a_shift,
+            count_width=self.count_width,
+            step_max=self.step_max,
+            fraction=self.lead.f,
+            v_to_x=self.v.f - self.lead.f + 1,
+            a_to_v=self.a.f - self.v.f,
+            operand_shift=self.lead.f - self.operand.f,
+            output_shift=self.v.f - self.velocity.f,
+            lead_max=self.lead.max,
+            v_max=self.velocity.max << (self.v.f - self.velocity.f),
+            a_max=self.a.max,
         )
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 kernel's parameters: gains from `si` where given, else those of the noise model."""
         value = {**self.words_for(gains), **si}
-        return FloatParams(*(value[word.name] / word.si_per_unit for word in self.words), self.count_width)
+        k_x, k_v, k_a = (value[word.name] / word.si_per_unit for word in self.words)
+        return FloatParams(k_x, k_v, k_a, self.count_width)
 
     def start(self, floating: bool = False) -> State:
         return FLOAT_START if floating else START

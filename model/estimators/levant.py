@@ -95,7 +95,7 @@ class State(NamedTuple):
     """`lead` and `u1` have the fraction bits of the velocity format (float: counts); `count` is the last one."""
 
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     lead: float
     u1: float
 
@@ -244,7 +244,7 @@ class Design(EstimatorDesign):
             count_width=self.count_width,
         )
 
-    def start(self, floating: bool = False) -> State:
+    def start(self, floating: bool = False) -> tuple:
         return FLOAT_START if floating else START
 
 

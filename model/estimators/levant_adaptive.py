@@ -130,7 +130,7 @@ class State(NamedTuple):
     """`lead`, `u1`, `count` as `levant.State`; the rest is the adaptation's."""
 
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     lead: float
     u1: float
     level: int
@@ -201,7 +201,7 @@ class Design(levant_semi_implicit.Design):
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> tuple:
         return FloatParams(self._float_common(gains, output, si), self.law)
 
-    def start(self, floating: bool = False) -> State:
+    def start(self, floating: bool = False) -> tuple:
         return FLOAT_START if floating else START
 
 
