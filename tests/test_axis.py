@@ -9,7 +9,7 @@ from hardwall.hdl.axis import Axis
 from hardwall.model import axis, quadrature
 from hardwall.model.estimators import registry
 from hardwall.model.spec import AxisSpec
-from hardwall.testing.bench import SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from stimuli.specs import ADJUSTED, MHZ, spec
 
 PINS = (

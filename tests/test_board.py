@@ -9,7 +9,7 @@ from cocotb.triggers import RisingEdge, Timer
 from hardwall.hdl.board import BYTE, PULSES, TELEMETRY, Board
 from hardwall.model import output, quadrature, wall
 from hardwall.model.estimators.estimate import estimate
-from hardwall.testing.bench import SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from stimuli.specs import spec
 
 HALF = 3

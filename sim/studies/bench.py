@@ -74,7 +74,7 @@ def _hits(scene: Scene, backend: str) -> Callable[[], float]:
 
 def _cocotb(name: str) -> Callable[[], float]:
     """Return a run of the same closed loop under cocotb, in samples a second; its force words must be the model's."""
-    from ..rtl.cocotb_runner import simulate_axis  # noqa: PLC0415  (cocotb comes with the regressions)
+    from ..rtl.cocotb_runner import Job, simulate_axis  # noqa: PLC0415  (cocotb comes with the regressions)
 
     scene = load(name)
     words = hit.run(_scene(name, {}, COCOTB_SAMPLES / scene.spec.sample_hz), "fixed").force_sha256
@@ -87,7 +87,7 @@ def _cocotb(name: str) -> Callable[[], float]:
             order = {"scene": found, "samples": COCOTB_SAMPLES, "report": str(report)}
             environ = {"HARDWALL_LOOP": json.dumps(order), "COCOTB_LOG_LEVEL": "WARNING"}
             log = build_dir() / "cocotb" / "bench.log"
-            simulate_axis(scene.spec, "hardwall.sim.studies.cocotb_loop", Path(folder), environ, log)
+            simulate_axis(scene.spec, Job("hardwall.sim.studies.cocotb_loop", Path(folder), environ, log=log))
             result = json.loads(report.read_text())
         if result["force_sha256"] != words:
             raise RuntimeError(f"the RTL under cocotb and the model differ in their first {COCOTB_SAMPLES} force words")
