@@ -14,7 +14,7 @@ from hardwall.sim.estimates.recording import Recording, load
 from hardwall.sim.estimates.replay import ReplayError, replay
 from hardwall.sim.pictures.replay import draw
 from hardwall.sim.pictures.style import SUFFIXES, save
-from hardwall.testing.bench import rng
+from hardwall.testing import rng
 from stimuli.replays import BOUND, COARSEN, EVERY, recording, reference_of, swing
 
 FILES = ["davinci_L2_02.csv", "davinci_L2_22.csv", "davinci_R5_42.csv"]
