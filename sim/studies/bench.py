@@ -13,7 +13,7 @@ from typing import Any
 from ...model.compiled import build_dir
 from ..jobs.result import Table, text_of
 from ..jobs.rounds import medians
-from ..rtl.cocotb_runner import simulate_axis
+from ..rtl.cocotb_runner import Job, simulate_axis
 from ..scene.load import load
 from ..scene.schema import Scene
 from ..walls import hit
@@ -76,7 +76,7 @@ def _cocotb(name: str) -> Callable[[], float]:
             order = {"scene": found, "samples": COCOTB_SAMPLES, "report": str(report)}
             environ = {"HARDWALL_LOOP": json.dumps(order), "COCOTB_LOG_LEVEL": "WARNING"}
             log = build_dir() / "cocotb" / "bench.log"
-            simulate_axis(scene.spec, "hardwall.sim.studies.cocotb_loop", Path(folder), environ, log)
+            simulate_axis(scene.spec, Job("hardwall.sim.studies.cocotb_loop", Path(folder), environ, log=log))
             result = json.loads(report.read_text())
         if result["force_sha256"] != words:
             raise RuntimeError(f"the RTL under cocotb and the model differ in their first {COCOTB_SAMPLES} force words")
