@@ -9,7 +9,7 @@ random campaigns.
 """
 
 from .bench import Bench, Monitor
-from .harness import Harness, packing_of
+from .harness import Harness, packing_of, ports_of
 from .packing import Packing, Record
 from .simulator import CAMPAIGN, SAMPLES, SEED, parameters, rng, simulate
 from .verdict import Wrong, check
@@ -27,6 +27,7 @@ __all__ = [
     "check",
     "packing_of",
     "parameters",
+    "ports_of",
     "rng",
     "simulate",
 ]

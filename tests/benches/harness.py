@@ -6,9 +6,9 @@ a batch of rows at a time, puts them through at their clocks, and keeps what the
 
 from pathlib import Path
 
-from amaranth.hdl import Cat, ClockSignal, Instance, Module, Mux, ResetSignal, Shape, Signal, unsigned
+from amaranth.hdl import Cat, ClockSignal, Instance, Module, Mux, ResetSignal, Shape, Signal, Value, unsigned
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In, Member, Out
 
 from .packing import Packing
 
@@ -20,27 +20,28 @@ RESERVED = "bench_"
 SEQUENCER = Path(__file__).with_name("sequencer.v")
 
 
-def packing_of(component: wiring.Component) -> Packing:
-    """Return how all members of a component lie in the harness's `bench_seen`.
+def ports_of(component: wiring.Component) -> dict[str, tuple[Member, Value]]:
+    """Return the ports of a component by their names in Verilog: member `b` of its member `a` is `a__b`.
 
     Raises:
-        TypeError: if a member is an interface instead of a port.
-        ValueError: if a member has a name that the harness keeps for itself.
+        ValueError: if a port has a name that the harness keeps for itself.
     """
-    shapes = {}
-    for name, member in component.signature.members.items():
-        if not member.is_port or member.dimensions:
-            raise TypeError(f"{type(component).__name__}.{name} must be a single port, not {member!r}")
+    ports = {"__".join(map(str, path)): (member, port) for path, member, port in component.signature.flatten(component)}
+    for name in ports:
         if name.startswith(RESERVED):
             raise ValueError(f"a port under test must not begin with {RESERVED}, not {name!r}")
-        shapes[name] = Shape.cast(member.shape)
-    return Packing(shapes)
+    return ports
+
+
+def packing_of(component: wiring.Component) -> Packing:
+    """Return how all ports of a component lie in the harness's `bench_seen`."""
+    return Packing({name: Shape.cast(member.shape) for name, (member, _) in ports_of(component).items()})
 
 
 def inputs_of(component: wiring.Component) -> Packing:
     """Return how the inputs of a component lie in a row of the sequencer."""
-    members = component.signature.members
-    return Packing({name: shape for name, shape in packing_of(component).shapes.items() if members[name].flow == In})
+    ports = ports_of(component)
+    return Packing({name: Shape.cast(member.shape) for name, (member, _) in ports.items() if member.flow == In})
 
 
 def row_of(inputs: Packing) -> Packing:
@@ -73,18 +74,18 @@ class Harness(wiring.Component):
             "events": Out(16),
             "records": Out(2 * BATCH * event_of(self.seen).width),
         }
-        members = component.signature.members
-        super().__init__({**members, **{RESERVED + name: member for name, member in own.items()}})
+        ports = {name: member for name, (member, _) in ports_of(component).items()}
+        super().__init__({**ports, **{RESERVED + name: member for name, member in own.items()}})
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.component = component = self.component
+        m.submodules.component = self.component
+        ports = {name: port for name, (_, port) in ports_of(self.component).items()}
         by_hand, by_sequencer = Cat(getattr(self, name) for name in self.inputs.shapes), Signal(self.inputs.width)
-        inputs = Cat(getattr(component, name) for name in self.inputs.shapes)
+        inputs = Cat(ports[name] for name in self.inputs.shapes)
         m.d.comb += inputs.eq(Mux(self.bench_campaign, by_sequencer, by_hand))
-        m.d.comb += self.bench_seen.eq(Cat(getattr(component, name) for name in self.seen.shapes))
-        for name in (each for each in self.seen.shapes if each not in self.inputs.shapes):
-            m.d.comb += getattr(self, name).eq(getattr(component, name))
+        m.d.comb += [getattr(self, name).eq(port) for name, port in ports.items() if name not in self.inputs.shapes]
+        m.d.comb += self.bench_seen.eq(Cat(ports.values()))
         m.submodules.sequencer = Instance(
             "bench_sequencer",
             p_INPUTS=self.inputs.width,
