@@ -24,29 +24,24 @@ def ports_of(component: wiring.Component) -> dict[str, tuple[Member, Value]]:
     """Return the ports of a component by their names in Verilog: member `b` of its member `a` is `a__b`.
 
     Raises:
-        TypeError: if a member is an array of ports.
         ValueError: if a port has a name that the harness keeps for itself.
     """
-    ports = {}
-    for path, member, port in component.signature.flatten(component):
-        name = "__".join(map(str, path))
-        if not all(isinstance(part, str) for part in path):
-            raise TypeError(f"{type(component).__name__}.{path[0]} must be a port or an interface, not an array")
+    ports = {"__".join(map(str, path)): (member, port) for path, member, port in component.signature.flatten(component)}
+    for name in ports:
         if name.startswith(RESERVED):
             raise ValueError(f"a port under test must not begin with {RESERVED}, not {name!r}")
-        ports[name] = member, port
     return ports
 
 
 def packing_of(component: wiring.Component) -> Packing:
-    """Return how all ports of a component lie in the harness's `bench_seen`: see `ports_of`."""
+    """Return how all ports of a component lie in the harness's `bench_seen`."""
     return Packing({name: Shape.cast(member.shape) for name, (member, _) in ports_of(component).items()})
 
 
 def inputs_of(component: wiring.Component) -> Packing:
     """Return how the inputs of a component lie in a row of the sequencer."""
-    ports = ports_of(component).items()
-    return Packing({name: Shape.cast(member.shape) for name, (member, _) in ports if member.flow == In})
+    ports = ports_of(component)
+    return Packing({name: Shape.cast(member.shape) for name, (member, _) in ports.items() if member.flow == In})
 
 
 def row_of(inputs: Packing) -> Packing:
@@ -89,9 +84,8 @@ class Harness(wiring.Component):
         by_hand, by_sequencer = Cat(getattr(self, name) for name in self.inputs.shapes), Signal(self.inputs.width)
         inputs = Cat(ports[name] for name in self.inputs.shapes)
         m.d.comb += inputs.eq(Mux(self.bench_campaign, by_sequencer, by_hand))
-        m.d.comb += self.bench_seen.eq(Cat(ports[name] for name in self.seen.shapes))
-        for name in (each for each in self.seen.shapes if each not in self.inputs.shapes):
-            m.d.comb += getattr(self, name).eq(ports[name])
+        m.d.comb += [getattr(self, name).eq(port) for name, port in ports.items() if name not in self.inputs.shapes]
+        m.d.comb += self.bench_seen.eq(Cat(ports.values()))
         m.submodules.sequencer = Instance(
             "bench_sequencer",
             p_INPUTS=self.inputs.width,

@@ -1,6 +1,7 @@
 """Signals side by side in one word: reading one wide signal takes cocotb as long as reading a narrow one."""
 
 from collections.abc import Iterable
+from itertools import accumulate
 
 import numpy as np
 from amaranth.hdl import Shape
@@ -12,17 +13,15 @@ class Packing:
     def __init__(self, shapes: dict[str, Shape]):
         self.shapes = shapes
         self.width = sum(shape.width for shape in shapes.values())
-        self._offsets: dict[str, int] = {}
-        offset = 0
-        for name, shape in shapes.items():
-            self._offsets[name] = offset
-            offset += shape.width
+        widths = [shape.width for shape in shapes.values()]
+        self._offsets = dict(zip(shapes, accumulate(widths, initial=0), strict=False))
+        self._masks = {name: (1 << width) - 1 for name, width in zip(shapes, widths, strict=True)}
 
     def pack(self, values: dict[str, int]) -> int:
         """Return the word of values by name; a negative one is taken modulo its width, those left out are 0."""
         word = 0
         for name, value in values.items():
-            word |= (int(value) & ((1 << self.shapes[name].width) - 1)) << self._offsets[name]
+            word |= (int(value) & self._masks[name]) << self._offsets[name]
         return word
 
     def bit(self, name: str) -> int:
@@ -32,7 +31,7 @@ class Packing:
     def column(self, name: str, words: Iterable[int]) -> list[int]:
         """Return one signal of many words."""
         offset, shape = self._offsets[name], self.shapes[name]
-        mask, sign = (1 << shape.width) - 1, (1 << shape.width - 1) * shape.signed
+        mask, sign = self._masks[name], (self._masks[name] + 1 >> 1) * shape.signed
         return [((word >> offset & mask) ^ sign) - sign for word in words]
 
 

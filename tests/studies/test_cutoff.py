@@ -14,12 +14,6 @@ from stimuli.command_line import call
 from stimuli.maps import Known
 
 
-@pytest.fixture(autouse=True)
-def fresh(tmp_path, monkeypatch):
-    """Results go to an empty folder; what is compiled stays where it is."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
-
-
 def map_of(case: Case, area: float, leaves: bool = False) -> Map:
     """Return a map of an area."""
     return Map(

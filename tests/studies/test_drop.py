@@ -20,12 +20,6 @@ from stimuli.scenes import ODD
 NOTHING = Effort("fixed", 0, 0.0)
 
 
-@pytest.fixture(autouse=True)
-def fresh(tmp_path, monkeypatch):
-    """Results go to an empty folder; what is compiled stays where it is."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
-
-
 def strike(scene: str, text: str, changes: dict, damping: float, start: int, backend: str) -> dict:
     """Three of four hits rest up to B = 1000 times the friction, all up to half of it; but none under 10 N s/m.
 

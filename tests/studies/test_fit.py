@@ -21,12 +21,6 @@ MASS_KG, DELAY_S = 0.2, 1.4e-3
 NAMES = {curve.label: name for name, curve in methods.methods().items()}
 
 
-@pytest.fixture(autouse=True)
-def fresh(tmp_path, monkeypatch):
-    """Results go to an empty folder; what is compiled stays where it is."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
-
-
 def largest_n_per_m(method: str, changes: dict, damping: float) -> float:
     """The paper's figure, stretched over B as the mass is off; and as the delay is off, 1000 Hz is stiffer."""
     stretch = 0.3 * changes.get("handle.mass_kg", 0.35) / MASS_KG

@@ -51,12 +51,6 @@ def nearest(values: np.ndarray, value: float) -> float:
     return float(values[np.abs(np.log(values / value)).argmin()])
 
 
-@pytest.fixture(autouse=True)
-def fresh(tmp_path, monkeypatch):
-    """Results go to an empty folder; what is compiled stays where it is."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
-
-
 @pytest.fixture(scope="module")
 def searched() -> tuple[gains.Search, Areas]:
     known = Areas(hill)

@@ -19,12 +19,6 @@ from stimuli.command_line import call
 EDGE = 22e3
 
 
-@pytest.fixture(autouse=True)
-def fresh(tmp_path, monkeypatch):
-    """Results go to an empty folder; what is compiled stays where it is."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
-
-
 class Invented:
     """Runs of a world with one rule: a wall is stable up to 22 kN/m, to other stiffnesses with some shortcuts."""
 
