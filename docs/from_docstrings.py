@@ -1,0 +1,49 @@
+"""How docstrings, which are written to be read in the source, become pages.
+
+An indented block after an empty line is an equation or an example: it stays as it is written. `|x|` is a magnitude and
+`2**n` a power, not markup. The line under an attribute is a sentence, whose first colon ends no type.
+"""
+
+import re
+
+from sphinx.application import Sphinx
+
+ONE_LINERS = {"attribute", "data", "property"}
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip())
+
+
+def as_written(_: Sphinx, what: str, __: str, ___: object, ____: object, lines: list[str]) -> None:
+    """Turn the lines of a docstring into what Sphinx reads as its author meant it."""
+    result: list[str] = []
+    literal, before = None, ""
+    for line in lines:
+        if literal is not None and line.strip() and _indent(line) <= literal:
+            literal = None
+        opens = literal is None and result and not result[-1].strip() and _indent(line) > _indent(before)
+        if opens and not re.match(r"\s*([-*]|\d+\.|\w+:)\s", before):
+            literal = _indent(before)
+            result += [" " * literal + "::", ""]
+        if literal is None and line.lstrip().startswith("- ") and before == (result or [""])[-1].replace("\\", ""):
+            result += [] if before.lstrip().startswith("- ") or _indent(before) > _indent(line) else [""]
+        if line.strip():
+            before = line
+        result.append(line if literal is not None else _escaped(line))
+    if what in ONE_LINERS and result:
+        result[0] = f": {result[0]}"
+    lines[:] = result
+
+
+def _escaped(line: str) -> str:
+    """Return a line of prose with its magnitudes and powers kept from being markup."""
+    parts = re.split(r"(`[^`]*`)", line)
+    parts[::2] = [re.sub(r"\|", r"\\|", re.sub(r"(?<=\w)\*\*(?=[\w(-])", r"\\*\\*", part)) for part in parts[::2]]
+    return "".join(parts)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Let it run before napoleon, which reads sections."""
+    app.connect("autodoc-process-docstring", as_written, priority=400)
+    return {"parallel_read_safe": True}
