@@ -35,7 +35,7 @@ class Signal:
     """
 
     name: str
-    motions: tuple
+    motion: tuple
     seconds: float
     judged_from_s: float
     acceleration_max_m_per_s2: float
