@@ -19,10 +19,12 @@ RUN := $(VENV)/bin/python -m
 HARDWALL := $(VENV)/bin/hardwall
 SOURCES := $(shell find hdl model sim -name "*.py" -o -name "*.cpp" -o -name "*.toml")
 
+# The main job: the paper's device with the generated hardware in the loop, and beside it the same axis at 1 MHz on the
+# bit-accurate model, which gives the hardware's words in a twentieth of the time.
 SCENE := seed-2011
 ESTIMATORS := levant fdm
-REPORTS := $(ESTIMATORS:%=build/hit-%.json)
-PICTURES := $(ESTIMATORS:%=build/hit-%.png)
+REPORTS := $(ESTIMATORS:%=build/hit-%.json) $(ESTIMATORS:%=build/mhz-%.json)
+PICTURES := $(REPORTS:%.json=%.png)
 
 # The iCE40 UltraPlus is too slow for 50 MHz.
 ON_ECP5 := --device ecp5-25k
@@ -100,12 +102,19 @@ help: ## this list
 # ---- the main job: one report and one picture an estimator ----------------------------------------------------------
 
 # Two targets of one pattern are made together. The report comes last and whole: without it nothing looks done.
+define hit
+@mkdir -p build
+@rm -f $(basename $@).json
+@echo "Hitting the wall of $(1) with $*, $(3) in the loop ..."
+@$(HARDWALL) hit $(1) --estimator $* --backend $(2) --plot $(basename $@).png --json >$(basename $@).partial
+@mv $(basename $@).partial $(basename $@).json
+endef
+
 build/hit-%.json build/hit-%.png: $(SOURCES) $(VENV)/.sim | tools
-	@mkdir -p build
-	@rm -f build/hit-$*.json
-	@echo "Hitting the wall of $(SCENE) with $*, the generated hardware in the loop ..."
-	@$(HARDWALL) hit $(SCENE) --estimator $* --backend rtl --plot build/hit-$*.png --json >build/hit-$*.partial
-	@mv build/hit-$*.partial build/hit-$*.json
+	$(call hit,$(SCENE),rtl,the generated hardware)
+
+build/mhz-%.json build/mhz-%.png: $(SOURCES) $(VENV)/.sim | tools
+	$(call hit,mhz,fixed,its bit-accurate model)
 
 # ---- the tools, by need: .sim runs the loop, .test the regressions, .synth place and route --------------------------
 
@@ -126,10 +135,13 @@ $(VENV)/.made: $(if $(STALE),FORCE) | tools
 	@printf '%s\n' "$(PYTHON)" >$(VENV)/.python
 	@printf '%s\n' "$(CURDIR)" >$@
 
-# One pip at a time, whatever make does in parallel.
+# One pip at a time, whatever make does in parallel; of what it says, the names of the packages that it gets.
+SAYS := s/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  unpacking all of these/p
 define install
-@echo "Installing into $(VENV), once: $(2) ..."
-@flock $(VENV)/.made $(RUN) pip install --quiet --disable-pip-version-check --editable '.[$(1)]'
+@echo "Installing into $(VENV), once: $(2) ..."; began=$$SECONDS; \
+  flock $(VENV)/.made $(RUN) pip install --disable-pip-version-check --progress-bar off --editable '.[$(1)]' \
+    | sed -un '$(SAYS)'; \
+  echo "  done in $$((SECONDS - began)) s"
 @touch $@
 endef
 
