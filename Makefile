@@ -2,6 +2,7 @@
 #
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
 #   ARGS="-k levant"          more options for pytest (test, soak)
+#   ONLY=hit/mhz              which cases are recorded anew: those whose names begin so (digests)
 #   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
 #                             which seeds, how many samples each, and how many of endurance (soak)
 
@@ -46,7 +47,7 @@ PYTEST := $(RUN) pytest -n 2 --dist worksteal
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test lint bench synth choose figures verilog docs soak clean distclean help tools FORCE
+.PHONY: all test lint bench synth choose figures verilog docs digests soak clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -84,9 +85,13 @@ docs: $(VENV)/.docs | tools ## the pages as a site in build/docs, every link ins
 	@$(RUN) sphinx --quiet --fail-on-warning --keep-going --doctree-dir build/doctrees docs build/docs
 	@echo build/docs/index.html
 
-soak: $(VENV)/.test | tools ## long campaigns: every estimator for 10^9 samples, RTL against model with new seeds
+digests: $(VENV)/.test | tools ## record anew what the program computes, and show what changed (after a change on purpose)
+	@$(VENV)/bin/python tests/digests.py $(ONLY)
+
+soak: $(VENV)/.test | tools ## long campaigns: 10^9 samples of every estimator, every digest, RTL against model with new seeds
 	@echo "HARDWALL_ENDURANCE=$(ENDURANCE)"
 	@HARDWALL_ENDURANCE=$(ENDURANCE) $(PYTEST) tests/test_endurance.py
+	@HARDWALL_DIGESTS=all $(PYTEST) tests/test_digests.py
 	@for seed in $(SEEDS); do \
 	  echo "HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES); again: make soak SEEDS=$$seed SAMPLES=$(SAMPLES)"; \
 	  HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES) $(PYTEST) -m rtl $(ARGS); \
