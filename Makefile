@@ -125,7 +125,7 @@ build/hit-%.json build/hit-%.png: $(SOURCES) $(VENV)/.sim | tools
 build/mhz-%.json build/mhz-%.png: $(SOURCES) $(VENV)/.sim | tools
 	$(call hit,mhz,fixed,its bit-accurate model)
 
-# ---- the tools, by need: .sim runs the loop, .test the regressions, .synth place and route, .docs the pages --------------------------
+# ---- the tools, by need: .sim runs the loop, .test the regressions, .synth place and route, .docs the pages ----------
 
 # .venv is made anew for another PYTHON, when its own is gone, and in a tree that was moved or copied.
 MADE_IN := $(file <$(VENV)/.made)

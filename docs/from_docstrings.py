@@ -1,7 +1,8 @@
 """How docstrings, which are written to be read in the source, become pages.
 
 An indented block after an empty line is an equation or an example: it stays as it is written. `|x|` is a magnitude and
-`2**n` a power, not markup. The line under an attribute is a sentence, whose first colon ends no type.
+`2**n` a power, not markup. What is returned, and the line under an attribute, is a sentence, whose first colon ends no
+type. The tuples of parameters that kernels take, and the fields of tuples that have no docstring, are left out.
 """
 
 import re
@@ -9,6 +10,7 @@ import re
 from sphinx.application import Sphinx
 
 ONE_LINERS = {"attribute", "data", "property"}
+OF_KERNELS = {"Params", "FloatParams"}
 
 
 def _indent(line: str) -> int:
@@ -28,12 +30,20 @@ def as_written(_: Sphinx, what: str, __: str, ___: object, ____: object, lines: 
             result += [" " * literal + "::", ""]
         if literal is None and line.lstrip().startswith("- ") and before == (result or [""])[-1].replace("\\", ""):
             result += [] if before.lstrip().startswith("- ") or _indent(before) > _indent(line) else [""]
+        if before.strip() == "Returns:":
+            line = f"{line[: _indent(line)]}: {line.lstrip()}"  # noqa: PLW2901
         if line.strip():
             before = line
         result.append(line if literal is not None else _escaped(line))
     if what in ONE_LINERS and result:
         result[0] = f": {result[0]}"
     lines[:] = result
+
+
+def left_out(_: Sphinx, __: str, name: str, member: object, skip: bool, ___: object) -> bool:
+    """Return whether a member is not for the page."""
+    plain_field = (getattr(member, "__doc__", None) or "").startswith("Alias for field number")
+    return skip or plain_field or name in OF_KERNELS
 
 
 def _escaped(line: str) -> str:
@@ -46,4 +56,5 @@ def _escaped(line: str) -> str:
 def setup(app: Sphinx) -> dict[str, bool]:
     """Let it run before napoleon, which reads sections."""
     app.connect("autodoc-process-docstring", as_written, priority=400)
+    app.connect("autodoc-skip-member", left_out)
     return {"parallel_read_safe": True}

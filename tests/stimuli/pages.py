@@ -17,11 +17,14 @@ PAGES = sorted(
 
 
 class Block(NamedTuple):
-    """A block of a page: its language, its text, whether it is marked as long, and what the page says it prints."""
+    """A block of a page: its language, its text, whether its mark keeps it from being run, and what it shall print.
+
+    Marks are `long`, for what takes minutes, and `setup`, for what changes the reader's machine.
+    """
 
     language: str
     text: str
-    long: bool
+    marked: bool
     printed: str | None
 
 
@@ -33,7 +36,7 @@ def text_of(name: str) -> str:
 
 def blocks(name: str) -> list[Block]:
     """Return the blocks of commands (`sh`) and of Python of a page, in order."""
-    pattern = r"^(\{\.long\}\n)?```(sh|python)\n(.*?)^```$(?:\n\nprints\n\n```text\n(.*?)^```$)?"
+    pattern = r"^(\{\.(?:long|setup)\}\n)?```(sh|python)\n(.*?)^```$(?:\n\nprints\n\n```text\n(.*?)^```$)?"
     found = re.findall(pattern, text_of(name), re.MULTILINE | re.DOTALL)
     return [Block(language, text, bool(mark), printed or None) for mark, language, text, printed in found]
 
