@@ -32,6 +32,10 @@ def as_written(_: Sphinx, what: str, __: str, ___: object, ____: object, lines: 
             result += [] if before.lstrip().startswith("- ") or _indent(before) > _indent(line) else [""]
         if before.strip() == "Returns:":
             line = f"{line[: _indent(line)]}: {line.lstrip()}"  # noqa: PLW2901
+        several = re.match(r"(\s+)((?:\w+, )+)(\w+): ", line)
+        if literal is None and several:
+            result += [f"{several[1]}{name}: see `{several[3]}`." for name in several[2].split(", ")[:-1]]
+            line = several[1] + line[several.start(3) :]  # noqa: PLW2901
         if line.strip():
             before = line
         result.append(line if literal is not None else _escaped(line))

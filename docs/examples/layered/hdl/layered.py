@@ -1,11 +1,11 @@
 """A layered wall: a stiff core under a soft skin."""
 
-from amaranth.hdl import Module, Mux, signed
-from amaranth.lib.wiring import In, Out
+from amaranth.hdl import Module, Mux
+from amaranth.lib.wiring import Member
 
 from hardwall.model.layered import Design
 
-from .arithmetic.fixed import saturate, shape
+from .arithmetic.fixed import saturate
 from .block import Block
 from .wall import Wall
 
@@ -32,19 +32,11 @@ class Layered(Block):
         Run-time parameters.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(
-            design,
-            Design,
-            lambda: {
-                "strobe": In(1),
-                "count": In(signed(design.count_width)),
-                "velocity": In(shape(design.velocity)),
-                **{word.name: In(shape(word.format)) for word in design.words},
-                "force": Out(shape(design.force)),
-                "valid": Out(1),
-            },
-        )
+    design_class = Design
+
+    @staticmethod
+    def members(design: Design) -> dict[str, Member]:
+        return Wall.members(design)
 
     def elaborate(self, platform):
         m = Module()

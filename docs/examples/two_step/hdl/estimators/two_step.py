@@ -25,22 +25,22 @@ class Estimator(EstimatorBlock):
     Source: elementary.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(design, Design)
+    design_class = Design
 
     def elaborate(self, platform):
         m = Module()
         fmt = self._design.velocity
+        count = self.seen.count
         running, taken = Signal(), Signal()
-        last, before, change = Signal.like(self.count), Signal.like(self.count), Signal.like(self.count)
+        last, before, change = Signal.like(count), Signal.like(count), Signal.like(count)
 
         m.d.sync += taken.eq(self.strobe)
         with m.If(self.strobe):
             goes_on = running & ~self.restart
             m.d.sync += [
-                change.eq(Mux(goes_on, (self.count - before)[: len(change)].as_signed(), 0)),
-                before.eq(Mux(goes_on, last, self.count)),
-                last.eq(self.count),
+                change.eq(Mux(goes_on, (count - before)[: len(change)].as_signed(), 0)),
+                before.eq(Mux(goes_on, last, count)),
+                last.eq(count),
                 running.eq(1),
             ]
 
