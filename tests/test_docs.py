@@ -23,17 +23,18 @@ from stimuli.pages import PAGES, ROOT, blocks, command_line, commands, text_of
 TOOLS = {"cp", "dask", "git", "pip", "pytest", "python", "source"}
 """What commands that are not run begin with, besides `hardwall` and `make`."""
 EXAMPLES = sorted(path.name for path in (ROOT / "docs/examples").iterdir() if (path / "wiring.patch").exists())
+GUIDES = [name for name in PAGES if name.startswith("docs/")]
 UNRUN = [
     (name, " ".join(words), words)
     for name in PAGES
     for block in blocks(name)
-    if block.language == "sh" and (block.marked or name in ("README.md", "CONTRIBUTING.md"))
+    if block.language == "sh" and (block.marked or name not in GUIDES)
     for words in commands(block)
 ]
 
 
 @pytest.mark.usefixtures("fresh")
-@pytest.mark.parametrize("name", [name for name in PAGES if any(not block.marked for block in blocks(name))])
+@pytest.mark.parametrize("name", [name for name in GUIDES if any(not block.marked for block in blocks(name))])
 def test_what_a_page_shows_runs(name, tmp_path, monkeypatch, capsys):
     """In order, in one folder and one namespace, as a reader would."""
     monkeypatch.chdir(tmp_path)
@@ -43,7 +44,7 @@ def test_what_a_page_shows_runs(name, tmp_path, monkeypatch, capsys):
             with contextlib.redirect_stdout(io.StringIO()) as out:
                 exec(compile(block.text, name, "exec"), names)
             assert out.getvalue() == (block.printed or "")
-        elif not block.marked and name.startswith("docs/"):
+        elif not block.marked:
             for words in commands(block):
                 assert words[0] == "hardwall", f"neither run nor marked: {' '.join(words)}"
                 code, _, err = call(monkeypatch, capsys, *words[1:])
@@ -107,7 +108,8 @@ def test_an_example_works_in_a_copy_of_the_project(example, tmp_path):
     }
     _run(["git", "apply", "wiring.patch"], tmp_path, environ)
     tests = [str(path.relative_to(ROOT / "docs/examples" / example)) for path in _tests_of(example)]
-    _run([sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider", *tests], tmp_path, environ)
+    quick = ["-q", "-n", "0", "-p", "no:cacheprovider", "-k", "not narrow"]
+    _run([sys.executable, "-m", "pytest", *quick, *tests], tmp_path, environ)
 
 
 def _tests_of(example: str) -> list[Path]:
