@@ -31,11 +31,9 @@ PICTURES := $(REPORTS:%.json=%.png)
 ON_ECP5 := --device ecp5-25k
 ON_ICE40 := --device ice40-up5k $(addprefix --set controller.,clock_hz=24000000 sample_hz=500000 actuation_hz=500000)
 
-# Every estimator on one map, which the best of them leave unless it is larger than the paper's.
 comma := ,
-ESTIMATORS_OF_ALL := fdm levant butterworth kalman period period-count levant-edge levant-semi-implicit levant-implicit \
-  levant-adaptive window foaw
-ALL_ON_THE_MAP := --estimators $(subst $() ,$(comma),$(strip $(ESTIMATORS_OF_ALL))) $(addprefix --set zwidth., \
+# Every estimator on one map, which the best of them leave unless it is larger than the paper's.
+ALL_ON_THE_MAP := --estimators all $(addprefix --set zwidth., \
   stiffness_to_n_per_m=150e3 stiffness_step_n_per_m=2e3 damping_step_n_s_per_m=12.0 walls_below=8)
 MAPPED := seed-2011 fit-2011 drive-2011
 STUDIES := cutoff gains rates drop trade

@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from .arithmetic.fixed import SQ, UQ, saturate, shift_floor, shift_round_half_up, wrap
 from .compiled import by_type, compiled
-from .words import Word, gain_format
+from .words import FieldError, Word, gain_format
 
 LATENCY = 6
 """Clocks from strobe to valid: see `hardwall.hdl.wall`."""
@@ -85,7 +85,7 @@ class Design:
             if bits > 61:
                 value = getattr(axis, name)
                 least = value * 2.0 ** (bits - 61)
-                raise ValueError(f"{name} must be at least {least:g} beside the other gain's largest, not {value!r}")
+                raise FieldError(name, f"must be at least {least:g} beside the other gain's largest, not {value!r}")
         self.words = (
             Word("wall_stiffness", self.stiffness, r / q, "N/m", 0, "spring of the wall"),
             Word("wall_damping", self.damping, r * tau / q, "N s/m", 0, "damper of the wall"),

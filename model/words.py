@@ -9,6 +9,17 @@ GAIN_BITS = 16
 """Bits of a gain word: the part of a multiplier's operand that iCE40UP (16 x 16) and ECP5 (18 x 18) both have."""
 
 
+class FieldError(ValueError):
+    """A value that cannot be: the message begins with the name of its field, which is also an attribute."""
+
+    def __init__(self, field: str, message: str):
+        super().__init__(field, message)
+        self.field, self.message = field, message
+
+    def __str__(self) -> str:
+        return f"{self.field} {self.message}"
+
+
 def gain_format(largest: float) -> UQ:
     """Return the `GAIN_BITS`-bit format that holds `largest` and resolves best."""
     i = bits_for(largest)
@@ -21,7 +32,7 @@ def check_positive(gains: object) -> None:
     """Raise ValueError, naming it, for a field of a dataclass of gains that is not finite and more than 0."""
     for name, value in vars(gains).items():
         if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
+            raise FieldError(name, f"must be finite and more than 0, not {value!r}")
 
 
 @dataclass(frozen=True)
@@ -46,7 +57,7 @@ class Word:
 
     def __post_init__(self):
         if not self.format.min <= self.reset <= self.format.max:
-            raise ValueError(f"{self.name} must fit {self.format}, not {self.reset!r}")
+            raise FieldError(self.name, f"must fit {self.format}, not {self.reset!r}")
 
     @property
     def si_min(self) -> float:
@@ -72,4 +83,4 @@ class Word:
             return self.format.from_real(value / self.si_per_unit)
         except ValueError:
             unit = f" {self.unit}" if self.unit else ""
-            raise ValueError(f"{self.name} must be {self.si_min:g} to {self.si_max:g}{unit}, not {value!r}") from None
+            raise FieldError(self.name, f"must be {self.si_min:g} to {self.si_max:g}{unit}, not {value!r}") from None

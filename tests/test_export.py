@@ -120,7 +120,8 @@ def test_written_tables_are_all_there(written):
 
 def test_text_is_the_same_in_another_process(written, tmp_path):
     program = (
-        "from specs import spec; from hardwall.hdl.export import write; import sys; write(spec('mhz'), sys.argv[1])"
+        "import sys; from stimuli.specs import spec; from hardwall.hdl.export import write; "
+        "write(spec('mhz'), sys.argv[1])"
     )
     command = [sys.executable, "-c", program, str(tmp_path)]
     subprocess.run(command, cwd=Path(__file__).parent, env=environment() | {"PYTHONHASHSEED": "7"}, check=True)

@@ -46,7 +46,7 @@ from ..arithmetic.fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_ro
 from ..arithmetic.sqrt import isqrt
 from ..arithmetic.sqrt import latency as sqrt_latency
 from ..compiled import compiled
-from ..words import GAIN_BITS, Word, check_positive
+from ..words import GAIN_BITS, FieldError, Word, check_positive
 from .estimate import estimate
 from .registry import output_word
 
@@ -261,7 +261,7 @@ def _check(value: float, name: str, low: float, high: float, scaled: float) -> N
     """Raise ValueError, in the units of `value`, unless `scaled` (the gain per sample) is within `low` to `high`."""
     if not low <= scaled <= high:
         unit = value / scaled
-        raise ValueError(f"{name} must be {low * unit:g} to {high * unit:g} at these rates, not {value!r}")
+        raise FieldError(name, f"must be {low * unit:g} to {high * unit:g} at these rates, not {value!r}")
 
 
 @compiled

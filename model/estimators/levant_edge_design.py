@@ -26,7 +26,7 @@ from ..arithmetic.divide import latency as divide_latency
 from ..arithmetic.fixed import SQ, UQ, bits_for, shift_floor
 from ..arithmetic.sqrt import latency as sqrt_latency
 from ..quadrature import Seen
-from ..words import GAIN_BITS, Word, check_positive
+from ..words import GAIN_BITS, FieldError, Word, check_positive
 
 HEADROOM_BITS = 2
 """A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
@@ -136,7 +136,7 @@ class Design:
         bound, speed = axis.acceleration_max_m_per_s2, axis.speed_max_counts_per_sample
         self.count_width, self.stamp_width, self.clocks = axis.count_width, axis.stamp_width, clocks
         if 4 * clocks > 1 << axis.stamp_width:
-            raise ValueError(f"sample_hz must be 4 or more for stamps that last a second, not {axis.sample_hz!r}")
+            raise FieldError("sample_hz", f"must be 4 or more for stamps that last a second, not {axis.sample_hz!r}")
 
         # Times, clocks.
         window = clock * min(math.sqrt(axis.speed_max_m_per_s / (clock * bound)), math.sqrt(q / bound) / 4)
@@ -255,6 +255,6 @@ def _gain(name: str, value: float, scaled: float) -> UQ:
     """Return the format of a gain of `value` SI and `scaled` in counts, samples and clocks."""
     if not 2.0**-60 <= scaled <= 2.0**20:
         unit = value / scaled
-        raise ValueError(f"{name} must be {2.0**-60 * unit:g} to {2.0**20 * unit:g} at these rates, not {value!r}")
+        raise FieldError(name, f"must be {2.0**-60 * unit:g} to {2.0**20 * unit:g} at these rates, not {value!r}")
     i = HEADROOM_BITS + bits_for(scaled)
     return UQ(i, GAIN_BITS - i)

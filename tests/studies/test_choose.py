@@ -1,8 +1,9 @@
 """The table to choose by, and the picture of what a bit buys, from made-up results."""
 
-from hardwall.sim.pictures import accuracy
+from hardwall.sim.pictures import bits
 from hardwall.sim.pictures import style as pictures
 from hardwall.sim.studies import choose
+from hardwall.sim.studies.bits import Bits
 
 COST = {"device": "some", "lut4": 10, "ff": 20, "dsp": 1, "bram": 0, "latency_clocks": 7, "board": {"max_sample_hz": 5}}
 
@@ -31,7 +32,7 @@ def test_a_curve_a_output_and_a_circle_at_the_derived_width(tmp_path):
         for output in ("u", "u1")
         for dropped in range(3)
     ]
-    picture = accuracy.what_a_bit_buys(rows)
+    picture = bits.draw(Bits(rows))
     by_width, by_logic = picture.axes
     assert [line.get_label() for line in by_width.lines if not line.get_label().startswith("_")] == [
         "levant u",
