@@ -17,7 +17,7 @@ from sphinx.application import Sphinx
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 
-from hardwall.sim.commands.app import app
+from hardwall.sim.commands.group import app
 from hardwall.sim.scene.schema import Scene
 
 log = logging.getLogger(__name__)
@@ -70,7 +70,7 @@ def commands() -> list[str]:
     """Return the lines of Markdown that describe every command."""
     group = typer.main.get_command(app)
     context = group.make_context("hardwall", [], resilient_parsing=True)
-    found = {name: group.get_command(context, name) for name in group.list_commands(context)}
+    found = {name: group.resolve_command(context, [name])[1] for name in group.list_commands(context)}
     shown = {name: command for name, command in found.items() if not command.hidden}
     firsts = [[f"[{code(name)}](#hardwall-{name})", cell(one.get_short_help_str(200))] for name, one in shown.items()]
     lines = [*table(["command", "what it does"], firsts), "", "## `hardwall`", "", *_options(group, context), ""]

@@ -60,9 +60,8 @@ def test_a_command_that_is_not_run_is_accepted(name, line, words):
     if tool == "hardwall":
         group = command_line()
         context = group.make_context("hardwall", [], resilient_parsing=True)
-        command = group.get_command(context, arguments[0])
-        assert command is not None, line
-        command.make_context(arguments[0], arguments[1:], parent=context)
+        name, command, options = group.resolve_command(context, arguments)
+        command.make_context(name, options, parent=context)
     elif tool == "make":
         targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
         assert {word for word in arguments if "=" not in word} <= targets

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import typer.main
 
-from hardwall.sim.commands.app import app
+from hardwall.sim.commands.group import app
 
 ROOT = Path(__file__).absolute().parents[2]
 PAGES = sorted(
