@@ -18,13 +18,13 @@ value, so that it resolves largest / 2**GAIN_BITS or better.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from types import ModuleType
 
 from .arithmetic.fixed import SQ, bits_for
-from .estimators import registry
-from .words import FieldError
+from .axis import Design
+from .checks import FieldError
+from .estimators.estimate import EstimatorGains
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,14 +65,16 @@ class AxisSpec:
     stiffness_max_n_per_m: float
     damping_max_n_s_per_m: float
     estimator: str = "levant"
-    gains: object = field(default=None)
+    gains: EstimatorGains | None = None
     estimator_bits_dropped: int = 0
 
     def __post_init__(self):
         for name, kind in self.__annotations__.items():
             value = getattr(self, name)
-            if kind is int and not isinstance(value, int):
+            if kind is int and (isinstance(value, bool) or not isinstance(value, int)):
                 raise TypeError(f"{name} must be an int, not {value!r}")
+            if kind is str and not isinstance(value, str):
+                raise TypeError(f"{name} must be a str, not {value!r}")
             if kind is float and (isinstance(value, bool) or not isinstance(value, int | float)):
                 raise TypeError(f"{name} must be a number, not {value!r}")
             if kind in (int, float) and name != "estimator_bits_dropped" and not (math.isfinite(value) and value > 0):
@@ -162,14 +164,7 @@ class AxisSpec:
         """Format of wall force and drive, in force LSB."""
         return SQ(self.force_limit_word.bit_length() + 2, 0)
 
-    @property
-    def model(self) -> ModuleType:
-        """The estimator's module."""
-        return registry.load(self.estimator)
-
     @cached_property
-    def design(self):
-        """Every derived format, word and latency: a `hardwall.model.axis.Design`."""
-        from .axis import Design  # noqa: PLC0415  (the axis is made of blocks that are designed from this spec)
-
+    def design(self) -> Design:
+        """Every derived format, word and latency."""
         return Design(self)

@@ -1,23 +1,12 @@
 """Run-time parameters of the hardware: a word on a port, and what it means in SI units."""
 
-import math
 from dataclasses import dataclass
 
 from .arithmetic.fixed import UQ, Format, bits_for
+from .checks import FieldError, check_number
 
 GAIN_BITS = 16
 """Bits of a gain word: the part of a multiplier's operand that iCE40UP (16 x 16) and ECP5 (18 x 18) both have."""
-
-
-class FieldError(ValueError):
-    """A value that cannot be: the message begins with the name of its field, which is also an attribute."""
-
-    def __init__(self, field: str, message: str):
-        super().__init__(field, message)
-        self.field, self.message = field, message
-
-    def __str__(self) -> str:
-        return f"{self.field} {self.message}"
 
 
 def gain_format(largest: float) -> UQ:
@@ -26,13 +15,6 @@ def gain_format(largest: float) -> UQ:
     fmt = UQ(i, GAIN_BITS - i)
     # A largest value just under a power of two may round up to it.
     return fmt if largest <= fmt.to_real(fmt.max) else UQ(i + 1, GAIN_BITS - i - 1)
-
-
-def check_positive(gains: object) -> None:
-    """Raise ValueError, naming it, for a field of a dataclass of gains that is not finite and more than 0."""
-    for name, value in vars(gains).items():
-        if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-            raise FieldError(name, f"must be finite and more than 0, not {value!r}")
 
 
 @dataclass(frozen=True)
@@ -77,8 +59,10 @@ class Word:
         """Return the word nearest to `value` (SI).
 
         Raises:
+            TypeError: if it is not a number.
             ValueError: if it does not fit, with the accepted range in SI units.
         """
+        check_number(self.name, value)
         try:
             return self.format.from_real(value / self.si_per_unit)
         except ValueError:

@@ -24,13 +24,16 @@ Formats, derived:
   difference over it exact. The hold adds at most every - 1 samples to the age of a window of thousands.
 """
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
+from ..checks import FieldError
 from ..compiled import compiled
-from ..words import FieldError
+
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
 
 MEMORY_BITS = 1 << 16
 """Largest memory: 16 of the 30 blocks of 4 kbit in an iCE40UP5K, 4 of the 56 of 18 kbit in an ECP5-25F."""
@@ -56,7 +59,7 @@ class State(NamedTuple):
     """
 
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     position: int
     phase: int
     head: int
@@ -82,7 +85,7 @@ class Design:
 
     latency = LATENCY
 
-    def __init__(self, axis, window_s: float, steps: int = 1):
+    def __init__(self, axis: "AxisSpec", window_s: float, steps: int = 1):
         self.count_width = axis.count_width
         self.change = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), 0)
         # Rounded to whole steps, a window may grow by half, or to the one step that it has at least.

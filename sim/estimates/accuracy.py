@@ -39,10 +39,10 @@ def outputs(text: str) -> list[tuple[str, str]]:
         ValueError: if there is none.
     """
     name, _, output = text.partition(":")
-    available = registry.load(name).OUTPUTS
+    design = registry.design_of(name)
     if output:
-        registry.choose(name, output)
-    return [(name, each) for each in ([output] if output else available)]
+        design.choose(output)
+    return [(name, each) for each in ([output] if output else design.outputs)]
 
 
 def axis_spec(
@@ -64,7 +64,7 @@ def axis_spec(
         actuation_hz=sample_hz,
         acceleration_max_m_per_s2=acceleration_max_m_per_s2,
         estimator=estimator,
-        gains=gains and registry.load(estimator).Gains(**gains),
+        gains=gains and registry.design_of(estimator).gains_class(**gains),
         estimator_bits_dropped=bits_dropped,
     )
 

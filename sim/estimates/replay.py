@@ -222,7 +222,7 @@ def axis_spec(counts: np.ndarray, count: int, acceleration_max: float, estimator
 
 def needs_pins(estimator: str, backend: str) -> bool:
     """Return whether the counts go through pins: into hardware, or to be stamped."""
-    return backend == "rtl" or registry.uses_stamps(estimator)
+    return backend == "rtl" or registry.design_of(estimator).uses_stamps()
 
 
 def run(
@@ -244,7 +244,7 @@ def run(
     Raises:
         RuntimeError: if the RTL could not be built.
     """
-    choice = registry.choose(spec.estimator, output)
+    choice = spec.design.estimator.choose(output)
     if backend == "rtl":
         from ..rtl.library import (  # noqa: PLC0415  (the other backends need neither Amaranth nor a C++ compiler)
             Hardware,
@@ -311,7 +311,7 @@ def replay(
         RuntimeError: if the RTL could not be built.
     """
     _one_of("estimator", estimator, tuple(registry.ESTIMATORS))
-    outputs = registry.load(estimator).OUTPUTS
+    outputs = registry.design_of(estimator).outputs
     output = outputs[0] if output is None else output
     _one_of(f"output of {estimator}", output, outputs)
     _one_of("backend", backend, BACKENDS)

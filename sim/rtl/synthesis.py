@@ -23,12 +23,11 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
 
-from ...hdl import __name__ as hdl
 from ...hdl.board import Board
+from ...hdl.estimators.registry import block_of
 from ...hdl.export import to_verilog
 from ...model import quadrature
 from ...model.compiled import build_dir
-from ...model.estimators import registry
 from ...model.spec import AxisSpec
 
 # Where the console scripts of the tools are.
@@ -215,7 +214,7 @@ def estimator_cells(spec: AxisSpec, device: str) -> dict[str, int]:
         SynthesisError: if a tool is missing or fails.
     """
     part = DEVICES[device]
-    component = registry.load(spec.estimator, f"{hdl}.estimators").Estimator(spec.design.estimator)
+    component = block_of(spec.design.estimator)
     folder = _netlist(f"estimator-{device}", part, to_verilog(component, "board"), "", spec.clock_hz)
     found = json.loads((folder / "board.json").read_text(encoding="utf-8"))["modules"]["board"]["cells"]
     types = [cell["type"] for cell in found.values()]

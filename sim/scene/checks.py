@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from ...model import quadrature
-from ...model.words import FieldError
+from ...model.checks import FieldError
 from ..world import device
 from ..world.euler import longest_s
 from .build import device_of
@@ -52,7 +52,7 @@ def check(scene: Scene) -> None:
 
 def _check_axis(scene: Scene) -> None:
     try:
-        spec, outputs = scene.spec, scene.spec.model.OUTPUTS
+        spec, outputs = scene.spec, scene.spec.design.estimator.outputs
         if scene.estimator_output not in outputs:
             raise FieldError("output", f"must be one of {', '.join(outputs)}, not {scene.estimator_output!r}")
         _check_start(scene)

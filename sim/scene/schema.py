@@ -45,7 +45,7 @@ class EncoderSection(Section):
 
 def _gains_section(name: str) -> type[Section]:
     """Return a section with the fields of an estimator's gains."""
-    fields = dict.fromkeys(registry.load(name).Gains.__annotations__, (Positive, ...))
+    fields = dict.fromkeys(registry.design_of(name).gains_class.__annotations__, (Positive, ...))
     return create_model(f"{name.title()}Section", __base__=Section, **fields)
 
 
@@ -185,13 +185,13 @@ class Scene(Section):
         )
         gains = getattr(self.controller.gains, self.controller.estimator)
         if gains is not None:
-            gains = registry.load(self.controller.estimator).Gains(**gains.model_dump())
+            gains = registry.design_of(self.controller.estimator).gains_class(**gains.model_dump())
         return AxisSpec(count_m=self.encoder.count_m, gains=gains, **fields)
 
     @property
     def estimator_output(self) -> str:
         """The estimator's output that the wall uses."""
-        return self.controller.output or self.spec.model.OUTPUTS[0]
+        return self.controller.output or self.spec.design.estimator.outputs[0]
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -203,7 +203,7 @@ class Scene(Section):
             "wall_position": -self.protocol.start_m,
             "wall_forbid_pull": self.wall.forbid_pull,
         }
-        si |= registry.choose(self.controller.estimator, self.estimator_output)
+        si |= self.spec.design.estimator.choose(self.estimator_output)
         if self.controller.slew_limit_n_per_s is not None:
             si["output_slew_limit"] = self.controller.slew_limit_n_per_s
         return si

@@ -84,7 +84,7 @@ def table(pairs: list[tuple[str, str]], measured: list[dict], costs: list[dict])
         rows.append(
             {
                 "estimator": estimator,
-                "output": output if len(registry.load(estimator).OUTPUTS) > 1 else "",
+                "output": output if len(registry.design_of(estimator).outputs) > 1 else "",
                 "rms_mm_s": {name: row["rms_mm_s"] for name, row in own.items()},
                 "impact_delay_s": own["impact"]["delay_s"],
                 **{name: cost[name] for name in ("device", "lut4", "ff", "dsp", "bram", "latency_clocks")},

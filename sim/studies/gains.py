@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ...model.estimators.levant import OUTPUTS, Gains
+from ...model.estimators.levant import Design, Gains
 from ..jobs.result import Table, table_of
 from ..scene.case import Case, accepted
 from ..scene.schema import Scene
@@ -174,10 +174,10 @@ def study(case: Case, mapping: Mapping) -> Search:
         possible = accepted(cases)
         return dict(zip(possible, mapping(title, list(possible.values())), strict=True))
 
-    coarse = maps("search of gains", COARSER, [(output, gains) for output in OUTPUTS for gains in tried])
-    by_output = {out: {gains: each for (of, gains), each in coarse.items() if of == out} for out in OUTPUTS}
+    coarse = maps("search of gains", COARSER, [(output, gains) for output in Design.outputs for gains in tried])
+    by_output = {out: {gains: each for (of, gains), each in coarse.items() if of == out} for out in Design.outputs}
     chosen = {output: papers | _best(found, bound) for output, found in by_output.items()}
-    pairs = dict.fromkeys((output, gains) for output in OUTPUTS for gains in chosen[output].values())
+    pairs = dict.fromkeys((output, gains) for output in Design.outputs for gains in chosen[output].values())
     finer = maps("the best again, in finer steps", FINER, list(pairs))
     picks = {
         output: {name: Pick(gains, finer[output, gains]) for name, gains in named.items() if (output, gains) in finer}

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import cocotb
 import numpy as np
-from amaranth.hdl import Cat, Module, Shape
+from amaranth.hdl import Cat, Module, Shape, Value
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In, Member, Out
 from cocotb.clock import Clock
 from cocotb.simtime import get_sim_time
 from cocotb.triggers import ClockCycles, RisingEdge
@@ -76,25 +76,32 @@ class Packing:
 
 
 class Observed(wiring.Component):
-    """A component with its own members, and one more that carries them all: `observed`, packed as `packing_of` says."""
+    """A component's ports, and one more that carries them all: `observed`, packed as `packing_of` says."""
 
     def __init__(self, component: wiring.Component):
         self.component = component
-        super().__init__({**component.signature.members, "observed": Out(packing_of(component).width)})
+        ports = {name: member for name, (member, _) in ports_of(component).items()}
+        super().__init__({**ports, "observed": Out(packing_of(component).width)})
 
     def elaborate(self, platform):
         m = Module()
         m.submodules.component = self.component
-        for name, member in self.component.signature.members.items():
-            inside, outside = getattr(self.component, name), getattr(self, name)
+        ports = ports_of(self.component)
+        for name, (member, inside) in ports.items():
+            outside = getattr(self, name)
             m.d.comb += inside.eq(outside) if member.flow == In else outside.eq(inside)
-        m.d.comb += self.observed.eq(Cat(getattr(self.component, name) for name in packing_of(self.component).shapes))
+        m.d.comb += self.observed.eq(Cat(inside for _, inside in ports.values()))
         return m
 
 
+def ports_of(component: wiring.Component) -> dict[str, tuple[Member, Value]]:
+    """Return the ports of a component by their names in Verilog: member `b` of its member `a` is `a__b`."""
+    return {"__".join(path): (member, port) for path, member, port in component.signature.flatten(component)}
+
+
 def packing_of(component: wiring.Component) -> Packing:
-    """Return how `Observed` packs the members of a component."""
-    return Packing({name: Shape.cast(member.shape) for name, member in component.signature.members.items()})
+    """Return how `Observed` packs the ports of a component."""
+    return Packing({name: Shape.cast(member.shape) for name, (member, _) in ports_of(component).items()})
 
 
 class Record:
@@ -148,9 +155,9 @@ class Bench:
 
     def __init__(self, dut, component):
         self.dut, self.packing = dut, packing_of(component)
-        members = component.signature.members
-        self._signed = {name: Shape.cast(members[name].shape).signed for name in members}
-        self._inputs = [name for name in members if members[name].flow == In and name not in ("clk", "rst")]
+        ports = ports_of(component)
+        self._signed = {name: shape.signed for name, shape in self.packing.shapes.items()}
+        self._inputs = [name for name, (port, _) in ports.items() if port.flow == In and name not in ("clk", "rst")]
 
     async def reset(self):
         """Start the clock, zero every input and hold reset for two clocks."""

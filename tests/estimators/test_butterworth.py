@@ -80,11 +80,11 @@ async def reset_mid_stream_starts_afresh(dut):
     reset = words(d, d.cutoff_max_hz)
     await bench.reset()
     for count in (0, 1, 2):
-        await bench.transact("strobe", "valid", count=count, **reset)
+        await bench.transact("strobe", "valid", seen__count=count, **reset)
     assert bench.reader("velocity")() != 0
     await bench.reset()
     for _ in range(3):
-        await bench.transact("strobe", "valid", count=-1, **reset)
+        await bench.transact("strobe", "valid", seen__count=-1, **reset)
         assert bench.reader("velocity")() == 0
 
 

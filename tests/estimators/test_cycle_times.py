@@ -13,7 +13,7 @@ from hardwall.model.quadrature import Seen
 from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from stimuli.edges import anything, rows, turn
 
-INPUTS = (*Seen._fields, "restart")
+INPUTS = (*(f"seen__{name}" for name in Seen._fields), "restart")
 
 
 class Widths(NamedTuple):

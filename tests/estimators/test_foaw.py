@@ -73,11 +73,11 @@ async def reset_mid_stream_starts_afresh(dut):
     tap = d.spacing * d.history.every
     await bench.reset()
     for count in range(2 * tap):
-        await bench.transact("strobe", "valid", count=count, **words)
+        await bench.transact("strobe", "valid", seen__count=count, **words)
     assert bench.reader("velocity")() != 0
     await bench.reset()
     for _ in range(tap + 1):
-        await bench.transact("strobe", "valid", count=-1, **words)
+        await bench.transact("strobe", "valid", seen__count=-1, **words)
         assert bench.reader("velocity")() == 0
 
 

@@ -64,11 +64,11 @@ async def reset_mid_stream_starts_afresh(dut):
     bench, (length,) = Bench(dut, component), reset_words(component.design)
     await bench.reset()
     for count in range(3 * component.design.history.every):
-        await bench.transact("strobe", "valid", count=count, window_length=length)
+        await bench.transact("strobe", "valid", seen__count=count, window_length=length)
     assert bench.reader("velocity")() != 0
     await bench.reset()
     for _ in range(component.design.history.every + 1):
-        await bench.transact("strobe", "valid", count=-1, window_length=length)
+        await bench.transact("strobe", "valid", seen__count=-1, window_length=length)
         assert bench.reader("velocity")() == 0
 
 
