@@ -94,7 +94,8 @@ def _options(command, context) -> list[str]:
         choices = re.search(r"<([^<>|]+(?:\|[^<>|]+)+)>", name)
         if choices:
             name = name.replace(choices[0], "CHOICE")
-            meaning = f"{meaning}: {', '.join(choices[1].split('|'))}"
+            text, bracket, default = meaning.partition(" [")
+            meaning = f"{text}: {', '.join(choices[1].split('|'))}{bracket}{default}"
         rows.append([code(name), cell(meaning)])
     return table(["argument or option", "meaning"], rows)
 
