@@ -58,7 +58,7 @@ def _label(axes: Axes, device: Device) -> None:
     areas, (low, high) = _areas(device), device.level_hz
     unfiltered = device.unfiltered.area / 1e6
     best = f"best: {device.best_hz:.0f} Hz, {areas[device.best_hz]:.3g}" + ", at the end" * device.at_end
-    best += f"\nwithin {LEVEL:.0%} of that: {low:.0f} to {high:.0f} Hz"
+    best += f"\nwithin {LEVEL * 100:g} % of that: {low:.0f} to {high:.0f} Hz"
     left = axes.get_xlim()[0]
     labels = [
         (best, (device.best_hz, areas[device.best_hz]), FILTERED),

@@ -9,7 +9,7 @@ from ..studies.drop import PAPERS, STARTS, STIFFNESSES_N_PER_M
 from ..studies.drop_result import STIFFNESS_N_PER_M, Drop, Law
 from ..walls.grid import grid_of
 from .labels import label_points
-from .style import AT_REST_M, COLOURS, THEORY, ink, length_text, looks, new_figure, page
+from .style import AT_REST_M, COLOURS, THEORY, ink, length_text, looks, new_figure, page, plain_decades
 
 OUTSIDE = ("mass", "count", "delay", "stiffness")
 """What was changed that is not in the law."""
@@ -77,6 +77,7 @@ def _rest(drop: Drop) -> Figure:
         if end < math.inf:
             axes.plot([end, end], [row - 0.42, row + 0.42], color="black", lw=2)
     axes.set_xscale("log")
+    plain_decades(axes.xaxis)
     axes.set_yticks(range(len(rows)), [drop.maps[name].case.label for name in rows])
     for text, name in zip(axes.get_yticklabels(), rows, strict=True):
         text.set_color(inks[name])
@@ -103,8 +104,11 @@ def _finite(law: Law) -> bool:
 
 def _law(drop: Drop) -> Figure:
     """Return the picture of the law: measured against predicted, one thing changed at a time, a panel a method."""
-    title = f"Up to which B three of four hits come to rest, one thing changed at a time\n{_setting(drop)}"
-    picture = new_figure(4.4, title)
+    title = (
+        "Up to which B the handle comes to rest, one thing changed at a time: predicted from the estimator alone,\n"
+        f"measured in the closed loop\n{_setting(drop)}"
+    )
+    picture = new_figure(4.9, title)
     panels = picture.subplots(1, len(PAPERS), sharex=True, sharey=True)
     known = [each for each in drop.laws if each.method in PAPERS and _finite(each)]
     factors = list(dict.fromkeys(each.factor for each in known))
@@ -124,10 +128,11 @@ def _law(drop: Drop) -> Figure:
         axes.set_yscale("log")
         axes.set_xlim(*line)
         axes.set_ylim(*line)
-        axes.set_aspect("equal")
+        plain_decades(axes.xaxis)
+        plain_decades(axes.yaxis)
         axes.set_title(drop.maps[name].case.label)
-        axes.set_xlabel("predicted from the estimator alone, B (N s/m)")
-    panels[0].set_ylabel("measured in the closed loop, B (N s/m)")
+        axes.set_xlabel("predicted: B (N s/m)")
+    panels[0].set_ylabel("measured: B (N s/m)")
     for index, factor in enumerate(factors):
         inside = factor not in OUTSIDE
         colour = "black" if factor == "none" else COLOURS["levant"] if inside else COLOURS["butterworth"]
@@ -146,7 +151,7 @@ def _ends(drop: Drop) -> Figure:
         f"In soft walls rest and stability end long before the edge of the map, which is that of stiff ones\n"
         f"(three of four of {STARTS} hits at K of {', '.join(f'{k / 1e3:g}' for k in STIFFNESSES_N_PER_M)} kN/m)"
     )
-    picture = new_figure(4.4, title)
+    picture = new_figure(4.9, title)
     panels = picture.subplots(1, len(PAPERS), sharex=True, sharey=True)
     inks, predicted = _inks(drop), _predicted(drop)
     for axes, name in zip(panels, PAPERS, strict=True):
@@ -169,7 +174,7 @@ def _ends(drop: Drop) -> Figure:
     panels[0].plot([], [], color=THEORY, ls=":", label="predicted: rests up to here")
     panels[0].plot([], [], color="black", ls="", marker="x", ms=6, label="comes to rest up to here")
     panels[0].plot([], [], color="black", ls="", marker="o", mfc="none", ms=9, label="stable up to here")
-    picture.legend(loc="outside lower center", ncols=4, frameon=False)
+    picture.legend(loc="outside lower center", ncols=2, frameon=False)
     return picture
 
 

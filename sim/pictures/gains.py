@@ -11,10 +11,10 @@ from ..studies.lipschitz import least_alpha_m_per_s2
 from .labels import label_points
 from .style import LABEL_PT, new_figure, page
 
-ROWS = {False: "stable", True: "stable, and in place at rest"}
+ROWS = {False: "stable walls", True: "stable walls that are in place"}
 MARKS = {"proposed": "o", "adjusted": "s", "best": "*", "best in place": "D", "best within the condition": "P"}
 """The gains that have a name; a pair with several names has the marker of the first."""
-OUTLINE = [withStroke(linewidth=2.5, foreground="black")]
+OUTLINE = [withStroke(linewidth=2, foreground="black")]
 
 
 @page
@@ -38,7 +38,7 @@ def draw(search: Search) -> Figure:
             axes.grid(visible=False)
             axes.set_xscale("log")
             axes.set_yscale("log")
-            axes.set_title(f"output {output}: walls that are {text}")
+            axes.set_title(f"output {output}: {text}")
     picture.colorbar(mesh, ax=panels, label="area of the stable region (MN/m N s/m)", aspect=40, pad=0.02)
     for axes in panels[-1]:
         axes.set_xlabel(r"$\lambda$ (m$^{1/2}$/s)")

@@ -12,6 +12,9 @@ from matplotlib.transforms import Bbox
 
 from .style import LABEL_PT
 
+LEADING = 1.3
+"""From one line of a column of labels to the next, in heights of its letters."""
+
 
 def label_right(axes: Axes, labels: Sequence[tuple[str, float, str]]) -> None:
     """Write names right of a panel, each at the height where its line ends there, moved apart where they would touch.
@@ -37,41 +40,40 @@ def label_right(axes: Axes, labels: Sequence[tuple[str, float, str]]) -> None:
             fontsize=LABEL_PT,
             va="center",
             annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "color": colour, "lw": 0.6, "shrinkA": 1, "shrinkB": 1},
+            arrowprops={"arrowstyle": "-", "color": colour, "lw": 0.6, "relpos": (0, 0.5), "shrinkA": 1, "shrinkB": 1},
         )
         for (text, _, colour), height in zip(labels, heights, strict=True)
     ]
     axes.figure.draw_without_rendering()
-    room = 1.25 * LABEL_PT / 72 * axes.figure.dpi / axes.get_window_extent().height
-    for text, place in zip(texts, spread(heights, room), strict=True):
+    room = LEADING * LABEL_PT / 72 * axes.figure.dpi / axes.get_window_extent().height
+    sizes = [room * (1 + text.count("\n")) for text, _, _ in labels]
+    for text, place in zip(texts, spread(heights, sizes), strict=True):
         text.set_position((1.04, place))
 
 
-def spread(heights: Sequence[float], room: float) -> list[float]:
-    """Return heights that are `room` apart and in the same order, as near to the given ones as their groups allow."""
-    order = sorted(range(len(heights)), key=lambda index: heights[index])
-    groups: list[list] = []
-    for index in order:
-        groups.append([heights[index], [index]])
-        # Groups that touch become one, around the mean of what they want.
-        while len(groups) > 1 and _bottom(groups[-1], room) < _top(groups[-2], room):
-            middle, members = groups.pop()
-            wanted = groups[-1][0] * len(groups[-1][1]) + middle * len(members)
-            groups[-1][1] += members
-            groups[-1][0] = wanted / len(groups[-1][1])
+def spread(heights: Sequence[float], sizes: Sequence[float]) -> list[float]:
+    """Return heights for labels of these sizes, in the same order and apart, as near as can be to the given ones."""
+    groups: list[tuple[float, list[int]]] = []
+    for index in sorted(range(len(heights)), key=lambda index: heights[index]):
+        group = (heights[index], [index])
+        # Groups that would touch become one, around the mean of what they ask for.
+        while groups and groups[-1][0] + _half(groups[-1], sizes) > group[0] - _half(group, sizes):
+            below = groups.pop()
+            members = below[1] + group[1]
+            group = (sum(heights[each] for each in members) / len(members), members)
+        groups.append(group)
     places = [0.0] * len(heights)
     for middle, members in groups:
-        for number, index in enumerate(members):
-            places[index] = middle + (number - (len(members) - 1) / 2) * room
+        top = middle - _half((middle, members), sizes)
+        for index in members:
+            places[index] = top + sizes[index] / 2
+            top += sizes[index]
     return places
 
 
-def _bottom(group: list, room: float) -> float:
-    return group[0] - len(group[1]) * room / 2
-
-
-def _top(group: list, room: float) -> float:
-    return group[0] + len(group[1]) * room / 2
+def _half(group: tuple[float, list[int]], sizes: Sequence[float]) -> float:
+    """Return half of the height of a group of labels."""
+    return sum(sizes[index] for index in group[1]) / 2
 
 
 AROUND = [
@@ -80,7 +82,7 @@ AROUND = [
     for angle in np.linspace(0, 2 * np.pi, 16, endpoint=False)
 ]
 """Where a label may stand, from the point that it names to its own nearest edge, in heights of its letters."""
-CLEAR_PX = 3.0
+CLEAR_PX = 5.0
 """So far is a label from what it must not cover."""
 
 
@@ -114,20 +116,31 @@ def label_points(
     taken: list[np.ndarray] = []
     texts = []
     for number, (text, _, colour) in enumerate(labels):
-        options = {"fontsize": LABEL_PT, "color": colour, "ha": "left", "va": "center"}
-        options |= {"xycoords": "data", "textcoords": "offset points", "annotation_clip": False}
-        options["path_effects"] = [withStroke(linewidth=2, foreground="white")]
-        options["arrowprops"] = {"arrowstyle": "-", "color": colour, "lw": 0.6, "shrinkA": 0, "shrinkB": 3}
-        written = axes.annotate(text, (0, 0), (0, 0), **options)
-        written.set_in_layout(False)
-        extent = written.get_window_extent(renderer)
+        measured = axes.text(0, 0, text, fontsize=LABEL_PT)
+        extent = measured.get_window_extent(renderer)
+        measured.remove()
         foreign = np.concatenate([*named[:number], *named[number + 1 :], *others])
         panel = _Panel(frame, taken, named[number], foreign)
         anchor, box = _place(np.array([extent.width, extent.height]), height, panel)
         taken.append(box)
-        written.xy = tuple(axes.transData.inverted().transform(anchor))
-        written.set_position((np.array([box[0], (box[1] + box[3]) / 2]) - anchor) * 72 / figure.dpi)
-        written.arrow_patch.set_visible(bool(_gap(box, anchor[None]) > 1.2 * height))
+        others.append(_leader(box, anchor))
+        near = _gap(box, anchor[None]) < 1.2 * height and panel.nearest(box)
+        # The line begins where the label is nearest to what it names.
+        begin = np.clip((anchor - box[:2]) / (box[2:] - box[:2]), 0, 1)
+        line = {"arrowstyle": "-", "color": colour, "lw": 0.6, "relpos": begin, "shrinkA": 0, "shrinkB": 3}
+        written = axes.annotate(
+            text,
+            axes.transData.inverted().transform(anchor),
+            (np.array([box[0], (box[1] + box[3]) / 2]) - anchor) * 72 / figure.dpi,
+            textcoords="offset points",
+            arrowprops=None if near else line,
+            path_effects=[withStroke(linewidth=2, foreground="white")],
+            annotation_clip=False,
+            color=colour,
+            fontsize=LABEL_PT,
+            va="center",
+        )
+        written.set_in_layout(False)
         texts.append(written)
     return texts
 
@@ -145,9 +158,18 @@ class _Panel(NamedTuple):
         left, bottom, right, top = box
         if left < self.frame.x0 or right > self.frame.x1 or bottom < self.frame.y0 or top > self.frame.y1:
             return False
-        if any(left < b[2] + 3 and b[0] < right + 3 and bottom < b[3] and b[1] < top for b in self.taken):
+        x, y = CLEAR_PX, CLEAR_PX / 2
+        if any(left < b[2] + x and b[0] < right + x and bottom < b[3] + y and b[1] < top + y for b in self.taken):
             return False
         return _gap(box, self.own) > CLEAR_PX and _gap(box, self.foreign) > CLEAR_PX
+
+    def clear(self, line: np.ndarray) -> bool:
+        """Return whether the line from a label to what it names runs through no label, and past nothing else."""
+        if any(_gap(box, line) == 0 for box in self.taken):
+            return False
+        # What lies at its end may be close to what it names.
+        points = line[: len(line) * 2 // 3]
+        return all(_gap(np.tile(point, 2), self.foreign) > CLEAR_PX for point in points)
 
     def nearest(self, box: np.ndarray) -> bool:
         """Return whether a label is clearly nearer to what it is of than to anything else."""
@@ -158,17 +180,27 @@ def _place(size: np.ndarray, height: float, panel: _Panel) -> tuple[np.ndarray, 
     """Return the point at which a label stands, and its box: left, bottom, right, top."""
     # Where two curves run together, a name would be of either.
     alone = [point for point in panel.own if _gap(np.tile(point, 2), panel.foreign) > 0.7 * height]
-    anchors, free = alone or list(panel.own), []
+    anchors, led, free = alone or list(panel.own), [], []
     for away in AROUND:
         for anchor in anchors:
             # The text is on that side of the place to which it leads.
             low = anchor + np.array(away) * height - size * (1 - np.sign(np.round(away, 6))) / 2
             box = np.concatenate([low, low + size])
-            if panel.free(box):
-                if panel.nearest(box):
-                    return anchor, box
-                free.append((anchor, box))
-    return free[0] if free else (anchors[0], np.concatenate([anchors[0], anchors[0] + size]))
+            if not panel.free(box):
+                continue
+            line = _leader(box, anchor)
+            if panel.nearest(box) and panel.clear(line):
+                return anchor, box
+            if not led and np.hypot(*(line[-1] - line[0])) > height and panel.clear(line):
+                led.append((anchor, box))
+            free.append((anchor, box))
+    return next(iter([*led, *free]), (anchors[0], np.concatenate([anchors[0], anchors[0] + size])))
+
+
+def _leader(box: np.ndarray, anchor: np.ndarray) -> np.ndarray:
+    """Return points of the line from a label to what it names."""
+    begin = np.clip(anchor, box[:2], box[2:])
+    return begin + (anchor - begin) * np.linspace(0, 1, 20)[:, None]
 
 
 def _gap(box: np.ndarray, points: np.ndarray) -> float:

@@ -1,6 +1,5 @@
 """The picture of what rate buys: the largest stable stiffness against the rate, and what ends it."""
 
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..studies.rates import Rates
@@ -19,7 +18,10 @@ def draw(rates: Rates) -> Figure:
     gains, limits = rates.gains, rates.limits
     scene = gains[0].own.case.scene
     rates_khz = [rate / 1e3 for rate in gains[0].rates_hz]
-    title = f"{scene.name}: what rate buys, and which part of the device ends it (grey: linear loop without friction)"
+    title = (
+        f"{scene.name}: what rate buys, and which part of the device ends it\n"
+        "grey: the linear loop without friction; open, at the left: at the scene's own rates of estimator and force"
+    )
     picture = new_figure(5.6, title)
     axes = picture.subplots()
     scenes = [gain.own.case.scene for gain in gains]
@@ -40,7 +42,7 @@ def draw(rates: Rates) -> Figure:
     axes.set_yticks([10, 20, 50, 100, 200, 500, 1000], ["10", "20", "50", "100", "200", "500", "1000"])
     axes.set_xlim(0.8 * OWN * rates_khz[0], 1.1 * rates_khz[-1])
     axes.set_ylim(10, TOP_KN_PER_M)
-    axes.set_xlabel("rate of estimator and force (kHz); open, at the left: the scene's own rates, estimator/force")
+    axes.set_xlabel("rate of estimator and force (kHz)")
     axes.set_ylabel("largest stable stiffness K of the map (kN/m)")
     leaving = []
     for style, (left, limit) in zip(STYLES, limits.items(), strict=True):
@@ -49,18 +51,10 @@ def draw(rates: Rates) -> Figure:
         if values[-1] < TOP_KN_PER_M:
             ends.append((f"linear: {left}", values[-1], THEORY))
         else:
-            leaving.append((f"linear: {left} (leaves the picture)", list(zip(rates_khz, values, strict=True))))
+            leaving.append((f"linear: {left}\n(leaves the picture)", list(zip(rates_khz, values, strict=True)), THEORY))
     label_right(axes, ends)
-    _name_those_that_leave(axes, leaving)
+    inside = [list(zip(rates_khz, [k / 1e3 for k in gain.largest_n_per_m], strict=True)) for gain in gains]
+    inside += [list(zip(rates_khz, [k / 1e3 for k in limit], strict=True)) for limit in limits.values()]
+    named = [points for _, points, _ in leaving]
+    label_points(axes, leaving, lines=[line for line in inside if line not in named])
     return picture
-
-
-def _name_those_that_leave(axes: Axes, leaving: list[tuple[str, list[tuple[float, float]]]]) -> None:
-    """Name the lines that leave the panel at the top, at the first of their points that is beyond."""
-    labels = []
-    for name, points in leaving:
-        inside = [point for point in points if point[1] < TOP_KN_PER_M]
-        beyond = next(point for point in points if point[1] >= TOP_KN_PER_M)
-        labels.append((name, inside[-1:] or [beyond], THEORY))
-    lines = [list(zip(*line.get_data(), strict=True)) for line in axes.lines if len(line.get_xdata()) > 1]
-    label_points(axes, labels, lines=lines)

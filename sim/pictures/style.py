@@ -12,8 +12,10 @@ from pathlib import Path
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..jobs.whole_file import whole_file
 
@@ -126,6 +128,13 @@ def name_above(axes: Axes, columns: int = 2) -> None:
         handlelength=1.4,
         columnspacing=1.2,
     )
+
+
+def plain_decades(axis: Axis) -> None:
+    """Give a logarithmic axis whole numbers as its ticks, in place of powers of ten."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def length_text(length_m: float) -> str:

@@ -3,14 +3,19 @@
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..studies.shortcuts import SCATTER
 from ..studies.trade import HIT, MAP, Point, Question, Trade
 from ..walls import methods
 from .labels import label_points
-from .style import COLOURS, LABEL_PT, THEORY, new_figure, page
+from .style import COLOURS, LABEL_PT, THEORY, new_figure, page, plain_decades
 
 NAMED = 8
 """At most so many settings of a panel have their names."""
 BEST, PLAIN = COLOURS["butterworth"], "0.55"
+NOTES = (
+    "blue, on the line: no setting is both faster and more right; those without a name are in the command's table\n"
+    "grey band: so much is chance, for a handle that is 0.1 % heavier or lighter changes as much"
+)
 QUESTIONS = {
     HIT: ("time of a hit (ms)", "verdicts that differ (%)", "is a wall stable? {walls} walls around the edge"),
     MAP: ("time of the maps of all estimators, in one process (s)", "largest error of K (%)", "where is the edge?"),
@@ -28,10 +33,10 @@ def _picture(trade: Trade, question: Question) -> Figure:
     time, error, asked = QUESTIONS[question]
     controller, grid = trade.scene.controller, trade.scene.zwidth
     title = (
-        f"{trade.scene.name}: what a faster simulation of a {question.name} gets wrong (samples at "
-        f"{controller.sample_hz / 1e3:g} kHz, force at {controller.actuation_hz / 1e3:g} kHz;\n"
+        f"What a faster simulation of a {question.name} gets wrong\n{trade.scene.name}: samples at "
+        f"{controller.sample_hz / 1e3:g} kHz, force at {controller.actuation_hz / 1e3:g} kHz; "
         f"B of {grid.damping_from_n_s_per_m:g} to {grid.damping_to_n_s_per_m:g} N s/m, K by "
-        f"{grid.stiffness_step_n_per_m / 1e3:g} kN/m). Line: none faster is as right. Without a name: see the table"
+        f"{grid.stiffness_step_n_per_m / 1e3:g} kN/m"
     )
     picture = new_figure(0.9 + 3.2 * len(trade.walls), title)
     panels = picture.subplots(len(trade.walls), sharex=True, squeeze=False)[:, 0]
@@ -42,6 +47,7 @@ def _picture(trade: Trade, question: Question) -> Figure:
         _draw(axes, trade, question, label)
     panels[-1].set_xlabel(time)
     picture.align_ylabels(panels)
+    picture.supxlabel(NOTES, x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)
     for axes, label in zip(panels, trade.walls, strict=True):
         _name(axes, trade, question, label)
     return picture
@@ -60,12 +66,11 @@ def _shown(trade: Trade, question: Question) -> list[Point]:
 def named(trade: Trade, question: Question, label: str) -> list[Point]:
     """Return the points of a panel that have their names, at most `NAMED`.
 
-    They are the best, the reference, and of each axis of shortcuts the boldest, which comes first in it.
+    They are the reference, the best, the slowest, and of each axis of shortcuts the boldest, which comes first in it.
     """
-    best = trade.best(question, label)
-    chosen = [best[-1], best[0], trade.points[0], *best]
-    shown = _shown(trade, question)
-    chosen += {point.shortcut.axis: point for point in reversed(shown) if point not in best}.values()
+    best, shown = trade.best(question, label), _shown(trade, question)
+    chosen = [trade.points[0], best[0], best[-1], max(shown, key=question.cost_s), *best]
+    chosen += {point.shortcut.axis: point for point in reversed(shown) if point.shortcut.axis != SCATTER}.values()
     distinct = [point for number, point in enumerate(chosen) if point not in chosen[:number]]
     return distinct[:NAMED]
 
@@ -81,22 +86,17 @@ def _draw(axes: Axes, trade: Trade, question: Question, label: str) -> None:
         colour = BEST if point in best else PLAIN
         axes.plot(*_spot(point, question, label), ls="", marker="o", ms=5, color=colour)
     axes.set_xscale("log")
+    plain_decades(axes.xaxis)
     most = max(_spot(point, question, label)[1] for point in shown)
     axes.set_ylim(-0.12 * most - 0.5, 1.2 * most + 1)
     axes.margins(x=0.1)
 
 
 def _name(axes: Axes, trade: Trade, question: Question, label: str) -> None:
-    """Write the names of a panel's points beside them, and of the scatter's band."""
-    best = trade.best(question, label)
-    spots = {point.shortcut.label: _spot(point, question, label) for point in _shown(trade, question)}
+    """Write the names of a panel's points beside them."""
+    best, names = trade.best(question, label), named(trade, question, label)
     labels = [
-        (point.shortcut.label, spots[point.shortcut.label], BEST if point in best else "0.25")
-        for point in named(trade, question, label)
+        (point.shortcut.label, _spot(point, question, label), BEST if point in best else "0.25") for point in names
     ]
-    line = [_spot(point, question, label) for point in best]
-    label_points(axes, labels, avoid=list(spots.values()), lines=[line])
-    scatter = trade.scatter(question, label) * 100
-    mark = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "ha": "right", "va": "top"}
-    text = "no less can be told: a handle 0.1 % heavier or lighter does as much"
-    axes.annotate(text, (1.0, scatter), (-3, -2), color=THEORY, fontsize=LABEL_PT, style="italic", **mark)
+    others = [_spot(point, question, label) for point in _shown(trade, question) if point not in names]
+    label_points(axes, labels, avoid=others, lines=[[_spot(point, question, label) for point in best]])
