@@ -72,7 +72,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("hardwall.sim.studies.drop.at_rest", at_rest)
     monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", verdict)
     picture = tmp_path / "drop.svg"
-    code, out, _ = call(monkeypatch, capsys, "drop", "--workers", 1, "--json", "--plot", picture)
+    code, out, err = call(monkeypatch, capsys, "drop", "--workers", 1, "--json", "--plot", picture)
     assert code == 0
     report = json.loads(out)
     measured = {(each["method"], each["factor"], each["value"]): each["measured_n_s_per_m"] for each in report["laws"]}
@@ -98,15 +98,17 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     assert adjusted["area_n2_s_per_m2"] == pytest.approx((78 - 6) * 40e3 + 24 * 20e3)
     assert kalman["of_papers_best"] == pytest.approx((198 - 6 + 12) / (78 - 6 + 12))
     assert kalman["before_the_end"] == 1.0
-    text = picture.read_text()
-    wanted = (
-        "damping B of the wall (N s/m)",
-        "measured = predicted",
-        "threshold, 3 µm",
-        "Kalman: ",
-        "stable up to here",
-    )
-    assert [label for label in wanted if label not in text] == []
+    wanted = {
+        "rest": ("damping B of the wall (N s/m)", "shaken, by more than 3 µm"),
+        "law": ("measured = predicted", "Coulomb friction"),
+        "ends": ("stiffness K of the wall (kN/m)", "stable up to here"),
+        "maps": ("largest stable stiffness K (kN/m)", "Kalman: "),
+    }
+    for name, labels in wanted.items():
+        path = tmp_path / f"drop-{name}.svg"
+        assert f"picture: {path}" in err.replace("\n", "")
+        text = path.read_text()
+        assert [label for label in labels if label not in text] == []
     monkeypatch.setattr("hardwall.sim.studies.drop.strike", None)
     monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
     code, out, _ = call(monkeypatch, capsys, "drop", "--workers", 1, "--resume")

@@ -157,8 +157,8 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         "sufficient for convergence",
         "proposed",
         "adjusted",
-        "in place at rest",
-        "area (kN/m N s/m)",
+        "stable walls that are in place",
+        "area of the stable region (MN/m N s/m)",
         "seed-2011",
     )
     assert [label for label in wanted if label not in text] == []

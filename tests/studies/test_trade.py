@@ -210,15 +210,13 @@ def test_the_command_prints_and_draws_real_hits(monkeypatch, capsys, tmp_path):
     assert report["settings"][0]["stiffness_error"] == {"fdm-500": {"median": 0.0, "largest": 0.0}}
     assert all(row["hit_s"] > 0 and row["map_hits"] > 0 for row in report["settings"])
     assert any(row["best_for_maps"] for row in report["settings"])
-    text = picture.read_text()
-    wanted = (
-        "steps of 100 us",
-        "time of a hit (ms)",
-        "verdicts that differ (%)",
-        "error of K at the edge",
-        "FDM + 500 Hz",
-    )
-    assert [words for words in wanted if words not in text] == []
+    wanted = {
+        "hit": ("steps of 100 us", "time of a hit (ms)", "verdicts that differ (%)", "FDM + 500 Hz"),
+        "map": ("steps of 100 us", "in one process (s)", "largest error of K (%)", "FDM + 500 Hz"),
+    }
+    for name, labels in wanted.items():
+        text = (tmp_path / f"trade-{name}.svg").read_text()
+        assert [label for label in labels if label not in text] == []
     monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
     code, out, _ = call(monkeypatch, capsys, *order, "--resume")
     assert code == 0

@@ -150,7 +150,13 @@ def test_report_and_picture(monkeypatch, capsys, tmp_path, map_of_one_process):
     assert report["maps"] == expected
     assert report["hits"] == sum(each["hits"] for each in report["maps"])
     text = picture.read_text()
-    wanted = ("damping B of the wall (N s/m)", "largest stable stiffness K (kN/m)", "FDM + 100 Hz", "linear loop")
+    wanted = (
+        "damping B of the wall (N s/m)",
+        "largest stable stiffness K (kN/m)",
+        "FDM + 100 Hz",
+        "linear loop",
+        "passive walls",
+    )
     assert [label for label in wanted if label not in text] == []
     code, out, _ = call(monkeypatch, capsys, "zwidth", *SET, *names, "--resume")
     assert code == 0
