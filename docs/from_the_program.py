@@ -95,7 +95,7 @@ def _options(command, context) -> list[str]:
         if choices:
             name = name.replace(choices[0], "CHOICE")
             text, bracket, default = meaning.partition(" [")
-            meaning = f"{text}: {', '.join(choices[1].split('|'))}{bracket}{default}"
+            meaning = f"{text.rstrip()}: {', '.join(choices[1].split('|'))}{bracket}{default}"
         rows.append([code(name), cell(meaning)])
     return table(["argument or option", "meaning"], rows)
 
