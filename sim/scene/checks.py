@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from ...model import quadrature
+from ...model.quadrature_speed import max_edge_rate
 
 SAMPLES_MAX = 10**9
 """Of a run's settling or measuring: a minute or two of the model's time, hours of the RTL's."""
@@ -63,7 +63,7 @@ def _check_axis(scene) -> None:
         raise ValueError(_key_of(str(error), scene.controller.estimator, controller)) from None
 
     error_counts = max(map(abs, scene.encoder.offsets))
-    fastest = spec.count_m * quadrature.max_edge_rate(spec.clock_hz, scene.controller.glitch_clocks, error_counts)
+    fastest = spec.count_m * max_edge_rate(spec.clock_hz, scene.controller.glitch_clocks, error_counts)
     if spec.speed_max_m_per_s > fastest:
         raise ValueError(
             f"controller.speed_max_m_per_s must be at most {fastest:g}, the decoder's limit at this clock, count size, "
