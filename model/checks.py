@@ -9,6 +9,17 @@ LARGEST = (1 << 62) - 1
 """Largest magnitude of a count or a clock: sums of two fit int64."""
 
 
+class FieldError(ValueError):
+    """A value that cannot be: the message begins with the name of its field, which is also an attribute."""
+
+    def __init__(self, field: str, message: str):
+        super().__init__(field, message)
+        self.field, self.message = field, message
+
+    def __str__(self) -> str:
+        return f"{self.field} {self.message}"
+
+
 def check_int(name: str, value: int, least: int, most: int | None = None) -> None:
     """Raise TypeError unless `value` is an int, ValueError unless it is `least` to `most` (None: no end)."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):

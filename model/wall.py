@@ -20,6 +20,7 @@ Together: fixed point differs from the exact equation on the same words by at mo
 from typing import TYPE_CHECKING, NamedTuple
 
 from .arithmetic.fixed import SQ, UQ, saturate, shift_floor, shift_round_half_up, wrap
+from .checks import FieldError
 from .compiled import by_type, compiled
 from .words import Word, gain_format
 
@@ -88,7 +89,7 @@ class Design:
             if bits > 61:
                 value = getattr(axis, name)
                 least = value * 2.0 ** (bits - 61)
-                raise ValueError(f"{name} must be at least {least:g} beside the other gain's largest, not {value!r}")
+                raise FieldError(name, f"must be at least {least:g} beside the other gain's largest, not {value!r}")
         self.words = (
             Word("wall_stiffness", self.stiffness, r / q, "N/m", 0, "spring of the wall"),
             Word("wall_damping", self.damping, r * tau / q, "N s/m", 0, "damper of the wall"),

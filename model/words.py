@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from .arithmetic.fixed import UQ, Format, bits_for
-from .checks import check_number
+from .checks import FieldError, check_number
 
 GAIN_BITS = 16
 """Bits of a gain word: the part of a multiplier's operand that iCE40UP (16 x 16) and ECP5 (18 x 18) both have."""
@@ -39,7 +39,7 @@ class Word:
 
     def __post_init__(self):
         if not self.format.min <= self.reset <= self.format.max:
-            raise ValueError(f"{self.name} must fit {self.format}, not {self.reset!r}")
+            raise FieldError(self.name, f"must fit {self.format}, not {self.reset!r}")
 
     @property
     def si_min(self) -> float:
@@ -67,4 +67,4 @@ class Word:
             return self.format.from_real(value / self.si_per_unit)
         except ValueError:
             unit = f" {self.unit}" if self.unit else ""
-            raise ValueError(f"{self.name} must be {self.si_min:g} to {self.si_max:g}{unit}, not {value!r}") from None
+            raise FieldError(self.name, f"must be {self.si_min:g} to {self.si_max:g}{unit}, not {value!r}") from None

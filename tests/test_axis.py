@@ -8,7 +8,7 @@ from cocotb.triggers import RisingEdge, Timer, ValueChange
 from hardwall.hdl.axis import Axis
 from hardwall.model import axis, quadrature
 from hardwall.model.spec import AxisSpec
-from hardwall.testing.bench import SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from stimuli.specs import ADJUSTED, MHZ, spec
 
 PINS = (

@@ -10,7 +10,7 @@ from hardwall.hdl.board import PULSES, TELEMETRY, Board
 from hardwall.hdl.frame import BYTE
 from hardwall.model import output, quadrature, wall
 from hardwall.model.estimators.estimate import estimate
-from hardwall.testing.bench import SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from stimuli.specs import spec
 
 HALF = 3

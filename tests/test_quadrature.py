@@ -20,7 +20,7 @@ from hardwall.model import quadrature as model
 from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.compiled import compiled
 from hardwall.model.quadrature import START, Params, State, advance, run, step
-from hardwall.testing.bench import SAMPLES, SEED, Bench, Packing, Record, check, parameters, ports_of, rng, simulate
+from hardwall.testing import SAMPLES, SEED, Bench, Packing, Record, check, parameters, ports_of, rng, simulate
 
 INPUTS = ("a", "b", "z", "glitch_clocks", "invert", "preload", "preload_count", "arm", "clear")
 OUTPUTS = (*State._fields[: model.N_OUTPUTS], "fault")

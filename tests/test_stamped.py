@@ -5,7 +5,7 @@ import pytest
 
 from hardwall.model import axis, quadrature, stamped
 from hardwall.model.axis import Axis
-from hardwall.testing.bench import rng
+from hardwall.testing import rng
 from stimuli.specs import spec
 
 SPEC = spec("mhz", "fdm")

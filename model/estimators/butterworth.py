@@ -51,6 +51,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..arithmetic.fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
+from ..checks import FieldError
 from ..compiled import compiled
 from ..words import GAIN_BITS, Word
 from .estimate import EstimatorDesign, EstimatorGains, estimate
@@ -208,7 +209,7 @@ class Design(EstimatorDesign):
     def _check(self, cutoff_hz: float):
         low, high = self.cutoff_min_hz, self.cutoff_max_hz
         if not low * (1 - 1e-9) <= cutoff_hz <= high * (1 + 1e-9):
-            raise ValueError(f"cutoff_hz must be {low:g} to {high:g} at these rates, not {cutoff_hz!r}")
+            raise FieldError("cutoff_hz", f"must be {low:g} to {high:g} at these rates, not {cutoff_hz!r}")
 
     def words_for(self, cutoff_hz: float) -> dict[str, float]:
         """Return the three words, by name, as numbers for `Axis`; the fixed-point axis rounds them.

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from ..arithmetic.fixed import SQ
+from ..checks import FieldError
 from ..compiled import by_type
 from ..words import Word
 
@@ -30,7 +31,7 @@ class EstimatorGains(ABC):
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
             if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
+                raise FieldError(name, f"must be finite and more than 0, not {value!r}")
 
     @classmethod
     @abstractmethod

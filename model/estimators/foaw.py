@@ -51,6 +51,7 @@ import numpy as np
 from ..arithmetic.fixed import SQ, UQ
 from ..arithmetic.signed_divide import divide
 from ..arithmetic.signed_divide import latency as divide_latency
+from ..checks import FieldError
 from ..compiled import compiled
 from ..words import Word
 from . import history
@@ -89,9 +90,9 @@ class Gains(EstimatorGains):
         band, window = self.band_counts, self.window_s
         most = BAND.to_real(BAND.max)
         if not (isinstance(band, int | float) and 0 <= band <= most):
-            raise ValueError(f"band_counts must be 0 to {most:g}, not {band!r}")
+            raise FieldError("band_counts", f"must be 0 to {most:g}, not {band!r}")
         if not (isinstance(window, int | float) and math.isfinite(window) and window > 0):
-            raise ValueError(f"window_s must be finite and more than 0, not {window!r}")
+            raise FieldError("window_s", f"must be finite and more than 0, not {window!r}")
 
     @classmethod
     def default(cls, axis: "AxisSpec") -> "Gains":

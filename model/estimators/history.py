@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
+from ..checks import FieldError
 from ..compiled import compiled
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ class Design:
         # Rounded to whole steps, a window may grow by half, or to the one step that it has at least.
         most = 2.0 ** (WIDTH_MAX - 1 - self.change.i) / axis.sample_hz
         if not 0 < window_s <= most:
-            raise ValueError(f"window_s must be more than 0 and at most {most:g} at these rates, not {window_s!r}")
+            raise FieldError("window_s", f"must be more than 0 and at most {most:g} at these rates, not {window_s!r}")
         samples = steps * max(1, round(window_s * axis.sample_hz / steps))
         for shift in range(WIDTH_MAX):
             self.every = 1 << shift

@@ -58,6 +58,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..arithmetic.fixed import SQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
+from ..checks import FieldError
 from ..compiled import compiled
 from ..words import GAIN_BITS, Word, gain_format
 from .estimate import EstimatorDesign, EstimatorGains, estimate
@@ -197,9 +198,9 @@ class Design(EstimatorDesign):
         )
         if room < 0:
             least = gains.acceleration_rms_m_per_s2 * 2.0 ** (-3 * room)
-            raise ValueError(
-                f"acceleration_rms_m_per_s2 must be at least {least:g} at these rates, "
-                f"not {gains.acceleration_rms_m_per_s2!r}"
+            raise FieldError(
+                "acceleration_rms_m_per_s2",
+                f"must be at least {least:g} at these rates, not {gains.acceleration_rms_m_per_s2!r}",
             )
         root = math.sqrt(axis.acceleration_max_m_per_s2 / axis.count_m) / axis.sample_hz
         f = axis.shrunk(min(max(RESOLUTION_BITS - math.floor(math.log2(root)), 0), room))

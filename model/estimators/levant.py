@@ -46,6 +46,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..arithmetic.fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from ..arithmetic.sqrt import isqrt
 from ..arithmetic.sqrt import latency as sqrt_latency
+from ..checks import FieldError
 from ..compiled import compiled
 from ..words import GAIN_BITS, Word
 from .estimate import EstimatorDesign, EstimatorGains, estimate
@@ -252,7 +253,7 @@ def _check(value: float, name: str, low: float, high: float, scaled: float) -> N
     """Raise ValueError, in the units of `value`, unless `scaled` (the gain per sample) is within `low` to `high`."""
     if not low <= scaled <= high:
         unit = value / scaled
-        raise ValueError(f"{name} must be {low * unit:g} to {high * unit:g} at these rates, not {value!r}")
+        raise FieldError(name, f"must be {low * unit:g} to {high * unit:g} at these rates, not {value!r}")
 
 
 @compiled

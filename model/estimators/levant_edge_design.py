@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..arithmetic.divide import latency as divide_latency
 from ..arithmetic.fixed import SQ, UQ, bits_for, shift_floor
 from ..arithmetic.sqrt import latency as sqrt_latency
+from ..checks import FieldError
 from ..quadrature import Seen
 from ..words import GAIN_BITS, Word
 from .estimate import EstimatorDesign, EstimatorGains
@@ -157,7 +158,7 @@ class Design(EstimatorDesign):
         super().__init__(axis, gains)
         self.clocks = axis.clocks_per_sample
         if 4 * self.clocks > 1 << axis.stamp_width:
-            raise ValueError(f"sample_hz must be 4 or more for stamps that last a second, not {axis.sample_hz!r}")
+            raise FieldError("sample_hz", f"must be 4 or more for stamps that last a second, not {axis.sample_hz!r}")
         self._derive_times(axis)
         self._derive_motion(axis)
         self._derive_places(axis)
@@ -286,6 +287,6 @@ def _gain(name: str, value: float, scaled: float) -> UQ:
     """Return the format of a gain of `value` SI and `scaled` in counts, samples and clocks."""
     if not 2.0**-60 <= scaled <= 2.0**20:
         unit = value / scaled
-        raise ValueError(f"{name} must be {2.0**-60 * unit:g} to {2.0**20 * unit:g} at these rates, not {value!r}")
+        raise FieldError(name, f"must be {2.0**-60 * unit:g} to {2.0**20 * unit:g} at these rates, not {value!r}")
     i = HEADROOM_BITS + bits_for(scaled)
     return UQ(i, GAIN_BITS - i)

@@ -48,6 +48,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..arithmetic.divide import divide
 from ..arithmetic.divide import latency as divide_latency
 from ..arithmetic.fixed import SQ, bits_for
+from ..checks import FieldError
 from ..compiled import compiled
 from ..quadrature import Seen
 from . import cycle_times
@@ -107,9 +108,9 @@ def check_stamps(axis) -> None:
     """Raise ValueError if the samples of an axis are too long for its stamps to tell edges."""
     longest = 1 << min(axis.stamp_width - 2, DIVIDEND_BITS - axis.stamp_width)
     if axis.clocks_per_sample > longest:
-        raise ValueError(
-            f"sample_hz must be at least {axis.clock_hz / longest:g} at clock_hz {axis.clock_hz}, "
-            f"not {axis.sample_hz!r}"
+        raise FieldError(
+            "sample_hz",
+            f"must be at least {axis.clock_hz / longest:g} at clock_hz {axis.clock_hz}, not {axis.sample_hz!r}",
         )
 
 
@@ -127,7 +128,7 @@ def velocity_format(axis, least_fraction: int = 0) -> SQ:
     i, f = 1 + max(1, bits_for(2 * speed)), max(bits_for(0.5 / half_lsb), least_fraction)
     if i + f > 62:
         most = 2.0 ** (60 - f) * axis.velocity_unit_m_per_s
-        raise ValueError(f"speed_max_m_per_s must be at most {most:g}, not {axis.speed_max_m_per_s!r}")
+        raise FieldError("speed_max_m_per_s", f"must be at most {most:g}, not {axis.speed_max_m_per_s!r}")
     return SQ(i, axis.shrunk(f))
 
 

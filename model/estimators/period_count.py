@@ -41,6 +41,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..arithmetic.divide import divide
 from ..arithmetic.divide import latency as divide_latency
 from ..arithmetic.fixed import UQ, bits_for, saturate, wrap
+from ..checks import FieldError
 from ..compiled import compiled
 from ..quadrature import Seen
 from ..words import Word
@@ -139,15 +140,15 @@ class Design(EstimatorDesign):
         tau, most = 1 / axis.sample_hz, _window_bits_max(axis)
         self.window_bits = round(math.log2(gains.window_s / tau))
         if not 0 <= self.window_bits <= most:
-            raise ValueError(f"window_s must be {tau:g} to {tau * 2**most:g} at these rates, not {gains.window_s!r}")
+            raise FieldError("window_s", f"must be {tau:g} to {tau * 2**most:g} at these rates, not {gains.window_s!r}")
         self.clocks = axis.clocks_per_sample
         self.velocity = velocity_format(axis, self.window_bits)
         fmt = UQ(axis.count_width - 1, 0)
         unit = axis.velocity_unit_m_per_s / 2**self.window_bits
         if not SWITCH_MIN <= round(gains.switch_m_per_s / unit) <= fmt.max:
-            raise ValueError(
-                f"switch_m_per_s must be {SWITCH_MIN * unit:g} to {fmt.max * unit:g} with this window, "
-                f"not {gains.switch_m_per_s!r}"
+            raise FieldError(
+                "switch_m_per_s",
+                f"must be {SWITCH_MIN * unit:g} to {fmt.max * unit:g} with this window, not {gains.switch_m_per_s!r}",
             )
         self.switch = Word(
             "period_count_switch",

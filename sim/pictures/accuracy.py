@@ -1,6 +1,5 @@
-"""Pictures of accuracy: the founding paper's two figures, and error against rate."""
+"""Pictures of accuracy: estimates of a motion over time, the founding paper's Figure 1, and error against rate."""
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -9,121 +8,126 @@ from ..estimates import signals
 from ..estimates.accuracy import axis_spec, exact_velocity
 from ..estimates.figures import lower_bound_m_per_s, window_floor_m_per_s
 from ..estimates.playback import velocities
-from ..walls.methods import Curve, label
+from ..studies.accuracy import Accuracy
+from ..walls.methods import Curve
 from ..world.encoder import offsets
-from .style import MARKERS
+from .labels import label_right
+from .style import LABEL_PT, MARK, THEORY, TRUTH, looks, name_above, new_figure, page
 
-REACHING_S = (0.0, 0.06)
-TURNING_S = (1.2, 1.28)
+PIECES = {"from the start": (0.0, 0.06), "where it turns": (1.2, 1.28)}
+"""Pieces of Figure 1 that are enlarged, s."""
 LEAST_MM_S = 1e-6
 """What is less is drawn as this: an axis of decades has no zero."""
 
 
-def figure_1(curves: list[Curve], rows: list[dict]) -> Figure:
-    """Return the paper's first figure: estimates of a decaying sine over time, and two pieces of it enlarged.
+@page
+def draw(accuracy: Accuracy) -> Figure:
+    """Return the founding paper's first figure, if that is what was measured; else the error against the rate."""
+    if accuracy.figure == 1:
+        return _figure_1(accuracy.curves, accuracy.rows)
+    return _against_rate(accuracy.rows, accuracy.labels)
+
+
+def _figure_1(curves: list[Curve], rows: list[dict]) -> Figure:
+    """Return the paper's first figure: estimates of a decaying sine over time, their error, and pieces enlarged.
 
     Args:
         curves: what to draw.
         rows: of `accuracy.measure`, one for each: at which rate, on which backend, with which gains and encoder.
     """
     signal, backend, sample_hz = signals.load("paper"), rows[0]["backend"], rows[0]["sample_hz"]
-    picture = Figure(figsize=(10, 7), layout="constrained")
-    panels = picture.subplot_mosaic("aa;bc", height_ratios=(1, 1.2))
+    title = f"50 exp(-t) sin(2πt) mm, counts of 1 µm at {sample_hz / 1e3:g} kHz, {backend}"
+    picture = new_figure(7.0, title)
+    panels = picture.subplot_mosaic("aa;ee;bc", height_ratios=(1.1, 1, 1.2))
     times = np.arange(int(signal.seconds * sample_hz)) / sample_hz
-    exact = exact_velocity(signal.motion, times)
-    for index, (curve, row) in enumerate(zip(curves, rows, strict=True)):
+    exact = exact_velocity(signal.motion, times) * 1e3
+    drawn = [panels["a"], panels["b"], panels["c"]]
+    for axes in drawn:
+        axes.plot(times, exact, label="exact derivative", **TRUTH)
+    styles = looks([(curve.estimator, curve.output) for curve in curves])
+    for index, (curve, row, style) in enumerate(zip(curves, rows, styles, strict=True)):
         spec = axis_spec(row["estimator"], sample_hz, row["acceleration_max_mm_s2"] / 1e3, row["gains"])
         parts = velocities(signal, spec, row["output"], backend, offsets(row["encoder_phase_error_counts"]))
-        estimate = np.concatenate([part for _, part, _ in parts])
-        for axes in panels.values():
-            # The first on top: what chatters hides what lags.
-            axes.plot(times, estimate * 1e3, lw=0.9, label=curve.label, zorder=3 - index / len(curves))
+        estimate = np.concatenate([part for _, part, _ in parts]) * 1e3
+        # The first on top: what chatters hides what lags.
+        line = {"color": style["color"], "lw": 0.9, "zorder": 3 - index / len(curves)}
+        for axes in drawn:
+            axes.plot(times, estimate, label=curve.label, **line)
+        panels["e"].plot(times, estimate - exact, label=f"{curve.label}: RMS {row['rms_mm_s']:.3g} mm/s", **line)
+        # An estimate begins far off: the error is framed from where it counts.
+    judged = times >= signal.judged_from_s
+    _frame(panels["e"], [line.get_ydata()[judged] for line in panels["e"].lines])
     for axes in panels.values():
-        axes.plot(times, exact * 1e3, color="black", lw=0.9, label="exact derivative", zorder=4)
         axes.set_xlabel("time (s)")
-        axes.set_ylabel("velocity (mm/s)")
-        axes.grid(alpha=0.3)
-    panels["a"].set_title(f"50 exp(-t) sin(2πt) mm, counts of 1 µm at {sample_hz / 1e3:g} kHz, {backend}")
-    panels["a"].legend(fontsize=8)
-    panels["a"].margins(x=0)
-    for name, (begin, end), title in (("b", REACHING_S, "from the start"), ("c", TURNING_S, "where it turns")):
-        inside = (times >= begin) & (times <= end)
-        low, high = exact[inside].min() * 1e3, exact[inside].max() * 1e3
-        panels[name].set_xlim(begin, end)
-        panels[name].set_title(title)
-        panels[name].set_ylim(low - 3, high + 3)
+        axes.set_ylabel("error (mm/s)" if axes is panels["e"] else "velocity (mm/s)")
+    for name in ("a", "e"):
+        name_above(panels[name], columns=3)
+        panels[name].set_xlim(0, signal.seconds)
+    panels["e"].axvline(signal.judged_from_s, color=MARK, lw=0.9, ls="--")
+    panels["e"].annotate(
+        "judged from here", (signal.judged_from_s, 0.97), (3, 0), xycoords=("data", "axes fraction"), va="top",
+        textcoords="offset points", color=MARK, fontsize=LABEL_PT,
+    )  # fmt: skip
+    for axes, (title, (begin, end)) in zip((panels["b"], panels["c"]), PIECES.items(), strict=True):
+        inside = exact[(times >= begin) & (times <= end)]
+        axes.set_title(title, fontsize=LABEL_PT)
+        axes.set_xlim(begin, end)
+        axes.set_ylim(inside.min() - 3, inside.max() + 3)
     panels["b"].set_ylim(0, 400)
     return picture
 
 
-def against_rate(rows: list[dict], labels: list[str]) -> Figure:
+def _frame(axes: Axes, curves: list[np.ndarray]) -> None:
+    """Frame a panel by these curves, alike on both sides of zero."""
+    largest = 1.1 * max(float(np.abs(curve).max()) for curve in curves)
+    axes.set_ylim(-largest, largest)
+    axes.axhline(0, color="black", lw=0.6)
+
+
+def _against_rate(rows: list[dict], labels: list[str]) -> Figure:
     """Return the picture of the RMS error against the sample rate, a curve for each label.
 
     Args:
         rows: of `accuracy.measure`, all of one signal.
         labels: what each row is called.
     """
-    picture = Figure(figsize=(10, 8), layout="constrained")
-    axes = picture.subplots()
-    names = list(dict.fromkeys(labels))
-    colours = mpl.colormaps["tab20"].colors
-    for index, name in enumerate(names):
-        points = [
-            (row["sample_hz"], max(row["rms_mm_s"], LEAST_MM_S))
-            for row, of in zip(rows, labels, strict=True)
-            if of == name
-        ]
-        style = {"color": colours[index % 20], "marker": MARKERS[index % len(MARKERS)], "ms": 4, "lw": 1.3}
-        axes.plot(*zip(*sorted(points), strict=True), label=name, **style)
-    _bounds(axes, rows)
     first = rows[0]
     phase = first["encoder_phase_error_counts"]
     encoder = f", encoder out of phase by {phase:g} counts" if phase else ""
-    axes.set_title(f"signal {first['signal']}, counts of 1 µm, {first['backend']}{encoder}")
+    title = f"RMS error on the signal {first['signal']}, counts of 1 µm, {first['backend']}{encoder}"
+    picture = new_figure(6.0, title)
+    axes = picture.subplots()
+    curves = {label: (row["estimator"], row["output"]) for row, label in zip(rows, labels, strict=True)}
+    ends = []
+    for (name, _), style in zip(curves.items(), looks(list(curves.values())), strict=True):
+        points = [
+            (row["sample_hz"], max(row["rms_mm_s"], LEAST_MM_S))
+            for row, label in zip(rows, labels, strict=True)
+            if label == name
+        ]
+        points.sort()
+        axes.plot(*zip(*points, strict=True), **style)
+        ends.append((name, points[-1][1], style["color"]))
     axes.set_xscale("log")
     axes.set_yscale("log")
+    ends += _bounds(axes, rows)
     axes.set_xlabel("sample rate (Hz)")
     axes.set_ylabel("RMS error (mm/s)")
-    axes.grid(alpha=0.3, which="both")
-    axes.legend(fontsize=7.5, ncols=1, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes.margins(x=0.02)
+    axes.set_ylim(*axes.get_ylim())
+    label_right(axes, ends)
     return picture
 
 
-def _bounds(axes: Axes, rows: list[dict]) -> None:
-    """Draw the two lines of theory."""
+def _bounds(axes: Axes, rows: list[dict]) -> list[tuple[str, float, str]]:
+    """Draw the two lines of theory; return their labels."""
     signal = signals.load(rows[0]["signal"])
     rates = sorted({row["sample_hz"] for row in rows})
     bound = lower_bound_m_per_s(signal.acceleration_max_m_per_s2) * 1e3
     floor = [window_floor_m_per_s(signal, rate) * 1e3 for rate in rates]
-    axes.axhline(bound, color="black", ls="--", lw=1, label=f"2√(Cε) = {bound:.3g}: no smaller largest error is sure")
-    axes.plot(rates, floor, color="black", ls=":", lw=1.3, label="difference over 2√(ε/C): RMS by its formula")
-
-
-def what_a_bit_buys(rows: list[dict]) -> Figure:
-    """Return the picture of error against the velocity's width, and against logic, a curve for each estimator's output.
-
-    Args:
-        rows: of `bits.bit`.
-    """
-    picture = Figure(figsize=(12, 6), layout="constrained")
-    by_width, by_logic = picture.subplots(1, 2, sharey=True)
-    names = list(dict.fromkeys((row["estimator"], row["output"]) for row in rows))
-    colours = mpl.colormaps["tab20"].colors
-    for index, (estimator, output) in enumerate(names):
-        own = [row for row in rows if (row["estimator"], row["output"]) == (estimator, output)]
-        errors = [row["rms_mm_s"] for row in own]
-        style = {"color": colours[index % 20], "marker": MARKERS[index % len(MARKERS)], "ms": 4, "lw": 1.2}
-        by_width.plot([row["velocity_bits"] for row in own], errors, label=label(estimator, output), **style)
-        by_logic.plot([row["lut4"] for row in own], errors, **style)
-        # The widths that follow from the spec.
-        for axes, key in ((by_width, "velocity_bits"), (by_logic, "lut4")):
-            axes.plot(own[0][key], errors[0], marker="o", ms=9, mfc="none", mec=style["color"])
-    by_width.set_xlabel("bits of the velocity")
-    by_logic.set_xlabel("LUT4 of the estimator alone (ECP5)")
-    by_width.set_ylabel("RMS error (mm/s)")
-    by_width.set_yscale("log")
-    for axes in (by_width, by_logic):
-        axes.grid(alpha=0.3, which="both")
-    picture.suptitle(f"the paper's signal at {rows[0]['sample_hz'] / 1e6:g} MHz; circles: the derived widths")
-    picture.legend(loc="outside right center", fontsize=8)
-    return picture
+    axes.axhline(bound, color=THEORY, ls="--", lw=1)
+    axes.plot(rates, floor, color=THEORY, ls=":", lw=1.3)
+    return [
+        (f"2√(Cε) = {bound:.3g}: no smaller\nlargest error is sure", bound, THEORY),
+        ("difference over 2√(ε/C):\nRMS by its formula", floor[-1], THEORY),
+    ]

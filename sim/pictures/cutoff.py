@@ -1,56 +1,72 @@
 """The picture of the area of the stable region against the filter's cutoff."""
 
-from collections.abc import Sequence
-
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from ..studies.cutoff import LEVEL, PAPERS_HZ, Device
+from ..studies.cutoff import LEVEL, PAPERS_HZ, Cutoffs, Device
+from .labels import label_points
+from .style import COLOURS, LABEL_PT, THEORY, new_figure, page
 
-COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")
 TICKS_HZ = (30, 50, 100, 200, 500, 1000, 2000, 4000)
+FILTERED, UNFILTERED = COLOURS["butterworth"], COLOURS["fdm"]
 
 
-def plot_cutoff(devices: Sequence[Device], backend: str) -> Figure:
-    """Return the picture: a panel a device, over one axis of cutoffs.
-
-    Args:
-        devices: what was found.
-        backend: that the maps were made on.
-    """
-    picture = Figure(figsize=(10, 1 + 3 * len(devices)), layout="constrained")
+@page
+def draw(cutoffs: Cutoffs) -> Figure:
+    """Return the picture: a panel a device, over one axis of cutoffs."""
+    devices = cutoffs.devices
+    title = "Area of the stable region of walls (K, B) behind a finite difference and a filter"
+    picture = new_figure(0.9 + 2.2 * len(devices), title)
     panels = picture.subplots(len(devices), sharex=True, squeeze=False)[:, 0]
-    for index, (axes, device) in enumerate(zip(panels, devices, strict=True)):
-        _draw(axes, device, COLOURS[index % len(COLOURS)])
+    for axes, device in zip(panels, devices, strict=True):
+        _draw(axes, device)
     panels[-1].set_xscale("log")
     panels[-1].set_xticks(TICKS_HZ, [f"{each}" for each in TICKS_HZ])
     panels[-1].xaxis.set_minor_formatter(NullFormatter())
     panels[-1].set_xlabel("cutoff of the second-order Butterworth filter (Hz); dotted: the founding paper's")
-    picture.suptitle(f"Area of the stable region of walls (K, B): finite difference and filter, {backend}")
+    picture.align_ylabels(panels)
+    for axes, device in zip(panels, devices, strict=True):
+        _label(axes, device)
     return picture
 
 
-def _draw(axes: Axes, device: Device, colour: str) -> None:
+def _areas(device: Device) -> dict[float, float]:
+    """Return the areas by cutoff, in thousands of kN/m N s/m."""
+    return {cutoff_hz: each.area / 1e6 for cutoff_hz, each in device.maps.items()}
+
+
+def _draw(axes: Axes, device: Device) -> None:
     """Draw one device's areas."""
-    areas = {cutoff_hz: each.area / 1e3 for cutoff_hz, each in device.maps.items()}
+    areas, unfiltered = _areas(device), device.unfiltered.area / 1e6
     for cutoff_hz in PAPERS_HZ:
-        axes.axvline(cutoff_hz, color="0.4", ls=":", lw=1)
-    axes.plot(list(areas), list(areas.values()), color=colour, marker="o", ms=4, lw=1.4)
+        axes.axvline(cutoff_hz, color=THEORY, ls=":", lw=0.9)
+    axes.axvspan(*device.level_hz, color=FILTERED, alpha=0.15, lw=0)
+    axes.axhline(unfiltered, color=UNFILTERED, ls="--", lw=1.1)
+    axes.plot(list(areas), list(areas.values()), color=FILTERED, marker="o", ms=3.5)
     if leaving := [cutoff_hz for cutoff_hz, each in device.maps.items() if each.leaves]:
-        style = {"ls": "", "marker": "^", "ms": 8, "mfc": "none", "color": colour}
-        axes.plot(leaving, [areas[each] for each in leaving], label="and more: the region leaves the map", **style)
-    best = f"best: {device.best_hz:.0f} Hz, {areas[device.best_hz]:.0f}" + ", at the end" * device.at_end
-    axes.plot(device.best_hz, areas[device.best_hz], ls="", marker="*", ms=15, color=colour, mec="black", label=best)
-    low, high = device.level_hz
-    axes.axvspan(low, high, color=colour, alpha=0.12, label=f"within {LEVEL:.0%} of that: {low:.0f} to {high:.0f} Hz")
-    unfiltered = device.unfiltered.area / 1e3
-    axes.axhline(unfiltered, color="black", ls="--", lw=1, label=f"no filter: {unfiltered:.0f}")
-    axes.set_title(_settings(device), fontsize=9)
-    axes.set_ylabel("area (kN/m N s/m)")
-    axes.set_ylim(0, 1.1 * max(*areas.values(), unfiltered, 1e-3))
-    axes.grid(alpha=0.3, axis="y")
-    axes.legend(fontsize=8, loc="best")
+        style = {"ls": "", "marker": "^", "ms": 7, "mfc": "none", "color": FILTERED}
+        axes.plot(leaving, [areas[each] for each in leaving], **style)
+    axes.plot(device.best_hz, areas[device.best_hz], ls="", marker="*", ms=13, color=FILTERED, mec="black")
+    axes.set_title(_settings(device), fontsize=LABEL_PT)
+    axes.set_ylabel("area\n(MN/m N s/m)")
+    axes.set_ylim(0, 1.15 * max(*areas.values(), unfiltered, 1e-6))
+
+
+def _label(axes: Axes, device: Device) -> None:
+    """Name the best cutoff, what is as good, the area without a filter, and what leaves the map."""
+    areas, (low, high) = _areas(device), device.level_hz
+    unfiltered = device.unfiltered.area / 1e6
+    best = f"best: {device.best_hz:.0f} Hz, {areas[device.best_hz]:.3g}" + ", at the end" * device.at_end
+    best += f"\nwithin {LEVEL * 100:g} % of that: {low:.0f} to {high:.0f} Hz"
+    left = axes.get_xlim()[0]
+    labels = [
+        (best, (device.best_hz, areas[device.best_hz]), FILTERED),
+        (f"no filter: {unfiltered:.3g}", (1.25 * left, unfiltered), UNFILTERED),
+    ]
+    if leaving := [cutoff_hz for cutoff_hz, each in device.maps.items() if each.leaves]:
+        labels.append(("and more: the region leaves the map", (leaving[0], areas[leaving[0]]), FILTERED))
+    label_points(axes, labels, lines=[list(areas.items()), [(left, unfiltered), (axes.get_xlim()[1], unfiltered)]])
 
 
 def _settings(device: Device) -> str:
@@ -60,6 +76,6 @@ def _settings(device: Device) -> str:
     return (
         f"{device.scene.name}: {handle.mass_kg:g} kg, {friction} dry friction, counts of "
         f"{device.scene.encoder.count_m * 1e6:g} µm, samples at {controller.sample_hz / 1e3:g} kHz, force at "
-        f"{controller.actuation_hz / 1e3:g} kHz; steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, "
+        f"{controller.actuation_hz / 1e3:g} kHz;\nsteps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, "
         f"{grid.damping_step_n_s_per_m:g} N s/m"
     )

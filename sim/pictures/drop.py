@@ -1,146 +1,202 @@
-"""The picture of why a stable region ends in a drop."""
+"""Pictures of why a stable region ends in a drop, one of each experiment."""
 
 import math
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..studies.drop import PAPERS, STIFFNESS_N_PER_M, Drop
-from ..walls.case import grid_of
-from .style import MARKERS
+from ..studies.drop import PAPERS, STARTS, STIFFNESSES_N_PER_M
+from ..studies.drop_result import STIFFNESS_N_PER_M, Drop, Law
+from ..walls.grid import grid_of
+from .labels import label_points
+from .style import AT_REST_M, COLOURS, THEORY, ink, length_text, looks, new_figure, page, plain_decades
 
-LEAST_M = 1e-9
-"""What is less is drawn as this: an axis of decades has no zero."""
-FLED_M = 0.1
-"""A handle that fled the encoder is drawn here."""
-STABLE = {"color": "0.4", "marker": "o", "ls": "", "mfc": "none"}
-RESTS = {"color": "0.4", "marker": "x", "ls": ""}
 OUTSIDE = ("mass", "count", "delay", "stiffness")
 """What was changed that is not in the law."""
+FACTORS = "osDv^<>Pp*h"
+"""A marker for each thing that was changed."""
 
 
-def plot_drop(found: Drop, backend: str) -> Figure:
-    """Return the picture: on the left what shakes a handle at rest, on the right the law, and the maps.
+@page
+def draw(drop: Drop) -> dict[str, Figure]:
+    """Return the pictures: `rest`, `law`, `ends` and `maps`."""
+    return {"rest": _rest(drop), "law": _law(drop), "ends": _ends(drop), "maps": _maps(drop)}
 
-    Args:
-        found: what `drop.study` gave.
-        backend: that it was made on.
-    """
-    picture = Figure(figsize=(14, 11), layout="constrained")
-    (position, law), (ends, maps) = picture.subplots(2, 2)
-    colours = {name: mpl.colormaps["tab10"](index) for index, name in enumerate(found.chatters)}
-    _draw_shaken(position, found, colours)
-    _draw_ends(ends, found, colours)
-    _draw_laws(law, found, colours)
-    _draw_maps(maps, found, colours)
-    controller = found.scene.controller
-    picture.suptitle(
-        f"{found.scene.name}, {backend}: estimators at {controller.sample_hz / 1e3:g} kHz, force at "
-        f"{controller.actuation_hz / 1e3:g} kHz; Coulomb friction {found.scene.handle.coulomb_n:g} N, "
-        f"push {found.scene.protocol.push_n:g} N"
+
+def _styles(drop: Drop) -> dict[str, dict]:
+    """Return the line style of each method, by name."""
+    scenes = {name: each.case.scene.controller for name, each in drop.maps.items()}
+    styles = looks([(one.estimator, one.output) for one in scenes.values()])
+    return dict(zip(scenes, styles, strict=True))
+
+
+def _inks(drop: Drop) -> dict[str, str]:
+    """Return the colour in which each method is written, by name."""
+    return {name: ink(each.case.scene.controller.estimator) for name, each in drop.maps.items()}
+
+
+def _setting(drop: Drop) -> str:
+    controller, handle = drop.scene.controller, drop.scene.handle
+    return (
+        f"{drop.scene.name}: samples at {controller.sample_hz / 1e3:g} kHz, force at "
+        f"{controller.actuation_hz / 1e3:g} kHz, friction {handle.coulomb_n:g} N, push {drop.scene.protocol.push_n:g} N"
     )
-    picture.legend(*maps.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=9)
+
+
+def _predicted(drop: Drop) -> dict[str, float]:
+    """Return up to which B the handle is predicted to rest, by method; infinite without end."""
+    return {each.method: each.predicted_n_s_per_m for each in drop.laws if each.factor == "none"}
+
+
+def _rest(drop: Drop) -> Figure:
+    """Return the picture of the hits of one wall: a row a method, B along it, and what became of each hit."""
+    title = (
+        f"What is quiet at rest lets the handle rest in walls of more damping; K = {STIFFNESS_N_PER_M / 1e3:g} kN/m, "
+        f"two hits each\n{_setting(drop)}"
+    )
+    picture = new_figure(4.5, title)
+    axes = picture.subplots()
+    threshold_m = drop.scene.protocol.threshold_mm * 1e-3
+    kinds = {
+        "at rest": {"marker": "o", "mfc": "white", "mec": "0.5", "ms": 5},
+        f"shaken, by less than {length_text(threshold_m)}: stable": {"marker": "o", "color": COLOURS["levant-edge"]},
+        f"shaken, by more than {length_text(threshold_m)}: unstable": {"marker": "X", "color": COLOURS["levant"]},
+    }
+    rows, inks, predicted = list(drop.maps), _inks(drop), _predicted(drop)
+    for kind, style in zip(range(len(kinds)), kinds.values(), strict=True):
+        spots = []
+        for row, name in enumerate(rows):
+            # The two hits of a wall stand one over the other.
+            hits = [each for each in drop.shaken if each.method == name]
+            for number, each in enumerate(hits):
+                if _kind(each.rms_m, threshold_m) == kind:
+                    spots.append((each.damping_n_s_per_m, row + (0.17 if number % 2 else -0.17)))
+        axes.plot(*np.array(spots).reshape(-1, 2).T, ls="", **{"ms": 5.5} | style)
+    for row, name in enumerate(rows):
+        end = predicted.get(name, math.inf)
+        if end < math.inf:
+            axes.plot([end, end], [row - 0.42, row + 0.42], color="black", lw=2)
+    axes.set_xscale("log")
+    plain_decades(axes.xaxis)
+    axes.set_yticks(range(len(rows)), [drop.maps[name].case.label for name in rows])
+    for text, name in zip(axes.get_yticklabels(), rows, strict=True):
+        text.set_color(inks[name])
+    axes.set_ylim(len(rows) - 0.4, -0.6)
+    axes.grid(visible=False, axis="y")
+    axes.set_xlabel("damping B of the wall (N s/m)")
+    for name, style in kinds.items():
+        axes.plot([], [], ls="", label=name, **{"ms": 5.5} | style)
+    axes.plot([], [], ls="", marker="|", ms=9, mew=2, color="black", label="predicted: rests up to here")
+    axes.legend(loc="lower left", bbox_to_anchor=(-0.35, 1.0), ncols=2, frameon=False, borderaxespad=0.2)
     return picture
 
 
-def _draw_shaken(axes: Axes, found: Drop, colours: dict) -> None:
-    for index, (name, colour) in enumerate(colours.items()):
-        own = [each for each in found.shaken if each.method == name]
-        # The first on top: what is at rest lies on one line.
-        style = {"color": colour, "marker": MARKERS[index], "ls": "", "ms": 6, "alpha": 0.8, "zorder": 3 - index / 10}
-        moved = [FLED_M if each.rms_m is None else max(each.rms_m, LEAST_M) for each in own]
-        axes.plot([each.damping_n_s_per_m for each in own], np.array(moved) * 1e6, **style)
-    threshold = found.scene.protocol.threshold_mm * 1e3
-    axes.axhline(threshold, color="black", lw=1, ls="--", label=f"threshold, {threshold:g} µm")
-    _draw_predicted(axes, found, colours)
-    axes.set_title(f"after the settling mark, K = {STIFFNESS_N_PER_M / 1e3:g} kN/m, two hits each")
-    axes.set_ylabel(f"RMS of position (µm; {LEAST_M * 1e6:g}: at rest)")
-    axes.set_xlabel("damping B of the wall (N s/m)")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.grid(alpha=0.3, which="both")
-    axes.legend(fontsize=8, loc="upper left")
+def _kind(rms_m: float | None, threshold_m: float) -> int:
+    """Return whether a handle was at rest (0), was shaken by less than the threshold (1), or by more, or fled (2)."""
+    if rms_m is None or rms_m >= threshold_m:
+        return 2
+    return int(rms_m >= AT_REST_M)
 
 
-def _draw_predicted(axes: Axes, found: Drop, colours: dict) -> None:
-    for each in found.laws:
-        if each.factor == "none" and each.predicted_n_s_per_m < math.inf:
-            axes.axvline(each.predicted_n_s_per_m, color=colours[each.method], lw=1.2, ls=":")
-    axes.plot([], [], color="0.4", ls=":", lw=1.2, label="predicted to rest up to here (same colour)")
+def _finite(law: Law) -> bool:
+    return law.predicted_n_s_per_m < math.inf and 0 < law.measured_n_s_per_m < math.inf
 
 
-def _draw_ends(axes: Axes, found: Drop, colours: dict) -> None:
-    for size, name in zip((13, 9), PAPERS, strict=True):
-        edges = found.maps[name].edges
-        upper = [edge.stable_n_per_m / 1e3 for edge in edges]
-        axes.plot([edge.damping_n_s_per_m for edge in edges], upper, color=colours[name], lw=1)
-        own = [each for each in found.ends if each.method == name]
+def _law(drop: Drop) -> Figure:
+    """Return the picture of the law: measured against predicted, one thing changed at a time, a panel a method."""
+    title = (
+        "Up to which B the handle comes to rest, one thing changed at a time: predicted from the estimator alone,\n"
+        f"measured in the closed loop\n{_setting(drop)}"
+    )
+    picture = new_figure(4.9, title)
+    panels = picture.subplots(1, len(PAPERS), sharex=True, sharey=True)
+    known = [each for each in drop.laws if each.method in PAPERS and _finite(each)]
+    factors = list(dict.fromkeys(each.factor for each in known))
+    ends = [value for each in known for value in (each.predicted_n_s_per_m, each.measured_n_s_per_m)] or [1.0, 2.0]
+    line = np.array([min(ends) / 1.5, max(ends) * 1.5])
+    for axes, name in zip(panels, PAPERS, strict=True):
+        axes.fill_between(line, line / 2, line * 2, color="0.92", lw=0)
+        axes.plot(line, line, color="black", lw=1)
+        for each in (each for each in known if each.method == name):
+            inside = each.factor not in OUTSIDE
+            colour = "black" if each.factor == "none" else COLOURS["levant"] if inside else COLOURS["butterworth"]
+            style = {"marker": FACTORS[factors.index(each.factor)], "color": colour, "ms": 6 + 3 * (not inside)}
+            axes.plot(
+                each.predicted_n_s_per_m, each.measured_n_s_per_m, mfc=colour if inside else "none", ls="", **style
+            )
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_xlim(*line)
+        axes.set_ylim(*line)
+        plain_decades(axes.xaxis)
+        plain_decades(axes.yaxis)
+        axes.set_title(drop.maps[name].case.label)
+        axes.set_xlabel("predicted: B (N s/m)")
+    panels[0].set_ylabel("measured: B (N s/m)")
+    for index, factor in enumerate(factors):
+        inside = factor not in OUTSIDE
+        colour = "black" if factor == "none" else COLOURS["levant"] if inside else COLOURS["butterworth"]
+        text = "as it is" if factor == "none" else factor if inside else f"{factor} (not in the law)"
+        style = {"marker": FACTORS[index], "color": colour, "mfc": colour if inside else "none", "ms": 6}
+        panels[0].plot([], [], ls="", label=text, **style)
+    panels[0].plot([], [], color="black", lw=1, label="measured = predicted")
+    panels[0].fill_between([], [], [], color="0.92", label="within a factor of 2")
+    picture.legend(loc="outside lower center", ncols=4, frameon=False)
+    return picture
+
+
+def _ends(drop: Drop) -> Figure:
+    """Return the picture of where rest ends, and where stability does, from soft walls to stiff ones."""
+    title = (
+        f"In soft walls rest and stability end long before the edge of the map, which is that of stiff ones\n"
+        f"(three of four of {STARTS} hits at K of {', '.join(f'{k / 1e3:g}' for k in STIFFNESSES_N_PER_M)} kN/m)"
+    )
+    picture = new_figure(4.9, title)
+    panels = picture.subplots(1, len(PAPERS), sharex=True, sharey=True)
+    inks, predicted = _inks(drop), _predicted(drop)
+    for axes, name in zip(panels, PAPERS, strict=True):
+        edges = drop.maps[name].edges
+        upper = [(edge.damping_n_s_per_m, edge.stable_n_per_m / 1e3) for edge in edges]
+        axes.plot(*zip(*upper, strict=True), color=inks[name])
+        own = [each for each in drop.ends if each.method == name]
         stable = [(each.stable_n_s_per_m, each.stiffness_n_per_m / 1e3) for each in own if each.stable_n_s_per_m]
         rests = [(each.rests_n_s_per_m, each.stiffness_n_per_m / 1e3) for each in own if each.rests_n_s_per_m]
-        for ends, style in ((stable, STABLE), (rests, RESTS)):
-            axes.plot(*np.array(ends).reshape(-1, 2).T, **style | {"color": colours[name], "ms": size})
-    axes.plot([], [], color="0.4", lw=1, label="upper edge of the map")
-    axes.plot([], [], **STABLE, label="stable up to here")
-    axes.plot([], [], **RESTS, label="comes to rest up to here")
-    _draw_predicted(axes, found, colours)
-    axes.set_title("where three of four hits still come to rest, and where they are still stable")
-    axes.set_xlabel("damping B of the wall (N s/m)")
-    axes.set_ylabel("stiffness K of the wall (kN/m)")
+        for ends, style in ((stable, {"marker": "o", "mfc": "none", "ms": 9}), (rests, {"marker": "x", "ms": 6})):
+            axes.plot(*np.array(ends).reshape(-1, 2).T, color="black", ls="", **style)
+        axes.set_title(drop.maps[name].case.label)
+        axes.set_xlabel("damping B of the wall (N s/m)")
+        if predicted.get(name, math.inf) < math.inf:
+            axes.axvline(predicted[name], color=THEORY, lw=1, ls=":")
     axes.set_xlim(0, None)
-    axes.set_ylim(0, 1.3 * axes.get_ylim()[1])
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, loc="upper left", ncols=2)
+    axes.set_ylim(0, 1.1 * axes.get_ylim()[1])
+    panels[0].set_ylabel("stiffness K of the wall (kN/m)")
+    panels[0].plot([], [], color=inks[PAPERS[0]], label="upper edge of the map")
+    panels[0].plot([], [], color=THEORY, ls=":", label="predicted: rests up to here")
+    panels[0].plot([], [], color="black", ls="", marker="x", ms=6, label="comes to rest up to here")
+    panels[0].plot([], [], color="black", ls="", marker="o", mfc="none", ms=9, label="stable up to here")
+    picture.legend(loc="outside lower center", ncols=2, frameon=False)
+    return picture
 
 
-def _draw_laws(axes: Axes, found: Drop, colours: dict) -> None:
-    known = [each for each in found.laws if each.method in PAPERS and _finite(each)]
-    factors = list(dict.fromkeys(each.factor for each in known))
-    for each in known:
-        inside = each.factor not in OUTSIDE
-        axes.plot(
-            each.predicted_n_s_per_m,
-            each.measured_n_s_per_m,
-            marker=MARKERS[factors.index(each.factor)],
-            color=colours[each.method],
-            mfc=colours[each.method] if inside else "none",
-            ms=7,
-            ls="",
-        )
-    for index, factor in enumerate(factors):
-        text = "as it is" if factor == "none" else factor
-        axes.plot([], [], marker=MARKERS[index], color="0.4", ls="", label=text)
-    for name in PAPERS:
-        axes.plot([], [], color=colours[name], lw=4, label=found.maps[name].case.label)
-    axes.plot([], [], marker="o", mfc="none", color="0.4", ls="", label="open: not in the law")
-    ends = [value for each in known for value in (each.predicted_n_s_per_m, each.measured_n_s_per_m)] or [1.0, 2.0]
-    line = np.array([min(ends), max(ends)])
-    axes.plot(line, line, color="black", lw=1, label="measured = predicted")
-    axes.fill_between(line, line / 2, line * 2, color="0.5", alpha=0.12, lw=0, label="within a factor of 2")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_title("up to which B three of four hits come to rest, one thing changed at a time")
-    axes.set_xlabel("predicted from the estimator alone, B (N s/m)")
-    axes.set_ylabel("measured in the closed loop, B (N s/m)")
-    axes.grid(alpha=0.3, which="both")
-    axes.legend(fontsize=8, loc="upper left", ncols=2)
-
-
-def _finite(each) -> bool:
-    return each.predicted_n_s_per_m < math.inf and 0 < each.measured_n_s_per_m < math.inf
-
-
-def _draw_maps(axes: Axes, found: Drop, colours: dict) -> None:
-    for index, (name, each) in enumerate(found.maps.items()):
+def _maps(drop: Drop) -> Figure:
+    """Return the picture of the stable region of each method."""
+    grid = grid_of(next(iter(drop.maps.values())).case.scene)
+    title = (
+        f"The stable region of each method, its area as a multiple of the paper's best\n{drop.scene.name}, "
+        f"maps in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, {grid.damping_step_n_s_per_m:.3g} N s/m"
+    )
+    picture = new_figure(5.0, title)
+    axes = picture.subplots()
+    styles, inks, labels = _styles(drop), _inks(drop), []
+    for name, each in drop.maps.items():
         edge = [(edge.damping_n_s_per_m, edge.stable_n_per_m / 1e3) for edge in each.edges]
-        times = found.of_papers(name)
-        label = each.case.label if times is None else f"{each.case.label}: {times:.2f} of the paper's best"
-        axes.plot(*zip(*edge, strict=True), color=colours[name], marker=MARKERS[index], ms=4, lw=1.4, label=label)
-    grid = grid_of(next(iter(found.maps.values())).case.parsed)
-    axes.set_title(f"stable walls, in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m; areas below")
+        times = drop.of_papers(name)
+        text = each.case.label if times is None else f"{each.case.label}: {times:.2f}"
+        axes.plot(*zip(*edge, strict=True), **styles[name])
+        labels.append((text, edge, inks[name]))
     axes.set_xlabel("damping B of the wall (N s/m)")
     axes.set_ylabel("largest stable stiffness K (kN/m)")
     axes.set_xlim(0, None)
-    axes.set_ylim(0, None)
-    axes.grid(alpha=0.3)
+    axes.set_ylim(0, 1.08 * axes.get_ylim()[1])
+    label_points(axes, labels)
+    return picture

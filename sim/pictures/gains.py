@@ -8,71 +8,71 @@ from matplotlib.patheffects import withStroke
 
 from ..studies.gains import Search
 from ..studies.lipschitz import least_alpha_m_per_s2
+from .labels import label_points
+from .style import LABEL_PT, new_figure, page
 
-ROWS = {False: "stable", True: "stable, and in place at rest"}
-MARKS = {
-    "proposed": {"marker": "o", "ms": 9, "mfc": "none", "mec": "white", "mew": 2},
-    "adjusted": {"marker": "s", "ms": 9, "mfc": "none", "mec": "white", "mew": 2},
-    "best": {"marker": "*", "ms": 22, "mfc": "tab:red", "mec": "white"},
-    "best in place": {"marker": "D", "ms": 10, "mfc": "tab:orange", "mec": "black"},
-    "best within the condition": {"marker": "P", "ms": 7, "mfc": "white", "mec": "black"},
-}
-"""From the largest to the smallest, so that those of one pair are seen together."""
+ROWS = {False: "stable walls", True: "stable walls that are in place"}
+MARKS = {"proposed": "o", "adjusted": "s", "best": "*", "best in place": "D", "best within the condition": "P"}
+"""The gains that have a name; a pair with several names has the marker of the first."""
+OUTLINE = [withStroke(linewidth=2, foreground="black")]
 
 
-def plot_gains(search: Search, backend: str) -> Figure:
-    """Return the picture: a column an output; above the paper's area, below that of the walls in place.
-
-    Args:
-        search: what was found.
-        backend: that the maps were made on.
-    """
-    picture = Figure(figsize=(12, 10.5), layout="constrained")
+@page
+def draw(search: Search) -> Figure:
+    """Return the picture: a column an output; above the paper's area, below that of the walls in place."""
+    controller, grid = search.scene.controller, search.coarse_grid
+    title = (
+        f"Levant's gains on {search.scene.name}: samples at {controller.sample_hz / 1e3:g} kHz, force at "
+        f"{controller.actuation_hz / 1e3:g} kHz; maps in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, "
+        f"{grid.damping_step_n_s_per_m:g} N s/m"
+    )
+    picture = new_figure(6.8, title)
     panels = picture.subplots(len(ROWS), len(search.maps), sharex=True, sharey=True)
     colours = mpl.colormaps["viridis"].with_extremes(bad="0.8")
     # The areas in place are parts of these.
-    largest = max(np.nanmax(search.areas(output, in_place=False)) for output in search.maps) / 1e3 or 1.0
+    largest = max(np.nanmax(search.areas(output, in_place=False)) for output in search.maps) / 1e6 or 1.0
     for row, (in_place, text) in zip(panels, ROWS.items(), strict=True):
         for axes, output in zip(row, search.maps, strict=True):
-            area = search.areas(output, in_place) / 1e3
+            area = search.areas(output, in_place) / 1e6
             mesh = axes.pcolormesh(search.lambdas, search.alphas, area, cmap=colours, vmin=0, vmax=largest)
-            _mark(axes, search, output)
-            axes.set_title(f"output {output}: walls that are {text}", fontsize=10)
-    picture.colorbar(mesh, ax=panels, label="area (kN/m N s/m)", aspect=40)
+            axes.grid(visible=False)
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.set_title(f"output {output}: {text}")
+    picture.colorbar(mesh, ax=panels, label="area of the stable region (MN/m N s/m)", aspect=40, pad=0.02)
     for axes in panels[-1]:
         axes.set_xlabel(r"$\lambda$ (m$^{1/2}$/s)")
     for axes in panels[:, 0]:
         axes.set_ylabel(r"$\alpha$ (m/s²)")
-    controller, grid = search.scene.controller, search.coarse_grid
-    picture.suptitle(
-        f"Levant's gains on {search.scene.name}, {backend}: estimator at {controller.sample_hz / 1e3:g} kHz, force at "
-        f"{controller.actuation_hz / 1e3:g} kHz; steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, "
-        f"{grid.damping_step_n_s_per_m:g} N s/m"
-    )
-    picture.legend(
-        *panels[0, 0].get_legend_handles_labels(),
-        loc="outside lower center",
-        ncols=3,
-        fontsize=10,
-        facecolor="0.55",
-        labelcolor="white",
-        borderpad=0.8,
-    )
+    for row in panels:
+        for axes, output in zip(row, search.maps, strict=True):
+            _mark(axes, search, output)
     return picture
 
 
 def _mark(axes: Axes, search: Search, output: str) -> None:
-    """Draw the sufficient condition's boundary, and the gains that have a name."""
+    """Draw the sufficient condition's boundary, and the gains that have a name, all with their names."""
     bound = search.bound_m_per_s2
-    lambdas = np.geomspace(search.lambdas[0], search.lambdas[-1], 2000)
+    lambdas = np.geomspace(search.lambdas[0], search.lambdas[-1], 500)
     least = np.array([least_alpha_m_per_s2(each, bound) or np.nan for each in lambdas])
     least[least > search.alphas[-1]] = np.nan
-    label = f"sufficient for convergence above it, C = {bound:g} m/s²"
-    axes.plot(
-        lambdas, least, color="white", lw=2, label=label, path_effects=[withStroke(linewidth=4, foreground="black")]
-    )
-    for name, mark in MARKS.items():
+    axes.plot(lambdas, least, color="white", lw=1.5, path_effects=OUTLINE)
+    curve = [(lam, alpha) for lam, alpha in zip(lambdas, least, strict=True) if np.isfinite(alpha)]
+    named: dict[tuple[float, float], list[str]] = {}
+    for name in MARKS:
         if pick := search.picks[output].get(name):
-            axes.plot(pick.gains.lambda_sqrt_m_per_s, pick.gains.alpha_m_per_s2, ls="", label=name, **mark)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+            named.setdefault((pick.gains.lambda_sqrt_m_per_s, pick.gains.alpha_m_per_s2), []).append(name)
+    for point, names in named.items():
+        axes.plot(*point, ls="", marker=MARKS[names[0]], ms=8, mfc="white", mec="black")
+    labels = [(_together(names), point, "white") for point, names in named.items()]
+    if curve:
+        text = f"above and right of it,\nsufficient for convergence\n(C = {bound:g} m/s²)"
+        labels.append((text, curve[len(curve) // 3 :: 10], "white"))
+    for written in label_points(axes, labels, lines=[curve] if curve else []):
+        written.set(path_effects=OUTLINE, fontsize=LABEL_PT)
+
+
+def _together(names: list[str]) -> str:
+    """Return the names of one pair as a label, a line each: `best, in place, within the condition`."""
+    first, *others = names
+    return ",\n".join([first, *(other.removeprefix("best ") if first == "best" else other for other in others)])

@@ -1,53 +1,48 @@
-"""Pictures of a hit."""
+"""The picture of a hit: position, velocity, the estimate's error and the force, of the whole run and of the contact."""
 
-from pathlib import Path
-
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..loop.record import Trace
 from ..walls.hit import Hit
-from .style import save
+from .style import FORCE, LABEL_PT, MARK, THEORY, TRUTH, WALL, length_text, looks, name_above, new_figure, page
 
-ESTIMATE, TRUE, BASELINE, FORCE = "tab:blue", "black", "0.8", "tab:red"
+OFFSET = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "fontsize": LABEL_PT}
+UNITS = ("position (mm)", "velocity (m/s)", "error (mm/s)", "force (N)")
 
 
-def plot_hit(hit: Hit, path: Path) -> None:
-    """Draw position, velocities and force of a hit: the whole run on the left, its first contact on the right.
+@page
+def draw(hit: Hit) -> Figure:
+    """Return the picture of a hit with traces: the whole run on the left, its first contact on the right.
 
-    Beside the estimate stands the finite difference of counts without encoder errors, the baseline it is to beat.
-
-    Args:
-        hit: a run with traces.
-        path: ends in one of `picture.SUFFIXES`.
-
-    Raises:
-        OSError: if the file cannot be written.
+    Under the estimate stands its error, and beside that the error of the finite difference of counts without encoder
+    errors, the baseline that an estimator is to beat.
     """
-    with mpl.rc_context({"font.size": 9}):
-        figure = Figure(figsize=(11, 7.5), layout="constrained")
-        axes = figure.subplots(3, 2, sharex="col", width_ratios=(1, 1.25))
-        figure.suptitle(_title(hit))
-        whole, contact = hit.overview, hit.detail
-        settle = hit.scene.protocol.settle_s
-        _column(axes[:, 0], whole, whole.time_s, hit, zoomed=False)
-        axes[0, 0].axvline(settle, color="tab:green", lw=0.8, ls="--")
-        mark = {"xycoords": ("data", "axes fraction"), "rotation": 90, "ha": "right", "va": "bottom", "fontsize": 7}
-        axes[0, 0].annotate("measured from here", (settle, 0.04), color="tab:green", **mark)
-        axes[0, 0].set_title("whole run")
-        axes[2, 0].set_xlabel("time (s)")
-        if len(contact.time_s):
-            contact = _first_contact(contact)
-            _column(axes[:, 1], contact, (contact.time_s - hit.contact_s) * 1e3, hit, zoomed=True)
-            axes[0, 1].set_title(f"first contact, at {hit.contact_s:.4f} s")
-            axes[2, 1].set_xlabel("time after contact (ms)")
-        else:
-            for axis in axes[:, 1]:
-                axis.set_axis_off()
-            axes[0, 1].set_title("the handle never reached the wall")
-        save(figure, path)
+    figure = new_figure(7.5, _title(hit))
+    axes = figure.subplots(4, 2, sharex="col", width_ratios=(1, 1.25), height_ratios=(1, 1.2, 1, 1))
+    _column(axes[:, 0], hit.overview, hit.overview.time_s, hit, zoomed=False)
+    settle = hit.scene.protocol.settle_s
+    axes[0, 0].axvline(settle, color=MARK, lw=0.9, ls="--")
+    axes[0, 0].annotate(
+        "judged from here", (settle, 0.05), xycoords=("data", "axes fraction"), color=MARK, rotation=90, ha="right",
+        fontsize=LABEL_PT,
+    )  # fmt: skip
+    axes[0, 0].set_title("whole run")
+    axes[-1, 0].set_xlabel("time (s)")
+    for panel, unit in zip(axes[:, 0], UNITS, strict=True):
+        panel.set_ylabel(unit)
+    figure.align_ylabels(axes[:, 0])
+    if len(hit.detail.time_s):
+        contact = _first_contact(hit.detail)
+        _column(axes[:, 1], contact, (contact.time_s - hit.contact_s) * 1e3, hit, zoomed=True)
+        axes[0, 1].set_title(f"first contact, at {hit.contact_s:.4f} s")
+        axes[-1, 1].set_xlabel("time after contact (ms)")
+    else:
+        for panel in axes[:, 1]:
+            panel.set_axis_off()
+        axes[0, 1].set_title("the handle never reached the wall")
+    return figure
 
 
 def _first_contact(trace: Trace) -> Trace:
@@ -64,47 +59,58 @@ def _first_contact(trace: Trace) -> Trace:
 def _title(hit: Hit) -> str:
     scene, spec = hit.scene, hit.scene.spec
     verdict = "stable" if hit.stable else "unstable"
+    moves = length_text(hit.rms_m)
+    settled = moves if moves == "at rest" else f"RMS of position {moves}"
     return (
-        f"{scene.name}: {scene.controller.estimator} (output {scene.estimator_output}), {hit.backend} backend, "
-        f"{spec.sample_hz / 1e3:g} kHz sampling, {spec.actuation_hz / 1e3:g} kHz actuation\n"
-        f"wall {scene.wall.stiffness_n_per_m / 1e3:g} kN/m, {scene.wall.damping_n_s_per_m:g} N s/m: {verdict}, "
-        f"RMS {hit.rms_m * 1e3:.5f} mm (threshold {scene.protocol.threshold_mm:g} mm)"
+        f"{scene.name}: {scene.controller.estimator}, output {scene.estimator_output}, on {hit.backend}; samples at "
+        f"{spec.sample_hz / 1e3:g} kHz, force at {spec.actuation_hz / 1e3:g} kHz\n"
+        f"wall of {scene.wall.stiffness_n_per_m / 1e3:g} kN/m, {scene.wall.damping_n_s_per_m:g} N s/m: {verdict}; "
+        f"{settled} (the threshold is {length_text(scene.protocol.threshold_mm * 1e-3)})"
     )
 
 
 def _column(axes: np.ndarray, trace: Trace, time: np.ndarray, hit: Hit, zoomed: bool) -> None:
-    """Fill one column of three panels."""
-    position, velocity, force = axes
-    position.plot(time, trace.position_m * 1e3, color=TRUE, lw=1, label="handle")
+    """Fill one column of four panels; the names of lines are in the right one, which has room for them."""
+    position, velocity, error, force = axes
+    position.plot(time, trace.position_m * 1e3, color="black", lw=1)
     low, high = position.get_ylim()
-    position.axhspan(0, max(high, 0), color="tab:red", alpha=0.08, lw=0, label="wall")
+    position.axhspan(0, max(high, 0), color=WALL, alpha=0.12, lw=0)
     position.set_ylim(low, high)
-    position.set_ylabel("position (mm)")
+    if zoomed:
+        position.annotate("wall", (1, high), (-4, -4), color=WALL, va="top", ha="right", **OFFSET)
 
-    if zoomed and hit.scene.controller.estimator != "fdm":
-        q, rate = hit.scene.spec.count_m, hit.scene.spec.sample_hz
-        difference = np.diff(np.floor(trace.position_m / q)) * (q * rate)
-        velocity.plot(time[1:], difference, color=BASELINE, lw=0.6, label="finite difference of ideal counts", zorder=1)
     name = hit.scene.controller.estimator
-    velocity.plot(
-        time, trace.estimate_m_per_s, color=ESTIMATE, lw=0.8, label=f"estimate ({name} {hit.scene.estimator_output})"
-    )
-    velocity.plot(time, trace.velocity_m_per_s, color=TRUE, lw=1, label="true")
-    velocity.set_ylabel("velocity (m/s)")
-    _frame(velocity, trace.velocity_m_per_s, trace.estimate_m_per_s)
+    (style,) = looks([(name, "u")])
+    estimate, true = trace.estimate_m_per_s, trace.velocity_m_per_s
+    velocity.plot(time, true, **TRUTH, label="true")
+    velocity.plot(time, estimate, color=style["color"], lw=0.9, label=f"estimate ({name} {hit.scene.estimator_output})")
+    _frame(velocity, true, estimate)
 
-    force.plot(time, trace.force_n, color=FORCE, lw=0.8, drawstyle="steps-post", label=_drive_label(hit))
-    force.axhline(-hit.scene.protocol.push_n, color="0.5", lw=0.8, ls=":", label="balance of the motor's push")
-    force.set_ylabel("force (N)")
-    for axis in axes:
-        axis.grid(alpha=0.3)
-        axis.legend(loc="best", fontsize=7, framealpha=0.9)
+    wrong = (estimate - true) * 1e3
+    if zoomed and name != "fdm":
+        q, rate = hit.scene.spec.count_m, hit.scene.spec.sample_hz
+        baseline = (np.diff(np.floor(trace.position_m / q)) * (q * rate) - true[1:]) * 1e3
+        # The smaller of the two lies on top.
+        below = np.std(baseline) > np.std(wrong)
+        line = {"color": "0.6", "lw": 0.7, "zorder": 2.1 if below else 2.3}
+        error.plot(time[1:], baseline, label="plain difference", **line)
+    rms = hit.estimate_rms_m_per_s
+    label = "estimate" if rms is None else f"estimate: RMS {rms * 1e3:.3g} mm/s"
+    error.plot(time, wrong, color=style["color"], lw=0.9, label=label, zorder=2.2)
+    error.axhline(0, color="black", lw=0.6)
+    _frame(error, wrong)
+
+    force.plot(time, trace.force_n, color=FORCE, lw=0.9, drawstyle="steps-post", label=_drive_label(hit))
+    force.axhline(-hit.scene.protocol.push_n, color=THEORY, lw=0.9, ls=":", label="balance of the push")
+    if zoomed:
+        for panel in (velocity, error, force):
+            name_above(panel)
 
 
 def _drive_label(hit: Hit) -> str:
     if hit.scene.delay_samples:
-        return f"drive, wall on handle; it acts {hit.scene.amplifier.delay_s * 1e3:g} ms later"
-    return "drive, wall on handle"
+        return f"wall (acts {hit.scene.amplifier.delay_s * 1e3:g} ms later)"
+    return "wall"
 
 
 def _frame(axis: Axes, *curves: np.ndarray) -> None:

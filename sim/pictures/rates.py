@@ -2,45 +2,59 @@
 
 from matplotlib.figure import Figure
 
-from ..scene.schema import Scene
-from ..studies.rates import Gain
-from .style import line_style
+from ..studies.rates import Rates
+from .labels import label_points, label_right
+from .style import THEORY, ink, looks, new_figure, page
 
 STYLES = "-", "--", "-.", ":"
-OWN = 0.55
+OWN = 0.45
 """Where the stiffness at the scene's own rates stands, as a share of the lowest rate."""
+TOP_KN_PER_M = 1500.0
 
 
-def plot_rates(gains: list[Gain], limits: dict[str, list[float]], scene: Scene, backend: str) -> Figure:
-    """Return the picture.
-
-    Args:
-        gains: by method.
-        limits: of `rates.linear_limits`, at the same rates.
-        scene: named in the title.
-        backend: that the maps were made on.
-    """
+@page
+def draw(rates: Rates) -> Figure:
+    """Return the picture."""
+    gains, limits = rates.gains, rates.limits
+    scene = gains[0].own.case.scene
     rates_khz = [rate / 1e3 for rate in gains[0].rates_hz]
-    picture = Figure(figsize=(10, 7), layout="constrained")
+    title = (
+        f"{scene.name}: what rate buys, and which part of the device ends it\n"
+        "grey: the linear loop without friction; open, at the left: at the scene's own rates of estimator and force"
+    )
+    picture = new_figure(5.6, title)
     axes = picture.subplots()
-    for style, (left, limit) in zip(STYLES, limits.items(), strict=True):
-        axes.plot(rates_khz, [k / 1e3 for k in limit], color="0.55", ls=style, lw=1.2, label=f"linear loop, {left}")
-    for index, gain in enumerate(gains):
-        style = line_style(index, 6)
+    scenes = [gain.own.case.scene for gain in gains]
+    ends = []
+    for gain, own, style in zip(
+        gains, scenes, looks([(own.controller.estimator, own.estimator_output) for own in scenes]), strict=True
+    ):
         largest = [k / 1e3 for k in gain.largest_n_per_m]
-        axes.plot(rates_khz, largest, label=gain.label, lw=1.5, **style)
-        axes.plot(OWN * rates_khz[0], gain.own.largest_n_per_m / 1e3, mfc="none", ls="", **style)
+        axes.plot(rates_khz, largest, **style)
+        axes.plot(OWN * rates_khz[0], gain.own.largest_n_per_m / 1e3, **style | {"ls": "", "mfc": "white"})
+        ends.append((gain.label, largest[-1], ink(own.controller.estimator)))
     axes.set_xscale("log")
     axes.set_yscale("log")
-    own = scene.controller
-    label = f"own:\n{own.sample_hz / 1e3:g}/{own.actuation_hz / 1e3:g}"
-    axes.set_xticks([OWN * rates_khz[0], *rates_khz], [label, *(f"{rate:g}" for rate in rates_khz)], minor=False)
+    controller = scene.controller
+    label = f"its own,\n{controller.sample_hz / 1e3:g}/{controller.actuation_hz / 1e3:g}"
+    axes.set_xticks([OWN * rates_khz[0], *rates_khz], [label, *(f"{rate:g}" for rate in rates_khz)])
     axes.minorticks_off()
     axes.set_yticks([10, 20, 50, 100, 200, 500, 1000], ["10", "20", "50", "100", "200", "500", "1000"])
-    axes.set_ylim(10, 1500)
-    axes.set_xlabel("rate of estimator and force (kHz); open: the scene's own, estimator / force")
+    axes.set_xlim(0.8 * OWN * rates_khz[0], 1.1 * rates_khz[-1])
+    axes.set_ylim(10, TOP_KN_PER_M)
+    axes.set_xlabel("rate of estimator and force (kHz)")
     axes.set_ylabel("largest stable stiffness K of the map (kN/m)")
-    axes.set_title(f"{scene.name}, {backend}: what rate buys, and which part ends it")
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, ncols=2, loc="lower right")
+    leaving = []
+    for style, (left, limit) in zip(STYLES, limits.items(), strict=True):
+        values = [k / 1e3 for k in limit]
+        axes.plot(rates_khz, values, color=THEORY, ls=style, lw=1, zorder=1.5)
+        if values[-1] < TOP_KN_PER_M:
+            ends.append((f"linear: {left}", values[-1], THEORY))
+        else:
+            leaving.append((f"linear: {left}\n(leaves the picture)", list(zip(rates_khz, values, strict=True)), THEORY))
+    label_right(axes, ends)
+    inside = [list(zip(rates_khz, [k / 1e3 for k in gain.largest_n_per_m], strict=True)) for gain in gains]
+    inside += [list(zip(rates_khz, [k / 1e3 for k in limit], strict=True)) for limit in limits.values()]
+    named = [points for _, points, _ in leaving]
+    label_points(axes, leaving, lines=[line for line in inside if line not in named])
     return picture

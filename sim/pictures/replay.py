@@ -1,4 +1,4 @@
-"""A picture of a replay: the recorded counts, the velocities over the whole recording, and a piece of it enlarged."""
+"""The picture of a replay: counts and velocities over the recording, a piece of it enlarged, and the error there."""
 
 from pathlib import Path
 
@@ -6,67 +6,78 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..estimates.reference import judged_from
-from ..estimates.replay import Replay, ReplayError
-from .style import SUFFIXES, save
+from ..estimates.replay import Replay
+from .style import LABEL_PT, MARK, TRUTH, looks, name_above, new_figure, page
 
 DETAIL_S = 0.4
 BACKEND_NAMES = {"float": "float64", "fixed": "bit-accurate model", "rtl": "hardware, through its pins"}
-ESTIMATE, BASELINE, REFERENCE = "tab:blue", "0.75", "black"
 
 
-def figure(result: Replay) -> Figure:
-    """Return the picture."""
-    recording, count = result.recording, result.coarsen or 1
-    time_s = recording.time_s
-    fig = Figure(figsize=(9, 9), layout="constrained")
-    counts, whole, detail = fig.subplots(3, 1, height_ratios=(1, 1.5, 1.7))
-
-    counts.plot(time_s, recording.counts, color="black", linewidth=0.9, rasterized=True)
+@page
+def draw(result: Replay) -> Figure:
+    """Return the picture of a replay."""
+    recording, time_s = result.recording, result.recording.time_s
+    figure = new_figure(8.0, _title(result))
+    counts, whole, detail, error = panels = figure.subplots(4, 1, height_ratios=(1, 1.4, 1.4, 1.2))
+    counts.plot(time_s, recording.counts, color="black", lw=0.9, rasterized=True)
     counts.set_ylabel(f"{recording.column} (counts)")
-    name = result.estimator if result.estimator == "fdm" else f"{result.estimator}, output {result.output}"
-    seen = "" if count == 1 else f", seen {count} times coarser"
-    counts.set_title(
-        f"{Path(recording.file).name}: {recording.column} at {recording.rate_hz:g} Hz{seen}\n"
-        f"{name} ({BACKEND_NAMES[result.backend]})"
-    )
-
-    def rms(value: float | None) -> str:
-        return "" if value is None else f", RMS error {value:.0f} counts/s"
-
-    lines = [
-        ("finite difference" + rms(result.rms_fdm_counts_per_s), result.difference_counts_per_s, BASELINE, 0.8),
-        (name + rms(result.rms_counts_per_s), result.velocity_counts_per_s, ESTIMATE, 1.0),
-        (f"zero-phase reference, {result.reference_hz:g} Hz", result.reference_counts_per_s, REFERENCE, 1.4),
-    ]
-    if result.estimator == "fdm":
-        lines.pop(0)
+    lines, reference = _lines(result), result.reference_counts_per_s
     first, last = _interesting(result)
     for axes, part in ((whole, slice(None)), (detail, slice(first, last))):
-        for label, values, colour, width in lines:
-            style = "steps-post" if axes is detail and colour != REFERENCE else "default"
-            axes.plot(
-                time_s[part],
-                values[part],
-                color=colour,
-                linewidth=width if axes is detail else 0.6 * width,
-                drawstyle=style,
-                label=label,
-                rasterized=axes is whole,
-            )
+        axes.plot(time_s[part], reference[part], label=_reference(result), rasterized=axes is whole, **TRUTH)
+        for label, values, style in lines:
+            step = {"drawstyle": "steps-post"} if axes is detail else {"rasterized": True}
+            axes.plot(time_s[part], values[part], label=label, **style, **step)
         axes.set_ylabel("velocity (counts/s)")
+    for _, values, style in lines:
+        error.plot(time_s[first:last], (values - reference)[first:last], drawstyle="steps-post", **style)
+    error.axhline(0, color="black", lw=0.6)
+    error.set_ylabel("error (counts/s)")
+    error.set_title("estimate less reference", fontsize=LABEL_PT)
+    name_above(whole, columns=1)
+    detail.set_title("the marked piece", fontsize=LABEL_PT)
+    whole.axvspan(time_s[first], time_s[last - 1], color=MARK, alpha=0.2, lw=0)
+    for axes in panels:
         axes.margins(x=0)
-    counts.margins(x=0)
-    counts.sharex(whole)
-    whole.axvspan(time_s[first], time_s[last - 1], color="tab:orange", alpha=0.25, linewidth=0, label="enlarged below")
-    legend = whole.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, fontsize="small", frameon=False)
-    for handle in legend.legend_handles[: len(lines)]:
-        handle.set_linewidth(2)
-    for axes in (whole, detail):
-        axes.set_xlabel("time (s)")
-    for axes in (counts, whole, detail):
-        axes.grid(alpha=0.3)
         axes.ticklabel_format(axis="y", style="plain", useOffset=False)
-    return fig
+    counts.sharex(whole)
+    error.sharex(detail)
+    for axes in (whole, error):
+        axes.set_xlabel("time (s)")
+    figure.align_ylabels(panels)
+    return figure
+
+
+def _title(result: Replay) -> str:
+    recording, count = result.recording, result.coarsen or 1
+    seen = "" if count == 1 else f", seen {count} times coarser"
+    return (
+        f"{Path(recording.file).name}: {recording.column} at {recording.rate_hz:g} Hz{seen}\n"
+        f"{_name(result)} ({BACKEND_NAMES[result.backend]})"
+    )
+
+
+def _name(result: Replay) -> str:
+    return result.estimator if result.estimator == "fdm" else f"{result.estimator}, output {result.output}"
+
+
+def _reference(result: Replay) -> str:
+    return f"zero-phase reference, {result.reference_hz:g} Hz"
+
+
+def _lines(result: Replay) -> list[tuple[str, np.ndarray, dict]]:
+    """Return label, velocities and style of the finite difference and of the estimate, which lies on top."""
+
+    def rms(value: float | None) -> str:
+        return "" if value is None else f", RMS error {value:.3g} counts/s"
+
+    (own,) = looks([(result.estimator, "u")])
+    difference = {"color": "0.55", "lw": 0.7}
+    lines = [
+        ("finite difference" + rms(result.rms_fdm_counts_per_s), result.difference_counts_per_s, difference),
+        (_name(result) + rms(result.rms_counts_per_s), result.velocity_counts_per_s, {"color": own["color"], "lw": 1}),
+    ]
+    return lines[1:] if result.estimator == "fdm" else lines
 
 
 def _interesting(result: Replay) -> tuple[int, int]:
@@ -77,19 +88,3 @@ def _interesting(result: Replay) -> tuple[int, int]:
     pieces = np.lib.stride_tricks.sliding_window_view(reference[begin:], length)
     first = begin + int(np.argmax(np.abs(pieces[:, -1] - pieces[:, 0])))
     return first, first + length
-
-
-def plot_replay(result: Replay, path: str | Path) -> None:
-    """Write the picture of a replay to a file.
-
-    Args:
-        result: the replay.
-        path: ends in one of `SUFFIXES`.
-
-    Raises:
-        ReplayError: for another ending.
-        OSError: if the file cannot be written.
-    """
-    if Path(path).suffix not in SUFFIXES:
-        raise ReplayError(f"the name of a plot must end in {', '.join(SUFFIXES)}, not {str(path)!r}")
-    save(figure(result), Path(path))

@@ -1,27 +1,174 @@
-"""What pictures share: how they are written, and how their lines are told apart."""
+"""The style of all pictures: sizes of a page, fonts, colours of estimators, and files.
 
+A picture is `PAGE_IN` wide, for a page that shows it 700 pixels wide: its smallest letters are then as high as those of
+a footnote. Colours are those of Okabe and Ito and of Tol, which the colour-blind tell apart; a marker says the same as
+a colour does. An estimator has the same colour and marker in every picture.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import wraps
 from pathlib import Path
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..jobs.whole_file import whole_file
 
 SUFFIXES = (".pdf", ".png", ".svg")
-MARKERS = "osv^<>DPX*hpd"
+PAGE_IN = 7.0
+DPI = 150
+TEXT_PT, LABEL_PT = 9.0, 8.0
+"""Sizes of letters: of titles and axes, and of labels and ticks."""
+SETTINGS = {
+    "font.size": TEXT_PT,
+    "axes.titlesize": TEXT_PT,
+    "axes.titlelocation": "left",
+    "axes.labelsize": TEXT_PT,
+    "figure.titlesize": TEXT_PT,
+    "legend.fontsize": LABEL_PT,
+    "legend.framealpha": 0.9,
+    "xtick.labelsize": LABEL_PT,
+    "ytick.labelsize": LABEL_PT,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "0.88",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "lines.linewidth": 1.3,
+    "lines.markersize": 4.0,
+    "path.simplify": True,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "hardwall",
+}
+
+TRUTH = {"color": "0.72", "lw": 3.0}
+"""The style of what is true: a broad pale line, over which a thin estimate is seen and which is seen beside it."""
+THEORY = "0.35"
+"""The colour of what no run gives."""
+WALL, FORCE, MARK = "#D55E00", "#000000", "#009E73"
+COLOURS = {
+    "fdm": "#444444",
+    "levant": "#D55E00",
+    "butterworth": "#0072B2",
+    "kalman": "#009E73",
+    "period": "#999933",
+    "period-count": "#B08900",
+    "levant-edge": "#E69F00",
+    "levant-semi-implicit": "#AA4499",
+    "levant-implicit": "#882255",
+    "levant-adaptive": "#332288",
+    "window": "#CC79A7",
+    "foaw": "#3FA7D6",
+}
+MARKERS = dict(zip(COLOURS, "ovsD<>^phXP*", strict=True))
+OTHER = {"color": "#000000", "marker": "."}
+"""An estimator that has no colour here yet."""
+FADED = 0.5
+"""The part of white in the palest of several lines of one estimator."""
+AT_REST_M = 1e-9
+"""A handle whose RMS of position is less is called at rest."""
 
 
-def line_style(index: int, size: float) -> dict:
-    """Return colour and marker of line number `index`, markers of a size in points."""
-    return {"color": mpl.colormaps["tab10"](index % 10), "marker": MARKERS[index % len(MARKERS)], "ms": size}
+def looks(curves: Sequence[tuple[str, str]]) -> list[dict]:
+    """Return the line style of each (estimator, output) of a picture.
+
+    Several lines of one estimator's output, with other gains, go from pale to full in their order. A second output is
+    dashed, and its markers are open.
+    """
+    styles = []
+    for index, (estimator, output) in enumerate(curves):
+        after = list(curves[index + 1 :]).count((estimator, output))
+        before = list(curves[:index]).count((estimator, output))
+        white = FADED * after / (before + after) if after else 0.0
+        colour = mpl.colors.to_hex((1 - white) * np.array(mpl.colors.to_rgb(ink(estimator))) + white)
+        second = output not in ("u", "end-fit")
+        filled = {"mfc": "white", "ls": "--"} if second else {"mfc": colour, "ls": "-"}
+        styles.append({"color": colour, "marker": MARKERS.get(estimator, OTHER["marker"]), "mec": colour} | filled)
+    return styles
+
+
+def ink(estimator: str) -> str:
+    """Return the colour in which an estimator is written: the full one, where its line may be pale."""
+    return COLOURS.get(estimator, OTHER["color"])
+
+
+def page(draw: Callable) -> Callable:
+    """Make a function that returns a figure, or figures by name, draw in the style of all pictures."""
+
+    @wraps(draw)
+    def drawn(*arguments, **options):
+        with mpl.rc_context(SETTINGS):
+            return draw(*arguments, **options)
+
+    return drawn
+
+
+def new_figure(height_in: float, title: str) -> Figure:
+    """Return a figure as wide as a page, with nothing in it but its title."""
+    figure = Figure(figsize=(PAGE_IN, height_in), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)  # which measures text
+    figure.suptitle(title, x=0.01, ha="left")
+    return figure
+
+
+def name_above(axes: Axes, columns: int = 2) -> None:
+    """Write the names of a panel's lines above it, where they hide nothing."""
+    axes.legend(
+        loc="lower left",
+        bbox_to_anchor=(0.0, 0.98),
+        ncols=columns,
+        frameon=False,
+        borderaxespad=0.0,
+        borderpad=0.2,
+        handlelength=1.4,
+        columnspacing=1.2,
+    )
+
+
+def plain_decades(axis: Axis) -> None:
+    """Give a logarithmic axis whole numbers as its ticks, in place of powers of ten."""
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def length_text(length_m: float) -> str:
+    """Return a length as text, in a unit that leaves significant digits; `at rest` for what is no motion."""
+    if length_m < AT_REST_M:
+        return "at rest"
+    return f"{length_m * 1e3:.3g} mm" if length_m >= 1e-4 else f"{length_m * 1e6:.3g} µm"
 
 
 def save(figure: Figure, path: Path) -> None:
     """Write a picture: text as text, and nothing in it that varies from run to run.
 
     Raises:
+        ValueError: if its name does not end in one of `SUFFIXES`.
         OSError: if the file cannot be written.
     """
+    if path.suffix not in SUFFIXES:
+        raise ValueError(f"the name of a picture must end in {', '.join(SUFFIXES)}, not {str(path)!r}")
     metadata = {".png": None, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[path.suffix]
-    with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "hardwall"}), whole_file(path) as part:
-        figure.savefig(part, format=path.suffix[1:], dpi=150, metadata=metadata)
+    with mpl.rc_context(SETTINGS), whole_file(path) as part:
+        figure.savefig(part, format=path.suffix[1:], dpi=DPI, metadata=metadata)
+
+
+def save_all(drawn: Figure | dict[str, Figure], path: Path) -> list[Path]:
+    """Write what a picture module's `draw` gave, several as STEM-NAME.SUFFIX; return the files that were written.
+
+    Raises:
+        ValueError: if the path does not end in one of `SUFFIXES`.
+        OSError: if a file cannot be written.
+    """
+    if isinstance(drawn, Figure):
+        save(drawn, path)
+        return [path]
+    paths = {name: path.with_stem(f"{path.stem}-{name}") for name in drawn}
+    for name, figure in drawn.items():
+        save(figure, paths[name])
+    return list(paths.values())

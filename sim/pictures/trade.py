@@ -1,65 +1,56 @@
-"""The picture of speed against accuracy: what each shortcut of a simulation costs, and how wrong it is."""
+"""Pictures of speed against accuracy: what each shortcut of a simulation saves, and how wrong it is."""
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patheffects import withStroke
 
+from ..studies.shortcuts import SCATTER
 from ..studies.trade import HIT, MAP, Point, Question, Trade
 from ..walls import methods
-from .style import line_style
+from .labels import label_points
+from .style import COLOURS, LABEL_PT, THEORY, new_figure, page, plain_decades
 
-NUMBER_PT = 8
-"""Size of a point's number."""
-AROUND_PT = [
-    radius * NUMBER_PT * np.array([np.sin(angle), np.cos(angle)])
-    for radius in np.arange(1.5, 20.0, 0.5)
-    for angle in np.linspace(0, 2 * np.pi, 16, endpoint=False)
-]
-"""Places for it, seen from the point, the nearest first."""
+NAMED = 8
+"""At most so many settings of a panel have their names."""
+BEST, PLAIN = COLOURS["butterworth"], "0.55"
+NOTES = (
+    "blue, on the line: no setting is both faster and more right; those without a name are in the command's table\n"
+    "grey band: so much is chance, for a handle that is 0.1 % heavier or lighter changes as much"
+)
+QUESTIONS = {
+    HIT: ("time of a hit (ms)", "verdicts that differ (%)", "is a wall stable? {walls} walls around the edge"),
+    MAP: ("time of the maps of all estimators, in one process (s)", "largest error of K (%)", "where is the edge?"),
+}
 
 
-def plot_trade(trade: Trade) -> Figure:
-    """Return the picture: a row an estimator; on the left its verdicts on walls, on the right the edge of its map."""
-    picture = Figure(figsize=(14, 9.5), layout="constrained")
-    panels = picture.subplots(len(trade.walls), 2, sharex="col", squeeze=False)
-    for row, label in zip(panels, trade.walls, strict=True):
-        for axes, question in zip(row, (HIT, MAP), strict=True):
-            _draw(axes, trade, question, label)
-        name = methods.methods()[label].label
-        row[0].set_title(f"{name}: a hit, and {trade.walls[label]} walls around the edge", fontsize=10)
-        row[0].set_ylabel("verdicts that differ (%)")
-        row[1].set_title(f"{name}: a map, and its edge", fontsize=10)
-        row[1].set_ylabel("error of K at the edge, largest over B (%)")
-    panels[-1, 0].set_xlabel("time of a hit (ms)")
-    panels[-1, 1].set_xlabel("time of the maps of all estimators, in one process (s)")
+@page
+def draw(trade: Trade) -> dict[str, Figure]:
+    """Return a picture a question, `hit` and `map`: a panel an estimator, error against time."""
+    return {question.name: _picture(trade, question) for question in QUESTIONS}
+
+
+def _picture(trade: Trade, question: Question) -> Figure:
+    """Return the picture of one question."""
+    time, error, asked = QUESTIONS[question]
     controller, grid = trade.scene.controller, trade.scene.zwidth
-    picture.suptitle(
-        f"{trade.scene.name}: estimators at {controller.sample_hz / 1e3:g} kHz, force at "
-        f"{controller.actuation_hz / 1e3:g} kHz; B of {grid.damping_from_n_s_per_m:g} to "
-        f"{grid.damping_to_n_s_per_m:g} N s/m, K by {grid.stiffness_step_n_per_m / 1e3:g} kN/m"
+    title = (
+        f"What a faster simulation of a {question.name} gets wrong\n{trade.scene.name}: samples at "
+        f"{controller.sample_hz / 1e3:g} kHz, force at {controller.actuation_hz / 1e3:g} kHz; "
+        f"B of {grid.damping_from_n_s_per_m:g} to {grid.damping_to_n_s_per_m:g} N s/m, K by "
+        f"{grid.stiffness_step_n_per_m / 1e3:g} kN/m"
     )
-    keys = [
-        Line2D([], [], label=f"{number}  {point.shortcut.label}", ls="", **_style(trade, point))
-        for number, point in enumerate(trade.points, 1)
-    ]
-    keys += [
-        Line2D([], [], label="none faster is as right", color="black", lw=1.2),
-        Line2D([], [], label="within the scatter", color="0.88", lw=9),
-    ]
-    picture.legend(handles=keys, loc="outside right center", fontsize=8.5)
-    picture.draw_without_rendering()
-    for row, label in zip(panels, trade.walls, strict=True):
-        for axes, question in zip(row, (HIT, MAP), strict=True):
-            _number(axes, trade, question, label)
+    picture = new_figure(0.9 + 3.2 * len(trade.walls), title)
+    panels = picture.subplots(len(trade.walls), sharex=True, squeeze=False)[:, 0]
+    for axes, label in zip(panels, trade.walls, strict=True):
+        name = methods.methods()[label].label
+        axes.set_title(f"{name}: {asked.format(walls=trade.walls[label])}")
+        axes.set_ylabel(error)
+        _draw(axes, trade, question, label)
+    panels[-1].set_xlabel(time)
+    picture.align_ylabels(panels)
+    picture.supxlabel(NOTES, x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)
+    for axes, label in zip(panels, trade.walls, strict=True):
+        _name(axes, trade, question, label)
     return picture
-
-
-def _style(trade: Trade, point: Point) -> dict:
-    """Return colour and shape of a point, those of its axis."""
-    index = list(dict.fromkeys(each.shortcut.axis for each in trade.points)).index(point.shortcut.axis)
-    return line_style(index, 6)
 
 
 def _spot(point: Point, question: Question, label: str) -> tuple[float, float]:
@@ -72,36 +63,40 @@ def _shown(trade: Trade, question: Question) -> list[Point]:
     return [point for point in trade.points if question is MAP or point.shortcut.coarser == 1]
 
 
+def named(trade: Trade, question: Question, label: str) -> list[Point]:
+    """Return the points of a panel that have their names, at most `NAMED`.
+
+    They are the reference, the best, the slowest, and of each axis of shortcuts the boldest, which comes first in it.
+    """
+    best, shown = trade.best(question, label), _shown(trade, question)
+    chosen = [trade.points[0], best[0], best[-1], max(shown, key=question.cost_s), *best]
+    chosen += {point.shortcut.axis: point for point in reversed(shown) if point.shortcut.axis != SCATTER}.values()
+    distinct = [point for number, point in enumerate(chosen) if point not in chosen[:number]]
+    return distinct[:NAMED]
+
+
 def _draw(axes: Axes, trade: Trade, question: Question, label: str) -> None:
     """Draw a panel's points, the line through the best, and the scatter."""
-    axes.axhspan(-100, trade.scatter(question, label) * 100, color="0.88", lw=0)
-    best = [_spot(point, question, label) for point in trade.best(question, label)]
-    axes.plot(*zip(*best, strict=True), color="black", lw=1.2, marker="o", ms=13, mfc="none")
+    scatter = trade.scatter(question, label) * 100
+    axes.axhspan(-100, scatter, color="0.92", lw=0)
+    best = trade.best(question, label)
     shown = _shown(trade, question)
+    axes.plot(*zip(*(_spot(point, question, label) for point in best), strict=True), color=BEST, lw=1.2)
     for point in shown:
-        axes.plot(*_spot(point, question, label), ls="", alpha=0.8, **_style(trade, point))
+        colour = BEST if point in best else PLAIN
+        axes.plot(*_spot(point, question, label), ls="", marker="o", ms=5, color=colour)
     axes.set_xscale("log")
-    axes.grid(alpha=0.3, which="both")
+    plain_decades(axes.xaxis)
     most = max(_spot(point, question, label)[1] for point in shown)
-    axes.set_ylim(-0.1 * most - 0.5, 1.15 * most + 1)
+    axes.set_ylim(-0.12 * most - 0.5, 1.2 * most + 1)
+    axes.margins(x=0.1)
 
 
-def _number(axes: Axes, trade: Trade, question: Question, label: str) -> None:
-    """Number a panel's points, each in the nearest place that is free, with a line to its own."""
-    numbered = [(number, point) for number, point in enumerate(trade.points, 1) if point in _shown(trade, question)]
-    spots = [_spot(point, question, label) for _, point in numbered]
-    places = [axes.transData.transform(spot) * 72 / axes.figure.dpi for spot in spots]
-    taken = list(places)
-    for (number, point), spot, own in zip(numbered, spots, places, strict=True):
-        offset = next(each for each in AROUND_PT if _free(own + each, taken))
-        taken.append(own + offset)
-        colour = _style(trade, point)["color"]
-        style = {"fontsize": NUMBER_PT, "color": colour, "ha": "center", "va": "center", "textcoords": "offset points"}
-        line = {"arrowstyle": "-", "color": colour, "lw": 0.5, "shrinkA": 0, "shrinkB": 0}
-        edge = [withStroke(linewidth=2, foreground="white")]
-        axes.annotate(str(number), spot, offset, arrowprops=line, path_effects=edge, **style)
-
-
-def _free(place: np.ndarray, taken: list[np.ndarray]) -> bool:
-    """Return whether a number has room at a place, points."""
-    return all(abs(place[0] - x) > 1.4 * NUMBER_PT or abs(place[1] - y) > 1.1 * NUMBER_PT for x, y in taken)
+def _name(axes: Axes, trade: Trade, question: Question, label: str) -> None:
+    """Write the names of a panel's points beside them."""
+    best, names = trade.best(question, label), named(trade, question, label)
+    labels = [
+        (point.shortcut.label, _spot(point, question, label), BEST if point in best else "0.25") for point in names
+    ]
+    others = [_spot(point, question, label) for point in _shown(trade, question) if point not in names]
+    label_points(axes, labels, avoid=others, lines=[[_spot(point, question, label) for point in best]])

@@ -1,68 +1,105 @@
-"""Pictures of Z-width maps: the stable region of each method, and what theory says of it."""
+"""The picture of a Z-width map: the stable region of each method, and what theory says of it."""
 
 from collections.abc import Sequence
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..scene.schema import Scene
-from ..walls.boundary import Grid
-from ..walls.theory import abbott_okamura_n_per_m, colgate_schenkel_n_per_m
+from ..studies.zwidth import ZWidth
+from ..walls import theory
+from ..walls.grid import grid_of
 from ..walls.zwidth import Map
-from .style import line_style
+from .labels import label_points
+from .style import LABEL_PT, THEORY, ink, looks, new_figure, page
 
 ROOM = 8
-"""For the names of so many maps; those of more stand beside the picture."""
+"""So many maps are named at their lines; the names of more stand beside the panel, in the order of their areas."""
+SEEN = 0.02
+"""What is lower than this part of the panel is written, not drawn."""
 
 
-def plot_zwidth(
-    maps: Sequence[Map], limits: Sequence[list[float] | None], scene: Scene, grid: Grid, backend: str
-) -> Figure:
-    """Return the picture of the largest stable stiffness against damping.
-
-    Args:
-        maps: of one scene.
-        limits: for each, the linear loop's limit (N/m) at every B of the grid, or None where there is none.
-        scene: whose handle and rates the theory is for.
-        grid: of the maps.
-        backend: that the maps were made on.
-    """
-    picture = Figure(figsize=(10, 7), layout="constrained")
+@page
+def draw(found: ZWidth) -> Figure:
+    """Return the picture of the largest stable stiffness against damping."""
+    maps = found.maps
+    scenes = [each.case.scene for each in maps]
+    scene, controller, grid = scenes[0], scenes[0].controller, grid_of(scenes[0])
+    title = (
+        f"{scene.name}: samples at {controller.sample_hz / 1e3:g} kHz, force at {controller.actuation_hz / 1e3:g} kHz; "
+        f"map in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, {grid.damping_step_n_s_per_m:.3g} N s/m"
+    )
+    picture = new_figure(5.2, title)
     axes = picture.subplots()
-    dampings = grid.dampings
-    for index, (each, limit) in enumerate(zip(maps, limits, strict=True)):
-        style = line_style(index, 4)
-        edge = [(edge.damping_n_s_per_m, edge.stable_n_per_m / 1e3) for edge in each.edges]
-        axes.plot(*zip(*edge, strict=True), label=each.case.label, lw=1.4, **style)
+    styles = looks([(scene.controller.estimator, scene.estimator_output) for scene in scenes])
+    edges = [[(edge.damping_n_s_per_m, edge.stable_n_per_m / 1e3) for edge in each.edges] for each in maps]
+    limits = [_linear(own, grid.dampings) for own in scenes]
+    for each, edge, limit, style in zip(maps, edges, limits, styles, strict=True):
+        axes.plot(*zip(*edge, strict=True), label=f"{each.case.label}: {each.area / 1e3:.0f}", **style | {"ms": 3.5})
         if limit:
-            axes.plot(dampings, np.array(limit) / 1e3, color=style["color"], ls="--", lw=0.9)
-    if any(limits):
-        axes.plot([], [], color="0.4", ls="--", lw=0.9, label="linear loop, no friction, exact (same colour)")
-    colgate = [colgate_schenkel_n_per_m(scene, damping) / 1e3 for damping in dampings]
-    axes.plot(
-        dampings,
-        colgate,
-        color="black",
-        ls=":",
-        lw=1.4,
-        label="passive: Colgate, Schenkel (0: none is)",
-    )
-    abbott = abbott_okamura_n_per_m(scene) / 1e3
-    axes.plot(
-        [0], [abbott], "k_", ms=16, mew=2, clip_on=False, label=f"passive at B = 0: Abbott, Okamura ({abbott:.3g} kN/m)"
-    )
-    controller = scene.controller
-    axes.set_title(
-        f"{scene.name}, {backend}: estimators at {controller.sample_hz / 1e3:g} kHz, force at "
-        f"{controller.actuation_hz / 1e3:g} kHz; steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m"
-    )
+            axes.plot(grid.dampings, np.array(limit) / 1e3, color=style["color"], ls=":", lw=1.1)
     axes.set_xlabel("damping B of the wall (N s/m)")
     axes.set_ylabel("largest stable stiffness K (kN/m)")
     axes.set_xlim(0, None)
-    axes.set_ylim(0, None)
-    axes.grid(alpha=0.3)
+    axes.set_ylim(0, 1.08 * axes.get_ylim()[1])
+    notes = ["dotted: limit of the linear loop without friction, in the colour of its method"] if any(limits) else []
+    if any(each.leaves for each in maps):
+        notes.append("a region whose line meets the right or the upper border of the map goes on beyond it")
+    notes += _passive(axes, scene, grid.dampings)
+    picture.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)
     if len(maps) > ROOM:
-        picture.legend(fontsize=8, loc="outside right upper")
+        _name_beside(axes, maps)
     else:
-        axes.legend(fontsize=8, loc="upper left")
+        inks = [ink(own.controller.estimator) for own in scenes]
+        labels = [(each.case.label, *where) for each, *where in zip(maps, edges, inks, strict=True)]
+        dotted = [list(zip(grid.dampings, np.array(limit) / 1e3, strict=True)) for limit in limits if limit]
+        label_points(axes, labels, lines=dotted)
     return picture
+
+
+def _linear(scene: Scene, dampings: list[float]) -> list[float] | None:
+    """Return the linear loop's limit (N/m) at every B; None for an estimator that is not linear."""
+    if scene.controller.estimator not in theory.LINEAR:
+        return None
+    loop = theory.Loop(scene)
+    return [theory.linear_limit_n_per_m(loop, damping) for damping in dampings]
+
+
+def _passive(axes: Axes, scene: Scene, dampings: list[float]) -> list[str]:
+    """Draw the passivity limits where they are high enough to be seen; return in words what they are."""
+    colgate = np.array([theory.colgate_schenkel_n_per_m(scene, damping) for damping in dampings]) / 1e3
+    abbott = theory.abbott_okamura_n_per_m(scene) / 1e3
+    top = axes.get_ylim()[1]
+    passive = np.flatnonzero(colgate > 0)
+    if not len(passive):
+        own = scene.handle.viscous_n_s_per_m
+        what = "none on this map" + f", for each B is more than the handle's own {own:g} N s/m" * (dampings[0] > own)
+    elif colgate.max() < SEEN * top:
+        last = dampings[passive[-1]]
+        what = f"up to {colgate.max():.2g} kN/m and {last:g} N s/m, too low to be seen"
+    else:
+        axes.plot(dampings, colgate, color=THEORY, ls="-.", lw=1.3)
+        what = f"below the dash-dotted line, up to {colgate.max():.3g} kN/m"
+    if abbott >= SEEN * top:
+        axes.plot([0], [abbott], "_", color=THEORY, ms=14, mew=2, clip_on=False)
+    shown = ", the mark on the axis" if abbott >= SEEN * top else ", too low to be seen"
+    return [
+        f"passive walls (Colgate, Schenkel): {what}",
+        f"passive without damping (Abbott, Okamura): up to {abbott:.3g} kN/m{shown}",
+    ]
+
+
+def _name_beside(axes: Axes, maps: Sequence[Map]) -> None:
+    """Write the names of many maps beside the panel, with their areas, the largest first."""
+    handles, labels = axes.get_legend_handles_labels()
+    order = sorted(range(len(maps)), key=lambda index: -maps[index].area)
+    axes.figure.legend(
+        [handles[index] for index in order],
+        [labels[index] for index in order],
+        loc="outside right upper",
+        title="area (kN/m N s/m)",
+        title_fontsize=LABEL_PT,
+        frameon=False,
+        fontsize=LABEL_PT,
+    )

@@ -18,10 +18,6 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Rate = Annotated[int, Field(gt=0, le=10**9)]
 
 
-class SceneError(ValueError):
-    """A scene that cannot be: one line, naming the file, the key and what is accepted."""
-
-
 class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
@@ -197,7 +193,7 @@ class Scene(Section):
         """The estimator's output that the wall uses."""
         return self.controller.output or self.spec.design.estimator.outputs[0]
 
-    @cached_property
+    @property
     def parameters(self) -> dict[str, float]:
         """Run-time parameters in SI units, by word; the count is 0 at the start, so the wall is so far from there."""
         si = {
@@ -212,10 +208,16 @@ class Scene(Section):
             si["output_slew_limit"] = self.controller.slew_limit_n_per_s
         return si
 
-    @cached_property
+    @property
     def words(self) -> dict[str, int]:
         """The same as the hardware takes them."""
         return self.spec.design.encode(**self.parameters)
+
+    def hitting(self, stiffness_n_per_m: float, damping_n_s_per_m: float, start_m: float) -> "Scene":
+        """Return the scene with another wall and start; the axis depends on neither, and is not derived again."""
+        wall = {"stiffness_n_per_m": stiffness_n_per_m, "damping_n_s_per_m": damping_n_s_per_m}
+        protocol = self.protocol.model_copy(update={"start_m": start_m})
+        return self.model_copy(update={"wall": self.wall.model_copy(update=wall), "protocol": protocol})
 
     @property
     def delay_samples(self) -> int:

@@ -7,7 +7,7 @@ import numpy as np
 from hardwall.hdl.estimators.estimate import EstimatorBlock
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.quadrature import seen_count
-from hardwall.testing.bench import Bench, check
+from hardwall.testing import Bench, check
 
 
 def names(design) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from hardwall.model.estimators import levant
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.quadrature import seen_count
 from hardwall.model.spec import AxisSpec
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng
 from hardwall.testing.estimators import follow, reset_words
 from stimuli.papers_signal import axis_at, swing
 

@@ -13,7 +13,7 @@ from hardwall.hdl.estimators.butterworth import Estimator
 from hardwall.model.axis import Axis
 from hardwall.model.estimators import butterworth
 from hardwall.model.estimators.butterworth import CUTOFF_MAX, FLOAT_START, START, Design, Gains, State, coefficients
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import RATES, axis_at, swing
 from stimuli.specs import spec

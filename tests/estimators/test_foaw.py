@@ -10,7 +10,7 @@ import pytest
 from hardwall.hdl.estimators.foaw import Estimator
 from hardwall.model.axis import Axis
 from hardwall.model.estimators import foaw
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import RATES, axis_at, piece
 from stimuli.specs import spec

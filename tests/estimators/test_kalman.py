@@ -13,7 +13,7 @@ from hardwall.hdl.estimators.kalman import Estimator
 from hardwall.model.axis import Axis
 from hardwall.model.estimators import kalman
 from hardwall.model.estimators.kalman import FLOAT_START, START, Design, Gains, State, steady_state
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import BOUND, RATES, axis_at, swing
 from stimuli.specs import spec

@@ -18,7 +18,7 @@ from hardwall.model.quadrature import Seen
 from hardwall.sim.estimates import accuracy, signals
 from hardwall.sim.estimates.playback import DECODER_CLOCKS, edges_of
 from hardwall.sim.world.encoder import offsets
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, names, reset_words
 from stimuli.specs import spec
 

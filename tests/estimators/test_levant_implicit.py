@@ -12,7 +12,7 @@ from hardwall.model.estimators import levant_implicit
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.levant import FLOAT_START, POSITION_BUDGET, START
 from hardwall.model.quadrature import seen_count
-from hardwall.testing.bench import rng, simulate
+from hardwall.testing import rng, simulate
 from hardwall.testing.estimators import model
 from stimuli.specs import spec
 

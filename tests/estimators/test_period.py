@@ -15,7 +15,7 @@ from hardwall.model.estimators.period import FLOAT_START, START
 from hardwall.model.quadrature import Seen
 from hardwall.sim.estimates import accuracy, motions, signals
 from hardwall.sim.world.encoder import offsets
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model
 from stimuli.edges import anything, check_rounding_is_the_only_difference, exact, rows, sights, turn, velocities
 from stimuli.papers_signal import RATES

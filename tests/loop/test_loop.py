@@ -139,7 +139,15 @@ def test_pictures_traces_and_waveforms_are_written(tmp_path, capsys, monkeypatch
         app.main()
         report = json.loads(capsys.readouterr().out)
         assert report["force_sha256"]
-    for text in ("position (mm)", "velocity (m/s)", "force (N)", "time (s)", "estimate (levant u)", "true"):
+    for text in (
+        "position (mm)",
+        "velocity (m/s)",
+        "force (N)",
+        "time (s)",
+        "error (mm/s)",
+        "estimate (levant u)",
+        "true",
+    ):
         assert text in picture.read_text()
     with np.load(trace) as arrays:
         assert json.loads(str(arrays["report"]))["samples"] == 10_000

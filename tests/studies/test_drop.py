@@ -6,21 +6,18 @@ import math
 import numpy as np
 import pytest
 
+from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.studies import drop
+from hardwall.sim.studies.drop_result import Drop, Law
 from hardwall.sim.walls.boundary import Edge
-from hardwall.sim.walls.case import Case
 from hardwall.sim.walls.chatter import Chatter
 from hardwall.sim.walls.methods import methods
-from hardwall.sim.walls.zwidth import Map
+from hardwall.sim.walls.zwidth import Effort, Map
 from stimuli.command_line import call
 from stimuli.scenes import ODD
 
-
-@pytest.fixture(autouse=True)
-def fresh(tmp_path, monkeypatch):
-    """Results go to an empty folder; what is compiled stays where it is."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
+NOTHING = Effort("fixed", 0, 0.0)
 
 
 def strike(scene: str, text: str, changes: dict, damping: float, start: int, backend: str) -> dict:
@@ -69,7 +66,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("hardwall.sim.studies.drop.at_rest", at_rest)
     monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", verdict)
     picture = tmp_path / "drop.svg"
-    code, out, _ = call(monkeypatch, capsys, "drop", "--workers", 1, "--json", "--plot", picture)
+    code, out, err = call(monkeypatch, capsys, "drop", "--workers", 1, "--json", "--plot", picture)
     assert code == 0
     report = json.loads(out)
     measured = {(each["method"], each["factor"], each["value"]): each["measured_n_s_per_m"] for each in report["laws"]}
@@ -95,15 +92,17 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     assert adjusted["area_n2_s_per_m2"] == pytest.approx((78 - 6) * 40e3 + 24 * 20e3)
     assert kalman["of_papers_best"] == pytest.approx((198 - 6 + 12) / (78 - 6 + 12))
     assert kalman["before_the_end"] == 1.0
-    text = picture.read_text()
-    wanted = (
-        "damping B of the wall (N s/m)",
-        "measured = predicted",
-        "threshold, 3 µm",
-        "Kalman: ",
-        "stable up to here",
-    )
-    assert [label for label in wanted if label not in text] == []
+    wanted = {
+        "rest": ("damping B of the wall (N s/m)", "shaken, by more than 3 µm"),
+        "law": ("measured = predicted", "Coulomb friction"),
+        "ends": ("stiffness K of the wall (kN/m)", "stable up to here"),
+        "maps": ("largest stable stiffness K (kN/m)", "Kalman: "),
+    }
+    for name, labels in wanted.items():
+        path = tmp_path / f"drop-{name}.svg"
+        assert f"picture: {path}" in err.replace("\n", "")
+        text = path.read_text()
+        assert [label for label in labels if label not in text] == []
     monkeypatch.setattr("hardwall.sim.studies.drop.strike", None)
     monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
     code, out, _ = call(monkeypatch, capsys, "drop", "--workers", 1, "--resume")
@@ -124,16 +123,16 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
 def test_k_before_the_end_is_that_of_the_last_wall_but_one(edges, part):
     case = Case("", "seed-2011", "", {})
     found = Map(case, [Edge(10.0 * n, 1e3 * k, None) for n, k in enumerate(edges)], 1, [None] * len(edges))
-    assert drop.Drop(load("seed-2011"), {}, [], [], [], {"adjusted": found}).before_the_end("adjusted") == part
+    assert Drop(load("seed-2011"), {}, [], [], [], {"adjusted": found}, NOTHING).before_the_end("adjusted") == part
 
 
 def test_agreement_leaves_out_what_has_no_end():
     pairs = ((10.0, 20.0), (10.0, math.inf), (math.inf, 5.0), (10.0, 0.0), (40.0, 20.0))
-    laws = [drop.Law("mass", "x 2", "proposed", *pair) for pair in pairs]
-    assert drop.Drop(load("seed-2011"), {}, [], [], laws, {}).agreement() == pytest.approx(
+    laws = [Law("mass", "x 2", "proposed", *pair) for pair in pairs]
+    assert Drop(load("seed-2011"), {}, [], [], laws, {}, NOTHING).agreement() == pytest.approx(
         [0.5, 0.875, 1.25, 1.625, 2.0]
     )
-    assert drop.Drop(load("seed-2011"), {}, [], [], [], {}).agreement() == []
+    assert Drop(load("seed-2011"), {}, [], [], [], {}, NOTHING).agreement() == []
 
 
 @pytest.mark.parametrize(

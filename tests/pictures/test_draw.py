@@ -1,0 +1,191 @@
+"""Every picture: what is on its axes, that all of its words are within it, and that its file is always the same."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.axis import Tick
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from hardwall.sim.estimates import figures
+from hardwall.sim.estimates.replay import replay
+from hardwall.sim.pictures import accuracy, bits, cutoff, drop, gains, hit, lipschitz, rates, trade, zwidth
+from hardwall.sim.pictures import replay as replayed
+from hardwall.sim.pictures.style import PAGE_IN, save
+from hardwall.sim.studies.accuracy import Accuracy
+from hardwall.sim.studies.trade import HIT, MAP
+from stimuli import results
+from stimuli.replays import BOUND, COARSEN, swing
+
+SECOND = {"encoder_phase_error_counts": 0.0, "acceleration_max_mm_s2": 2000.0, "backend": "float", "rms_mm_s": 1.0}
+
+
+def figure_1() -> Figure:
+    curves = figures.curves(1)
+    rows = [curve.job("paper", 1_000) | SECOND for curve in curves]
+    return accuracy.draw(Accuracy(1, curves, rows, [curve.label for curve in curves]))
+
+
+def every_estimator_mapped() -> Figure:
+    return zwidth.draw(
+        results.zwidth([results.map_of(name, 2e4, 200) for name in ("fdm-30", "fdm-100", "adjusted")] * 4)
+    )
+
+
+PICTURES = {
+    "hit": lambda: hit.draw(results.hit()),
+    "hit, unstable": lambda: hit.draw(results.hit(4.2e-6)),
+    "hit, never reached": lambda: hit.draw(results.hit(reached=False)),
+    "replay": lambda: replayed.draw(replay(swing(), coarsen=COARSEN, acceleration_max_counts_per_s2=BOUND)),
+    "figure 1": figure_1,
+    "figure 2": lambda: accuracy.draw(results.rows()),
+    "bits": lambda: bits.draw(results.bits_dropped()),
+    "cutoff": lambda: cutoff.draw(results.devices()),
+    "gains": lambda: gains.draw(results.search()),
+    "lipschitz": lambda: lipschitz.draw(results.fit()),
+    "rates": lambda: rates.draw(results.rate_gains()),
+    "zwidth": lambda: zwidth.draw(results.maps()),
+    "zwidth of many": every_estimator_mapped,
+    **{
+        f"drop, {name}": lambda name=name: drop.draw(results.dropped())[name]
+        for name in ("rest", "law", "ends", "maps")
+    },
+    **{f"trade, {name}": lambda name=name: trade.draw(results.traded())[name] for name in ("hit", "map")},
+}
+
+
+@pytest.fixture(scope="module", params=PICTURES)
+def picture(request) -> Figure:
+    return PICTURES[request.param]()
+
+
+def words(figure: Figure) -> list[Text]:
+    """Return the texts of a figure that are seen, but for the ticks', once it is laid out."""
+    figure.draw_without_rendering()
+    ticks = {text for tick in figure.findobj(Tick) for text in tick.findobj(Text)}
+    texts = figure.findobj(Text, include_self=False)
+    return [text for text in texts if text.get_visible() and text.get_text() and text not in ticks]
+
+
+def shown(figure: Figure) -> list:
+    return [axes for axes in figure.axes if axes.axison and axes.get_label() != "<colorbar>"]
+
+
+def test_axes_have_names_with_units(picture):
+    below = [axes.get_xlabel() for axes in shown(picture)]
+    beside = [axes.get_ylabel() for axes in shown(picture)]
+    assert any(below)
+    named = [label for label in below + beside if label]
+    without = [label for label in named if not re.search(r"\(.+\)|bits|LUT4", label)]
+    assert without == []
+    # A panel without a name shares the axis of one that has it.
+    for axes, label in zip(shown(picture), below, strict=True):
+        assert label or len(axes.get_shared_x_axes().get_siblings(axes)) > 1
+
+
+def test_all_words_are_within_the_picture(picture):
+    frame = picture.bbox
+    renderer = picture.canvas.get_renderer()
+    assert picture.get_size_inches()[0] == PAGE_IN
+    outside = []
+    for each in [*words(picture), *shown(picture)]:
+        box = each.get_tightbbox(renderer)
+        if box.x0 < frame.x0 - 1 or box.x1 > frame.x1 + 1 or box.y0 < frame.y0 - 1 or box.y1 > frame.y1 + 1:
+            outside.append(each)
+    assert outside == []
+
+
+def test_letters_are_large_enough_to_read(picture):
+    small = {text.get_text() for text in words(picture) if text.get_fontsize() < 7.5}
+    # Exponents of ticks are smaller than their tens, and are part of them.
+    assert small == set()
+
+
+@pytest.mark.parametrize(
+    ("name", "suffix"),
+    [
+        ("hit", ".png"),
+        ("figure 2", ".svg"),
+        ("zwidth", ".png"),
+        ("zwidth", ".svg"),
+        ("zwidth", ".pdf"),
+        ("trade, map", ".svg"),
+    ],
+)
+def test_a_picture_is_always_the_same_file(tmp_path, name, suffix):
+    for number in range(2):
+        save(PICTURES[name](), tmp_path / f"{number}{suffix}")
+    first, second = ((tmp_path / f"{number}{suffix}").read_bytes() for number in range(2))
+    assert len(first) > 1000
+    assert first == second
+
+
+@pytest.mark.parametrize("name", ["hit", "replay", "figure 1"])
+def test_an_error_stands_under_the_estimate(name):
+    figure = PICTURES[name]()
+    (error,) = [axes for axes in figure.axes if axes.get_ylabel().startswith("error")]
+    others = [axes for axes in figure.axes if axes.get_ylabel().startswith("velocity")]
+    top = others[0].get_position()
+    figure.draw_without_rendering()
+    assert error.get_position().y1 <= top.y0
+    # What the panel has is the estimate less the truth, of the panel above.
+    if name == "hit":
+        true, estimate = (line.get_ydata() for line in others[0].lines[:2])
+        assert error.lines[0].get_ydata() == pytest.approx((estimate - true) * 1e3)
+
+
+@pytest.mark.parametrize("name", ["hit", "replay", "figure 1"])
+def test_the_estimate_lies_over_a_truth_that_is_broader(name):
+    for axes in PICTURES[name]().axes:
+        if axes.get_ylabel().startswith("velocity"):
+            true, estimate = axes.lines[0], axes.lines[-1]
+            assert true.get_zorder() <= estimate.get_zorder()
+            assert true.get_linewidth() > 2 * estimate.get_linewidth()
+
+
+@pytest.mark.parametrize(("rms_m", "text"), [(0.0, "at rest"), (4.2e-6, "4.2 µm"), (1.234e-3, "1.23 mm")])
+def test_a_hit_says_how_it_settled_in_digits_that_count(rms_m, text):
+    title = hit.draw(results.hit(rms_m)).get_suptitle()
+    assert text in title
+    assert "0.0000" not in title
+
+
+@pytest.mark.parametrize("question", [HIT, MAP])
+def test_a_panel_of_the_trade_names_its_best_and_few_others(question):
+    made = results.traded()
+    figure = trade.draw(made)[question.name]
+    assert len(figure.axes) == len(made.walls)
+    for axes, label in zip(figure.axes, made.walls, strict=True):
+        labels = {point.shortcut.label for point in made.points}
+        names = [text.get_text() for text in axes.texts if text.get_text() in labels]
+        assert 2 <= len(names) == len(set(names)) <= trade.NAMED
+        best = made.best(question, label)
+        assert {best[0].shortcut.label, best[-1].shortcut.label, made.points[0].shortcut.label} <= set(names)
+        assert not any(text.isdigit() for text in names)
+
+
+def test_the_passivity_limit_is_seen_or_said_to_be_absent():
+    absent = " ".join(text.get_text() for text in words(zwidth.draw(results.maps())))
+    assert "passive walls (Colgate, Schenkel): none on this map" in absent
+    plain = results.map_of("fdm-500", 2e4, 200)
+    viscous = replace(plain, case=plain.case.changed({"handle.viscous_n_s_per_m": 100.0}))
+    seen = zwidth.draw(results.zwidth([viscous]))
+    assert "below the dash-dotted line" in " ".join(text.get_text() for text in words(seen))
+    assert "-." in [line.get_linestyle() for line in seen.axes[0].lines]
+
+
+def test_gains_with_several_names_are_named_once():
+    figure = gains.draw(results.search())
+    for axes in figure.axes[:4]:
+        names = [text.get_text() for text in axes.texts]
+        assert "best,\nwithin the condition" in names
+        assert len(names) == len(set(names)) == 5
+
+
+def test_a_circle_is_at_the_derived_width():
+    by_width, by_logic = bits.draw(results.bits_dropped()).axes
+    assert by_width.lines[0].get_xdata().tolist() == [20, 19, 18]
+    assert [line.get_xdata()[0] for line in by_logic.lines[1::2]] == [1000, 500, 1500]
+    assert np.isfinite([line.get_ydata()[0] for line in by_width.lines]).all()
