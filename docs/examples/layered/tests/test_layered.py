@@ -6,7 +6,7 @@ import pytest
 from hardwall.hdl.layered import Layered
 from hardwall.model import wall
 from hardwall.model.layered import Design
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from stimuli.specs import spec
 
 

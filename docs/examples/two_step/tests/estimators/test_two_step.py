@@ -6,7 +6,7 @@ import pytest
 
 from hardwall.hdl.estimators.two_step import Estimator
 from hardwall.model.estimators.two_step import START
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model
 from stimuli.specs import spec
 
