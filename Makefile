@@ -2,6 +2,7 @@
 #
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
 #   ARGS="-k levant"          more options for pytest (test, soak)
+#   ONLY=hit/mhz              which cases are recorded anew: those whose names begin so (digests)
 #   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
 #                             which seeds, how many samples each, and how many of endurance (soak)
 
@@ -19,20 +20,20 @@ RUN := $(VENV)/bin/python -m
 HARDWALL := $(VENV)/bin/hardwall
 SOURCES := $(shell find hdl model sim -name "*.py" -o -name "*.cpp" -o -name "*.toml")
 
+# The main job: the paper's device with the generated hardware in the loop, and beside it the same axis at 1 MHz on the
+# bit-accurate model, which gives the hardware's words in a twentieth of the time.
 SCENE := seed-2011
 ESTIMATORS := levant fdm
-REPORTS := $(ESTIMATORS:%=build/hit-%.json)
-PICTURES := $(ESTIMATORS:%=build/hit-%.png)
+REPORTS := $(ESTIMATORS:%=build/hit-%.json) $(ESTIMATORS:%=build/mhz-%.json)
+PICTURES := $(REPORTS:%.json=%.png)
 
 # The iCE40 UltraPlus is too slow for 50 MHz.
 ON_ECP5 := --device ecp5-25k
 ON_ICE40 := --device ice40-up5k $(addprefix --set controller.,clock_hz=24000000 sample_hz=500000 actuation_hz=500000)
 
-# Every estimator on one map, which the best of them leave unless it is larger than the paper's.
 comma := ,
-ESTIMATORS_OF_ALL := fdm levant butterworth kalman period period-count levant-edge levant-semi-implicit levant-implicit \
-  levant-adaptive window foaw
-ALL_ON_THE_MAP := --estimators $(subst $() ,$(comma),$(strip $(ESTIMATORS_OF_ALL))) $(addprefix --set zwidth., \
+# Every estimator on one map, which the best of them leave unless it is larger than the paper's.
+ALL_ON_THE_MAP := --estimators all $(addprefix --set zwidth., \
   stiffness_to_n_per_m=150e3 stiffness_step_n_per_m=2e3 damping_step_n_s_per_m=12.0 walls_below=8)
 MAPPED := seed-2011 fit-2011 drive-2011
 STUDIES := cutoff gains rates drop trade
@@ -44,7 +45,7 @@ PYTEST := $(RUN) pytest -n 2 --dist worksteal
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test lint bench synth choose figures verilog soak clean distclean help tools FORCE
+.PHONY: all test lint bench synth choose figures verilog docs digests soak clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -78,9 +79,17 @@ figures: $(VENV)/.synth | tools ## the founding paper's figures and every study 
 verilog: $(VENV)/.sim | tools ## the axis of the scene as Verilog, in build/verilog/
 	@$(HARDWALL) verilog $(SCENE) --output-folder build/verilog
 
-soak: $(VENV)/.test | tools ## long campaigns: every estimator for 10^9 samples, RTL against model with new seeds
+docs: $(VENV)/.docs | tools ## the pages as a site in build/docs, every link inside checked; any warning is a failure
+	@$(RUN) sphinx --quiet --fail-on-warning --keep-going --doctree-dir build/doctrees docs build/docs
+	@echo build/docs/index.html
+
+digests: $(VENV)/.test | tools ## record anew what the program computes, and show what changed (after a change on purpose)
+	@$(VENV)/bin/python tests/digests.py $(ONLY)
+
+soak: $(VENV)/.test | tools ## long campaigns: 10^9 samples of every estimator, every digest, RTL against model with new seeds
 	@echo "HARDWALL_ENDURANCE=$(ENDURANCE)"
 	@HARDWALL_ENDURANCE=$(ENDURANCE) $(PYTEST) tests/test_endurance.py
+	@HARDWALL_DIGESTS=all $(PYTEST) tests/test_digests.py
 	@for seed in $(SEEDS); do \
 	  echo "HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES); again: make soak SEEDS=$$seed SAMPLES=$(SAMPLES)"; \
 	  HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES) $(PYTEST) -m rtl $(ARGS); \
@@ -100,14 +109,21 @@ help: ## this list
 # ---- the main job: one report and one picture an estimator ----------------------------------------------------------
 
 # Two targets of one pattern are made together. The report comes last and whole: without it nothing looks done.
-build/hit-%.json build/hit-%.png: $(SOURCES) $(VENV)/.sim | tools
-	@mkdir -p build
-	@rm -f build/hit-$*.json
-	@echo "Hitting the wall of $(SCENE) with $*, the generated hardware in the loop ..."
-	@$(HARDWALL) hit $(SCENE) --estimator $* --backend rtl --plot build/hit-$*.png --json >build/hit-$*.partial
-	@mv build/hit-$*.partial build/hit-$*.json
+define hit
+@mkdir -p build
+@rm -f $(basename $@).json
+@echo "Hitting the wall of $(1) with $*, $(3) in the loop ..."
+@$(HARDWALL) hit $(1) --estimator $* --backend $(2) --plot $(basename $@).png --json >$(basename $@).partial
+@mv $(basename $@).partial $(basename $@).json
+endef
 
-# ---- the tools, by need: .sim runs the loop, .test the regressions, .synth place and route --------------------------
+build/hit-%.json build/hit-%.png: $(SOURCES) $(VENV)/.sim | tools
+	$(call hit,$(SCENE),rtl,the generated hardware)
+
+build/mhz-%.json build/mhz-%.png: $(SOURCES) $(VENV)/.sim | tools
+	$(call hit,mhz,fixed,its bit-accurate model)
+
+# ---- the tools, by need: .sim runs the loop, .test the regressions, .synth place and route, .docs the pages ----------
 
 # .venv is made anew for another PYTHON, when its own is gone, and in a tree that was moved or copied.
 MADE_IN := $(file <$(VENV)/.made)
@@ -126,10 +142,13 @@ $(VENV)/.made: $(if $(STALE),FORCE) | tools
 	@printf '%s\n' "$(PYTHON)" >$(VENV)/.python
 	@printf '%s\n' "$(CURDIR)" >$@
 
-# One pip at a time, whatever make does in parallel.
+# One pip at a time, whatever make does in parallel; of what it says, the names of the packages that it gets.
+SAYS := s/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  unpacking all of these/p
 define install
-@echo "Installing into $(VENV), once: $(2) ..."
-@flock $(VENV)/.made $(RUN) pip install --quiet --disable-pip-version-check --editable '.[$(1)]'
+@echo "Installing into $(VENV), once: $(2) ..."; began=$$SECONDS; \
+  flock $(VENV)/.made $(RUN) pip install --disable-pip-version-check --progress-bar off --editable '.[$(1)]' \
+    | sed -un '$(SAYS)'; \
+  echo "  done in $$((SECONDS - began)) s"
 @touch $@
 endef
 
@@ -141,6 +160,9 @@ $(VENV)/.test: pyproject.toml $(VENV)/.sim | tools
 
 $(VENV)/.synth: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)synth,place and route)
+
+$(VENV)/.docs: pyproject.toml $(VENV)/.sim | tools
+	$(call install,sim$(comma)docs,the tools of the pages)
 
 # ---- what only the system can give, named before anything starts ----------------------------------------------------
 

@@ -5,10 +5,10 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.axis import GLITCH_WIDTH, ILLEGAL_WIDTH
-from hardwall.model.estimators import registry
 from hardwall.model.spec import AxisSpec
 
 from .arithmetic.fixed import shape
+from .estimators.registry import block_of
 from .output import Output
 from .quadrature import Quadrature
 from .wall import Wall
@@ -122,8 +122,7 @@ class Axis(wiring.Component):
         m = Module()
         spec, design = self._spec, self._spec.design
         m.submodules.decoder = decoder = Quadrature(spec.count_width, spec.stamp_width, GLITCH_WIDTH, ILLEGAL_WIDTH)
-        hdl = registry.load(spec.estimator, f"{__package__}.estimators")
-        m.submodules.estimator = estimator = hdl.Estimator(design.estimator)
+        m.submodules.estimator = estimator = block_of(design.estimator)
         m.submodules.wall = wall = Wall(design.wall)
         m.submodules.output_stage = output = Output(design.output)
 
@@ -153,8 +152,9 @@ class Axis(wiring.Component):
         sampled_count = Signal.like(self.count)
         sampled_fault = Signal()
         with m.If(strobe):
-            m.d.sync += [sampled_count.eq(decoder.count), sampled_fault.eq(decoder.fault)]
+            m.d.sync += [sampled_count.eq(decoder.seen.count), sampled_fault.eq(decoder.fault)]
 
+        wiring.connect(m, decoder.seen, estimator.seen)
         m.d.comb += [
             decoder.a.eq(self.encoder_a),
             decoder.b.eq(self.encoder_b),
@@ -167,7 +167,6 @@ class Axis(wiring.Component):
             decoder.clear.eq(self.clear_flags),
             estimator.strobe.eq(strobe),
             estimator.restart.eq(restart),
-            *(getattr(estimator, name).eq(getattr(decoder, name)) for name in design.estimator.inputs),
             wall.strobe.eq(estimator.valid),
             wall.count.eq(sampled_count),
             wall.velocity.eq(estimator.velocity),
@@ -178,18 +177,18 @@ class Axis(wiring.Component):
             self.drive.eq(output.drive),
             self.sampled.eq(output.valid),
             self.actuated.eq(output.valid & output.actuated),
-            self.count.eq(decoder.count),
+            self.count.eq(decoder.seen.count),
             self.velocity.eq(estimator.velocity),
             self.wall_force.eq(wall.force),
             self.illegal_count.eq(decoder.illegal_count),
             self.index_count.eq(decoder.index_count),
             self.index_armed.eq(decoder.index_armed),
             self.index_latched.eq(decoder.index_latched),
-            self.stamp.eq(decoder.stamp),
-            self.stamp_a_rise.eq(decoder.stamp_a_rise),
-            self.stamp_b_rise.eq(decoder.stamp_b_rise),
-            self.stamp_a_fall.eq(decoder.stamp_a_fall),
-            self.stamp_b_fall.eq(decoder.stamp_b_fall),
+            self.stamp.eq(decoder.seen.stamp),
+            self.stamp_a_rise.eq(decoder.seen.stamp_a_rise),
+            self.stamp_b_rise.eq(decoder.seen.stamp_b_rise),
+            self.stamp_a_fall.eq(decoder.seen.stamp_a_fall),
+            self.stamp_b_fall.eq(decoder.seen.stamp_b_fall),
         ]
 
         # A flag shows with the sample that raised it, and stays.

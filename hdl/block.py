@@ -1,27 +1,33 @@
 """A component whose formats and latency are those of its twin in `hardwall.model`."""
 
-from collections.abc import Callable
+from abc import abstractmethod
 
 from amaranth.lib import wiring
+from amaranth.lib.wiring import Member
 
 
 class Block(wiring.Component):
     """A component whose formats and latency come from its twin's `Design`.
 
-    `members` is called once the design is known to be one.
+    A subclass names that class as `design_class` and says by `members` what its ports are.
 
     Raises
     ------
     TypeError
-        If `design` is not a `kind`.
+        If `design` is not of that class.
     """
 
-    def __init__(self, design, kind: type, members: Callable[[], dict]):
+    def __init__(self, design):
+        kind = self.design_class
         if not isinstance(design, kind):
-            name = f"{kind.__module__.rsplit('.', 1)[-1]}.{kind.__name__}"
-            raise TypeError(f"design must be a {name}, not {design!r}")
+            raise TypeError(f"design must be a {kind.__module__.rpartition('.')[2]}.{kind.__name__}, not {design!r}")
         self._design = design
-        super().__init__(members())
+        super().__init__(self.members(design))
+
+    @staticmethod
+    @abstractmethod
+    def members(design) -> dict[str, Member]:
+        """Return the members for a design."""
 
     @property
     def design(self):

@@ -1,10 +1,7 @@
 """An axis for real packages: few pins, parameters and telemetry through a serial port, a drive that a filter can take.
 
-The frame of the serial port is one list of fields each way, `Board.commands` and `Board.telemetry`; `encode` and
-`decode` are what a host does with it.
+A `Frame` of the serial port goes each way: `Board.commands` to the axis, `Board.telemetry` from it.
 """
-
-from collections.abc import Mapping
 
 from amaranth.hdl import Cat, ClockDomain, Const, Module, Mux, Shape, Signal, Value
 from amaranth.lib import wiring
@@ -14,6 +11,7 @@ from amaranth.lib.wiring import In, Out
 from hardwall.model.spec import AxisSpec
 
 from .axis import Axis
+from .frame import BYTE, Frame
 
 PULSES = ("commit", "clear_flags", "preload", "index_arm")
 """What a frame can do besides being read; the first bits of it."""
@@ -33,7 +31,6 @@ TELEMETRY = (
     "stamp_a_fall",
     "stamp_b_fall",
 )
-BYTE = 8
 
 
 class Board(wiring.Component):
@@ -100,6 +97,12 @@ class Board(wiring.Component):
     def __init__(self, spec: AxisSpec):
         self._axis = Axis(spec)
         self._spec = spec
+        members = self._axis.signature.members
+        names = (*PULSES, "preload_count", *(word.name for word in spec.design.words)), TELEMETRY
+        fields = [{name: Shape.cast(members[name].shape) for name in way} for way in names]
+        longest = max(sum(shape.width for shape in way.values()) for way in fields)
+        bits = -(-(longest + 1) // BYTE) * BYTE
+        self._commands, self._telemetry = (Frame(way, bits) for way in fields)
         super().__init__(
             {
                 "clk": In(1),
@@ -137,57 +140,19 @@ class Board(wiring.Component):
         return self._spec.force.width - 2
 
     @property
-    def commands(self) -> tuple[tuple[str, Shape], ...]:
-        """Fields of a frame to the axis, in the order on the wire; unused bits follow."""
-        shapes = self._axis.signature.members
-        names = (*PULSES, "preload_count", *(word.name for word in self._spec.design.words))
-        return tuple((name, Shape.cast(shapes[name].shape)) for name in names)
+    def commands(self) -> Frame:
+        """A frame to the axis."""
+        return self._commands
 
     @property
-    def telemetry(self) -> tuple[tuple[str, Shape], ...]:
-        """Fields of a frame from the axis, in the order on the wire; unused bits follow."""
-        shapes = self._axis.signature.members
-        return tuple((name, Shape.cast(shapes[name].shape)) for name in TELEMETRY)
+    def telemetry(self) -> Frame:
+        """A frame from the axis."""
+        return self._telemetry
 
     @property
     def frame_bits(self) -> int:
         """Bits of a frame, each way: whole bytes, of which the last bit is unused."""
-        longest = max(sum(shape.width for _, shape in fields) for fields in (self.commands, self.telemetry))
-        return -(-(longest + 1) // BYTE) * BYTE
-
-    def encode(self, values: Mapping[str, int]) -> bytes:
-        """Return the frame that gives the axis `values`, by name; what is not named is zero.
-
-        Raises:
-            ValueError: for a name that is no field of a frame, or a value that does not fit its field.
-        """
-        frame, left = 0, self.frame_bits
-        known = dict(self.commands)
-        for name in values:
-            if name not in known:
-                raise ValueError(f"name must be one of {', '.join(known)}, not {name!r}")
-        for name, shape in known.items():
-            value, least = values.get(name, 0), -(1 << (shape.width - 1)) if shape.signed else 0
-            if not least <= value < least + (1 << shape.width):
-                raise ValueError(f"{name} must be {least} to {least + (1 << shape.width) - 1}, not {value!r}")
-            left -= shape.width
-            frame |= (value & ((1 << shape.width) - 1)) << left
-        return frame.to_bytes(self.frame_bits // BYTE, "big")
-
-    def decode(self, frame: bytes) -> dict[str, int]:
-        """Return the telemetry, by name, of a frame from the axis.
-
-        Raises:
-            ValueError: if it has not the length of a frame.
-        """
-        if len(frame) * BYTE != self.frame_bits:
-            raise ValueError(f"frame must have {self.frame_bits // BYTE} bytes, not {len(frame)!r}")
-        word, left, values = int.from_bytes(frame, "big"), self.frame_bits, {}
-        for name, shape in self.telemetry:
-            left -= shape.width
-            value = word >> left & ((1 << shape.width) - 1)
-            values[name] = value - (1 << shape.width) if shape.signed and value >> (shape.width - 1) else value
-        return values
+        return self._commands.bits
 
     def elaborate(self, platform):
         m = Module()
@@ -233,10 +198,8 @@ class Board(wiring.Component):
                 m.d.sync += [frame.eq(Cat(bit, frame)), taken.eq(Mux(taken > self.frame_bits, taken, taken + 1))]
         m.d.comb += self.scan_out.eq(frame[-1])
 
-        left = len(frame)
-        for name, shape in self.commands:
-            left -= shape.width
-            field = frame[left : left + shape.width]
+        for name, low, shape in self.commands:
+            field = frame[low : low + shape.width]
             m.d.comb += getattr(axis, name).eq(field & given if name in PULSES else field)
 
         # The axis limits the drive, so its magnitude has the bits of the limit.

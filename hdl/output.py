@@ -1,7 +1,7 @@
 """From the wall's force to the drive."""
 
 from amaranth.hdl import Module, Mux, Signal, signed
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.output import Design
 
@@ -59,22 +59,21 @@ class Output(Block):
         If `design` is not of that class.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(
-            design,
-            Design,
-            lambda: {
-                "strobe": In(1),
-                "force": In(shape(design.force)),
-                "fault": In(1),
-                "enable": In(1),
-                **{word.name: In(shape(word.format)) for word in design.words},
-                "drive": Out(shape(design.force)),
-                "limited": Out(len(design.flags)),
-                "actuated": Out(1),
-                "valid": Out(1),
-            },
-        )
+    design_class = Design
+
+    @staticmethod
+    def members(design: Design) -> dict[str, Member]:
+        return {
+            "strobe": In(1),
+            "force": In(shape(design.force)),
+            "fault": In(1),
+            "enable": In(1),
+            **{word.name: In(shape(word.format)) for word in design.words},
+            "drive": Out(shape(design.force)),
+            "limited": Out(len(design.flags)),
+            "actuated": Out(1),
+            "valid": Out(1),
+        }
 
     def elaborate(self, platform):
         m = Module()

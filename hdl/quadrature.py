@@ -1,4 +1,7 @@
-"""Quadrature decoder: the pins of an incremental encoder to a count, with clock stamps, index and faults."""
+"""Quadrature decoder: the pins of an incremental encoder to a count, with clock stamps, index and faults.
+
+`Seen` is the bus from it to the estimators.
+"""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, signed
 from amaranth.lib import wiring
@@ -6,8 +9,48 @@ from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model import quadrature as model
+from hardwall.model.checks import check_int
 
-from .checks import check_int
+
+class Seen(wiring.Signature):
+    """What an estimator may use of the decoder, valid at every clock; the twin of `hardwall.model.quadrature.Seen`.
+
+    Parameters
+    ----------
+    count_width, stamp_width : int
+        Bits of the count and of the clock stamps.
+
+    Members
+    -------
+    count : Out(signed(count_width))
+        Position, counts.
+    stamp : Out(stamp_width)
+        Clocks since reset.
+    stamp_a_rise, stamp_b_rise, stamp_a_fall, stamp_b_fall : Out(stamp_width)
+        `stamp` in the clock that decoded the last edge of that kind, one before its count is out.
+    edge : Out(2)
+        Kind of the last counted edge: 0 A rose, 1 B rose, 2 A fell, 3 B fell. Its stamp is that of this kind.
+    down : Out(1)
+        Whether that edge counted -1.
+    run : Out(3)
+        Edges in a row that counted that way, at most 4: so many stamps are of this run. 0 before the first edge, and
+        after an illegal change.
+    """
+
+    def __init__(self, count_width: int, stamp_width: int):
+        super().__init__(
+            {
+                "count": Out(signed(count_width)),
+                "stamp": Out(stamp_width),
+                "stamp_a_rise": Out(stamp_width),
+                "stamp_b_rise": Out(stamp_width),
+                "stamp_a_fall": Out(stamp_width),
+                "stamp_b_fall": Out(stamp_width),
+                "edge": Out(2),
+                "down": Out(1),
+                "run": Out(range(model.RUN_MAX + 1)),
+            }
+        )
 
 
 class Quadrature(wiring.Component):
@@ -69,25 +112,14 @@ class Quadrature(wiring.Component):
         Strobe: arms the index latch.
     clear : In(1)
         Strobe: clears `illegal`, `overspeed` and `illegal_count`.
-    count : Out(signed(count_width))
-        Position, counts.
+    seen : Out(Seen)
+        Count, stamps and the last edges.
     index_count : Out(signed(count_width))
         Position at the first rising edge of Z after `arm`, counts.
     index_armed, index_latched : Out(1)
         The latch is waiting for that edge; it has seen it.
-    stamp : Out(stamp_width)
-        Clocks since reset.
-    stamp_a_rise, stamp_b_rise, stamp_a_fall, stamp_b_fall : Out(stamp_width)
-        `stamp` in the clock that decoded the last edge of that kind, one before its count is out.
     stepped : Out(1)
         High for one clock with the count of a new edge.
-    edge : Out(2)
-        Kind of the last counted edge: 0 A rose, 1 B rose, 2 A fell, 3 B fell. Its stamp is that of this kind.
-    down : Out(1)
-        Whether that edge counted -1.
-    run : Out(3)
-        Edges in a row that counted that way, at most 4: so many stamps are of this run. 0 before the first edge, and
-        after an illegal change.
     illegal, overspeed : Out(1)
         Sticky flags, see above.
     fault : Out(1)
@@ -127,19 +159,11 @@ class Quadrature(wiring.Component):
                 "preload_count": In(signed(count_width)),
                 "arm": In(1),
                 "clear": In(1),
-                "count": Out(signed(count_width)),
+                "seen": Out(Seen(count_width, stamp_width)),
                 "index_count": Out(signed(count_width)),
                 "index_armed": Out(1),
                 "index_latched": Out(1),
-                "stamp": Out(stamp_width),
-                "stamp_a_rise": Out(stamp_width),
-                "stamp_b_rise": Out(stamp_width),
-                "stamp_a_fall": Out(stamp_width),
-                "stamp_b_fall": Out(stamp_width),
                 "stepped": Out(1),
-                "edge": Out(2),
-                "down": Out(1),
-                "run": Out(range(model.RUN_MAX + 1)),
                 "illegal": Out(1),
                 "overspeed": Out(1),
                 "fault": Out(1),
@@ -169,14 +193,15 @@ class Quadrature(wiring.Component):
         return model.Params(self._count_width, self._stamp_width, self._fault_width)
 
     def latency(self, glitch_clocks: int) -> int:
-        """Clock edges from the first that sees a pin changed to the new `count`, both included."""
+        """Clock edges from the first that sees a pin changed to the new `seen.count`, both included."""
         return model.latency(glitch_clocks)
 
     def elaborate(self, platform):
         m = Module()
-        seen = Signal(3)
+        seen = self.seen
+        pins = Signal(3)
         # Three independent bits, so they may share a synchroniser. A reset does not reach it: the start outlasts it.
-        m.submodules.synchroniser = FFSynchronizer(Cat(self.a, self.b, self.z), seen)
+        m.submodules.synchroniser = FFSynchronizer(Cat(self.a, self.b, self.z), pins)
         starting = Signal(range(model.START.starting + 1), init=model.START.starting)
         running = starting == 0
 
@@ -186,18 +211,16 @@ class Quadrature(wiring.Component):
         differs = Signal(3)
         accepted = Signal(3)
         waiting = Signal(3)
-        m.d.comb += [differs.eq((seen ^ level) & running.replicate(3)), waiting.eq(differs & ~accepted)]
+        m.d.comb += [differs.eq((pins ^ level) & running.replicate(3)), waiting.eq(differs & ~accepted)]
         for bit, channel in enumerate("abz"):
             held = Signal(self._glitch_width, name=f"held_{channel}")
             m.d.comb += accepted[bit].eq(differs[bit] & (held >= self.glitch_clocks))
             # A waiting channel has held < glitch_clocks, so the sum fits.
             m.d.sync += held.eq(Mux(waiting[bit], (held + 1)[: self._glitch_width], 0))
-        pending = Signal(3)
-        moved = Signal(3)
-        up = Signal()
+        pending, moved, up = Signal(3), Signal(3), Signal()
         m.d.sync += [
             pending.eq(waiting),
-            level.eq(Mux(running, level ^ accepted, seen)),
+            level.eq(Mux(running, level ^ accepted, pins)),
             moved.eq(accepted),
             up.eq(level[0] ^ accepted[0] ^ level[1]),
         ]
@@ -205,11 +228,11 @@ class Quadrature(wiring.Component):
         # A pulse is rejected when its channel comes back while pending.
         previous = Signal(2)
         crossed = Signal(2)
-        edges = seen[:2] ^ previous
+        edges = pins[:2] ^ previous
         crossing = crossed | Cat(edges[1], edges[0])
         outrun = (pending & ~differs & crossing).any()
         m.d.sync += [
-            previous.eq(seen[:2]),
+            previous.eq(pins[:2]),
             crossed.eq(waiting[:2] & crossing),
             self.overspeed.eq(outrun | (self.overspeed & ~self.clear)),
             starting.eq(Mux(running, 0, (starting - 1)[: len(starting)])),
@@ -224,29 +247,29 @@ class Quadrature(wiring.Component):
         m.d.comb += [
             down.eq(~(up ^ self.invert)),
             change.eq(Mux(one, Mux(down, -1, 1), 0)),
-            count.eq((Mux(self.preload, self.preload_count, self.count) + change)[: self._count_width]),
+            count.eq((Mux(self.preload, self.preload_count, seen.count) + change)[: self._count_width]),
         ]
         m.d.sync += [
-            self.count.eq(count),
+            seen.count.eq(count),
             self.stepped.eq(one),
-            self.stamp.eq((self.stamp + 1)[: self._stamp_width]),
+            seen.stamp.eq((seen.stamp + 1)[: self._stamp_width]),
         ]
-        for bit, rise, fall in ((0, self.stamp_a_rise, self.stamp_a_fall), (1, self.stamp_b_rise, self.stamp_b_fall)):
+        for bit, rise, fall in ((0, seen.stamp_a_rise, seen.stamp_a_fall), (1, seen.stamp_b_rise, seen.stamp_b_fall)):
             with m.If(one & moved[bit]):
                 with m.If(level[bit]):
-                    m.d.sync += rise.eq(self.stamp)
+                    m.d.sync += rise.eq(seen.stamp)
                 with m.Else():
-                    m.d.sync += fall.eq(self.stamp)
+                    m.d.sync += fall.eq(seen.stamp)
 
         with m.If(one):
             m.d.sync += [
-                self.edge.eq(Cat(moved[1], ~(moved[:2] & level[:2]).any())),
-                self.down.eq(down),
+                seen.edge.eq(Cat(moved[1], ~(moved[:2] & level[:2]).any())),
+                seen.down.eq(down),
                 # Saturates: RUN_MAX is a power of two.
-                self.run.eq(Mux(self.down == down, self.run + ~self.run[-1], 1)),
+                seen.run.eq(Mux(seen.down == down, seen.run + ~seen.run[-1], 1)),
             ]
         with m.Elif(both):
-            m.d.sync += self.run.eq(0)
+            m.d.sync += seen.run.eq(0)
 
         with m.If(self.arm):
             m.d.sync += [self.index_armed.eq(1), self.index_latched.eq(0)]

@@ -1,7 +1,7 @@
 """The virtual wall: a unilateral spring and damper."""
 
 from amaranth.hdl import Module, Mux, Signal, signed
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.wall import Design
 
@@ -60,19 +60,18 @@ class Wall(Block):
     Source: Chawda, Celik, O'Malley, World Haptics 2011, the virtual wall.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(
-            design,
-            Design,
-            lambda: {
-                "strobe": In(1),
-                "count": In(signed(design.count_width)),
-                "velocity": In(shape(design.velocity)),
-                **{word.name: In(shape(word.format)) for word in design.words},
-                "force": Out(shape(design.force)),
-                "valid": Out(1),
-            },
-        )
+    design_class = Design
+
+    @staticmethod
+    def members(design: Design) -> dict[str, Member]:
+        return {
+            "strobe": In(1),
+            "count": In(signed(design.count_width)),
+            "velocity": In(shape(design.velocity)),
+            **{word.name: In(shape(word.format)) for word in design.words},
+            "force": Out(shape(design.force)),
+            "valid": Out(1),
+        }
 
     def elaborate(self, platform):
         m = Module()

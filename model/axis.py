@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from . import output, quadrature, wall
+from . import checks, output, quadrature, wall
 from .arithmetic.fixed import UQ
 from .compiled import compiled
 from .estimators import registry
@@ -35,8 +36,8 @@ class Params(NamedTuple):
     """Parameters of the three blocks, all integer words or all float64; and where their flags stand."""
 
     estimator: tuple
-    wall: tuple
-    output: tuple
+    wall: wall.Params | wall.FloatParams
+    output: output.Params
     estimator_bit: int
     output_bit: int
 
@@ -45,7 +46,7 @@ class State(NamedTuple):
     """States of the blocks, and the sticky flags (bits as `Design.flags`, after the encoder's)."""
 
     estimator: tuple
-    output: tuple
+    output: output.State
     flags: int
 
 
@@ -60,12 +61,19 @@ class Design:
         latency_to_drive: clocks from the sample strobe to the changed drive.
     """
 
+    words: tuple[Word, ...]
+    flags: tuple[str, ...]
+
     def __init__(self, spec: "AxisSpec"):
-        gains = spec.gains if spec.gains is not None else spec.model.Gains.default(spec)
+        estimator = registry.design_of(spec.estimator)
+        gains = estimator.gains_class.default(spec) if spec.gains is None else spec.gains
+        if not isinstance(gains, estimator.gains_class):
+            kind = f"{estimator.gains_class.__module__.rpartition('.')[2]}.Gains"
+            raise TypeError(f"gains of {spec.estimator} must be {kind} or None, not {gains!r}")
         self.spec = spec
         self.gains = gains
         self.decoder = quadrature.Params(spec.count_width, spec.stamp_width, ILLEGAL_WIDTH)
-        self.estimator = spec.model.Design(spec, gains)
+        self.estimator = estimator(spec, gains)
         self.wall = wall.Design(spec, self.estimator.velocity)
         self.output = output.Design(spec)
         self.words = (
@@ -90,6 +98,7 @@ class Design:
         """Return every run-time word by name: from SI where given, else as after reset.
 
         Raises:
+            TypeError: for a value that is not a number.
             ValueError: for a name that is not a word, or a value that does not fit; with what is accepted.
         """
         known = {word.name: word for word in self.words}
@@ -105,8 +114,7 @@ class Design:
 
     def float_params(self, words: dict[str, int], si: dict[str, float]) -> Params:
         """Return the float64 kernel's parameters: gains as given in `si`, by word's name, not as rounded to `words`."""
-        outputs = self.spec.model.OUTPUTS
-        selected = outputs[words.get(registry.output_word(self.spec.estimator), 0)]
+        selected = self.estimator.outputs[words.get(self.estimator.output_word(), 0)]
         return Params(
             self.estimator.float_params(self.gains, selected, si),
             self.wall.float_params(si.get("wall_stiffness", 0.0), si.get("wall_damping", 0.0), words),
@@ -116,11 +124,7 @@ class Design:
 
     def start(self, floating: bool = False) -> State:
         """Return the state before the first sample, for one run: it may hold arrays that the run writes to."""
-        if hasattr(self.estimator, "start"):
-            estimator = self.estimator.start(floating)
-        else:
-            estimator = self.spec.model.FLOAT_START if floating else self.spec.model.START
-        return State(estimator, output.FLOAT_START if floating else output.START, 0)
+        return State(self.estimator.start(floating), output.FLOAT_START if floating else output.START, 0)
 
     def flag_names(self, flags: int) -> list[str]:
         """Return the names of the flags raised in `flags`."""
@@ -128,7 +132,9 @@ class Design:
 
 
 @compiled
-def step(params, state, seen, restart, fault, enable):
+def step(
+    params: Params, state: State, seen: quadrature.Seen, restart: int, fault: int, enable: int
+) -> tuple[State, float, float]:
     """Take one sample: return (state, velocity, force); the drive is `state.output.drive`.
 
     Args:
@@ -253,41 +259,39 @@ class Axis:
         params: parameters of `step`.
 
     Raises:
+        TypeError: if `spec` is not an AxisSpec, or a value not a number.
         ValueError: for an unknown name or a value out of range.
     """
 
     def __init__(self, spec: "AxisSpec", floating: bool = False, **si: float):
+        if not isinstance(getattr(spec, "design", None), Design):
+            raise TypeError(f"spec must be an AxisSpec, not {spec!r}")
         self.design = spec.design
         self.words = words = self.design.encode(**si)
         self.floating = floating
         self.params = self.design.float_params(words, si) if floating else self.design.params(words)
 
-    def run(self, counts: np.ndarray) -> Record:
+    def run(self, counts: ArrayLike) -> Record:
         """Run records of counts from the start state.
 
         Args:
             counts: integers, shape (samples,), or (lanes, samples) for independent axes side by side. A count may
-                exceed the count's width: it wraps, as the hardware's does.
+                exceed the count's width: it wraps, as the hardware's does; it may not jump by half of its range.
 
         Raises:
             TypeError: if the counts are not integers.
-            ValueError: if they have not one or two dimensions; or if the estimator needs more than counts, the stamps
-                of edges: `hardwall.model.stamped.run` has them.
+            ValueError: if they have not one or two dimensions, or jump; or if the estimator needs more than counts,
+                the stamps of edges: `hardwall.model.stamped.run` has them.
         """
-        if registry.uses_stamps(self.design.spec.estimator):
+        if self.design.estimator.uses_stamps():
             raise ValueError(f"estimator must be one that needs only counts, not {self.design.spec.estimator!r}")
-        counts = np.asarray(counts)
-        if not np.issubdtype(counts.dtype, np.integer):
-            raise TypeError(f"counts must be integers, not {counts.dtype!r}")
-        if counts.ndim not in (1, 2):
-            raise ValueError(f"counts must have 1 or 2 dimensions, not {counts.ndim!r}")
-        half = 1 << (self.design.spec.count_width - 1)
-        lanes = np.atleast_2d(((counts.astype(np.int64) + half) & (2 * half - 1)) - half)
+        spec = self.design.spec
+        checked = checks.lanes_of_counts(counts, spec.count_width, spec.clocks_per_sample)
+        lanes = np.atleast_2d(checked)
         number = np.float64 if self.floating else np.int64
         velocity, force, drive = (np.zeros(lanes.shape, number) for _ in range(3))
         flags = np.zeros(lanes.shape, np.int64)
         for lane in range(len(lanes)):
             start = self.design.start(self.floating)
             run(self.params, start, lanes[lane], velocity[lane], force[lane], drive[lane], flags[lane])
-        shape = counts.shape
-        return Record(self.design, *(array.reshape(shape) for array in (velocity, force, drive, flags)))
+        return Record(self.design, *(array.reshape(checked.shape) for array in (velocity, force, drive, flags)))

@@ -14,10 +14,22 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, Protocol, TypeVar, cast
 
 import numba
 from numba.core import config
 from numba.extending import overload
+
+Kernel = TypeVar("Kernel", bound=Callable)
+
+
+class ByType(Protocol):
+    """A function of several bodies, chosen by the class of its first argument."""
+
+    def __call__(self, first: Any, *rest: Any) -> Any: ...
+
+    def register(self, kind: type) -> Callable[[Kernel], Kernel]:
+        """Return a decorator that makes a function the body for `kind`."""
 
 
 def build_dir() -> Path:
@@ -44,17 +56,18 @@ def source_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-def compiled(function: Callable) -> Callable:
+def compiled(function: Kernel) -> Kernel:
     """Compile `function` with Numba, cached on disk by the content of the project's sources."""
-    saved = config.CACHE_DIR
-    config.CACHE_DIR = str(build_dir() / "numba" / source_digest())
+    settings: Any = config
+    saved = settings.CACHE_DIR
+    settings.CACHE_DIR = str(build_dir() / "numba" / source_digest())
     try:
-        return numba.njit(cache=True, error_model="numpy")(function)
+        return cast(Kernel, numba.njit(cache=True, error_model="numpy")(function))
     finally:
-        config.CACHE_DIR = saved
+        settings.CACHE_DIR = saved
 
 
-def by_type(declaration: Callable) -> Callable:
+def by_type(declaration: Callable) -> ByType:
     """Return a function that calls the variant registered for the class of its first argument.
 
     `declaration` gives the name and the docstring; its body is never run. Variants are added with
@@ -94,5 +107,5 @@ def by_type(declaration: Callable) -> Callable:
 
         return add
 
-    call.register = register
-    return call
+    call.register = register  # type: ignore[attr-defined]
+    return cast(ByType, call)

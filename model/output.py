@@ -8,11 +8,14 @@ Between, it holds. Without `enable`, or with a fault, the drive is zero at every
 again from zero. The force limit is the last thing done to it.
 """
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from .arithmetic.fixed import UQ, saturate
 from .compiled import compiled
 from .words import Word
+
+if TYPE_CHECKING:
+    from .spec import AxisSpec
 
 FLAGS = ("slew_limited", "force_limited")
 LATENCY = 3
@@ -48,7 +51,7 @@ class Design:
     latency = LATENCY
     flags = FLAGS
 
-    def __init__(self, axis):
+    def __init__(self, axis: "AxisSpec"):
         self.decimation = axis.samples_per_actuation
         self.force = axis.force
         self.force_limit = axis.force_limit_word

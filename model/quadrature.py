@@ -43,7 +43,7 @@ class Params(NamedTuple):
 class State(NamedTuple):
     """Every register of the decoder; up to `illegal_count` also its outputs, by the same names."""
 
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     index_count: int
     index_armed: int
     index_latched: int
@@ -87,7 +87,7 @@ class Seen(NamedTuple):
     edges before it stand a count each farther back, and their kinds and stamps go back likewise.
     """
 
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     stamp: int
     stamp_a_rise: int
     stamp_b_rise: int
@@ -102,7 +102,7 @@ START = State(*(3 if name == "starting" else 0 for name in State._fields))
 
 
 @compiled
-def seen(state):
+def seen(state: State) -> Seen:
     """Return what an estimator sees of a decoder's `state`."""
     return Seen(
         state.count,
@@ -126,7 +126,7 @@ def stamp_of(record, kind):
 
 
 @compiled
-def seen_count(count):
+def seen_count(count: int) -> Seen:
     """Return what an estimator sees that uses the count alone."""
     return Seen(count, 0, 0, 0, 0, 0, 0, 0, 0)
 

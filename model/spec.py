@@ -18,12 +18,13 @@ value, so that it resolves largest / 2**GAIN_BITS or better.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from types import ModuleType
 
 from .arithmetic.fixed import SQ, bits_for
-from .estimators import registry
+from .axis import Design
+from .checks import FieldError
+from .estimators.estimate import EstimatorGains
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,47 +65,52 @@ class AxisSpec:
     stiffness_max_n_per_m: float
     damping_max_n_s_per_m: float
     estimator: str = "levant"
-    gains: object = field(default=None)
+    gains: EstimatorGains | None = None
     estimator_bits_dropped: int = 0
 
     def __post_init__(self):
         for name, kind in self.__annotations__.items():
             value = getattr(self, name)
-            if kind is int and not isinstance(value, int):
+            if kind is int and (isinstance(value, bool) or not isinstance(value, int)):
                 raise TypeError(f"{name} must be an int, not {value!r}")
+            if kind is str and not isinstance(value, str):
+                raise TypeError(f"{name} must be a str, not {value!r}")
             if kind is float and (isinstance(value, bool) or not isinstance(value, int | float)):
                 raise TypeError(f"{name} must be a number, not {value!r}")
             if kind in (int, float) and name != "estimator_bits_dropped" and not (math.isfinite(value) and value > 0):
-                raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
+                raise FieldError(name, f"must be finite and more than 0, not {value!r}")
         if not 0 <= self.estimator_bits_dropped <= 32:
-            raise ValueError(f"estimator_bits_dropped must be 0 to 32, not {self.estimator_bits_dropped!r}")
+            raise FieldError("estimator_bits_dropped", f"must be 0 to 32, not {self.estimator_bits_dropped!r}")
         self._check_rates()
         self._check_widths()
         if self.design.latency_to_drive > self.clocks_per_sample:
             fastest = self.clock_hz // self.design.latency_to_drive
-            raise ValueError(
-                f"sample_hz must leave {self.design.latency_to_drive} clocks for the force path, so at most {fastest} "
-                f"at clock_hz {self.clock_hz}, not {self.sample_hz!r}"
+            raise FieldError(
+                "sample_hz",
+                f"must leave {self.design.latency_to_drive} clocks for the force path, so at most {fastest} "
+                f"at clock_hz {self.clock_hz}, not {self.sample_hz!r}",
             )
 
     def _check_rates(self):
         if self.clock_hz % self.sample_hz:
-            raise ValueError(f"sample_hz must divide clock_hz {self.clock_hz}, not {self.sample_hz!r}")
+            raise FieldError("sample_hz", f"must divide clock_hz {self.clock_hz}, not {self.sample_hz!r}")
         if self.sample_hz % self.actuation_hz:
-            raise ValueError(f"actuation_hz must divide sample_hz {self.sample_hz}, not {self.actuation_hz!r}")
+            raise FieldError("actuation_hz", f"must divide sample_hz {self.sample_hz}, not {self.actuation_hz!r}")
 
     def _check_widths(self):
         if self.travel_m < self.count_m:
-            raise ValueError(f"travel_m must be at least one count of {self.count_m:g} m, not {self.travel_m!r}")
+            raise FieldError("travel_m", f"must be at least one count of {self.count_m:g} m, not {self.travel_m!r}")
         if self.count_width > 32:
-            raise ValueError(
-                f"travel_m must be at most {2**29 * self.count_m:g} for a 32-bit count of {self.count_m:g} m, "
-                f"not {self.travel_m!r}"
+            raise FieldError(
+                "travel_m",
+                f"must be at most {2**29 * self.count_m:g} for a 32-bit count of {self.count_m:g} m, "
+                f"not {self.travel_m!r}",
             )
         if not 1 <= self.force_max_n / self.force_resolution_n < 2**24:
-            raise ValueError(
-                f"force_resolution_n must be {self.force_max_n / 2**24:g} to {self.force_max_n:g} for force_max_n "
-                f"{self.force_max_n:g}, not {self.force_resolution_n!r}"
+            raise FieldError(
+                "force_resolution_n",
+                f"must be {self.force_max_n / 2**24:g} to {self.force_max_n:g} for force_max_n "
+                f"{self.force_max_n:g}, not {self.force_resolution_n!r}",
             )
 
     def shrunk(self, derived: int) -> int:
@@ -115,9 +121,9 @@ class AxisSpec:
         """
         left = derived - self.estimator_bits_dropped
         if self.estimator_bits_dropped and left < 0:
-            raise ValueError(
-                f"estimator_bits_dropped must be 0 to {max(derived, 0)} with this estimator, "
-                f"not {self.estimator_bits_dropped!r}"
+            raise FieldError(
+                "estimator_bits_dropped",
+                f"must be 0 to {max(derived, 0)} with this estimator, not {self.estimator_bits_dropped!r}",
             )
         return left
 
@@ -158,14 +164,7 @@ class AxisSpec:
         """Format of wall force and drive, in force LSB."""
         return SQ(self.force_limit_word.bit_length() + 2, 0)
 
-    @property
-    def model(self) -> ModuleType:
-        """The estimator's module."""
-        return registry.load(self.estimator)
-
     @cached_property
-    def design(self):
-        """Every derived format, word and latency: a `hardwall.model.axis.Design`."""
-        from .axis import Design  # noqa: PLC0415  (the axis is made of blocks that are designed from this spec)
-
+    def design(self) -> Design:
+        """Every derived format, word and latency."""
         return Design(self)

@@ -11,8 +11,9 @@ sample k is taken at the strobe, clock (k + 1) D - 1 with D clocks a sample.
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from . import axis, quadrature
+from . import axis, checks, quadrature
 from .compiled import compiled
 
 
@@ -90,7 +91,7 @@ def _run(controller, state, clocks_per_sample, edge_clocks, edge_levels, velocit
         velocity[k], force[k], drive[k], flags[k] = state.velocity, state.force, state.drive, state.flags
 
 
-def run(of: axis.Axis, edge_clocks: np.ndarray, edge_levels: np.ndarray, samples: int, level: int = 0) -> axis.Record:
+def run(of: axis.Axis, edge_clocks: ArrayLike, edge_levels: ArrayLike, samples: int, level: int = 0) -> axis.Record:
     """Run a record of edges from reset.
 
     Args:
@@ -98,31 +99,25 @@ def run(of: axis.Axis, edge_clocks: np.ndarray, edge_levels: np.ndarray, samples
         edge_clocks: integers, shape (edges,): numbers of the clocks, never decreasing and not negative, at which a
             register at the pins first holds the new level.
         edge_levels: integers of the same shape: the pins from then on, a | b << 1.
-        samples: how many to take.
+        samples: how many to take, 1 or more.
         level: of the pins at reset.
 
     Returns:
         The record, arrays of shape (samples,).
 
     Raises:
-        TypeError: if clocks or levels are not integers.
-        ValueError: if the shapes differ, the clocks decrease or are negative, or a level is not of 0 to 3.
+        TypeError: if `of` is not an Axis, or one of the others not an integer or integers.
+        ValueError: if the shapes differ, the clocks decrease or are negative, a level is not 0 to 3, or there are no
+            samples to take.
     """
-    clocks, levels = np.asarray(edge_clocks), np.asarray(edge_levels)
-    for name, values in (("edge_clocks", clocks), ("edge_levels", levels)):
-        if values.size and not np.issubdtype(values.dtype, np.integer):
-            raise TypeError(f"{name} must be integers, not {values.dtype!r}")
-    if clocks.ndim != 1 or clocks.shape != levels.shape:
-        raise ValueError(f"edge_clocks and edge_levels must have one shape (edges,), not {clocks.shape, levels.shape}")
-    if clocks.size and (clocks[0] < 0 or (np.diff(clocks) < 0).any()):
-        raise ValueError("edge_clocks must be 0 or more and never decrease")
-    for name, values in (("edge_levels", levels), ("level", np.array([level]))):
-        if ((values < 0) | (values > 3)).any():
-            raise ValueError(f"{name} must be 0 to 3")
+    if not isinstance(of, axis.Axis):
+        raise TypeError(f"of must be an Axis, not {of!r}")
+    edges = checks.edges(edge_clocks, edge_levels)
+    checks.check_int("samples", samples, 1)
+    checks.check_int("level", level, 0, 3)
     number = np.float64 if of.floating else np.int64
     velocity, force, drive = (np.zeros(samples, number) for _ in range(3))
     flags = np.zeros(samples, np.int64)
     start = controller(of, level)
-    edges = clocks.astype(np.int64), levels.astype(np.int64)
     _run(*start, of.design.spec.clocks_per_sample, *edges, velocity, force, drive, flags)
     return axis.Record(of.design, velocity, force, drive, flags)

@@ -17,11 +17,15 @@ Formats, derived, with the force LSB r, the count q and the sample period tau:
 Together: fixed point differs from the exact equation on the same words by at most one force LSB.
 """
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from .arithmetic.fixed import SQ, UQ, saturate, shift_floor, shift_round_half_up, wrap
+from .checks import FieldError
 from .compiled import by_type, compiled
 from .words import Word, gain_format
+
+if TYPE_CHECKING:
+    from .spec import AxisSpec
 
 LATENCY = 6
 """Clocks from strobe to valid: see `hardwall.hdl.wall`."""
@@ -69,7 +73,7 @@ class Design:
 
     latency = LATENCY
 
-    def __init__(self, axis, velocity: SQ):
+    def __init__(self, axis: "AxisSpec", velocity: SQ):
         q, r, tau = axis.count_m, axis.force_resolution_n, 1 / axis.sample_hz
         self.count_width = axis.count_width
         self.force = axis.force
@@ -85,7 +89,7 @@ class Design:
             if bits > 61:
                 value = getattr(axis, name)
                 least = value * 2.0 ** (bits - 61)
-                raise ValueError(f"{name} must be at least {least:g} beside the other gain's largest, not {value!r}")
+                raise FieldError(name, f"must be at least {least:g} beside the other gain's largest, not {value!r}")
         self.words = (
             Word("wall_stiffness", self.stiffness, r / q, "N/m", 0, "spring of the wall"),
             Word("wall_damping", self.damping, r * tau / q, "N s/m", 0, "damper of the wall"),

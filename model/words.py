@@ -1,9 +1,9 @@
 """Run-time parameters of the hardware: a word on a port, and what it means in SI units."""
 
-import math
 from dataclasses import dataclass
 
 from .arithmetic.fixed import UQ, Format, bits_for
+from .checks import FieldError, check_number
 
 GAIN_BITS = 16
 """Bits of a gain word: the part of a multiplier's operand that iCE40UP (16 x 16) and ECP5 (18 x 18) both have."""
@@ -15,13 +15,6 @@ def gain_format(largest: float) -> UQ:
     fmt = UQ(i, GAIN_BITS - i)
     # A largest value just under a power of two may round up to it.
     return fmt if largest <= fmt.to_real(fmt.max) else UQ(i + 1, GAIN_BITS - i - 1)
-
-
-def check_positive(gains: object) -> None:
-    """Raise ValueError, naming it, for a field of a dataclass of gains that is not finite and more than 0."""
-    for name, value in vars(gains).items():
-        if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be finite and more than 0, not {value!r}")
 
 
 @dataclass(frozen=True)
@@ -46,7 +39,7 @@ class Word:
 
     def __post_init__(self):
         if not self.format.min <= self.reset <= self.format.max:
-            raise ValueError(f"{self.name} must fit {self.format}, not {self.reset!r}")
+            raise FieldError(self.name, f"must fit {self.format}, not {self.reset!r}")
 
     @property
     def si_min(self) -> float:
@@ -66,10 +59,12 @@ class Word:
         """Return the word nearest to `value` (SI).
 
         Raises:
+            TypeError: if it is not a number.
             ValueError: if it does not fit, with the accepted range in SI units.
         """
+        check_number(self.name, value)
         try:
             return self.format.from_real(value / self.si_per_unit)
         except ValueError:
             unit = f" {self.unit}" if self.unit else ""
-            raise ValueError(f"{self.name} must be {self.si_min:g} to {self.si_max:g}{unit}, not {value!r}") from None
+            raise FieldError(self.name, f"must be {self.si_min:g} to {self.si_max:g}{unit}, not {value!r}") from None

@@ -7,9 +7,8 @@ from cocotb.triggers import RisingEdge, Timer, ValueChange
 
 from hardwall.hdl.axis import Axis
 from hardwall.model import axis, quadrature
-from hardwall.model.estimators import registry
 from hardwall.model.spec import AxisSpec
-from hardwall.testing.bench import SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from stimuli.specs import ADJUSTED, MHZ, spec
 
 PINS = (
@@ -46,7 +45,7 @@ def random_words(design: axis.Design, random: np.random.Generator) -> dict[str, 
     words["wall_left"], words["wall_forbid_pull"] = random.integers(0, 2, 2).tolist()
     words["encoder_glitch_clocks"] = int(random.choice([0, 1, 2, 5]))
     words["encoder_invert"] = int(random.random() < 0.2)
-    outputs, selector = design.spec.model.OUTPUTS, registry.output_word(design.spec.estimator)
+    outputs, selector = design.estimator.outputs, design.estimator.output_word()
     if len(outputs) > 1:
         words[selector] = int(random.integers(0, len(outputs)))
     return words

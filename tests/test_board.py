@@ -6,10 +6,11 @@ import cocotb
 import pytest
 from cocotb.triggers import RisingEdge, Timer
 
-from hardwall.hdl.board import BYTE, PULSES, TELEMETRY, Board
+from hardwall.hdl.board import PULSES, TELEMETRY, Board
+from hardwall.hdl.frame import BYTE
 from hardwall.model import output, quadrature, wall
 from hardwall.model.estimators.estimate import estimate
-from hardwall.testing.bench import SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from stimuli.specs import spec
 
 HALF = 3
@@ -149,7 +150,7 @@ class Host:
 
         Bits set in `stuck` are sent as ones. Unless `heard`, or if it is no whole frame, the axis is to get nothing.
         """
-        frame = int.from_bytes(self.board.encode(values), "big") | stuck
+        frame = int.from_bytes(self.board.commands.encode(values), "big") | stuck
         length = self.board.frame_bits
         bits = length if bits is None else bits
         # The twin has seen `clocks` edges; the next has that number. The first edge to act on a change is number
@@ -173,7 +174,8 @@ class Host:
         self.bench.drive(scan_select_n=1)
         await self.edges(HALF)
         expected = self.captured.pop(frozen)
-        return (self.board.decode(answer.to_bytes(length // BYTE, "big")) if bits == length else None), expected
+        telemetry = self.board.telemetry.decode(answer.to_bytes(length // BYTE, "big")) if bits == length else None
+        return telemetry, expected
 
     async def commit(self, **values: int):
         """Send words, the others as after reset, and wait until they hold and have reached the pulses."""
@@ -273,7 +275,7 @@ async def the_density_of_pulses_is_the_drive(dut):
     await host.reset()
     axis = host.twin.spec
     top, full = axis.force_limit_word, 2**host.board.drive_bits
-    fields = dict(host.board.commands)
+    fields = host.board.commands.fields
     half = 1 << (fields["wall_position"].width - 1)
     stiffest = 2 ** fields["wall_stiffness"].width - 1
     # The limit sets the magnitude: the wall pushes with all it has.
@@ -295,7 +297,7 @@ async def the_density_of_pulses_is_the_drive(dut):
 async def enable_low_is_no_drive(dut):
     host = Host(dut, **parameters())
     await host.reset()
-    fields, top = dict(host.board.commands), host.twin.spec.force_limit_word
+    fields, top = host.board.commands.fields, host.twin.spec.force_limit_word
     largest = {
         "wall_stiffness": (1 << fields["wall_stiffness"].width) - 1,
         "wall_position": 1 - (1 << (fields["wall_position"].width - 1)),
@@ -332,17 +334,19 @@ def test_rtl(name):
 def test_frames_are_lists_of_whole_fields():
     board = make("mhz")
     assert board.frame_bits % BYTE == 0
-    assert [name for name, _ in board.commands] == [
+    assert list(board.commands.fields) == [
         *PULSES,
         "preload_count",
         *(word.name for word in board.spec.design.words),
     ]
-    frame = board.encode({"commit": 1, "preload_count": -1})
-    width = dict(board.commands)["preload_count"].width
+    frame = board.commands.encode({"commit": 1, "preload_count": -1})
+    width = board.commands.fields["preload_count"].width
     assert int.from_bytes(frame, "big") >> (board.frame_bits - 4 - width) == 0b1000 << width | (1 << width) - 1
-    width = dict(board.telemetry)["drive"].width
-    answer = board.decode(((1 << width) - 5 << (board.frame_bits - width)).to_bytes(board.frame_bits // BYTE, "big"))
-    assert answer == {name: -5 if name == "drive" else 0 for name in TELEMETRY}
+    width = board.telemetry.fields["drive"].width
+    answer = (1 << width) - 5 << (board.frame_bits - width)
+    assert board.telemetry.decode(answer.to_bytes(board.frame_bits // BYTE, "big")) == {
+        name: -5 if name == "drive" else 0 for name in TELEMETRY
+    }
 
 
 @pytest.mark.parametrize(
@@ -356,13 +360,13 @@ def test_frames_are_lists_of_whole_fields():
 )
 def test_frames_that_cannot_be_are_refused(values, message):
     with pytest.raises(ValueError, match=message):
-        make("mhz").encode(values)
+        make("mhz").commands.encode(values)
 
 
 def test_an_answer_of_the_wrong_length_is_refused():
     board = make("mhz")
     with pytest.raises(ValueError, match=rf"^frame must have {board.frame_bits // BYTE} bytes, not 3$"):
-        board.decode(b"abc")
+        board.telemetry.decode(b"abc")
 
 
 def test_wrong_spec_is_refused():

@@ -9,7 +9,8 @@ import pytest
 
 from hardwall.hdl.axis import Axis
 from hardwall.hdl.board import Board
-from hardwall.hdl.export import COLUMNS, port_table, to_verilog, write
+from hardwall.hdl.export import to_verilog, write
+from hardwall.hdl.ports import COLUMNS, port_table
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from stimuli.specs import spec
 
@@ -114,13 +115,14 @@ def test_written_tables_are_all_there(written):
     assert port_table(Board(axis)) in text
     board = Board(axis)
     for fields in (board.commands, board.telemetry):
-        listed = [rf"\| [\d:]+ \| `{name}` \| (un)?signed \|\n" for name, _ in fields]
+        listed = [rf"\| [\d:]+ \| `{name}` \| (un)?signed \|\n" for name, *_ in fields]
         assert re.search("".join(listed), text)
 
 
 def test_text_is_the_same_in_another_process(written, tmp_path):
     program = (
-        "from specs import spec; from hardwall.hdl.export import write; import sys; write(spec('mhz'), sys.argv[1])"
+        "import sys; from stimuli.specs import spec; from hardwall.hdl.export import write; "
+        "write(spec('mhz'), sys.argv[1])"
     )
     command = [sys.executable, "-c", program, str(tmp_path)]
     subprocess.run(command, cwd=Path(__file__).parent, env=environment() | {"PYTHONHASHSEED": "7"}, check=True)

@@ -20,7 +20,7 @@ from hardwall.model import quadrature as model
 from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.compiled import compiled
 from hardwall.model.quadrature import START, Params, State, advance, run, step
-from hardwall.testing.bench import SAMPLES, SEED, Bench, Packing, Record, check, packing_of, parameters, rng, simulate
+from hardwall.testing import SAMPLES, SEED, Bench, Packing, Record, check, parameters, ports_of, rng, simulate
 
 INPUTS = ("a", "b", "z", "glitch_clocks", "invert", "preload", "preload_count", "arm", "clear")
 OUTPUTS = (*State._fields[: model.N_OUTPUTS], "fault")
@@ -143,7 +143,9 @@ class Recorded(wiring.Component):
 
     def __init__(self, **widths: int):
         self.decoder = Quadrature(**widths)
-        shapes = packing_of(self.decoder).shapes
+        # What the estimators see is a bus of the decoder; here its members go by their own names, as the model's.
+        self.ports = {name.removeprefix("seen__"): port for name, (_, port) in ports_of(self.decoder).items()}
+        shapes = {name: port.shape() for name, port in self.ports.items()}
         self.stimuli = Packing({name: shapes[name] for name in INPUTS})
         self.records = Packing({"reset": unsigned(1), **{name: shapes[name] for name in (*INPUTS, *OUTPUTS)}})
         super().__init__({"stimulus": In(self.stimuli.width), "record": Out(self.records.width)})
@@ -151,8 +153,8 @@ class Recorded(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         m.submodules.decoder = self.decoder
-        m.d.comb += Cat(getattr(self.decoder, name) for name in INPUTS).eq(self.stimulus)
-        m.d.comb += self.record.eq(Cat(ResetSignal(), (getattr(self.decoder, name) for name in (*INPUTS, *OUTPUTS))))
+        m.d.comb += Cat(self.ports[name] for name in INPUTS).eq(self.stimulus)
+        m.d.comb += self.record.eq(Cat(ResetSignal(), (self.ports[name] for name in (*INPUTS, *OUTPUTS))))
         return m
 
 

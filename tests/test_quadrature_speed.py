@@ -8,7 +8,7 @@ import pytest
 from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.compiled import compiled
 from hardwall.model.quadrature import START, Params, advance, clocks_to_fault, max_edge_rate, step
-from hardwall.testing.bench import rng
+from hardwall.testing import rng
 
 
 def test_max_edge_rate():

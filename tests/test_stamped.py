@@ -5,7 +5,7 @@ import pytest
 
 from hardwall.model import axis, quadrature, stamped
 from hardwall.model.axis import Axis
-from hardwall.testing.bench import rng
+from hardwall.testing import rng
 from stimuli.specs import spec
 
 SPEC = spec("mhz", "fdm")
@@ -55,20 +55,3 @@ def test_counts_come_after_the_decoders_latency():
 def test_no_edges_are_standstill():
     seen = stamped.run(Axis(SPEC), np.array([], np.int64), [], 5, level=3)
     assert not any((seen.velocity.any(), seen.drive.any(), seen.flags.any()))
-
-
-@pytest.mark.parametrize(
-    ("clocks", "levels", "level", "error", "message"),
-    [
-        ([1.5], [1], 0, TypeError, r"^edge_clocks must be integers"),
-        ([1], ["a"], 0, TypeError, r"^edge_levels must be integers"),
-        ([1, 2], [1], 0, ValueError, r"^edge_clocks and edge_levels must have one shape"),
-        ([3, 2], [1, 3], 0, ValueError, r"^edge_clocks must be 0 or more and never decrease"),
-        ([-1], [1], 0, ValueError, r"^edge_clocks must be 0 or more"),
-        ([1], [4], 0, ValueError, r"^edge_levels must be 0 to 3"),
-        ([1], [1], 5, ValueError, r"^level must be 0 to 3"),
-    ],
-)
-def test_what_is_no_record_is_refused(clocks, levels, level, error, message):
-    with pytest.raises(error, match=message):
-        stamped.run(Axis(SPEC), np.array(clocks), np.array(levels), 5, level)

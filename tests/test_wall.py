@@ -9,7 +9,7 @@ import pytest
 
 from hardwall.hdl.wall import Wall
 from hardwall.model import wall
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from stimuli.specs import spec
 
 NAMES = ("wall_stiffness", "wall_damping", "wall_position", "wall_left", "wall_forbid_pull")

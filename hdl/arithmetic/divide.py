@@ -5,8 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.arithmetic import divide as model
-
-from ..checks import check_int
+from hardwall.model.checks import check_int
 
 
 class Divide(wiring.Component):

@@ -5,8 +5,8 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.arithmetic import signed_divide as model
+from hardwall.model.checks import check_int
 
-from ..checks import check_int
 from .divide import Divide
 
 

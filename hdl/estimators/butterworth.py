@@ -33,8 +33,7 @@ class Estimator(EstimatorBlock):
     Source: Chawda, Celik, O'Malley, World Haptics 2011, "FDM" with a Butterworth filter.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(design, Design)
+    design_class = Design
 
     def elaborate(self, platform):
         m = Module()
@@ -44,8 +43,8 @@ class Estimator(EstimatorBlock):
         state_max = velocity.max << (state.f - velocity.f)
 
         running = Signal()
-        last = Signal.like(self.count)
-        moved = Signal.like(self.count)
+        last = Signal.like(self.seen.count)
+        moved = Signal.like(self.seen.count)
         d, d1, d2 = (Signal(range(-design.step_max, design.step_max + 1), name=name) for name in ("d", "d1", "d2"))
         four_x = Signal(signed(len(d) + 2))
         w, y = (Signal(shape(state), name=name) for name in "wy")
@@ -94,8 +93,8 @@ class Estimator(EstimatorBlock):
                 fresh = self.restart | ~running
                 # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
                 m.d.sync += [
-                    moved.eq(Mux(fresh, 0, (self.count - last)[: len(moved)].as_signed())),
-                    last.eq(self.count),
+                    moved.eq(Mux(fresh, 0, (self.seen.count - last)[: len(moved)].as_signed())),
+                    last.eq(self.seen.count),
                     running.eq(1),
                 ]
                 with m.If(fresh):

@@ -4,10 +4,11 @@ from amaranth.hdl import Array, Module, Mux, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from hardwall.model.checks import check_int
 from hardwall.model.estimators import cycle_times as model
 from hardwall.model.quadrature import RUN_MAX
 
-from ..checks import check_int
+from ..quadrature import Seen
 
 
 class CycleTimes(wiring.Component):
@@ -34,8 +35,8 @@ class CycleTimes(wiring.Component):
         Takes what the decoder has seen.
     restart : In(1)
         With `strobe`: this sample counts as the first.
-    count, stamp, stamp_a_rise, stamp_b_rise, stamp_a_fall, stamp_b_fall, edge, down, run : In
-        The decoder's outputs, see `hardwall.hdl.quadrature`.
+    seen : In(Seen)
+        What the decoder shows.
     news : Out(1)
         Whether there is a new edge.
     cycles : Out
@@ -62,16 +63,11 @@ class CycleTimes(wiring.Component):
         check_int("stamp_width", stamp_width, 3, 62)
         check_int("cycles_max", cycles_max, 1)
         self._cycles_max = cycles_max
-        stamps = ("stamp", "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall")
         super().__init__(
             {
                 "strobe": In(1),
                 "restart": In(1),
-                "count": In(signed(count_width)),
-                **{name: In(stamp_width) for name in stamps},
-                "edge": In(2),
-                "down": In(1),
-                "run": In(range(RUN_MAX + 1)),
+                "seen": In(Seen(count_width, stamp_width)),
                 "news": Out(1),
                 "cycles": Out(range(cycles_max + 1)),
                 "cycle": Out(stamp_width),
@@ -84,11 +80,11 @@ class CycleTimes(wiring.Component):
 
     @property
     def count_width(self) -> int:
-        return len(self.count)
+        return len(self.seen.count)
 
     @property
     def stamp_width(self) -> int:
-        return len(self.stamp)
+        return len(self.seen.stamp)
 
     @property
     def cycles_max(self) -> int:
@@ -101,15 +97,16 @@ class CycleTimes(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        width = len(self.stamp)
-        stamps = (self.stamp_a_rise, self.stamp_b_rise, self.stamp_a_fall, self.stamp_b_fall)
+        seen = self.seen
+        width = len(seen.stamp)
+        stamps = (seen.stamp_a_rise, seen.stamp_b_rise, seen.stamp_a_fall, seen.stamp_b_fall)
         now = Array(Signal(width, name=f"now_{kind}") for kind in range(4))
         before = Array(Signal(width, name=f"before_{kind}") for kind in range(4))
         time = Signal(width)
-        edge, run, last_run = Signal.like(self.edge), Signal.like(self.run), Signal.like(self.run)
+        edge, run, last_run = Signal.like(seen.edge), Signal.like(seen.run), Signal.like(seen.run)
         down, last_down = Signal(), Signal()
-        count = Signal.like(self.count)
-        moved = Signal.like(self.count)
+        count = Signal.like(seen.count)
+        moved = Signal.like(seen.count)
         running, first = Signal(), Signal()
         fresh = Signal(4)
 
@@ -137,16 +134,16 @@ class CycleTimes(wiring.Component):
                 m.d.sync += [
                     *(old.eq(new) for old, new in zip(before, now, strict=True)),
                     *(new.eq(stamp) for new, stamp in zip(now, stamps, strict=True)),
-                    time.eq(self.stamp),
-                    edge.eq(self.edge),
-                    kind.eq(self.edge),
-                    down.eq(self.down),
+                    time.eq(seen.stamp),
+                    edge.eq(seen.edge),
+                    kind.eq(seen.edge),
+                    down.eq(seen.down),
                     last_down.eq(down),
-                    run.eq(self.run),
+                    run.eq(seen.run),
                     last_run.eq(run),
                     # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
-                    moved.eq(self.count - count),
-                    count.eq(self.count),
+                    moved.eq(seen.count - count),
+                    count.eq(seen.count),
                     first.eq(self.restart | ~running),
                     running.eq(1),
                 ]

@@ -1,12 +1,12 @@
-"""What every velocity estimator is in hardware: its members, and how a decoder feeds it."""
+"""What every velocity estimator is in hardware: its members, and the bus by which it sees the decoder."""
 
-from amaranth.hdl import signed
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In, Member, Out
 
-from hardwall.model.quadrature import RUN_MAX
+from hardwall.model.estimators.estimate import EstimatorDesign
 
 from ..arithmetic.fixed import shape
 from ..block import Block
+from ..quadrature import Seen
 
 
 class EstimatorBlock(Block):
@@ -14,8 +14,8 @@ class EstimatorBlock(Block):
 
     Parameters
     ----------
-    design : Design
-        Of its twin; `kind` is the class that it must be of.
+    design : hardwall.model.estimators.estimate.EstimatorDesign
+        That of the estimator, of its `design_class`.
 
     Members
     -------
@@ -23,8 +23,8 @@ class EstimatorBlock(Block):
         Takes a sample.
     restart : In(1)
         With `strobe`: this sample counts as the first.
-    one input for each of `design.inputs` : In
-        Outputs of the decoder, by the same names, valid with `strobe`: `count` is the position, counts, and may wrap.
+    seen : In(Seen)
+        What the decoder shows, valid with `strobe`; an estimator uses `design.inputs` of it.
     one input for each of `design.words` : In
         Run-time parameters; constant from a `strobe` to its `valid`.
     velocity : Out(SQ)
@@ -40,17 +40,14 @@ class EstimatorBlock(Block):
         If `design` is not of that class.
     """
 
-    def __init__(self, design, kind: type):
-        def members() -> dict:
-            seen = {"count": signed(design.count_width), "edge": 2, "down": 1, "run": range(RUN_MAX + 1)}
-            return {
-                "strobe": In(1),
-                "restart": In(1),
-                **{name: In(design.stamp_width if name[:5] == "stamp" else seen[name]) for name in design.inputs},
-                **{word.name: In(shape(word.format)) for word in design.words},
-                "velocity": Out(shape(design.velocity)),
-                "saturated": Out(len(design.flags)),
-                "valid": Out(1),
-            }
-
-        super().__init__(design, kind, members)
+    @staticmethod
+    def members(design: EstimatorDesign) -> dict[str, Member]:
+        return {
+            "strobe": In(1),
+            "restart": In(1),
+            "seen": In(Seen(design.count_width, design.stamp_width)),
+            **{word.name: In(shape(word.format)) for word in design.words},
+            "velocity": Out(shape(design.velocity)),
+            "saturated": Out(len(design.flags)),
+            "valid": Out(1),
+        }

@@ -25,23 +25,22 @@ class Estimator(EstimatorBlock):
     Source: Chawda, Celik, O'Malley, World Haptics 2011, "FDM".
     """
 
-    def __init__(self, design: Design):
-        super().__init__(design, Design)
+    design_class = Design
 
     def elaborate(self, platform):
         m = Module()
         fmt = self._design.velocity
         running = Signal()
-        last = Signal.like(self.count)
-        moved = Signal.like(self.count)
+        last = Signal.like(self.seen.count)
+        moved = Signal.like(self.seen.count)
         taken = Signal()
 
         m.d.sync += taken.eq(self.strobe)
         with m.If(self.strobe):
             # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
             m.d.sync += [
-                moved.eq(Mux(running & ~self.restart, (self.count - last)[: len(moved)].as_signed(), 0)),
-                last.eq(self.count),
+                moved.eq(Mux(running & ~self.restart, (self.seen.count - last)[: len(moved)].as_signed(), 0)),
+                last.eq(self.seen.count),
                 running.eq(1),
             ]
 

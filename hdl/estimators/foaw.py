@@ -39,8 +39,7 @@ class Estimator(EstimatorBlock):
     Source: Janabi-Sharifi, Hayward, Chen, IEEE Transactions on Control Systems Technology 2000.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(design, Design)
+    design_class = Design
 
     def elaborate(self, platform):
         m = Module()
@@ -62,7 +61,7 @@ class Estimator(EstimatorBlock):
         m.d.comb += [
             history.strobe.eq(self.strobe),
             history.restart.eq(self.restart),
-            history.count.eq(self.count),
+            history.count.eq(self.seen.count),
             history.age.eq(age),
             division.dividend.eq(dividend),
             division.divisor.eq(divisor),

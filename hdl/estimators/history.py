@@ -2,7 +2,7 @@
 
 from amaranth.hdl import Module, Mux, Signal, signed, unsigned
 from amaranth.lib.memory import Memory
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.estimators.history import Design
 
@@ -51,21 +51,20 @@ class History(Block):
         If `design` is not of that class.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(
-            design,
-            Design,
-            lambda: {
-                "strobe": In(1),
-                "restart": In(1),
-                "count": In(signed(design.count_width)),
-                "valid": Out(1),
-                "stored": Out(1),
-                "limited": Out(1),
-                "age": In(design.age_bits),
-                "change": Out(signed(design.width)),
-            },
-        )
+    design_class = Design
+
+    @staticmethod
+    def members(design: Design) -> dict[str, Member]:
+        return {
+            "strobe": In(1),
+            "restart": In(1),
+            "count": In(signed(design.count_width)),
+            "valid": Out(1),
+            "stored": Out(1),
+            "limited": Out(1),
+            "age": In(design.age_bits),
+            "change": Out(signed(design.width)),
+        }
 
     def elaborate(self, platform):
         m = Module()

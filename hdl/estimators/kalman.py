@@ -33,8 +33,7 @@ class Estimator(EstimatorBlock):
     Source: Belanger, Dobrovolny, Helmy, Zhang, International Journal of Robotics Research 17 (1998), 1225.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(design, Design)
+    design_class = Design
 
     def elaborate(self, platform):
         m = Module()
@@ -42,8 +41,8 @@ class Estimator(EstimatorBlock):
         velocity, v_max = design.velocity, design.velocity.max << (design.v.f - design.velocity.f)
 
         running = Signal()
-        last = Signal.like(self.count)
-        moved = Signal.like(self.count)
+        last = Signal.like(self.seen.count)
+        moved = Signal.like(self.seen.count)
         d = Signal(range(-design.step_max, design.step_max + 1))
         # With a gain just below 2, lead may turn to its own opposite and a little beyond.
         lead = Signal(signed(design.lead.width + 1))
@@ -101,8 +100,8 @@ class Estimator(EstimatorBlock):
                 fresh = self.restart | ~running
                 # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
                 m.d.sync += [
-                    moved.eq(Mux(fresh, 0, (self.count - last)[: len(moved)].as_signed())),
-                    last.eq(self.count),
+                    moved.eq(Mux(fresh, 0, (self.seen.count - last)[: len(moved)].as_signed())),
+                    last.eq(self.seen.count),
                     running.eq(1),
                 ]
                 with m.If(fresh):

@@ -35,8 +35,7 @@ class Estimator(EstimatorBlock):
     Source: Chawda, Celik, O'Malley, World Haptics 2011, the first-order differentiator; Levant 1998.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(design, Design)
+    design_class = Design
 
     def elaborate(self, platform):
         m = Module()
@@ -93,17 +92,17 @@ def arrive(m, block, lead, u1, e, then):
     """
     velocity, error = block.design.velocity, block.design.error
     running = Signal()
-    last, moved = Signal.like(block.count), Signal.like(block.count)
+    last, moved = Signal.like(block.seen.count), Signal.like(block.seen.count)
     distance = Signal(signed(max(len(lead), len(moved) + velocity.f) + 1))
     first = Signal()
     fresh = block.restart | ~running
     with m.State("SAMPLE"), m.If(block.strobe):
         # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
         m.d.sync += [
-            moved.eq(Mux(fresh, 0, (block.count - last)[: len(moved)].as_signed())),
+            moved.eq(Mux(fresh, 0, (block.seen.count - last)[: len(moved)].as_signed())),
             lead.eq(Mux(fresh, 0, lead)),
             u1.eq(Mux(fresh, 0, u1)),
-            last.eq(block.count),
+            last.eq(block.seen.count),
             running.eq(1),
             first.eq(fresh),
         ]

@@ -38,8 +38,7 @@ class Estimator(levant_semi_implicit.Estimator):
     Source: ours, on Levant 1998 and the projection of `levant_semi_implicit`.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(design, Design)
+    design_class = Design
 
     def elaborate(self, platform):
         self._level = Signal(range(max(self.design.levels, 1) + 1))

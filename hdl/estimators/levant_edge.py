@@ -43,8 +43,7 @@ class Estimator(EstimatorBlock):
     Source: Levant 1998 for the law; its use on edges is this project's.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(design, Design)
+    design_class = Design
 
     def elaborate(self, platform):
         m = Module()
@@ -124,17 +123,17 @@ class Estimator(EstimatorBlock):
 
     def _states_of_the_sample(self, m, s):
         """What the sample is: which edge came last, and what is to be done with it."""
-        d = self._design
+        d, seen = self._design, self.seen
         with m.State("SAMPLE"), m.If(self.strobe):
-            stamps = Array([self.stamp_a_rise, self.stamp_b_rise, self.stamp_a_fall, self.stamp_b_fall])
+            stamps = Array([seen.stamp_a_rise, seen.stamp_b_rise, seen.stamp_a_fall, seen.stamp_b_fall])
             m.d.sync += [
                 s.fresh.eq(self.restart | ~s.running),
                 s.running.eq(1),
-                s.now.eq(self.stamp),
-                s.at.eq(stamps[self.edge]),
-                s.to.eq(self.count + self.down),
-                s.to_kind.eq(self.edge ^ Cat(0, self.down)),
-                s.full_run.eq(self.run == RUN_MAX),
+                s.now.eq(seen.stamp),
+                s.at.eq(stamps[seen.edge]),
+                s.to.eq(seen.count + seen.down),
+                s.to_kind.eq(seen.edge ^ Cat(0, seen.down)),
+                s.full_run.eq(seen.run == RUN_MAX),
             ]
             m.next = "DIFFERENCE"
         with m.State("DIFFERENCE"):

@@ -35,8 +35,7 @@ class Estimator(levant_semi_implicit.Estimator):
     Source: Acary, Brogliato 2010; Brogliato, Polyakov, Efimov 2020; Mojallizadeh, Brogliato, Acary 2021.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(design, Design)
+    design_class = Design
 
     def elaborate(self, platform):
         self._quarter = Signal(max(2 * len(self._word(0)) - self.design.quarter_shift, 1))

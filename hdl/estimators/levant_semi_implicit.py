@@ -36,8 +36,7 @@ class Estimator(EstimatorBlock):
     Source: Acary, Brogliato, Orlov 2012; Michel et al. 2021; the module of the design says what is our own.
     """
 
-    def __init__(self, design: Design, kind: type = Design):
-        super().__init__(design, kind)
+    design_class = Design
 
     # What those of the family that project do in their own way.
 

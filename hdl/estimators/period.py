@@ -1,6 +1,7 @@
 """Velocity from the time of whole encoder cycles."""
 
 from amaranth.hdl import Module, Mux, Signal
+from amaranth.lib.wiring import connect, flipped
 
 from hardwall.model.estimators.period import Design
 
@@ -33,8 +34,7 @@ class Estimator(EstimatorBlock):
     Source: Brown, Schneider, Mulligan 1992; Ohmae et al. 1982.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(design, Design)
+    design_class = Design
 
     def elaborate(self, platform):
         m = Module()
@@ -43,8 +43,8 @@ class Estimator(EstimatorBlock):
         quotient_width, fraction = design.velocity.width, design.velocity.f + 1
 
         m.submodules.times = times = CycleTimes(design.count_width, design.stamp_width, design.cycles_max)
-        for name in ("strobe", "restart", *design.inputs):
-            m.d.comb += getattr(times, name).eq(getattr(self, name))
+        m.d.comb += [times.strobe.eq(self.strobe), times.restart.eq(self.restart)]
+        connect(m, flipped(self.seen), times.seen)
 
         # The speed's quotient is held until there is another edge.
         scaled = Signal(range(4 * clocks * design.cycles_max + 1))
@@ -71,7 +71,7 @@ class Estimator(EstimatorBlock):
         magnitude = Mux(saturated, design.velocity.max, far)
         m.d.sync += self.valid.eq(0)
         with m.If(self.strobe):
-            m.d.sync += down.eq(self.down)
+            m.d.sync += down.eq(self.seen.down)
         with m.FSM():
             with m.State("OBSERVE"), m.If(times.valid):
                 m.d.comb += limit.start.eq(1)

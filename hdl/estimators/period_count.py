@@ -1,6 +1,7 @@
 """Velocity by the time of one encoder cycle when slow, by the counts of a window when fast."""
 
 from amaranth.hdl import Module, Mux, Signal, signed
+from amaranth.lib.wiring import connect, flipped
 
 from hardwall.model.estimators.period_count import Design
 
@@ -35,8 +36,7 @@ class Estimator(EstimatorBlock):
     Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(design, Design)
+    design_class = Design
 
     def elaborate(self, platform):
         m = Module()
@@ -44,24 +44,24 @@ class Estimator(EstimatorBlock):
         velocity, window_bits = design.velocity, design.window_bits
 
         m.submodules.times = times = CycleTimes(design.count_width, design.stamp_width, design.cycles_max)
-        for name in ("strobe", "restart", *design.inputs):
-            m.d.comb += getattr(times, name).eq(getattr(self, name))
+        m.d.comb += [times.strobe.eq(self.strobe), times.restart.eq(self.restart)]
+        connect(m, flipped(self.seen), times.seen)
 
         running, down = Signal(), Signal()
         samples = Signal(range(1 << window_bits)) if window_bits else Signal(1)
-        first, moved = Signal.like(self.count), Signal.like(self.count)
+        first, moved = Signal.like(self.seen.count), Signal.like(self.seen.count)
         full, counting = Signal(), Signal()
         far_counted = Signal(signed(len(moved) + velocity.f - window_bits))
         size = Mux(moved < 0, -moved, moved)
         m.d.comb += far_counted.eq(moved << (velocity.f - window_bits))
         m.d.sync += full.eq(0)
         with m.If(self.strobe):
-            m.d.sync += [down.eq(self.down), running.eq(1), samples.eq(samples + 1)]
+            m.d.sync += [down.eq(self.seen.down), running.eq(1), samples.eq(samples + 1)]
             with m.If(self.restart | ~running):
-                m.d.sync += [samples.eq(0), first.eq(self.count), moved.eq(0), counting.eq(0)]
+                m.d.sync += [samples.eq(0), first.eq(self.seen.count), moved.eq(0), counting.eq(0)]
             with m.Elif(samples == (1 << window_bits) - 1):
                 # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
-                m.d.sync += [samples.eq(0), first.eq(self.count), moved.eq(self.count - first), full.eq(1)]
+                m.d.sync += [samples.eq(0), first.eq(self.seen.count), moved.eq(self.seen.count - first), full.eq(1)]
         with m.If(full):
             switch = self.period_count_switch
             m.d.sync += counting.eq((size > switch) | counting & (size + 1 >= switch))

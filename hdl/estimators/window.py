@@ -30,8 +30,7 @@ class Estimator(EstimatorBlock):
     Source: the minimax window; see the model.
     """
 
-    def __init__(self, design: Design):
-        super().__init__(design, Design)
+    design_class = Design
 
     def elaborate(self, platform):
         m = Module()
@@ -46,7 +45,7 @@ class Estimator(EstimatorBlock):
         m.d.comb += [
             history.strobe.eq(self.strobe),
             history.restart.eq(self.restart),
-            history.count.eq(self.count),
+            history.count.eq(self.seen.count),
             history.age.eq(length),
             division.dividend.eq(history.change),
             division.divisor.eq(length),

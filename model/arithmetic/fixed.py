@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+from ..checks import check_number
 from ..compiled import compiled
 
 
@@ -63,8 +64,10 @@ class Format:
         """Return the word nearest to `value`, ties upward.
 
         Raises:
-            ValueError: if the value is not finite or its word is outside the format.
+            TypeError: if the value is not a number.
+            ValueError: if it is not finite or its word is outside the format.
         """
+        check_number(f"value for {self}", value)
         if not math.isfinite(value):
             raise ValueError(f"value for {self} must be finite, not {value!r}")
         word = math.floor(math.ldexp(value, self.f) + 0.5)

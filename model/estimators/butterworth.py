@@ -46,15 +46,19 @@ motion it is the filter's step response, as for any step of velocity: 4.3 % over
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..arithmetic.fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
+from ..checks import FieldError
 from ..compiled import compiled
-from ..words import GAIN_BITS, Word, check_positive
-from .estimate import estimate
+from ..words import GAIN_BITS, Word
+from .estimate import EstimatorDesign, EstimatorGains, estimate
 
-OUTPUTS = ("u",)
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
+
 CUTOFF_MAX = 0.4
 """Highest cutoff, of the sampling rate."""
 RESOLUTION_BITS = 10
@@ -74,20 +78,13 @@ STEPS = 15
 
 
 @dataclass(frozen=True)
-class Gains:
-    """The cutoff of the low pass, Hz.
-
-    Raises:
-        ValueError: if it is not finite and more than 0.
-    """
+class Gains(EstimatorGains):
+    """The cutoff of the low pass, Hz."""
 
     cutoff_hz: float
 
-    def __post_init__(self):
-        check_positive(self)
-
     @classmethod
-    def default(cls, axis) -> "Gains":
+    def default(cls, axis: "AxisSpec") -> "Gains":
         """Return the cutoff with half of the minimax window for delay, sqrt(2) / (2 pi f_c) = sqrt(q / C)."""
         return cls(min(_default_hz(axis), CUTOFF_MAX * axis.sample_hz))
 
@@ -121,7 +118,7 @@ class State(NamedTuple):
     """`w` and `y` have the fraction bits of the accumulators (float: counts a sample); `d1`, `d2` are differences."""
 
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     d1: int
     d2: int
     w: float
@@ -138,7 +135,7 @@ START = State(0, 0, 0, 0, 0, 0)
 FLOAT_START = State(0, 0, 0, 0, 0.0, 0.0)
 
 
-class Design:
+class Design(EstimatorDesign):
     """Formats, run-time words and latency of the filter for an axis: the module says how they follow.
 
     Attributes:
@@ -153,13 +150,14 @@ class Design:
         ValueError: if the cutoff is above CUTOFF_MAX of the rate, or below what int64 can hold; with the range.
     """
 
-    inputs = ("count",)
+    name = "butterworth"
+    gains_class = Gains
     flags = ("velocity_saturated", "state_saturated")
     latency = STEPS
 
-    def __init__(self, axis, gains: Gains):
+    def __init__(self, axis: "AxisSpec", gains: Gains):
+        super().__init__(axis, gains)
         self._sample_hz = axis.sample_hz
-        self.count_width = axis.count_width
         # No two counts are farther apart than half of their range.
         self.step_max = min(math.floor(2 * axis.speed_max_counts_per_sample) + 2, 1 << (axis.count_width - 1))
         self.coefficient = UQ(1, GAIN_BITS - 1)
@@ -211,7 +209,7 @@ class Design:
     def _check(self, cutoff_hz: float):
         low, high = self.cutoff_min_hz, self.cutoff_max_hz
         if not low * (1 - 1e-9) <= cutoff_hz <= high * (1 + 1e-9):
-            raise ValueError(f"cutoff_hz must be {low:g} to {high:g} at these rates, not {cutoff_hz!r}")
+            raise FieldError("cutoff_hz", f"must be {low:g} to {high:g} at these rates, not {cutoff_hz!r}")
 
     def words_for(self, cutoff_hz: float) -> dict[str, float]:
         """Return the three words, by name, as numbers for `Axis`; the fixed-point axis rounds them.
@@ -234,8 +232,7 @@ class Design:
         shift = self.operand.f + self.coefficient.f - self.state.f
         return shift + EXPONENT_STEP * min(exponent, self.exponent_max)
 
-    def params(self, words: dict[str, int]) -> Params:
-        """Return the integer kernel's parameters for the given run-time words."""
+    def params(self, words: Mapping[str, int]) -> Params:
         return Params(
             words["butterworth_frequency"],
             words["butterworth_damping"],
@@ -248,13 +245,16 @@ class Design:
             self.velocity.max << (self.state.f - self.velocity.f),
         )
 
-    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+    def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 kernel's parameters: coefficients from `si` where given, else those of `gains`."""
         value = {**self.words_for(gains.cutoff_hz), **si}
         scale = 2.0 ** -(EXPONENT_STEP * min(value["butterworth_exponent"], self.exponent_max))
         return FloatParams(
             value["butterworth_frequency"] * scale, value["butterworth_damping"] * scale, self.count_width
         )
+
+    def start(self, floating: bool = False) -> State:
+        return FLOAT_START if floating else START
 
 
 @estimate.register(Params)

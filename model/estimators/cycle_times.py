@@ -31,7 +31,7 @@ class Memory(NamedTuple):
     """What is kept of the last sample's `Seen`, and which kinds' stamps are known (bit k: kind k) and not too old."""
 
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     down: int
     run: int
     stamp_a_rise: int

@@ -1,6 +1,112 @@
-"""One step of a velocity estimator: the kernel that every estimator registers a variant of."""
+"""What every velocity estimator is in the model: its gains, its design, and one step of its kernel.
 
+`EstimatorGains` and `EstimatorDesign` are the contract; `estimate` is the kernel of which each estimator registers two
+variants, one for the integer words of the hardware and one for the same algorithm in float64. To add an estimator, see
+`registry`.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+from ..arithmetic.fixed import SQ
+from ..checks import FieldError
 from ..compiled import by_type
+from ..words import Word
+
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
+
+
+@dataclass(frozen=True)
+class EstimatorGains(ABC):
+    """The gains of an estimator in SI units, which the names of the fields tell.
+
+    Raises:
+        ValueError: for a field that is not finite and more than 0.
+    """
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
+                raise FieldError(name, f"must be finite and more than 0, not {value!r}")
+
+    @classmethod
+    @abstractmethod
+    def default(cls, axis: "AxisSpec") -> Self:
+        """Return the gains for an axis that names none, from its rates, ranges and count size alone."""
+
+
+class EstimatorDesign(ABC):
+    """Formats, run-time words and latency of an estimator, derived from an axis and gains.
+
+    Attributes of the class:
+        name: the estimator's in the registry; the names of its words begin with it, hyphens as underscores.
+        gains_class: its `EstimatorGains`.
+        outputs: names of its selectable outputs, the default first; the word `output_word()` selects one of several.
+        inputs: names of what it uses of `quadrature.Seen`.
+        flags: names of its saturation flags, bit 0 first.
+
+    Attributes:
+        count_width, stamp_width: bits of the decoder's count and of its stamps.
+        velocity: format of the velocity, counts a sample.
+        words: its run-time words, in the order of the hardware's ports.
+        latency: clocks from strobe to valid.
+
+    Raises:
+        ValueError: if the gains or the axis do not fit what int64 and the hardware hold, with the accepted range.
+    """
+
+    name: ClassVar[str]
+    gains_class: ClassVar[type[EstimatorGains]]
+    outputs: ClassVar[tuple[str, ...]] = ("u",)
+    inputs: ClassVar[tuple[str, ...]] = ("count",)
+    flags: ClassVar[tuple[str, ...]] = ("velocity_saturated",)
+    velocity: SQ
+    words: tuple[Word, ...] = ()
+
+    def __init__(self, axis: "AxisSpec", gains: Any):
+        self.count_width, self.stamp_width = axis.count_width, axis.stamp_width
+
+    @property
+    @abstractmethod
+    def latency(self) -> int:
+        """Clocks from strobe to valid."""
+
+    @abstractmethod
+    def params(self, words: Mapping[str, int]) -> tuple:
+        """Return the integer kernel's parameters for the given run-time words."""
+
+    @abstractmethod
+    def float_params(self, gains: Any, output: str, si: Mapping[str, float]) -> tuple:
+        """Return the float64 kernel's parameters: gains unrounded, those of `si`, by word, before the designed."""
+
+    @abstractmethod
+    def start(self, floating: bool = False) -> tuple:
+        """Return the state before the first sample, for one run: it may hold arrays that the run writes to."""
+
+    @classmethod
+    def uses_stamps(cls) -> bool:
+        """Return whether it needs the clock stamps of edges, beside the count."""
+        return cls.inputs != ("count",)
+
+    @classmethod
+    def output_word(cls) -> str:
+        """Return the name of the run-time word that selects among several outputs."""
+        return f"{cls.name.replace('-', '_')}_output"
+
+    @classmethod
+    def choose(cls, output: str) -> dict[str, int]:
+        """Return the run-time word, by name, that selects an output; none where there is one only.
+
+        Raises:
+            ValueError: if there is no such output.
+        """
+        if output not in cls.outputs:
+            raise ValueError(f"output of {cls.name} must be one of {', '.join(cls.outputs)}, not {output!r}")
+        return {cls.output_word(): cls.outputs.index(output)} if len(cls.outputs) > 1 else {}
 
 
 @by_type
@@ -8,8 +114,8 @@ def estimate(params, state, seen, restart):
     """Take one sample: return (state, velocity, flags).
 
     Args:
-        params: an estimator's `Params` (integer words) or `FloatParams` (the same algorithm in float64).
-        state: its state, from the start or the previous call; an array in it is written in place.
+        params: what a design's `params` (integer words) or `float_params` (the same algorithm in float64) returns.
+        state: its state, from `start` or the previous call; an array in it is written in place.
         seen: a `quadrature.Seen`; its count is a signed word that may have wrapped.
         restart: true to forget the past: this sample counts as the first.
 

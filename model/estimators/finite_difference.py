@@ -5,22 +5,24 @@ the largest speed saturates for that sample alone. The first sample, and one wit
 standstill; a reset in motion is right from the second sample on.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
 from ..compiled import compiled
-from .estimate import estimate
+from .estimate import EstimatorDesign, EstimatorGains, estimate
 
-OUTPUTS = ("u",)
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
 
 
 @dataclass(frozen=True)
-class Gains:
+class Gains(EstimatorGains):
     """A finite difference has no gains."""
 
     @classmethod
-    def default(cls, axis) -> "Gains":
+    def default(cls, axis: "AxisSpec") -> "Gains":
         return cls()
 
 
@@ -31,7 +33,7 @@ class Params(NamedTuple):
 
 class State(NamedTuple):
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
 
 
 class FloatParams(NamedTuple):
@@ -39,30 +41,31 @@ class FloatParams(NamedTuple):
 
 
 START = State(0, 0)
-FLOAT_START = START
 
 
-class Design:
+class Design(EstimatorDesign):
     """Formats of the finite difference for an axis.
 
     The velocity is a whole number of counts a sample; its range is twice the axis's largest speed, so that a loop that
     overshoots still reads true. It saturates beyond, with the flag `velocity_saturated`.
     """
 
-    inputs = ("count",)
-    flags = ("velocity_saturated",)
-    words = ()
+    name = "fdm"
+    gains_class = Gains
     latency = 2
 
-    def __init__(self, axis, gains: Gains):
-        self.count_width = axis.count_width
+    def __init__(self, axis: "AxisSpec", gains: Gains):
+        super().__init__(axis, gains)
         self.velocity = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), axis.shrunk(0))
 
-    def params(self, words: dict[str, int]) -> Params:
+    def params(self, words: Mapping[str, int]) -> Params:
         return Params(self.count_width, self.velocity.max)
 
-    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+    def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         return FloatParams(self.count_width)
+
+    def start(self, floating: bool = False) -> State:
+        return START
 
 
 @compiled

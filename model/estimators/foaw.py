@@ -42,21 +42,25 @@ Control Systems Technology 2000.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..arithmetic.fixed import SQ, UQ
 from ..arithmetic.signed_divide import divide
 from ..arithmetic.signed_divide import latency as divide_latency
+from ..checks import FieldError
 from ..compiled import compiled
 from ..words import Word
 from . import history
-from .estimate import estimate
+from .estimate import EstimatorDesign, EstimatorGains, estimate
 from .history import change_over, take
 
-OUTPUTS = ("end-fit", "best-fit")
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
+
 TAPS = 12
 """Most steps back that are searched, one a clock."""
 UNIT = math.lcm(*range(1, TAPS + 1))
@@ -72,7 +76,7 @@ WEIGHTS = np.array([0, *(UNIT // i for i in range(1, TAPS + 1))])
 
 
 @dataclass(frozen=True)
-class Gains:
+class Gains(EstimatorGains):
     """Band, counts, and longest window, s.
 
     Raises:
@@ -86,12 +90,12 @@ class Gains:
         band, window = self.band_counts, self.window_s
         most = BAND.to_real(BAND.max)
         if not (isinstance(band, int | float) and 0 <= band <= most):
-            raise ValueError(f"band_counts must be 0 to {most:g}, not {band!r}")
+            raise FieldError("band_counts", f"must be 0 to {most:g}, not {band!r}")
         if not (isinstance(window, int | float) and math.isfinite(window) and window > 0):
-            raise ValueError(f"window_s must be finite and more than 0, not {window!r}")
+            raise FieldError("window_s", f"must be finite and more than 0, not {window!r}")
 
     @classmethod
-    def default(cls, axis) -> "Gains":
+    def default(cls, axis: "AxisSpec") -> "Gains":
         """Return a band of one count, and the window in which half of it is for the axis's largest acceleration."""
         return cls(BAND_COUNTS, 2 * math.sqrt(BAND_COUNTS * axis.count_m / axis.acceleration_max_m_per_s2))
 
@@ -125,7 +129,7 @@ class FloatParams(NamedTuple):
     samples: float
 
 
-class Design:
+class Design(EstimatorDesign):
     """Formats, run-time words and latency of FOAW for an axis: the module says how they follow.
 
     Attributes:
@@ -139,11 +143,12 @@ class Design:
         ValueError: if the window is too long for int64, with the accepted range.
     """
 
-    inputs = ("count",)
-    flags = ("velocity_saturated",)
+    name = "foaw"
+    gains_class = Gains
+    outputs = ("end-fit", "best-fit")
 
-    def __init__(self, axis, gains: Gains):
-        self.count_width = axis.count_width
+    def __init__(self, axis: "AxisSpec", gains: Gains):
+        super().__init__(axis, gains)
         self.history = history.Design(axis, gains.window_s, TAPS)
         self.spacing = self.history.longest // TAPS
         self.velocity = SQ(self.history.change.i, axis.shrunk(self.history.fraction + ROUNDING_BITS))
@@ -159,26 +164,24 @@ class Design:
 
     @property
     def latency(self) -> int:
-        """Clocks from strobe to valid."""
         return STEPS + self.history.latency + TAPS + divide_latency(self.velocity.width - 1)
 
     def start(self, floating: bool = False) -> State:
         """Return the state before the first sample, with a memory of its own."""
         return State(self.history.start(), 0.0 if floating else 0)
 
-    def params(self, words: dict[str, int]) -> Params:
-        """Return the kernel's parameters for the given run-time words."""
+    def params(self, words: Mapping[str, int]) -> Params:
         window = min(max(words["foaw_window"], 1), TAPS)
         output, band = words["foaw_output"], words["foaw_band"]
         return Params(self.history.params(), output, band, 1 << BAND.f, window, self.spacing, self.fraction)
 
-    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+    def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 algorithm's parameters: the same taps, the band unrounded; `si` before the designed."""
         _, band, window = self.words
         taps = window.from_si(si["foaw_window"]) if "foaw_window" in si else window.reset
         return FloatParams(
             self.history.params(floating=True),
-            OUTPUTS.index(output),
+            self.outputs.index(output),
             si["foaw_band"] / band.si_per_unit if "foaw_band" in si else gains.band_counts,
             1.0,
             min(max(taps, 1), TAPS),

@@ -24,12 +24,16 @@ Formats, derived:
   difference over it exact. The hold adds at most every - 1 samples to the age of a window of thousands.
 """
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
+from ..checks import FieldError
 from ..compiled import compiled
+
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
 
 MEMORY_BITS = 1 << 16
 """Largest memory: 16 of the 30 blocks of 4 kbit in an iCE40UP5K, 4 of the 56 of 18 kbit in an ECP5-25F."""
@@ -55,7 +59,7 @@ class State(NamedTuple):
     """
 
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     position: int
     phase: int
     head: int
@@ -81,13 +85,13 @@ class Design:
 
     latency = LATENCY
 
-    def __init__(self, axis, window_s: float, steps: int = 1):
+    def __init__(self, axis: "AxisSpec", window_s: float, steps: int = 1):
         self.count_width = axis.count_width
         self.change = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), 0)
         # Rounded to whole steps, a window may grow by half, or to the one step that it has at least.
         most = 2.0 ** (WIDTH_MAX - 1 - self.change.i) / axis.sample_hz
         if not 0 < window_s <= most:
-            raise ValueError(f"window_s must be more than 0 and at most {most:g} at these rates, not {window_s!r}")
+            raise FieldError("window_s", f"must be more than 0 and at most {most:g} at these rates, not {window_s!r}")
         samples = steps * max(1, round(window_s * axis.sample_hz / steps))
         for shift in range(WIDTH_MAX):
             self.every = 1 << shift

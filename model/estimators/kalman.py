@@ -53,17 +53,21 @@ the step response, as for any step of velocity: about 41 % over, and settled in 
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..arithmetic.fixed import SQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
+from ..checks import FieldError
 from ..compiled import compiled
-from ..words import GAIN_BITS, Word, check_positive, gain_format
-from .estimate import estimate
+from ..words import GAIN_BITS, Word, gain_format
+from .estimate import EstimatorDesign, EstimatorGains, estimate
 
-OUTPUTS = ("u",)
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
+
 RESOLUTION_BITS = 11
 """The output LSB is no larger than sqrt(C') over two to this."""
 GUARD_BITS = 6
@@ -79,15 +83,12 @@ STEPS = 12
 
 
 @dataclass(frozen=True)
-class Gains:
+class Gains(EstimatorGains):
     """The noise model, SI units.
 
     Attributes:
         acceleration_rms_m_per_s2, acceleration_time_s: acceleration of the axis, and for how long it lasts.
         noise_rms_m, noise_time_s: error of the position measured, and for how long it lasts.
-
-    Raises:
-        ValueError: if one is not finite and more than 0.
     """
 
     acceleration_rms_m_per_s2: float
@@ -95,11 +96,8 @@ class Gains:
     noise_rms_m: float
     noise_time_s: float
 
-    def __post_init__(self):
-        check_positive(self)
-
     @classmethod
-    def default(cls, axis) -> "Gains":
+    def default(cls, axis: "AxisSpec") -> "Gains":
         """Return the module's model: uniform acceleration within C, uniform quantisation, the minimax window."""
         bound, q = axis.acceleration_max_m_per_s2, axis.count_m
         window = 2 * math.sqrt(q / bound)
@@ -174,7 +172,7 @@ class State(NamedTuple):
     """Words of the formats of `Design` (float: counts and sample periods); `count` is the last one."""
 
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     lead: float
     v: float
     a: float
@@ -191,7 +189,7 @@ START = State(0, 0, 0, 0, 0)
 FLOAT_START = State(0, 0, 0.0, 0.0, 0.0)
 
 
-class Design:
+class Design(EstimatorDesign):
     """Formats, run-time words and latency of the filter for an axis: the module says how they follow.
 
     Attributes:
@@ -204,13 +202,14 @@ class Design:
         ValueError: if the noise model has a bandwidth too small for int64, with the least acceleration.
     """
 
-    inputs = ("count",)
+    name = "kalman"
+    gains_class = Gains
     flags = ("velocity_saturated", "innovation_saturated", "state_saturated")
     latency = STEPS
 
-    def __init__(self, axis, gains: Gains):
+    def __init__(self, axis: "AxisSpec", gains: Gains):
+        super().__init__(axis, gains)
         self._axis = axis
-        self.count_width = axis.count_width
         # No two counts are farther apart than half of their range.
         self.step_max = most = min(math.floor(2 * axis.speed_max_counts_per_sample) + 2, 1 << (axis.count_width - 1))
         index = gains.index(axis)
@@ -230,9 +229,9 @@ class Design:
         )
         if room < 0:
             least = gains.acceleration_rms_m_per_s2 * 2.0 ** (-3 * room)
-            raise ValueError(
-                f"acceleration_rms_m_per_s2 must be at least {least:g} at these rates, "
-                f"not {gains.acceleration_rms_m_per_s2!r}"
+            raise FieldError(
+                "acceleration_rms_m_per_s2",
+                f"must be at least {least:g} at these rates, not {gains.acceleration_rms_m_per_s2!r}",
             )
         root = math.sqrt(axis.acceleration_max_m_per_s2 / axis.count_m) / axis.sample_hz
         f = axis.shrunk(min(max(RESOLUTION_BITS - math.floor(math.log2(root)), 0), room))
@@ -261,27 +260,36 @@ class Design:
         rate = self._axis.sample_hz
         return {"kalman_position": k_x, "kalman_velocity": k_v * rate, "kalman_acceleration": k_a * rate**2}
 
-    def params(self, words: dict[str, int]) -> Params:
-        """Return the integer kernel's parameters for the given run-time words."""
+    def params(self, words: Mapping[str, int]) -> Params:
+        k_x, k_v, k_a = (words[word.name] for word in self.words)
+        x_shift, v_shift, a_shift = self.shifts
         return Params(
-            *(words[word.name] for word in self.words),
-            *self.shifts,
-            self.count_width,
-            self.step_max,
-            self.lead.f,
-            self.v.f - self.lead.f + 1,
-            self.a.f - self.v.f,
-            self.lead.f - self.operand.f,
-            self.v.f - self.velocity.f,
-            self.lead.max,
-            self.velocity.max << (self.v.f - self.velocity.f),
-            self.a.max,
+            k_x=k_x,
+            k_v=k_v,
+            k_a=k_a,
+            x_shift=x_shift,
+            v_shift=v_shift,
+            a_shift=a_shift,
+            count_width=self.count_width,
+            step_max=self.step_max,
+            fraction=self.lead.f,
+            v_to_x=self.v.f - self.lead.f + 1,
+            a_to_v=self.a.f - self.v.f,
+            operand_shift=self.lead.f - self.operand.f,
+            output_shift=self.v.f - self.velocity.f,
+            lead_max=self.lead.max,
+            v_max=self.velocity.max << (self.v.f - self.velocity.f),
+            a_max=self.a.max,
         )
 
-    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+    def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 kernel's parameters: gains from `si` where given, else those of the noise model."""
         value = {**self.words_for(gains), **si}
-        return FloatParams(*(value[word.name] / word.si_per_unit for word in self.words), self.count_width)
+        k_x, k_v, k_a = (value[word.name] / word.si_per_unit for word in self.words)
+        return FloatParams(k_x, k_v, k_a, self.count_width)
+
+    def start(self, floating: bool = False) -> State:
+        return FLOAT_START if floating else START
 
 
 @estimate.register(Params)

@@ -39,18 +39,21 @@ and alpha tau: see `levant_semi_implicit` for what does.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..arithmetic.fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from ..arithmetic.sqrt import isqrt
 from ..arithmetic.sqrt import latency as sqrt_latency
+from ..checks import FieldError
 from ..compiled import compiled
-from ..words import GAIN_BITS, Word, check_positive
-from .estimate import estimate
-from .registry import output_word
+from ..words import GAIN_BITS, Word
+from .estimate import EstimatorDesign, EstimatorGains, estimate
 
-OUTPUTS = ("u", "u1")
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
+
 ALPHA_BITS = 9
 """The designed alpha's word has at least this many bits below its top one: it is off by 0.1 % at most."""
 POSITION_BUDGET = 2.0**-5
@@ -62,21 +65,14 @@ STEPS = 7
 
 
 @dataclass(frozen=True)
-class Gains:
-    """Gains in SI units: lambda in m^(1/2)/s, alpha in m/s^2.
-
-    Raises:
-        ValueError: if either is not finite and more than 0.
-    """
+class Gains(EstimatorGains):
+    """Gains in SI units: lambda in m^(1/2)/s, alpha in m/s^2."""
 
     lambda_sqrt_m_per_s: float
     alpha_m_per_s2: float
 
-    def __post_init__(self):
-        check_positive(self)
-
     @classmethod
-    def default(cls, axis) -> "Gains":
+    def default(cls, axis: "AxisSpec") -> "Gains":
         """Return the paper's proposed gains for |f''| <= C, the axis's bound: lambda = sqrt(C), alpha = 1.1 C."""
         bound = axis.acceleration_max_m_per_s2
         return cls(math.sqrt(bound), 1.1 * bound)
@@ -100,7 +96,7 @@ class State(NamedTuple):
     """`lead` and `u1` have the fraction bits of the velocity format (float: counts); `count` is the last one."""
 
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     lead: float
     u1: float
 
@@ -116,14 +112,12 @@ START = State(0, 0, 0, 0)
 FLOAT_START = State(0, 0, 0.0, 0.0)
 
 
-class Design:
+class Design(EstimatorDesign):
     """Formats, run-time words and latency of the differentiator for an axis: the module says how they follow.
 
     Its kin of other kernels differ in the attributes of the class and in the methods that begin with one underscore.
 
     Attributes:
-        name: in the registry; the words begin with it.
-        kinds: `Params` and `FloatParams` of the kernels.
         steps: clocks of the sequence besides the root.
         roundings: how often u is rounded to its fraction bits.
         velocity, error, root, radicand: formats of u and u1, e, sqrt(|e|) and its integer radicand.
@@ -134,20 +128,20 @@ class Design:
         ValueError: if the gains do not fit any format that int64 can hold, with the accepted range.
     """
 
-    inputs = ("count",)
-    flags = ("error_saturated", "velocity_saturated")
     name = "levant"
-    kinds = (Params, FloatParams)
+    gains_class = Gains
+    outputs = ("u", "u1")
+    flags = ("error_saturated", "velocity_saturated")
     steps = STEPS
     roundings = 1
 
-    def __init__(self, axis, gains: Gains):
+    def __init__(self, axis: "AxisSpec", gains: Gains):
+        super().__init__(axis, gains)
         tau, q = 1 / axis.sample_hz, axis.count_m
         lam = gains.lambda_sqrt_m_per_s * tau / math.sqrt(q)
         alpha = gains.alpha_m_per_s2 * tau**2 / q
         speed = axis.speed_max_counts_per_sample
 
-        self.count_width = axis.count_width
         i = 1 + bits_for(max(2 * speed, 2.0))
         # A gain that moves u across its whole range in a sample is no gain; one too small needs more than int64.
         f_max = 60 - max(axis.count_width, i)
@@ -192,7 +186,7 @@ class Design:
             Word(
                 f"{prefix}_alpha", self.alpha, q / tau**2, "m/s^2", self.alpha.from_real(alpha), "gain of the sign term"
             ),
-            Word(output_word(self.name), UQ(1, 0), 1.0, "", 0, "velocity output: 0 for u, 1 for u1"),
+            Word(self.output_word(), UQ(1, 0), 1.0, "", 0, "velocity output: 0 for u, 1 for u1"),
         )
 
     def _least(self, f_max: int) -> tuple[float, float]:
@@ -218,13 +212,18 @@ class Design:
 
     @property
     def latency(self) -> int:
-        """Clocks from strobe to valid."""
         return self.steps + sqrt_latency(self.radicand.width)
 
-    def params(self, words: dict[str, int]) -> Params:
-        """Return the kernel's parameters for the given run-time words."""
+    def params(self, words: Mapping[str, int]) -> tuple:
+        return self._common(words)
+
+    def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> tuple:
+        return self._float_common(gains, output, si)
+
+    def _common(self, words: Mapping[str, int]) -> Params:
+        """Return what every integer kernel of the family takes."""
         lam, alpha, output = (words[word.name] for word in self.words)
-        return self.kinds[0](
+        return Params(
             lambda_=lam,
             alpha=alpha,
             output=output,
@@ -234,34 +233,27 @@ class Design:
             product_shift=self.product - self.velocity.f,
             error_max=self.error.max,
             velocity_max=self.velocity.max,
-            **self._more(),
         )
 
-    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
-        """Return the float64 algorithm's parameters, per sample: gains unrounded, those of `si` before the designed."""
+    def _float_common(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
+        """Return what every float64 kernel of the family takes, gains per sample."""
         lam, alpha, _ = self.words
-        return self.kinds[1](
+        return FloatParams(
             lambda_=si.get(lam.name, gains.lambda_sqrt_m_per_s) / lam.si_per_unit,
             alpha=si.get(alpha.name, gains.alpha_m_per_s2) / alpha.si_per_unit,
-            output=OUTPUTS.index(output),
+            output=self.outputs.index(output),
             count_width=self.count_width,
-            **self._more_float(),
         )
 
-    def _more(self) -> dict[str, int]:
-        """Return what the parameters of the integer kernel have beyond `Params`."""
-        return {}
-
-    def _more_float(self) -> dict[str, int]:
-        """Return what the parameters of the float64 kernel have beyond `FloatParams`."""
-        return {}
+    def start(self, floating: bool = False) -> tuple:
+        return FLOAT_START if floating else START
 
 
 def _check(value: float, name: str, low: float, high: float, scaled: float) -> None:
     """Raise ValueError, in the units of `value`, unless `scaled` (the gain per sample) is within `low` to `high`."""
     if not low <= scaled <= high:
         unit = value / scaled
-        raise ValueError(f"{name} must be {low * unit:g} to {high * unit:g} at these rates, not {value!r}")
+        raise FieldError(name, f"must be {low * unit:g} to {high * unit:g} at these rates, not {value!r}")
 
 
 @compiled

@@ -69,17 +69,19 @@ Formats are those of `levant_semi_implicit`, and differ thus:
 """
 
 import math
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..arithmetic.fixed import bits_for, saturate, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import isqrt
 from ..compiled import compiled
-from . import levant_semi_implicit
+from . import levant, levant_semi_implicit
 from .estimate import estimate
-from .levant import OUTPUTS, POSITION_BUDGET, Gains, arrive, sign_of
+from .levant import POSITION_BUDGET, Gains, arrive, sign_of
 from .levant_semi_implicit import band, float_settle, settle
 
-__all__ = ["FLOAT_START", "OUTPUTS", "START", "Design", "FloatParams", "Gains", "Params", "State"]
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
 
 STEPS = 17
 """Clocks of the sequence besides the root: see `hardwall.hdl.estimators.levant_adaptive`."""
@@ -99,43 +101,36 @@ LEAST_ALPHA_BITS = 5
 """alpha at the last level has at least this many bits below its top one: rounding it down costs 3 % at most."""
 
 
-class Params(NamedTuple):
-    """As `levant.Params`; and of the adaptation, as `Design`; thresholds of time for even and for odd levels."""
+class Law(NamedTuple):
+    """Parameters of the adaptation, as `Design` has them; thresholds of time for even and for odd levels."""
 
-    lambda_: int
-    alpha: int
-    output: int
-    count_width: int
-    fraction: int
-    radicand_shift: int
-    product_shift: int
-    error_max: int
-    velocity_max: int
-    spare: int
     levels: int
     reach_even: int
     reach_odd: int
     hold_even: int
     hold_odd: int
+
+
+class Params(NamedTuple):
+    """The family's; the adaptation's; and the bits that the largest shift of lambda takes from the product."""
+
+    levant: levant.Params
+    law: Law
+    spare: int
 
 
 class FloatParams(NamedTuple):
-    lambda_: float
-    alpha: float
-    output: int
-    count_width: int
-    levels: int
-    reach_even: int
-    reach_odd: int
-    hold_even: int
-    hold_odd: int
+    """The family's and the adaptation's."""
+
+    levant: levant.FloatParams
+    law: Law
 
 
 class State(NamedTuple):
     """`lead`, `u1`, `count` as `levant.State`; the rest is the adaptation's."""
 
     running: int
-    count: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
     lead: float
     u1: float
     level: int
@@ -159,10 +154,9 @@ class Design(levant_semi_implicit.Design):
     """
 
     name = "levant-adaptive"
-    kinds = (Params, FloatParams)
     steps = STEPS
 
-    def __init__(self, axis, gains: Gains):
+    def __init__(self, axis: "AxisSpec", gains: Gains):
         super().__init__(axis, gains)
         most = gains.alpha_m_per_s2 / RATIO / axis.sample_hz**2 / axis.count_m
         self.reach = _times(math.sqrt(EXCESS * LOST / most))
@@ -196,18 +190,19 @@ class Design(levant_semi_implicit.Design):
         """Return how many samples of calm leave `level`."""
         return -(-_threshold(*self.hold, level) >> TIME_BITS)
 
-    def _more(self) -> dict[str, int]:
-        return {"spare": self.spare, **self._more_float()}
+    @property
+    def law(self) -> Law:
+        """The adaptation's parameters, of either kernel."""
+        return Law(self.levels, *self.reach, *self.hold)
 
-    def _more_float(self) -> dict[str, int]:
-        (reach_even, reach_odd), (hold_even, hold_odd) = self.reach, self.hold
-        return {
-            "levels": self.levels,
-            "reach_even": reach_even,
-            "reach_odd": reach_odd,
-            "hold_even": hold_even,
-            "hold_odd": hold_odd,
-        }
+    def params(self, words: Mapping[str, int]) -> tuple:
+        return Params(self._common(words), self.law, self.spare)
+
+    def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> tuple:
+        return FloatParams(self._float_common(gains, output, si), self.law)
+
+    def start(self, floating: bool = False) -> tuple:
+        return FLOAT_START if floating else START
 
 
 def _times(first: float) -> tuple[int, int]:
@@ -221,7 +216,7 @@ def _threshold(even, odd, level):
 
 
 @compiled
-def adapt(params, state, restart, sign, whole):
+def adapt(law, state, restart, sign, whole):
     """Return (level, side, elapsed, reached, limit, calm) after a sample whose |b| is `whole` counts, rounded down."""
     fresh = restart or not state.running
     level = 0 if fresh else state.level
@@ -233,18 +228,18 @@ def adapt(params, state, restart, sign, whole):
 
     if sign not in (0, side):
         side, elapsed, reached, limit = sign, 0, 0, LOST
-    if reached < params.levels:
+    if reached < law.levels:
         elapsed += 1
-        if elapsed << TIME_BITS >= _threshold(params.reach_even, params.reach_odd, reached + 1):
+        if elapsed << TIME_BITS >= _threshold(law.reach_even, law.reach_odd, reached + 1):
             reached += 1
     if whole >= limit:
         level = max(min(level if limit == LOST else level - 2, reached), 0)
         limit *= 2
     if whole >= LOST:
         calm = 0
-    elif level < params.levels:
+    elif level < law.levels:
         calm += 1
-        if calm << TIME_BITS >= _threshold(params.hold_even, params.hold_odd, level):
+        if calm << TIME_BITS >= _threshold(law.hold_even, law.hold_odd, level):
             level += 1
             calm = 0
     return level, side, elapsed, reached, limit, calm
@@ -253,16 +248,17 @@ def adapt(params, state, restart, sign, whole):
 @estimate.register(Params)
 @compiled
 def step(params, state, seen, restart):
-    moved, lead, u1 = arrive(params, state, seen, restart)
-    distance = lead - (moved << params.fraction)
-    error = saturate(distance, -params.error_max, params.error_max)
-    adapted = adapt(params, state, restart, sign_of(error), abs(error) >> params.fraction)
+    family = params.levant
+    moved, lead, u1 = arrive(family, state, seen, restart)
+    distance = lead - (moved << family.fraction)
+    error = saturate(distance, -family.error_max, family.error_max)
+    adapted = adapt(params.law, state, restart, sign_of(error), abs(error) >> family.fraction)
     level = adapted[0]
-    sign, near, beyond = band(error, params.alpha >> level)
-    root = isqrt(shift_floor(beyond, params.radicand_shift + (level & 1)))
-    product = (params.lambda_ * (2 * root + 1) << params.spare) >> (level >> 1)
-    correction = min(shift_round_half_up(product, params.product_shift + params.spare), beyond)
-    lead, u1, velocity, far = settle(params, u1, sign, near, beyond, correction)
+    sign, near, beyond = band(error, family.alpha >> level)
+    root = isqrt(shift_floor(beyond, family.radicand_shift + (level & 1)))
+    product = (family.lambda_ * (2 * root + 1) << params.spare) >> (level >> 1)
+    correction = min(shift_round_half_up(product, family.product_shift + params.spare), beyond)
+    lead, u1, velocity, far = settle(family, u1, sign, near, beyond, correction)
     return State(1, seen.count, lead, u1, *adapted), velocity, int(error != distance) | far << 1
 
 
@@ -270,11 +266,12 @@ def step(params, state, seen, restart):
 @compiled
 def float_step(params, state, seen, restart):
     """The same in float64, unsaturated."""
-    moved, lead, u1 = arrive(params, state, seen, restart)
+    family = params.levant
+    moved, lead, u1 = arrive(family, state, seen, restart)
     error = lead - moved
-    adapted = adapt(params, state, restart, sign_of(error), int(abs(error)))
+    adapted = adapt(params.law, state, restart, sign_of(error), int(abs(error)))
     scale = 2.0 ** -adapted[0]
-    sign, near, beyond = band(error, params.alpha * scale)
-    correction = min(params.lambda_ * math.sqrt(scale * beyond), beyond)
-    lead, u1, velocity = float_settle(params, u1, sign, near, beyond, correction)
+    sign, near, beyond = band(error, family.alpha * scale)
+    correction = min(family.lambda_ * math.sqrt(scale * beyond), beyond)
+    lead, u1, velocity = float_settle(family, u1, sign, near, beyond, correction)
     return State(1, seen.count, lead, u1, *adapted), velocity, 0

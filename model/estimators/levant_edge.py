@@ -78,7 +78,6 @@ interval of half the stamp's range or more says only where the axis is.
 """
 
 import math
-from typing import NamedTuple
 
 from ..arithmetic.divide import divide
 from ..arithmetic.fixed import saturate, shift_floor, shift_round_half_up, wrap
@@ -87,10 +86,9 @@ from ..compiled import compiled
 from ..quadrature import RUN_MAX, stamp_of
 from .estimate import estimate
 from .levant import sign_of
-from .levant_edge_design import LEARN_SHIFT, Design, FloatParams, Gains, Params
+from .levant_edge_design import LEARN_SHIFT, Design, FloatParams, Gains, Params, State
 
-OUTPUTS = ("u",)
-__all__ = ["FLOAT_START", "OUTPUTS", "START", "Design", "Gains"]
+__all__ = ["Design", "Gains"]
 REST_BITS = 3
 """An axis rests when 2**REST_BITS of the last intervals, rounded up to a power of two, have brought no edge."""
 LEFT_MAX = 46
@@ -98,28 +96,6 @@ LEFT_MAX = 46
 ANCHOR, FIRST, TIMED, CARRIED, LOOSE = range(5)
 """What the last edge is: the anchor itself; the first known; one to correct by; one too close that has stayed the last
 for long, a new anchor as well; one too close as yet."""
-
-
-class State(NamedTuple):
-    """The anchor (`known` if it was seen to come), the motion there, and the places of the four kinds of edges.
-
-    Velocity, acceleration and places are words (float: counts a sample, that a clock, counts times clocks a sample);
-    `length` is that of the last interval used, bits.
-    """
-
-    running: int
-    known: int
-    number: int
-    stamp: int
-    kind: int
-    length: int
-    velocity: float
-    acceleration: float
-    places: tuple
-
-
-START = State(0, 0, 0, 0, 0, 0, 0, 0, (0, 0, 0, 0))
-FLOAT_START = State(0, 0, 0, 0, 0, 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
 
 
 @compiled

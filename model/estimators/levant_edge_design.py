@@ -1,4 +1,4 @@
-"""Gains, formats and run-time words of `levant_edge`, derived from the axis; that module says the law.
+"""Gains, formats, run-time words and state of `levant_edge`, derived from the axis; that module says the law.
 
 Symbols as there: v, a, E, T, L, D, C; q is a count, u the velocity out.
 
@@ -19,14 +19,20 @@ Symbols as there: v, a, E, T, L, D, C; q is a count, u the velocity out.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..arithmetic.divide import latency as divide_latency
 from ..arithmetic.fixed import SQ, UQ, bits_for, shift_floor
 from ..arithmetic.sqrt import latency as sqrt_latency
+from ..checks import FieldError
 from ..quadrature import Seen
-from ..words import GAIN_BITS, Word, check_positive
+from ..words import GAIN_BITS, Word
+from .estimate import EstimatorDesign, EstimatorGains
+
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
 
 HEADROOM_BITS = 2
 """A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
@@ -49,21 +55,14 @@ STEPS = 19
 
 
 @dataclass(frozen=True)
-class Gains:
-    """Gains in SI units: lambda in m^(1/2)/s^(3/2), alpha in m/s^3.
-
-    Raises:
-        ValueError: if either is not finite and more than 0.
-    """
+class Gains(EstimatorGains):
+    """Gains in SI units: lambda in m^(1/2)/s^(3/2), alpha in m/s^3."""
 
     lambda_sqrt_m_per_s3: float
     alpha_m_per_s3: float
 
-    def __post_init__(self):
-        check_positive(self)
-
     @classmethod
-    def default(cls, axis) -> "Gains":
+    def default(cls, axis: "AxisSpec") -> "Gains":
         """Return alpha = 2 C / sqrt(q / C) and Levant's lambda = 1.5 sqrt(alpha), with C and q the axis's."""
         bound = axis.acceleration_max_m_per_s2
         alpha = 2 * bound * math.sqrt(bound / axis.count_m)
@@ -112,7 +111,29 @@ class FloatParams(NamedTuple):
     place_max: float
 
 
-class Design:
+class State(NamedTuple):
+    """The anchor (`known` if it was seen to come), the motion there, and the places of the four kinds of edges.
+
+    Velocity, acceleration and places are words (float: counts a sample, that a clock, counts times clocks a sample);
+    `length` is that of the last interval used, bits.
+    """
+
+    running: int
+    known: int
+    number: int
+    stamp: int
+    kind: int
+    length: int
+    velocity: float
+    acceleration: float
+    places: tuple
+
+
+START = State(0, 0, 0, 0, 0, 0, 0, 0, (0, 0, 0, 0))
+FLOAT_START = State(0, 0, 0, 0, 0, 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
+
+
+class Design(EstimatorDesign):
     """Formats, run-time words and latency of the differentiator for an axis: the module says how they follow.
 
     Attributes:
@@ -128,44 +149,55 @@ class Design:
         ValueError: if the gains or the rates do not fit any format that int64 can hold, with the accepted range.
     """
 
+    name = "levant-edge"
+    gains_class = Gains
     inputs = Seen._fields
     flags = ("error_saturated", "velocity_saturated")
 
-    def __init__(self, axis, gains: Gains):
-        tau, q, clock, clocks = 1 / axis.sample_hz, axis.count_m, axis.clock_hz, axis.clocks_per_sample
-        bound, speed = axis.acceleration_max_m_per_s2, axis.speed_max_counts_per_sample
-        self.count_width, self.stamp_width, self.clocks = axis.count_width, axis.stamp_width, clocks
-        if 4 * clocks > 1 << axis.stamp_width:
-            raise ValueError(f"sample_hz must be 4 or more for stamps that last a second, not {axis.sample_hz!r}")
+    def __init__(self, axis: "AxisSpec", gains: Gains):
+        super().__init__(axis, gains)
+        self.clocks = axis.clocks_per_sample
+        if 4 * self.clocks > 1 << axis.stamp_width:
+            raise FieldError("sample_hz", f"must be 4 or more for stamps that last a second, not {axis.sample_hz!r}")
+        self._derive_times(axis)
+        self._derive_motion(axis)
+        self._derive_places(axis)
+        self._derive_gains(axis, gains)
 
-        # Times, clocks.
+    def _derive_times(self, axis: "AxisSpec") -> None:
+        """Derive how a time, in clocks, is held as it multiplies and divides."""
+        clock, bound, q = axis.clock_hz, axis.acceleration_max_m_per_s2, axis.count_m
         window = clock * min(math.sqrt(axis.speed_max_m_per_s / (clock * bound)), math.sqrt(q / bound) / 4)
         self.shortest = min(max(math.floor(math.log2(max(window, 2.0))), 1), axis.stamp_width - 3)
         within_count = clock * math.sqrt(q / bound)
         exact = bits_for(math.sqrt(within_count * 2.0 ** (SPEED_BITS - 2)))
-        self.mantissa = min(max(exact, bits_for(4 * max(clocks, 1 << self.shortest))), axis.stamp_width - 1)
-        span = max(axis.stamp_width - 1 - self.mantissa, 0)
+        self.mantissa = min(max(exact, bits_for(4 * max(self.clocks, 1 << self.shortest))), axis.stamp_width - 1)
+        self.turn_span = max(axis.stamp_width - 1 - self.mantissa, 0)
 
-        # Velocity and acceleration.
-        i = 1 + bits_for(max(2 * speed, 2.0))
+    def _derive_motion(self, axis: "AxisSpec") -> None:
+        """Derive the formats of velocity and acceleration."""
+        tau, q, bound = 1 / axis.sample_hz, axis.count_m, axis.acceleration_max_m_per_s2
+        i = 1 + bits_for(max(2 * axis.speed_max_counts_per_sample, 2.0))
         least = math.sqrt(bound / q) * tau
-        slowest = clocks * 2.0 ** (1 - axis.stamp_width)
+        slowest = self.clocks * 2.0 ** (1 - axis.stamp_width)
         f = max(SPEED_BITS - math.floor(math.log2(least)), 1 - math.floor(math.log2(slowest)), 0)
         f = min(f, WIDTH_MAX - i, 60 - self.mantissa - i)
         self.velocity = SQ(i, axis.shrunk(f))
-        f = self.velocity.f
-        largest = bound * tau / q / clock
-        i = 1 + ACCELERATION_BITS + bits_for(largest)
+        i = 1 + ACCELERATION_BITS + bits_for(bound * tau / q / axis.clock_hz)
         self.acceleration = SQ(i, self.velocity.width - i)
 
-        # Errors of place, in counts times D.
+    def _derive_places(self, axis: "AxisSpec") -> None:
+        """Derive the formats of errors and places of edges, in counts times D, and of edges passed."""
+        f = self.velocity.f
         self.error = SQ(self.velocity.i + self.mantissa + 2, f - min(max(self.shortest - 1, 0), f))
-        fine = PLACE_BITS - math.floor(math.log2(clocks))
-        self.place = SQ(max(bits_for(clocks / 2), 0) + 1, max(fine, 0))
-        passed = 2 * speed * (2 + (2 << self.shortest) / clocks) + 1
+        fine = PLACE_BITS - math.floor(math.log2(self.clocks))
+        self.place = SQ(max(bits_for(self.clocks / 2), 0) + 1, max(fine, 0))
+        passed = 2 * axis.speed_max_counts_per_sample * (2 + (2 << self.shortest) / self.clocks) + 1
         self.distance = SQ(min(1 + bits_for(passed), axis.count_width), 0)
 
-        # Gains.
+    def _derive_gains(self, axis: "AxisSpec", gains: Gains) -> None:
+        """Derive the formats of the gains and of the root, and the run-time words."""
+        tau, q, clock = 1 / axis.sample_hz, axis.count_m, axis.clock_hz
         alpha = gains.alpha_m_per_s3 * tau / q / clock**2
         lam = gains.lambda_sqrt_m_per_s3 * math.sqrt(tau / q) / clock
         self.alpha = _gain("alpha_m_per_s3", gains.alpha_m_per_s3, alpha)
@@ -192,11 +224,9 @@ class Design:
                 "gain of the sign term",
             ),
         )
-        self.turn_span = span
 
     @property
     def latency(self) -> int:
-        """Clocks from strobe to valid."""
         return STEPS + max(self.quotient_latency, sqrt_latency(self.radicand.width + 1))
 
     @property
@@ -204,8 +234,7 @@ class Design:
         """Clocks of the division."""
         return divide_latency(self.velocity.width - 1, QUOTIENT_BITS)
 
-    def params(self, words: dict[str, int]) -> Params:
-        """Return the kernel's parameters for the given run-time words."""
+    def params(self, words: Mapping[str, int]) -> Params:
         f, a_f, e_f = self.velocity.f, self.acceleration.f, self.error.f
         return Params(
             lambda_=words["levant_edge_lambda"],
@@ -234,7 +263,7 @@ class Design:
             acceleration_max=self.acceleration.max,
         )
 
-    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+    def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 algorithm's parameters: gains unrounded, those of `si` before the designed."""
         lam, alpha = self.words
         return FloatParams(
@@ -250,11 +279,14 @@ class Design:
             2.0 ** (self.place.i - 1),
         )
 
+    def start(self, floating: bool = False) -> State:
+        return FLOAT_START if floating else START
+
 
 def _gain(name: str, value: float, scaled: float) -> UQ:
     """Return the format of a gain of `value` SI and `scaled` in counts, samples and clocks."""
     if not 2.0**-60 <= scaled <= 2.0**20:
         unit = value / scaled
-        raise ValueError(f"{name} must be {2.0**-60 * unit:g} to {2.0**20 * unit:g} at these rates, not {value!r}")
+        raise FieldError(name, f"must be {2.0**-60 * unit:g} to {2.0**20 * unit:g} at these rates, not {value!r}")
     i = HEADROOM_BITS + bits_for(scaled)
     return UQ(i, GAIN_BITS - i)

@@ -37,40 +37,30 @@ Formats are those of `levant_semi_implicit`, and differ thus:
 """
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from ..arithmetic.fixed import saturate, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import isqrt
 from ..compiled import compiled
-from . import levant_semi_implicit
+from . import levant, levant_semi_implicit
 from .estimate import estimate
-from .levant import FLOAT_START, OUTPUTS, START, Gains, State, arrive
+from .levant import State, arrive
 from .levant_semi_implicit import band, float_settle, settle
-
-__all__ = ["FLOAT_START", "OUTPUTS", "START", "Design", "FloatParams", "Gains", "Params", "State"]
 
 
 class Params(NamedTuple):
-    """As `levant.Params`; and by how much lambda^2 is shifted to the radicand's and to the velocity's fraction bits."""
+    """The family's; and by how much lambda^2 is shifted to the radicand's and to the velocity's fraction bits."""
 
-    lambda_: int
-    alpha: int
-    output: int
-    count_width: int
-    fraction: int
-    radicand_shift: int
-    product_shift: int
-    error_max: int
-    velocity_max: int
+    levant: levant.Params
     quarter_shift: int
     half_shift: int
 
 
 class FloatParams(NamedTuple):
-    lambda_: float
-    alpha: float
-    output: int
-    count_width: int
+    """The family's, in a class of its own by which the kernel is found."""
+
+    levant: levant.FloatParams
 
 
 class Design(levant_semi_implicit.Design):
@@ -81,7 +71,6 @@ class Design(levant_semi_implicit.Design):
     """
 
     name = "levant-implicit"
-    kinds = (Params, FloatParams)
     roundings = 2
 
     def _position_per_root(self, lam: float) -> float:
@@ -98,22 +87,26 @@ class Design(levant_semi_implicit.Design):
     def half_shift(self) -> int:
         return 2 * self.lambda_.f + 1 - self.velocity.f
 
-    def _more(self) -> dict[str, int]:
-        return {"quarter_shift": self.quarter_shift, "half_shift": self.half_shift}
+    def params(self, words: Mapping[str, int]) -> tuple:
+        return Params(self._common(words), self.quarter_shift, self.half_shift)
+
+    def float_params(self, gains: levant.Gains, output: str, si: Mapping[str, float]) -> tuple:
+        return FloatParams(self._float_common(gains, output, si))
 
 
 @estimate.register(Params)
 @compiled
 def step(params, state, seen, restart):
-    moved, lead, u1 = arrive(params, state, seen, restart)
-    distance = lead - (moved << params.fraction)
-    error = saturate(distance, -params.error_max, params.error_max)
-    sign, near, beyond = band(error, params.alpha)
-    square = params.lambda_ * params.lambda_
-    root = isqrt(shift_floor(beyond, params.radicand_shift) + shift_floor(square, params.quarter_shift))
-    full = shift_round_half_up(params.lambda_ * (2 * root + 1), params.product_shift)
+    family = params.levant
+    moved, lead, u1 = arrive(family, state, seen, restart)
+    distance = lead - (moved << family.fraction)
+    error = saturate(distance, -family.error_max, family.error_max)
+    sign, near, beyond = band(error, family.alpha)
+    square = family.lambda_ * family.lambda_
+    root = isqrt(shift_floor(beyond, family.radicand_shift) + shift_floor(square, params.quarter_shift))
+    full = shift_round_half_up(family.lambda_ * (2 * root + 1), family.product_shift)
     correction = saturate(full - shift_round_half_up(square, params.half_shift), 0, beyond)
-    lead, u1, velocity, far = settle(params, u1, sign, near, beyond, correction)
+    lead, u1, velocity, far = settle(family, u1, sign, near, beyond, correction)
     return State(1, seen.count, lead, u1), velocity, int(error != distance) | far << 1
 
 
@@ -121,10 +114,11 @@ def step(params, state, seen, restart):
 @compiled
 def float_step(params, state, seen, restart):
     """The same in float64, unsaturated."""
-    moved, lead, u1 = arrive(params, state, seen, restart)
-    sign, near, beyond = band(lead - moved, params.alpha)
-    half = params.lambda_ / 2
+    family = params.levant
+    moved, lead, u1 = arrive(family, state, seen, restart)
+    sign, near, beyond = band(lead - moved, family.alpha)
+    half = family.lambda_ / 2
     # The difference of the two roots, without their cancellation.
-    correction = params.lambda_ * beyond / (math.sqrt(beyond + half * half) + half)
-    lead, u1, velocity = float_settle(params, u1, sign, near, beyond, correction)
+    correction = family.lambda_ * beyond / (math.sqrt(beyond + half * half) + half)
+    lead, u1, velocity = float_settle(family, u1, sign, near, beyond, correction)
     return State(1, seen.count, lead, u1), velocity, 0

@@ -49,6 +49,7 @@ Formats are those of `levant`, with beyond for |e|, and differ thus:
 """
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from ..arithmetic.fixed import saturate, shift_floor, shift_round_half_up
@@ -56,44 +57,38 @@ from ..arithmetic.sqrt import isqrt
 from ..compiled import compiled
 from . import levant
 from .estimate import estimate
-from .levant import FLOAT_START, OUTPUTS, START, Gains, State, arrive, sign_of
-
-__all__ = ["FLOAT_START", "OUTPUTS", "START", "Design", "FloatParams", "Gains", "Params", "State"]
+from .levant import State, arrive, sign_of
 
 STEPS = 12
 """Clocks of the sequence besides the root: see `hardwall.hdl.estimators.levant_semi_implicit`."""
 
 
 class Params(NamedTuple):
-    """As `levant.Params`."""
+    """Parameters of the integer kernel: the family's, in a class of its own by which its kernel is found."""
 
-    lambda_: int
-    alpha: int
-    output: int
-    count_width: int
-    fraction: int
-    radicand_shift: int
-    product_shift: int
-    error_max: int
-    velocity_max: int
+    levant: levant.Params
 
 
 class FloatParams(NamedTuple):
-    lambda_: float
-    alpha: float
-    output: int
-    count_width: int
+    """Parameters of the float64 kernel, likewise."""
+
+    levant: levant.FloatParams
 
 
 class Design(levant.Design):
     """Formats, run-time words and latency for an axis, as `levant.Design`: the module says what differs."""
 
     name = "levant-semi-implicit"
-    kinds = (Params, FloatParams)
     steps = STEPS
 
     def _catch(self, step: float, lam: float) -> float:
         return (step / lam) ** 2 + step
+
+    def params(self, words: Mapping[str, int]) -> tuple:
+        return Params(self._common(words))
+
+    def float_params(self, gains: levant.Gains, output: str, si: Mapping[str, float]) -> tuple:
+        return FloatParams(self._float_common(gains, output, si))
 
 
 @compiled
@@ -124,13 +119,14 @@ def float_settle(params, u1, sign, near, beyond, correction):
 @estimate.register(Params)
 @compiled
 def step(params, state, seen, restart):
-    moved, lead, u1 = arrive(params, state, seen, restart)
-    distance = lead - (moved << params.fraction)
-    error = saturate(distance, -params.error_max, params.error_max)
-    sign, near, beyond = band(error, params.alpha)
-    root = isqrt(shift_floor(beyond, params.radicand_shift))
-    correction = min(shift_round_half_up(params.lambda_ * (2 * root + 1), params.product_shift), beyond)
-    lead, u1, velocity, far = settle(params, u1, sign, near, beyond, correction)
+    family = params.levant
+    moved, lead, u1 = arrive(family, state, seen, restart)
+    distance = lead - (moved << family.fraction)
+    error = saturate(distance, -family.error_max, family.error_max)
+    sign, near, beyond = band(error, family.alpha)
+    root = isqrt(shift_floor(beyond, family.radicand_shift))
+    correction = min(shift_round_half_up(family.lambda_ * (2 * root + 1), family.product_shift), beyond)
+    lead, u1, velocity, far = settle(family, u1, sign, near, beyond, correction)
     return State(1, seen.count, lead, u1), velocity, int(error != distance) | far << 1
 
 
@@ -138,8 +134,9 @@ def step(params, state, seen, restart):
 @compiled
 def float_step(params, state, seen, restart):
     """The same in float64, unsaturated."""
-    moved, lead, u1 = arrive(params, state, seen, restart)
-    sign, near, beyond = band(lead - moved, params.alpha)
-    correction = min(params.lambda_ * math.sqrt(beyond), beyond)
-    lead, u1, velocity = float_settle(params, u1, sign, near, beyond, correction)
+    family = params.levant
+    moved, lead, u1 = arrive(family, state, seen, restart)
+    sign, near, beyond = band(lead - moved, family.alpha)
+    correction = min(family.lambda_ * math.sqrt(beyond), beyond)
+    lead, u1, velocity = float_settle(family, u1, sign, near, beyond, correction)
     return State(1, seen.count, lead, u1), velocity, 0

@@ -41,19 +41,23 @@ The velocity saturates at its format's largest word, either sign, with the flag 
 may wrap. At the first sample, and with a restart, what came before is forgotten: 0 until two new edges.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..arithmetic.divide import divide
 from ..arithmetic.divide import latency as divide_latency
 from ..arithmetic.fixed import SQ, bits_for
+from ..checks import FieldError
 from ..compiled import compiled
 from ..quadrature import Seen
 from . import cycle_times
 from .cycle_times import AGE_LIMIT, NOTHING, Memory, observe
-from .estimate import estimate
+from .estimate import EstimatorDesign, EstimatorGains, estimate
 
-OUTPUTS = ("u",)
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
+
 ERROR_SHARE = 0.01
 """How much rounding may add to the stamp's own error."""
 DIVIDEND_BITS = 56
@@ -63,11 +67,11 @@ STEPS = cycle_times.LATENCY + 2
 
 
 @dataclass(frozen=True)
-class Gains:
+class Gains(EstimatorGains):
     """Periods have no gains."""
 
     @classmethod
-    def default(cls, axis) -> "Gains":
+    def default(cls, axis: "AxisSpec") -> "Gains":
         return cls()
 
 
@@ -104,9 +108,9 @@ def check_stamps(axis) -> None:
     """Raise ValueError if the samples of an axis are too long for its stamps to tell edges."""
     longest = 1 << min(axis.stamp_width - 2, DIVIDEND_BITS - axis.stamp_width)
     if axis.clocks_per_sample > longest:
-        raise ValueError(
-            f"sample_hz must be at least {axis.clock_hz / longest:g} at clock_hz {axis.clock_hz}, "
-            f"not {axis.sample_hz!r}"
+        raise FieldError(
+            "sample_hz",
+            f"must be at least {axis.clock_hz / longest:g} at clock_hz {axis.clock_hz}, not {axis.sample_hz!r}",
         )
 
 
@@ -124,41 +128,43 @@ def velocity_format(axis, least_fraction: int = 0) -> SQ:
     i, f = 1 + max(1, bits_for(2 * speed)), max(bits_for(0.5 / half_lsb), least_fraction)
     if i + f > 62:
         most = 2.0 ** (60 - f) * axis.velocity_unit_m_per_s
-        raise ValueError(f"speed_max_m_per_s must be at most {most:g}, not {axis.speed_max_m_per_s!r}")
+        raise FieldError("speed_max_m_per_s", f"must be at most {most:g}, not {axis.speed_max_m_per_s!r}")
     return SQ(i, axis.shrunk(f))
 
 
-class Design:
+class Design(EstimatorDesign):
     """Formats and latency for an axis: the module says how they follow.
 
     Raises:
         ValueError: if a sample is too long for the stamps, or the dividend for int64, with the accepted range.
     """
 
+    name = "period"
+    gains_class = Gains
     inputs = Seen._fields
-    flags = ("velocity_saturated",)
-    words = ()
 
-    def __init__(self, axis, gains: Gains):
+    def __init__(self, axis: "AxisSpec", gains: Gains):
+        super().__init__(axis, gains)
         check_stamps(axis)
-        self.count_width, self.stamp_width = axis.count_width, axis.stamp_width
         self.clocks = axis.clocks_per_sample
         self.velocity = velocity_format(axis)
         self.cycles_max = (self.clocks + 3) // 4
 
     @property
     def latency(self) -> int:
-        """Clocks from strobe to valid."""
         return STEPS + divide_latency(self.velocity.width)
 
-    def params(self, words: dict[str, int]) -> Params:
+    def params(self, words: Mapping[str, int]) -> Params:
         fraction, width = self.velocity.f + 1, self.velocity.width
         return Params(
             self.count_width, self.stamp_width, self.clocks, self.cycles_max, fraction, width, self.velocity.max
         )
 
-    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+    def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         return FloatParams(self.count_width, self.stamp_width, self.clocks)
+
+    def start(self, floating: bool = False) -> State:
+        return FLOAT_START if floating else START
 
 
 @compiled

@@ -34,21 +34,25 @@ restart: 0 until there are five edges in one direction, or a fast window.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..arithmetic.divide import divide
 from ..arithmetic.divide import latency as divide_latency
 from ..arithmetic.fixed import UQ, bits_for, saturate, wrap
+from ..checks import FieldError
 from ..compiled import compiled
 from ..quadrature import Seen
-from ..words import Word, check_positive
+from ..words import Word
 from . import cycle_times
 from .cycle_times import NOTHING, Memory, observe
-from .estimate import estimate
+from .estimate import EstimatorDesign, EstimatorGains, estimate
 from .period import check_stamps, velocity_format
 
-OUTPUTS = ("u",)
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
+
 CYCLE_SPEED = 3.0
 """Counts a sample at which switching is due: with a misplaced edge still no more than the four of a cycle."""
 SWITCH_MIN = 2
@@ -58,21 +62,14 @@ STEPS = cycle_times.LATENCY + 2
 
 
 @dataclass(frozen=True)
-class Gains:
-    """The window to count over, held to a power of two of samples; and the speed above which to count.
-
-    Raises:
-        ValueError: if either is not finite and more than 0.
-    """
+class Gains(EstimatorGains):
+    """The window to count over, held to a power of two of samples; and the speed above which to count."""
 
     window_s: float
     switch_m_per_s: float
 
-    def __post_init__(self):
-        check_positive(self)
-
     @classmethod
-    def default(cls, axis) -> "Gains":
+    def default(cls, axis: "AxisSpec") -> "Gains":
         """Return the best window for the axis's bound on the acceleration, and where it beats a cycle."""
         acceleration = axis.acceleration_max_m_per_s2 / (axis.count_m * axis.sample_hz**2)
         window = 1 << min(max(round(math.log2(2 / (3 * acceleration)) / 2), 0), _window_bits_max(axis))
@@ -113,7 +110,6 @@ class State(NamedTuple):
 
 
 START = State(NOTHING, 0, 0, 0, 0, 0)
-FLOAT_START = START
 
 
 def _window_bits_max(axis) -> int:
@@ -121,7 +117,7 @@ def _window_bits_max(axis) -> int:
     return max(axis.count_width - 1 - bits_for(2 * max(axis.speed_max_counts_per_sample, 1.0)), 0)
 
 
-class Design:
+class Design(EstimatorDesign):
     """Formats, run-time word and latency for an axis: the module says how they follow.
 
     Attributes:
@@ -132,26 +128,27 @@ class Design:
         ValueError: if the gains, or the axis, do not fit formats that int64 can hold, with the accepted range.
     """
 
+    name = "period-count"
+    gains_class = Gains
     inputs = Seen._fields
-    flags = ("velocity_saturated",)
     cycles_max = 2
     """More than one cycle in a sample is not timed; how many there are is all the same."""
 
-    def __init__(self, axis, gains: Gains):
+    def __init__(self, axis: "AxisSpec", gains: Gains):
+        super().__init__(axis, gains)
         check_stamps(axis)
         tau, most = 1 / axis.sample_hz, _window_bits_max(axis)
         self.window_bits = round(math.log2(gains.window_s / tau))
         if not 0 <= self.window_bits <= most:
-            raise ValueError(f"window_s must be {tau:g} to {tau * 2**most:g} at these rates, not {gains.window_s!r}")
-        self.count_width, self.stamp_width = axis.count_width, axis.stamp_width
+            raise FieldError("window_s", f"must be {tau:g} to {tau * 2**most:g} at these rates, not {gains.window_s!r}")
         self.clocks = axis.clocks_per_sample
         self.velocity = velocity_format(axis, self.window_bits)
         fmt = UQ(axis.count_width - 1, 0)
         unit = axis.velocity_unit_m_per_s / 2**self.window_bits
         if not SWITCH_MIN <= round(gains.switch_m_per_s / unit) <= fmt.max:
-            raise ValueError(
-                f"switch_m_per_s must be {SWITCH_MIN * unit:g} to {fmt.max * unit:g} with this window, "
-                f"not {gains.switch_m_per_s!r}"
+            raise FieldError(
+                "switch_m_per_s",
+                f"must be {SWITCH_MIN * unit:g} to {fmt.max * unit:g} with this window, not {gains.switch_m_per_s!r}",
             )
         self.switch = Word(
             "period_count_switch",
@@ -170,11 +167,9 @@ class Design:
 
     @property
     def latency(self) -> int:
-        """Clocks from strobe to valid."""
         return STEPS + divide_latency(self.velocity.width)
 
-    def params(self, words: dict[str, int]) -> Params:
-        """Return the kernel's parameters for the given run-time words."""
+    def params(self, words: Mapping[str, int]) -> Params:
         return Params(
             count_width=self.count_width,
             stamp_width=self.stamp_width,
@@ -186,10 +181,13 @@ class Design:
             velocity_max=self.velocity.max,
         )
 
-    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+    def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 algorithm's parameters; it counts as the integer one does, so switches at whole counts."""
         switch = self.switch.from_si(si.get("period_count_switch", gains.switch_m_per_s))
         return FloatParams(self.count_width, self.stamp_width, 1 << self.window_bits, switch, self.clocks)
+
+    def start(self, floating: bool = False) -> State:
+        return START
 
 
 @compiled

@@ -34,19 +34,22 @@ Source: elementary; the bound is Taylor's formula and the triangle inequality.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..arithmetic.fixed import SQ, UQ
 from ..arithmetic.signed_divide import divide
 from ..arithmetic.signed_divide import latency as divide_latency
 from ..compiled import compiled
-from ..words import Word, check_positive
+from ..words import Word
 from . import history
-from .estimate import estimate
+from .estimate import EstimatorDesign, EstimatorGains, estimate
 from .history import change_over, take
 
-OUTPUTS = ("u",)
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
+
 EPS_COUNTS = 0.5
 """Largest distance between a count and the position, half a count apart."""
 ROUNDING_BITS = 8
@@ -56,20 +59,13 @@ STEPS = 2
 
 
 @dataclass(frozen=True)
-class Gains:
-    """The window, s.
-
-    Raises:
-        ValueError: if it is not finite and more than 0.
-    """
+class Gains(EstimatorGains):
+    """The window, s."""
 
     window_s: float
 
-    def __post_init__(self):
-        check_positive(self)
-
     @classmethod
-    def default(cls, axis) -> "Gains":
+    def default(cls, axis: "AxisSpec") -> "Gains":
         """Return the minimax window for |f''| <= C, the axis's bound: 2 sqrt(eps / C)."""
         return cls(2 * math.sqrt(EPS_COUNTS * axis.count_m / axis.acceleration_max_m_per_s2))
 
@@ -95,7 +91,7 @@ class FloatParams(NamedTuple):
     samples: float
 
 
-class Design:
+class Design(EstimatorDesign):
     """Formats, run-time word and latency of the window for an axis: the module says how they follow.
 
     Attributes:
@@ -108,11 +104,11 @@ class Design:
         ValueError: if the window is too long for int64, with the accepted range.
     """
 
-    inputs = ("count",)
-    flags = ("velocity_saturated",)
+    name = "window"
+    gains_class = Gains
 
-    def __init__(self, axis, gains: Gains):
-        self.count_width = axis.count_width
+    def __init__(self, axis: "AxisSpec", gains: Gains):
+        super().__init__(axis, gains)
         self.history = history.Design(axis, gains.window_s)
         self.velocity = SQ(self.history.change.i, axis.shrunk(self.history.fraction + ROUNDING_BITS))
         self.fraction = axis.shrunk(self.history.age_bits + ROUNDING_BITS)
@@ -129,18 +125,16 @@ class Design:
 
     @property
     def latency(self) -> int:
-        """Clocks from strobe to valid."""
         return STEPS + self.history.latency + divide_latency(self.velocity.width - 1)
 
     def start(self, floating: bool = False) -> State:
         """Return the state before the first sample, with a memory of its own."""
         return State(self.history.start(), 0.0 if floating else 0)
 
-    def params(self, words: dict[str, int]) -> Params:
-        """Return the kernel's parameters for the given run-time words."""
+    def params(self, words: Mapping[str, int]) -> Params:
         return Params(self.history.params(), max(words["window_length"], 1), self.fraction)
 
-    def float_params(self, gains: Gains, output: str, si: dict[str, float]) -> FloatParams:
+    def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 algorithm's parameters: the same whole number of samples, `si` before the designed."""
         (word,) = self.words
         length = max(word.from_si(si["window_length"]) if "window_length" in si else word.reset, 1)

@@ -1,45 +1,47 @@
-"""What the commands of the command line share: options, input checks, tables and the progress bar."""
+"""The options of the commands, and the checks of what is given with them."""
 
-import json
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
-from rich.text import Text
 
 from ...model.estimators import registry
+from ..estimates.accuracy import RATES_HZ, outputs
 from ..scene.load import names
-
-log = Console(stderr=True, highlight=False)
+from ..walls.methods import Curve, label
+from .errors import BadInput
 
 Estimator = Literal[tuple(registry.ESTIMATORS)]
 Backend = Literal["float", "fixed", "rtl"]
 Device = Literal["ecp5-25k", "ice40-up5k"]
 
 SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help=f"{', '.join(names())}, or a .toml file")]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="change a key of the scene; an empty value takes it out"),
+EstimatorOption = Annotated[Estimator | None, typer.Option(help="velocity estimator", show_default="the scene's")]
+OutputOption = Annotated[str | None, typer.Option(help="its output, e.g. u or u1", show_default="its first")]
+EstimatorsOption = Annotated[
+    str | None, typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="which", show_default="all")
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="print JSON on stdout, and nothing else")]
-WorkersOption = Annotated[int | None, typer.Option(min=1, help="processes [default: one a core]")]
+BackendOption = Annotated[Backend, typer.Option(help="float64 algorithm, bit-accurate model, or the Verilated RTL")]
+ModelOption = Annotated[Literal["float", "fixed"], typer.Option(help="float64 algorithm, or bit-accurate model")]
+DeviceOption = Annotated[Device, typer.Option(help="the part to place and route for")]
+SeedsOption = Annotated[int, typer.Option(min=1, max=99, help="how many placements; fmax is their median")]
+RateOption = Annotated[float, typer.Option(metavar="HZ", help="sample rate")]
+
+WorkersOption = Annotated[int | None, typer.Option(min=1, help="processes", show_default="one a core")]
 SchedulerOption = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="of a Dask cluster that runs, in place of workers of its own")
 ]
 ResumeOption = Annotated[bool, typer.Option("--resume", help="go on where an interrupted run was")]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="change a key of the scene; an empty value takes it out"),
+]
 PlotOption = Annotated[Path | None, typer.Option(metavar="FILE", help="draw it: .png, .svg or .pdf")]
+JsonOption = Annotated[bool, typer.Option("--json", help="print JSON on stdout, and nothing else")]
 
 
-class BadInput(Exception):
-    """One line: what is wrong with what was given, and what is accepted."""
-
-
-def scene_changes(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
+def changes_of(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
     """Return scene changes from `--set` and from options of their own (None: not given)."""
     changes = {}
     for assignment in assignments or []:
@@ -54,10 +56,46 @@ def scene_changes(assignments: list[str] | None, **options: Any) -> dict[str, An
     return changes | named
 
 
+GAINS = ("controller.estimator", "controller.output", "controller.gains")
+WALL = ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m")
+
+
+def refuse(changes: dict[str, Any], keys: tuple[str, ...], instead: str) -> None:
+    """Refuse changes of a scene that the command makes itself."""
+    for key in changes:
+        if key.startswith(keys):
+            raise BadInput(f"--set {key} is what this command sets itself: {instead}")
+
+
+def refuse_for_maps(changes: dict[str, Any], estimators: str) -> None:
+    """Refuse changes of methods, for a reason that is given, and of walls."""
+    refuse(changes, GAINS, estimators)
+    refuse(changes, WALL, "see the scene's section zwidth")
+
+
+def curves_of(wanted: str | None, papers: dict[str, Curve] | None = None) -> list[Curve]:
+    """Return the estimators of a list NAME[:OUTPUT], of which `all` is every one.
+
+    Args:
+        wanted: the list; None is all.
+        papers: methods of the founding paper that are also names.
+    """
+    papers, curves = papers or {}, []
+    try:
+        for name in (word.strip() for word in ("all" if wanted is None else wanted).split(",")):
+            if name in papers:
+                curves.append(papers[name])
+                continue
+            every = registry.ESTIMATORS if name == "all" else [name]
+            curves += [Curve(label(*pair), *pair) for each in every for pair in outputs(each)]
+    except ValueError as error:
+        also = f", or of {', '.join(papers)}" if papers else ""
+        raise BadInput(f"--estimators: {error}{also}") from None
+    return list({curve.label: curve for curve in curves}.values())
+
+
 def rates_of(text: str, option: str) -> list[int]:
     """Return the rates (Hz) of a list in an option."""
-    from ..estimates.accuracy import RATES_HZ  # noqa: PLC0415  (kernels are loaded only where they run)
-
     rates = []
     for word in text.split(","):
         try:
@@ -85,63 +123,3 @@ def output_file(path: Path | None, option: str, suffixes: tuple[str, ...]) -> Pa
     if path.stat().st_size == 0:
         path.unlink()
     return path
-
-
-def draw(drawn, path: Path) -> None:
-    """Write the pictures that a study has, and say where they are."""
-    from ..pictures.style import save_all  # noqa: PLC0415  (Matplotlib is loaded only where something is drawn)
-
-    for written in save_all(drawn, path):
-        log.print(f"picture: {written}")
-
-
-def picture_file(path: Path | None) -> Path | None:
-    """Return where `--plot` wants the picture: see `output_file`."""
-    if path is None:
-        return None
-    from ..pictures.style import SUFFIXES  # noqa: PLC0415  (Matplotlib is loaded only where something is drawn)
-
-    return output_file(path, "--plot", SUFFIXES)
-
-
-def show(report: dict[str, Any], as_json: bool) -> None:
-    """Print a report: one JSON object, or a table of its keys."""
-    if as_json:
-        print(json.dumps(report))
-        return
-    table = Table(box=None, show_header=False)
-    for key, value in report.items():
-        table.add_row(Text(key, "bold"), Text(_text(value), overflow="fold"))
-    Console(highlight=False, soft_wrap=True).print(table)
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}"
-    return ", ".join(map(_text, value)) if isinstance(value, list) else str(value)
-
-
-def show_table(columns: dict[str, str], rows: list[list[str]]) -> None:
-    """Print a table; `columns` maps each heading to `left` or `right`."""
-    table = Table()
-    for name, justify in columns.items():
-        table.add_column(name, justify=justify)
-    for row in rows:
-        table.add_row(*map(Text, row))
-    Console(highlight=False, width=max(120, log.width)).print(table)
-
-
-class progress:
-    """A progress bar on stderr while a run lasts; gives the function that moves it."""
-
-    def __init__(self, title: str, total: int):
-        columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-        self._bar = Progress(*columns, console=log, transient=True, disable=not log.is_terminal)
-        self._task = self._bar.add_task(escape(title), total=total)
-
-    def __enter__(self):
-        self._bar.start()
-        return lambda done: self._bar.update(self._task, completed=done)
-
-    def __exit__(self, *_) -> None:
-        self._bar.stop()

@@ -7,6 +7,7 @@ was.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -14,13 +15,12 @@ import numpy as np
 from ...model.compiled import compiled
 from ...model.estimators import registry
 from ...model.spec import AxisSpec
-from ..scene.load import load as load_scene
+from ..scene.case import Case
 from ..world.encoder import offsets
-from . import signals
+from . import recording, signals
 from .errors import Judge
 from .motions import velocity
 from .playback import velocities
-from .recording import load as load_recording
 from .replay import replay
 
 RATES_HZ = (1_000, 10_000_000)
@@ -39,10 +39,10 @@ def outputs(text: str) -> list[tuple[str, str]]:
         ValueError: if there is none.
     """
     name, _, output = text.partition(":")
-    available = registry.load(name).OUTPUTS
+    design = registry.design_of(name)
     if output:
-        registry.choose(name, output)
-    return [(name, each) for each in ([output] if output else available)]
+        design.choose(output)
+    return [(name, each) for each in ([output] if output else design.outputs)]
 
 
 def axis_spec(
@@ -58,13 +58,13 @@ def axis_spec(
         ValueError: if it cannot be; the message names the field.
     """
     return replace(
-        load_scene("mhz").spec,
+        Case.of("mhz").scene.spec,
         clock_hz=sample_hz * max(-(-CLOCK_HZ // sample_hz), CLOCKS),
         sample_hz=sample_hz,
         actuation_hz=sample_hz,
         acceleration_max_m_per_s2=acceleration_max_m_per_s2,
         estimator=estimator,
-        gains=gains and registry.load(estimator).Gains(**gains),
+        gains=gains and registry.design_of(estimator).gains_class(**gains),
         estimator_bits_dropped=bits_dropped,
     )
 
@@ -136,13 +136,8 @@ def measure(
         }
     )
     begin = math.ceil(known.judged_from_s * sample_hz)
-    judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
-    for first, words, flags in velocities(known, spec, output, backend, offsets(phase_error_counts)):
-        raised |= flags
-        estimate = words[max(begin - first, 0) :]
-        since = first + len(words) - len(estimate)
-        times = np.arange(since, since + len(estimate)) / sample_hz
-        judge.add(since - begin, estimate, exact_velocity(known.motion, times))
+    chunks = velocities(known, spec, output, backend, offsets(phase_error_counts))
+    judge, raised = _judged(known, begin, sample_hz, chunks)
     return {
         "estimator": estimator,
         "output": output,
@@ -164,6 +159,20 @@ def measure(
     }
 
 
+def _judged(
+    known: signals.Signal, begin: int, sample_hz: int, chunks: Iterator[tuple[int, np.ndarray, int]]
+) -> tuple[Judge, int]:
+    """Return the errors of an estimate from sample `begin` on, and the flags that were raised."""
+    judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
+    for first, words, flags in chunks:
+        raised |= flags
+        estimate = words[max(begin - first, 0) :]
+        since = first + len(words) - len(estimate)
+        times = np.arange(since, since + len(estimate)) / sample_hz
+        judge.add(since - begin, estimate, exact_velocity(known.motion, times))
+    return judge, raised
+
+
 def measure_recording(
     estimator: str, output: str, file: str, column: str, backend: str = "float", content: str = ""
 ) -> dict:
@@ -181,7 +190,7 @@ def measure_recording(
         RecordingError, ReplayError: in one line, what cannot be and what is accepted.
         RuntimeError: if the RTL could not be built.
     """
-    result = replay(load_recording(file, column), estimator, output, backend, coarsen=COARSEN)
+    result = replay(recording.load(file, column), estimator, output, backend, coarsen=COARSEN)
     rate, begin = result.recording.rate_hz, result.judged_from
     estimate, exact = result.velocity_counts_per_s[begin:], result.reference_counts_per_s[begin:]
     judge = Judge(len(estimate), rate)

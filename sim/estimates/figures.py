@@ -45,7 +45,7 @@ def curves(figure: int) -> list[Curve]:
     others = [
         Curve(label(name, output), name, output)
         for name in registry.ESTIMATORS
-        for output in registry.load(name).OUTPUTS
+        for output in registry.design_of(name).outputs
         if (name, output) not in shown
     ]
     return papers + others

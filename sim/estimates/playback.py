@@ -12,7 +12,6 @@ import numpy as np
 from ...model import quadrature, stamped
 from ...model.axis import Axis
 from ...model.compiled import compiled
-from ...model.estimators import registry
 from ...model.spec import AxisSpec
 from ..loop.controllers import sample, sample_quietly
 from ..world.encoder import Encoder
@@ -62,7 +61,7 @@ def velocities(
         RuntimeError: if the RTL could not be built.
     """
     passed = edges_of(signal, spec, offsets)
-    axis = Axis(spec, floating=backend == "float", **registry.choose(spec.estimator, output))
+    axis = Axis(spec, floating=backend == "float", **spec.design.estimator.choose(output))
     controller, state = stamped.controller(axis, passed.start_level)
     hardware = nullcontext()
     if backend == "rtl":

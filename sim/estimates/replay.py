@@ -35,6 +35,7 @@ from ...model import axis, quadrature, stamped
 from ...model.arithmetic.fixed import bits_for
 from ...model.estimators import registry
 from ...model.spec import AxisSpec
+from ..jobs.result import Summary
 from ..jobs.whole_file import whole_file
 from ..world.encoder import level
 from .recording import Recording
@@ -56,7 +57,7 @@ class ReplayError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Replay:
+class Replay(Summary):
     """What an estimator made of a recording; arrays of the recording's length, in recorded counts and seconds.
 
     Attributes:
@@ -98,20 +99,31 @@ class Replay:
         return judged_from(self.recording.rate_hz)
 
     def _rms(self, velocity: np.ndarray) -> float | None:
-        if self.coarsen is None:
-            return None
         error = (velocity - self.reference_counts_per_s)[self.judged_from :]
-        return float(np.sqrt(np.mean(error**2)))
+        return float(np.sqrt(np.mean(error**2))) if len(error) else None
 
     @cached_property
-    def rms_counts_per_s(self) -> float | None:
-        """RMS of the estimate's error against the reference, after the first second; None without `coarsen`."""
+    def error_rms_counts_per_s(self) -> float | None:
+        """RMS of the estimate's error against the reference, after the first second; None for a shorter recording.
+
+        Without `coarsen` the reference is that of the very counts that the estimator saw.
+        """
         return self._rms(self.velocity_counts_per_s)
 
     @cached_property
-    def rms_fdm_counts_per_s(self) -> float | None:
+    def error_rms_fdm_counts_per_s(self) -> float | None:
         """The same of the finite difference."""
         return self._rms(self.difference_counts_per_s)
+
+    @property
+    def rms_counts_per_s(self) -> float | None:
+        """The estimate's error where it was judged: None without `coarsen`."""
+        return None if self.coarsen is None else self.error_rms_counts_per_s
+
+    @property
+    def rms_fdm_counts_per_s(self) -> float | None:
+        """The same of the finite difference."""
+        return None if self.coarsen is None else self.error_rms_fdm_counts_per_s
 
     def report(self) -> dict:
         """Return the summary that the command line prints, units in the keys; counts are recorded counts."""
@@ -131,6 +143,8 @@ class Replay:
             "reference_hz": self.reference_hz,
             "rms_counts_per_s": self.rms_counts_per_s,
             "rms_fdm_counts_per_s": self.rms_fdm_counts_per_s,
+            "error_rms_counts_per_s": self.error_rms_counts_per_s,
+            "error_rms_fdm_counts_per_s": self.error_rms_fdm_counts_per_s,
             "max_abs_counts_per_s": float(np.abs(self.velocity_counts_per_s).max()),
             "flags": self.flags,
             "velocity_sha256": self.velocity_sha256,
@@ -208,7 +222,7 @@ def axis_spec(counts: np.ndarray, count: int, acceleration_max: float, estimator
 
 def needs_pins(estimator: str, backend: str) -> bool:
     """Return whether the counts go through pins: into hardware, or to be stamped."""
-    return backend == "rtl" or registry.uses_stamps(estimator)
+    return backend == "rtl" or registry.design_of(estimator).uses_stamps()
 
 
 def run(
@@ -230,7 +244,7 @@ def run(
     Raises:
         RuntimeError: if the RTL could not be built.
     """
-    choice = registry.choose(spec.estimator, output)
+    choice = spec.design.estimator.choose(output)
     if backend == "rtl":
         from ..rtl.library import (  # noqa: PLC0415  (the other backends need neither Amaranth nor a C++ compiler)
             Hardware,
@@ -297,7 +311,7 @@ def replay(
         RuntimeError: if the RTL could not be built.
     """
     _one_of("estimator", estimator, tuple(registry.ESTIMATORS))
-    outputs = registry.load(estimator).OUTPUTS
+    outputs = registry.design_of(estimator).outputs
     output = outputs[0] if output is None else output
     _one_of(f"output of {estimator}", output, outputs)
     _one_of("backend", backend, BACKENDS)

@@ -9,6 +9,8 @@ from functools import cache
 
 import numpy as np
 
+from ..scene.case import Case
+from ..walls.hit import run
 from . import motions
 
 DEVICE_ACCELERATION = 12.0
@@ -81,11 +83,9 @@ def hit() -> Signal:
 
     C is the largest acceleration on the way.
     """
-    from ..scene.load import load  # noqa: PLC0415
-    from ..walls import hit as hits  # noqa: PLC0415  (the loop is compiled only where it runs)
-
-    scene = load("mhz", {"wall.stiffness_n_per_m": 10e3, "wall.damping_n_s_per_m": 20.0, "controller.output": "u1"})
-    detail = hits.run(scene, "float", traces=True).detail
+    wall = {"wall.stiffness_n_per_m": 10e3, "wall.damping_n_s_per_m": 20.0}
+    scene = Case.of("mhz", wall | {"controller.output": "u1"}).scene
+    detail = run(scene, "float", traces=True).detail
     path = motions.Track(TRACK_LEAD_S, 1 / scene.spec.sample_hz, detail.position_m, detail.velocity_m_per_s)
     length = (len(detail.time_s) - 1) / scene.spec.sample_hz
     x, v, h = detail.position_m, detail.velocity_m_per_s, 1 / scene.spec.sample_hz

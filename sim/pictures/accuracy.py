@@ -8,6 +8,7 @@ from ..estimates import signals
 from ..estimates.accuracy import axis_spec, exact_velocity
 from ..estimates.figures import lower_bound_m_per_s, window_floor_m_per_s
 from ..estimates.playback import velocities
+from ..studies.accuracy import Accuracy
 from ..walls.methods import Curve
 from ..world.encoder import offsets
 from .labels import label_right
@@ -20,7 +21,14 @@ LEAST_MM_S = 1e-6
 
 
 @page
-def draw_figure_1(curves: list[Curve], rows: list[dict]) -> Figure:
+def draw(accuracy: Accuracy) -> Figure:
+    """Return the founding paper's first figure, if that is what was measured; else the error against the rate."""
+    if accuracy.figure == 1:
+        return _figure_1(accuracy.curves, accuracy.rows)
+    return _against_rate(accuracy.rows, accuracy.labels)
+
+
+def _figure_1(curves: list[Curve], rows: list[dict]) -> Figure:
     """Return the paper's first figure: estimates of a decaying sine over time, their error, and pieces enlarged.
 
     Args:
@@ -76,8 +84,7 @@ def _frame(axes: Axes, curves: list[np.ndarray]) -> None:
     axes.axhline(0, color="black", lw=0.6)
 
 
-@page
-def draw(rows: list[dict], labels: list[str]) -> Figure:
+def _against_rate(rows: list[dict], labels: list[str]) -> Figure:
     """Return the picture of the RMS error against the sample rate, a curve for each label.
 
     Args:

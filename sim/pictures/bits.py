@@ -2,18 +2,16 @@
 
 from matplotlib.figure import Figure
 
+from ..studies.bits import Bits
 from ..walls.methods import label
 from .labels import label_right
 from .style import looks, new_figure, page
 
 
 @page
-def draw(rows: list[dict]) -> Figure:
-    """Return the picture, a curve for each estimator's output.
-
-    Args:
-        rows: of `bits.bit`.
-    """
+def draw(bits: Bits) -> Figure:
+    """Return the picture, a curve for each estimator's output."""
+    rows = bits.rows
     title = f"the paper's signal at {rows[0]['sample_hz'] / 1e6:g} MHz; circles: the derived widths"
     picture = new_figure(5.5, title)
     by_width, by_logic = picture.subplots(1, 2, sharey=True)

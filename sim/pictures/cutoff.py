@@ -1,12 +1,10 @@
 """The picture of the area of the stable region against the filter's cutoff."""
 
-from collections.abc import Sequence
-
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from ..studies.cutoff import LEVEL, PAPERS_HZ, Device
+from ..studies.cutoff import LEVEL, PAPERS_HZ, Cutoffs, Device
 from .labels import label_points
 from .style import COLOURS, LABEL_PT, THEORY, new_figure, page
 
@@ -15,12 +13,9 @@ FILTERED, UNFILTERED = COLOURS["butterworth"], COLOURS["fdm"]
 
 
 @page
-def draw(devices: Sequence[Device]) -> Figure:
-    """Return the picture: a panel a device, over one axis of cutoffs.
-
-    Args:
-        devices: the areas of each.
-    """
+def draw(cutoffs: Cutoffs) -> Figure:
+    """Return the picture: a panel a device, over one axis of cutoffs."""
+    devices = cutoffs.devices
     title = "Area of the stable region of walls (K, B) behind a finite difference and a filter"
     picture = new_figure(0.9 + 2.2 * len(devices), title)
     panels = picture.subplots(len(devices), sharex=True, squeeze=False)[:, 0]

@@ -5,8 +5,9 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..studies.drop import PAPERS, STARTS, STIFFNESS_N_PER_M, STIFFNESSES_N_PER_M, Drop, Law
-from ..walls.case import grid_of
+from ..studies.drop import PAPERS, STARTS, STIFFNESSES_N_PER_M
+from ..studies.drop_result import STIFFNESS_N_PER_M, Drop, Law
+from ..walls.grid import grid_of
 from .labels import label_points
 from .style import AT_REST_M, COLOURS, LABEL_PT, THEORY, ink, length_text, looks, new_figure, page, plain_decades
 
@@ -38,7 +39,7 @@ def draw(drop: Drop) -> dict[str, Figure]:
 
 def _inks(drop: Drop) -> dict[str, str]:
     """Return the colour in which each method is written, by name."""
-    return {name: ink(each.case.parsed.controller.estimator) for name, each in drop.maps.items()}
+    return {name: ink(each.case.scene.controller.estimator) for name, each in drop.maps.items()}
 
 
 def _setting(drop: Drop) -> str:
@@ -185,7 +186,7 @@ def _ends(drop: Drop) -> Figure:
 
 def _maps(drop: Drop) -> Figure:
     """Return the picture of the stable regions: a panel a method, the others pale behind it."""
-    grid = grid_of(next(iter(drop.maps.values())).case.parsed)
+    grid = grid_of(next(iter(drop.maps.values())).case.scene)
     title = (
         "The stable region of each method; in brackets its area, as a multiple of the paper's best\n"
         f"{drop.scene.name}, maps in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, "
@@ -202,7 +203,7 @@ def _maps(drop: Drop) -> Figure:
     for axes, (name, each) in zip(panels.flat, drop.maps.items(), strict=False):
         for other in edges.values():
             axes.plot(*zip(*other, strict=True), color="0.85", lw=0.9)
-        controller = each.case.parsed.controller
+        controller = each.case.scene.controller
         (style,) = looks([(controller.estimator, controller.output)])
         axes.plot(*zip(*edges[name], strict=True), **style | {"lw": 1.6, "ms": 3.5})
         times = drop.of_papers(name)

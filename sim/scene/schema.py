@@ -18,10 +18,6 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Rate = Annotated[int, Field(gt=0, le=10**9)]
 
 
-class SceneError(ValueError):
-    """A scene that cannot be: one line, naming the file, the key and what is accepted."""
-
-
 class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
@@ -49,7 +45,7 @@ class EncoderSection(Section):
 
 def _gains_section(name: str) -> type[Section]:
     """Return a section with the fields of an estimator's gains."""
-    fields = dict.fromkeys(registry.load(name).Gains.__annotations__, (Positive, ...))
+    fields = dict.fromkeys(registry.design_of(name).gains_class.__annotations__, (Positive, ...))
     return create_model(f"{name.title()}Section", __base__=Section, **fields)
 
 
@@ -189,15 +185,15 @@ class Scene(Section):
         )
         gains = getattr(self.controller.gains, self.controller.estimator)
         if gains is not None:
-            gains = registry.load(self.controller.estimator).Gains(**gains.model_dump())
+            gains = registry.design_of(self.controller.estimator).gains_class(**gains.model_dump())
         return AxisSpec(count_m=self.encoder.count_m, gains=gains, **fields)
 
     @property
     def estimator_output(self) -> str:
         """The estimator's output that the wall uses."""
-        return self.controller.output or self.spec.model.OUTPUTS[0]
+        return self.controller.output or self.spec.design.estimator.outputs[0]
 
-    @cached_property
+    @property
     def parameters(self) -> dict[str, float]:
         """Run-time parameters in SI units, by word; the count is 0 at the start, so the wall is so far from there."""
         si = {
@@ -207,15 +203,21 @@ class Scene(Section):
             "wall_position": -self.protocol.start_m,
             "wall_forbid_pull": self.wall.forbid_pull,
         }
-        si |= registry.choose(self.controller.estimator, self.estimator_output)
+        si |= self.spec.design.estimator.choose(self.estimator_output)
         if self.controller.slew_limit_n_per_s is not None:
             si["output_slew_limit"] = self.controller.slew_limit_n_per_s
         return si
 
-    @cached_property
+    @property
     def words(self) -> dict[str, int]:
         """The same as the hardware takes them."""
         return self.spec.design.encode(**self.parameters)
+
+    def hitting(self, stiffness_n_per_m: float, damping_n_s_per_m: float, start_m: float) -> "Scene":
+        """Return the scene with another wall and start; the axis depends on neither, and is not derived again."""
+        wall = {"stiffness_n_per_m": stiffness_n_per_m, "damping_n_s_per_m": damping_n_s_per_m}
+        protocol = self.protocol.model_copy(update={"start_m": start_m})
+        return self.model_copy(update={"wall": self.wall.model_copy(update=wall), "protocol": protocol})
 
     @property
     def delay_samples(self) -> int:

@@ -1,16 +1,19 @@
 """How fast the closed loop runs, and what each optional part of a scene costs; measured side by side in one run.
 
-Every figure is a median over rounds, and in each round every contestant runs once, so that a machine that slows down
-slows them all.
+Every figure is a median over rounds in which the contestants take turns: see `jobs.rounds`.
 """
 
 import json
-import statistics
 import tempfile
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ...model.compiled import build_dir
+from ..jobs.result import Table, text_of
+from ..jobs.rounds import medians
+from ..rtl.cocotb_runner import Job, simulate_axis
 from ..scene.load import load
 from ..scene.schema import Scene
 from ..walls import hit
@@ -49,18 +52,6 @@ def _scene(name: str, changes: dict, seconds: float) -> Scene:
     return load(name, changes | half)
 
 
-def medians(
-    contestants: dict[Hashable, Callable[[], float]], rounds: int, progress: Callable[[str], None]
-) -> dict[Hashable, float]:
-    """Return the median over the rounds of what each contestant gives, taken in turns."""
-    given: dict[Hashable, list[float]] = {name: [] for name in contestants}
-    for number in range(rounds):
-        for name, run in contestants.items():
-            progress(f"round {number + 1} of {rounds}: {name}")
-            given[name].append(run())
-    return {name: statistics.median(values) for name, values in given.items()}
-
-
 def _hits(scene: Scene, backend: str) -> Callable[[], float]:
     """Return a run of the closed loop, in samples a second."""
 
@@ -74,8 +65,6 @@ def _hits(scene: Scene, backend: str) -> Callable[[], float]:
 
 def _cocotb(name: str) -> Callable[[], float]:
     """Return a run of the same closed loop under cocotb, in samples a second; its force words must be the model's."""
-    from ..rtl.cocotb_runner import simulate_axis  # noqa: PLC0415  (cocotb comes with the regressions)
-
     scene = load(name)
     words = hit.run(_scene(name, {}, COCOTB_SAMPLES / scene.spec.sample_hz), "fixed").force_sha256
 
@@ -87,7 +76,7 @@ def _cocotb(name: str) -> Callable[[], float]:
             order = {"scene": found, "samples": COCOTB_SAMPLES, "report": str(report)}
             environ = {"HARDWALL_LOOP": json.dumps(order), "COCOTB_LOG_LEVEL": "WARNING"}
             log = build_dir() / "cocotb" / "bench.log"
-            simulate_axis(scene.spec, "hardwall.sim.studies.cocotb_loop", Path(folder), environ, log)
+            simulate_axis(scene.spec, Job("hardwall.sim.studies.cocotb_loop", Path(folder), environ, log=log))
             result = json.loads(report.read_text())
         if result["force_sha256"] != words:
             raise RuntimeError(f"the RTL under cocotb and the model differ in their first {COCOTB_SAMPLES} force words")
@@ -96,27 +85,60 @@ def _cocotb(name: str) -> Callable[[], float]:
     return run
 
 
-def bench(scene: str, progress: Callable[[str], None]) -> dict:
-    """Return the benchmark's report: samples a second by backend, and nanoseconds a sample by optional part.
+@dataclass(frozen=True)
+class Speeds:
+    """What was measured.
+
+    Attributes:
+        scene: name of the scene.
+        samples_per_s: by backend, and under cocotb.
+        clocks_per_sample: of the hardware.
+        ns_per_sample_of_parts: by optional part.
+    """
+
+    scene: str
+    samples_per_s: dict[str, float]
+    clocks_per_sample: int
+    ns_per_sample_of_parts: dict[str, float]
+
+    def _ratios(self) -> dict[str, float]:
+        rtl, cocotb = self.samples_per_s["rtl"], self.samples_per_s["cocotb"]
+        return {"rtl_over_cocotb": rtl / cocotb, "rtl_clocks_per_s": rtl * self.clocks_per_sample}
+
+    def report(self) -> dict[str, Any]:
+        """Return what the command line prints, units in the keys."""
+        head = {"scene": self.scene, "rounds": ROUNDS, "samples_per_s": self.samples_per_s}
+        return head | self._ratios() | {"ns_per_sample_of_parts": self.ns_per_sample_of_parts}
+
+    def tables(self) -> list[Table]:
+        """Return the same, a line a number."""
+        speeds = {f"{name} (samples/s)": value for name, value in self.samples_per_s.items()}
+        costs = {f"{name} (ns/sample)": value for name, value in self.ns_per_sample_of_parts.items()}
+        lines = {"scene": self.scene, "rounds": ROUNDS} | self._ratios() | speeds | costs
+        return [Table({}, [[key, text_of(value)] for key, value in lines.items()])]
+
+    def notes(self) -> list[str]:
+        return []
+
+
+def study(scene: str, progress: Callable[[str], None]) -> Speeds:
+    """Return samples a second by backend, and nanoseconds a sample by optional part.
 
     Args:
-        scene: name of a scene.
+        scene: its name or file.
         progress: called with what is measured next.
+
+    Raises:
+        RuntimeError: if the RTL under cocotb makes other force words than the model.
     """
+    spec = load(scene).spec
     progress("compiling and building")
     speeds = {backend: _hits(_scene(scene, {}, seconds), backend) for backend, seconds in SECONDS_OF_SCENE.items()}
     speeds["cocotb"] = _cocotb(scene)
     parts = {
         name: _hits(_scene(scene, changes, SECONDS_OF_SCENE["fixed"]), "fixed")
-        for name, changes in _parts(1 / load(scene).spec.sample_hz).items()
+        for name, changes in _parts(1 / spec.sample_hz).items()
     }
     samples_per_s = medians(speeds, ROUNDS, progress)
     costs = {name: 1e9 / rate for name, rate in medians(parts, ROUNDS, progress).items()}
-    return {
-        "scene": scene,
-        "rounds": ROUNDS,
-        "samples_per_s": samples_per_s,
-        "rtl_over_cocotb": samples_per_s["rtl"] / samples_per_s["cocotb"],
-        "rtl_clocks_per_s": samples_per_s["rtl"] * load(scene).spec.clocks_per_sample,
-        "ns_per_sample_of_parts": costs,
-    }
+    return Speeds(scene, samples_per_s, spec.clocks_per_sample, costs)

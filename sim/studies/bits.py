@@ -1,12 +1,49 @@
 """What a bit buys: an estimator's error and its logic against the width of its words, bit by bit below the derived."""
 
+from dataclasses import dataclass
+from typing import Any
+
 from ..estimates import signals
 from ..estimates.accuracy import axis_spec, measure
+from ..jobs.result import Table, table_of
 from ..rtl.synthesis import estimator_cells
+from ..walls.methods import Curve
 
 SIGNAL = "paper"
 DEVICE = "ecp5-25k"
 DROPPED = range(13)
+
+
+@dataclass(frozen=True)
+class Bits:
+    """What bits buy: rows of `bit`."""
+
+    rows: list[dict[str, Any]]
+
+    def report(self) -> list[dict[str, Any]]:
+        """Return the rows, units in the keys."""
+        return self.rows
+
+    def tables(self) -> list[Table]:
+        """Return the rows."""
+        columns = ("bits_dropped", "velocity_bits", "rms_mm_s", "lut4", "ff", "dsp")
+        lines = [
+            [f"{row['estimator']} {row['output']}", *(f"{row[name]:.5g}" for name in columns)] for row in self.rows
+        ]
+        heads = ("bits dropped", "velocity bits", "RMS (mm/s)", "LUT4", "FF", "DSP")
+        return [table_of(("estimator",), heads, lines)]
+
+    def notes(self) -> list[str]:
+        return []
+
+
+def jobs(curves: list[Curve], sample_hz: int) -> list[dict[str, Any]]:
+    """Return the arguments of `bit` for each estimator, bit by bit."""
+    return [
+        {"estimator": curve.estimator, "output": curve.output, "sample_hz": sample_hz, "bits_dropped": dropped}
+        for curve in curves
+        for dropped in DROPPED
+    ]
 
 
 def bit(estimator: str, output: str, sample_hz: int, bits_dropped: int) -> dict | None:

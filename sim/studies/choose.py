@@ -4,8 +4,12 @@ The gains are those for the bound C on the acceleration that the impact asks for
 every situation. Errors are RMS, mm/s.
 """
 
+from dataclasses import dataclass
+from typing import Any
+
 from ...model.estimators import registry
 from ..estimates import signals
+from ..jobs.result import Table, table_of
 
 PHASE_ERROR_COUNTS = 0.25
 SITUATIONS = {
@@ -18,6 +22,39 @@ SITUATIONS = {
 }
 """What a handle does: about 1 and 300 mm/s (no round speeds, whose counts lock to the samples), the paper's swing, a
 wall, a count that flickers, the swing seen badly."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The table to choose by: rows of `table`."""
+
+    rows: list[dict[str, Any]]
+
+    def report(self) -> list[dict[str, Any]]:
+        """Return the rows, units in the keys."""
+        return self.rows
+
+    def tables(self) -> list[Table]:
+        """Return the errors, and the costs."""
+        names = list(SITUATIONS)
+        best = {name: min(row["rms_mm_s"][name] for row in self.rows) for name in names}
+        errors, costs = [], []
+        for row in self.rows:
+            estimator = f"{row['estimator']} {row['output']}".strip()
+            own = [f"{row['rms_mm_s'][name]:.3g}{'*' * (row['rms_mm_s'][name] == best[name])}" for name in names]
+            delay = "" if row["impact_delay_s"] is None else f"{row['impact_delay_s'] * 1e6:.3g}"
+            errors.append([estimator, *own, delay])
+            logic = [str(row[name]) for name in ("lut4", "ff", "dsp", "bram", "latency_clocks")]
+            costs.append([estimator, *logic, f"{row['max_sample_hz']:,}"])
+        numbers = ("LUT4", "FF", "DSP", "BRAM", "clocks", "max samples/s")
+        return [
+            table_of(("RMS error (mm/s)",), (*names, "impact delay (us)"), errors),
+            table_of((f"cost on {self.rows[0]['device']}",), numbers, costs),
+        ]
+
+    def notes(self) -> list[str]:
+        """Return what a star is."""
+        return ["*: the least error"]
 
 
 def jobs(pairs: list[tuple[str, str]], sample_hz: int, backend: str) -> list[dict]:
@@ -47,7 +84,7 @@ def table(pairs: list[tuple[str, str]], measured: list[dict], costs: list[dict])
         rows.append(
             {
                 "estimator": estimator,
-                "output": output if len(registry.load(estimator).OUTPUTS) > 1 else "",
+                "output": output if len(registry.design_of(estimator).outputs) > 1 else "",
                 "rms_mm_s": {name: row["rms_mm_s"] for name, row in own.items()},
                 "impact_delay_s": own["impact"]["delay_s"],
                 **{name: cost[name] for name in ("device", "lut4", "ff", "dsp", "bram", "latency_clocks")},

@@ -1,7 +1,10 @@
 """What a velocity estimator costs in logic: alone, as synthesised, and as part of a board, placed and routed."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
 
+from ..jobs.result import Table, table_of
 from ..rtl.synthesis import estimator_cells, synthesise
 from ..scene.load import load
 
@@ -14,6 +17,48 @@ RATES = {
     },
 }
 """By device: what differs from the scene `mhz`, which is too fast for the slower one."""
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What estimators take of devices: rows of `cost`."""
+
+    rows: list[dict[str, Any]]
+
+    def report(self) -> list[dict[str, Any]]:
+        """Return the rows."""
+        return self.rows
+
+    def tables(self) -> list[Table]:
+        """Return two tables for each device: of the estimators alone, and of the board with each."""
+        tables = []
+        for device in dict.fromkeys(row["device"] for row in self.rows):
+            own = [row for row in self.rows if row["device"] == device]
+            tables.append(table_of((f"{device}: alone",), ALONE, [_alone(row) for row in own]))
+            tables.append(table_of((f"{device}: board",), BOARD, [_board(row) for row in own]))
+        return tables
+
+    def notes(self) -> list[str]:
+        return []
+
+
+ALONE = ("LUT4", "FF", "DSP", "BRAM", "clocks")
+BOARD = ("LUT4", "FF", "DSP", "fmax (MHz)", "samples/s")
+
+
+def _alone(row: dict[str, Any]) -> list[str]:
+    return [row["estimator"], *(str(row[name]) for name in ("lut4", "ff", "dsp", "bram", "latency_clocks"))]
+
+
+def _board(row: dict[str, Any]) -> list[str]:
+    board = row["board"]
+    cells = [str(board[name]) for name in ("lut4", "ff", "dsp")]
+    return [row["estimator"], *cells, f"{board['fmax_mhz']:.1f}", f"{board['max_sample_hz']:,}"]
+
+
+def jobs(estimators: list[str], device: str, seeds: int) -> list[dict[str, Any]]:
+    """Return the arguments of `cost` for each estimator."""
+    return [{"estimator": name, "device": device, "seeds": list(range(1, seeds + 1))} for name in estimators]
 
 
 def cost(estimator: str, device: str, seeds: Iterable[int]) -> dict:

@@ -18,10 +18,12 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ...model.estimators.butterworth import CUTOFF_MAX
-from ..scene.load import parse, read
+from ..jobs.result import Table, table_of
+from ..scene.case import Case, accepted
 from ..scene.schema import Scene
-from ..walls.case import Case, accepted, room
-from ..walls.zwidth import Map, Mapping
+from ..walls.grid import wider_grid
+from ..walls.zwidth import Effort, Map, Mapping
+from .zwidth import area_text, plus_of_areas
 
 SCENES = ("seed-2011", "desktop-arm", "maglev")
 """The paper's device, and two that differ from it in mass, friction, count and rates."""
@@ -100,52 +102,83 @@ class Device:
         }
 
 
+@dataclass(frozen=True)
+class Cutoffs:
+    """What was found: the devices, and what their maps took."""
+
+    devices: list[Device]
+    effort: Effort
+
+    def report(self) -> dict[str, Any]:
+        """Return what the command line prints, units in the keys."""
+        return self.effort._asdict() | {"devices": [each.report() for each in self.devices]}
+
+    def tables(self) -> list[Table]:
+        """Return the best cutoff of each device, and the areas at every cutoff."""
+        numbers = ("best (Hz)", "its area (kN/m N s/m)", "within 5 %, from (Hz)", "to (Hz)", "no filter: area")
+        rows = []
+        for each in self.devices:
+            best = f"{each.best_hz:.0f}" + ", at the end" * each.at_end
+            level = [f"{end:.0f}" for end in each.level_hz]
+            rows.append([each.scene.name, best, area_text(each.best), *level, area_text(each.unfiltered)])
+        cutoffs = sorted({cutoff_hz for each in self.devices for cutoff_hz in each.maps})
+        areas = [
+            [f"{cutoff:g}", *(area_text(each.maps[cutoff]) if cutoff in each.maps else "" for each in self.devices)]
+            for cutoff in cutoffs
+        ]
+        columns = ("cutoff (Hz)", *(f"{each.scene.name}: area" for each in self.devices))
+        return [table_of(("device",), numbers, rows), table_of((), columns, areas)]
+
+    def notes(self) -> list[str]:
+        """Return what a + is."""
+        return plus_of_areas(found for each in self.devices for found in (*each.maps.values(), each.unfiltered))
+
+
 class _Cases:
     """The cases of one scene."""
 
-    def __init__(self, scene: str, changes: dict[str, Any]):
-        self._scene, self._text = scene, read(scene)
-        self._changes = changes | room(parse(scene, self._text, changes), COARSER)
-        self.parsed = parse(scene, self._text, self._changes)
+    def __init__(self, case: Case):
+        self._case = case.changed(wider_grid(case.scene, COARSER))
+        self.scene = self._case.scene
 
     def unfiltered(self) -> Case:
-        return self._case("unfiltered", {"controller.estimator": "fdm"})
+        return self._of("unfiltered", {"controller.estimator": "fdm"})
 
     def filtered(self, cutoff_hz: float) -> Case:
         gains = {"controller.gains.butterworth": {"cutoff_hz": cutoff_hz}}
-        return self._case(f"{cutoff_hz:g} Hz", {"controller.estimator": "butterworth", **gains})
+        return self._of(f"{cutoff_hz:g} Hz", {"controller.estimator": "butterworth", **gains})
 
     def sweep(self) -> dict[float, Case]:
         """Return the sweep's cases by cutoff: those that the rate allows, the highest of them at its end."""
-        end = min(float(SWEEP_HZ[-1]), CUTOFF_MAX * self.parsed.controller.sample_hz)
+        end = min(float(SWEEP_HZ[-1]), CUTOFF_MAX * self.scene.controller.sample_hz)
         cutoffs = [*(float(each) for each in SWEEP_HZ if each < end), end]
         return accepted({cutoff_hz: self.filtered(cutoff_hz) for cutoff_hz in cutoffs})
 
-    def _case(self, label: str, changes: dict[str, Any]) -> Case:
-        return Case(f"{self.parsed.name}, {label}", self._scene, self._text, self._changes | changes)
+    def _of(self, label: str, changes: dict[str, Any]) -> Case:
+        return self._case.changed(changes, f"{self.scene.name}, {label}")
 
 
-def study(scenes: list[str], changes: dict[str, Any], mapping: Mapping) -> list[Device]:
+def study(cases: list[Case], mapping: Mapping) -> Cutoffs:
     """Return the areas of every scene against the cutoff, the best cutoff of each among them.
 
     Args:
-        scenes: names or files.
-        changes: of all of them, by dotted key.
+        cases: the scenes.
         mapping: makes the maps.
 
     Raises:
         SceneError: if a scene cannot be, or has no section `zwidth`.
     """
-    devices = [_Cases(scene, changes) for scene in scenes]
+    devices = [_Cases(case) for case in cases]
     sweeps = [device.sweep() for device in devices]
     # The largest regions take longest: they go first.
-    cases = {(place, cutoff): sweep[cutoff] for place, sweep in enumerate(sweeps) for cutoff in reversed(sweep)}
-    cases |= {(place, None): device.unfiltered() for place, device in enumerate(devices)}
-    found = dict(zip(cases, mapping("sweep of cutoffs", list(cases.values())), strict=True))
-    return [
+    swept = {(place, cutoff): sweep[cutoff] for place, sweep in enumerate(sweeps) for cutoff in reversed(sweep)}
+    swept |= {(place, None): device.unfiltered() for place, device in enumerate(devices)}
+    found = dict(zip(swept, mapping("sweep of cutoffs", list(swept.values())), strict=True))
+    searched = [
         _searched(device, {cutoff: found[place, cutoff] for cutoff in sweeps[place]}, found[place, None], mapping)
         for place, device in enumerate(devices)
     ]
+    return Cutoffs(searched, mapping.effort())
 
 
 def _searched(device: _Cases, sweep: dict[float, Map], unfiltered: Map, mapping: Mapping) -> Device:
@@ -166,4 +199,4 @@ def _searched(device: _Cases, sweep: dict[float, Map], unfiltered: Map, mapping:
     if areas[top] > 0 and bounds[0] < bounds[1]:
         options = {"xatol": math.log1p(TOLERANCE), "maxiter": EVALUATIONS}
         minimize_scalar(loss, bounds=bounds, method="bounded", options=options)
-    return Device(device.parsed, dict(sorted(maps.items())), unfiltered)
+    return Device(device.scene, dict(sorted(maps.items())), unfiltered)

@@ -16,22 +16,22 @@ holds, or not, whatever the stiffness. Four experiments:
 import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from ..scene.load import parse, read
-from ..scene.schema import Scene, SceneError
+from ..scene.case import Case, accepted
+from ..scene.errors import SceneError
+from ..scene.schema import Scene
 from ..walls import hit
-from ..walls.case import Case, accepted, room
-from ..walls.chatter import Chatter, at_rest
+from ..walls.chatter import at_rest
+from ..walls.grid import wider_grid
 from ..walls.methods import PROPOSED, Curve, methods
-from ..walls.zwidth import Map, Mapping
+from ..walls.zwidth import Mapping
+from .drop_result import STIFFNESS_N_PER_M, Drop, End, Law, Shaken
 
-STIFFNESS_N_PER_M = 5e3
-"""Of the walls that are hit one by one: soft enough that without chatter they are stable by far."""
 DAMPINGS_N_S_PER_M = np.geomspace(3, 400, 18).round(1)
 STARTS = 8
 """Hits of one wall. Each starts by `APART` counts farther off: which cycle the chatter falls into is chance."""
@@ -65,109 +65,6 @@ Striking = Callable[[str, list[dict]], list[dict]]
 """What makes the result of `strike` for each job; the text is for the one who waits."""
 
 
-@dataclass(frozen=True)
-class Shaken:
-    """One hit of the first experiment: RMS of position after the settling mark; None if the handle fled."""
-
-    method: str
-    damping_n_s_per_m: float
-    rms_m: float | None
-
-
-@dataclass(frozen=True)
-class End:
-    """The largest B of `ENDS_N_S_PER_M` with which enough of the hits come to rest, and are stable; 0 without any."""
-
-    method: str
-    stiffness_n_per_m: float
-    rests_n_s_per_m: float
-    stable_n_s_per_m: float
-
-
-@dataclass(frozen=True)
-class Law:
-    """One change of the scene, and up to which B the handle comes to rest.
-
-    Attributes:
-        factor, value: what was changed, and how.
-        method: by name.
-        predicted_n_s_per_m: up to which enough of the cycles let it rest; infinite without end.
-        measured_n_s_per_m: up to which enough of the hits came to rest; 0 if under the least B tried, infinite if
-            beyond the largest.
-    """
-
-    factor: str
-    value: str
-    method: str
-    predicted_n_s_per_m: float
-    measured_n_s_per_m: float
-
-
-@dataclass(frozen=True)
-class Drop:
-    """What was found.
-
-    Attributes:
-        scene: as it was hit.
-        chatters: by the names of `curves`.
-        shaken, ends, laws: of the first three experiments.
-        maps: by the names of `curves`.
-    """
-
-    scene: Scene
-    chatters: dict[str, Chatter]
-    shaken: list[Shaken]
-    ends: list[End]
-    laws: list[Law]
-    maps: dict[str, Map]
-
-    def agreement(self) -> list[float]:
-        """Return what was measured over what was predicted where both are known: least, quartiles and most."""
-        ratios = [
-            each.measured_n_s_per_m / each.predicted_n_s_per_m
-            for each in self.laws
-            if 0 < each.measured_n_s_per_m < math.inf and each.predicted_n_s_per_m < math.inf
-        ]
-        return np.quantile(ratios, (0, 0.25, 0.5, 0.75, 1)).tolist() if ratios else []
-
-    def before_the_end(self, name: str) -> float | None:
-        """Return K a step of B before a map's last stable wall, over its largest: a sharp drop has half or more.
-
-        None where the region leaves the map, or has no two dampings.
-        """
-        edges = self.maps[name].edges
-        stable = [edge.stable_n_per_m for edge in edges if edge.stable_n_per_m]
-        return None if edges[-1].stable_n_per_m or len(stable) < 2 else stable[-2] / max(stable)
-
-    def of_papers(self, name: str) -> float | None:
-        """Return a map's area as a multiple of the paper's best, that of Levant with adjusted gains; None without."""
-        papers = self.maps["adjusted"].area
-        return self.maps[name].area / papers if papers else None
-
-    def report(self) -> dict[str, Any]:
-        """Return what the command line prints; null for what is infinite."""
-        return {
-            "scene": self.scene.name,
-            "stiffness_n_per_m": STIFFNESS_N_PER_M,
-            "methods": {
-                name: {
-                    "swing_m_per_s": [float(chatter.swing_m_per_s.min()), float(chatter.swing_m_per_s.max())],
-                    "mean_m_per_s": float(np.abs(chatter.mean_m_per_s).max()),
-                    "of_papers_best": self.of_papers(name),
-                    "before_the_end": self.before_the_end(name),
-                    **self.maps[name].report(),
-                }
-                for name, chatter in self.chatters.items()
-            },
-            "shaken": [vars(each) for each in self.shaken],
-            "ends": [vars(each) for each in self.ends],
-            "measured_over_predicted": self.agreement(),
-            "laws": [
-                {key: None if value == math.inf else value for key, value in vars(each).items()} for each in self.laws
-            ],
-        }
-
-
 def curves(scene: Scene) -> dict[str, Curve]:
     """Return what is compared: the paper's methods, the same gains without chatter, and other estimators."""
     papers = methods(scene)
@@ -194,22 +91,21 @@ def strike(scene: str, text: str, changes: dict[str, Any], damping: float, start
         start: which of the starts.
         backend: `float` or `fixed`.
     """
-    plain = parse(scene, text, changes)
-    own = {"wall.damping_n_s_per_m": damping}
-    own["protocol.start_m"] = plain.protocol.start_m - start * APART * plain.encoder.count_m
-    result = hit.run(parse(scene, text, changes | own), backend, until_sure=True)
+    case = Case("", scene, text, changes)
+    plain = case.scene
+    start_m = plain.protocol.start_m - start * APART * plain.encoder.count_m
+    result = hit.run(case.hitting(damping_n_s_per_m=damping, start_m=start_m), backend, until_sure=True)
     if result.samples <= plain.protocol.settle_s * plain.spec.sample_hz:
         return {"rests": False, "stable": False, "rms_m": None}
     rests = result.rms_m < REST_COUNTS * plain.encoder.count_m and result.mean_m > 0
     return {"rests": rests, "stable": result.stable, "rms_m": result.rms_m}
 
 
-def study(scene: str, changes: dict[str, Any], backend: str, striking: Striking, mapping: Mapping) -> Drop:
+def study(case: Case, backend: str, striking: Striking, mapping: Mapping) -> Drop:
     """Return the four experiments on a scene.
 
     Args:
-        scene: its name or file.
-        changes: of it, by dotted key.
+        case: the scene.
         backend: `float` or `fixed`.
         striking: makes single hits.
         mapping: makes maps, on the same backend.
@@ -217,28 +113,29 @@ def study(scene: str, changes: dict[str, Any], backend: str, striking: Striking,
     Raises:
         SceneError: if the scene cannot be, or has no section `zwidth`, or no Coulomb friction.
     """
-    text = read(scene)
-    plain = parse(scene, text, changes | {"wall.stiffness_n_per_m": STIFFNESS_N_PER_M})
+    soft = case.changed({"wall.stiffness_n_per_m": STIFFNESS_N_PER_M})
+    plain = soft.scene
     if not plain.handle.coulomb_n:
         raise SceneError(f"{plain.name}: handle.coulomb_n must be more than 0: no friction holds against a chatter")
     compared = curves(plain)
     most = max(float(DAMPINGS_N_S_PER_M[-1]), plain.controller.damping_max_n_s_per_m)
-    roomy = changes | {"wall.stiffness_n_per_m": STIFFNESS_N_PER_M, "controller.damping_max_n_s_per_m": most}
-    cases = {name: Case(curve.label, scene, text, roomy | curve.changes) for name, curve in compared.items()}
+    damped = soft.changed({"controller.damping_max_n_s_per_m": most})
+    cases = {name: damped.changed(curve.changes, curve.label) for name, curve in compared.items()}
     changed = {("none", "", name): case for name, case in cases.items()}
     for name in PAPERS:
         for (factor, value), change in _changes(plain, compared[name]).items():
-            changed[factor, value, name] = replace(cases[name], changes=cases[name].changes | change)
+            changed[factor, value, name] = cases[name].changed(change)
     changed = accepted(changed)
-    wider = changes | room(plain, COARSER)
-    maps = mapping("maps", [replace(cases[name], changes=wider | curve.changes) for name, curve in compared.items()])
+    wider = case.changed(wider_grid(plain, COARSER))
+    maps = mapping("maps", [wider.changed(curve.changes, curve.label) for curve in compared.values()])
     return Drop(
         plain,
-        {name: at_rest(case.parsed, backend) for name, case in cases.items()},
+        {name: at_rest(each.scene, backend) for name, each in cases.items()},
         _shaken(cases, backend, striking),
         _ends(cases, backend, striking),
         _laws(changed, backend, striking),
         dict(zip(compared, maps, strict=True)),
+        mapping.effort(),
     )
 
 
@@ -262,8 +159,7 @@ def _changes(scene: Scene, curve: Curve) -> dict[tuple[str, str], dict[str, Any]
 
 
 def _job(case: Case, damping: float, start: int, backend: str) -> dict:
-    of_case = {"scene": case.scene, "text": case.text, "changes": case.changes}
-    return of_case | {"damping": damping, "start": start, "backend": backend}
+    return case.job() | {"damping": damping, "start": start, "backend": backend}
 
 
 def _shaken(cases: dict[str, Case], backend: str, striking: Striking) -> list[Shaken]:
@@ -277,8 +173,7 @@ def _ends(cases: dict[str, Case], backend: str, striking: Striking) -> list[End]
     """Return the ends: every damping is tried, for a stiff wall has a least one, too."""
     walls = {}
     for name, stiffness in product(PAPERS, STIFFNESSES_N_PER_M):
-        wall = {"wall.stiffness_n_per_m": stiffness}
-        walls[name, stiffness] = replace(cases[name], changes=cases[name].changes | wall)
+        walls[name, stiffness] = cases[name].changed({"wall.stiffness_n_per_m": stiffness})
     asked = list(product(walls, ENDS_N_S_PER_M.tolist(), range(STARTS)))
     results = striking("ends", [_job(walls[key], damping, start, backend) for key, damping, start in asked])
     counts = {"rests": Counter(), "stable": Counter()}
@@ -312,7 +207,7 @@ def _laws(changed: dict[tuple[str, str, str], Case], backend: str, striking: Str
         measured = math.sqrt(low[key] * high[key])
         if low[key] == least or high[key] == most:
             measured = 0.0 if low[key] == least else math.inf
-        laws.append(Law(*key, _predicted(case.parsed, backend), measured))
+        laws.append(Law(*key, _predicted(case.scene, backend), measured))
     return laws
 
 

@@ -21,12 +21,13 @@ from typing import Any
 import numpy as np
 from scipy.optimize import differential_evolution
 
-from ..scene.load import parse, read
-from ..scene.schema import Scene, SceneError
-from ..walls.case import Case
+from ..jobs.result import Table, table_of
+from ..scene.case import Case
+from ..scene.errors import SceneError
+from ..scene.schema import Scene
 from ..walls.figure_5 import ABOUT, Fact, facts
 from ..walls.methods import Curve, methods
-from ..walls.zwidth import Map, Mapping, NeverReached
+from ..walls.zwidth import Effort, Map, Mapping, NeverReached
 
 READINGS = {"3-30": (3.0, 30.0), "30-300": (30.0, 300.0)}
 """Ends of the paper's B axis, N s/m."""
@@ -167,17 +168,55 @@ class Fit:
             "finalists": [trial.report() for trial in self.finalists],
         }
 
+    def tables(self) -> list[Table]:
+        """Return the best finalist: its values, and the facts with them."""
+        best = self.finalists[0]
+        values = [[key, f"{self.own[key]:g}", f"{value:g}"] for key, value in best.values.items()]
+        lacks = self.least_shortfalls()
+        judged = [
+            [before.text, _held(before), _held(after), after.numbers, "" if lack is None else f"{lack:.3f}"]
+            for before, after, lack in zip(self.before.facts, best.facts, lacks, strict=True)
+        ]
+        columns = ("the paper's Figure 5", "before", f"fitted: {best.held} of {len(judged)}", "numbers")
+        return [
+            table_of((f"B axis {self.reading}",), ("before", "fitted"), values),
+            table_of(columns, ("least, others held",), judged),
+        ]
+
+
+def _held(fact: Fact) -> str:
+    return "held" if fact.held else f"short by {fact.shortfall:.3f}"
+
+
+@dataclass(frozen=True)
+class Fits:
+    """The fits of a scene, one for each reading of the B axis that was searched, by one seed."""
+
+    scene: Scene
+    fits: list[Fit]
+    seed: int
+    effort: Effort
+
+    def report(self) -> dict[str, Any]:
+        """Return what the command line prints."""
+        keys = {"scene": self.scene.name, "seed": self.seed, "fits": [each.report() for each in self.fits]}
+        return keys | {"backend": self.effort.backend, "seconds": self.effort.seconds}
+
+    def tables(self) -> list[Table]:
+        """Return those of each fit."""
+        return [table for each in self.fits for table in each.tables()]
+
+    def notes(self) -> list[str]:
+        """Return what the searches took."""
+        return [f"{sum(len(each.trials) for each in self.fits)} evaluations, {self.effort.seconds:.0f} s"]
+
 
 class _Judge:
     """Maps a scene with some values, and judges the maps."""
 
-    def __init__(self, scene: str, changes: dict[str, Any], reading: str, mapping: Mapping):
-        self._scene, self._text, self._changes, self._mapping = scene, read(scene), changes, mapping
+    def __init__(self, case: Case, reading: str, mapping: Mapping):
+        self._case, self._mapping = case, mapping
         self._low, self._end = READINGS[reading]
-
-    def parsed(self) -> Scene:
-        """The scene as it is."""
-        return parse(self._scene, self._text, self._changes)
 
     def _grid(self, steps: int) -> dict[str, Any]:
         end = BEYOND * self._end
@@ -191,16 +230,16 @@ class _Judge:
 
     def coarsely(self, values: dict[str, float]) -> Trial:
         """Return a trial of the search."""
-        changes = self._changes | self._grid(COARSE) | SHORT | values
+        case = self._case.changed(self._grid(COARSE) | SHORT | values)
         try:
-            papers = methods(parse(self._scene, self._text, changes))
-            (adjusted,) = self._maps(papers, changes, ["adjusted"]).values()
+            papers = methods(case.scene)
+            (adjusted,) = self._maps(papers, case, ["adjusted"]).values()
         except (SceneError, NeverReached):
             return Trial(values, [], HOPELESS, 0.0, {})
         off = self._off(adjusted)
         if off[0] > FAR:
             return Trial(values, [], *off, {"adjusted": adjusted})
-        return self._judged(values, papers, changes)
+        return self._judged(values, papers, case)
 
     def fully(self, values: dict[str, float]) -> Trial:
         """Return a trial in fine steps, on the scene's own protocol.
@@ -208,15 +247,15 @@ class _Judge:
         Raises:
             SceneError: if the scene cannot be.
         """
-        changes = self._changes | self._grid(FULL) | values
-        return self._judged(values, methods(parse(self._scene, self._text, changes)), changes)
+        case = self._case.changed(self._grid(FULL) | values)
+        return self._judged(values, methods(case.scene), case)
 
-    def _judged(self, values: dict[str, float], methods: dict[str, Curve], changes: dict[str, Any]) -> Trial:
-        maps = self._maps(methods, changes, list(methods))
+    def _judged(self, values: dict[str, float], papers: dict[str, Curve], case: Case) -> Trial:
+        maps = self._maps(papers, case, list(papers))
         return Trial(values, facts(maps), *self._off(maps["adjusted"]), maps)
 
-    def _maps(self, methods: dict[str, Curve], changes: dict[str, Any], names: list[str]) -> dict[str, Map]:
-        cases = [Case(methods[name].label, self._scene, self._text, changes | methods[name].changes) for name in names]
+    def _maps(self, papers: dict[str, Curve], case: Case, names: list[str]) -> dict[str, Map]:
+        cases = [case.changed(papers[name].changes, papers[name].label) for name in names]
         return dict(zip(names, self._mapping("fit", cases), strict=True))
 
     def _off(self, adjusted: Map) -> tuple[float, float]:
@@ -228,19 +267,12 @@ class _Judge:
 
 
 def study(
-    scene: str,
-    changes: dict[str, Any],
-    reading: str,
-    evaluations: int,
-    seed: int,
-    mapping: Mapping,
-    progress: Callable[[int], None],
+    case: Case, reading: str, evaluations: int, seed: int, mapping: Mapping, progress: Callable[[int], None]
 ) -> Fit:
     """Return the fit of a scene for one reading of the B axis.
 
     Args:
-        scene: its name or file.
-        changes: of it, by dotted key; a key that is searched has the searched value.
+        case: the scene; a key that is searched has the searched value, whatever its changes say.
         reading: of `READINGS`.
         evaluations: of the search, about so many: whole generations.
         seed: of the search.
@@ -251,8 +283,7 @@ def study(
         SceneError: if the scene cannot be, or lacks a key that is searched.
         zwidth.NeverReached: if its handle, with its own values, does not come to the wall.
     """
-    judge = _Judge(scene, changes, reading, mapping)
-    plain = judge.parsed()
+    judge, plain = _Judge(case, reading, mapping), case.scene
     own = {key: _value(plain, key) for key in PARAMETERS}
     before = judge.fully({})
     trials: list[Trial] = []

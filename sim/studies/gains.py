@@ -18,14 +18,16 @@ from typing import Any
 
 import numpy as np
 
-from ...model.estimators.levant import OUTPUTS, Gains
-from ..scene.load import parse, read
+from ...model.estimators.levant import Design, Gains
+from ..jobs.result import Table, table_of
+from ..scene.case import Case, accepted
 from ..scene.schema import Scene
-from ..walls import methods
 from ..walls.boundary import Grid
-from ..walls.case import Case, accepted, grid_of, room
-from ..walls.zwidth import Map, Mapping
+from ..walls.grid import grid_of, wider_grid
+from ..walls.methods import methods
+from ..walls.zwidth import Effort, Map, Mapping
 from .lipschitz import least_alpha_m_per_s2
+from .zwidth import area_text, plus_of_areas
 
 LAMBDAS = np.geomspace(0.3, 100, 16)
 """Of sqrt(C)."""
@@ -53,6 +55,7 @@ class Search:
         lambdas, alphas: that were tried, ascending, m^(1/2)/s and m/s^2.
         maps: in coarse steps, by output and gains; without those that no words can be derived for.
         picks: the paper's gains and the best, by output and by what they are.
+        effort: what the maps took.
     """
 
     scene: Scene
@@ -60,11 +63,12 @@ class Search:
     alphas: np.ndarray
     maps: dict[str, dict[Gains, Map]]
     picks: dict[str, dict[str, Pick]]
+    effort: Effort
 
     @property
     def coarse_grid(self) -> Grid:
         """Of the search."""
-        return grid_of(next(iter(self.maps["u"].values())).case.parsed)
+        return grid_of(next(iter(self.maps["u"].values())).case.scene)
 
     @property
     def bound_m_per_s2(self) -> float:
@@ -90,6 +94,7 @@ class Search:
     def report(self) -> dict[str, Any]:
         """Return what the command line prints, units in the keys; rows of areas go by alpha."""
         return {
+            **self.effort._asdict(),
             "scene": self.scene.name,
             "c_m_per_s2": self.bound_m_per_s2,
             "lambda_sqrt_m_per_s": self.lambdas.tolist(),
@@ -113,6 +118,28 @@ class Search:
         }
         return {"area_n2_s_per_m2": rows(False), "area_in_place_n2_s_per_m2": rows(True), "picks": picks}
 
+    def _picks(self) -> list[tuple[str, str, Pick]]:
+        return [(output, name, pick) for output, picks in self.picks.items() for name, pick in picks.items()]
+
+    def tables(self) -> list[Table]:
+        """Return the gains that have a name."""
+        numbers = ("lambda (m^.5/s)", "alpha (m/s^2)", "area (kN/m N s/m)", "of the paper's", "in place")
+        rows = []
+        for output, name, pick in self._picks():
+            multiple = self.of_papers(pick)
+            pair = f"{pick.gains.lambda_sqrt_m_per_s:.4g}", f"{pick.gains.alpha_m_per_s2:.4g}"
+            times = "" if multiple is None else f"{multiple:.2f}"
+            rows.append([output, name, *pair, area_text(pick.map), times, f"{pick.map.area_in_place / 1e3:.0f}"])
+        return [table_of(("output", "gains"), numbers, rows)]
+
+    def notes(self) -> list[str]:
+        """Return which gains are at the edge of what was tried, and what a + is."""
+        return [
+            f"{output}, {name}: at the edge of what was tried; better gains may lie beyond"
+            for output, name, pick in self._picks()
+            if self.at_edge(pick.gains)
+        ] + plus_of_areas(pick.map for _, _, pick in self._picks())
+
 
 def converges(gains: Gains, bound_m_per_s2: float) -> bool:
     """Return whether gains satisfy the sufficient condition for signals whose acceleration has a bound."""
@@ -120,23 +147,20 @@ def converges(gains: Gains, bound_m_per_s2: float) -> bool:
     return least is not None and gains.alpha_m_per_s2 >= least
 
 
-def study(scene: str, changes: dict[str, Any], mapping: Mapping) -> Search:
+def study(case: Case, mapping: Mapping) -> Search:
     """Return the areas of a scene over Levant's gains.
 
     Args:
-        scene: its name or file.
-        changes: of it, by dotted key.
+        case: the scene.
         mapping: makes the maps.
 
     Raises:
         SceneError: if the scene cannot be, with none of the gains either, or has no section `zwidth`.
     """
-    text = read(scene)
-    plain = parse(scene, text, changes)
+    plain = case.scene
     bound = plain.controller.acceleration_max_m_per_s2
-    papers = dict(
-        zip(PAPERS, (Gains.default(plain.controller), Gains(**methods.methods(plain)["adjusted"].gains)), strict=True)
-    )
+    adjusted = Gains(**methods(plain)["adjusted"].gains)
+    papers = dict(zip(PAPERS, (Gains.default(plain.controller), adjusted), strict=True))
     lambdas, alphas = LAMBDAS * np.sqrt(bound), ALPHAS * bound
     tried = [Gains(lam, alpha) for lam in lambdas.tolist() for alpha in alphas.tolist()]
 
@@ -146,20 +170,20 @@ def study(scene: str, changes: dict[str, Any], mapping: Mapping) -> Search:
             levant = {"controller.estimator": "levant", "controller.output": output}
             levant["controller.gains.levant"] = asdict(gains)
             label = f"{output}, lambda {gains.lambda_sqrt_m_per_s:.4g}, alpha {gains.alpha_m_per_s2:.4g}"
-            cases[output, gains] = Case(label, scene, text, changes | room(plain, coarser) | levant)
+            cases[output, gains] = case.changed(wider_grid(plain, coarser) | levant, label)
         possible = accepted(cases)
         return dict(zip(possible, mapping(title, list(possible.values())), strict=True))
 
-    coarse = maps("search of gains", COARSER, [(output, gains) for output in OUTPUTS for gains in tried])
-    by_output = {out: {gains: each for (of, gains), each in coarse.items() if of == out} for out in OUTPUTS}
+    coarse = maps("search of gains", COARSER, [(output, gains) for output in Design.outputs for gains in tried])
+    by_output = {out: {gains: each for (of, gains), each in coarse.items() if of == out} for out in Design.outputs}
     chosen = {output: papers | _best(found, bound) for output, found in by_output.items()}
-    pairs = dict.fromkeys((output, gains) for output in OUTPUTS for gains in chosen[output].values())
+    pairs = dict.fromkeys((output, gains) for output in Design.outputs for gains in chosen[output].values())
     finer = maps("the best again, in finer steps", FINER, list(pairs))
     picks = {
         output: {name: Pick(gains, finer[output, gains]) for name, gains in named.items() if (output, gains) in finer}
         for output, named in chosen.items()
     }
-    return Search(next(iter(finer.values())).case.parsed, lambdas, alphas, by_output, picks)
+    return Search(next(iter(finer.values())).case.scene, lambdas, alphas, by_output, picks, mapping.effort())
 
 
 def _area(each: Map, in_place: bool) -> float:

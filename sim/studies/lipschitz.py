@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from ..scene.load import read
+from ..jobs.result import Summary
+from ..scene.case import Case
 from ..scene.schema import Scene
-from ..walls import hit, methods
-from ..walls.case import Case
+from ..walls import hit
+from ..walls.methods import ADJUSTED, methods
 from .sines import Sines, fit
 
 METHOD = "fdm-500"
@@ -26,7 +27,7 @@ POINTS = 500
 
 
 @dataclass(frozen=True)
-class Lipschitz:
+class Lipschitz(Summary):
     """What a hit says of C.
 
     Attributes:
@@ -56,7 +57,7 @@ class Lipschitz:
 
     def report(self) -> dict[str, Any]:
         """Return what the command line prints: C, how good it is, and the gains that follow."""
-        bound, adjusted = self.bound_m_per_s2, methods.ADJUSTED["lambda_sqrt_m_per_s"]
+        bound, adjusted = self.bound_m_per_s2, ADJUSTED["lambda_sqrt_m_per_s"]
         return {
             "scene": self.scene.name,
             "stiffness_n_per_m": self.scene.wall.stiffness_n_per_m,
@@ -82,11 +83,11 @@ def least_alpha_m_per_s2(lambda_sqrt_m_per_s: float, bound_m_per_s2: float) -> f
     return bound_m_per_s2 * (square + four) / (square - four) if square > four else None
 
 
-def measure(scene: str, changes: dict[str, Any], before_s: float, after_s: float, count: int) -> Lipschitz:
+def study(case: Case, before_s: float, after_s: float, count: int) -> Lipschitz:
     """Hit the wall of a scene, and fit sines to what was recorded around the contact.
 
     Args:
-        scene, changes: see `scene.load`; the estimator is the paper's for this, a difference filtered at 500 Hz.
+        case: the scene; the estimator is the paper's for this, a difference filtered at 500 Hz.
         before_s, after_s: how much of the record is fitted, before and after the first contact.
         count: of sines.
 
@@ -94,9 +95,9 @@ def measure(scene: str, changes: dict[str, Any], before_s: float, after_s: float
         SceneError: if there is no such scene.
         RuntimeError: if the handle never reached the wall, or the record is too short.
     """
-    method = methods.methods()[METHOD]
-    loaded = Case(method.label, scene, read(scene), changes | method.changes).parsed
-    result = hit.run(loaded, "fixed", traces=True)
+    method = methods()[METHOD]
+    scene = case.changed(method.changes, method.label).scene
+    result = hit.run(scene, "fixed", traces=True)
     if not (result.detail.position_m > 0).any():
         near = f"{hit.DETAIL_S:g} s of coming within {-hit.DETAIL_FROM_M * 1e3:g} mm"
         raise RuntimeError(f"the handle did not reach the wall, or not within {near}: there is no impact to fit")
@@ -104,10 +105,10 @@ def measure(scene: str, changes: dict[str, Any], before_s: float, after_s: float
     times = whole.time_s - result.contact_s
     inside = np.flatnonzero((times >= -before_s) & (times <= after_s))
     kept = inside[:: max(-(-len(inside) // POINTS), 1)]
-    positions = np.floor(whole.position_m[kept] / loaded.encoder.count_m) * loaded.encoder.count_m
+    positions = np.floor(whole.position_m[kept] / scene.encoder.count_m) * scene.encoder.count_m
     try:
         sines = fit(times[kept] - times[kept][0] if len(kept) else times[kept], positions, count)
     except ValueError as error:
         raise RuntimeError(f"the record is too short: {error}") from None
-    peak = np.abs(np.diff(contact.velocity_m_per_s)).max() * loaded.spec.sample_hz
-    return Lipschitz(loaded, times[kept], positions, whole.velocity_m_per_s[kept], sines, float(peak))
+    peak = np.abs(np.diff(contact.velocity_m_per_s)).max() * scene.spec.sample_hz
+    return Lipschitz(scene, times[kept], positions, whole.velocity_m_per_s[kept], sines, float(peak))

@@ -5,14 +5,15 @@ limit without either, with one, and with both, tells which of them ends the gain
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-from ..scene.load import load, read
+from ..jobs.result import Table, table_of
+from ..scene.case import Case
 from ..scene.schema import Scene
-from ..walls import methods, theory
-from ..walls.case import Case, grid_of
-from ..walls.zwidth import Map, Mapping
+from ..walls import theory
+from ..walls.grid import grid_of
+from ..walls.methods import Curve
+from ..walls.zwidth import Effort, Map, Mapping
 
 RATES_HZ = (1_000, 2_500, 10_000, 25_000, 100_000, 250_000, 1_000_000)
 METHODS = ("fdm", "butterworth", "adjusted", "levant:u1", "kalman", "levant-edge")
@@ -94,14 +95,51 @@ class Gain:
         }
 
 
-def study(
-    scene: str, changes: dict[str, Any], curves: list[methods.Curve], rates_hz: list[int], mapping: Mapping
-) -> list[Gain]:
+@dataclass(frozen=True)
+class Rates:
+    """What was found.
+
+    Attributes:
+        scene: as it is.
+        gains: what rate buys each method.
+        limits: the linear loop's largest stiffness (N/m) at each rate, by what is left of the device.
+        effort: what the maps took.
+    """
+
+    scene: Scene
+    gains: list[Gain]
+    limits: dict[str, list[float]]
+    effort: Effort
+
+    def report(self) -> dict[str, Any]:
+        """Return what the command line prints, units in the keys."""
+        methods = [each.report() for each in self.gains]
+        return self.effort._asdict() | {"methods": methods, "linear_limits": self.limits}
+
+    def tables(self) -> list[Table]:
+        """Return the largest K by rate."""
+        rates = [f"{rate / 1e3:g} kHz" for rate in self.gains[0].rates_hz]
+        rows = []
+        for each in self.gains:
+            values = [f"{a_map.largest_n_per_m / 1e3:.0f}" + "+" * a_map.clipped for a_map in (each.own, *each.maps)]
+            ratio = "" if each.ratio is None else f"{each.ratio:.2f}"
+            ends = "" if each.ends_at_hz is None else f"{each.ends_at_hz / 1e3:g}"
+            rows.append([each.label, *values, ratio, ends])
+        for left, limit in self.limits.items():
+            rows.append([f"linear: {left}", "", *(f"{value / 1e3:.0f}" for value in limit), "", ""])
+        return [table_of(("largest K (kN/m)",), ("own", *rates, "ratio", "gains to (kHz)"), rows)]
+
+    def notes(self) -> list[str]:
+        """Return what a + is."""
+        clipped = any(each.clipped for gain in self.gains for each in (gain.own, *gain.maps))
+        return ["own: at the scene's own rates"] + ["+: K goes on beyond the map"] * clipped
+
+
+def study(case: Case, curves: list[Curve], rates_hz: list[int], mapping: Mapping) -> Rates:
     """Return what rate buys each method.
 
     Args:
-        scene: its name or file; it need not have a section `zwidth`.
-        changes: of it, by dotted key.
+        case: the scene; it need not have a section `zwidth`.
         curves: the methods.
         rates_hz: ascending.
         mapping: makes the maps.
@@ -109,12 +147,13 @@ def study(
     Raises:
         SceneError: if a case cannot be.
     """
-    text, common = read(scene), FINE | SHORT | changes
+    limits, common = linear_limits(case, rates_hz), case.with_defaults(FINE | SHORT)
     step = "zwidth.stiffness_step_n_per_m"
-    at = [{step: common[step] / FINER}, *(at_rate(rate_hz) for rate_hz in rates_hz)]
-    cases = [Case(curve.label, scene, text, common | each | curve.changes) for curve in curves for each in at]
-    maps = iter(mapping(f"{Path(scene).stem}, what rate buys", cases))
-    return [Gain(curve.label, rates_hz, next(maps), [next(maps) for _ in rates_hz]) for curve in curves]
+    at = [{step: common.changes[step] / FINER}, *(at_rate(rate_hz) for rate_hz in rates_hz)]
+    cases = [common.changed(each | curve.changes, curve.label) for curve in curves for each in at]
+    maps = iter(mapping(f"{case.scene.name}, what rate buys", cases))
+    gains = [Gain(curve.label, rates_hz, next(maps), [next(maps) for _ in rates_hz]) for curve in curves]
+    return Rates(case.scene, gains, limits, mapping.effort())
 
 
 LAG = {"amplifier.bandwidth_hz": None, "amplifier.current_limit_a": None, "motor": None}
@@ -128,22 +167,23 @@ WITHOUT = {
 """Parts that are taken out, by what is left."""
 
 
-def linear_limits(scene: str, changes: dict[str, Any], rates_hz: list[int]) -> dict[str, list[float]]:
+def linear_limits(case: Case, rates_hz: list[int]) -> dict[str, list[float]]:
     """Return the linear loop's largest stiffness (N/m) over all dampings of the map, at each rate, by what is left.
 
     The estimator is the plain difference; friction that sticks is left out.
     """
-    limits = {}
-    for left, without in WITHOUT.items():
-        fdm = {"controller.estimator": "fdm", "controller.output": None}
-        row = []
-        for rate_hz in rates_hz:
-            left_out = taken_out(load(scene, changes), without)
-            loaded = load(scene, FINE | SHORT | changes | at_rate(rate_hz) | fdm | left_out)
-            loop = theory.Loop(loaded)
-            row.append(max(theory.linear_limit_n_per_m(loop, damping) for damping in grid_of(loaded).dampings))
-        limits[left] = row
-    return limits
+    fdm = {"controller.estimator": "fdm", "controller.output": None}
+    common = case.with_defaults(FINE | SHORT).changed(fdm)
+    return {
+        left: [_limit(common.changed(at_rate(rate_hz) | taken_out(case.scene, without)).scene) for rate_hz in rates_hz]
+        for left, without in WITHOUT.items()
+    }
+
+
+def _limit(scene: Scene) -> float:
+    """Return the linear loop's largest stiffness (N/m) over all dampings of a scene's map."""
+    loop = theory.Loop(scene)
+    return max(theory.linear_limit_n_per_m(loop, damping) for damping in grid_of(scene).dampings)
 
 
 def taken_out(scene: Scene, without: dict[str, Any]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Any, NamedTuple
 
+from ..jobs.result import Table, table_of
 from ..scene.schema import Scene
 from .shortcuts import SCATTER, Shortcut
 
@@ -64,12 +65,14 @@ class Trade:
         points: the reference first.
         walls: by estimator, how many verdicts were compared.
         words_checked: hits of the hardware, each with the force words of `fixed`.
+        seconds: what all of it took.
     """
 
     scene: Scene
     points: list[Point]
     walls: dict[str, int]
     words_checked: int
+    seconds: float = 0.0
 
     def scatter(self, question: Question, label: str) -> float:
         """Return the larger error of the two changes that nobody could measure: less than this is none."""
@@ -89,7 +92,33 @@ class Trade:
                 mark[f"best_for_{question.name}s"] += [label] * (point in found)
         points = [point.report() | mark for point, mark in zip(self.points, marks, strict=True)]
         keys = {"scene": self.scene.name, "walls": self.walls, "rtl_hits_with_the_words_of_fixed": self.words_checked}
-        return keys | {"settings": points}
+        return keys | {"settings": points, "seconds": self.seconds}
+
+    def tables(self) -> list[Table]:
+        """Return what each shortcut costs and gets wrong: of the verdicts of hits, then of the edges of maps."""
+        hits, maps = [], []
+        for point in self.points:
+            share = [f"{self._star(HIT, label, point)}{each:.0%}" for label, each in point.differ.items()]
+            hits.append([point.shortcut.label, f"{point.hit_s * 1e3:.1f}", *share])
+            ends = {label: "{median:.0%} to {largest:.0%}".format(**point.of_stiffness(label)) for label in self.walls}
+            wrong = [f"{self._star(MAP, label, point)}{each}" for label, each in ends.items()]
+            maps.append([point.shortcut.label, str(point.hits), f"{point.map_s:.1f}", *wrong])
+        return [
+            table_of(("setting",), ("hit (ms)", *(f"{label}: verdicts" for label in self.walls)), hits),
+            table_of(("setting",), ("maps: hits", "s", *(f"{label}: K" for label in self.walls)), maps),
+        ]
+
+    def _star(self, question: Question, label: str, point: Point) -> str:
+        return "* " * (point in self.best(question, label))
+
+    def notes(self) -> list[str]:
+        """Return what the columns are."""
+        walls = ", ".join(f"{count} walls with {label}" for label, count in self.walls.items())
+        return [
+            f"verdicts: how many differ, of {walls}. K: its error at the edge of the map, median to largest over B. "
+            f"*: none faster is as right; what is within the scatter is right. "
+            f"rtl: its verdicts are those of fixed, whose force words it had in {self.words_checked} hits"
+        ]
 
 
 def best(points: list[Point], cost: Callable[[Point], float], error: Callable[[Point], float]) -> list[Point]:

@@ -12,15 +12,18 @@ The hardware has the verdicts of `fixed`, for it has its force words: here that 
 
 import json
 import statistics
+import time
 from collections.abc import Callable, Hashable
 from dataclasses import replace
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
-from ..scene.load import load, parse, read
-from ..scene.schema import SceneError
-from ..walls import hit, methods
-from ..walls.case import Case, grid_of
+from ..jobs.store import sources
+from ..scene.case import Case
+from ..scene.errors import SceneError
+from ..walls import hit
+from ..walls.grid import grid_of
+from ..walls.methods import Curve, methods
 from ..walls.zwidth import Map
 from .shortcuts import REFERENCE, Shortcut, shortcuts
 from .trade import Point, Trade
@@ -52,17 +55,23 @@ class Runs(Protocol):
         """Return the results of jobs for `zwidth.verdict`."""
 
     def medians(self, contestants: dict[Hashable, Callable[[], float]], rounds: int) -> dict[Hashable, float]:
-        """Return the median over the rounds of what each gives, taken in turns: `bench.medians`."""
+        """Return the median over the rounds of what each gives, taken in turns: `rounds.medians`."""
 
 
-class _Cases:
-    """What is run, and against what, as cases of a scene."""
+class _Contest:
+    """A scene, the shortcuts that it has, and the estimators that they are tried with.
 
-    def __init__(self, name: str, changes: dict[str, Any]):
-        self._name, self._text, self._changes = name, read(name), GRID | changes
-        self.scene = load(name, self._changes)
+    Attributes:
+        scene: with the grid of the maps.
+        curves: the estimators, labelled as on the command line.
+        shortcuts: all of them; `computed` are those of a model, `hardware` those of the RTL.
+    """
+
+    def __init__(self, case: Case):
+        self._case = case.with_defaults(GRID)
+        self.scene = self._case.scene
         self._grid = grid_of(self.scene)
-        self.curves = [replace(methods.methods(self.scene)[method], label=method) for method in METHODS]
+        self.curves = [replace(methods(self.scene)[method], label=method) for method in METHODS]
         self.shortcuts = shortcuts(self.scene, self._differs)
         self.computed = [each for each in self.shortcuts if each.backend != "rtl"]
         self.hardware = [each for each in self.shortcuts if each.backend == "rtl"]
@@ -70,26 +79,27 @@ class _Cases:
     def _differs(self, shortcut: Shortcut) -> bool:
         """Whether a shortcut is a scene, and not the reference's."""
         try:
-            scenes = [(self.of(shortcut, curve).parsed, self.of(REFERENCE, curve).parsed) for curve in self.curves]
+            own, reference = (
+                [self.case_of(each, curve).scene for curve in self.curves] for each in (shortcut, REFERENCE)
+            )
         except SceneError:
             return False
-        same_hits = shortcut.backend == REFERENCE.backend and shortcut.coarser == 1
-        return not same_hits or any(one != other for one, other in scenes)
+        return own != reference or shortcut.backend != REFERENCE.backend or shortcut.coarser > 1
 
-    def of(self, shortcut: Shortcut, curve: methods.Curve) -> Case:
-        """Return the map of a shortcut."""
-        changes = self._changes | curve.changes | shortcut.changes
+    def case_of(self, shortcut: Shortcut, curve: Curve) -> Case:
+        """Return what a shortcut makes of the scene with an estimator."""
+        changes = curve.changes | shortcut.changes
         if shortcut.coarser > 1:
             changes["zwidth.stiffness_step_n_per_m"] = shortcut.coarser * self._grid.stiffness_step_n_per_m
-        return Case(curve.label, self._name, self._text, changes)
+        return self._case.changed(changes, curve.label)
 
     def model_of(self, shortcut: Shortcut) -> Shortcut:
-        """Return what has the verdicts of a shortcut: itself, or of hardware its model."""
+        """Return the shortcut whose verdicts one has: its own, or those of the hardware's model."""
         if shortcut.backend != "rtl":
             return shortcut
         return next(each for each in self.computed if (each.backend, each.changes) == ("fixed", shortcut.changes))
 
-    def around(self, edge: dict[float, float]) -> list[list[Wall]]:
+    def walls_around(self, edge: dict[float, float]) -> list[list[Wall]]:
         """Return the walls around an edge, by B."""
         step, walls = self._grid.stiffness_step_n_per_m, []
         for damping, stiffness in edge.items():
@@ -97,11 +107,9 @@ class _Cases:
             walls.append([(row * step, damping) for row in dict.fromkeys(rows)])
         return walls
 
-    def run(self, shortcut: Shortcut, curve: methods.Curve, wall: Wall) -> hit.Hit:
+    def hit(self, shortcut: Shortcut, curve: Curve, wall: Wall) -> hit.Hit:
         """Hit a wall."""
-        at = {"wall.stiffness_n_per_m": wall[0], "wall.damping_n_s_per_m": wall[1]}
-        scene = parse(self._name, self._text, self.of(shortcut, curve).changes | at)
-        return hit.run(scene, shortcut.backend, until_sure=True)
+        return hit.run(self.case_of(shortcut, curve).hitting(*wall), shortcut.backend, until_sure=True)
 
 
 def _edge(of: Map) -> dict[float, float]:
@@ -109,102 +117,119 @@ def _edge(of: Map) -> dict[float, float]:
     return {edge.damping_n_s_per_m: edge.stable_n_per_m for edge in of.edges if edge.stable_n_per_m}
 
 
-def _what(shortcut: Shortcut) -> str:
-    """Return what a shortcut's hits are: two that differ in the map's steps alone have the same."""
+def _hits_of(shortcut: Shortcut) -> str:
+    """Return a name for the hits of a shortcut: two that differ in the map's steps alone have the same."""
     return json.dumps([shortcut.backend, shortcut.changes], sort_keys=True)
 
 
-def study(name: str, changes: dict[str, Any], runs: Runs) -> Trade:
+def study(case: Case, runs: Runs) -> Trade:
     """Return the trade of a scene.
 
     Args:
-        name: of the scene, or its file.
-        changes: of it, by dotted key.
+        case: the scene.
         runs: what runs the hits.
 
     Raises:
         SceneError: if the scene cannot be, or has no section `zwidth`.
         RuntimeError: if none of its walls is stable, or the hardware's force words are not those of `fixed`.
     """
-    cases = _Cases(name, changes)
-    maps = _maps(cases, runs)
-    edges = {curve.label: _edge(maps[REFERENCE.label, curve.label]) for curve in cases.curves}
+    began, contest = time.perf_counter(), _Contest(case)
+    maps = _maps(contest, runs)
+    edges = {curve.label: _edge(maps[REFERENCE.label, curve.label]) for curve in contest.curves}
     for label, edge in edges.items():
         if not edge:
-            raise RuntimeError(f"{cases.scene.name}: with {label} no wall of the map is stable: nothing to compare at")
-    around = {label: cases.around(edge) for label, edge in edges.items()}
-    verdicts = _verdicts(cases, around, runs)
+            raise RuntimeError(
+                f"{contest.scene.name}: with {label} no wall of the map is stable: nothing to compare at"
+            )
+    around = {label: contest.walls_around(edge) for label, edge in edges.items()}
+    verdicts = _verdicts(contest, around, runs)
     # One wall of each B, each at another distance from the edge.
     timed = {label: [at[n % len(at)] for n, at in enumerate(walls)] for label, walls in around.items()}
-    seconds = _seconds(cases, timed, runs)
+    seconds = _seconds(contest, timed, runs)
     points = []
-    for shortcut in cases.shortcuts:
-        model, hits, differ, errors, hit_s, map_s = cases.model_of(shortcut), 0, {}, {}, [], 0.0
-        for label, edge in edges.items():
-            one, truth = maps[model.label, label], verdicts[_what(REFERENCE), label]
-            pairs = zip(verdicts[_what(model), label], truth, strict=True)
-            differ[label] = statistics.mean(float(here != there) for here, there in pairs)
-            found = _edge(one)
-            errors[label] = [abs(found.get(damping, 0.0) / wanted - 1) for damping, wanted in edge.items()]
-            hit_s.append(seconds[_what(shortcut), label])
-            hits += one.hits
-            map_s += one.hits * hit_s[-1]
-        points.append(Point(shortcut, statistics.mean(hit_s), hits, map_s, differ, errors))
-    checked = len(cases.hardware) * sum(len(walls[:RTL_WALLS]) for walls in timed.values())
-    return Trade(cases.scene, points, {label: sum(map(len, walls)) for label, walls in around.items()}, checked)
+    for shortcut in contest.shortcuts:
+        model, hits = contest.model_of(shortcut), _hits_of(shortcut)
+        own = {label: maps[model.label, label] for label in edges}
+        hit_s = {label: seconds[hits, label] for label in edges}
+        point = Point(
+            shortcut,
+            hit_s=statistics.mean(hit_s.values()),
+            hits=sum(each.hits for each in own.values()),
+            map_s=sum(each.hits * hit_s[label] for label, each in own.items()),
+            differ={
+                label: _share_that_differs(verdicts[_hits_of(model), label], verdicts[_hits_of(REFERENCE), label])
+                for label in edges
+            },
+            errors={label: _errors(_edge(own[label]), edge) for label, edge in edges.items()},
+        )
+        points.append(point)
+    checked = len(contest.hardware) * sum(len(walls[:RTL_WALLS]) for walls in timed.values())
+    walls = {label: sum(map(len, walls)) for label, walls in around.items()}
+    return Trade(contest.scene, points, walls, checked, time.perf_counter() - began)
 
 
-def _maps(cases: _Cases, runs: Runs) -> dict[tuple[str, str], Map]:
+def _share_that_differs(verdicts: list[bool], truth: list[bool]) -> float:
+    return statistics.mean(float(here != there) for here, there in zip(verdicts, truth, strict=True))
+
+
+def _errors(edge: dict[float, float], truth: dict[float, float]) -> list[float]:
+    """Return the relative errors of K at each B where the true edge is; a region that has ended there is wrong by 1."""
+    return [abs(edge.get(damping, 0.0) / stiffness - 1) for damping, stiffness in truth.items()]
+
+
+def _maps(contest: _Contest, runs: Runs) -> dict[tuple[str, str], Map]:
     """Return the maps by the labels of shortcut and estimator."""
     maps = {}
-    for backend in dict.fromkeys(each.backend for each in cases.computed):
-        keys = [(each, curve) for each in cases.computed if each.backend == backend for curve in cases.curves]
-        found = runs.maps(backend, [cases.of(*key) for key in keys])
+    for backend in dict.fromkeys(each.backend for each in contest.computed):
+        keys = [(each, curve) for each in contest.computed if each.backend == backend for curve in contest.curves]
+        found = runs.maps(backend, [contest.case_of(*key) for key in keys])
         maps |= {(each.label, curve.label): one for (each, curve), one in zip(keys, found, strict=True)}
     return maps
 
 
-def _verdicts(cases: _Cases, around: dict[str, list[list[Wall]]], runs: Runs) -> dict[tuple[str, str], list[bool]]:
-    """Return whether each wall is stable, by what is run and the estimator's label."""
-    keys = {
-        (_what(each), curve.label): cases.of(each, curve).job(each.backend)
-        for each in cases.computed
+def _verdicts(contest: _Contest, around: dict[str, list[list[Wall]]], runs: Runs) -> dict[tuple[str, str], list[bool]]:
+    """Return whether each wall is stable, by `_hits_of` a shortcut and the estimator's label."""
+    common = {"sources": sources()}
+    cases = {
+        (_hits_of(each), curve.label): contest.case_of(each, curve).job() | common | {"backend": each.backend}
+        for each in contest.computed
         if each.coarser == 1
-        for curve in cases.curves
+        for curve in contest.curves
     }
     jobs = [
         job | {"stiffness": stiffness, "damping": damping}
-        for (_, label), job in keys.items()
+        for (_, label), job in cases.items()
         for walls in around[label]
         for stiffness, damping in walls
     ]
     results = iter(runs.verdicts(jobs))
-    return {key: [next(results)["stable"] for walls in around[key[1]] for _ in walls] for key in keys}
+    return {key: [next(results)["stable"] for walls in around[key[1]] for _ in walls] for key in cases}
 
 
-def _seconds(cases: _Cases, timed: dict[str, list[Wall]], runs: Runs) -> dict[tuple[str, str], float]:
-    """Return the time of a hit, the mean over the walls, by what is run and the estimator's label."""
+def _seconds(contest: _Contest, timed: dict[str, list[Wall]], runs: Runs) -> dict[tuple[str, str], float]:
+    """Return the time of a hit, the mean over the walls, by `_hits_of` a shortcut and the estimator's label."""
 
     def contestants(shortcuts: list[Shortcut], walls: int | None, seconds_of: Callable[..., float]) -> dict:
         return {
-            (_what(each), curve.label, wall): partial(seconds_of, each, curve, wall)
+            (_hits_of(each), curve.label, wall): partial(seconds_of, each, curve, wall)
             for each in shortcuts
-            for curve in cases.curves
+            for curve in contest.curves
             for wall in timed[curve.label][:walls]
         }
 
-    def model(*which: Any) -> float:
-        return cases.run(*which).seconds
+    def model(shortcut: Shortcut, curve: Curve, wall: Wall) -> float:
+        return contest.hit(shortcut, curve, wall).seconds
 
-    def hardware(shortcut: Shortcut, *which: Any) -> float:
-        result, words = cases.run(shortcut, *which), cases.run(cases.model_of(shortcut), *which).force_sha256
-        if result.force_sha256 != words:
-            raise RuntimeError(f"the RTL and the model differ in their force words: {shortcut.label}, {which}")
+    def hardware(shortcut: Shortcut, curve: Curve, wall: Wall) -> float:
+        result, same = (contest.hit(each, curve, wall) for each in (shortcut, contest.model_of(shortcut)))
+        if result.force_sha256 != same.force_sha256:
+            where = f"{shortcut.label}, {curve.label}, K {wall[0]:g}, B {wall[1]:g}"
+            raise RuntimeError(f"the RTL and the model differ in their force words: {where}")
         return result.seconds
 
-    found = runs.medians(contestants(cases.computed, None, model), ROUNDS)
-    found |= runs.medians(contestants(cases.hardware, RTL_WALLS, hardware), 1)
+    found = runs.medians(contestants(contest.computed, None, model), ROUNDS)
+    found |= runs.medians(contestants(contest.hardware, RTL_WALLS, hardware), 1)
     means: dict[tuple[str, str], list[float]] = {}
-    for (what, label, _), seconds in found.items():
-        means.setdefault((what, label), []).append(seconds)
+    for (hits, label, _), seconds in found.items():
+        means.setdefault((hits, label), []).append(seconds)
     return {key: statistics.mean(each) for key, each in means.items()}

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...model import stamped
 from ...model.axis import Axis
+from ..jobs.result import Summary
 from ..jobs.whole_file import whole_file
 from ..loop import loop, record
 from ..scene.build import output_step_n, start_of, work_of, world_of
@@ -33,7 +34,7 @@ WAVEFORM_CLOCKS = 60_000
 
 
 @dataclass
-class Hit:
+class Hit(Summary):
     """Result of a run; `report` is its summary.
 
     Attributes:

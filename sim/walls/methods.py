@@ -69,4 +69,4 @@ def methods(scene: Scene | None = None) -> dict[str, Curve]:
 
 def label(estimator: str, output: str) -> str:
     """Return what an estimator's output is called: its name alone where it has one output."""
-    return estimator if len(registry.load(estimator).OUTPUTS) == 1 else f"{estimator} {output}"
+    return estimator if len(registry.design_of(estimator).outputs) == 1 else f"{estimator} {output}"

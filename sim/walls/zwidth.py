@@ -8,16 +8,16 @@ same whatever the number of workers, and an interrupted one goes on where it was
 import platform
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 from distributed import Client, as_completed
 
 from ..jobs import store
 from ..jobs.cluster import result_of
-from ..scene.load import parse
+from ..scene.case import Case
 from . import hit
 from .boundary import Edge, area, trace
-from .case import Case, grid_of
+from .grid import grid_of
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class Map:
         """
         return {
             "label": self.case.label,
-            "scene": self.case.scene,
+            "scene": self.case.source,
             "changes": self.case.changes,
             "boundary": [[edge.damping_n_s_per_m, edge.stable_n_per_m] for edge in self.edges],
             "leaves_the_map_at": [edge.damping_n_s_per_m for edge in self.edges if edge.marginal_n_per_m is None],
@@ -101,8 +101,22 @@ class Map:
         }
 
 
-Mapping = Callable[[str, list[Case]], list[Map]]
-"""What makes the map of each case; the text is for the one who waits."""
+class Effort(NamedTuple):
+    """What maps took: the backend they were made on, their hits, and how long it was until the last of them, s."""
+
+    backend: str
+    hits: int
+    seconds: float
+
+
+class Mapping(Protocol):
+    """What makes maps for a study."""
+
+    def __call__(self, title: str, cases: list[Case]) -> list[Map]:
+        """Return the map of each case; the title is for the one who waits."""
+
+    def effort(self) -> Effort:
+        """Return what the maps took until now."""
 
 
 class NeverReached(RuntimeError):
@@ -126,8 +140,7 @@ def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float
     """
     if sources != store.sources():
         raise RuntimeError(f"a worker, {platform.node()}, has other sources of hardwall, or versions of its tools")
-    wall = {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": damping}
-    result = hit.run(parse(scene, text, changes | wall), backend, until_sure=True)
+    result = hit.run(Case("", scene, text, changes).hitting(stiffness, damping), backend, until_sure=True)
     if not result.touched:
         raise NeverReached(f"the handle did not reach the wall: nothing is said of K {stiffness:g}, B {damping:g}")
     in_place = result.stable and result.in_place
@@ -139,9 +152,9 @@ class _Tracing:
     """One trace on its way: which wall it asks for, and what it found at the end."""
 
     def __init__(self, case: Case, backend: str):
-        self._case, self._grid = case, grid_of(case.parsed)
+        self._case, self._grid = case, grid_of(case.scene)
         self._steps: Generator = trace(self._grid)
-        self._job = case.job(backend)
+        self._job = case.job() | {"sources": store.sources(), "backend": backend}
         self._hits, self._seconds = 0, 0.0
         self._in_place: dict[tuple[float, float], bool] = {}
         self.wanted: dict | None = None

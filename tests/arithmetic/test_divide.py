@@ -7,7 +7,7 @@ from cocotb.triggers import ClockCycles, RisingEdge
 
 from hardwall.hdl.arithmetic.divide import Divide
 from hardwall.model.arithmetic.divide import divide
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 
 WIDTHS = [(1, 1, 1), (3, 5, 2), (24, 10, 14), (20, 26, 20)]
 

@@ -7,7 +7,7 @@ import pytest
 
 from hardwall.hdl.arithmetic.signed_divide import SignedDivide
 from hardwall.model.arithmetic.signed_divide import divide
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 
 
 def make(**sizes: int) -> SignedDivide:

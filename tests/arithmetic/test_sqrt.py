@@ -9,7 +9,7 @@ from cocotb.triggers import ClockCycles, RisingEdge
 
 from hardwall.hdl.arithmetic.sqrt import Sqrt
 from hardwall.model.arithmetic.sqrt import isqrt
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 
 
 def around_squares(width: int) -> list[int]:

@@ -1,0 +1,33 @@
+"""The test bench: Amaranth components under cocotb on Verilator, held to a model word for word.
+
+Two halves in one test file, which is read twice. Under pytest, `simulate` builds the hardware and starts the simulator.
+There, cocotb runs the tests of the same file: `Bench` clocks, resets and drives the component, its `campaign` puts rows
+of inputs through it, and `check` holds what came out against the model with `==`.
+
+`HARDWALL_SEED` (default 1) is the seed of everything random; `HARDWALL_SAMPLES` (default 100000) is the length of the
+random campaigns.
+"""
+
+from .bench import Bench, Monitor
+from .harness import Harness, packing_of, ports_of
+from .packing import Packing, Record
+from .simulator import CAMPAIGN, SAMPLES, SEED, parameters, rng, simulate
+from .verdict import Wrong, check
+
+__all__ = [
+    "CAMPAIGN",
+    "SAMPLES",
+    "SEED",
+    "Bench",
+    "Harness",
+    "Monitor",
+    "Packing",
+    "Record",
+    "Wrong",
+    "check",
+    "packing_of",
+    "parameters",
+    "ports_of",
+    "rng",
+    "simulate",
+]

@@ -7,12 +7,12 @@ import numpy as np
 from hardwall.hdl.estimators.estimate import EstimatorBlock
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.quadrature import seen_count
-from hardwall.testing.bench import Bench, check
+from hardwall.testing import Bench, check
 
 
 def names(design) -> tuple[str, ...]:
     """Return what a row holds, in order: what the estimator sees of the decoder, the restart, the run-time words."""
-    return (*design.inputs, "restart", *(word.name for word in design.words))
+    return (*(f"seen__{name}" for name in design.inputs), "restart", *(word.name for word in design.words))
 
 
 def reset_words(design) -> list[int]:

@@ -19,12 +19,6 @@ KEYS = {
 SHORT = ["--estimators", "fdm,levant:u1", "--rates", "1e3,2000"]
 
 
-@pytest.fixture(autouse=True)
-def fresh(tmp_path, monkeypatch):
-    """Results go to an empty folder; what is compiled stays where it is."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
-
-
 def test_rows_as_json_and_as_a_table(monkeypatch, capsys):
     arguments = ["accuracy", *SHORT, "--workers", 1, "--signal", "hit", "--signal", "steady:10"]
     code, out, err = call(monkeypatch, capsys, *arguments, "--json")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hardwall.sim.estimates.errors import CHATTER_S, Judge
-from hardwall.testing.bench import rng
+from hardwall.testing import rng
 
 RATE = 10_000.0
 

@@ -10,7 +10,7 @@ from hardwall.model import quadrature, stamped
 from hardwall.sim.estimates.replay import replay, run
 from hardwall.sim.estimates.through_pins import through_pins
 from hardwall.sim.world.encoder import level
-from hardwall.testing.bench import rng
+from hardwall.testing import rng
 from stimuli.replays import BOUND, COARSEN, EVERY, recording, swing
 
 

@@ -8,11 +8,11 @@ import cocotb
 import numpy as np
 
 from hardwall.model.axis import Axis
-from hardwall.model.estimators import levant, registry
+from hardwall.model.estimators import levant
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.quadrature import seen_count
 from hardwall.model.spec import AxisSpec
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng
 from hardwall.testing.estimators import follow, reset_words
 from stimuli.papers_signal import axis_at, swing
 
@@ -85,11 +85,11 @@ def campaign(make, start, rows=stimulus, fewer: tuple[str, ...] = ("narrow",)):
         bench = Bench(dut, component)
         await bench.reset()
         reset = dict(zip((word.name for word in component.design.words), reset_words(component.design), strict=True))
-        await bench.transact("strobe", "valid", count=0, **reset)
-        await bench.transact("strobe", "valid", count=1, **reset)
+        await bench.transact("strobe", "valid", seen__count=0, **reset)
+        await bench.transact("strobe", "valid", seen__count=1, **reset)
         assert bench.reader("velocity")() != 0
         await bench.reset()
-        await bench.transact("strobe", "valid", count=-1, **reset)
+        await bench.transact("strobe", "valid", seen__count=-1, **reset)
         assert bench.reader("velocity")() == 0
 
     return follows_model, reset_mid_stream_starts_afresh
@@ -97,7 +97,7 @@ def campaign(make, start, rows=stimulus, fewer: tuple[str, ...] = ("narrow",)):
 
 def axis(axis_spec: AxisSpec, output: str = "u", floating: bool = False) -> Axis:
     """Return an axis with that output selected."""
-    return Axis(axis_spec, floating, **registry.choose(axis_spec.estimator, output))
+    return Axis(axis_spec, floating, **axis_spec.design.estimator.choose(output))
 
 
 def rms_errors(axis_spec: AxisSpec, output: str, seconds: float, runs: int = 1) -> tuple[float, float]:
@@ -114,7 +114,7 @@ def rms_errors(axis_spec: AxisSpec, output: str, seconds: float, runs: int = 1) 
 def displacements(axis_spec: AxisSpec, counts: np.ndarray) -> Iterator[tuple[float, float, float]]:
     """Yield (sign, |b|, u - u1) of each sample in which b is not 0, in counts; of the kin that project."""
     d = axis_spec.design.estimator
-    params, state = d.params({word.name: word.reset for word in d.words}), axis_spec.model.START
+    params, state = d.params({word.name: word.reset for word in d.words}), d.start()
     for count in counts.tolist():
         moved = count - state.count if state.running else 0
         b = (state.lead - (moved << d.velocity.f)) * d.velocity.lsb
@@ -160,7 +160,7 @@ def check_wrap_and_restart(axis_spec: AxisSpec) -> None:
     expected = one.run(counts).velocity
     assert expected.any()
     assert (one.run(counts + half - counts[0] - 1000).velocity == expected).all()
-    params, states = one.params.estimator, [axis_spec.model.START] * 2
+    params, states = one.params.estimator, [axis_spec.design.start().estimator] * 2
     for k, count in enumerate(counts[: len(counts) // 2].tolist()):
         states[0], *_ = estimate(params, states[0], seen_count(count), int(k == 700))
         if k >= 700:
@@ -187,7 +187,7 @@ def check_finite_difference_in_the_band(estimator: str) -> None:
     d = axis_spec.design.estimator
     assert d.alpha.to_real(d.words[1].reset) > 12
     moved = np.cumsum(rng().integers(-6, 7, 5000))
-    for output in axis_spec.model.OUTPUTS:
+    for output in axis_spec.design.estimator.outputs:
         for floating in (False, True):
             record = axis(axis_spec, output, floating).run(np.cumsum(moved))
             lsb = 1.0 if floating else d.velocity.lsb
@@ -202,7 +202,7 @@ def check_standstill(estimator: str, rate: int) -> None:
     until = len(ramp) + rate // 10
     explicit = axis(axis_at("levant", rate)).run(counts).velocity
     assert (np.abs(explicit[until:]) > 0).mean() > 0.99
-    for output in axis_spec.model.OUTPUTS:
+    for output in axis_spec.design.estimator.outputs:
         velocity = axis(axis_spec, output).run(counts).velocity
         assert velocity[: len(ramp)].any()
         assert not velocity[until:].any()

@@ -13,7 +13,7 @@ from hardwall.hdl.estimators.butterworth import Estimator
 from hardwall.model.axis import Axis
 from hardwall.model.estimators import butterworth
 from hardwall.model.estimators.butterworth import CUTOFF_MAX, FLOAT_START, START, Design, Gains, State, coefficients
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import RATES, axis_at, swing
 from stimuli.specs import spec
@@ -80,11 +80,11 @@ async def reset_mid_stream_starts_afresh(dut):
     reset = words(d, d.cutoff_max_hz)
     await bench.reset()
     for count in (0, 1, 2):
-        await bench.transact("strobe", "valid", count=count, **reset)
+        await bench.transact("strobe", "valid", seen__count=count, **reset)
     assert bench.reader("velocity")() != 0
     await bench.reset()
     for _ in range(3):
-        await bench.transact("strobe", "valid", count=-1, **reset)
+        await bench.transact("strobe", "valid", seen__count=-1, **reset)
         assert bench.reader("velocity")() == 0
 
 

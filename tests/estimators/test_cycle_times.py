@@ -10,10 +10,10 @@ import pytest
 from hardwall.hdl.estimators.cycle_times import CycleTimes
 from hardwall.model.estimators.cycle_times import NOTHING, Times, observe
 from hardwall.model.quadrature import Seen
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from stimuli.edges import anything, rows, turn
 
-INPUTS = (*Seen._fields, "restart")
+INPUTS = (*(f"seen__{name}" for name in Seen._fields), "restart")
 
 
 class Widths(NamedTuple):

@@ -8,7 +8,7 @@ import pytest
 
 from hardwall.hdl.estimators.finite_difference import Estimator
 from hardwall.model.estimators.finite_difference import START
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model
 from stimuli.specs import spec
 

@@ -10,7 +10,7 @@ import pytest
 from hardwall.hdl.estimators.foaw import Estimator
 from hardwall.model.axis import Axis
 from hardwall.model.estimators import foaw
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import RATES, axis_at, piece
 from stimuli.specs import spec
@@ -73,11 +73,11 @@ async def reset_mid_stream_starts_afresh(dut):
     tap = d.spacing * d.history.every
     await bench.reset()
     for count in range(2 * tap):
-        await bench.transact("strobe", "valid", count=count, **words)
+        await bench.transact("strobe", "valid", seen__count=count, **words)
     assert bench.reader("velocity")() != 0
     await bench.reset()
     for _ in range(tap + 1):
-        await bench.transact("strobe", "valid", count=-1, **words)
+        await bench.transact("strobe", "valid", seen__count=-1, **words)
         assert bench.reader("velocity")() == 0
 
 

@@ -7,7 +7,7 @@ from cocotb.triggers import ClockCycles
 from hardwall.hdl.estimators.history import History
 from hardwall.model.estimators import history
 from hardwall.model.estimators.history import change_over, take
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from stimuli.specs import spec
 
 WINDOWS = {"paper": 2e-3, "narrow": 40e-6, "mhz": 20e-3}

@@ -12,7 +12,7 @@ from hardwall.model.estimators import levant
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.levant import START
 from hardwall.model.quadrature import seen_count
-from hardwall.testing.bench import simulate
+from hardwall.testing import simulate
 from hardwall.testing.estimators import model
 from stimuli.specs import spec
 

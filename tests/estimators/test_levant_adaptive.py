@@ -13,7 +13,7 @@ from hardwall.model.estimators import levant_adaptive
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.levant_adaptive import LOST, START
 from hardwall.model.quadrature import seen_count
-from hardwall.testing.bench import rng, simulate
+from hardwall.testing import rng, simulate
 from hardwall.testing.estimators import model, reset_words
 from stimuli.papers_signal import BOUND, RATES, axis_at, swing
 from stimuli.specs import spec

@@ -13,14 +13,13 @@ from hardwall.hdl.estimators.levant_edge import Estimator
 from hardwall.model.compiled import compiled
 from hardwall.model.estimators import levant_edge
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.estimators.levant_edge import FLOAT_START, START
-from hardwall.model.estimators.levant_edge_design import LEARN_SHIFT
+from hardwall.model.estimators.levant_edge_design import FLOAT_START, LEARN_SHIFT, START
 from hardwall.model.quadrature import Seen
 from hardwall.sim.estimates import accuracy, signals
 from hardwall.sim.estimates.playback import DECODER_CLOCKS, edges_of
 from hardwall.sim.world.encoder import offsets
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
-from hardwall.testing.estimators import follow, model, reset_words
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing.estimators import follow, model, names, reset_words
 from stimuli.specs import spec
 
 
@@ -106,14 +105,13 @@ async def follows_model(dut):
 async def reset_mid_stream_starts_afresh(dut):
     d = design(parameters()["name"])
     bench, scale = Bench(dut, Estimator(d)), Scale(d)
-    names = (*d.inputs, "restart", *(word.name for word in d.words))
 
     async def sample(edges):
         scale.now += 2 << d.shortest
         for _ in range(edges):
             scale.pass_edge(True, scale.now - 3)
         row = (*scale.row(), 0, *reset_words(d))
-        await bench.transact("strobe", "valid", **dict(zip(names, row, strict=True)))
+        await bench.transact("strobe", "valid", **dict(zip(names(d), row, strict=True)))
         return bench.reader("velocity")()
 
     await bench.reset()

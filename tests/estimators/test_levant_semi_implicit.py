@@ -10,10 +10,9 @@ import pytest
 from hardwall.hdl.estimators.levant_semi_implicit import Estimator
 from hardwall.model.estimators import levant_semi_implicit
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.estimators.levant import POSITION_BUDGET
-from hardwall.model.estimators.levant_semi_implicit import FLOAT_START, START
+from hardwall.model.estimators.levant import FLOAT_START, POSITION_BUDGET, START
 from hardwall.model.quadrature import seen_count
-from hardwall.testing.bench import rng, simulate
+from hardwall.testing import rng, simulate
 from hardwall.testing.estimators import model
 from stimuli.specs import spec
 

@@ -3,6 +3,7 @@
 import levants
 import pytest
 
+from hardwall.hdl.estimators.registry import ESTIMATORS
 from hardwall.model.estimators import registry
 from stimuli.papers_signal import BOUND, RATES, axis_at
 from stimuli.specs import spec
@@ -24,15 +25,15 @@ def test_word_length_costs_a_hundredth_at_every_rate(name, rate, bound, output):
 @pytest.mark.parametrize(("gains", "named"), levants.REFUSED)
 @pytest.mark.parametrize("name", [*FIXED_GAINS, ADAPTIVE])
 def test_gains_that_cannot_be_held_are_refused(name, gains, named):
-    module = registry.load(name)
+    design = registry.design_of(name)
     with pytest.raises(ValueError, match=f"^{named}"):
-        module.Design(spec("paper", name), module.Gains(**gains))
+        design(spec("paper", name), design.gains_class(**gains))
 
 
 @pytest.mark.parametrize("name", [*FIXED_GAINS, ADAPTIVE])
 def test_wrong_design_is_refused(name):
     with pytest.raises(TypeError, match=r"not 3$"):
-        registry.load(name, "hardwall.hdl").Estimator(3)
+        ESTIMATORS[name](3)
 
 
 @pytest.mark.parametrize("name", PROJECTING)

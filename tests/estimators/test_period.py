@@ -15,7 +15,7 @@ from hardwall.model.estimators.period import FLOAT_START, START
 from hardwall.model.quadrature import Seen
 from hardwall.sim.estimates import accuracy, motions, signals
 from hardwall.sim.world.encoder import offsets
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model
 from stimuli.edges import anything, check_rounding_is_the_only_difference, exact, rows, sights, turn, velocities
 from stimuli.papers_signal import RATES
@@ -45,6 +45,11 @@ async def follows_model(dut):
         assert end in expected["velocity"]
 
 
+def on_pins(seen: dict[str, int]) -> dict[str, int]:
+    """Return what is seen of the decoder by the names of the ports."""
+    return {f"seen__{name}": value for name, value in seen.items()}
+
+
 @cocotb.test()
 async def reset_mid_stream_starts_afresh(dut):
     name = parameters()["name"]
@@ -57,10 +62,10 @@ async def reset_mid_stream_starts_afresh(dut):
         {"count": 5, "stamp": 90, "stamp_a_rise": 85, "stamp_b_rise": 70, "stamp_a_fall": 75, "stamp_b_fall": 80},
     ]
     for expected_moving, row in zip((False, False, True), moving, strict=True):
-        await bench.transact("strobe", "valid", **row, **edges)
+        await bench.transact("strobe", "valid", **on_pins(row | edges))
         assert (bench.reader("velocity")() > 0) == expected_moving
     await bench.reset()
-    await bench.transact("strobe", "valid", **moving[-1], **edges)
+    await bench.transact("strobe", "valid", **on_pins(moving[-1] | edges))
     assert bench.reader("velocity")() == 0
 
 

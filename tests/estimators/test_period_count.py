@@ -15,7 +15,7 @@ from hardwall.model.estimators.period_count import START
 from hardwall.model.quadrature import seen_count
 from hardwall.sim.estimates import accuracy, motions, signals
 from hardwall.sim.world.encoder import offsets
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.edges import anything, check_rounding_is_the_only_difference, rows, sights, turn, velocities
 from stimuli.papers_signal import RATES

@@ -10,7 +10,7 @@ import pytest
 from hardwall.hdl.estimators.window import Estimator
 from hardwall.model.axis import Axis
 from hardwall.model.estimators import window
-from hardwall.testing.bench import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import RATES, axis_at, piece
 from stimuli.specs import spec
@@ -64,11 +64,11 @@ async def reset_mid_stream_starts_afresh(dut):
     bench, (length,) = Bench(dut, component), reset_words(component.design)
     await bench.reset()
     for count in range(3 * component.design.history.every):
-        await bench.transact("strobe", "valid", count=count, window_length=length)
+        await bench.transact("strobe", "valid", seen__count=count, window_length=length)
     assert bench.reader("velocity")() != 0
     await bench.reset()
     for _ in range(component.design.history.every + 1):
-        await bench.transact("strobe", "valid", count=-1, window_length=length)
+        await bench.transact("strobe", "valid", seen__count=-1, window_length=length)
         assert bench.reader("velocity")() == 0
 
 

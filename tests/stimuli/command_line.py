@@ -2,6 +2,9 @@
 
 from hardwall.sim.commands import app
 
+WIDTH = 80
+"""Of a terminal that is not there."""
+
 
 def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
     """Return exit code, stdout and stderr of `hardwall ARGUMENTS`."""
@@ -13,4 +16,6 @@ def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
     except SystemExit as exit_:
         code = exit_.code
     out, err = capsys.readouterr()
+    if "--json" not in arguments:
+        assert [line for line in out.splitlines() if len(line) > WIDTH] == [], "a table does not fit"
     return code, out, err

@@ -42,7 +42,7 @@ SPECS = {
     "wide": WIDE,
 }
 
-EVERY_OUTPUT = [(name, output) for name in registry.ESTIMATORS for output in registry.load(name).OUTPUTS]
+EVERY_OUTPUT = [(name, output) for name in registry.ESTIMATORS for output in registry.design_of(name).outputs]
 
 
 @cache

@@ -5,18 +5,13 @@ import math
 
 import pytest
 
+from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, names, read
 from hardwall.sim.studies import cutoff
 from hardwall.sim.walls.boundary import Edge
-from hardwall.sim.walls.case import Case
 from hardwall.sim.walls.zwidth import Map
 from stimuli.command_line import call
-
-
-@pytest.fixture(autouse=True)
-def fresh(tmp_path, monkeypatch):
-    """Results go to an empty folder; what is compiled stays where it is."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
+from stimuli.maps import Known
 
 
 def map_of(case: Case, area: float, leaves: bool = False) -> Map:
@@ -31,7 +26,7 @@ def cutoff_of(case: Case) -> float | None:
     return gains and gains["cutoff_hz"]
 
 
-class Known:
+class Areas(Known):
     """Maps of areas that are a function of the cutoff; None for no filter."""
 
     def __init__(self, area):
@@ -48,8 +43,8 @@ def staircase(cutoff_hz: float | None) -> float:
 
 
 def test_the_top_of_a_staircase_is_found_between_the_sweep_s_cutoffs():
-    known = Known(staircase)
-    (device,) = cutoff.study(["seed-2011"], {}, known)
+    known = Areas(staircase)
+    (device,) = cutoff.study([Case.of("seed-2011")], known).devices
     sweep, *search = known.calls
     assert set(cutoff.PAPERS_HZ) < set(sweep)
     assert (min(sweep[:-1]), max(sweep[:-1]), sweep[-1]) == (30.0, 4000.0, None)
@@ -65,26 +60,26 @@ def test_the_top_of_a_staircase_is_found_between_the_sweep_s_cutoffs():
 
 @pytest.mark.parametrize("top_hz", [1200.0, 433.0, 77.0])
 def test_the_search_closes_in_on_the_top(top_hz):
-    known = Known(lambda cutoff_hz: 1e4 - 1e4 * math.log((cutoff_hz or 1.0) / top_hz) ** 2)
-    (device,) = cutoff.study(["seed-2011"], {}, known)
+    known = Areas(lambda cutoff_hz: 1e4 - 1e4 * math.log((cutoff_hz or 1.0) / top_hz) ** 2)
+    (device,) = cutoff.study([Case.of("seed-2011")], known).devices
     assert device.best_hz == pytest.approx(top_hz, rel=cutoff.TOLERANCE)
 
 
 def test_an_area_that_still_rises_where_the_rate_ends_is_said_to():
-    (device,) = cutoff.study(["desktop-arm"], {}, Known(lambda cutoff_hz: cutoff_hz or 1e4))
+    (device,) = cutoff.study([Case.of("desktop-arm")], Areas(lambda cutoff_hz: cutoff_hz or 1e4)).devices
     assert (device.best_hz, device.at_end) == (400.0, True)
     assert device.report()["best_is_at_the_end"] is True
 
 
 def test_nothing_stable_is_not_searched():
-    known = Known(lambda _: 0.0)
-    (device,) = cutoff.study(["maglev"], {}, known)
+    known = Areas(lambda _: 0.0)
+    (device,) = cutoff.study([Case.of("maglev")], known).devices
     assert (len(known.calls), device.best.area) == (1, 0.0)
 
 
 def test_every_scene_is_swept_at_once_and_has_its_own():
-    known = Known(staircase)
-    devices = cutoff.study(list(cutoff.SCENES), {"handle.mass_kg": 0.5}, known)
+    known = Areas(staircase)
+    devices = cutoff.study([Case.of(name, {"handle.mass_kg": 0.5}) for name in cutoff.SCENES], known).devices
     assert [(each.scene.name, each.scene.handle.mass_kg) for each in devices] == [(name, 0.5) for name in cutoff.SCENES]
     assert len(known.calls[0]) == sum(len(each.maps) + 1 for each in devices) - len(known.calls[1:])
 
@@ -167,9 +162,10 @@ def test_two_files_of_one_name_are_two_devices(tmp_path):
         path.parent.mkdir()
         path.write_text(read("seed-2011").replace("mass_kg = 0.35", f"mass_kg = {mass}"))
 
-    def of_mass(title: str, cases: list[Case]) -> list[Map]:
-        return [map_of(case, 100 * case.parsed.handle.mass_kg) for case in cases]
+    class OfMass(Known):
+        def __call__(self, title: str, cases: list[Case]) -> list[Map]:
+            return [map_of(case, 100 * case.scene.handle.mass_kg) for case in cases]
 
-    devices = cutoff.study([str(path) for path in paths], {}, of_mass)
+    devices = cutoff.study([Case.of(str(path)) for path in paths], OfMass()).devices
     assert [round(device.best.area) for device in devices] == [35, 70]
     assert [round(device.unfiltered.area) for device in devices] == [35, 70]

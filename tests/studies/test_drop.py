@@ -6,21 +6,18 @@ import math
 import numpy as np
 import pytest
 
+from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.studies import drop
+from hardwall.sim.studies.drop_result import Drop, Law
 from hardwall.sim.walls.boundary import Edge
-from hardwall.sim.walls.case import Case
 from hardwall.sim.walls.chatter import Chatter
 from hardwall.sim.walls.methods import methods
-from hardwall.sim.walls.zwidth import Map
+from hardwall.sim.walls.zwidth import Effort, Map
 from stimuli.command_line import call
 from stimuli.scenes import ODD
 
-
-@pytest.fixture(autouse=True)
-def fresh(tmp_path, monkeypatch):
-    """Results go to an empty folder; what is compiled stays where it is."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
+NOTHING = Effort("fixed", 0, 0.0)
 
 
 def strike(scene: str, text: str, changes: dict, damping: float, start: int, backend: str) -> dict:
@@ -126,16 +123,16 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
 def test_k_before_the_end_is_that_of_the_last_wall_but_one(edges, part):
     case = Case("", "seed-2011", "", {})
     found = Map(case, [Edge(10.0 * n, 1e3 * k, None) for n, k in enumerate(edges)], 1, [None] * len(edges))
-    assert drop.Drop(load("seed-2011"), {}, [], [], [], {"adjusted": found}).before_the_end("adjusted") == part
+    assert Drop(load("seed-2011"), {}, [], [], [], {"adjusted": found}, NOTHING).before_the_end("adjusted") == part
 
 
 def test_agreement_leaves_out_what_has_no_end():
     pairs = ((10.0, 20.0), (10.0, math.inf), (math.inf, 5.0), (10.0, 0.0), (40.0, 20.0))
-    laws = [drop.Law("mass", "x 2", "proposed", *pair) for pair in pairs]
-    assert drop.Drop(load("seed-2011"), {}, [], [], laws, {}).agreement() == pytest.approx(
+    laws = [Law("mass", "x 2", "proposed", *pair) for pair in pairs]
+    assert Drop(load("seed-2011"), {}, [], [], laws, {}, NOTHING).agreement() == pytest.approx(
         [0.5, 0.875, 1.25, 1.625, 2.0]
     )
-    assert drop.Drop(load("seed-2011"), {}, [], [], [], {}).agreement() == []
+    assert Drop(load("seed-2011"), {}, [], [], [], {}, NOTHING).agreement() == []
 
 
 @pytest.mark.parametrize(

@@ -6,23 +6,19 @@ import math
 import numpy as np
 import pytest
 
+from hardwall.sim.scene.case import Case
 from hardwall.sim.studies import fit
 from hardwall.sim.walls import methods
 from hardwall.sim.walls.boundary import Edge
-from hardwall.sim.walls.case import Case, grid_of
 from hardwall.sim.walls.figure_5 import Fact
+from hardwall.sim.walls.grid import grid_of
 from hardwall.sim.walls.zwidth import Map, NeverReached
 from stimuli.command_line import call
 from stimuli.figure_5 import PAPER
+from stimuli.maps import Known
 
 MASS_KG, DELAY_S = 0.2, 1.4e-3
 NAMES = {curve.label: name for name, curve in methods.methods().items()}
-
-
-@pytest.fixture(autouse=True)
-def fresh(tmp_path, monkeypatch):
-    """Results go to an empty folder; what is compiled stays where it is."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
 
 
 def largest_n_per_m(method: str, changes: dict, damping: float) -> float:
@@ -36,7 +32,7 @@ def largest_n_per_m(method: str, changes: dict, damping: float) -> float:
     return 1e3 * PAPER[method][max(place, 0)] * stiffer if inside or place < 0 else 0.0
 
 
-class Known:
+class Device(Known):
     """Maps of a device that is known."""
 
     def __init__(self):
@@ -48,7 +44,7 @@ class Known:
 
     def _map(self, case: Case) -> Map:
         edges = []
-        for damping in grid_of(case.parsed).dampings:
+        for damping in grid_of(case.scene).dampings:
             stiffness = largest_n_per_m(NAMES[case.label], case.changes, damping)
             edges.append(Edge(damping, stiffness, stiffness + 1e3))
             if not stiffness:
@@ -56,12 +52,12 @@ class Known:
         return Map(case, edges, 1, [True] * len(edges))
 
 
-def found(evaluations: int, mapping: Known, seed: int = 1) -> fit.Fit:
-    return fit.study("seed-2011", {}, "3-30", evaluations, seed, mapping, lambda done: None)
+def found(evaluations: int, mapping: Device, seed: int = 1) -> fit.Fit:
+    return fit.study(Case.of("seed-2011"), "3-30", evaluations, seed, mapping, lambda done: None)
 
 
 def test_a_known_device_is_found_again():
-    known = Known()
+    known = Device()
     result = found(240, known)
     assert result.before.held < 8
     best = result.finalists[0]
@@ -84,17 +80,17 @@ def test_a_known_device_is_found_again():
 
 
 def test_a_search_is_its_seed_s():
-    first, again, other = (found(24, Known(), seed).trials for seed in (1, 1, 2))
+    first, again, other = (found(24, Device(), seed).trials for seed in (1, 1, 2))
     assert [each.values for each in first] == [each.values for each in again] != [each.values for each in other]
 
 
 def test_both_the_map_of_a_trial_and_its_judgement_have_the_trial_s_alpha():
-    known = Known()
+    known = Device()
     result = found(24, known)
     key = "controller.gains.levant"
     for case in known.cases:
         if NAMES[case.label] == "adjusted":
-            assert case.parsed.controller.gains.levant.model_dump() == case.changes[key]
+            assert case.scene.controller.gains.levant.model_dump() == case.changes[key]
     alphas = {trial.values[f"{key}.alpha_m_per_s2"] for trial in result.trials}
     assert {case.changes[key]["alpha_m_per_s2"] for case in known.cases if NAMES[case.label] == "adjusted"} >= alphas
 
@@ -171,7 +167,7 @@ def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, mes
 
 
 def test_nothing_stable_is_far_off():
-    class Nothing(Known):
+    class Nothing(Device):
         def _map(self, case: Case) -> Map:
             return Map(case, [Edge(3.0, 0.0, 1e3)], 1, [False])
 
@@ -182,9 +178,9 @@ def test_nothing_stable_is_far_off():
 
 
 def test_a_device_that_does_not_reach_the_wall_ends_no_search():
-    class Rough(Known):
+    class Rough(Device):
         def _map(self, case: Case) -> Map:
-            if case.parsed.handle.coulomb_n > 0.1:
+            if case.scene.handle.coulomb_n > 0.1:
                 raise NeverReached("the handle did not reach the wall: nothing is said of K 1000, B 3")
             return super()._map(case)
 

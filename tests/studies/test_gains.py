@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from hardwall.model.estimators.levant import Gains
+from hardwall.sim.scene.case import Case
 from hardwall.sim.studies import gains
 from hardwall.sim.walls.boundary import Edge
-from hardwall.sim.walls.case import Case
 from hardwall.sim.walls.zwidth import Map
 from stimuli.command_line import call
+from stimuli.maps import Known
 
 BOUND = 12.0
 BRIEF = {
@@ -25,7 +26,7 @@ BRIEF = {
 SET = [word for key, value in BRIEF.items() for word in ("--set", f"{key}={value}")]
 
 
-class Known:
+class Areas(Known):
     """Maps of areas that are a function of output and gains, with walls in place if alpha is less than 20."""
 
     def __init__(self, area):
@@ -50,16 +51,10 @@ def nearest(values: np.ndarray, value: float) -> float:
     return float(values[np.abs(np.log(values / value)).argmin()])
 
 
-@pytest.fixture(autouse=True)
-def fresh(tmp_path, monkeypatch):
-    """Results go to an empty folder; what is compiled stays where it is."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
-
-
 @pytest.fixture(scope="module")
-def searched() -> tuple[gains.Search, Known]:
-    known = Known(hill)
-    return gains.study("seed-2011", {}, known), known
+def searched() -> tuple[gains.Search, Areas]:
+    known = Areas(hill)
+    return gains.study(Case.of("seed-2011"), known), known
 
 
 def test_the_best_of_a_known_hill_are_found(searched):
@@ -77,7 +72,7 @@ def test_the_best_of_a_known_hill_are_found(searched):
 
 def test_the_picks_are_mapped_again_in_finer_steps(searched):
     search, known = searched
-    coarse, finer = ({case.parsed.zwidth.stiffness_step_n_per_m for case in call} for call in known.calls)
+    coarse, finer = ({case.scene.zwidth.stiffness_step_n_per_m for case in call} for call in known.calls)
     assert (coarse, finer) == ({4e3}, {2e3})
     assert {case.label for case in known.calls[1]} == {
         pick.map.case.label for picks in search.picks.values() for pick in picks.values()
@@ -106,7 +101,7 @@ def test_areas_are_held_against_the_paper_s_better_pair(searched):
 )
 def test_a_best_pair_at_the_edge_is_said_to_be(lam, alpha, edge):
     search = gains.study(
-        "seed-2011", {}, Known(lambda _, x, y: 1 / (1 + math.log(x / lam) ** 2 + math.log(y / alpha) ** 2))
+        Case.of("seed-2011"), Areas(lambda _, x, y: 1 / (1 + math.log(x / lam) ** 2 + math.log(y / alpha) ** 2))
     )
     assert search.at_edge(search.picks["u"]["best"].gains) is edge
 
@@ -114,7 +109,7 @@ def test_a_best_pair_at_the_edge_is_said_to_be(lam, alpha, edge):
 def test_gains_without_words_are_left_out(monkeypatch):
     monkeypatch.setattr(gains, "LAMBDAS", np.array([1.0, 1e9]))
     monkeypatch.setattr(gains, "ALPHAS", np.array([1.0, 10.0]))
-    search = gains.study("seed-2011", {}, Known(lambda *_: 1.0))
+    search = gains.study(Case.of("seed-2011"), Areas(lambda *_: 1.0))
     assert np.isnan(search.areas("u", False)).tolist() == [[False, True], [False, True]]
     assert search.report()["outputs"]["u"]["area_n2_s_per_m2"] == [[1.0, None], [1.0, None]]
 
@@ -183,5 +178,5 @@ def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, mes
 
 
 def test_the_adjusted_gains_are_the_scene_s():
-    search = gains.study("fit-2011", {}, Known(hill))
+    search = gains.study(Case.of("fit-2011"), Areas(hill))
     assert [search.picks[output]["adjusted"].gains.alpha_m_per_s2 for output in ("u", "u1")] == [75.8, 75.8]

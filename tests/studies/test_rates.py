@@ -4,12 +4,14 @@ import json
 
 import pytest
 
+from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load
 from hardwall.sim.studies import rates
 from hardwall.sim.walls import methods, theory
 from hardwall.sim.walls.boundary import Edge
 from hardwall.sim.walls.zwidth import Map
 from stimuli.command_line import call
+from stimuli.maps import Known
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
@@ -20,33 +22,35 @@ FEW = {
 }  # fmt: skip
 
 
-def mapping(stiffness):
-    """Return what gives maps of one wall each, of these stiffnesses, and keeps the cases."""
-    seen, values = [], iter(stiffness)
+class OneWall(Known):
+    """Maps of one wall each, of these stiffnesses; it keeps the cases."""
 
-    def make(title, cases):
-        seen.extend(cases)
-        return [Map(case, [Edge(10.0, k := next(values), k + 1)], 1, [True]) for case in cases]
+    def __init__(self, stiffness):
+        self.seen, self._values = [], iter(stiffness)
 
-    return make, seen
+    def __call__(self, title, cases):
+        self.seen.extend(cases)
+        return [Map(case, [Edge(10.0, k := next(self._values), k + 1)], 1, [True]) for case in cases]
 
 
 def test_each_method_is_mapped_at_the_scene_s_rates_and_at_each():
-    make, seen = mapping([20e3, 100e3, 296e3, 300e3, 0.0, 50e3, 60e3, 40e3])
-    kalman, fdm = rates.study("drive-2011", {"handle.coulomb_n": 0.2}, CURVES, [1_000, 10_000, 1_000_000], make)
-    controllers = [case.parsed.controller for case in seen]
+    maps = OneWall([20e3, 100e3, 296e3, 300e3, 0.0, 50e3, 60e3, 40e3])
+    case = Case.of("drive-2011", {"handle.coulomb_n": 0.2})
+    kalman, fdm = rates.study(case, CURVES, [1_000, 10_000, 1_000_000], maps).gains
+    seen = maps.seen
+    controllers = [case.scene.controller for case in seen]
     assert [(c.estimator, c.sample_hz, c.actuation_hz) for c in controllers[:4]] == [
         ("kalman", 10_000, 1_000), ("kalman", 1_000, 1_000), ("kalman", 10_000, 10_000), ("kalman", 10**6, 10**6),
     ]  # fmt: skip
-    assert {case.parsed.handle.coulomb_n for case in seen} == {0.2}
-    assert [case.parsed.amplifier.delay_s for case in seen[:2]] == [1e-3, 0.0]
+    assert {case.scene.handle.coulomb_n for case in seen} == {0.2}
+    assert [case.scene.amplifier.delay_s for case in seen[:2]] == [1e-3, 0.0]
     assert (kalman.ratio, kalman.ends_at_hz) == (15.0, 10_000)
     assert (fdm.ratio, fdm.ends_at_hz) == (None, 10_000)
     assert json.loads(json.dumps(fdm.report()))["largest_stiffness_n_per_m"] == [50e3, 60e3, 40e3]
 
 
 def test_each_part_lowers_the_linear_limit_and_without_any_it_grows_with_the_rate():
-    limits = rates.linear_limits("drive-2011", {}, [1_000, 100_000])
+    limits = rates.linear_limits(Case.of("drive-2011"), [1_000, 100_000])
     whole, no_cable, no_lag, rigid = limits.values()
     for each in (no_cable, no_lag):
         assert whole[1] < each[1] < rigid[1]

@@ -5,23 +5,18 @@ from types import SimpleNamespace
 
 import pytest
 
-from hardwall.sim.scene.load import load, parse
+from hardwall.sim.scene.case import Case
+from hardwall.sim.scene.load import load
 from hardwall.sim.studies import trade_runs
 from hardwall.sim.studies.shortcuts import REFERENCE, Shortcut, shortcuts
 from hardwall.sim.studies.trade import HIT, MAP, Point, Trade, best
 from hardwall.sim.studies.trade_runs import AROUND, GRID, METHODS, study
 from hardwall.sim.walls.boundary import trace
-from hardwall.sim.walls.case import grid_of
+from hardwall.sim.walls.grid import grid_of
 from hardwall.sim.walls.zwidth import Map
 from stimuli.command_line import call
 
 EDGE = 22e3
-
-
-@pytest.fixture(autouse=True)
-def fresh(tmp_path, monkeypatch):
-    """Results go to an empty folder; what is compiled stays where it is."""
-    monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")
 
 
 class Invented:
@@ -36,7 +31,7 @@ class Invented:
         return [self._map(case, backend) for case in cases]
 
     def _map(self, case, backend):
-        steps, hits, stable = trace(grid_of(case.parsed)), 0, None
+        steps, hits, stable = trace(grid_of(case.scene)), 0, None
         while True:
             try:
                 stable = self.stable(*steps.send(stable), case.changes, backend)
@@ -65,7 +60,7 @@ def hardware(monkeypatch):
 
 @pytest.fixture
 def found(hardware):
-    trade = study("drive-2011", {}, Invented())
+    trade = study(Case.of("drive-2011"), Invented())
     return trade, {point.shortcut.label: point for point in trade.points}
 
 
@@ -110,13 +105,13 @@ def test_other_force_words_are_a_failure(monkeypatch):
         trade_runs.hit, "run", lambda scene, backend, until_sure: SimpleNamespace(seconds=5.0, force_sha256=backend)
     )
     with pytest.raises(RuntimeError, match=r"^the RTL and the model differ in their force words: rtl, "):
-        study("drive-2011", {}, Invented())
+        study(Case.of("drive-2011"), Invented())
 
 
 def test_where_nothing_is_stable_there_is_nothing_to_compare(hardware, monkeypatch):
     monkeypatch.setattr(Invented, "stable", lambda *_: False)
     with pytest.raises(RuntimeError, match=r"^drive-2011: with adjusted no wall of the map is stable"):
-        study("drive-2011", {}, Invented())
+        study(Case.of("drive-2011"), Invented())
 
 
 def point(label, seconds, error, axis="parts", coarser=1):
@@ -142,9 +137,8 @@ def test_what_is_within_the_scatter_is_no_error():
 
 def test_every_shortcut_is_a_scene_of_its_own():
     def changed(shortcut):
-        return parse("drive-2011", text, GRID | shortcut.changes)
+        return load("drive-2011", GRID | shortcut.changes)
 
-    text = trade_runs.read("drive-2011")
     scene = load("drive-2011", GRID)
     every = shortcuts(scene, lambda _: True)
     assert len({each.label for each in every}) == len(every) == 25
@@ -163,7 +157,7 @@ def test_every_shortcut_is_a_scene_of_its_own():
 
 
 def test_a_scene_that_lacks_a_part_has_no_shortcut_without_it(hardware):
-    labels = [each.shortcut.label for each in study("seed-2011", {}, Invented()).points]
+    labels = [each.shortcut.label for each in study(Case.of("seed-2011"), Invented()).points]
     assert [label for label in labels if "no " in label or "rigid" in label] == []
     assert "steps of 10 us" in labels
     assert "samples at 5 kHz + steps of 100 us" in labels

@@ -5,9 +5,9 @@ from dataclasses import asdict
 
 import pytest
 
+from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls.boundary import Edge
-from hardwall.sim.walls.case import Case
 from hardwall.sim.walls.figure_5 import facts
 from hardwall.sim.walls.methods import methods
 from hardwall.sim.walls.zwidth import Map

@@ -13,6 +13,7 @@ import pytest
 from distributed import Client, LocalCluster
 
 from hardwall.sim.jobs.store import Store
+from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.walls import hit, methods, zwidth
 from hardwall.sim.walls.boundary import Edge
@@ -30,7 +31,7 @@ SMALL = {
 }
 SET = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
 METHODS = [methods.methods()[name] for name in ("fdm-100", "adjusted")]
-CASES = [zwidth.Case(each.label, "seed-2011", read("seed-2011"), SMALL | each.changes) for each in METHODS]
+CASES = [Case(each.label, "seed-2011", read("seed-2011"), SMALL | each.changes) for each in METHODS]
 
 
 @pytest.fixture(scope="module")
@@ -198,7 +199,7 @@ def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, mes
 def test_a_scene_of_a_file_need_not_be_there_any_more(tmp_path, map_of_one_process):
     file = tmp_path / "mine.toml"
     file.write_text(read("seed-2011"))
-    cases = [replace(case, scene=str(file), text=read(str(file))) for case in CASES]
+    cases = [replace(case, source=str(file), text=read(str(file))) for case in CASES]
     file.unlink()
     maps = zwidth.run(cases, "fixed", Store("zwidth"))
     assert [each.edges for each in maps] == [each.edges for each in map_of_one_process]

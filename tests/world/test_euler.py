@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hardwall.sim.scene.build import world_of
+from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load
-from hardwall.sim.scene.schema import SceneError
 from hardwall.sim.walls import hit
 from hardwall.sim.world.advance import advance
 from hardwall.sim.world.converter import Pulse

@@ -1,0 +1,39 @@
+"""The components of the velocity estimators, by the names of `hardwall.model.estimators.registry`; one line each."""
+
+from hardwall.model.estimators.estimate import EstimatorDesign
+
+from . import (
+    butterworth,
+    finite_difference,
+    foaw,
+    kalman,
+    levant,
+    levant_adaptive,
+    levant_edge,
+    levant_implicit,
+    levant_semi_implicit,
+    period,
+    period_count,
+    window,
+)
+from .estimate import EstimatorBlock
+
+ESTIMATORS: dict[str, type[EstimatorBlock]] = {
+    "fdm": finite_difference.Estimator,
+    "levant": levant.Estimator,
+    "butterworth": butterworth.Estimator,
+    "kalman": kalman.Estimator,
+    "period": period.Estimator,
+    "period-count": period_count.Estimator,
+    "levant-edge": levant_edge.Estimator,
+    "levant-semi-implicit": levant_semi_implicit.Estimator,
+    "levant-implicit": levant_implicit.Estimator,
+    "levant-adaptive": levant_adaptive.Estimator,
+    "window": window.Estimator,
+    "foaw": foaw.Estimator,
+}
+
+
+def block_of(design: EstimatorDesign) -> EstimatorBlock:
+    """Return the component of a design."""
+    return ESTIMATORS[design.name](design)

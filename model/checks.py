@@ -1,0 +1,105 @@
+"""What the model checks of what it is given: each error says in one sentence what, the accepted range and the value."""
+
+from numbers import Real
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+LARGEST = (1 << 62) - 1
+"""Largest magnitude of a count or a clock: sums of two fit int64."""
+
+
+class FieldError(ValueError):
+    """A value that cannot be: the message begins with the name of its field, which is also an attribute."""
+
+    def __init__(self, field: str, message: str):
+        super().__init__(field, message)
+        self.field, self.message = field, message
+
+    def __str__(self) -> str:
+        return f"{self.field} {self.message}"
+
+
+def check_int(name: str, value: int, least: int, most: int | None = None) -> None:
+    """Raise TypeError unless `value` is an int, ValueError unless it is `least` to `most` (None: no end)."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer):
+        raise TypeError(f"{name} must be an int, not {value!r}")
+    if value < least or (most is not None and value > most):
+        accepted = f"{least} or more" if most is None else f"{least} to {most}"
+        raise ValueError(f"{name} must be {accepted}, not {value!r}")
+
+
+def check_number(name: str, value: float) -> None:
+    """Raise TypeError unless `value` is a real number."""
+    if not isinstance(value, Real):
+        raise TypeError(f"{name} must be a number, not {value!r}")
+
+
+def integers(name: str, values: ArrayLike, least: int = -LARGEST, most: int = LARGEST) -> np.ndarray:
+    """Return an array of integers as int64; one without elements may be of any type.
+
+    Raises:
+        TypeError: if it is not an array of integers.
+        ValueError: if an element is not within `least` to `most`.
+    """
+    try:
+        array = np.asarray(values)
+    except ValueError:
+        raise TypeError(f"{name} must be an array of integers, not {values!r}") from None
+    if array.size and not np.issubdtype(array.dtype, np.integer):
+        raise TypeError(f"{name} must be integers, not {array.dtype}")
+    if array.size:
+        wrong = np.flatnonzero((array < least) | (array > most))
+        if len(wrong):
+            first = int(wrong[0])
+            raise ValueError(f"{name} must be {least} to {most}, not {array.reshape(-1)[first]} at element {first}")
+    return array.astype(np.int64)
+
+
+def lanes_of_counts(counts: ArrayLike, width: int, most: int) -> np.ndarray:
+    """Return records of counts as int64 words of `width` bits, shape (samples,) or (lanes, samples).
+
+    Counts beyond the width wrap. Between two samples a count may change by less than half of its range, or go round
+    it; where it went round it has changed by at most `most`, as many as the decoder counts in a sample.
+
+    Raises:
+        TypeError: if they are not integers.
+        ValueError: if they have not one or two dimensions, or jump.
+    """
+    array = integers("counts", counts)
+    if array.ndim not in (1, 2):
+        raise ValueError(f"counts must have 1 or 2 dimensions, (samples,) or (lanes, samples), not {array.ndim}")
+    half = 1 << (width - 1)
+    changes = np.diff(array, axis=-1)
+    far = np.abs(changes) >= half
+    if far.any():
+        round_it = ((changes + half) & (2 * half - 1)) - half
+        wrong = np.argwhere(far & (np.abs(round_it) > most))
+        if len(wrong):
+            where = tuple(wrong[0].tolist())
+            raise ValueError(
+                f"counts must change by less than {half}, half of their range, from sample to sample, "
+                f"not by {changes[where]} at sample {where[-1] + 1}"
+            )
+    return ((array + half) & (2 * half - 1)) - half
+
+
+def edges(edge_clocks: ArrayLike, edge_levels: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Return the clocks and the levels of a record of edges as int64.
+
+    Raises:
+        TypeError: if clocks or levels are not integers.
+        ValueError: if the shapes differ or are not (edges,), the clocks are negative or decrease, or a level is not 0
+            to 3.
+    """
+    clocks = integers("edge_clocks", edge_clocks, 0)
+    levels = integers("edge_levels", edge_levels, 0, 3)
+    if clocks.ndim != 1 or clocks.shape != levels.shape:
+        raise ValueError(f"edge_clocks and edge_levels must have one shape (edges,), not {clocks.shape, levels.shape}")
+    back = np.flatnonzero(np.diff(clocks) < 0)
+    if len(back):
+        first = int(back[0])
+        raise ValueError(
+            f"edge_clocks must never decrease, not from {clocks[first]} to {clocks[first + 1]} at element {first + 1}"
+        )
+    return clocks, levels

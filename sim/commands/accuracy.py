@@ -1,0 +1,104 @@
+"""The command `accuracy`."""
+
+import hashlib
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..estimates import figures, recording, signals
+from ..estimates.accuracy import measure, measure_recording, spec_of
+from ..estimates.replay import ReplayError
+from ..jobs.store import Store
+from ..studies import accuracy
+from ..world.encoder import offsets
+from .errors import BadInput
+from .options import BackendOption, EstimatorsOption, curves_of, rates_of
+from .study import StudyOptions, study
+
+DRAWN_HZ_MAX = 100_000
+"""Figure 1 is drawn sample by sample."""
+
+
+@study("workers", "plot")
+def command(
+    options: StudyOptions,
+    figure: Annotated[int | None, typer.Option(min=1, max=2, help="reproduce the founding paper's figure")] = None,
+    signal: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="paper, sweep, stop, flicker, hit, steady:MM_PER_S, or FILE.csv:COLUMN", show_default="paper"
+        ),
+    ] = None,
+    wanted: EstimatorsOption = None,
+    rates: Annotated[str | None, typer.Option(metavar="HZ,...", help="sample rates, e.g. 1e3,10e3,1e6")] = None,
+    backend: BackendOption = "float",
+    encoder_phase_error: Annotated[
+        float, typer.Option(metavar="COUNTS", help="channel B late by so much, -0.95 to 0.95")
+    ] = 0.0,
+    acceleration_max: Annotated[
+        float | None, typer.Option(metavar="C", help="m/s^2, sets the gains", show_default="the signal's own")
+    ] = None,
+) -> None:
+    if figure and signal:
+        raise BadInput(f"--figure {figure} has a signal of its own: give it or --signal, not both")
+    curves = figures.curves(figure) if wanted is None and figure else curves_of(wanted)
+    known, recorded = _signals(list(dict.fromkeys(signal or ["paper"])))
+    if not known and (rates is not None or encoder_phase_error or acceleration_max is not None):
+        raise BadInput(
+            "--rates, --encoder-phase-error and --acceleration-max are for known motions: a recording has its own"
+        )
+    if acceleration_max is not None and not 0 < acceleration_max < 1e6:
+        raise BadInput(f"--acceleration-max must be more than 0 and less than 1e6 m/s^2, not {acceleration_max!r}")
+    at = figures.RATES_HZ[figure or 2] if rates is None else rates_of(rates, "--rates")
+    if options.plot and (recorded or len(known) > 1):
+        raise BadInput("--plot draws error against rate for one signal that is no recording: give one --signal")
+    if options.plot and figure == 1 and (len(at) > 1 or at[0] > DRAWN_HZ_MAX):
+        raise BadInput(f"--figure 1 is drawn at one rate of at most {DRAWN_HZ_MAX:g} Hz, not {rates!r}")
+    of_all = {"backend": backend, "phase_error_counts": encoder_phase_error}
+    if acceleration_max is not None:
+        of_all["acceleration_max_m_per_s2"] = acceleration_max
+    labelled = accuracy.jobs(curves, known, at, of_all)
+    labels, jobs = [label for label, _ in labelled], [job for _, job in labelled]
+    try:
+        offsets(encoder_phase_error)
+        # What cannot be is said before anything long begins.
+        for job in jobs:
+            spec_of(job)
+        files = [job | {"backend": backend} for job in _recording_jobs(curves, recorded)]
+        rows = options.results(f"accuracy, {backend}", measure, jobs, Store("accuracy"))
+        rows += options.results(f"recordings, {backend}", measure_recording, files, Store("recordings"))
+    except (ValueError, recording.RecordingError, ReplayError) as error:
+        raise BadInput(str(error)) from None
+    options.finish(accuracy.Accuracy(figure, curves, rows, labels))
+
+
+def _signals(names: list[str]) -> tuple[list[str], list[tuple[str, str]]]:
+    """Return the known motions, and file and column of each recording `FILE.csv:COLUMN`; a column may have a colon."""
+    known, recorded = [], []
+    for name in names:
+        stem, colon, column = name.partition(".csv:")
+        if colon:
+            recorded.append((f"{stem}.csv", column))
+            continue
+        try:
+            signals.load(name)
+        except ValueError as error:
+            raise BadInput(f"--signal: {error}, or FILE.csv:COLUMN") from None
+        known.append(name)
+    return known, recorded
+
+
+def _recording_jobs(curves: list, recorded: list[tuple[str, str]]) -> list[dict]:
+    """Return the arguments of `measure_recording` but for the backend.
+
+    Raises:
+        RecordingError: if there is no such recording.
+    """
+    jobs = []
+    for file, column in recorded:
+        recording.load(file, column)
+        content = hashlib.sha256(Path(file).read_bytes()).hexdigest()
+        keys = {"file": file, "column": column, "content": content}
+        jobs += [{"estimator": curve.estimator, "output": curve.output} | keys for curve in curves]
+    return jobs

@@ -1,0 +1,13 @@
+"""The command `bench`."""
+
+from ..scene.case import Case
+from ..studies import bench
+from .options import SceneArgument
+from .study import StudyOptions, study
+from .terminal import log
+
+
+@study()
+def command(options: StudyOptions, scene: SceneArgument = "mhz") -> None:
+    Case.of(scene)
+    options.finish(bench.study(scene, log.print))

@@ -1,0 +1,29 @@
+"""The command `choose`."""
+
+from ..estimates.accuracy import measure
+from ..jobs.store import Store
+from ..studies import choose
+from .costs import costs_of
+from .errors import BadInput
+from .options import BackendOption, DeviceOption, EstimatorsOption, RateOption, SeedsOption, curves_of, rates_of
+from .study import StudyOptions, study
+
+
+@study("workers")
+def command(
+    options: StudyOptions,
+    rate: RateOption = 1e6,
+    wanted: EstimatorsOption = None,
+    backend: BackendOption = "fixed",
+    device: DeviceOption = "ecp5-25k",
+    seeds: SeedsOption = 3,
+) -> None:
+    (sample_hz,) = rates_of(str(rate), "--rate")
+    pairs = [(curve.estimator, curve.output) for curve in curves_of(wanted)]
+    jobs = choose.jobs(pairs, sample_hz, backend)
+    try:
+        measured = options.results(f"situations, {backend}", measure, jobs, Store("accuracy"))
+    except ValueError as error:
+        raise BadInput(str(error)) from None
+    costs = costs_of(options, list(dict.fromkeys(name for name, _ in pairs)), device, seeds)
+    options.finish(choose.Choice(choose.table(pairs, measured, costs)))

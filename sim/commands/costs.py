@@ -1,0 +1,29 @@
+"""The command `costs`."""
+
+from dataclasses import replace
+from typing import Annotated
+
+import typer
+
+from ..jobs.store import Store
+from ..studies import costs
+from .options import Device, EstimatorsOption, SeedsOption, curves_of
+from .study import StudyOptions, study
+
+
+@study()
+def command(
+    options: StudyOptions,
+    wanted: EstimatorsOption = None,
+    device: Annotated[Device | None, typer.Option(help="the part", show_default="each")] = None,
+    seeds: SeedsOption = 3,
+) -> None:
+    names = list(dict.fromkeys(curve.estimator for curve in curves_of(wanted)))
+    rows = [row for part in ([device] if device else costs.RATES) for row in costs_of(options, names, part, seeds)]
+    options.finish(costs.Costs(rows))
+
+
+def costs_of(options: StudyOptions, names: list[str], device: str, seeds: int) -> list[dict]:
+    """Return what each estimator costs on a device: one after the other, for each places with its own processes."""
+    alone = replace(options, workers=1)
+    return alone.results(f"costs on {device}", costs.cost, costs.jobs(names, device, seeds), Store("costs"))

@@ -1,0 +1,29 @@
+"""The command `cutoff`."""
+
+from typing import Annotated
+
+import typer
+
+from ..scene.case import Case
+from ..scene.load import names
+from ..studies import cutoff
+from .maps import Maps
+from .options import ModelOption, refuse_for_maps
+from .study import StudyOptions, study
+
+
+@study("workers", "scheduler", "resume", "set_", "plot")
+def command(
+    options: StudyOptions,
+    scenes: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="SCENE...", help=f"of {', '.join(names())}, or .toml files", show_default="three devices"
+        ),
+    ] = None,
+    backend: ModelOption = "fixed",
+) -> None:
+    changes = options.changes()
+    refuse_for_maps(changes, "it is what is searched")
+    cases = [Case.of(scene, changes) for scene in dict.fromkeys(scenes or cutoff.SCENES)]
+    options.finish(cutoff.study(cases, Maps(options, backend)))

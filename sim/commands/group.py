@@ -1,0 +1,91 @@
+"""The commands by name. The module of one is imported only when it runs, or shows its own help."""
+
+import importlib.metadata
+from importlib import import_module
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from .errors import BadInput
+
+COMMANDS = {
+    "hit": "Hit the wall: the founding paper's protocol, and whether the wall is stable.",
+    "replay": "Put recorded counts through an estimator; the RTL gets them through its pins.",
+    "table": "Print reports of hits side by side.",
+    "bench": "Measure the closed loop's speed on every backend and under cocotb, and what optional parts cost.",
+    "verilog": "Write the axis of a scene as Verilog, with a table of its ports.",
+    "synth": "Size and speed of the axis, with the serial port of a board, on a real part.",
+    "accuracy": "Hold velocity estimators against the exact derivative of known motions, at any rate.",
+    "costs": "What each estimator takes of a device: alone, and the board with it placed and routed "
+    "(a minute or two each).",
+    "choose": "The table to choose an estimator by: its error in each situation, all with one set of gains, "
+    "and its cost.",
+    "bits": "What a bit buys: error and logic as the words of an estimator shrink bit by bit from the derived widths.",
+    "zwidth": "Map the walls that are stable: for each estimator, the largest stiffness at every damping.",
+    "lipschitz": "The bound C on the acceleration, from sines fitted to a hit, and the gains that follow: "
+    "the paper's Figure 4.",
+    "trade": "Speed against accuracy: what a coarser backend, device, rate, solver or map saves, "
+    "and what it gets wrong.",
+    "cutoff": "The best cutoff of a filter behind a finite difference: the area of the stable region against it.",
+    "gains": "Levant's gains, searched in full: the area of the stable region over lambda and alpha, for both outputs.",
+    "rates": "What rate buys a stiff wall, 1 kHz to 1 MHz, and which part of the device ends it.",
+    "drop": "Why Levant's stable region ends at one damping, in a sharp drop; and estimators that have none.",
+    "fit": "Search what the paper does not give (mass, friction, delay ...) for a device that shows its Figure 5.",
+}
+"""What each is for, in a line: all of its help but for the options."""
+
+
+class LazyGroup(TyperGroup):
+    """Commands that are names and a line of help until one is called."""
+
+    def __init__(self, **settings: Any):
+        stubs = {name: TyperCommand(name=name, help=line) for name, line in COMMANDS.items()}
+        super().__init__(**settings | {"commands": stubs})
+
+    def resolve_command(self, context: Any, words: list[str]) -> tuple[str | None, Any, list[str]]:
+        """Return the command that is called, with its options, and what is left of the words."""
+        name, stub, rest = super().resolve_command(context, words)
+        return name, stub and _loaded(name), rest
+
+
+def _loaded(name: str) -> Any:
+    """Return a command with its options, its module imported."""
+    alone = typer.Typer(add_completion=False)
+    alone.command(name, help=COMMANDS[name])(import_module(f".{name}", __package__).command)
+    return typer.main.get_command(alone)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"hardwall {importlib.metadata.version('hardwall')}")
+        raise typer.Exit
+
+
+app = typer.Typer(
+    cls=LazyGroup,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    help="A stiff virtual wall in hardware: encoder edges in, force out.",
+)
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version, and end")
+    ] = False,
+) -> None:
+    pass
+
+
+def run() -> None:
+    """Run the command that is called.
+
+    Raises:
+        BadInput: for a command, an option or an argument that cannot be; without words where help was all that came.
+    """
+    try:
+        app(prog_name="hardwall", standalone_mode=False)
+    except typer.TyperException as error:
+        raise BadInput(" ".join(error.format_message().split())) from None

@@ -1,0 +1,46 @@
+"""The command `hit`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..scene.case import Case
+from ..walls import hit
+from .errors import BadInput
+from .options import BackendOption, EstimatorOption, OutputOption, SceneArgument, output_file
+from .study import StudyOptions, study
+from .terminal import log, progress
+
+
+@study("set_", "plot")
+def command(
+    options: StudyOptions,
+    scene: SceneArgument = "seed-2011",
+    estimator: EstimatorOption = None,
+    output: OutputOption = None,
+    backend: BackendOption = "fixed",
+    stiffness: Annotated[float | None, typer.Option(help="of the wall, N/m")] = None,
+    damping: Annotated[float | None, typer.Option(help="of the wall, N s/m")] = None,
+    trace: Annotated[
+        Path | None, typer.Option(metavar="FILE", help=".npz: the samples; .fst: a waveform of the contact (rtl)")
+    ] = None,
+) -> None:
+    changes = options.changes(
+        controller__estimator=estimator,
+        controller__output=output,
+        wall__stiffness_n_per_m=stiffness,
+        wall__damping_n_s_per_m=damping,
+    )
+    of = Case.of(scene, changes).scene
+    trace = output_file(trace, "--trace", (".fst", ".npz"))
+    waveform = trace if trace and trace.suffix == ".fst" else None
+    if waveform and backend != "rtl":
+        raise BadInput(f"--trace {waveform.name} needs --backend rtl: only hardware has waveforms")
+    with progress(f"{of.name} {of.controller.estimator} {backend}", of.samples) as advance:
+        result = hit.run(of, backend, bool(options.plot or trace), advance, waveform)
+    options.finish(result)
+    if trace and not waveform:
+        result.save(trace)
+    if trace:
+        log.print(f"trace: {trace}")

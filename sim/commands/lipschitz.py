@@ -1,0 +1,23 @@
+"""The command `lipschitz`."""
+
+from typing import Annotated
+
+import typer
+
+from ..scene.case import Case
+from ..studies import lipschitz
+from .options import GAINS, SceneArgument, refuse
+from .study import StudyOptions, study
+
+
+@study("set_", "plot")
+def command(
+    options: StudyOptions,
+    scene: SceneArgument = "seed-2011",
+    before: Annotated[float, typer.Option(min=0.0, metavar="S", help="of the record, before the contact")] = 0.1,
+    after: Annotated[float, typer.Option(min=1e-3, metavar="S", help="and after it")] = 0.4,
+    sines: Annotated[int, typer.Option(min=1, max=20, help="how many are fitted")] = 7,
+) -> None:
+    case = Case.of(scene, options.changes())
+    refuse(case.changes, GAINS, "it takes the paper's filter")
+    options.finish(lipschitz.study(case, before, after, sines))

@@ -1,0 +1,58 @@
+"""What the commands about stable walls share: maps, made on a cluster as the options say."""
+
+import time
+from contextlib import AbstractContextManager
+
+from distributed import Client
+
+from ..jobs import cluster
+from ..jobs.store import Store
+from ..scene.case import Case
+from ..walls import zwidth
+from ..walls.grid import grid_of
+from ..walls.zwidth import Effort, Map
+from .errors import BadInput
+from .study import StudyOptions
+from .terminal import progress
+
+
+def cluster_for(options: StudyOptions, jobs: int) -> AbstractContextManager[Client | None]:
+    """Return `cluster.client` as `--workers` or `--scheduler` ask for it."""
+    if options.workers and options.scheduler is not None:
+        raise BadInput(f"--scheduler {options.scheduler} has workers of its own: give it or --workers, not both")
+    return cluster.client(jobs, options.workers, options.scheduler)
+
+
+class Maps:
+    """Makes maps as the options say, and knows what they took: a `zwidth.Mapping`."""
+
+    def __init__(self, options: StudyOptions, backend: str):
+        self._options, self._backend = options, backend
+        self._hits, self._began = 0, time.perf_counter()
+
+    def __call__(self, title: str, cases: list[Case]) -> list[Map]:
+        for case in cases:
+            grid_of(case.scene)  # before a cluster is started
+        maps = self._made(f"{title}, {self._backend}", cases)
+        self._hits += sum(each.hits for each in maps)
+        return maps
+
+    def _made(self, title: str, cases: list[Case]) -> list[Map]:
+        known = Store("zwidth", self._options.resume)
+        with cluster_for(self._options, len(cases)) as client, progress(title, len(cases)) as advance:
+            return zwidth.run(cases, self._backend, known, client, advance)
+
+    def effort(self) -> Effort:
+        """Return what the maps took until now."""
+        return Effort(self._backend, self._hits, time.perf_counter() - self._began)
+
+
+class MapsOnOneCluster(Maps):
+    """The same on a cluster that is there already, with no bar of their own: for very many maps."""
+
+    def __init__(self, options: StudyOptions, backend: str, known: Store, client: Client | None):
+        super().__init__(options, backend)
+        self._known, self._client = known, client
+
+    def _made(self, title: str, cases: list[Case]) -> list[Map]:
+        return zwidth.run(cases, self._backend, self._known, self._client)

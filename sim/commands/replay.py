@@ -1,0 +1,45 @@
+"""The command `replay`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..estimates import recording, replay
+from .errors import BadInput
+from .options import BackendOption, Estimator, OutputOption, output_file
+from .study import StudyOptions, study
+from .terminal import log, progress
+
+
+@study("plot")
+def command(
+    options: StudyOptions,
+    file: Annotated[Path, typer.Argument(metavar="FILE.csv", help="a recording, its first line the columns' names")],
+    column: Annotated[str, typer.Option(help="the column of encoder counts")],
+    rate: Annotated[
+        float | None, typer.Option(metavar="HZ", help="sample rate", show_default="from column time_s")
+    ] = None,
+    coarsen: Annotated[int | None, typer.Option(help="divide the counts, and judge against the full ones")] = None,
+    estimator: Annotated[Estimator, typer.Option(help="velocity estimator")] = "levant",
+    output: OutputOption = None,
+    backend: BackendOption = "fixed",
+    acceleration_max: Annotated[
+        float | None,
+        typer.Option(metavar="C", help="counts/s^2, sets the gains", show_default="the recording's"),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="write the velocities")] = None,
+) -> None:
+    if out and out.exists() and file.exists() and out.samefile(file):
+        raise BadInput(f"--out must be another file than the recording, not {str(out)!r}")
+    out = output_file(out, "--out", (".csv",))
+    try:
+        recorded = recording.load(file, column, rate)
+        with progress(f"{file.name} {estimator} {backend}", len(recorded.counts)) as advance:
+            result = replay.replay(recorded, estimator, output, backend, coarsen, acceleration_max, progress=advance)
+    except (recording.RecordingError, replay.ReplayError) as error:
+        raise BadInput(str(error)) from None
+    options.finish(result)
+    if out:
+        result.save(out)
+        log.print(f"velocities: {out}")

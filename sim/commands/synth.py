@@ -1,0 +1,22 @@
+"""The command `synth`."""
+
+from ..jobs.result import Values
+from ..rtl.synthesis import synthesise
+from ..scene.case import Case
+from .options import DeviceOption, EstimatorOption, SceneArgument, SeedsOption
+from .study import StudyOptions, study
+from .terminal import log
+
+
+@study("set_")
+def command(
+    options: StudyOptions,
+    scene: SceneArgument = "mhz",
+    device: DeviceOption = "ecp5-25k",
+    seeds: SeedsOption = 3,
+    estimator: EstimatorOption = None,
+) -> None:
+    of = Case.of(scene, options.changes(controller__estimator=estimator)).scene
+    with log.status(f"{device}: Yosys, then nextpnr with {seeds} seeds"):
+        report = synthesise(of.spec, device, range(1, seeds + 1), of.controller.glitch_clocks)
+    options.finish(Values({"scene": of.name} | report))

@@ -1,0 +1,42 @@
+"""The command `table`."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..jobs.result import table_of
+from .errors import BadInput
+from .terminal import show
+
+REST_MM = 1e-6
+"""A handle whose RMS is less is at rest: it has moved by a nanometre."""
+NUMBERS = ("K (N/m)", "B (N s/m)", "wall", "RMS (mm)", "peak force (N)", "samples/s", "force words")
+
+
+def command(
+    files: Annotated[list[Path], typer.Argument(metavar="FILE", help="JSON reports of `hardwall hit --json`")],
+) -> None:
+    rows = []
+    for file in files:
+        try:
+            rows.append(_row(json.loads(file.read_text())))
+        except FileNotFoundError:
+            raise BadInput(f"{file}: no such file") from None
+        except (OSError, ValueError, KeyError, TypeError):
+            raise BadInput(f"{file}: not a JSON report of `hardwall hit --json`") from None
+    show(table_of(("run",), NUMBERS, rows))
+
+
+def _row(report: dict) -> list[str]:
+    return [
+        f"{report['estimator']} {report['output']}, {report['backend']}, {report['scene']}",
+        f"{report['stiffness_n_per_m']:g}",
+        f"{report['damping_n_s_per_m']:g}",
+        "stable" if report["stable"] else "unstable",
+        "at rest" if report["rms_mm"] < REST_MM else f"{report['rms_mm']:.3g}",
+        f"{report['max_force_n']:.3f}",
+        f"{report['samples_per_s']:.3g}",
+        (report["force_sha256"] or "")[:8],
+    ]

@@ -1,0 +1,107 @@
+"""What people see: tables on stdout, everything else on stderr."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import rich.table
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.text import Text
+
+from ..jobs.result import Table
+
+log = Console(stderr=True, highlight=False, markup=False)
+
+
+GAP, EDGE = 2, 1
+"""Spaces between two columns, and on either side of a table."""
+WORD_MAX = 20
+"""A longer word may be broken, so that a name without spaces, of a file perhaps, leaves room for the numbers."""
+
+
+def show(table: Table) -> None:
+    """Print a table as wide as the terminal, or several that are: no number is broken, and no word of usual length."""
+    console = Console(highlight=False)
+    if not table.columns:
+        drawn = rich.table.Table(box=None, show_header=False, pad_edge=False)
+        drawn.add_column(style="bold", no_wrap=True)
+        drawn.add_column(overflow="fold")
+        _print(console, drawn, table.rows)
+        return
+    columns = [_Column(*each, [row[place] for row in table.rows]) for place, each in enumerate(table.columns.items())]
+    for part in _parts(columns, console.width - 2 * EDGE):
+        drawn = rich.table.Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+        for column, width in _widths(part, console.width - 2 * EDGE):
+            drawn.add_column(Text(column.heading), justify=column.justify, overflow="fold", width=width)
+        _print(console, drawn, list(zip(*(column.cells for column in part), strict=True)))
+
+
+def _print(console: Console, drawn: rich.table.Table, rows: Iterable[Iterable[str]]) -> None:
+    for row in rows:
+        drawn.add_row(*map(Text, row))
+    console.print(drawn)
+
+
+@dataclass(frozen=True)
+class _Column:
+    heading: str
+    justify: str
+    cells: list[str]
+
+    @property
+    def least(self) -> int:
+        """How narrow it may be: as its numbers, or its longest word."""
+        words = [word[:WORD_MAX] for cell in self.cells for word in cell.split()]
+        return max(map(len, [*(words if self.justify == "left" else self.cells), *self.heading.split()]), default=1)
+
+    @property
+    def most(self) -> int:
+        """How wide it is with nothing in two lines."""
+        return max(map(len, [self.heading, *self.cells]))
+
+
+def _parts(columns: list[_Column], width: int) -> list[list[_Column]]:
+    """Return the columns that fit side by side: all those of words, and as many of numbers as there is room for."""
+    words = [column for column in columns if column.justify == "left"]
+    room = width + GAP - sum(column.least + GAP for column in words)
+    parts, left = [list(words)], room
+    for column in columns:
+        if column.justify == "left":
+            continue
+        if column.least + GAP > left and len(parts[-1]) > len(words):
+            parts.append(list(words))
+            left = room
+        parts[-1].append(column)
+        left -= column.least + GAP
+    return parts
+
+
+def _widths(columns: list[_Column], width: int) -> list[tuple[_Column, int]]:
+    """Return each column with its width: what is left over goes to words first, as they need it."""
+    spare = width + GAP - sum(column.least + GAP for column in columns)
+    widths = {column.heading: column.least for column in columns}
+    for justify in ("left", "right"):
+        wanted = {each.heading: each.most - each.least for each in columns if each.justify == justify}
+        part = min(max(spare, 0) / max(sum(wanted.values()), 1), 1.0)
+        for heading, more in wanted.items():
+            widths[heading] += int(part * more)
+            spare -= int(part * more)
+    return [(column, widths[column.heading]) for column in columns]
+
+
+class progress:
+    """A progress bar on stderr while a run lasts; gives the function that moves it."""
+
+    def __init__(self, title: str, total: int):
+        columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+        self._bar = Progress(*columns, console=log, transient=True, disable=not log.is_terminal)
+        self._task = self._bar.add_task(escape(title), total=total)
+
+    def __enter__(self):
+        self._bar.start()
+        return lambda done: self._bar.update(self._task, completed=done)
+
+    def __exit__(self, *_) -> None:
+        self._bar.stop()

@@ -1,0 +1,119 @@
+"""A scene as a value: its text and what is changed of it, of which any process makes the same scene."""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, TypeVar
+
+from .checks import check_hit
+from .errors import SceneError
+from .load import parse, read
+from .schema import Scene
+
+Key = TypeVar("Key")
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is hit or mapped.
+
+    Attributes:
+        label: in tables, legends and errors.
+        source, text: the scene's name or file, and what is in it: the file need not be where a worker runs.
+        changes: of the scene, by dotted key; a value of None takes the key out.
+    """
+
+    label: str
+    source: str
+    text: str
+    changes: dict[str, Any]
+
+    @classmethod
+    def of(cls, source: str, changes: dict[str, Any] | None = None, label: str = "") -> "Case":
+        """Return the case of a scene by its name or file, which is read here and nowhere else.
+
+        Raises:
+            SceneError: if there is no such scene, or it cannot be.
+        """
+        case = cls(label, source, read(source), changes or {})
+        _ = case.scene
+        return case
+
+    @property
+    def scene(self) -> Scene:
+        """The scene, changed; it is made once a process.
+
+        Raises:
+            SceneError: if it cannot be.
+        """
+        try:
+            return _scene(_Recipe(self.source, self.text, self.changes))
+        except SceneError as error:
+            raise SceneError(f"{error} ({self.label})" if self.label else str(error)) from None
+
+    def changed(self, changes: dict[str, Any], label: str | None = None) -> "Case":
+        """Return the case with more changes, and another label if one is given."""
+        return replace(self, changes=self.changes | changes, label=self.label if label is None else label)
+
+    def with_defaults(self, changes: dict[str, Any]) -> "Case":
+        """Return the case with changes that give way to its own."""
+        return replace(self, changes=changes | self.changes)
+
+    def job(self) -> dict[str, Any]:
+        """Return the case as keys of a job, of which a worker makes it again."""
+        return {"scene": self.source, "text": self.text, "changes": self.changes}
+
+    def hitting(
+        self,
+        stiffness_n_per_m: float | None = None,
+        damping_n_s_per_m: float | None = None,
+        start_m: float | None = None,
+    ) -> Scene:
+        """Return the scene for a hit of another wall, or from another start; of the scene, these alone are checked.
+
+        Raises:
+            SceneError: if there can be no such hit.
+        """
+        scene = self.scene
+        own = scene.wall.stiffness_n_per_m, scene.wall.damping_n_s_per_m, scene.protocol.start_m
+        asked = stiffness_n_per_m, damping_n_s_per_m, start_m
+        hit = scene.hitting(*(mine if other is None else other for mine, other in zip(own, asked, strict=True)))
+        try:
+            check_hit(hit)
+        except ValueError as error:
+            raise SceneError(f"{self.source}: {error}") from None
+        return hit
+
+
+@dataclass(frozen=True)
+class _Recipe:
+    """What a scene is made of, with a digest of what Python cannot digest itself."""
+
+    source: str
+    text: str
+    changes: dict[str, Any]
+
+    def __hash__(self) -> int:
+        return hash((self.source, self.text, repr(self.changes)))
+
+
+@lru_cache(maxsize=1 << 10)
+def _scene(recipe: _Recipe) -> Scene:
+    return parse(recipe.source, recipe.text, recipe.changes)
+
+
+def accepted(cases: dict[Key, Case]) -> dict[Key, Case]:
+    """Return the cases that can be: words for extreme gains may not fit.
+
+    Raises:
+        SceneError: if none can.
+    """
+    possible, refusal = {}, None
+    for key, case in cases.items():
+        try:
+            _ = case.scene
+            possible[key] = case
+        except SceneError as error:
+            refusal = error
+    if refusal and not possible:
+        raise refusal
+    return possible

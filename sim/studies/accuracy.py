@@ -1,0 +1,64 @@
+"""How accurate estimators are, side by side: every one on every signal, at every rate."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from ..jobs.result import Table, table_of
+from ..walls.methods import Curve
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """What was measured.
+
+    Attributes:
+        figure: of the founding paper, which it reproduces; None for others.
+        curves: the estimators.
+        rows: of `accuracy.measure` and `accuracy.measure_recording`, those of recordings last.
+        labels: of the curve of each row of a known motion.
+    """
+
+    figure: int | None
+    curves: list[Curve]
+    rows: list[dict[str, Any]]
+    labels: list[str]
+
+    def report(self) -> list[dict[str, Any]]:
+        """Return the rows, units in the keys."""
+        return self.rows
+
+    def tables(self) -> list[Table]:
+        """Return a table of the known motions, and one of the recordings, whose unit is another."""
+        ordered = sorted(self.rows, key=lambda row: (row["signal"], row["sample_hz"]))
+        by_unit = {unit: [row for row in ordered if f"rms_{unit}" in row] for unit in ("mm_s", "counts_s")}
+        return [_table(rows, unit) for unit, rows in by_unit.items() if rows]
+
+    def notes(self) -> list[str]:
+        return []
+
+
+def _table(rows: list[dict[str, Any]], unit: str) -> Table:
+    flagged = any(row["flags"] for row in rows)
+    lines = []
+    for row in rows:
+        errors = [f"{row[f'{kind}_{unit}']:.4g}" for kind in ("rms", "max", "chatter")]
+        delay = "" if row["delay_s"] is None else f"{row['delay_s'] * 1e6:.4g}"
+        flags = [", ".join(row["flags"])] * flagged
+        name = f"{row['estimator']} {row['output']}"
+        lines.append([name, row["signal"], f"{row['sample_hz']:g}", *errors, delay, *flags])
+    written = unit.replace("_", "/")
+    numbers = ("rate (Hz)", f"RMS ({written})", "largest", "chatter", "delay (us)")
+    return table_of(("estimator", "signal"), (*numbers, *["flags"] * flagged), lines)
+
+
+def jobs(curves: list[Curve], names: list[str], rates_hz: list[int], options: dict) -> list[tuple[str, dict]]:
+    """Return the label and the arguments of `accuracy.measure` for each estimator on each known motion at each rate.
+
+    The fastest rates take longest: they go first.
+    """
+    return [
+        (curve.label, curve.job(name, rate, **options))
+        for rate in sorted(rates_hz, reverse=True)
+        for name in names
+        for curve in curves
+    ]

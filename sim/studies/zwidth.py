@@ -1,0 +1,89 @@
+"""Z-width of several methods on one scene: their maps side by side, and what the paper's six show of its Figure 5."""
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from ..jobs.result import Table, table_of
+from ..scene.case import Case
+from ..scene.schema import Scene
+from ..walls.figure_5 import Fact, facts
+from ..walls.methods import Curve, methods
+from ..walls.zwidth import Effort, Map, Mapping
+
+
+@dataclass(frozen=True)
+class ZWidth:
+    """What was found.
+
+    Attributes:
+        scene: whose handle and rates it is of.
+        maps: of each method.
+        facts: of the paper's Figure 5, where the methods are the paper's.
+        effort: what the maps took.
+    """
+
+    scene: Scene
+    maps: list[Map]
+    facts: list[Fact]
+    effort: Effort
+
+    def report(self) -> dict[str, Any]:
+        """Return what the command line prints, units in the keys."""
+        maps = {"maps": [each.report() for each in self.maps], "facts": [asdict(fact) for fact in self.facts]}
+        return {"scene": self.scene.name} | self.effort._asdict() | maps
+
+    def tables(self) -> list[Table]:
+        """Return the maps in numbers, and the facts if there are some."""
+        areas = ("area (kN/m N s/m)", "held", "in place")
+        rows = [
+            [
+                each.case.label,
+                area_text(each),
+                "" if each.area_held is None else f"{each.area_held / 1e3:.0f}",
+                f"{each.area_in_place / 1e3:.0f}",
+                f"{each.largest_n_per_m / 1e3:g}",
+                f"{each.damping_n_s_per_m:g}",
+                str(each.hits),
+                f"{each.seconds:.1f}",
+            ]
+            for each in self.maps
+        ]
+        tables = [table_of(("method",), (*areas, "largest K (kN/m)", "to B (N s/m)", "hits", "s"), rows)]
+        if self.facts:
+            lines = [[fact.text, "held" if fact.held else "not held", fact.numbers] for fact in self.facts]
+            tables.append(table_of(("the paper's Figure 5", "here", "numbers"), (), lines))
+        return tables
+
+    def notes(self) -> list[str]:
+        """Return what a + is."""
+        return plus_of_areas(self.maps)
+
+
+def study(case: Case, curves: list[Curve] | None, mapping: Mapping) -> ZWidth:
+    """Return the maps of a scene.
+
+    Args:
+        case: the scene.
+        curves: the methods; None for those of the paper's Figure 5.
+        mapping: makes the maps.
+
+    Raises:
+        SceneError: if the scene cannot be with one of the methods, or has no section `zwidth`.
+    """
+    scene = case.scene
+    papers = methods(scene)
+    cases = [case.changed(curve.changes, curve.label) for curve in (papers.values() if curves is None else curves)]
+    maps = mapping(f"{scene.name} Z-width", cases)
+    shown = facts(dict(zip(papers, maps, strict=True))) if curves is None else []
+    return ZWidth(scene, maps, shown, mapping.effort())
+
+
+def area_text(each: Map) -> str:
+    """Return the area of a map in kN/m N s/m, with a + where the region leaves the map."""
+    return f"{each.area / 1e3:.0f}" + "+" * each.leaves
+
+
+def plus_of_areas(maps: Iterable[Map]) -> list[str]:
+    """Return what the + of `area_text` is, as notes, if there was one."""
+    return ["+: the region goes on beyond the map"] if any(each.leaves for each in maps) else []

@@ -1,0 +1,102 @@
+"""What is simulated of a component: its own ports, all of them in one word too, and a sequencer for campaigns.
+
+A turn of cocotb takes longer than many clocks of Verilator. The sequencer is hardware beside the component: it takes
+a batch of rows at a time, puts them through at their clocks, and keeps what the ports carried where it matters.
+"""
+
+from pathlib import Path
+
+from amaranth.hdl import Cat, ClockSignal, Instance, Module, Mux, ResetSignal, Shape, Signal, Value, unsigned
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Member, Out
+
+from .packing import Packing
+
+BATCH = 16
+"""The most rows that the sequencer takes at a time."""
+SPACING_BITS = 16
+RESERVED = "bench_"
+"""The beginning of the names of the harness's own ports."""
+SEQUENCER = Path(__file__).with_name("sequencer.v")
+
+
+def ports_of(component: wiring.Component) -> dict[str, tuple[Member, Value]]:
+    """Return the ports of a component by their names in Verilog: member `b` of its member `a` is `a__b`.
+
+    Raises:
+        ValueError: if a port has a name that the harness keeps for itself.
+    """
+    ports = {"__".join(map(str, path)): (member, port) for path, member, port in component.signature.flatten(component)}
+    for name in ports:
+        if name.startswith(RESERVED):
+            raise ValueError(f"a port under test must not begin with {RESERVED}, not {name!r}")
+    return ports
+
+
+def packing_of(component: wiring.Component) -> Packing:
+    """Return how all ports of a component lie in the harness's `bench_seen`."""
+    return Packing({name: Shape.cast(member.shape) for name, (member, _) in ports_of(component).items()})
+
+
+def inputs_of(component: wiring.Component) -> Packing:
+    """Return how the inputs of a component lie in a row of the sequencer."""
+    ports = ports_of(component)
+    return Packing({name: Shape.cast(member.shape) for name, (member, _) in ports.items() if member.flow == In})
+
+
+def row_of(inputs: Packing) -> Packing:
+    """Return how the sequencer takes a row: the inputs, and how many clocks later than the next the next row comes."""
+    return Packing({"inputs": unsigned(inputs.width), "spacing": unsigned(SPACING_BITS)})
+
+
+def event_of(seen: Packing) -> Packing:
+    """Return how the sequencer gives an event: what all ports carried, and at which clock of the batch."""
+    return Packing({"seen": unsigned(seen.width), "clock": unsigned(32)})
+
+
+class Harness(wiring.Component):
+    """A component with its own ports; `bench_seen`, which carries them all; and those of `sequencer.v` as `bench_*`.
+
+    While `bench_campaign` is high the sequencer drives the component's inputs, else the ports of their names do.
+    """
+
+    def __init__(self, component: wiring.Component):
+        self.component, self.seen, self.inputs = component, packing_of(component), inputs_of(component)
+        own = {
+            "campaign": In(1),
+            "go": In(1),
+            "length": In(8),
+            "rows": In(BATCH * row_of(self.inputs).width),
+            "strobe": In(self.inputs.width),
+            "watched": In(self.seen.width),
+            "seen": Out(self.seen.width),
+            "busy": Out(1),
+            "events": Out(16),
+            "records": Out(2 * BATCH * event_of(self.seen).width),
+        }
+        ports = {name: member for name, (member, _) in ports_of(component).items()}
+        super().__init__({**ports, **{RESERVED + name: member for name, member in own.items()}})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.component = self.component
+        ports = {name: port for name, (_, port) in ports_of(self.component).items()}
+        by_hand, by_sequencer = Cat(getattr(self, name) for name in self.inputs.shapes), Signal(self.inputs.width)
+        inputs = Cat(ports[name] for name in self.inputs.shapes)
+        m.d.comb += inputs.eq(Mux(self.bench_campaign, by_sequencer, by_hand))
+        m.d.comb += [getattr(self, name).eq(port) for name, port in ports.items() if name not in self.inputs.shapes]
+        m.d.comb += self.bench_seen.eq(Cat(ports.values()))
+        m.submodules.sequencer = Instance(
+            "bench_sequencer",
+            p_INPUTS=self.inputs.width,
+            p_SEEN=self.seen.width,
+            p_BATCH=BATCH,
+            p_SPACING=SPACING_BITS,
+            i_clk=ClockSignal(),
+            i_rst=ResetSignal(),
+            i_seen=self.bench_seen,
+            o_driven=by_sequencer,
+            **{f"i_{name}": getattr(self, RESERVED + name) for name in ("go", "length", "rows", "strobe", "watched")},
+            **{f"o_{name}": getattr(self, RESERVED + name) for name in ("busy", "events", "records")},
+        )
+        return m

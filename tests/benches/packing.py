@@ -1,0 +1,62 @@
+"""Signals side by side in one word: reading one wide signal takes cocotb as long as reading a narrow one."""
+
+from collections.abc import Iterable
+from itertools import accumulate
+
+import numpy as np
+from amaranth.hdl import Shape
+
+
+class Packing:
+    """How signals lie side by side in one word, the first in its lowest bits; their shapes by name, as `shapes`."""
+
+    def __init__(self, shapes: dict[str, Shape]):
+        self.shapes = shapes
+        self.width = sum(shape.width for shape in shapes.values())
+        widths = [shape.width for shape in shapes.values()]
+        self._offsets = dict(zip(shapes, accumulate(widths, initial=0), strict=False))
+        self._masks = {name: (1 << width) - 1 for name, width in zip(shapes, widths, strict=True)}
+
+    def pack(self, values: dict[str, int]) -> int:
+        """Return the word of values by name; a negative one is taken modulo its width, those left out are 0."""
+        word = 0
+        for name, value in values.items():
+            word |= (int(value) & self._masks[name]) << self._offsets[name]
+        return word
+
+    def bit(self, name: str) -> int:
+        """Return the word in which a signal of one bit is 1 and all else is 0."""
+        return 1 << self._offsets[name]
+
+    def column(self, name: str, words: Iterable[int]) -> list[int]:
+        """Return one signal of many words."""
+        offset, shape = self._offsets[name], self.shapes[name]
+        mask, sign = self._masks[name], (self._masks[name] + 1 >> 1) * shape.signed
+        return [((word >> offset & mask) ^ sign) - sign for word in words]
+
+
+class Record:
+    """What signals carried at some clocks.
+
+    Attributes:
+        names: the signals, in the order of a row.
+        clocks: the clock number of each row.
+    """
+
+    def __init__(self, names: tuple[str, ...], packing: Packing, words: list[int], clocks: list[int]):
+        self.names, self.clocks = names, clocks
+        self._packing, self._words = packing, words
+
+    def add(self, clock: int, word: int) -> None:
+        """Add what was seen at a clock edge, packed."""
+        self.clocks.append(clock)
+        self._words.append(word)
+
+    @property
+    def rows(self) -> list[tuple[int, ...]]:
+        """The signals in the order of `names`, record by record."""
+        return list(zip(*(self._packing.column(name, self._words) for name in self.names), strict=True))
+
+    def column(self, name: str) -> np.ndarray:
+        """Return one recorded signal as int64."""
+        return np.array(self._packing.column(name, self._words), np.int64)

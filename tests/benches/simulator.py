@@ -1,0 +1,90 @@
+"""From pytest into the simulator, and what both sides know of the run: its seed, its length and its parameters.
+
+A test file is read twice. Under pytest `simulate` builds the Verilog of a component, once for its content, and starts
+the simulator, in which cocotb reads the file again and runs the tests that `cocotb.test` marks.
+"""
+
+import json
+import os
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from hardwall.model.compiled import build_dir
+from hardwall.sim.rtl import cocotb_runner
+
+from .harness import SEQUENCER, Harness
+
+SEED = int(os.environ.get("HARDWALL_SEED", "1"))
+"""The seed of everything random, from `HARDWALL_SEED`."""
+SAMPLES = int(os.environ.get("HARDWALL_SAMPLES", "100000"))
+"""How many samples a random campaign has, from `HARDWALL_SAMPLES`."""
+TRACED_SAMPLES = int(traced) if (traced := os.environ.get("HARDWALL_TRACED_SAMPLES")) else None
+"""Where a campaign that failed is to end, when it is run again to be traced."""
+CAMPAIGN = {"timeout_time": SAMPLES + 20_000, "timeout_unit": "us"}
+"""For `cocotb.test` of a campaign: hardware that stops answering fails, instead of hanging, at 100 clocks a sample."""
+
+
+def simulate(test_file: str, make: Callable, *, checks: str | None = None, **parameters) -> None:
+    """Run the cocotb tests of `test_file` on the hardware that `make(**parameters)` returns.
+
+    What is built goes to `HARDWALL_BUILD`, else to `build/` of the checkout that the test is part of, else to `build/`
+    of the working directory. A failing test is run again with the same seed, up to the sample that is wrong, and
+    leaves its waveform there.
+
+    Args:
+        test_file: the caller's `__file__`.
+        make: returns the component; the simulator's side may call it again.
+        checks: a regular expression of the names to run; default: all of the file.
+        parameters: JSON values, for `make`; the simulator's side finds them by the function `parameters`.
+
+    Raises:
+        RuntimeError: if a test fails or none runs; it says what was wrong, the seed, the waveform, and how to run the
+            test again.
+    """
+    file, component = Path(test_file).absolute(), make(**parameters)
+    name = type(component).__module__.rsplit(".", 1)[-1]
+    job = cocotb_runner.Job(
+        module=file.stem,
+        folder=file.parent,
+        environ={"HARDWALL_PARAMETERS": json.dumps(parameters)},
+        seed=SEED,
+        checks=checks,
+        build=_build_dir(file),
+        more=SEQUENCER.read_text(encoding="ascii"),
+    )
+    try:
+        cocotb_runner.simulate(Harness(component), name, job)
+    except cocotb_runner.CocotbFailedError as failed:
+        waveform = cocotb_runner.trace(Harness(component), name, job, failed)
+        where = f"waveform at {os.path.relpath(waveform)}" if waveform else "no waveform, for it passed when traced"
+        raise RuntimeError(f"{failed}; seed {SEED}, {where}{_again()}") from None
+
+
+def _build_dir(file: Path) -> Path:
+    """Return where what is built for a test file goes."""
+    ours = build_dir()
+    return ours if os.environ.get("HARDWALL_BUILD") or file.is_relative_to(ours.parent) else Path("build").absolute()
+
+
+def _again() -> str:
+    """Return how the test that pytest is in is run again, if it is in one."""
+    test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]
+    if not test:
+        return ""
+    given = [f"{name}={os.environ[name]}" for name in ("HARDWALL_SAMPLES",) if name in os.environ]
+    python = os.path.relpath(sys.executable)
+    return f", again: {' '.join([f'HARDWALL_SEED={SEED}', *given])} {python} -m pytest -n 0 {shlex.quote(test)}"
+
+
+def parameters() -> dict:
+    """Return, inside the simulator, the parameters that `simulate` was called with."""
+    return json.loads(os.environ["HARDWALL_PARAMETERS"])
+
+
+def rng() -> np.random.Generator:
+    """Return a generator seeded from `HARDWALL_SEED`."""
+    return np.random.default_rng(SEED)

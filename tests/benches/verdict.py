@@ -1,0 +1,49 @@
+"""The verdict: what the hardware gave against what the model gives, word for word."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from .packing import Record
+
+
+class Wrong(AssertionError):
+    """Hardware that is wrong at a sample; the number is left for whoever runs it again to look at that sample."""
+
+    def __init__(self, sample: int, message: str):
+        super().__init__(message)
+        if left := os.environ.get("HARDWALL_WRONG_SAMPLE"):
+            Path(left).write_text(str(sample), encoding="ascii")
+
+
+def check(inputs: Record, outputs: Record, expected: dict[str, np.ndarray], latency: int | None = None) -> None:
+    """Hold every recorded output against the model's, exactly; fail on a lost, an extra or no output at all.
+
+    Args:
+        inputs: what the hardware took.
+        outputs: what it gave.
+        expected: what the model made of `inputs`, by the names of `outputs`.
+        latency: every output must also come so many clocks after its input.
+
+    Raises:
+        AssertionError: if any of it does not hold.
+    """
+    assert len(outputs.clocks) > 0, "nothing was compared"
+    assert len(inputs.clocks) == len(outputs.clocks), f"{len(inputs.clocks)} inputs but {len(outputs.clocks)} outputs"
+    assert set(expected) == set(outputs.names), "the model and the monitor name different outputs"
+    for name, values in expected.items():
+        seen, model = outputs.column(name), np.asarray(values)
+        wrong = np.flatnonzero(seen != model)
+        if len(wrong):
+            first = int(wrong[0])
+            raise Wrong(
+                first,
+                f"{name} differs at {len(wrong)} of {len(seen)} samples, first at {first}: RTL {seen[first]}, "
+                f"model {model[first]}, inputs {dict(zip(inputs.names, inputs.rows[first], strict=True))}",
+            )
+    if latency is not None:
+        taken = np.array(outputs.clocks) - np.array(inputs.clocks)
+        wrong = np.flatnonzero(taken != latency)
+        if len(wrong):
+            raise Wrong(int(wrong[0]), f"latency {sorted(set(taken.tolist()))} clocks, promised {latency}")

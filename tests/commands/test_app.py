@@ -1,0 +1,134 @@
+"""The command line as a whole: fast help, the version, completion, and extras that are not installed."""
+
+import importlib
+import importlib.metadata
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from hardwall.sim.commands.group import COMMANDS
+from hardwall.sim.commands.terminal import show
+from hardwall.sim.jobs.result import Table, Values, table_of
+from stimuli.command_line import call
+
+HEAVY = {"numba", "numpy", "scipy", "matplotlib", "distributed", "pydantic", "amaranth"}
+WITHOUT = """
+import sys
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {absent!r}:
+            raise ModuleNotFoundError("No module named " + repr(name), name=name)
+sys.meta_path.insert(0, Absent())
+from hardwall.sim.commands.app import main
+sys.argv = ["hardwall", *{arguments!r}]
+main()
+"""
+
+
+def without(absent: set[str], *arguments: str) -> subprocess.CompletedProcess:
+    """Run the command line where some packages are not installed."""
+    program = WITHOUT.format(absent=absent, arguments=arguments)
+    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+
+
+def test_help_shows_every_command_and_loads_none():
+    program = "import sys; from hardwall.sim.commands.app import main; sys.argv = ['hardwall', '--help']\n"
+    program += "try: main()\nfinally: print(*{name.partition('.')[0] for name in sys.modules}, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0
+    assert [name for name in COMMANDS if f" {name} " not in done.stdout] == []
+    assert set(done.stderr.split()) & HEAVY == set()
+    assert max(map(len, done.stdout.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_its_file_and_its_help(monkeypatch, capsys, name):
+    code, out, err = call(monkeypatch, capsys, name, "--help")
+    assert (code, err) == (0, "")
+    words = " ".join(out.replace("│", " ").split())
+    assert COMMANDS[name] in words
+    assert f"Usage: hardwall {name}" in words
+    assert callable(importlib.import_module(f"hardwall.sim.commands.{name}").command)
+
+
+def test_alone_it_prints_help_and_no_error(monkeypatch, capsys):
+    code, out, err = call(monkeypatch, capsys)
+    assert (code, err) == (2, "")
+    assert "Usage: hardwall" in out
+
+
+def test_the_version_is_the_package_s(monkeypatch, capsys):
+    code, out, _ = call(monkeypatch, capsys, "--version")
+    assert (code, out) == (0, f"hardwall {importlib.metadata.version('hardwall')}\n")
+
+
+def test_a_command_that_is_almost_one_is_suggested(monkeypatch, capsys):
+    code, _, err = call(monkeypatch, capsys, "gain")
+    assert (code, err) == (2, "hardwall: error: No such command 'gain'. Did you mean 'gains'?\n")
+
+
+@pytest.mark.parametrize(("words", "wanted"), [("hardwall cu", "cutoff"), ("hardwall hit --stif", "--stiffness")])
+def test_a_shell_completes_commands_and_options(words, wanted):
+    asked = {"_HARDWALL_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
+    program = "from hardwall.sim.commands.app import main; import sys; sys.argv = ['hardwall']; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=os.environ | asked, capture_output=True, text=True, check=False
+    )
+    assert wanted in done.stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("absent", "arguments", "named", "extra"),
+    [
+        ("typer", ("--help",), "typer", "sim"),
+        ("rich", ("hit",), "rich", "sim"),
+        ("pydantic", ("hit",), "pydantic", "sim"),
+        ("scipy", ("lipschitz",), "scipy", "sim"),
+        ("cocotb", ("bench",), "cocotb", "test"),
+    ],
+)
+def test_an_extra_that_is_not_installed_is_named_in_a_line(absent, arguments, named, extra):
+    done = without({absent}, *arguments)
+    assert (done.returncode, done.stdout) == (1, "")
+    package = done.stderr.removeprefix("hardwall: error: ").split(" ")[0]
+    assert package.partition(".")[0] == named
+    assert (
+        done.stderr == f"hardwall: error: {package} is not installed: it comes with pip install 'hardwall[{extra}]'\n"
+    )
+
+
+def test_what_comes_with_no_extra_is_a_fault_of_ours():
+    done = without({"numpy"}, "hit")
+    assert "ModuleNotFoundError" in done.stderr
+
+
+def test_numbers_of_a_table_are_never_broken_and_words_are(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    words = "an estimator of a very long name that takes two lines or more"
+    numbers = [f"{number:,}" for number in (1_234_567, 12, 345_678, 9_876_543, 1, 22)]
+    show(table_of(("method",), ("area (kN/m N s/m)", "b", "c", "best of all", "e", "f"), [[words, *numbers]]))
+    out, _ = capsys.readouterr()
+    assert max(map(len, out.splitlines())) <= 80
+    assert [number for number in numbers if number not in out] == []
+    assert set(words.split()) <= set(out.split())
+
+
+def test_a_summary_reads_well(capsys):
+    result = Values({"rms_mm": 3.4e-18, "mean_mm": -0.035, "flags": [], "gains": [1.0, 0.5], "digest": "x" * 200})
+    (table,) = result.tables()
+    assert dict(table.rows)["rms_mm"] == "0 (< 1e-12)"
+    assert dict(table.rows)["gains"] == "1, 0.5"
+    assert dict(table.rows)["flags"] == "-"
+    show(table)
+    out, _ = capsys.readouterr()
+    assert max(map(len, out.splitlines())) <= 80
+    assert out.count("x") == 200
+    assert json.dumps(result.report())
+
+
+def test_a_name_with_markup_is_only_a_name(capsys):
+    show(Table({"[red]heading": "left"}, [["[bold]cell"]]))
+    assert "[bold]cell" in capsys.readouterr()[0]

@@ -1,0 +1,20 @@
+"""One list of estimators on each side, by the same names; no other is known."""
+
+import pytest
+
+from hardwall.hdl.estimators import registry as hardware
+from hardwall.model.estimators import registry
+
+
+def test_both_sides_have_the_same_names():
+    assert list(hardware.ESTIMATORS) == list(registry.ESTIMATORS)
+
+
+def test_every_design_has_one_name():
+    assert [registry.design_of(name).name for name in registry.ESTIMATORS] == list(registry.ESTIMATORS)
+
+
+@pytest.mark.parametrize("name", ["", "Levant", "hardwall", 3])
+def test_an_unknown_name_is_refused(name):
+    with pytest.raises(ValueError, match=rf"^estimator must be one of fdm, levant, .*, foaw, not {name!r}$"):
+        registry.design_of(name)

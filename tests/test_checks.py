@@ -1,0 +1,135 @@
+"""What the model refuses, and how it says so: what, the accepted range and the value, in one sentence."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hardwall.model import stamped
+from hardwall.model.arithmetic.fixed import SQ
+from hardwall.model.axis import Axis
+from hardwall.model.estimators import foaw, levant, registry
+from hardwall.model.spec import AxisSpec
+from stimuli.specs import PAPER, spec
+
+AXIS = Axis(spec("mhz", "fdm"))
+HALF = 1 << (AXIS.design.spec.count_width - 1)
+
+
+@pytest.mark.parametrize(
+    ("counts", "error", "message"),
+    [
+        ([0.5], TypeError, "counts must be integers, not float64"),
+        ([0, math.nan], TypeError, "counts must be integers, not float64"),
+        (["1", "2"], TypeError, "counts must be integers, not <U1"),
+        ([True, False], TypeError, "counts must be integers, not bool"),
+        ([1, None], TypeError, "counts must be integers, not object"),
+        ([[1], [1, 2]], TypeError, "counts must be an array of integers, not [[1], [1, 2]]"),
+        (3, ValueError, "counts must have 1 or 2 dimensions, (samples,) or (lanes, samples), not 0"),
+        ([0, 1 << 62], ValueError, f"counts must be -{2**62 - 1} to {2**62 - 1}, not {2**62} at element 1"),
+        (
+            np.array([2**64 - 1], np.uint64),
+            ValueError,
+            f"counts must be -{2**62 - 1} to {2**62 - 1}, not {2**64 - 1} at element 0",
+        ),
+        (
+            [0, 3, HALF + 60],
+            ValueError,
+            f"counts must change by less than {HALF}, half of their range, from sample to sample, "
+            f"not by {HALF + 57} at sample 2",
+        ),
+        (
+            [[0, 1], [0, -HALF]],
+            ValueError,
+            f"counts must change by less than {HALF}, half of their range, from sample to sample, "
+            f"not by {-HALF} at sample 1",
+        ),
+    ],
+)
+def test_counts(counts, error, message):
+    with pytest.raises(error) as refused:
+        AXIS.run(counts)
+    assert str(refused.value) == message
+
+
+def test_counts_that_are_counts():
+    wrapped = AXIS.run([HALF - 2, HALF - 1, -HALF, 1 - HALF]).velocity
+    assert wrapped.tolist() == AXIS.run([HALF - 2, HALF - 1, HALF, HALF + 1]).velocity.tolist() == [0, 1, 1, 1]
+    assert AXIS.run(np.array([1, 2], np.uint8)).velocity.tolist() == [0, 1]
+    assert AXIS.run([]).velocity.shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"of": 3}, TypeError, "of must be an Axis, not 3"),
+        ({"edge_clocks": [1.5, 2.0]}, TypeError, "edge_clocks must be integers, not float64"),
+        ({"edge_clocks": [1, math.nan]}, TypeError, "edge_clocks must be integers, not float64"),
+        ({"edge_levels": ["a", "b"]}, TypeError, "edge_levels must be integers, not <U1"),
+        ({"edge_clocks": [-1, 2]}, ValueError, f"edge_clocks must be 0 to {2**62 - 1}, not -1 at element 0"),
+        ({"edge_clocks": [3, 2]}, ValueError, "edge_clocks must never decrease, not from 3 to 2 at element 1"),
+        ({"edge_levels": [1, 4]}, ValueError, "edge_levels must be 0 to 3, not 4 at element 1"),
+        (
+            {"edge_levels": [1]},
+            ValueError,
+            "edge_clocks and edge_levels must have one shape (edges,), not ((2,), (1,))",
+        ),
+        ({"samples": 0}, ValueError, "samples must be 1 or more, not 0"),
+        ({"samples": 5.0}, TypeError, "samples must be an int, not 5.0"),
+        ({"level": 4}, ValueError, "level must be 0 to 3, not 4"),
+        ({"level": "1"}, TypeError, "level must be an int, not '1'"),
+    ],
+)
+def test_records_of_edges(arguments, error, message):
+    good = {"of": AXIS, "edge_clocks": [1, 2], "edge_levels": [1, 3], "samples": 5}
+    with pytest.raises(error) as refused:
+        stamped.run(**(good | arguments))
+    assert str(refused.value) == message
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"spec": 3}, TypeError, r"^spec must be an AxisSpec, not 3$"),
+        ({"stiffness": 1.0}, ValueError, r"^parameter must be one of .*wall_stiffness.*, not 'stiffness'$"),
+        ({"wall_stiffness": "1e3"}, TypeError, r"^wall_stiffness must be a number, not '1e3'$"),
+        ({"wall_stiffness": 1e6}, ValueError, r"^wall_stiffness must be 0 to 255996 N/m, not 1000000.0$"),
+        ({"wall_damping": math.nan}, ValueError, r"^wall_damping must be 0 to .* N s/m, not nan$"),
+        ({"wall_left": 2}, ValueError, r"^wall_left must be 0 to 1, not 2$"),
+    ],
+)
+@pytest.mark.parametrize("floating", [False, True])
+def test_parameters_of_an_axis(arguments, error, message, floating):
+    with pytest.raises(error, match=message):
+        Axis(**({"spec": AXIS.design.spec, "floating": floating} | arguments))
+
+
+@pytest.mark.parametrize(
+    ("fields", "error", "message"),
+    [
+        ({"clock_hz": 12e6}, TypeError, r"^clock_hz must be an int, not 12000000.0$"),
+        ({"clock_hz": True}, TypeError, r"^clock_hz must be an int, not True$"),
+        ({"travel_m": "1"}, TypeError, r"^travel_m must be a number, not '1'$"),
+        ({"travel_m": math.nan}, ValueError, r"^travel_m must be finite and more than 0, not nan$"),
+        ({"estimator": 3}, TypeError, r"^estimator must be a str, not 3$"),
+        ({"estimator": "fd"}, ValueError, r"^estimator must be one of fdm, .*, not 'fd'$"),
+        ({"gains": {"alpha": 1.0}}, TypeError, r"^gains of levant must be levant.Gains or None, not \{'alpha': 1.0\}$"),
+        (
+            {"estimator": "fdm", "gains": levant.Gains(1.0, 1.0)},
+            TypeError,
+            r"^gains of fdm must be finite_difference.Gains or None, not Gains\(",
+        ),
+    ],
+)
+def test_fields_of_a_spec(fields, error, message):
+    with pytest.raises(error, match=message):
+        AxisSpec(**(PAPER | fields))
+
+
+def test_names_numbers_and_outputs():
+    with pytest.raises(ValueError, match=r"^estimator must be one of fdm, levant, .*, not 'fd'$"):
+        registry.design_of("fd")
+    with pytest.raises(ValueError, match=r"^output of foaw must be one of end-fit, best-fit, not 'u'$"):
+        foaw.Design.choose("u")
+    with pytest.raises(TypeError, match=r"^value for SQ\(3, 2\) must be a number, not 'a'$"):
+        SQ(3, 2).from_real("a")

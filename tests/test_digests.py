@@ -1,0 +1,145 @@
+"""What the program computes is what was recorded; and both the digests and what compares them can tell a change.
+
+`HARDWALL_DIGESTS=all` (in `make soak`) holds every case; else those that are quick. See `digests`.
+"""
+
+import os
+import re
+from pathlib import Path
+
+import digests
+import netlists
+import pytest
+
+CASES = {case.name: case for case in digests.cases()}
+EVERY = os.environ.get("HARDWALL_DIGESTS") == "all"
+RECORDED = digests.load()
+EXACT = RECORDED["machine"] == digests.machine()
+INNER = """
+module inner(input [3:0] a, input [3:0] b, output [3:0] y);
+  assign y = a - b;
+endmodule
+"""
+TOP = """
+module top(input clk, input [3:0] p, input [3:0] q, input [1:0] place, output reg [3:0] sum, output reg [3:0] kept);
+  wire [3:0] less;
+  reg [3:0] looked;
+  initial sum = 4'd3;
+  inner part(.a(p), .b(q), .y(less));
+  always @* begin
+    case (place)
+      2'd0: looked = 4'd9;
+      2'd1: looked = 4'd4;
+      2'd2: looked = 4'd13;
+      default: looked = 4'd7;
+    endcase
+  end
+  always @(posedge clk) sum <= less + 4'd5;
+  always @(posedge clk) kept <= looked;
+endmodule
+"""
+VERILOG = INNER + TOP
+
+
+@pytest.mark.parametrize("name", [name for name, case in CASES.items() if EVERY or case.short])
+def test_it_computes_what_was_recorded(name):
+    recorded = {entry: value for entry, value in RECORDED["entries"].items() if digests.belongs(entry, name)}
+    assert recorded, "nothing was recorded: make digests"
+    found = CASES[name].run()
+    lines = []
+    for entry, value in recorded.items():
+        lines += digests.differences(value, found[entry], EXACT, entry) if entry in found else [f"{entry}: is gone"]
+    assert not lines, "\n".join(["what is computed changed; if it should: make digests", *lines])
+
+
+def test_every_entry_is_of_one_case():
+    owners = {entry: [name for name in CASES if digests.belongs(entry, name)] for entry in RECORDED["entries"]}
+    assert {entry: names for entry, names in owners.items() if len(names) != 1} == {}
+    assert list(RECORDED["entries"]) == sorted(RECORDED["entries"])
+
+
+def test_what_is_quick_has_every_kind():
+    quick = {case.name for case in CASES.values() if case.short}
+    assert {name.split("/")[0] for name in quick} == {name.split("/")[0] for name in CASES}
+    scenes = {name.split("/")[1] for name in quick if name.startswith("hit/")}
+    assert scenes >= set(digests.SCENES)
+    for estimator, outputs in digests.OUTPUTS.items():
+        wanted = {f"hit/seed-2011/{estimator}:{output}/fixed" for output in outputs} | {f"axis/{estimator}"}
+        assert wanted <= quick
+
+
+@pytest.mark.parametrize(
+    ("recorded", "found", "lines"),
+    [
+        ({"a": 1, "b": [2, 3]}, {"a": 1, "b": [2, 3], "c": 4}, []),
+        ({"a": 1, "b": [2, 3]}, {"b": [2, 4]}, [".a: is gone", ".b[1]: was 3, is 4"]),
+        ({"a": [1, 2]}, {"a": [1]}, [".a: was [1, 2], is [1]"]),
+        ({"a": True}, {"a": 1}, [".a: was True, is 1"]),
+        ({"a": None}, {"a": 0.0}, [".a: was None, is 0.0"]),
+        ({"a": float("nan")}, {"a": float("nan")}, []),
+        ("0f3a", "0f3b", [": was '0f3a', is '0f3b'"]),
+    ],
+)
+@pytest.mark.parametrize("exact", [True, False])
+def test_a_difference_is_named(recorded, found, lines, exact):
+    assert digests.differences(recorded, found, exact) == lines
+
+
+def test_floats_are_equal_here_and_near_elsewhere():
+    def same(*values, exact):
+        return not digests.differences(*values, exact)
+
+    near, far = 1.0 + 1e-9, 1.0 + 1e-5
+    assert same(1.0, 1.0, exact=True)
+    assert not same(1.0, near, exact=True)
+    assert same(1.0, near, exact=False)
+    assert not same(1.0, far, exact=False)
+    assert not same("float64 0f", "float64 0e", exact=True)
+    assert same("float64 0f", "float64 0e", exact=False)
+    assert not same("float64 0f", None, exact=False)
+
+
+def circuit(folder: Path, verilog: str) -> str:
+    (folder / "top.v").write_text(verilog)
+    return netlists.digest(folder / "top.v", "top")
+
+
+@pytest.mark.parametrize(
+    ("pattern", "put"),
+    [
+        (r"\bless\b", "difference"),
+        (r"\binner\b", "outer"),
+        (r"\bpart\b", "another"),
+        (r"(?s)(  always @\*.*?endcase\n  end\n)(.*)(?=endmodule)", r"\2\1"),
+        (r"(  always .* sum .*\n)(  always .* kept .*\n)", r"\2\1"),
+        (r"(?s)(module inner.*?endmodule)(.*)", r"\2\n\1"),
+        (r"(?s)\(input clk, (.*)\);\n  wire", r"(\1, input clk);\n  wire"),
+    ],
+    ids=["wire", "module", "instance", "blocks", "statements", "modules", "ports' order"],
+)
+def test_names_and_order_within_a_circuit_are_not_seen(tmp_path, pattern, put):
+    changed = re.sub(pattern, put, VERILOG)
+    assert changed != VERILOG
+    assert circuit(tmp_path, changed) == circuit(tmp_path, VERILOG)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "put"),
+    [
+        (r"4'd5", "4'd6"),
+        (r"4'd13", "4'd12"),
+        (r"initial sum = 4'd3", "initial sum = 4'd2"),
+        (r"a - b", "b - a"),
+        (r"a - b", "a + b"),
+        (r"\.a\(p\), \.b\(q\)", ".a(q), .b(p)"),
+        (r"\bplace\b", "where"),
+        (r"input \[1:0\] place", "input [2:0] place"),
+        (r"output reg \[3:0\] kept", "inout reg [3:0] kept"),
+        (r"posedge clk\) kept", "negedge clk) kept"),
+    ],
+    ids=["constant", "table", "initial value", "operands", "operator", "wiring", "port", "width", "direction", "edge"],
+)
+def test_a_changed_circuit_is_seen(tmp_path, pattern, put):
+    changed = re.sub(pattern, put, VERILOG)
+    assert changed != VERILOG
+    assert circuit(tmp_path, changed) != circuit(tmp_path, VERILOG)
