@@ -8,6 +8,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from .errors import BadInput
+from .terminal import hear_stages
 
 COMMANDS = {
     "hit": "Hit the wall: the founding paper's protocol, and whether the wall is stable.",
@@ -85,6 +86,7 @@ def run() -> None:
     Raises:
         BadInput: for a command, an option or an argument that cannot be; without words where help was all that came.
     """
+    hear_stages()
     try:
         app(prog_name="hardwall", standalone_mode=False)
     except typer.TyperException as error:

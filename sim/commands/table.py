@@ -6,13 +6,18 @@ from typing import Annotated
 
 import typer
 
-from ..jobs.result import table_of
+from ..jobs.result import table_of, text_of
 from .errors import BadInput
-from .terminal import show
+from .terminal import log, show
 
 REST_MM = 1e-6
 """A handle whose RMS is less is at rest: it has moved by a nanometre."""
-NUMBERS = ("K (N/m)", "B (N s/m)", "wall", "RMS (mm)", "peak force (N)", "samples/s", "force words")
+NUMBERS = ("K (N/m)", "B (N s/m)", "wall", "RMS (mm)", "peak force (N)", "velocity error (mm/s)", "force words")
+NOTES = (
+    "RMS: distance of the handle from its mean once it has settled in the wall; less than a nanometre is at rest.",
+    "velocity error: RMS of the estimate against the true velocity during the first contact, 0.1 s at most.",
+    "force words: the first digits of the SHA-256 of every force word; runs of equal words took the same path.",
+)
 
 
 def command(
@@ -27,9 +32,12 @@ def command(
         except (OSError, ValueError, KeyError, TypeError):
             raise BadInput(f"{file}: not a JSON report of `hardwall hit --json`") from None
     show(table_of(("run",), NUMBERS, rows))
+    for note in NOTES:
+        log.print(note)
 
 
 def _row(report: dict) -> list[str]:
+    error = report["estimate_rms_mm_per_s"]
     return [
         f"{report['estimator']} {report['output']}, {report['backend']}, {report['scene']}",
         f"{report['stiffness_n_per_m']:g}",
@@ -37,6 +45,6 @@ def _row(report: dict) -> list[str]:
         "stable" if report["stable"] else "unstable",
         "at rest" if report["rms_mm"] < REST_MM else f"{report['rms_mm']:.3g}",
         f"{report['max_force_n']:.3f}",
-        f"{report['samples_per_s']:.3g}",
+        text_of(error if error is None else float(f"{error:.3g}")),
         (report["force_sha256"] or "")[:8],
     ]

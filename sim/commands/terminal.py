@@ -1,5 +1,7 @@
 """What people see: tables on stdout, everything else on stderr."""
 
+import logging
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -11,10 +13,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.text import Text
 
 from ..jobs.result import Table
+from ..jobs.stages import logger
 
 log = Console(stderr=True, highlight=False, markup=False)
-
-
+SILENCE_S = 10.0
+"""How long nothing may be said where there is no bar to look at."""
 GAP, EDGE = 2, 1
 """Spaces between two columns, and on either side of a table."""
 WORD_MAX = 20
@@ -91,17 +94,41 @@ def _widths(columns: list[_Column], width: int) -> list[tuple[_Column, int]]:
     return [(column, widths[column.heading]) for column in columns]
 
 
+class _Stages(logging.Handler):
+    """Prints what the program says that it is doing."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        log.print(record.getMessage(), style="dim")
+
+
+def hear_stages() -> None:
+    """Print on stderr what takes a while: see `jobs.stages`."""
+    logger.handlers = [_Stages()]
+    logger.setLevel(logging.INFO)
+
+
 class progress:
-    """A progress bar on stderr while a run lasts; gives the function that moves it."""
+    """What is done while a run lasts, on stderr: a bar in a terminal, elsewhere a line now and then.
+
+    It gives the function that is to be called with how much is done.
+    """
 
     def __init__(self, title: str, total: int):
+        self._title, self._total, self._said = title, total, time.monotonic()
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         self._bar = Progress(*columns, console=log, transient=True, disable=not log.is_terminal)
         self._task = self._bar.add_task(escape(title), total=total)
 
     def __enter__(self):
         self._bar.start()
-        return lambda done: self._bar.update(self._task, completed=done)
+        return self._done
 
     def __exit__(self, *_) -> None:
         self._bar.stop()
+
+    def _done(self, done: float) -> None:
+        self._bar.update(self._task, completed=done)
+        now = time.monotonic()
+        if not log.is_terminal and now - self._said >= SILENCE_S:
+            self._said = now
+            log.print(f"{self._title}: {done / self._total:.0%}")

@@ -18,6 +18,7 @@ from ...hdl.axis import Axis
 from ...hdl.export import to_verilog
 from ...model.compiled import build_dir
 from ...model.spec import AxisSpec
+from ..jobs.stages import stage
 from .verilated import Rtl, RtlState
 from .verilator import LINT_OPTIONS, environment
 
@@ -116,7 +117,8 @@ def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
         command = ["verilator", "--cc", "--build", "-j", str(os.cpu_count() or 1), *options]
         command += ["-CFLAGS", f"-fPIC -I{work}", "--lib-create", "axis", "--Mdir", str(work / "obj")]
         command += [name for name in files if not name.endswith(".h")]
-        done = subprocess.run(command, cwd=work, env=environment(), capture_output=True, text=True, check=False)
+        with stage("building the hardware with Verilator, once"):
+            done = subprocess.run(command, cwd=work, env=environment(), capture_output=True, text=True, check=False)
         if done.returncode:
             log = folder.parent / "failed.log"
             log.write_text(" ".join(command) + "\n" + done.stdout + done.stderr)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...model import stamped
 from ..jobs.result import Summary
+from ..jobs.stages import stage
 from ..jobs.whole_file import whole_file
 from ..loop import loop, record
 from ..loop.backends import Opened, is_exact, number_of, opened
@@ -23,6 +24,8 @@ from .tally import Tally
 
 CHUNK = 1 << 16
 """Samples between two looks at progress, and at whether the user wants no more; fewer of those that take long."""
+LOOKS = 100
+"""Into how many pieces a run is divided for someone who watches it."""
 LOOK_S = 0.1
 """Time between two looks at whether the verdict is sure."""
 OVERVIEW_POINTS = 6000
@@ -168,20 +171,32 @@ class _Loop:
         controller, state, _ = axis
         actions, total = dict(marks), self.scene.samples
         # Compiling is not running: a call with nothing to do keeps it out of the time.
-        loop.run(self.world, controller, state, self.at, self.memory, 0)
+        with stage("compiling the loop, once"):
+            loop.run(self.world, controller, state, self.at, self.memory, 0)
         began = time.perf_counter()
         while self.at.sample < total and not (self.until_sure and self.tally.sure_unstable):
             first = self.at.sample
             if first in actions:
                 actions.pop(first)()
             until = min(first + self.chunk, total, *(sample for sample in actions if sample > first))
-            state, self.at = loop.run(self.world, controller, state, self.at, self.memory, until)
+            state = self._chunk(controller, state, until, progress)
             if self.lost_edges:
                 break
             self.tally.add(first, self.memory.positions[: until - first], self.memory.drives[: until - first])
-            if progress:
-                progress(until)
         return self._hit(time.perf_counter() - began, int(state.flags))
+
+    def _chunk(self, controller, state, until: int, progress: Callable[[int], None] | None):
+        """Run to the end of a chunk, in pieces where somebody watches; return the controller's state."""
+        first, memory = self.at.sample, self.memory
+        piece = max(1, self.scene.samples // LOOKS) if progress else self.chunk
+        while self.at.sample < until and not self.lost_edges:
+            done = self.at.sample - first
+            rest = memory._replace(positions=memory.positions[done:], drives=memory.drives[done:])
+            end = min(self.at.sample + piece, until)
+            state, self.at = loop.run(self.world, controller, state, self.at, rest, end)
+            if progress:
+                progress(self.at.sample)
+        return state
 
     @property
     def lost_edges(self) -> bool:
