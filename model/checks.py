@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 LARGEST = (1 << 62) - 1
-"""Largest magnitude of a count or a clock: sums of two fit int64."""
+"""The largest count or clock, and less one the least: sums and differences of two fit int64."""
 
 
 class FieldError(ValueError):
@@ -35,7 +35,7 @@ def check_number(name: str, value: float) -> None:
         raise TypeError(f"{name} must be a number, not {value!r}")
 
 
-def integers(name: str, values: ArrayLike, least: int = -LARGEST, most: int = LARGEST) -> np.ndarray:
+def integers(name: str, values: ArrayLike, least: int = -LARGEST - 1, most: int = LARGEST) -> np.ndarray:
     """Return an array of integers as int64; one without elements may be of any type.
 
     Raises:
