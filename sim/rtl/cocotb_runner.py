@@ -215,7 +215,11 @@ def _failed(results: Path, job: Job, ended: int) -> dict[str, str]:
     if not cases:
         raise RuntimeError(f"{job.module} ran no test")
     said = {
-        case.get("name"): next((bad.get("message", "") for bad in case if bad.tag in ("failure", "error")), None)
+        case.get("name"): next((_first_line(bad) for bad in case if bad.tag in ("failure", "error")), None)
         for case in cases
     }
     return {name: message for name, message in said.items() if message is not None}
+
+
+def _first_line(bad: ElementTree.Element) -> str:
+    return bad.get("message", "").partition("\n")[0]
