@@ -45,7 +45,7 @@ PYTEST := $(RUN) pytest -n logical --maxprocesses 8 --dist worksteal
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test lint bench synth choose figures verilog digests soak clean distclean help tools FORCE
+.PHONY: all test lint bench synth choose figures verilog docs digests soak clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -78,6 +78,10 @@ figures: $(VENV)/.synth | tools ## the founding paper's figures and every study 
 
 verilog: $(VENV)/.sim | tools ## the axis of the scene as Verilog, in build/verilog/
 	@$(HARDWALL) verilog $(SCENE) --output-folder build/verilog
+
+docs: $(VENV)/.docs | tools ## the pages as a site in build/docs, every link inside checked; any warning is a failure
+	@$(RUN) sphinx --quiet --fail-on-warning --keep-going --doctree-dir build/doctrees docs build/docs
+	@echo build/docs/index.html
 
 digests: $(VENV)/.test | tools ## record anew what the program computes, and show what changed (after a change on purpose)
 	@$(VENV)/bin/python tests/digests.py $(ONLY)
@@ -119,7 +123,7 @@ build/hit-%.json build/hit-%.png: $(SOURCES) $(VENV)/.sim | tools
 build/mhz-%.json build/mhz-%.png: $(SOURCES) $(VENV)/.sim | tools
 	$(call hit,mhz,fixed,its bit-accurate model)
 
-# ---- the tools, by need: .sim runs the loop, .test the regressions, .synth place and route --------------------------
+# ---- the tools, by need: .sim runs the loop, .test the regressions, .synth place and route, .docs the pages ----------
 
 # .venv is made anew for another PYTHON, when its own is gone, and in a tree that was moved or copied.
 MADE_IN := $(file <$(VENV)/.made)
@@ -156,6 +160,9 @@ $(VENV)/.test: pyproject.toml $(VENV)/.sim | tools
 
 $(VENV)/.synth: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)synth,place and route)
+
+$(VENV)/.docs: pyproject.toml $(VENV)/.sim | tools
+	$(call install,sim$(comma)docs,the tools of the pages)
 
 # ---- what only the system can give, named before anything starts ----------------------------------------------------
 

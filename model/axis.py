@@ -50,6 +50,19 @@ class State(NamedTuple):
     flags: int
 
 
+class Timing(NamedTuple):
+    """When an axis takes its samples and changes its drive, in clocks numbered from 0, the first after reset."""
+
+    clocks_per_sample: int
+    latency: int  # from a strobe to the changed drive
+
+
+@compiled
+def strobe_of(timing, k):
+    """Return the number of the clock at which sample k is taken."""
+    return (k + 1) * timing.clocks_per_sample - 1
+
+
 class Design:
     """Formats, run-time words and latencies of an axis, derived from its `AxisSpec`.
 
@@ -59,6 +72,7 @@ class Design:
         words: every run-time word, in the order of the hardware's ports.
         flags: names of the sticky flags, bit 0 first.
         latency_to_drive: clocks from the sample strobe to the changed drive.
+        timing: that, and the clocks of a sample.
     """
 
     words: tuple[Word, ...]
@@ -93,6 +107,7 @@ class Design:
         self.flags = (*ENCODER_FLAGS, *self.estimator.flags, *self.output.flags)
         self._flag_bits = len(ENCODER_FLAGS), len(ENCODER_FLAGS) + len(self.estimator.flags)
         self.latency_to_drive = self.estimator.latency + self.wall.latency + self.output.latency
+        self.timing = Timing(spec.clocks_per_sample, self.latency_to_drive)
 
     def encode(self, **si: float) -> dict[str, int]:
         """Return every run-time word by name: from SI where given, else as after reset.
@@ -158,60 +173,6 @@ def run(params, state, counts, velocity, force, drive, flags):
         state, velocity[k], force[k] = step(params, state, quadrature.seen_count(counts[k]), 0, 0, 1)
         drive[k] = state.output.drive
         flags[k] = state.flags
-    return state
-
-
-class PinState(NamedTuple):
-    """State of the whole axis, decoder included; `restart` waits for the next sample after a preload."""
-
-    decoder: quadrature.State
-    axis: State
-    restart: int
-
-
-@compiled
-def run_pins(timing, decoder, settings, params, state, pins, first, until, out):
-    """Run clocks `first` to `until` (not included) on records of the pins; fill `out`; return the state.
-
-    Args:
-        timing: (clocks a sample, `Design.latency_to_drive`).
-        decoder: `quadrature.Params`.
-        settings: (glitch_clocks, invert), as the decoder has them.
-        params: of `step`.
-        state: a `PinState`.
-        pins: int64, shape (8, clocks): A, B, Z, drive_enable, preload, preload_count, index_arm, clear_flags.
-            `drive_enable` and `clear_flags` change between a changed drive and the next strobe only.
-        out: int64, shape (14, samples): drive, velocity, force, flags and actuated of each sample; and count,
-            illegal_count, index_count, index_latched, index_armed and the four stamps when its drive has changed.
-    """
-    per_sample, latency = timing
-    glitch_clocks, invert = settings
-    for n in range(first, until):
-        sample = (n + 1) // per_sample - 1
-        now, restart = state.axis, state.restart
-        if (n + 1) % per_sample == 0:
-            fault = state.decoder.illegal | state.decoder.overspeed << 1
-            out[4, sample] = now.output.phase == 0
-            seen = quadrature.seen(state.decoder)
-            now, out[1, sample], out[2, sample] = step(params, now, seen, restart, fault, pins[3, n])
-            out[0, sample], out[3, sample] = now.output.drive, now.flags
-            restart = 0
-        elif (n + 1 - latency) % per_sample == 0 and n >= latency:
-            shown = (n + 1 - latency) // per_sample - 1
-            live = state.decoder
-            out[5, shown], out[6, shown] = live.count, live.illegal_count
-            out[7, shown], out[8, shown], out[9, shown] = live.index_count, live.index_latched, live.index_armed
-            out[10, shown], out[11, shown] = live.stamp_a_rise, live.stamp_b_rise
-            out[12, shown], out[13, shown] = live.stamp_a_fall, live.stamp_b_fall
-        if pins[7, n]:
-            now = State(now.estimator, now.output, 0)
-        if not pins[3, n]:
-            now = State(now.estimator, output.State(now.output.phase, 0), now.flags)
-        decoded = quadrature.step(
-            decoder, state.decoder, pins[0, n], pins[1, n], pins[2, n],
-            glitch_clocks, invert, pins[4, n], pins[5, n], pins[6, n], pins[7, n],
-        )  # fmt: skip
-        state = PinState(decoded, now, restart | pins[4, n])
     return state
 
 

@@ -68,7 +68,7 @@ def lanes_of_counts(counts: ArrayLike, width: int, most: int) -> np.ndarray:
     """
     array = integers("counts", counts)
     if array.ndim not in (1, 2):
-        raise ValueError(f"counts must have 1 or 2 dimensions, (samples,) or (lanes, samples), not {array.ndim}")
+        raise ValueError(f"counts must have 1 or 2 dimensions, not {array.ndim}")
     half = 1 << (width - 1)
     changes = np.diff(array, axis=-1)
     far = np.abs(changes) >= half

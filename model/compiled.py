@@ -56,15 +56,28 @@ def source_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-def compiled(function: Kernel) -> Kernel:
-    """Compile `function` with Numba, cached on disk by the content of the project's sources."""
+def _jit(function: Kernel, folder: str, **options: bool) -> Any:
+    """Return `function` compiled with Numba, cached on disk in a folder of the content of the project's sources."""
     settings: Any = config
     saved = settings.CACHE_DIR
-    settings.CACHE_DIR = str(build_dir() / "numba" / source_digest())
+    settings.CACHE_DIR = str(build_dir() / "numba" / source_digest() / folder)
     try:
-        return cast(Kernel, numba.njit(cache=True, error_model="numpy")(function))
+        return numba.njit(cache=True, error_model="numpy", **options)(function)
     finally:
         settings.CACHE_DIR = saved
+
+
+def compiled(function: Kernel) -> Kernel:
+    """Compile `function` with Numba, cached on disk by the content of the project's sources.
+
+    What takes and gives Python's objects is a third of the compiler's work, and a call from compiled code needs none of
+    it: for such calls there is a second compilation, without.
+    """
+    kernel = _jit(function, "called")
+    if not config.DISABLE_JIT:
+        inner = _jit(function, "inlined", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+        kernel.get_call_template, kernel.get_overload = inner.get_call_template, inner.get_overload
+    return cast(Kernel, kernel)
 
 
 def by_type(declaration: Callable) -> ByType:

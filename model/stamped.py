@@ -4,8 +4,7 @@ The clock is never stepped: between edges the decoder is advanced at once. `run`
 
     record = stamped.run(Axis(spec), edge_clocks, edge_levels, samples)
 
-and `sample`, its kernel, is what closes the loop in `hardwall.sim`. Clocks are numbered from 0, the first after reset;
-sample k is taken at the strobe, clock (k + 1) D - 1 with D clocks a sample.
+and `sample`, its kernel, is what closes the loop in `hardwall.sim`. `clocked` has the same axis clock by clock.
 """
 
 from typing import NamedTuple
@@ -15,6 +14,13 @@ from numpy.typing import ArrayLike
 
 from . import axis, checks, quadrature
 from .compiled import compiled
+
+
+class Edges(NamedTuple):
+    """Edges of an encoder: from which clock on the pins show which level. How many there are is said beside it."""
+
+    clocks: np.ndarray  # int64, never decreasing: when a register at the pins first holds the new level
+    levels: np.ndarray  # integers: a | b << 1
 
 
 class Controller(NamedTuple):
@@ -27,6 +33,8 @@ class Controller(NamedTuple):
 
 
 class State(NamedTuple):
+    """Decoder and axis after a sample, and what they show of it."""
+
     drive: float  # force LSB
     velocity: float  # words of the estimator's format; floating axis: counts a sample
     force: float  # force LSB, before the output stage
@@ -35,6 +43,11 @@ class State(NamedTuple):
     axis: axis.State
     clock: int  # to which the decoder has been advanced
     level: int  # of the pins, a | b << 1
+
+
+def room_for(edges: int) -> Edges:
+    """Return arrays with room for so many edges, none in them yet."""
+    return Edges(np.zeros(edges, np.int64), np.zeros(edges, np.int64))
 
 
 def controller(of: axis.Axis, level: int) -> tuple[Controller, State]:
@@ -47,9 +60,8 @@ def controller(of: axis.Axis, level: int) -> tuple[Controller, State]:
 
 @compiled
 def _decode(controller, decoder, level, clocks):
-    return quadrature.advance(
-        controller.decoder, decoder, level & 1, level >> 1, 0, clocks, controller.glitch_clocks, controller.invert
-    )
+    inputs = quadrature.Inputs(level & 1, level >> 1, 0, controller.glitch_clocks, controller.invert)
+    return quadrature.advance(controller.decoder, decoder, inputs, clocks)
 
 
 @compiled
@@ -62,32 +74,34 @@ def sample_quietly(controller, state, strobe):
 
 
 @compiled
-def sample(controller, state, edge_clocks, edge_levels, first, until, strobe):
-    """Take the sample at clock `strobe`: return (state, number of the first edge not yet taken).
+def sample(controller, state, edges, n_edges, strobe):
+    """Take the sample at clock `strobe`: return (state, how many edges were taken).
 
     Args:
         controller, state: of `controller`.
-        edge_clocks, edge_levels: integer arrays: from which clock on, never decreasing, the pins show which level.
-        first, until: the edges to take from them.
+        edges: `Edges`.
+        n_edges: how many there are.
     """
-    decoder, clock, level, taken = state.decoder, state.clock, state.level, first
+    decoder, clock, level, taken = state.decoder, state.clock, state.level, 0
     # The strobe sees registers loaded by the clocks before it: an edge at the strobe's own clock is for the next.
-    while taken < until and edge_clocks[taken] < strobe:
-        if edge_clocks[taken] > clock:
-            decoder = _decode(controller, decoder, level, edge_clocks[taken] - clock)
-            clock = edge_clocks[taken]
-        level = edge_levels[taken]
+    while taken < n_edges and edges.clocks[taken] < strobe:
+        if edges.clocks[taken] > clock:
+            decoder = _decode(controller, decoder, level, edges.clocks[taken] - clock)
+            clock = edges.clocks[taken]
+        level = edges.levels[taken]
         taken += 1
     state = State(state.drive, state.velocity, state.force, state.flags, decoder, state.axis, clock, level)
     return sample_quietly(controller, state, strobe), taken
 
 
 @compiled
-def _run(controller, state, clocks_per_sample, edge_clocks, edge_levels, velocity, force, drive, flags):
+def _run(controller, state, timing, edges, record):
+    velocity, force, drive, flags = record
     first = 0
     for k in range(len(velocity)):
-        strobe = (k + 1) * clocks_per_sample - 1
-        state, first = sample(controller, state, edge_clocks, edge_levels, first, len(edge_clocks), strobe)
+        rest = Edges(edges.clocks[first:], edges.levels[first:])
+        state, taken = sample(controller, state, rest, len(rest.clocks), axis.strobe_of(timing, k))
+        first += taken
         velocity[k], force[k], drive[k], flags[k] = state.velocity, state.force, state.drive, state.flags
 
 
@@ -112,12 +126,12 @@ def run(of: axis.Axis, edge_clocks: ArrayLike, edge_levels: ArrayLike, samples: 
     """
     if not isinstance(of, axis.Axis):
         raise TypeError(f"of must be an Axis, not {of!r}")
-    edges = checks.edges(edge_clocks, edge_levels)
+    edges = Edges(*checks.edges(edge_clocks, edge_levels))
     checks.check_int("samples", samples, 1)
     checks.check_int("level", level, 0, 3)
     number = np.float64 if of.floating else np.int64
     velocity, force, drive = (np.zeros(samples, number) for _ in range(3))
     flags = np.zeros(samples, np.int64)
     start = controller(of, level)
-    _run(*start, of.design.spec.clocks_per_sample, *edges, velocity, force, drive, flags)
+    _run(*start, of.design.timing, edges, (velocity, force, drive, flags))
     return axis.Record(of.design, velocity, force, drive, flags)

@@ -6,19 +6,12 @@ import pytest
 from cocotb.triggers import RisingEdge, Timer, ValueChange
 
 from hardwall.hdl.axis import Axis
-from hardwall.model import axis, quadrature
+from hardwall.model import axis, clocked, quadrature, stamped
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from stimuli.specs import ADJUSTED, MHZ, spec
 
-PINS = (
-    "encoder_a", "encoder_b", "encoder_z", "drive_enable", "preload", "preload_count", "index_arm", "clear_flags",
-)  # fmt: skip
-OUTPUTS = (
-    "drive", "velocity", "wall_force", "flags", "actuated",
-    "count", "illegal_count", "index_count", "index_latched", "index_armed",
-    "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall",
-)  # fmt: skip
+PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
 SLACK = 12
 """Clocks of each sample after the drive has changed, in which the host may act."""
 
@@ -77,16 +70,16 @@ def reference(spec: AxisSpec, pins: np.ndarray, commits: list[tuple[int, dict[st
     """Return OUTPUTS of each sample, from the model; `commits` says at which strobe which words take effect."""
     design = spec.design
     words = {word.name: word.reset for word in design.words}
-    decoder = design.decoder
-    timing = spec.clocks_per_sample, design.latency_to_drive
-    state = axis.PinState(quadrature.START, design.start(), 0)
+    state = clocked.State(quadrature.START, design.start(), 0)
     out = np.zeros((len(OUTPUTS), samples), np.int64)
     clock = 0
 
     def run_to(clocks: int, settings: dict[str, int], gains: dict[str, int]) -> None:
         nonlocal state, clock
         encoder = settings["encoder_glitch_clocks"], settings["encoder_invert"]
-        state = axis.run_pins(timing, decoder, encoder, design.params(gains), state, pins, clock, clocks, out)
+        controller = stamped.Controller(design.decoder, *encoder, design.params(gains))
+        records = clocked.Pins(*pins), clocked.Outputs(*out)
+        state = clocked.run(controller, design.timing, state, *records, clock, clocks)
         clock = clocks
 
     for strobe, new in commits:

@@ -84,14 +84,14 @@ class Twin:
         self.magnitude, self.negative = abs(self.drive), int(self.drive < 0)
 
         self.sticky = (0 if given.get("clear_flags") else self.sticky) | self._raised()
-        controls = (self.words["encoder_glitch_clocks"], self.words["encoder_invert"])
+        inputs = quadrature.Inputs(a, b, z, self.words["encoder_glitch_clocks"], self.words["encoder_invert"])
         if self.strobe:
             if self.waiting:
                 self.words, self.waiting = self.waiting, None
             self._sample()
             self.restart = 0
         pulses = [given.get(name, 0) for name in ("preload", "preload_count", "index_arm", "clear_flags")]
-        self.decoder = quadrature.step(self.decoder_params, self.decoder, a, b, z, *controls, *pulses)
+        self.decoder = quadrature.step(self.decoder_params, self.decoder, inputs, quadrature.Strobes(*pulses))
         if self.clocks in self.loaded:
             setattr(self, *self.loaded.pop(self.clocks))
         if given.get("preload"):

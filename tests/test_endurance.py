@@ -85,7 +85,7 @@ def test_what_is_made_up_is_what_a_decoder_shows():
         # The decoder counts edge n at clock n period, so it is at the pins a latency earlier.
         quarter = (clock + quadrature.latency(0)) // period * (-1 if down else 1) & 3
         levels = quarter ^ quarter >> 1
-        record = quadrature.run(params, levels & 1, levels >> 1, 0)
+        record = quadrature.run(params, quadrature.Inputs(levels & 1, levels >> 1, 0))
         for now in range(1, 1500):
             state = quadrature.State(*(int(column[now - 1]) for column in record))
             made, shown = _seen(widths, now, period, down), quadrature.seen(state)

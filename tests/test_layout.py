@@ -19,7 +19,7 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 # The rooms of sim/, each importing only from those before it; of them, `rtl` alone imports hdl.
 FLOORS = ("world", "jobs", "rtl", "loop", "scene", "walls", "estimates", "studies", "pictures", "commands")
 # Of hdl, what is no block of the data path and has no arithmetic to twin; of model, what has no hardware.
-NOT_TWINNED = {"block", "board", "export", "frame", "ports"}
+NOT_TWINNED = {"block", "board", "export", "frame", "ports", "estimators/levant_edge_signals"}
 CONFIG = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS = CONFIG["project"]["optional-dependencies"]
 PROVIDERS = importlib.metadata.packages_distributions()

@@ -19,10 +19,10 @@ from hardwall.hdl.quadrature import Quadrature
 from hardwall.model import quadrature as model
 from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.compiled import compiled
-from hardwall.model.quadrature import START, Params, State, advance, run, step
+from hardwall.model.quadrature import NO_STROBES, START, Inputs, Params, State, Strobes, advance, run, step
 from hardwall.testing import SAMPLES, SEED, Bench, Packing, Record, check, parameters, ports_of, rng, simulate
 
-INPUTS = ("a", "b", "z", "glitch_clocks", "invert", "preload", "preload_count", "arm", "clear")
+INPUTS = (*Inputs._fields, *Strobes._fields)
 OUTPUTS = (*State._fields[: model.N_OUTPUTS], "fault")
 WIDE = {"count_width": 32, "stamp_width": 24}
 NARROW = {"count_width": 4, "stamp_width": 5, "glitch_width": 4, "fault_width": 2}
@@ -129,10 +129,15 @@ def expected(params: Params, inputs: dict[str, np.ndarray]) -> dict[str, np.ndar
     record = np.empty((model.N_OUTPUTS, len(inputs["reset"])), np.int64)
     for begin, end in zip(resets, [*resets[1:], record.shape[1]], strict=True):
         record[:, begin] = START[: model.N_OUTPUTS]
-        after = run(params, *(inputs[name][begin + 1 : end] for name in INPUTS))
+        after = run_all(params, {name: inputs[name][begin + 1 : end] for name in INPUTS})
         record[:, begin + 1 : end] = after[: model.N_OUTPUTS]
     outputs = dict(zip(OUTPUTS, record, strict=False))
     return {**outputs, "fault": outputs["illegal"] | outputs["overspeed"]}
+
+
+def run_all(params: Params, columns: dict[str, np.ndarray]) -> State:
+    """Return the states of a record of all inputs, by name."""
+    return run(params, *(kind(*(columns[name] for name in kind._fields)) for kind in (Inputs, Strobes)))
 
 
 # RTL against model.
@@ -292,9 +297,9 @@ def test_a_limit_lowered_with_two_edges_waiting_is_illegal():
 
 
 @compiled
-def stepwise(params, state, a, b, z, clocks, glitch_clocks, invert):
+def stepwise(params, state, inputs, clocks):
     for _ in range(clocks):
-        state = step(params, state, a, b, z, glitch_clocks, invert)
+        state = step(params, state, inputs, NO_STROBES)
     return state
 
 
@@ -305,32 +310,32 @@ HOLDS = st.lists(st.tuples(st.integers(0, 7), st.integers(0, 40), st.integers(0,
 @given(armed=st.booleans(), holds=HOLDS)
 @example(armed=False, holds=[(0, 1, 0, 0), (1, 2, 0, 0)])
 def test_advance_is_so_many_steps(armed, holds):
-    slow = fast = step(PARAMS, START, 1, 0, 0, arm=1) if armed else START
+    slow = fast = step(PARAMS, START, Inputs(1, 0, 0), Strobes(arm=1)) if armed else START
     for levels, clocks, glitch_clocks, invert in holds:
-        a, b, z = levels & 1, levels >> 1 & 1, levels >> 2
-        slow = stepwise(PARAMS, slow, a, b, z, clocks, glitch_clocks, invert)
-        fast = advance(PARAMS, fast, a, b, z, clocks, glitch_clocks, invert)
+        inputs = Inputs(levels & 1, levels >> 1 & 1, levels >> 2, glitch_clocks, invert)
+        slow = stepwise(PARAMS, slow, inputs, clocks)
+        fast = advance(PARAMS, fast, inputs, clocks)
         assert slow == fast
 
 
 def test_advance_jumps():
-    still = advance(PARAMS, START, 1, 1, 0, 1 << 61)
-    assert still == stepwise(PARAMS, START, 1, 1, 0, 32, 0, 0)
+    still = advance(PARAMS, START, Inputs(1, 1, 0), 1 << 61)
+    assert still == stepwise(PARAMS, START, Inputs(1, 1, 0), 32)
 
 
 def test_lanes_are_single_records():
     lanes = [random_stimulus(np.random.default_rng([SEED, lane]), 500, 4) for lane in range(5)]
-    together = run(PARAMS, *(np.stack([lane[name] for lane in lanes]) for name in INPUTS))
+    together = run_all(PARAMS, {name: np.stack([lane[name] for lane in lanes]) for name in INPUTS})
     assert together.count.shape == (5, 500)
     for index, lane in enumerate(lanes):
-        alone = run(PARAMS, *(lane[name] for name in INPUTS))
+        alone = run_all(PARAMS, lane)
         assert all((both[index] == one).all() for both, one in zip(together, alone, strict=True))
 
 
 def digest() -> str:
     inputs = random_stimulus(rng(), 2000, 4)
-    record = np.stack(run(PARAMS, *(inputs[name] for name in INPUTS)))
-    rest = advance(PARAMS, State(*record[:, -1].tolist()), 1, 0, 1, 1000, 3)
+    record = np.stack(run_all(PARAMS, inputs))
+    rest = advance(PARAMS, State(*record[:, -1].tolist()), Inputs(1, 0, 1, 3), 1000)
     return hashlib.sha256(record.tobytes() + repr(tuple(map(int, rest))).encode()).hexdigest()
 
 

@@ -7,7 +7,8 @@ import pytest
 
 from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.compiled import compiled
-from hardwall.model.quadrature import START, Params, advance, clocks_to_fault, max_edge_rate, step
+from hardwall.model.quadrature import NO_STROBES, START, Inputs, Params, advance, step
+from hardwall.model.quadrature_speed import clocks_to_fault, max_edge_rate
 from hardwall.testing import rng
 
 
@@ -39,7 +40,7 @@ def turn(params, glitch_clocks, rate, places, clocks):
             true[clock] += (position - place) >> 34
         a = int((position - places[0]) % (4 * ONE) < places[2] - places[0])
         b = int((position - places[1]) % (4 * ONE) < places[3] - places[1])
-        state = step(params, state, a, b, 0, glitch_clocks)
+        state = step(params, state, Inputs(a, b, 0, glitch_clocks, 0), NO_STROBES)
         if clock >= delay and state.count != wrap(true[clock - delay] - true[0], params.count_width):
             wrong = min(wrong, clock)
         if state.illegal | state.overspeed:
@@ -106,7 +107,7 @@ def explore(shortest, longest, memory):
     params = Params(4, 1, 1)
     met = {np.int64(-1)}
     todo = [
-        (advance(params, START, pins & 1, pins >> 1, 0, 100), pins * (((1 << 2 * memory) - 1) // 3), 0, 0)
+        (advance(params, START, Inputs(pins & 1, pins >> 1, 0, 0, 0), 100), pins * (((1 << 2 * memory) - 1) // 3), 0, 0)
         for pins in range(4)
     ]
     wrong = late = 0
@@ -121,10 +122,10 @@ def explore(shortest, longest, memory):
                 past -= motion(history >> 2 * back + 2 & 3, history >> 2 * back & 3)
             late += not known
         for glitch_clocks in range(shortest, longest + 1):
-            rest = advance(params, state, now & 1, now >> 1, 0, longest + 4, glitch_clocks)
+            rest = advance(params, state, Inputs(now & 1, now >> 1, 0, glitch_clocks, 0), longest + 4)
             wrong += (rest.illegal | rest.overspeed) == 0 and (jumped > 0 or rest.count != wrap(position, 4))
             for pins in range(4):
-                after = step(params, state, pins & 1, pins >> 1, 0, glitch_clocks)
+                after = step(params, state, Inputs(pins & 1, pins >> 1, 0, glitch_clocks, 0), NO_STROBES)
                 if after.illegal | after.overspeed:
                     continue
                 where = position + motion(now, pins)

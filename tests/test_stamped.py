@@ -31,7 +31,7 @@ def test_records_are_the_decoders_clocks_and_the_axis_samples(floating):
     pins = np.zeros(samples * period, np.int64)
     for clock, level in zip(clocks, levels, strict=True):
         pins[clock:] = level
-    decoded = quadrature.run(of.design.decoder, pins & 1, pins >> 1, 0, glitch_clocks=2)
+    decoded = quadrature.run(of.design.decoder, quadrature.Inputs(pins & 1, pins >> 1, 0, 2))
     state = of.design.start(floating)
     for k in range(samples):
         before = quadrature.State(*(int(column[(k + 1) * period - 2]) for column in decoded))

@@ -1,6 +1,6 @@
 """A sliding-mode differentiator driven by the clock-stamped edges of the encoder."""
 
-from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, signed, unsigned
+from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, signed
 
 from hardwall.model.arithmetic.sqrt import latency as sqrt_latency
 from hardwall.model.estimators.levant_edge import REST_BITS, Design
@@ -8,9 +8,10 @@ from hardwall.model.estimators.levant_edge_design import QUOTIENT_BITS
 from hardwall.model.quadrature import RUN_MAX
 
 from ..arithmetic.divide import Divide
-from ..arithmetic.fixed import at_most, fitted, length_of, shape, shift_floor, shift_round_half_up
+from ..arithmetic.fixed import at_most, fitted, length_of, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import Sqrt
 from .estimate import EstimatorBlock
+from .levant_edge_signals import Signals
 
 
 class Estimator(EstimatorBlock):
@@ -47,7 +48,7 @@ class Estimator(EstimatorBlock):
 
     def elaborate(self, platform):
         m = Module()
-        s = _Signals(self)
+        s = Signals(self._design)
         self._measure(m, s)
         self._solve(m, s)
         self._learn(m, s)
@@ -278,56 +279,6 @@ class Estimator(EstimatorBlock):
                 self.valid.eq(1),
             ]
             m.next = "SAMPLE"
-
-
-class _Signals:
-    """The registers and wires of an estimator, by the names of the model's."""
-
-    def __init__(self, block: Estimator):
-        d = block.design
-        self.params = d.params({word.name: word.reset for word in d.words})
-        count, clocks, velocity = signed(d.count_width), unsigned(d.stamp_width), shape(d.velocity)
-
-        # Held from sample to sample: the anchor, the motion there, the places of the four edges.
-        self.running, self.known = Signal(), Signal()
-        self.number, self.stamp, self.kind = Signal(count), Signal(clocks), Signal(2)
-        self.length = Signal(range(d.stamp_width + 1))
-        self.v, self.a = Signal(velocity), Signal(shape(d.acceleration))
-        self.places = Array(Signal(shape(d.place), name=f"place_{n}") for n in range(4))
-
-        # Of the sample. `anchor`: its edge is the new anchor; `loose`: it is not yet.
-        self.fresh, self.full_run, self.rest, self.beyond = Signal(), Signal(), Signal(), Signal()
-        self.correct, self.carry, self.anchor, self.loose = Signal(), Signal(), Signal(), Signal()
-        self.now, self.at, self.waited = Signal(clocks), Signal(clocks), Signal()
-        self.to, self.to_kind, self.passed = Signal(count), Signal(2), Signal(count)
-        self.flags = Signal(2)
-
-        # A time and its length, as it multiplies, and what it makes of an acceleration.
-        self.measure, self.size = Signal(clocks), Signal(range(d.stamp_width + 1))
-        self.cut, self.kept = Signal(range(d.turn_span + 2)), Signal(range(d.turn_span + 1))
-        self.time, self.age_time = Signal(d.mantissa), Signal(d.mantissa)
-        self.drop, self.age_drop = Signal.like(self.kept), Signal.like(self.kept)
-        self.left, self.right = Signal(velocity), Signal(d.mantissa)
-        self.product = Signal(signed(d.velocity.width + d.mantissa))
-        self.turned, self.turn = (Signal(signed(d.velocity.width + 1)) for _ in range(2))
-        self.ahead = Signal(signed(d.velocity.width + 2))
-
-        # The error of place, and what it changes.
-        self.distance, self.apart = Signal(shape(d.distance)), Signal(signed(d.place.width + 1))
-        bits = max(d.distance.width + d.clocks.bit_length() + d.place.f, d.place.width + 1) + 1
-        self.way, self.moved = Signal(signed(bits)), Signal(shape(d.error))
-        self.e, self.e_cut = Signal(shape(d.error)), Signal.like(self.cut)
-        self.start, self.solved, self.root = Signal(), Signal(), Signal(d.root.width)
-        self.root_product = Signal(d.lambda_.width + d.root.width)
-        self.slope, self.far_slope, self.limit = Signal(d.velocity.width - 1), Signal(), Signal(d.velocity.width - 1)
-        self.bent, self.relay = Signal(d.acceleration.width - 1), Signal(d.acceleration.width - 1)
-        self.change, self.bend = Signal(velocity), Signal(shape(d.acceleration))
-        self.here, self.there = Signal(shape(d.place)), Signal(shape(d.place))
-        self.next_here, self.next_there = Signal(shape(d.place)), Signal(shape(d.place))
-
-        # What no further edge allows.
-        self.bound, self.onward = Signal(d.velocity.width - 1), Signal(d.velocity.width - 1)
-        self.line, self.end = Signal(velocity), Signal(signed(d.velocity.width + 1))
 
 
 def _shifted(value, right: int, left):

@@ -27,7 +27,7 @@ rates stands for each:
 
 For tau -> 0 and the default gains h = tau sqrt(C/q): a bandwidth of 3464 rad/s for C = 12 m/s^2 on 1 um at any rate.
 Were quantisation taken for white at the sampling rate, the bandwidth would grow with the rate although no count comes
-sooner. The gains follow from h alone: `steady_state`. For small h, K = (2 h, 2 h^2, h^3).
+sooner. The gains follow from h alone: `riccati.steady_state`. For small h, K = (2 h, 2 h^2, h^3).
 
 Formats, derived. C' = C tau^2 / q; 2**reach is no less than 1/h nor than 1.
 
@@ -57,13 +57,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
 from ..arithmetic.fixed import SQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from ..checks import FieldError
 from ..compiled import compiled
 from ..words import GAIN_BITS, Word, gain_format
 from .estimate import EstimatorDesign, EstimatorGains, estimate
+from .riccati import steady_state
 
 if TYPE_CHECKING:
     from ..spec import AxisSpec
@@ -76,8 +75,6 @@ ERROR_NORM = 18.0
 """Largest sum of all rounding errors at v, in units of a guard bit: see above."""
 HEADROOM_BITS = 2
 """A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
-INDEX_MAX = 64.0
-"""Gains are those of h = infinity from here on."""
 STEPS = 12
 """Clocks of the sequence: see `hardwall.hdl.estimators.kalman`."""
 
@@ -111,34 +108,6 @@ class Gains(EstimatorGains):
         if integrators == 2:
             return (power / math.tanh(tau / (2 * self.acceleration_time_s)) / noise) ** (1 / 4)
         return (-2 * power * math.expm1(-tau / self.acceleration_time_s) / noise) ** (1 / 6)
-
-
-def steady_state(index: float, integrators: int = 3) -> tuple[float, float, float]:
-    """Return K_x, K_v and K_a for a bandwidth of `index` a sample; K_a = 0 for two integrators.
-
-    The discrete Riccati equation of the filter, the last state's derivative white noise of density 1 and time in units
-    of the bandwidth, by structure-preserving doubling: each round squares the number of samples seen, and nothing in
-    it cancels however small the index.
-    """
-    h = min(index, INDEX_MAX)
-    n = integrators
-    power = np.subtract.outer(-np.arange(n), -np.arange(n))
-    factorial = np.array([1.0, 1.0, 2.0])
-    a = np.where(power >= 0, h ** np.maximum(power, 0) / factorial[np.maximum(power, 0)], 0.0)
-    down = n - 1 - np.arange(n)
-    order = np.add.outer(down, down) + 1
-    p = h**order / (order * np.multiply.outer(factorial[down], factorial[down]))
-    noise = 1 / h
-    f, g = a.T, np.zeros((n, n))
-    g[0, 0] = 1 / noise
-    change = math.inf
-    while change > 1e-15:
-        solved = np.linalg.solve(np.eye(n) + g @ p, np.concatenate([f, g], 1))
-        more = f.T @ p @ solved[:, :n]
-        change = np.abs(more).max() / np.abs(p).max()
-        p, g, f = p + more, g + f @ solved[:, n:] @ f.T, f @ solved[:, :n]
-    gains = p[:, 0] / (p[0, 0] + noise) * h ** np.arange(n)
-    return (*gains.tolist(), 0.0)[:3]
 
 
 def norms(index: float) -> tuple[float, float, float]:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...model.compiled import by_type, compiled
+from ...model.stamped import Edges
 from ..world.encoder import Cell, Encoder, edge, level, locate
 
 BISECTIONS = 200
@@ -217,23 +218,21 @@ def _edges(motion, encoder, step_s, steps, room):
     return times, cells, found
 
 
-class Edges(NamedTuple):
-    """The edges of a motion, on a clock.
+class Encoded(NamedTuple):
+    """What an encoder makes of a motion.
 
     Attributes:
-        clocks: int64, the clock at which a register at the pins first holds the new level.
-        levels: int64, the pins from then on, a | b << 1.
-        start_level: the pins before the first.
+        edges: when a register at the pins first holds which level.
+        start_level: the pins before the first, a | b << 1.
         start_cell: the count at time 0, which a decoder calls 0.
     """
 
-    clocks: np.ndarray
-    levels: np.ndarray
+    edges: Edges
     start_level: int
     start_cell: int
 
 
-def edges(motion, encoder: Encoder, seconds: float, step_s: float, offset_clocks: int) -> Edges:
+def encoded(motion, encoder: Encoder, seconds: float, step_s: float, offset_clocks: int) -> Encoded:
     """Return the edges of a motion from time 0 on, in their order.
 
     An edge that is passed at time t is stamped ceil(t clock_hz) + offset_clocks moving up, floor(t clock_hz) + 1 +
@@ -258,4 +257,4 @@ def edges(motion, encoder: Encoder, seconds: float, step_s: float, offset_clocks
     at = times * encoder.clock_hz
     clocks = np.where(upwards, np.ceil(at), np.floor(at) + 1).astype(np.int64) + offset_clocks
     quarter = (cells + 1) & 3
-    return Edges(clocks, quarter ^ (quarter >> 1), int(level(start)), int(start))
+    return Encoded(Edges(clocks, quarter ^ (quarter >> 1)), int(level(start)), int(start))

@@ -1,55 +1,37 @@
 """Recorded counts through a velocity estimator, on any backend, and held against a reference that is not causal.
 
-The axis of a replay has units of its own, which make one piece of hardware serve any recording: the metre of its
-`AxisSpec` is a *recorded count* and its second is `SECOND` *sample periods* (so long that no clock stamp of an edge
-wraps meanwhile). With `coarsen` = N the axis sees counts // N, so
-its count is N recorded counts, and everything that is reported is in recorded counts and true seconds, whatever N is.
-The floor puts coarse counts (N - 1) / 2 recorded counts too low on average: constant, so no velocity comes of it.
-
-What the axis must cover follows from the recording, each range rounded up to a power of two:
-
-- travel: the span of the recording (at most what a 32-bit count has; beyond, the count wraps, which is no fault);
-- speed: the largest change in a sample, and one count more;
-- clock, in periods a sample: enough for the force path, and for the fastest change through the decoder
-  (`quadrature.max_edge_rate`); what a clock of `CLOCK_MAX_HZ` does not let through is an error on `rtl`.
+With `coarsen` = N the estimator sees counts // N, and everything that is reported is in recorded counts and true
+seconds, whatever N is. The floor puts coarse counts (N - 1) / 2 recorded counts too low on average: constant, so no
+velocity comes of it. `replay_axis` has the axis.
 
 The bound C on the acceleration, from which an estimator gets its gains, is that of `reference`. It can be given
 instead. A recording that hardly accelerates gets a C that moves one count over its whole length, which counts cannot
-tell from none, or the least that words hold beside its travel and speed (`ACCELERATION_RANGE`).
-
-`float` and `fixed` take the counts as they are; `rtl`, and any estimator that uses the stamps of edges, gets them
-`through_pins`.
+tell from none, or the least that words hold beside its travel and speed (`replay_axis.ACCELERATION_RANGE`). A change
+that a clock of `CLOCK_MAX_HZ` does not let through the pins is an error.
 """
 
 import hashlib
 import math
-import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from ...model import axis, quadrature, stamped
-from ...model.arithmetic.fixed import bits_for
 from ...model.estimators import registry
+from ...model.quadrature_speed import max_edge_rate
 from ...model.spec import AxisSpec
 from ..jobs.result import Summary
 from ..jobs.whole_file import whole_file
-from ..world.encoder import level
+from ..loop.backends import BACKENDS, is_exact
 from .recording import Recording
 from .reference import REFERENCE_HZ, SETTLE_S, acceleration_bound, judged_from, zero_phase_velocity
-from .through_pins import DECODER_CLOCKS, GLITCH_CLOCKS, run_pins
+from .replay_axis import SECOND, axis_spec, least_bound, needs_pins, run
+from .through_pins import GLITCH_CLOCKS
 
-BACKENDS = ("float", "fixed", "rtl")
-SECOND = 1 << 10
-TRAVEL_MAX = 2.0**29
-"""Of an axis with a 32-bit count."""
 CLOCK_MAX_HZ = 100e6
 """Fastest clock of a replay: more counts a second are a fault of the recording, not a motion."""
-ACCELERATION_RANGE = 2.0**48
-"""The largest ratio of travel or speed to C, in counts and samples, at which no estimator's words exceed int64."""
 
 
 class ReplayError(ValueError):
@@ -173,98 +155,6 @@ class Replay(Summary):
             )
 
 
-def _power_of_two(value: float) -> float:
-    """Return the least power of two that is no less than `value`."""
-    return 2.0 ** bits_for(value)
-
-
-def _ranges(counts: np.ndarray) -> tuple[float, float]:
-    """Return the travel, counts, and the speed, counts a sample, of the axis for a recording."""
-    span = int(counts.max()) - int(counts.min())
-    fastest = int(np.abs(np.diff(counts)).max())
-    return min(_power_of_two(max(span, 1)), TRAVEL_MAX), _power_of_two(fastest + 1)
-
-
-def _least_bound(counts: np.ndarray) -> float:
-    """Return the least C that is taken from a recording, counts a sample^2."""
-    return max(2 / len(counts) ** 2, max(_ranges(counts)) / ACCELERATION_RANGE)
-
-
-def axis_spec(counts: np.ndarray, count: int, acceleration_max: float, estimator: str) -> AxisSpec:
-    """Return the axis for a recording, in units of its own; the module says how it follows.
-
-    Args:
-        counts: as the axis sees them, each `count` recorded counts.
-        acceleration_max: C, recorded counts a sample^2.
-    """
-    fastest = int(np.abs(np.diff(counts)).max())
-    travel, speed = _ranges(counts)
-    # The wall and the output stage are there and do nothing: any ranges do.
-    spec = AxisSpec(
-        clock_hz=SECOND << 16,
-        sample_hz=SECOND,
-        actuation_hz=SECOND,
-        count_m=float(count),
-        travel_m=travel * count,
-        speed_max_m_per_s=speed * count * SECOND,
-        acceleration_max_m_per_s2=acceleration_max * SECOND**2,
-        force_max_n=1.0,
-        force_resolution_n=1.0,
-        stiffness_max_n_per_m=1.0 / count,
-        damping_max_n_s_per_m=1.0 / count / SECOND,
-        estimator=estimator,
-    )
-    # The edges of an interval begin before its strobe, and must not reach into the force path of the one before.
-    path = spec.design.latency_to_drive + DECODER_CLOCKS
-    clocks = max(path, fastest / quadrature.max_edge_rate(1.0, GLITCH_CLOCKS))
-    return replace(spec, clock_hz=int(_power_of_two(clocks)) * SECOND)
-
-
-def needs_pins(estimator: str, backend: str) -> bool:
-    """Return whether the counts go through pins: into hardware, or to be stamped."""
-    return backend == "rtl" or registry.design_of(estimator).uses_stamps()
-
-
-def run(
-    spec: AxisSpec,
-    counts: np.ndarray,
-    backend: str,
-    output: str,
-    progress: Callable[[int], None] | None = None,
-) -> tuple[np.ndarray, int, float]:
-    """Return what an axis makes of a record of counts: (velocity words, or float counts a sample; flags; seconds).
-
-    Args:
-        spec: the axis, with clocks enough in a sample for the largest change.
-        counts: int64, as the axis sees them.
-        backend: one of `BACKENDS`.
-        output: the estimator's output.
-        progress: called with the number of samples done.
-
-    Raises:
-        RuntimeError: if the RTL could not be built.
-    """
-    choice = spec.design.estimator.choose(output)
-    if backend == "rtl":
-        from ..rtl.library import (  # noqa: PLC0415  (the other backends need neither Amaranth nor a C++ compiler)
-            Hardware,
-        )
-
-        words = spec.design.encode(encoder_glitch_clocks=GLITCH_CLOCKS, **choice)
-        with Hardware(spec, words, int(level(0)), short=True) as hardware:
-            return run_pins(hardware.controller, hardware.start, spec, counts, progress)
-    model = axis.Axis(spec, floating=backend == "float", **choice)
-    if needs_pins(spec.estimator, backend):
-        return run_pins(*stamped.controller(model, int(level(0))), spec, counts, progress)
-    model.run(counts[:0])  # compiles
-    began = time.perf_counter()
-    record = model.run(counts)
-    seconds = time.perf_counter() - began
-    if progress:
-        progress(len(counts))
-    return record.velocity, int(record.flags[-1]), seconds
-
-
 def _one_of(name: str, value: object, accepted: tuple[str, ...]) -> None:
     if value not in accepted:
         raise ReplayError(f"{name} must be one of {', '.join(accepted)}, not {value!r}")
@@ -273,7 +163,7 @@ def _one_of(name: str, value: object, accepted: tuple[str, ...]) -> None:
 def _check_speed(recording: Recording, counts: np.ndarray, count: int) -> None:
     """Raise ReplayError, with the sample, if a change is too fast for the pins."""
     steps = np.abs(np.diff(counts))
-    most = quadrature.max_edge_rate(CLOCK_MAX_HZ, GLITCH_CLOCKS) / recording.rate_hz
+    most = max_edge_rate(CLOCK_MAX_HZ, GLITCH_CLOCKS) / recording.rate_hz
     if steps.max() > most:
         k = int(np.argmax(steps > most)) + 1
         coarse = "" if count == 1 else f" of {count}"
@@ -282,6 +172,33 @@ def _check_speed(recording: Recording, counts: np.ndarray, count: int) -> None:
             f"in a sample at {recording.rate_hz:g} Hz (a clock of {CLOCK_MAX_HZ / 1e6:g} MHz), "
             f"not by {steps[k - 1]} at sample {k}, {recording.time_s[k]:g} s"
         )
+
+
+def _check_numbers(recording: Recording, coarsen: object, bound: float | None, cutoff: float) -> None:
+    """Raise ReplayError if a recording cannot be replayed with these numbers."""
+    rate, samples = recording.rate_hz, len(recording.counts)
+    if coarsen is not None and not (isinstance(coarsen, int) and 1 <= coarsen < 2**31):
+        raise ReplayError(f"coarsen must be a whole number of 1 to 2**31 - 1, not {coarsen!r}")
+    if coarsen is not None and samples <= judged_from(rate):
+        raise ReplayError(
+            f"{recording.file}: with coarsen a recording must be longer than {SETTLE_S:g} s, after which the estimate "
+            f"is judged, not {samples} samples at {rate:g} Hz"
+        )
+    if not 0 < cutoff < rate / 2:
+        raise ReplayError(f"reference_hz must be more than 0 and less than {rate / 2:g}, half the rate, not {cutoff!r}")
+    if bound is not None and not (math.isfinite(bound) and bound > 0):
+        raise ReplayError(f"acceleration_max_counts_per_s2 must be finite and more than 0, not {bound!r}")
+
+
+def _axis_for(counts: np.ndarray, count: int, bound: float, rate_hz: float, estimator: str) -> AxisSpec:
+    """Return the axis for counts that are each `count` recorded counts, with a bound in recorded counts a second^2."""
+    try:
+        return axis_spec(counts, count, bound / rate_hz**2, estimator)
+    except ValueError as error:
+        raise ReplayError(
+            f"acceleration_max_counts_per_s2 must give gains that fit this recording (as if {SECOND} samples were a "
+            f"second: {error}), not {bound!r}"
+        ) from None
 
 
 def replay(
@@ -300,7 +217,7 @@ def replay(
         recording: from `recording.load`.
         estimator: its name.
         output: which of its outputs; None for its first.
-        backend: one of `BACKENDS`.
+        backend: one of `backends.BACKENDS`.
         coarsen: floor-divide the counts by this first, and judge the estimate; 1 judges without coarser counts.
         acceleration_max_counts_per_s2: the bound C that sets the gains; None to take it from the recording.
         reference_hz: cutoff of the reference; None for the usual one.
@@ -315,20 +232,9 @@ def replay(
     output = outputs[0] if output is None else output
     _one_of(f"output of {estimator}", output, outputs)
     _one_of("backend", backend, BACKENDS)
-    if coarsen is not None and not (isinstance(coarsen, int) and 1 <= coarsen < 2**31):
-        raise ReplayError(f"coarsen must be a whole number of 1 to 2**31 - 1, not {coarsen!r}")
-    rate, samples = recording.rate_hz, len(recording.counts)
-    if coarsen is not None and samples <= judged_from(rate):
-        raise ReplayError(
-            f"{recording.file}: with coarsen a recording must be longer than {SETTLE_S:g} s, after which the estimate "
-            f"is judged, not {samples} samples at {rate:g} Hz"
-        )
+    rate, bound = recording.rate_hz, acceleration_max_counts_per_s2
     cutoff = min(REFERENCE_HZ, rate / 4) if reference_hz is None else reference_hz
-    if not 0 < cutoff < rate / 2:
-        raise ReplayError(f"reference_hz must be more than 0 and less than {rate / 2:g}, half the rate, not {cutoff!r}")
-    bound = acceleration_max_counts_per_s2
-    if bound is not None and not (math.isfinite(bound) and bound > 0):
-        raise ReplayError(f"acceleration_max_counts_per_s2 must be finite and more than 0, not {bound!r}")
+    _check_numbers(recording, coarsen, bound, cutoff)
 
     count = coarsen or 1
     counts = recording.counts // count
@@ -336,17 +242,11 @@ def replay(
         _check_speed(recording, counts, count)
     reference = zero_phase_velocity(recording.counts, rate, cutoff)
     if bound is None:
-        bound = max(acceleration_bound(reference, rate), _least_bound(counts) * count * rate**2)
-    try:
-        spec = axis_spec(counts, count, bound / rate**2, estimator)
-    except ValueError as error:
-        raise ReplayError(
-            f"acceleration_max_counts_per_s2 must give gains that fit this recording (as if {SECOND} samples were a "
-            f"second: {error}), not {bound!r}"
-        ) from None
+        bound = max(acceleration_bound(reference, rate), least_bound(counts) * count * rate**2)
+    spec = _axis_for(counts, count, bound, rate, estimator)
     velocity, flags, seconds = run(spec, counts, backend, output, progress)
 
-    exact = backend != "float"
+    exact = is_exact(backend)
     lsb = spec.design.estimator.velocity.lsb if exact else 1.0
     return Replay(
         recording=recording,

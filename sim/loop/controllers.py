@@ -1,9 +1,9 @@
 """The three controllers that can close the loop: pins and a sample strobe in, drive out.
 
 `float` and `fixed` are the models of decoder and axis (`hardwall.model.stamped`), in float64 or in the hardware's
-integers; `rtl` is the
-Verilated hardware behind function pointers. All take the same clock-stamped edges, sample at the same clock, and
-change the drive the same number of clocks later. Their states share the fields `drive`, `velocity` and `flags`.
+integers; `rtl` is the Verilated hardware behind function pointers; `backends` opens them. All take the same
+clock-stamped edges, sample at the same clock, and change the drive the same number of clocks later. Their states share
+the fields `drive`, `velocity` and `flags`.
 """
 
 from ...model import stamped
@@ -13,34 +13,35 @@ from ..rtl.verilated import Rtl, RtlState
 
 
 @by_type
-def sample(controller, state, edge_clocks, edge_levels, n_edges, strobe, until):
+def sample(controller, state, edges, n_edges, strobe):
     """Take one sample: return (state, taken), `taken` being the number of edges used up.
 
     Args:
         controller: `stamped.Controller` or `Rtl`.
         state: `stamped.State` or `RtlState`.
-        edge_clocks, edge_levels: int64 arrays; from which clock on the pins show which level, a | b << 1.
+        edges: `stamped.Edges` of int64.
         n_edges: edges in them: those that the last call did not take, and those since.
         strobe: number of the clock at which the count is sampled.
-        until: number of the clock at which the drive has changed; edges from it on are for the next call.
     """
 
 
 @by_type
-def sample_quietly(controller, state, strobe, until):
+def sample_quietly(controller, state, strobe):
     """Take one sample with no edges: return the state. Passing no array makes it much the cheaper call."""
 
 
-@sample_quietly.register(stamped.Controller)
 @compiled
-def _model_sample_quietly(controller, state, strobe, until):
-    return stamped.sample_quietly(controller, state, strobe)
+def taken_off(edges, n_edges, taken):
+    """Move the edges after the first `taken` to the front; return how many they are."""
+    left = n_edges - taken
+    for i in range(left):
+        edges.clocks[i] = edges.clocks[taken + i]
+        edges.levels[i] = edges.levels[taken + i]
+    return left
 
 
-@sample.register(stamped.Controller)
-@compiled
-def _model_sample(controller, state, edge_clocks, edge_levels, n_edges, strobe, until):
-    return stamped.sample(controller, state, edge_clocks, edge_levels, 0, n_edges, strobe)
+sample.register(stamped.Controller)(stamped.sample)
+sample_quietly.register(stamped.Controller)(stamped.sample_quietly)
 
 
 # What `read` of sim/rtl/library.cpp answers.
@@ -56,16 +57,19 @@ def _read(controller):
     )
 
 
+# The hardware is run until its drive has changed; edges from then on are for the next sample.
+
+
 @sample_quietly.register(Rtl)
 @compiled
-def _rtl_sample_quietly(controller, state, strobe, until):
-    call(controller.advance, controller.context, 0, 0, 0, until)
+def _rtl_sample_quietly(controller, state, strobe):
+    call(controller.advance, controller.context, 0, 0, 0, strobe + controller.latency)
     return _read(controller)
 
 
 @sample.register(Rtl)
 @compiled
-def _rtl_sample(controller, state, edge_clocks, edge_levels, n_edges, strobe, until):
-    edges = edge_clocks.ctypes.data, edge_levels.ctypes.data
-    taken = call(controller.advance, controller.context, edges[0], edges[1], n_edges, until)
+def _rtl_sample(controller, state, edges, n_edges, strobe):
+    clocks, levels, until = edges.clocks.ctypes.data, edges.levels.ctypes.data, strobe + controller.latency
+    taken = call(controller.advance, controller.context, clocks, levels, n_edges, until)
     return _read(controller), taken

@@ -11,15 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...model.axis import Timing, strobe_of
 from ...model.compiled import compiled
-from ..world.advance import advance, advance_quietly
+from ...model.stamped import Edges
+from ..world.advance import Interval, Moment, advance, advance_quietly
 from ..world.converter import Converter, converted
-from ..world.encoder import Cell, Encoder
+from ..world.encoder import Encoder
 from ..world.euler import Stepped
-from ..world.rigid import Motion, Rigid, Span
-from ..world.taylor import State, Train
-from .controllers import sample, sample_quietly
-from .record import keep
+from ..world.rigid import Rigid, Span
+from ..world.taylor import Train
+from .controllers import sample, sample_quietly, taken_off
+from .record import Record, keep
 
 EDGE_CAPACITY = 1 << 14
 """Edges that one sample may bring before the loop gives up: with any decoder, far beyond its limit."""
@@ -28,7 +30,7 @@ EDGE_CAPACITY = 1 << 14
 class World(NamedTuple):
     """What the controller is connected to, and when.
 
-    `before` is the span from a changed drive to the next strobe, `after` that from the strobe to the changed drive.
+    `before` is the length from a changed drive to the next strobe, `after` that from the strobe to the changed drive.
     """
 
     plant: Rigid | Train | Stepped
@@ -36,92 +38,82 @@ class World(NamedTuple):
     converter: Converter | None
     push_n: float  # of the motor, besides the wall
     force_lsb_n: float
-    clocks_per_sample: int
-    latency: int  # clocks
+    timing: Timing
     before: Span | float  # a `Span` for a `Rigid`, else s
     after: Span | float
-
-
-class Delay(NamedTuple):
-    """An amplifier that passes on the drive some samples late: the last `len(drives)` ones, by sample number."""
-
-    drives: np.ndarray
 
 
 class Progress(NamedTuple):
     """Where the loop stands: between the drive's change after sample `sample - 1`, and the strobe of `sample`."""
 
     sample: int
-    motion: Motion | State
-    cell: Cell
+    moment: Moment
     force_n: float
-    n_edges: int  # not yet taken by the controller; negative: edges were lost
+
+
+class Memory(NamedTuple):
+    """The arrays that a run writes to.
+
+    They stand apart from what it returns: an array that is handed back for every sample costs more than the sample.
+    """
+
+    edges: Edges  # on their way to the controller
+    delay: np.ndarray | None  # the drives that a late amplifier still holds, by sample number
+    overview: Record | None
+    detail: Record | None
+    positions: np.ndarray  # float64: the position (m) at each sample of a call
+    drives: np.ndarray  # the drive (force LSB) after each
 
 
 @compiled
 def _delayed(delay, k, drive):
+    """Return what an amplifier passes on that is as many samples late as `delay` is long."""
     if delay is None:
         return drive
-    slot = k % len(delay.drives)
-    late = delay.drives[slot]
-    delay.drives[slot] = drive
+    slot = k % len(delay)
+    late = delay[slot]
+    delay[slot] = drive
     return late
 
 
 @compiled
-def run(world, controller, state, progress, delay, records, edges, positions, drives, until):
+def run(world, controller, state, progress, memory, until):
     """Run the loop up to sample `until`; return (state, progress).
 
     Args:
         world: a `World`.
         controller, state: of `sim.loop.controllers`.
         progress: a `Progress`.
-        delay: a `Delay`, or None.
-        records: a pair of `Record`s, or None for either.
-        edges: a pair of int64 arrays, the encoder's edges on their way to the controller.
-        positions: float64 array that takes the position (m) at each sample of this call.
-        drives: array that takes the drive (force LSB) after each.
+        memory: a `Memory`.
         until: number of the first sample not to take, within what the arrays hold. Stops early if edges were lost.
     """
-    edge_clocks, edge_levels = edges
-    first, motion, cell, force_n, n_edges = progress
+    plant, timing, edges = world.plant, world.timing, memory.edges
+    first, moment, force_n = progress
     k = first
-    before_clocks = world.clocks_per_sample - world.latency
-    while k < until and n_edges >= 0:
-        strobe = (k + 1) * world.clocks_per_sample - 1
-        at = motion
-        positions[k - first] = motion.position_m
+    while k < until and moment.n_edges >= 0:
+        strobe = strobe_of(timing, k)
+        changed = strobe + timing.latency
+        at = moment.motion
+        memory.positions[k - first] = at.position_m
 
         # From the strobe until the drive changes, the old force acts.
-        moved, quiet = advance_quietly(world.plant, motion, cell, force_n, world.after)
-        if quiet:
-            motion = moved
-        else:
-            motion, cell, n_edges = advance(
-                world.plant, world.encoder, motion, cell, force_n, world.after,
-                strobe, world.latency, edge_clocks, edge_levels, n_edges,
-            )  # fmt: skip
+        interval = Interval(world.after, strobe, timing.latency)
+        after, quiet = advance_quietly(plant, moment, force_n, interval)
+        moment = after if quiet else advance(plant, world.encoder, moment, force_n, interval, edges)
 
-        if n_edges > 0:
-            state, taken = sample(controller, state, edge_clocks, edge_levels, n_edges, strobe, strobe + world.latency)
-            n_edges -= taken
-            for i in range(n_edges):
-                edge_clocks[i] = edge_clocks[taken + i]
-                edge_levels[i] = edge_levels[taken + i]
+        if moment.n_edges > 0:
+            state, taken = sample(controller, state, edges, moment.n_edges, strobe)
+            moment = Moment(moment.motion, moment.cell, taken_off(edges, moment.n_edges, taken))
         else:
-            state = sample_quietly(controller, state, strobe, strobe + world.latency)
-        drives[k - first] = state.drive
-        force_n = converted(world.converter, world.push_n + world.force_lsb_n * _delayed(delay, k, state.drive))
-        keep(records[0], k, at, state.velocity, state.drive)
-        keep(records[1], k, at, state.velocity, state.drive)
+            state = sample_quietly(controller, state, strobe)
+        memory.drives[k - first] = state.drive
+        drive = _delayed(memory.delay, k, state.drive)
+        force_n = converted(world.converter, world.push_n + world.force_lsb_n * drive)
+        keep(memory.overview, k, at, state.velocity, state.drive)
+        keep(memory.detail, k, at, state.velocity, state.drive)
 
-        moved, quiet = advance_quietly(world.plant, motion, cell, force_n, world.before)
-        if quiet:
-            motion = moved
-        elif n_edges >= 0:
-            motion, cell, n_edges = advance(
-                world.plant, world.encoder, motion, cell, force_n, world.before,
-                strobe + world.latency, before_clocks, edge_clocks, edge_levels, n_edges,
-            )  # fmt: skip
+        interval = Interval(world.before, changed, timing.clocks_per_sample - timing.latency)
+        after, quiet = advance_quietly(plant, moment, force_n, interval)
+        moment = after if quiet else advance(plant, world.encoder, moment, force_n, interval, edges)
         k += 1
-    return state, Progress(k, motion, cell, force_n, n_edges)
+    return state, Progress(k, moment, force_n)

@@ -41,12 +41,13 @@ class Trace:
     force_n: np.ndarray
 
 
-def new(spec: AxisSpec, floating: bool, trigger_m: float, stride: int, room: int) -> Record:
-    """Return an empty record for `room` samples."""
+def new(spec: AxisSpec, number: type, trigger_m: float, stride: int, room: int) -> Record:
+    """Return an empty record for `room` samples, its estimates of a type of number."""
     position, velocity, force = (np.zeros(room) for _ in range(3))
-    estimate = np.zeros(room, np.float64 if floating else np.int64)
     mark, sample = np.array([0, -1]), np.zeros(room, np.int64)
-    return Record(trigger_m, stride, spec.force_resolution_n, mark, sample, position, velocity, estimate, force)
+    return Record(
+        trigger_m, stride, spec.force_resolution_n, mark, sample, position, velocity, np.zeros(room, number), force
+    )
 
 
 def trace_of(record: Record, spec: AxisSpec) -> Trace:

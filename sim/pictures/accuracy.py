@@ -49,24 +49,24 @@ def _figure_1(curves: list[Curve], rows: list[dict]) -> Figure:
         spec = axis_spec(row["estimator"], sample_hz, row["acceleration_max_mm_s2"] / 1e3, row["gains"])
         parts = velocities(signal, spec, row["output"], backend, offsets(row["encoder_phase_error_counts"]))
         estimate = np.concatenate([part for _, part, _ in parts]) * 1e3
-        # The first on top: what chatters hides what lags.
-        line = {"color": style["color"], "lw": 0.9, "zorder": 3 - index / len(curves)}
+        # The first on top: what chatters would hide what lags, and lets the truth be seen through it.
+        line = {"color": style["color"], "lw": 0.9, "zorder": 3 - index / len(curves), "alpha": 0.5 if index else 1.0}
         for axes in drawn:
             axes.plot(times, estimate, label=curve.label, **line)
         panels["e"].plot(times, estimate - exact, label=f"{curve.label}: RMS {row['rms_mm_s']:.3g} mm/s", **line)
-        # An estimate begins far off: the error is framed from where it counts.
+    # An estimate begins far off: the error is framed from where it counts.
     judged = times >= signal.judged_from_s
     _frame(panels["e"], [line.get_ydata()[judged] for line in panels["e"].lines])
     for axes in panels.values():
         axes.set_xlabel("time (s)")
         axes.set_ylabel("error (mm/s)" if axes is panels["e"] else "velocity (mm/s)")
-    for name in ("a", "e"):
-        name_above(panels[name], columns=3)
+    for name, columns in (("a", 3), ("e", 1)):
+        name_above(panels[name], columns)
         panels[name].set_xlim(0, signal.seconds)
     panels["e"].axvline(signal.judged_from_s, color=MARK, lw=0.9, ls="--")
     panels["e"].annotate(
         "judged from here", (signal.judged_from_s, 0.97), (3, 0), xycoords=("data", "axes fraction"), va="top",
-        textcoords="offset points", color=MARK, fontsize=LABEL_PT,
+        textcoords="offset points", color=MARK, fontsize=LABEL_PT, bbox={"fc": "white", "lw": 0, "pad": 1},
     )  # fmt: skip
     for axes, (title, (begin, end)) in zip((panels["b"], panels["c"]), PIECES.items(), strict=True):
         inside = exact[(times >= begin) & (times <= end)]

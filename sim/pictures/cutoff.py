@@ -32,13 +32,13 @@ def draw(cutoffs: Cutoffs) -> Figure:
 
 
 def _areas(device: Device) -> dict[float, float]:
-    """Return the areas by cutoff, in thousands of kN/m N s/m."""
-    return {cutoff_hz: each.area / 1e6 for cutoff_hz, each in device.maps.items()}
+    """Return the areas by cutoff, in kN/m N s/m."""
+    return {cutoff_hz: each.area / 1e3 for cutoff_hz, each in device.maps.items()}
 
 
 def _draw(axes: Axes, device: Device) -> None:
     """Draw one device's areas."""
-    areas, unfiltered = _areas(device), device.unfiltered.area / 1e6
+    areas, unfiltered = _areas(device), device.unfiltered.area / 1e3
     for cutoff_hz in PAPERS_HZ:
         axes.axvline(cutoff_hz, color=THEORY, ls=":", lw=0.9)
     axes.axvspan(*device.level_hz, color=FILTERED, alpha=0.15, lw=0)
@@ -49,24 +49,24 @@ def _draw(axes: Axes, device: Device) -> None:
         axes.plot(leaving, [areas[each] for each in leaving], **style)
     axes.plot(device.best_hz, areas[device.best_hz], ls="", marker="*", ms=13, color=FILTERED, mec="black")
     axes.set_title(_settings(device), fontsize=LABEL_PT)
-    axes.set_ylabel("area\n(MN/m N s/m)")
-    axes.set_ylim(0, 1.15 * max(*areas.values(), unfiltered, 1e-6))
+    axes.set_ylabel("area (kN/m N s/m)")
+    axes.set_ylim(0, 1.15 * max(*areas.values(), unfiltered, 1e-3))
 
 
 def _label(axes: Axes, device: Device) -> None:
     """Name the best cutoff, what is as good, the area without a filter, and what leaves the map."""
     areas, (low, high) = _areas(device), device.level_hz
-    unfiltered = device.unfiltered.area / 1e6
-    best = f"best: {device.best_hz:.0f} Hz, {areas[device.best_hz]:.3g}" + ", at the end" * device.at_end
+    unfiltered = device.unfiltered.area / 1e3
+    best = f"best: {device.best_hz:.0f} Hz, {areas[device.best_hz]:.0f}" + ", at the end" * device.at_end
     best += f"\nwithin {LEVEL * 100:g} % of that: {low:.0f} to {high:.0f} Hz"
-    left = axes.get_xlim()[0]
+    level = [(hz, unfiltered) for hz in axes.get_xlim()]
     labels = [
         (best, (device.best_hz, areas[device.best_hz]), FILTERED),
-        (f"no filter: {unfiltered:.3g}", (1.25 * left, unfiltered), UNFILTERED),
+        (f"no filter: {unfiltered:.0f}", level, UNFILTERED),
     ]
     if leaving := [cutoff_hz for cutoff_hz, each in device.maps.items() if each.leaves]:
         labels.append(("and more: the region leaves the map", (leaving[0], areas[leaving[0]]), FILTERED))
-    label_points(axes, labels, lines=[list(areas.items()), [(left, unfiltered), (axes.get_xlim()[1], unfiltered)]])
+    label_points(axes, labels, lines=[list(areas.items())])
 
 
 def _settings(device: Device) -> str:

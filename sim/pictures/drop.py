@@ -9,25 +9,32 @@ from ..studies.drop import PAPERS, STARTS, STIFFNESSES_N_PER_M
 from ..studies.drop_result import STIFFNESS_N_PER_M, Drop, Law
 from ..walls.grid import grid_of
 from .labels import label_points
-from .style import AT_REST_M, COLOURS, THEORY, ink, length_text, looks, new_figure, page, plain_decades
+from .style import AT_REST_M, COLOURS, LABEL_PT, THEORY, ink, length_text, looks, new_figure, page, plain_decades
 
 OUTSIDE = ("mass", "count", "delay", "stiffness")
 """What was changed that is not in the law."""
-FACTORS = "osDv^<>Pp*h"
-"""A marker for each thing that was changed."""
+KINDS = {
+    "changed: friction, push, gains, samples a force": (
+        lambda factor: factor not in (*OUTSIDE, "none"),
+        {"marker": "o", "color": COLOURS["levant"], "ms": 5},
+    ),
+    f"changed, not in the law: {', '.join(OUTSIDE)}": (
+        lambda factor: factor in OUTSIDE,
+        {"marker": "s", "color": COLOURS["butterworth"], "mfc": "none", "ms": 6},
+    ),
+    "as it is": (lambda factor: factor == "none", {"marker": "D", "color": "black", "ms": 5}),
+}
+"""Which of the things that were changed have which style."""
+BAND = 2.0
+"""Laws that are wrong by more times than this have their names."""
+COLUMNS = 3
+"""Of panels."""
 
 
 @page
 def draw(drop: Drop) -> dict[str, Figure]:
     """Return the pictures: `rest`, `law`, `ends` and `maps`."""
     return {"rest": _rest(drop), "law": _law(drop), "ends": _ends(drop), "maps": _maps(drop)}
-
-
-def _styles(drop: Drop) -> dict[str, dict]:
-    """Return the line style of each method, by name."""
-    scenes = {name: each.case.scene.controller for name, each in drop.maps.items()}
-    styles = looks([(one.estimator, one.output) for one in scenes.values()])
-    return dict(zip(scenes, styles, strict=True))
 
 
 def _inks(drop: Drop) -> dict[str, str]:
@@ -51,7 +58,7 @@ def _predicted(drop: Drop) -> dict[str, float]:
 def _rest(drop: Drop) -> Figure:
     """Return the picture of the hits of one wall: a row a method, B along it, and what became of each hit."""
     title = (
-        f"What is quiet at rest lets the handle rest in walls of more damping; K = {STIFFNESS_N_PER_M / 1e3:g} kN/m, "
+        f"What becomes of the handle in a wall of K = {STIFFNESS_N_PER_M / 1e3:g} kN/m and more and more damping, "
         f"two hits each\n{_setting(drop)}"
     )
     picture = new_figure(4.5, title)
@@ -105,51 +112,50 @@ def _finite(law: Law) -> bool:
 def _law(drop: Drop) -> Figure:
     """Return the picture of the law: measured against predicted, one thing changed at a time, a panel a method."""
     title = (
-        "Up to which B the handle comes to rest, one thing changed at a time: predicted from the estimator alone,\n"
-        f"measured in the closed loop\n{_setting(drop)}"
+        "Up to which B the handle comes to rest: predicted from the estimator alone, measured in the closed loop\n"
+        f"{_setting(drop)}; one thing changed at a time"
     )
     picture = new_figure(4.9, title)
     panels = picture.subplots(1, len(PAPERS), sharex=True, sharey=True)
     known = [each for each in drop.laws if each.method in PAPERS and _finite(each)]
-    factors = list(dict.fromkeys(each.factor for each in known))
-    ends = [value for each in known for value in (each.predicted_n_s_per_m, each.measured_n_s_per_m)] or [1.0, 2.0]
+    ends = [value for each in known for value in _spot(each)] or [1.0, 2.0]
     line = np.array([min(ends) / 1.5, max(ends) * 1.5])
     for axes, name in zip(panels, PAPERS, strict=True):
-        axes.fill_between(line, line / 2, line * 2, color="0.92", lw=0)
-        axes.plot(line, line, color="black", lw=1)
-        for each in (each for each in known if each.method == name):
-            inside = each.factor not in OUTSIDE
-            colour = "black" if each.factor == "none" else COLOURS["levant"] if inside else COLOURS["butterworth"]
-            style = {"marker": FACTORS[factors.index(each.factor)], "color": colour, "ms": 6 + 3 * (not inside)}
-            axes.plot(
-                each.predicted_n_s_per_m, each.measured_n_s_per_m, mfc=colour if inside else "none", ls="", **style
-            )
+        axes.fill_between(line, line / BAND, line * BAND, color="0.92", lw=0, label=f"within a factor of {BAND:g}")
+        axes.plot(line, line, color="black", lw=1, label="measured = predicted")
+        own = [each for each in known if each.method == name]
+        for label, (chosen, style) in KINDS.items():
+            spots = [_spot(each) for each in own if chosen(each.factor)]
+            axes.plot(*np.array(spots).reshape(-1, 2).T, ls="", label=label, **style)
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.set_xlim(*line)
-        axes.set_ylim(*line)
         plain_decades(axes.xaxis)
         plain_decades(axes.yaxis)
+        axes.set_xlim(*line)
+        axes.set_ylim(*line)
         axes.set_title(drop.maps[name].case.label)
         axes.set_xlabel("predicted: B (N s/m)")
     panels[0].set_ylabel("measured: B (N s/m)")
-    for index, factor in enumerate(factors):
-        inside = factor not in OUTSIDE
-        colour = "black" if factor == "none" else COLOURS["levant"] if inside else COLOURS["butterworth"]
-        text = "as it is" if factor == "none" else factor if inside else f"{factor} (not in the law)"
-        style = {"marker": FACTORS[index], "color": colour, "mfc": colour if inside else "none", "ms": 6}
-        panels[0].plot([], [], ls="", label=text, **style)
-    panels[0].plot([], [], color="black", lw=1, label="measured = predicted")
-    panels[0].fill_between([], [], [], color="0.92", label="within a factor of 2")
-    picture.legend(loc="outside lower center", ncols=4, frameon=False)
+    picture.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    for axes, name in zip(panels, PAPERS, strict=True):
+        own = [each for each in known if each.method == name]
+        far = [each for each in own if not 1 / BAND <= each.measured_n_s_per_m / each.predicted_n_s_per_m <= BAND]
+        labels = [(f"{each.factor} {each.value}", _spot(each), "black") for each in far]
+        label_points(
+            axes, labels, avoid=[_spot(each) for each in own if each not in far], lines=[[(x, x) for x in line]]
+        )
     return picture
+
+
+def _spot(law: Law) -> tuple[float, float]:
+    return law.predicted_n_s_per_m, law.measured_n_s_per_m
 
 
 def _ends(drop: Drop) -> Figure:
     """Return the picture of where rest ends, and where stability does, from soft walls to stiff ones."""
     title = (
-        f"In soft walls rest and stability end long before the edge of the map, which is that of stiff ones\n"
-        f"(three of four of {STARTS} hits at K of {', '.join(f'{k / 1e3:g}' for k in STIFFNESSES_N_PER_M)} kN/m)"
+        f"Up to which B three of four of {STARTS} hits come to rest, and are stable, at K of "
+        f"{', '.join(f'{k / 1e3:g}' for k in STIFFNESSES_N_PER_M)} kN/m\n{_setting(drop)}"
     )
     picture = new_figure(4.9, title)
     panels = picture.subplots(1, len(PAPERS), sharex=True, sharey=True)
@@ -179,24 +185,36 @@ def _ends(drop: Drop) -> Figure:
 
 
 def _maps(drop: Drop) -> Figure:
-    """Return the picture of the stable region of each method."""
+    """Return the picture of the stable regions: a panel a method, the others pale behind it."""
     grid = grid_of(next(iter(drop.maps.values())).case.scene)
     title = (
-        f"The stable region of each method, its area as a multiple of the paper's best\n{drop.scene.name}, "
-        f"maps in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, {grid.damping_step_n_s_per_m:.3g} N s/m"
+        "The stable region of each method; in brackets its area, as a multiple of the paper's best\n"
+        f"{drop.scene.name}, maps in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, "
+        f"{grid.damping_step_n_s_per_m:.3g} N s/m"
     )
-    picture = new_figure(5.0, title)
-    axes = picture.subplots()
-    styles, inks, labels = _styles(drop), _inks(drop), []
-    for name, each in drop.maps.items():
-        edge = [(edge.damping_n_s_per_m, edge.stable_n_per_m / 1e3) for edge in each.edges]
+    picture = new_figure(6.2, title)
+    rows = math.ceil(len(drop.maps) / COLUMNS)
+    panels = picture.subplots(rows, COLUMNS, sharex=True, sharey=True, squeeze=False)
+    inks = _inks(drop)
+    edges = {
+        name: [(edge.damping_n_s_per_m, edge.stable_n_per_m / 1e3) for edge in each.edges]
+        for name, each in drop.maps.items()
+    }
+    for axes, (name, each) in zip(panels.flat, drop.maps.items(), strict=False):
+        for other in edges.values():
+            axes.plot(*zip(*other, strict=True), color="0.85", lw=0.9)
+        controller = each.case.scene.controller
+        (style,) = looks([(controller.estimator, controller.output)])
+        axes.plot(*zip(*edges[name], strict=True), **style | {"lw": 1.6, "ms": 3.5})
         times = drop.of_papers(name)
-        text = each.case.label if times is None else f"{each.case.label}: {times:.2f}"
-        axes.plot(*zip(*edge, strict=True), **styles[name])
-        labels.append((text, edge, inks[name]))
-    axes.set_xlabel("damping B of the wall (N s/m)")
-    axes.set_ylabel("largest stable stiffness K (kN/m)")
-    axes.set_xlim(0, None)
-    axes.set_ylim(0, 1.08 * axes.get_ylim()[1])
-    label_points(axes, labels)
+        label = each.case.label.replace(", ", ",\n")
+        axes.set_title(label if times is None else f"{label} ({times:.2f})", color=inks[name], fontsize=LABEL_PT)
+    for axes in panels.flat[len(drop.maps) :]:
+        axes.set_axis_off()
+    panels[0, 0].set_xlim(0, None)
+    panels[0, 0].set_ylim(0, None)
+    for axes in panels[-1]:
+        axes.set_xlabel("damping B (N s/m)")
+    for axes in panels[:, 0]:
+        axes.set_ylabel("stiffness K (kN/m)")
     return picture

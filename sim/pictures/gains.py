@@ -30,16 +30,16 @@ def draw(search: Search) -> Figure:
     panels = picture.subplots(len(ROWS), len(search.maps), sharex=True, sharey=True)
     colours = mpl.colormaps["viridis"].with_extremes(bad="0.8")
     # The areas in place are parts of these.
-    largest = max(np.nanmax(search.areas(output, in_place=False)) for output in search.maps) / 1e6 or 1.0
+    largest = max(np.nanmax(search.areas(output, in_place=False)) for output in search.maps) / 1e3 or 1.0
     for row, (in_place, text) in zip(panels, ROWS.items(), strict=True):
         for axes, output in zip(row, search.maps, strict=True):
-            area = search.areas(output, in_place) / 1e6
+            area = search.areas(output, in_place) / 1e3
             mesh = axes.pcolormesh(search.lambdas, search.alphas, area, cmap=colours, vmin=0, vmax=largest)
             axes.grid(visible=False)
             axes.set_xscale("log")
             axes.set_yscale("log")
             axes.set_title(f"output {output}: {text}")
-    picture.colorbar(mesh, ax=panels, label="area of the stable region (MN/m N s/m)", aspect=40, pad=0.02)
+    picture.colorbar(mesh, ax=panels, label="area of the stable region (kN/m N s/m)", aspect=40, pad=0.02)
     for axes in panels[-1]:
         axes.set_xlabel(r"$\lambda$ (m$^{1/2}$/s)")
     for axes in panels[:, 0]:

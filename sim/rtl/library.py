@@ -181,6 +181,7 @@ class Hardware:
         def address(name: str) -> int:
             return ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value
 
-        return Rtl(address("axis_advance"), address("axis_read"), self._context)
+        latency = self.spec.design.latency_to_drive
+        return Rtl(address("axis_advance"), address("axis_read"), self._context, latency)
 
     start = RtlState(0, 0, 0)

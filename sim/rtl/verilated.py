@@ -9,6 +9,7 @@ class Rtl(NamedTuple):
     advance: int
     read: int
     context: int
+    latency: int  # of the axis, clocks from a strobe to the changed drive
 
 
 class RtlState(NamedTuple):

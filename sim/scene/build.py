@@ -2,11 +2,12 @@
 
 from ..loop import loop
 from ..world import device
+from ..world.advance import Moment
 from ..world.converter import AS_IT_IS, Converter, Pulse, converted, width_of
 from ..world.encoder import Encoder, locate
 from ..world.euler import Stepped, stepped
+from ..world.linear import State
 from ..world.rigid import Coulomb, Handle, Motion, Rigid, span
-from ..world.taylor import State
 from .schema import Scene
 
 
@@ -61,14 +62,15 @@ def work_of(world: loop.World) -> int:
     if isinstance(plant, Rigid):
         return 1
     step_s = plant.step_s if isinstance(plant, Stepped) else plant.leg_s
-    pulses = world.clocks_per_sample // plant.pulse.period if plant.pulse.period else 0
-    return 1 + int(world.clocks_per_sample / world.encoder.clock_hz / step_s) + 2 * pulses
+    pulses = world.timing.clocks_per_sample // plant.pulse.period if plant.pulse.period else 0
+    return 1 + int(world.timing.clocks_per_sample / world.encoder.clock_hz / step_s) + 2 * pulses
 
 
 def world_of(scene: Scene) -> loop.World:
     """Return the loop's constants for a scene."""
-    spec, latency = scene.spec, scene.spec.design.latency_to_drive
-    before_s, after_s = (spec.clocks_per_sample - latency) / spec.clock_hz, latency / spec.clock_hz
+    spec, timing = scene.spec, scene.spec.design.timing
+    after_s = timing.latency / spec.clock_hz
+    before_s = (timing.clocks_per_sample - timing.latency) / spec.clock_hz
     parts = device_of(scene)
     if parts is None:
         handle = Handle(scene.handle.mass_kg, scene.handle.viscous_n_s_per_m)
@@ -84,8 +86,7 @@ def world_of(scene: Scene) -> loop.World:
         converter=_converter(scene),
         push_n=scene.protocol.push_n,
         force_lsb_n=spec.force_resolution_n,
-        clocks_per_sample=spec.clocks_per_sample,
-        latency=latency,
+        timing=timing,
         before=before,
         after=after,
     )
@@ -99,4 +100,4 @@ def start_of(scene: Scene, world: loop.World) -> loop.Progress:
         pulse = world.plant.pulse
         width = width_of(pulse, push_n) if pulse.period else 0
         motion = State(position_m, 0.0, (0.0, 0.0, 0.0), width)
-    return loop.Progress(0, motion, locate(world.encoder, position_m), push_n, 0)
+    return loop.Progress(0, Moment(motion, locate(world.encoder, position_m), 0), push_n)

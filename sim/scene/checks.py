@@ -6,8 +6,8 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from ...model import quadrature
 from ...model.checks import FieldError
+from ...model.quadrature_speed import max_edge_rate
 from ..world import device
 from ..world.euler import longest_s
 from .build import device_of
@@ -65,7 +65,7 @@ def _check_axis(scene: Scene) -> None:
         raise ValueError(f"encoder.{error}") from None
 
     error_counts = max(map(abs, scene.encoder.offsets))
-    fastest = spec.count_m * quadrature.max_edge_rate(spec.clock_hz, scene.controller.glitch_clocks, error_counts)
+    fastest = spec.count_m * max_edge_rate(spec.clock_hz, scene.controller.glitch_clocks, error_counts)
     if spec.speed_max_m_per_s > fastest:
         raise ValueError(
             f"controller.speed_max_m_per_s must be at most {fastest:g}, the decoder's limit at this clock, count size, "

@@ -16,10 +16,13 @@ import numpy as np
 from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, ReadOnly, Timer
 
+from ...model.axis import strobe_of
+from ...model.stamped import room_for
 from ..loop import loop
+from ..loop.controllers import taken_off
 from ..scene.build import start_of, world_of
 from ..scene.load import load
-from ..world.advance import advance
+from ..world.advance import Interval, advance
 from ..world.converter import converted
 from ..world.encoder import level
 
@@ -32,9 +35,9 @@ async def closed_loop(dut):
     """Close the loop for some samples; write the force words' digest and the seconds taken."""
     order = json.loads(os.environ["HARDWALL_LOOP"])
     scene = load(order["scene"])
-    world, edges = world_of(scene), tuple(np.zeros(loop.EDGE_CAPACITY, np.int64) for _ in range(2))
-    _, motion, cell, force_n, n_edges = start_of(scene, world)
-    await _open(dut, scene, int(level(cell.number)))
+    world, edges = world_of(scene), room_for(loop.EDGE_CAPACITY)
+    _, moment, force_n = start_of(scene, world)
+    await _open(dut, scene, int(level(moment.cell.number)))
     # `_open` has run clock 0. Half a period on, a pin is set between two rising edges: in clock n, for edge n to see.
     await Timer(PERIOD_NS // 2, "ns")
 
@@ -43,23 +46,19 @@ async def closed_loop(dut):
     words: list[int] = []
     began = time.perf_counter()
     for k in range(order["samples"]):
-        strobe = (k + 1) * world.clocks_per_sample - 1
-        until = strobe + world.latency
-        motion, cell, n_edges = advance(
-            world.plant, world.encoder, motion, cell, force_n, world.after,
-            strobe, world.latency, *edges, n_edges,
-        )  # fmt: skip
+        strobe = strobe_of(world.timing, k)
+        until = strobe + world.timing.latency
+        interval = Interval(world.after, strobe, world.timing.latency)
+        moment = advance(world.plant, world.encoder, moment, force_n, interval, edges)
         taken = 0
-        while taken < n_edges and edges[0][taken] < until:
-            if edges[0][taken] > now:
-                await Timer(int(edges[0][taken] - now) * PERIOD_NS, "ns")
-                now = int(edges[0][taken])
-            dut.encoder_a.value = int(edges[1][taken]) & 1
-            dut.encoder_b.value = int(edges[1][taken]) >> 1
+        while taken < moment.n_edges and edges.clocks[taken] < until:
+            if edges.clocks[taken] > now:
+                await Timer(int(edges.clocks[taken] - now) * PERIOD_NS, "ns")
+                now = int(edges.clocks[taken])
+            dut.encoder_a.value = int(edges.levels[taken]) & 1
+            dut.encoder_b.value = int(edges.levels[taken]) >> 1
             taken += 1
-        for array in edges:
-            array[: n_edges - taken] = array[taken:n_edges]
-        n_edges -= taken
+        moment = moment._replace(n_edges=taken_off(edges, moment.n_edges, taken))
         if until > now:
             await Timer((until - now) * PERIOD_NS, "ns")
             now = until
@@ -67,11 +66,10 @@ async def closed_loop(dut):
         words.append(drive)
         late.append(drive)
         force_n = converted(world.converter, world.push_n + world.force_lsb_n * late.pop(0))
-        if world.clocks_per_sample > world.latency:
-            motion, cell, n_edges = advance(
-                world.plant, world.encoder, motion, cell, force_n, world.before,
-                until, world.clocks_per_sample - world.latency, *edges, n_edges,
-            )  # fmt: skip
+        left = world.timing.clocks_per_sample - world.timing.latency
+        if left:
+            interval = Interval(world.before, until, left)
+            moment = advance(world.plant, world.encoder, moment, force_n, interval, edges)
     seconds = time.perf_counter() - began
     actuations = np.array(words[:: scene.spec.samples_per_actuation], "<i4")
     report = {"seconds": seconds, "force_sha256": hashlib.sha256(actuations.tobytes()).hexdigest()}

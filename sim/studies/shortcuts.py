@@ -41,7 +41,7 @@ class Shortcut:
         axis: of what it is a shortcut.
         label: in tables and pictures; no two have the same.
         changes: of the scene, by dotted key.
-        backend: one of `hit.BACKENDS`.
+        backend: one of `backends.BACKENDS`.
         coarser: times by which a map's steps of K are longer.
     """
 

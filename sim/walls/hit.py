@@ -1,11 +1,10 @@
 """Hitting the wall: the founding paper's protocol on any scene and backend."""
 
-import hashlib
 import json
 import math
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,15 +12,15 @@ from pathlib import Path
 import numpy as np
 
 from ...model import stamped
-from ...model.axis import Axis
 from ..jobs.result import Summary
 from ..jobs.whole_file import whole_file
 from ..loop import loop, record
+from ..loop.backends import Opened, is_exact, number_of, opened
 from ..scene.build import output_step_n, start_of, work_of, world_of
 from ..scene.schema import Scene
 from ..world.encoder import level
+from .tally import Tally
 
-BACKENDS = ("float", "fixed", "rtl")
 CHUNK = 1 << 16
 """Samples between two looks at progress, and at whether the user wants no more; fewer of those that take long."""
 LOOK_S = 0.1
@@ -31,6 +30,9 @@ DETAIL_FROM_M = -0.2e-3
 DETAIL_S = 0.1
 WAVEFORM_CLOCKS = 60_000
 """Length of a waveform; a fifth of it before the contact."""
+
+Marks = Iterable[tuple[int, Callable[[], None]]]
+"""At which samples to do what."""
 
 
 @dataclass
@@ -131,51 +133,81 @@ class Hit(Summary):
         }
 
 
-class _Tally:
-    """Mean, RMS, largest force and force words of a run, chunk by chunk."""
+class _Loop:
+    """The closed loop of a scene on a backend: where it stands, the arrays that it writes to, and its tally."""
 
-    def __init__(self, scene: Scene, exact: bool):
-        spec, protocol = scene.spec, scene.protocol
-        self._hopeless = round(protocol.measure_s * spec.sample_hz) * (protocol.threshold_mm * 1e-3) ** 2
-        self._settled = round(protocol.settle_s * spec.sample_hz)
-        self._mean_from = self._settled - round(protocol.mean_s * spec.sample_hz)
-        self._decimation = spec.samples_per_actuation
-        self._digest = hashlib.sha256() if exact else None
-        self._sum = self._squares = 0.0
-        self._measured = 0
-        self.largest_drive, self.farthest_m = 0, -math.inf
+    def __init__(self, scene: Scene, backend: str, traces: bool, until_sure: bool):
+        self.scene, self.backend, self.until_sure = scene, backend, until_sure
+        self.world = world_of(scene)
+        self.at = start_of(scene, self.world)
+        self.start_level = int(level(self.at.moment.cell.number))
+        self.tally = Tally(scene, is_exact(backend))
+        number, spec = number_of(backend), scene.spec
+        chunk = max(round(LOOK_S * spec.sample_hz), 1) if until_sure else CHUNK
+        self.chunk = max(1, min(chunk, CHUNK // work_of(self.world)))
+        overview = detail = None
+        if traces:
+            stride = max(1, scene.samples // OVERVIEW_POINTS)
+            overview = record.new(spec, number, -np.inf, stride, scene.samples // stride + 1)
+            detail = record.new(spec, number, DETAIL_FROM_M, 1, round(DETAIL_S * spec.sample_hz))
+        self.memory = loop.Memory(
+            edges=stamped.room_for(loop.EDGE_CAPACITY),
+            delay=np.zeros(scene.delay_samples, number) if scene.delay_samples else None,
+            overview=overview,
+            detail=detail,
+            positions=np.zeros(self.chunk),
+            drives=np.zeros(self.chunk, number),
+        )
+
+    def run(self, axis: Opened, marks: Marks, progress: Callable[[int], None] | None) -> Hit:
+        """Run the loop in chunks that end at the `marks`, and return what came of it.
+
+        Raises:
+            RuntimeError: if the handle outran every decoder's limit by far.
+        """
+        controller, state, _ = axis
+        actions, total = dict(marks), self.scene.samples
+        # Compiling is not running: a call with nothing to do keeps it out of the time.
+        loop.run(self.world, controller, state, self.at, self.memory, 0)
+        began = time.perf_counter()
+        while self.at.sample < total and not (self.until_sure and self.tally.sure_unstable):
+            first = self.at.sample
+            if first in actions:
+                actions.pop(first)()
+            until = min(first + self.chunk, total, *(sample for sample in actions if sample > first))
+            state, self.at = loop.run(self.world, controller, state, self.at, self.memory, until)
+            if self.lost_edges:
+                break
+            self.tally.add(first, self.memory.positions[: until - first], self.memory.drives[: until - first])
+            if progress:
+                progress(until)
+        return self._hit(time.perf_counter() - began, int(state.flags))
 
     @property
-    def mean_m(self) -> float:
-        return self._sum / (self._settled - self._mean_from)
+    def lost_edges(self) -> bool:
+        """Whether the handle outran the encoder by far; an error unless the run is only `until_sure`."""
+        lost = self.at.moment.n_edges < 0
+        if lost and not self.until_sure:
+            when = self.at.sample / self.scene.spec.sample_hz
+            raise RuntimeError(f"the handle passed more than {loop.EDGE_CAPACITY} edges in a sample, at {when:g} s")
+        return lost
 
-    @property
-    def rms_m(self) -> float:
-        """Of what was measured; infinite if nothing was."""
-        return (self._squares / self._measured) ** 0.5 if self._measured else math.inf
-
-    @property
-    def sure_unstable(self) -> bool:
-        """Whether the rest of the run cannot make it stable: its squares already exceed what the threshold allows."""
-        return self._squares >= self._hopeless
-
-    @property
-    def force_sha256(self) -> str | None:
-        return self._digest and self._digest.hexdigest()
-
-    def add(self, first: int, positions: np.ndarray, drives: np.ndarray) -> None:
-        def part(start: int, stop: int) -> np.ndarray:
-            return positions[max(start - first, 0) : max(stop - first, 0)]
-
-        self._sum += float(part(self._mean_from, self._settled).sum())
-        rest = part(self._settled, first + len(positions))
-        if len(rest):
-            self._squares += float(np.square(rest - self.mean_m).sum())
-            self._measured += len(rest)
-        self.largest_drive = max(self.largest_drive, float(np.abs(drives).max()))
-        self.farthest_m = max(self.farthest_m, float(positions.max()))
-        if self._digest:
-            self._digest.update(drives[-first % self._decimation :: self._decimation].astype("<i4").tobytes())
+    def _hit(self, seconds: float, flags: int) -> Hit:
+        scene, tally, memory = self.scene, self.tally, self.memory
+        return Hit(
+            scene=scene,
+            backend=self.backend,
+            samples=self.at.sample,
+            seconds=seconds,
+            mean_m=tally.mean_m,
+            rms_m=math.inf if self.lost_edges else tally.rms_m,
+            touched=tally.farthest_m > 0 or tally.largest_drive > 0,
+            max_force_n=tally.largest_drive * scene.spec.force_resolution_n,
+            flags=scene.spec.design.flag_names(flags),
+            force_sha256=tally.force_sha256,
+            overview=memory.overview and record.trace_of(memory.overview, scene.spec),
+            detail=memory.detail and record.trace_of(memory.detail, scene.spec),
+        )
 
 
 def run(
@@ -190,7 +222,7 @@ def run(
 
     Args:
         scene: from `scene.load`.
-        backend: one of `BACKENDS`.
+        backend: one of `backends.BACKENDS`.
         traces: keep samples of the whole run and of the contact.
         progress: called with the number of samples done.
         waveform: for `rtl`, an FST file to write, of every signal around the contact.
@@ -200,31 +232,14 @@ def run(
     Raises:
         RuntimeError: if the handle outran every decoder's limit by far, or the RTL could not be built.
     """
-    floating, spec, world = backend == "float", scene.spec, world_of(scene)
-    at = start_of(scene, world)
-    start_level = int(level(at.cell.number))
-    records = None, None
-    if traces:
-        stride = max(1, scene.samples // OVERVIEW_POINTS)
-        records = (
-            record.new(spec, floating, -np.inf, stride, scene.samples // stride + 1),
-            record.new(spec, floating, DETAIL_FROM_M, 1, round(DETAIL_S * spec.sample_hz)),
-        )
-    if backend != "rtl":
-        controller, state = stamped.controller(Axis(spec, floating, **scene.parameters), start_level)
-        return _closed_loop(scene, backend, world, controller, state, at, records, progress, (), until_sure)
-
-    from ..rtl.library import Hardware  # noqa: PLC0415  (the other backends need neither Amaranth nor a C++ compiler)
-
-    with Hardware(spec, scene.words, start_level, traced=waveform is not None) as hardware, _vcd(waveform) as vcd:
+    closed = _Loop(scene, backend, traces, until_sure)
+    traced = waveform is not None
+    with opened(scene.spec, backend, scene.parameters, closed.start_level, traced) as axis, _vcd(waveform) as vcd:
         # What the hardware will do is known before it runs: the contact is where the bit-accurate model has it.
-        marks = _waveform_marks(scene, hardware, vcd) if waveform else ()
-        result = _closed_loop(
-            scene, backend, world, hardware.controller, hardware.start, at, records, progress, marks, until_sure
-        )
-        if waveform:
-            hardware.end_trace()
-        return result
+        result = closed.run(axis, _waveform_marks(scene, axis.hardware, vcd) if traced else (), progress)
+        if traced:
+            axis.hardware.end_trace()
+    return result
 
 
 @contextmanager
@@ -241,52 +256,9 @@ def _vcd(waveform: Path | None) -> Iterator[Path | None]:
         vcd_to_fst(vcd, waveform)
 
 
-def _waveform_marks(scene: Scene, hardware, vcd: Path) -> list[tuple[int, Callable[[], None]]]:
+def _waveform_marks(scene: Scene, hardware, vcd: Path) -> Marks:
     """Return at which samples to do what for a waveform around the contact."""
     length = max(1, WAVEFORM_CLOCKS // scene.spec.clocks_per_sample)
     contact = round(run(scene, "fixed", traces=True).contact_s * scene.spec.sample_hz)
     first = max(contact - length // 5, 0)
     return [(first, lambda: hardware.trace(vcd)), (first + length, hardware.end_trace)]
-
-
-def _closed_loop(scene, backend, world, controller, state, at, records, progress, marks, until_sure) -> Hit:
-    """Run the loop in chunks that end at the `marks` (sample, action), and tally it."""
-    floating, total = backend == "float", scene.samples
-    number = np.float64 if floating else np.int64
-    delay = loop.Delay(np.zeros(scene.delay_samples, number)) if scene.delay_samples else None
-    edges = np.zeros(loop.EDGE_CAPACITY, np.int64), np.zeros(loop.EDGE_CAPACITY, np.int64)
-    chunk = max(round(LOOK_S * scene.spec.sample_hz), 1) if until_sure else CHUNK
-    chunk = max(1, min(chunk, CHUNK // work_of(world)))
-    positions, drives = np.zeros(chunk), np.zeros(chunk, number)
-    tally, actions = _Tally(scene, exact=not floating), dict(marks)
-    # Compiling is not running: a call with nothing to do keeps it out of the time.
-    loop.run(world, controller, state, at, delay, records, edges, positions, drives, 0)
-    began = time.perf_counter()
-    while at.sample < total and not (until_sure and tally.sure_unstable):
-        first = at.sample
-        if first in actions:
-            actions.pop(first)()
-        until = min(first + chunk, total, *(sample for sample in actions if sample > first))
-        state, at = loop.run(world, controller, state, at, delay, records, edges, positions, drives, until)
-        if at.n_edges < 0 and until_sure:
-            break
-        if at.n_edges < 0:
-            when = at.sample / scene.spec.sample_hz
-            raise RuntimeError(f"the handle passed more than {loop.EDGE_CAPACITY} edges in a sample, at {when:g} s")
-        tally.add(first, positions[: until - first], drives[: until - first])
-        if progress:
-            progress(until)
-    return Hit(
-        scene=scene,
-        backend=backend,
-        samples=at.sample,
-        seconds=time.perf_counter() - began,
-        mean_m=tally.mean_m,
-        rms_m=math.inf if at.n_edges < 0 else tally.rms_m,
-        touched=tally.farthest_m > 0 or tally.largest_drive > 0,
-        max_force_n=tally.largest_drive * scene.spec.force_resolution_n,
-        flags=scene.spec.design.flag_names(int(state.flags)),
-        force_sha256=tally.force_sha256,
-        overview=records[0] and record.trace_of(records[0], scene.spec),
-        detail=records[1] and record.trace_of(records[1], scene.spec),
-    )

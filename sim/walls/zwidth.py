@@ -131,7 +131,7 @@ def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float
         scene, text, changes: of a `Case`.
         sources: what `store.sources` gives where the map is made: results are kept under it.
         stiffness, damping: of the wall, N/m and N s/m.
-        backend: one of `hit.BACKENDS`.
+        backend: one of `backends.BACKENDS`.
 
     Raises:
         SceneError: if the scene cannot be.
@@ -195,7 +195,7 @@ def run(
 
     Args:
         cases: what to map; the grid is each scene's own.
-        backend: one of `hit.BACKENDS`.
+        backend: one of `backends.BACKENDS`.
         known: where verdicts are kept, and looked for.
         client: of a Dask cluster; None for this process alone.
         progress: called after every verdict with how many maps are done, parts of one counted too.

@@ -1,4 +1,4 @@
-"""The device of a scene with more than a rigid handle: its parts as matrices, for `drivetrain` to advance.
+"""The device of a scene with more than a rigid handle: its parts as matrices, for `taylor` to advance.
 
 From the command u (N), what the controller asks of the motor with the steady push, to the handle, in that order. All
 is in terms of the handle's straight line: with the pulley's radius r, the motor's torque constant gives kf = Kt / r.
@@ -25,8 +25,9 @@ import numpy as np
 from scipy.linalg import matrix_balance
 
 from .converter import AS_IT_IS, Pulse
+from .linear import GRIP, PHASES, QUANTITIES, SEEN, STATES, VOLTAGE, phase_number
 from .polynomials import FIRST
-from .taylor import GRIP, PHASES, QUANTITIES, SEEN, STATES, VOLTAGE, Train, phase_number
+from .taylor import Train
 
 LEG_RATE = 1.0
 """Of a leg, the longest time that one Taylor polynomial serves: its length times the fastest rate."""
@@ -195,7 +196,7 @@ def fastest_per_s(device: Device) -> float:
 
 
 def train(device: Device, longest_s: float) -> Train:
-    """Return the device as `drivetrain` advances it.
+    """Return the device as `taylor` advances it.
 
     Args:
         device: its parts.

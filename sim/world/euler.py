@@ -1,4 +1,4 @@
-"""A linear device in fixed steps of semi-implicit Euler: the ordinary way, to hold `drivetrain` against.
+"""A linear device in fixed steps of semi-implicit Euler: the ordinary way, to hold `taylor` against.
 
 From the same tables, in steps of `step_s`; the last before the command changes is what is left:
 
@@ -21,16 +21,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ...model.compiled import compiled
-from .advance import advance, advance_quietly
+from .advance import Moment, advance, advance_quietly
 from .converter import Pulse
 from .device import Device, equations
 from .encoder import level, next_cell, stamp
-from .taylor import (
+from .linear import (
     GRIP,
     SEEN,
     STUCK,
     State,
-    Train,
     advance_in_stretches,
     along_of,
     limited_of,
@@ -39,6 +38,7 @@ from .taylor import (
     quantity,
     stretch,
 )
+from .taylor import Train
 
 ROUNDING = 1e-6
 """By which an eigenvalue of 1 may seem larger: where it is double, the root of a unit in the last place, and more."""
@@ -46,7 +46,7 @@ BISECTIONS = 50
 
 
 class Stepped(NamedTuple):
-    """A device as `stepped` makes it; fields as those of `drivetrain.Train`."""
+    """A device as `stepped` makes it; fields as those of `taylor.Train`."""
 
     tables: np.ndarray
     coulomb_n: float
@@ -129,10 +129,9 @@ def _seen(plant, state):
 
 @stretch.register(Stepped)
 @compiled
-def _stretch(
-    plant, encoder, state, cell, command_n, since_s, until_s, clock, clocks, edge_clocks, edge_levels, n_edges
-):
-    room = min(len(edge_clocks), len(edge_levels))
+def _stretch(plant, encoder, moment, command_n, since_s, until_s, interval, edges):
+    state, cell, n_edges = moment
+    room = min(len(edges.clocks), len(edges.levels))
     # A whole number of steps has no rest, whatever rounding says.
     steps = math.ceil((until_s - since_s) / plant.step_s * (1 - 1e-9))
     for number in range(steps):
@@ -145,11 +144,11 @@ def _stretch(
             upwards = after_m >= cell.upper_m
             edge_m = cell.upper_m if upwards else cell.lower_m
             at_s = begin_s + seconds * (edge_m - before_m) / (after_m - before_m)
-            edge_clocks[n_edges] = clock + stamp(encoder, upwards, at_s, clocks)
+            edges.clocks[n_edges] = interval.clock + stamp(encoder, upwards, at_s, interval.clocks)
             cell = next_cell(encoder, cell, upwards)
-            edge_levels[n_edges] = level(cell.number)
+            edges.levels[n_edges] = level(cell.number)
             n_edges += 1
         if not cell.lower_m <= after_m < cell.upper_m:
             n_edges = -1
             break
-    return state, cell, n_edges
+    return Moment(state, cell, n_edges)

@@ -13,13 +13,16 @@ All terms of a row are computed to a few units in the last place for every z, b 
 while `net` is constant, so an interval holds at most one turn (an instant of zero velocity), and its time is known too.
 
 Intervals of equal length share their coefficients: a `Span` is computed once, and only an interval that is cut by an
-event (a turn, an encoder edge) evaluates exponentials and logarithms.
+event (a turn, an encoder edge) evaluates exponentials and logarithms. Stick and slip are events at their exact time,
+and a handle that sticks keeps its `Motion` bit for bit.
 """
 
 import math
 from typing import NamedTuple
 
 from ...model.compiled import compiled
+from .advance import Moment, advance, advance_quietly
+from .encoder import level, next_cell, stamp
 
 
 class Handle(NamedTuple):
@@ -175,26 +178,55 @@ def resume(handle, coulomb, rest, force_n, seconds):
     return glide(rest, net_force(coulomb, rest, force_n), span(handle, seconds))
 
 
+@advance_quietly.register(Rigid)
 @compiled
-def advance(handle, coulomb, motion, force_n, interval):
-    """Return the `Motion` at the end of an interval of constant applied force.
-
-    Stick and slip are events at their exact time. A handle that sticks keeps its `Motion` bit for bit.
-
-    Args:
-        handle: a `Handle`.
-        coulomb: a `Coulomb`, or None for a handle without dry friction.
-        motion: the `Motion` at the start.
-        force_n: motor and wall together (N), positive towards positive positions.
-        interval: `span(handle, seconds)` of the length of the interval.
-    """
+def _advance_quietly(plant, moment, force_n, interval):
+    coulomb, (motion, cell, n_edges) = plant.coulomb, moment
     if sticks(coulomb, motion, force_n):
-        return motion
-    net_n = net_force(coulomb, motion, force_n)
-    end = glide(motion, net_n, interval)
+        return moment, True
+    end = glide(motion, net_force(coulomb, motion, force_n), interval.length)
+    after, quiet = Moment(end, cell, n_edges), cell.lower_m <= end.position_m < cell.upper_m
+    if motion.velocity_m_per_s * end.velocity_m_per_s > 0.0:
+        return after, quiet
     if coulomb is None:
-        return end
-    if turned(motion, end):
-        at_s, rest = turn(handle, motion, net_n, interval.seconds)
-        return resume(handle, coulomb, rest, force_n, interval.seconds - at_s)
-    return end
+        # A turn reaches no farther than the initial velocity would: most turns need not be looked for.
+        farthest_m = motion.position_m + motion.velocity_m_per_s * interval.length.seconds
+        return after, quiet and cell.lower_m <= farthest_m < cell.upper_m
+    return after, False
+
+
+@advance.register(Rigid)
+@compiled
+def _advance(plant, encoder, moment, force_n, interval, edges):
+    (handle, coulomb), (motion, cell, n_edges) = plant, moment
+    if sticks(coulomb, motion, force_n):
+        return moment
+    seconds = interval.length.seconds
+    net_n = net_force(coulomb, motion, force_n)
+    whole = glide(motion, net_n, interval.length)
+    # A leg is a motion in one direction under one net force. A turn makes two of the interval.
+    start, since_s = motion, 0.0
+    end, until_s = whole, seconds
+    turning = turned(motion, whole)
+    if turning:
+        until_s, end = turn(handle, motion, net_n, seconds)
+    room = min(len(edges.clocks), len(edges.levels))
+    while True:
+        while not cell.lower_m <= end.position_m < cell.upper_m and 0 <= n_edges < room:
+            upwards = end.position_m >= cell.upper_m
+            travel_m = (cell.upper_m if upwards else cell.lower_m) - start.position_m
+            at_s = since_s + reach(handle, start, net_n, until_s - since_s, travel_m)
+            cell = next_cell(encoder, cell, upwards)
+            edges.clocks[n_edges] = interval.clock + stamp(encoder, upwards, at_s, interval.clocks)
+            edges.levels[n_edges] = level(cell.number)
+            n_edges += 1
+        if not cell.lower_m <= end.position_m < cell.upper_m:
+            n_edges = -1
+        if not turning:
+            return Moment(end, cell, n_edges)
+        turning = False
+        start, since_s = end, until_s
+        end, until_s = whole, seconds
+        if coulomb is not None:
+            net_n = net_force(coulomb, start, force_n)
+            end = resume(handle, coulomb, start, force_n, until_s - since_s)

@@ -53,27 +53,28 @@ def test_a_track_is_exact_for_a_cubic():
 def test_the_pins_show_the_cell_at_every_clock(name, errors):
     """A register at the pins holds, after clock n, the level of the cell of the position at time n / clock_hz."""
     path, encoder = MOTIONS[name], Encoder(1e-6, CLOCK_HZ, offsets(*errors))
-    found = motions.edges(path, encoder, SECONDS, 2e-4, 7)
+    found = motions.encoded(path, encoder, SECONDS, 2e-4, 7)
     clocks = np.arange(1, int(SECONDS * CLOCK_HZ))
     cells = np.array([locate(encoder, motions.position(path, n / CLOCK_HZ)).number for n in clocks])
     assert found.start_cell == locate(encoder, motions.position(path, 0.0)).number
     assert found.start_level == level(found.start_cell)
-    levels = np.concatenate([[found.start_level], found.levels])
-    shown = levels[np.searchsorted(found.clocks - 7, clocks, side="right")]
-    assert (np.diff(found.clocks) >= 0).all()
+    edges = found.edges
+    levels = np.concatenate([[found.start_level], edges.levels])
+    shown = levels[np.searchsorted(edges.clocks - 7, clocks, side="right")]
+    assert (np.diff(edges.clocks) >= 0).all()
     wrong = np.flatnonzero(shown != [level(cell) for cell in cells])
     assert wrong.tolist() == []
-    assert len(found.clocks) >= np.abs(np.diff(cells)).sum() > 30
+    assert len(edges.clocks) >= np.abs(np.diff(cells)).sum() > 30
 
 
 def test_edges_do_not_depend_on_the_step():
     path, encoder = MOTIONS["decaying"], Encoder(1e-6, 50e6)
-    fine, coarse = (motions.edges(path, encoder, SECONDS, step, 0) for step in (1e-5, 3e-3))
-    assert (fine.clocks == coarse.clocks).all()
-    assert (fine.levels == coarse.levels).all()
+    fine, coarse = (motions.encoded(path, encoder, SECONDS, step, 0) for step in (1e-5, 3e-3))
+    assert (fine.edges.clocks == coarse.edges.clocks).all()
+    assert (fine.edges.levels == coarse.edges.levels).all()
 
 
 def test_more_edges_than_room_at_first():
-    found = motions.edges(motions.Steady(1.0, 0.3e-6), Encoder(1e-6, 50e6), 0.2, 1e-3, 0)
-    assert len(found.clocks) == 200_000
-    assert found.clocks.tolist()[:2] == [math.ceil(0.7e-6 * 50e6), math.ceil(1.7e-6 * 50e6)]
+    found = motions.encoded(motions.Steady(1.0, 0.3e-6), Encoder(1e-6, 50e6), 0.2, 1e-3, 0)
+    assert len(found.edges.clocks) == 200_000
+    assert found.edges.clocks.tolist()[:2] == [math.ceil(0.7e-6 * 50e6), math.ceil(1.7e-6 * 50e6)]

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from hardwall.model import quadrature, stamped
-from hardwall.sim.estimates.replay import replay, run
+from hardwall.model.axis import Timing
+from hardwall.sim.estimates.replay import replay
+from hardwall.sim.estimates.replay_axis import run
 from hardwall.sim.estimates.through_pins import through_pins
 from hardwall.sim.world.encoder import level
 from hardwall.testing import rng
@@ -82,10 +84,8 @@ def test_every_strobe_sees_the_recorded_count(clocks):
     # A finite difference as wide as the count.
     axis = axis._replace(estimator=axis.estimator._replace(count_width=width, velocity_max=2**width))
     state = stamped.State(0, 0, 0, 0, quadrature.START, spec.design.start(), 0, int(level(0)))
-    edges = np.zeros(2 * clocks, np.int64), np.zeros(2 * clocks, np.int64)
-    velocity = np.zeros(len(counts), np.int64)
-    state, left = through_pins(
-        stamped.Controller(decoder, 0, 0, axis), state, counts, clocks, 30, edges, 0, velocity, 0, len(counts)
-    )
+    controller, velocity = stamped.Controller(decoder, 0, 0, axis), np.zeros(len(counts), np.int64)
+    edges = stamped.room_for(2 * clocks)
+    state, left = through_pins(controller, state, Timing(clocks, 30), counts, velocity, edges, 0, 0, len(counts))
     assert velocity.tolist() == np.diff(counts, prepend=0).tolist()
     assert (left, state.flags) == (0, 0)

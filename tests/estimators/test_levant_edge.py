@@ -16,7 +16,7 @@ from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.levant_edge_design import FLOAT_START, LEARN_SHIFT, START
 from hardwall.model.quadrature import Seen
 from hardwall.sim.estimates import accuracy, signals
-from hardwall.sim.estimates.playback import DECODER_CLOCKS, edges_of
+from hardwall.sim.estimates.playback import DECODER_CLOCKS, encoded_signal
 from hardwall.sim.world.encoder import offsets
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, names, reset_words
@@ -247,8 +247,8 @@ def columns(axis, passed, samples: int) -> np.ndarray:
     An edge passed by clock n is stamped n, and the strobe of sample k sees those passed by clock k D.
     """
     assert passed.start_cell % 4 == 0
-    clocks = passed.clocks - axis.clocks_per_sample + 1 + DECODER_CLOCKS
-    code = np.array([0, 1, 3, 2])[np.r_[passed.start_level, passed.levels]]  # of a | b << 1, in the order upwards
+    clocks = passed.edges.clocks - axis.clocks_per_sample + 1 + DECODER_CLOCKS
+    code = np.array([0, 1, 3, 2])[np.r_[passed.start_level, passed.edges.levels]]  # of a | b << 1, in the order upwards
     step = (np.diff(code) + 1) % 4 - 1
     count, down = np.cumsum(step), (step < 0).astype(np.int64)
     kind = ((count + down) & 3) ^ down << 1
@@ -285,7 +285,7 @@ def motion(name: str, sample_hz: int, seconds: float, phase: float = 0.0, clock_
     axis = accuracy.axis_spec("levant-edge", sample_hz, signals.DEVICE_ACCELERATION)
     axis = replace(axis, clock_hz=clock_hz) if clock_hz else axis
     signal = replace(signals.load(name), seconds=seconds)
-    passed = edges_of(signal, axis, offsets(float(phase)))
+    passed = encoded_signal(signal, axis, offsets(float(phase)))
     samples = int(seconds * sample_hz)
     exact = accuracy.exact_velocity(signal.motion, np.arange(samples) / sample_hz)
     return axis, columns(axis, passed, samples), exact

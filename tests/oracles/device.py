@@ -11,7 +11,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from hardwall.sim.world.device import Device, Motor, Transmission
-from hardwall.sim.world.taylor import State
+from hardwall.sim.world.linear import State
 
 
 def between(rng, low, high):

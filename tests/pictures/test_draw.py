@@ -1,6 +1,7 @@
 """Every picture: what is on its axes, that all of its words are within it, and that its file is always the same."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from hardwall.sim.estimates.replay import replay
 from hardwall.sim.pictures import accuracy, bits, cutoff, drop, gains, hit, lipschitz, rates, trade, zwidth
 from hardwall.sim.pictures import replay as replayed
 from hardwall.sim.pictures.style import PAGE_IN, save
+from hardwall.sim.studies.accuracy import Accuracy
 from hardwall.sim.studies.trade import HIT, MAP
 from stimuli import results
 from stimuli.replays import BOUND, COARSEN, swing
@@ -22,11 +24,14 @@ SECOND = {"encoder_phase_error_counts": 0.0, "acceleration_max_mm_s2": 2000.0, "
 
 def figure_1() -> Figure:
     curves = figures.curves(1)
-    return accuracy.draw_figure_1(curves, [curve.job("paper", 1_000) | SECOND for curve in curves])
+    rows = [curve.job("paper", 1_000) | SECOND for curve in curves]
+    return accuracy.draw(Accuracy(1, curves, rows, [curve.label for curve in curves]))
 
 
 def every_estimator_mapped() -> Figure:
-    return zwidth.draw([results.map_of(name, 2e4, 200) for name in ("fdm-30", "fdm-100", "adjusted")] * 4)
+    return zwidth.draw(
+        results.zwidth([results.map_of(name, 2e4, 200) for name in ("fdm-30", "fdm-100", "adjusted")] * 4)
+    )
 
 
 PICTURES = {
@@ -35,12 +40,12 @@ PICTURES = {
     "hit, never reached": lambda: hit.draw(results.hit(reached=False)),
     "replay": lambda: replayed.draw(replay(swing(), coarsen=COARSEN, acceleration_max_counts_per_s2=BOUND)),
     "figure 1": figure_1,
-    "figure 2": lambda: accuracy.draw(*results.rows()),
-    "bits": lambda: bits.draw(results.bit_rows()),
+    "figure 2": lambda: accuracy.draw(results.rows()),
+    "bits": lambda: bits.draw(results.bits_dropped()),
     "cutoff": lambda: cutoff.draw(results.devices()),
     "gains": lambda: gains.draw(results.search()),
     "lipschitz": lambda: lipschitz.draw(results.fit()),
-    "rates": lambda: rates.draw(*results.rate_gains()),
+    "rates": lambda: rates.draw(results.rate_gains()),
     "zwidth": lambda: zwidth.draw(results.maps()),
     "zwidth of many": every_estimator_mapped,
     **{
@@ -164,9 +169,9 @@ def test_a_panel_of_the_trade_names_its_best_and_few_others(question):
 def test_the_passivity_limit_is_seen_or_said_to_be_absent():
     absent = " ".join(text.get_text() for text in words(zwidth.draw(results.maps())))
     assert "passive walls (Colgate, Schenkel): none on this map" in absent
-    viscous = results.map_of("fdm-500", 2e4, 200)
-    viscous.case.changes["handle.viscous_n_s_per_m"] = 100.0
-    seen = zwidth.draw([viscous])
+    plain = results.map_of("fdm-500", 2e4, 200)
+    viscous = replace(plain, case=plain.case.changed({"handle.viscous_n_s_per_m": 100.0}))
+    seen = zwidth.draw(results.zwidth([viscous]))
     assert "below the dash-dotted line" in " ".join(text.get_text() for text in words(seen))
     assert "-." in [line.get_linestyle() for line in seen.axes[0].lines]
 
@@ -180,7 +185,7 @@ def test_gains_with_several_names_are_named_once():
 
 
 def test_a_circle_is_at_the_derived_width():
-    by_width, by_logic = bits.draw(results.bit_rows()).axes
+    by_width, by_logic = bits.draw(results.bits_dropped()).axes
     assert by_width.lines[0].get_xdata().tolist() == [20, 19, 18]
     assert [line.get_xdata()[0] for line in by_logic.lines[1::2]] == [1000, 500, 1500]
     assert np.isfinite([line.get_ydata()[0] for line in by_width.lines]).all()

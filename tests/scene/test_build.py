@@ -56,7 +56,7 @@ def test_pulses_begin_with_the_push():
     scene = load("seed-2011", PULSES | {"protocol.push_n": 25.0})
     world = world_of(scene)
     assert world.plant.pulse == Pulse(50.0, 600, 2)
-    assert start_of(scene, world).motion.width == 450
+    assert start_of(scene, world).moment.motion.width == 450
     assert device_of(load("seed-2011", AMPLIFIER)).pulse == AS_IT_IS
 
 

@@ -1,19 +1,23 @@
 """A device moved for an interval by the code under test, where no encoder edge is near."""
 
-import numpy as np
-
-from hardwall.sim.world.advance import advance
+from hardwall.model.stamped import room_for
+from hardwall.sim.world.advance import Interval, Moment, advance
 from hardwall.sim.world.device import train
 from hardwall.sim.world.encoder import Encoder, locate
-from hardwall.sim.world.taylor import State
+from hardwall.sim.world.linear import State
 
 COARSE = Encoder(1e9, 1e6)  # no edge anywhere
-NO_EDGES = np.zeros(0, np.int64), np.zeros(0, np.int64)
+ANYWHERE = locate(COARSE, 0.5e9)._replace(lower_m=-1e18)
+"""The cell that every device of the tests is in."""
+NO_EDGES = room_for(0)
+
+
+def after(plant, motion, force_n, length, clock=0, clocks=1, encoder=COARSE):
+    """Return the motion after an interval of any plant."""
+    moment, interval = Moment(motion, ANYWHERE, 0), Interval(length, clock, clocks)
+    return advance(plant, encoder, moment, force_n, interval, NO_EDGES).motion
 
 
 def moved(device, state, command, seconds):
     """Return the state after an interval, by the code under test."""
-    system = train(device, seconds)
-    cell = locate(COARSE, 0.5e9)
-    start = State(state.position_m, *state[1:])
-    return advance(system, COARSE, start, cell._replace(lower_m=-1e18), command, seconds, 0, 1, *NO_EDGES, 0)[0]
+    return after(train(device, seconds), State(*state), command, seconds)

@@ -8,11 +8,16 @@ from hardwall.sim.loop.record import Trace
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.studies import bits, cutoff, drop, gains, lipschitz, rates, shortcuts, sines, trade
+from hardwall.sim.studies.accuracy import Accuracy
+from hardwall.sim.studies.drop_result import Drop, End, Law, Shaken
+from hardwall.sim.studies.zwidth import ZWidth
 from hardwall.sim.walls.boundary import Edge
 from hardwall.sim.walls.chatter import Chatter
 from hardwall.sim.walls.hit import Hit
 from hardwall.sim.walls.methods import methods
-from hardwall.sim.walls.zwidth import Map
+from hardwall.sim.walls.zwidth import Effort, Map
+
+NOTHING = Effort("fixed", 0, 0.0)
 
 
 def hit(rms_m: float = 0.0, reached: bool = True) -> Hit:
@@ -40,41 +45,47 @@ def map_of(method: str, stiffest_n_per_m: float, last_n_s_per_m: float, case: Ca
     return Map(case, edges, 40, [True] * len(edges))
 
 
-def maps() -> list[Map]:
+def zwidth(maps: list[Map]) -> ZWidth:
+    """Return maps as the study of them has them."""
+    return ZWidth(load("seed-2011"), maps, [], NOTHING)
+
+
+def maps() -> ZWidth:
     """Return a map of each of the founding paper's methods."""
     ends = {"fdm-30": 90, "fdm-100": 190, "fdm-500": 300, "fdm-1000": 400, "proposed": 130, "adjusted": 180}
-    return [map_of(name, 250 * end, end) for name, end in ends.items()]
+    return zwidth([map_of(name, 250 * end, end) for name, end in ends.items()])
 
 
-def rows() -> tuple[list[dict], list[str]]:
-    """Return rows of `accuracy.measure` for Figure 2, and their labels."""
+def rows() -> Accuracy:
+    """Return what is measured for Figure 2."""
     found = [
         curve.job("paper", rate) | {"rms_mm_s": 1e4 / rate / (1 + number), "backend": "float"}
         for number, curve in enumerate(figures.curves(2))
         for rate in (1_000, 100_000, 10_000_000)
     ]
     labels = [curve.label for curve in figures.curves(2) for _ in range(3)]
-    return [row | {"encoder_phase_error_counts": 0.0} for row in found], labels
+    return Accuracy(2, figures.curves(2), [row | {"encoder_phase_error_counts": 0.0} for row in found], labels)
 
 
-def bit_rows() -> list[dict]:
-    """Return rows of `bits.bit` for two estimators."""
-    return [
+def bits_dropped() -> bits.Bits:
+    """Return what bits buy two estimators."""
+    rows = [
         {"estimator": estimator, "output": output, "sample_hz": 1_000_000, "velocity_bits": 20 - dropped}
         | {"rms_mm_s": (0.1 + dropped) * scale, "lut4": 500 * scale - dropped}
         for estimator, output, scale in (("levant", "u", 2), ("levant", "u1", 1), ("kalman", "u", 3))
         for dropped in list(bits.DROPPED)[:3]
     ]
+    return bits.Bits(rows)
 
 
-def devices() -> list[cutoff.Device]:
+def devices() -> cutoff.Cutoffs:
     """Return two devices: one whose best cutoff is inside, and one whose best is at the end."""
     scene = load("seed-2011")
     found = []
     for best in (500, 4000):
         own = {hz: map_of("fdm-500", 1e5 / (1 + np.log(hz / best) ** 2), 200) for hz in (30.0, 100.0, 500.0, 4000.0)}
         found.append(cutoff.Device(scene, own, map_of("fdm-500", 4e4, 200)))
-    return found
+    return cutoff.Cutoffs(found, NOTHING)
 
 
 def search() -> gains.Search:
@@ -85,10 +96,10 @@ def search() -> gains.Search:
     papers = {"proposed": Gains(12**0.5, 13.2), "adjusted": Gains(250**0.5, 50.0)}
     named = papers | dict.fromkeys(("best", "best within the condition"), pairs[-2]) | {"best in place": pairs[8]}
     picks = {name: gains.Pick(pair, map_of("adjusted", 4e4, 180)) for name, pair in named.items()}
-    return gains.Search(scene, lambdas, alphas, {"u": own, "u1": own}, {"u": picks, "u1": picks})
+    return gains.Search(scene, lambdas, alphas, {"u": own, "u1": own}, {"u": picks, "u1": picks}, NOTHING)
 
 
-def dropped() -> drop.Drop:
+def dropped() -> Drop:
     """Return the four experiments, with a handle that fled, and a law without end."""
     scene = load("seed-2011")
     curves = drop.curves(scene)
@@ -97,15 +108,13 @@ def dropped() -> drop.Drop:
         case = Case(curve.label, "seed-2011", read("seed-2011"), curve.changes)
         found[name] = map_of(name, 3e4 + 1e4 * number, 120 + 40 * number, case)
     walls = [(name, b, hit) for name in curves for b in drop.DAMPINGS_N_S_PER_M.tolist() for hit in range(2)]
-    shaken = [drop.Shaken(name, b, None if b > 350 else 1e-5 if b > 100 else 0.0) for name, b, _ in walls]
-    ends = [drop.End(name, k, 40.0, 80.0) for name in drop.PAPERS for k in drop.STIFFNESSES_N_PER_M]
+    shaken = [Shaken(name, b, None if b > 350 else 1e-5 if b > 100 else 0.0) for name, b, _ in walls]
+    ends = [End(name, k, 40.0, 80.0) for name in drop.PAPERS for k in drop.STIFFNESSES_N_PER_M]
     factors = ("none", *drop.TIMES, *drop.GAINS, "samples a force")
-    laws = [
-        drop.Law(each, "x 2", name, 40.0 + n, 45.0 * 1.1**n) for name in drop.PAPERS for n, each in enumerate(factors)
-    ]
-    laws.append(drop.Law("none", "", "kalman", np.inf, np.inf))
+    laws = [Law(each, "x 2", name, 40.0 + n, 45.0 * 1.1**n) for name in drop.PAPERS for n, each in enumerate(factors)]
+    laws.append(Law("none", "", "kalman", np.inf, np.inf))
     quiet = Chatter(np.zeros(3), np.zeros(3))
-    return drop.Drop(scene, dict.fromkeys(curves, quiet), shaken, ends, laws, found)
+    return Drop(scene, dict.fromkeys(curves, quiet), shaken, ends, laws, found, NOTHING)
 
 
 def fit() -> lipschitz.Lipschitz:
@@ -117,14 +126,15 @@ def fit() -> lipschitz.Lipschitz:
     )
 
 
-def rate_gains() -> tuple[list[rates.Gain], dict[str, list[float]]]:
+def rate_gains() -> rates.Rates:
     """Return what rate buys two methods, and the linear limits, one of which leaves the picture."""
     hz = [1_000, 10_000, 1_000_000]
     found = []
     for method, scale in (("adjusted", 1.0), ("fdm-500", 1.1)):
         at = [map_of(method, scale * k, 200) for k in (3e4, 1e5, 3e5, 3e5)]
         found.append(rates.Gain(at[0].case.label, hz, at[0], at[1:]))
-    return found, {left: [1e5 * n, 4e5 * n, 5e5 * n**2] for n, left in enumerate(rates.WITHOUT, 1)}
+    limits = {left: [1e5 * n, 4e5 * n, 5e5 * n**2] for n, left in enumerate(rates.WITHOUT, 1)}
+    return rates.Rates(load("seed-2011"), found, limits, NOTHING)
 
 
 def traded() -> trade.Trade:

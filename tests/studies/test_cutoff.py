@@ -124,7 +124,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     text = picture.read_text()
     wanted = (
         "cutoff of the second-order",
-        "(MN/m N s/m)",
+        "area (kN/m N s/m)",
         "seed-2011: 0.35 kg, 0.1 N dry friction",
         "no filter: 0",
     )

@@ -152,7 +152,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         "proposed",
         "adjusted",
         "stable walls that are in place",
-        "area of the stable region (MN/m N s/m)",
+        "area of the stable region (kN/m N s/m)",
         "seed-2011",
     )
     assert [label for label in wanted if label not in text] == []

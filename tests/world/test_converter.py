@@ -3,13 +3,11 @@
 import numpy as np
 import pytest
 
-from hardwall.sim.world.advance import advance
 from hardwall.sim.world.converter import Converter, Pulse, converted, width_of
 from hardwall.sim.world.device import Device, equations, train
-from hardwall.sim.world.encoder import locate
-from hardwall.sim.world.taylor import State
+from hardwall.sim.world.linear import State
 from oracles.device import exponential
-from stimuli.moves import COARSE, NO_EDGES
+from stimuli.moves import COARSE, after
 
 
 def test_a_converter_takes_the_nearest_code_and_saturates():
@@ -34,12 +32,12 @@ def test_pulses_move_the_device_as_the_forces_that_they_are(period):
     device = Device(0.3, 2.0, bandwidth_hz=2e3, pulse=pulse)
     matrix = np.zeros((5, 5))
     matrix[:3] = equations(device).rates
-    system, cell = train(device, 1e-4), locate(encoder, 0.5e9)._replace(lower_m=-1e18)
+    system = train(device, 1e-4)
     state, expected, width = State(0.0, 0.1, (0.0, 0.0, 0.0), period // 2), [0.0, 0.1, 0.0], period // 2
     widths = set()
     for clock in range(0, 300, 30):
         command = float(rng.normal(0, 6))
-        state, _, _ = advance(system, encoder, state, cell, command, 30e-6, clock, 30, *NO_EDGES, 0)
+        state = after(system, state, command, 30e-6, clock, 30, encoder)
         for now in range(clock, clock + 30):
             if now % period == 0:
                 width = width_of(pulse, command)

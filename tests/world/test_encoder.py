@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hardwall.sim.world import rigid
-from hardwall.sim.world.advance import advance, advance_quietly
+from hardwall.model.stamped import Edges
+from hardwall.sim.world.advance import Interval, Moment, advance, advance_quietly
 from hardwall.sim.world.encoder import MARGIN, Cell, Encoder, edge, level, locate, offsets
 from hardwall.sim.world.rigid import Coulomb, Handle, Motion, Rigid, span
+from stimuli.moves import after
 
 U = 2.0**-53
 CLOCK_HZ = 100.0
@@ -62,8 +63,8 @@ class Scale:
         return np.abs(self.edges[:, None] - positions).min(axis=0)
 
 
-def buffers(size: int) -> tuple[np.ndarray, np.ndarray]:
-    return np.zeros(size, np.int64), np.zeros(size, np.uint8)
+def buffers(size: int) -> Edges:
+    return Edges(np.zeros(size, np.int64), np.zeros(size, np.uint8))
 
 
 def steps(levels) -> np.ndarray:
@@ -95,32 +96,31 @@ def test_pins_show_the_geometry_at_every_clock(dry):
         encoder = random_encoder(rng)
         motion = Motion(*rng.normal(0, 1, 2).tolist())
         cell = locate(encoder, motion.position_m)
-        stamps, words = buffers(20_000)
+        edges = stamps, words = buffers(20_000)
         clock = int(rng.integers(-1000, 1 << 40))
         n_edges = 0
         for _ in range(3):
             clocks = int(rng.choice([1, 2, rng.integers(1, 150)]))
-            interval = span(handle, clocks / CLOCK_HZ)
+            interval = Interval(span(handle, clocks / CLOCK_HZ), clock, clocks)
+            seconds = interval.length.seconds
             force = random_force(rng, friction)
-            position, turn_s, holds = true_path(handle, friction, motion, force, interval.seconds)
-            reach_m = (abs(motion.velocity_m_per_s) + (abs(force) + friction) * interval.seconds) * interval.seconds * 4
+            position, turn_s, holds = true_path(handle, friction, motion, force, seconds)
+            reach_m = (abs(motion.velocity_m_per_s) + (abs(force) + friction) * seconds) * seconds * 4
             scale = Scale(encoder, motion.position_m - reach_m, motion.position_m + reach_m)
-            before, old = cell, n_edges
-            fast, quiet = advance_quietly(Rigid(handle, coulomb), motion, cell, force, interval)
-            expected_motion = rigid.advance(handle, coulomb, motion, force, interval)
-            motion, cell, n_edges = advance(
-                Rigid(handle, coulomb), encoder, motion, cell, force, interval, clock, clocks, stamps, words, n_edges
-            )
-            assert motion == expected_motion
+            plant, moment = Rigid(handle, coulomb), Moment(motion, cell, n_edges)
+            fast, quiet = advance_quietly(plant, moment, force, interval)
+            unseen = after(plant, motion, force, interval.length)
+            motion, cell, n_edges = advance(plant, encoder, moment, force, interval, edges)
+            assert motion == unseen, "edges move nothing"
             assert cell.lower_m <= motion.position_m < cell.upper_m
             if quiet:
-                assert (fast, n_edges, cell) == (motion, old, before)
+                assert fast == (motion, cell, n_edges) == (motion, *moment[1:])
 
-            new = stamps[old:n_edges]
+            new = stamps[moment.n_edges : n_edges]
             assert (np.diff(new) >= 0).all()
             assert ((new > clock) & (new <= clock + clocks)).all()
-            step = steps([level(before.number), *words[old:n_edges].tolist()])
-            numbers = before.number + np.concatenate([[0], np.cumsum(step)])
+            step = steps([level(moment.cell.number), *words[moment.n_edges : n_edges].tolist()])
+            numbers = moment.cell.number + np.concatenate([[0], np.cumsum(step)])
             assert numbers[-1] == cell.number
 
             # The last edge up to each clock gives the cell there. Within the error of a position, either cell will do.
@@ -133,7 +133,7 @@ def test_pins_show_the_geometry_at_every_clock(dry):
             assert (~certain).sum() <= 2
 
             # Not one edge more than the way to the turn and back has.
-            ends = position(np.array([0, turn_s or 0, interval.seconds]))
+            ends = position(np.array([0, turn_s or 0, seconds]))
             assert len(new) == np.abs(np.diff(scale.cells(ends))).sum()
             turns += turn_s is not None
             stuck += holds
@@ -173,14 +173,13 @@ def test_locate_agrees_with_counting_edges():
 
 def passages(encoder, motion, force, clocks, clock=1000, coulomb=None, handle=UNIT):
     """Return the new motion, the new cell, and [(stamp, pins)] of one interval from `clock`."""
-    stamps, words = buffers(100)
-    start, interval = locate(encoder, motion.position_m), span(handle, clocks / encoder.clock_hz)
-    fast, quiet = advance_quietly(Rigid(handle, coulomb), motion, start, force, interval)
-    motion, cell, n_edges = advance(
-        Rigid(handle, coulomb), encoder, motion, start, force, interval, clock, clocks, stamps, words, 0
-    )
+    edges = stamps, words = buffers(100)
+    plant, start = Rigid(handle, coulomb), Moment(motion, locate(encoder, motion.position_m), 0)
+    interval = Interval(span(handle, clocks / encoder.clock_hz), clock, clocks)
+    fast, quiet = advance_quietly(plant, start, force, interval)
+    motion, cell, n_edges = advance(plant, encoder, start, force, interval, edges)
     if quiet:
-        assert (fast, start, n_edges) == (motion, cell, 0)
+        assert fast == (motion, cell, n_edges) == (motion, start.cell, 0)
     return motion, cell, list(zip(stamps[:n_edges].tolist(), words[:n_edges].tolist(), strict=True))
 
 
@@ -234,46 +233,54 @@ def test_rounding_puts_no_edge_outside_its_interval(clock_hz):
 
 
 def test_an_interval_without_edges_or_turns_is_quiet():
-    cell, interval = Cell(0, 0.0, 1.0), span(UNIT, 1.0)
+    cell, interval = Cell(0, 0.0, 1.0), Interval(span(UNIT, 1.0), 0, 1)
+
+    def quietly(coulomb, motion, force):
+        moment, quiet = advance_quietly(Rigid(UNIT, coulomb), Moment(motion, cell, 7), force, interval)
+        assert moment[1:] == (cell, 7)
+        return moment.motion, quiet
+
     for coulomb in (None, Coulomb(0.0), Coulomb(0.125)):
-        assert advance_quietly(Rigid(UNIT, coulomb), Motion(0.25, 0.5), cell, 0.0, interval)[1]
-        assert advance_quietly(Rigid(UNIT, coulomb), Motion(0.75, -0.5), cell, 0.0, interval)[1]
-        assert not advance_quietly(Rigid(UNIT, coulomb), Motion(0.75, 0.5), cell, 0.0, interval)[1]
-    assert advance_quietly(Rigid(UNIT, None), Motion(0.5, -0.5), cell, 0.0, interval) == ((0.0, -0.5), True)
-    assert not advance_quietly(Rigid(UNIT, None), Motion(0.5, 0.5), cell, 0.0, interval)[1]
-    assert advance_quietly(Rigid(UNIT, Coulomb(0.5)), Motion(0.5, 0.0), cell, -0.5, interval) == ((0.5, 0.0), True)
+        assert quietly(coulomb, Motion(0.25, 0.5), 0.0)[1]
+        assert quietly(coulomb, Motion(0.75, -0.5), 0.0)[1]
+        assert not quietly(coulomb, Motion(0.75, 0.5), 0.0)[1]
+    assert quietly(None, Motion(0.5, -0.5), 0.0) == ((0.0, -0.5), True)
+    assert not quietly(None, Motion(0.5, 0.5), 0.0)[1]
+    assert quietly(Coulomb(0.5), Motion(0.5, 0.0), -0.5) == ((0.5, 0.0), True)
     # A turn: without friction it may lie where no edge can be; with friction it is an event.
-    assert advance_quietly(Rigid(UNIT, None), Motion(0.5, 0.25), cell, -0.5, interval) == ((0.5, -0.25), True)
-    assert not advance_quietly(Rigid(UNIT, None), Motion(0.5, 0.5), cell, -0.5, interval)[1]
-    assert not advance_quietly(Rigid(UNIT, Coulomb(0.0)), Motion(0.5, 0.25), cell, -0.5, interval)[1]
+    assert quietly(None, Motion(0.5, 0.25), -0.5) == ((0.5, -0.25), True)
+    assert not quietly(None, Motion(0.5, 0.5), -0.5)[1]
+    assert not quietly(Coulomb(0.0), Motion(0.5, 0.25), -0.5)[1]
 
 
 @pytest.mark.parametrize("coulomb", [None, Coulomb(0.0)])
 def test_full_arrays_are_reported_and_never_overrun(coulomb):
     encoder = Encoder(1.0, 4.0)
     # 8 edges up to the turn after 2 s, 8 back, in 16 clocks.
-    fixed = (Rigid(UNIT, coulomb), encoder, Motion(0.5, 8.0), locate(encoder, 0.5), -4.0, span(UNIT, 4.0), 0, 16)
+    plant, cell, interval = Rigid(UNIT, coulomb), locate(encoder, 0.5), Interval(span(UNIT, 4.0), 0, 16)
     for clocks_room, words_room in [(16, 16), (15, 15), (8, 8), (7, 9), (9, 3), (0, 0)]:
         stamps, words = np.full(32, -7), np.full(32, 77, np.uint8)
         room = min(clocks_room, words_room)
-        motion, _, n_edges = advance(*fixed, stamps[:clocks_room], words[:words_room], 0)
+        edges = Edges(stamps[:clocks_room], words[:words_room])
+        motion, _, n_edges = advance(plant, encoder, Moment(Motion(0.5, 8.0), cell, 0), -4.0, interval, edges)
         assert motion == (0.5, -8.0)
         assert n_edges == (16 if room == 16 else -1)
         assert (stamps[:room] > 0).all()
         assert (words[:room] < 4).all()
         if room < 16:  # and stays so
-            assert advance(*fixed, stamps[:clocks_room], words[:words_room], -1)[2] == -1
+            lost = Moment(Motion(0.5, 8.0), cell, -1)
+            assert advance(plant, encoder, lost, -4.0, interval, edges).n_edges == -1
         assert (stamps[room:] == -7).all()
         assert (words[room:] == 77).all()
 
 
 def test_edges_are_appended_to_those_already_there():
     encoder = Encoder(1.0, 4.0)
-    stamps, words = buffers(4)
-    stamps[:2] = 5, 9
-    arguments = (Rigid(UNIT, None), encoder, Motion(0.5, 1.0), locate(encoder, 0.5), 0.0, span(UNIT, 1.0), 10, 4)
-    assert advance(*arguments, stamps, words, 2)[2] == 3
-    assert stamps.tolist() == [5, 9, 12, 0]
+    edges = buffers(4)
+    edges.clocks[:2] = 5, 9
+    moment, interval = Moment(Motion(0.5, 1.0), locate(encoder, 0.5), 2), Interval(span(UNIT, 1.0), 10, 4)
+    assert advance(Rigid(UNIT, None), encoder, moment, 0.0, interval, edges).n_edges == 3
+    assert edges.clocks.tolist() == [5, 9, 12, 0]
 
 
 @pytest.mark.parametrize(
@@ -302,13 +309,12 @@ def replay() -> str:
     for coulomb in (None, Coulomb(0.2)):
         for viscous in (0.0, 0.01, 3.0):
             handle, encoder = Handle(0.35, viscous), Encoder(0.003, CLOCK_HZ, offsets(0.2, 0.1))
+            plant, length = Rigid(handle, coulomb), span(handle, 10 / CLOCK_HZ)
             motion, cell = Motion(0.1, 0.5), locate(encoder, 0.1)
             for clock in range(0, 400, 10):
-                stamps, words = buffers(1000)
-                motion, cell, n_edges = advance(
-                    *(Rigid(handle, coulomb), encoder, motion, cell, float(rng.normal()), span(handle, 10 / CLOCK_HZ)),
-                    *(clock, 10, stamps, words, 0),
-                )
+                edges = stamps, words = buffers(1000)
+                moment, interval = Moment(motion, cell, 0), Interval(length, clock, 10)
+                motion, cell, n_edges = advance(plant, encoder, moment, float(rng.normal()), interval, edges)
                 lines.append(
                     f"{[float(v).hex() for v in motion]} {int(cell.number)} {stamps[:n_edges]} {words[:n_edges]}"
                 )
@@ -318,7 +324,7 @@ def replay() -> str:
 def test_plain_python_gives_the_same_bits():
     outcome = subprocess.run(
         [sys.executable, "-c", "from test_encoder import replay; print(replay())"],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(Path(__file__).parent.parent)},
         cwd=Path(__file__).parent,
         capture_output=True,
         text=True,

@@ -5,18 +5,19 @@ import math
 import numpy as np
 import pytest
 
+from hardwall.model.stamped import Edges, room_for
 from hardwall.sim.scene.build import world_of
 from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls import hit
-from hardwall.sim.world.advance import advance
+from hardwall.sim.world.advance import Interval, Moment, advance
 from hardwall.sim.world.converter import Pulse
 from hardwall.sim.world.device import Device, Hand, Transmission, train
 from hardwall.sim.world.encoder import Encoder, level, locate, offsets
 from hardwall.sim.world.euler import Stepped, longest_s, stepped
-from hardwall.sim.world.taylor import State
+from hardwall.sim.world.linear import State
 from oracles.device import between, ours, random_cable, random_motor
-from stimuli.moves import COARSE, NO_EDGES, moved
+from stimuli.moves import COARSE, after, moved
 from stimuli.scenes import PULSES
 
 REST = State(0.0, 0.0, (0.0, 0.0, 0.0), 0)
@@ -31,9 +32,7 @@ def system(device, step_s, seconds=SECONDS):
 
 def moved_in_steps(device, state, command, step_s, seconds=SECONDS):
     """Return the state after an interval, by the code under test."""
-    cell = locate(COARSE, 0.5e9)._replace(lower_m=-1e18)
-    plant = system(device, step_s, seconds)
-    return advance(plant, COARSE, state, cell, command, seconds, 0, 1, *NO_EDGES, 0)[0]
+    return after(system(device, step_s, seconds), state, command, seconds)
 
 
 def random_case(rng, number, events):
@@ -113,11 +112,13 @@ def test_edges_are_where_the_line_from_step_to_step_passes_them(at_motor):
         cable = random_cable(rng, (1e3, 1e4), (0.1, 0.3), 10.0)
         device = Device(0.2, 1.0, transmission=cable, encoder_at_motor=at_motor)
         start = State(0.0, float(rng.normal()), (float(rng.normal() * 1e-3), 0.0, 0.0), 0)
-        stamps, words = np.zeros(5000, np.int64), np.zeros(5000, np.int64)
+        found = room_for(5000)
         seconds = clocks / encoder.clock_hz
         plant, first_m = system(device, seconds, seconds), start.others[0] * at_motor
         cell = locate(encoder, first_m)
-        end, last, n_edges = advance(plant, encoder, start, cell, 1.0, seconds, 0, clocks, stamps, words, 0)
+        interval = Interval(seconds, 0, clocks)
+        end, last, n_edges = advance(plant, encoder, Moment(start, cell, 0), 1.0, interval, found)
+        stamps, words = found
         last_m = end.position_m + end.others[0] * at_motor
         assert last.number == locate(encoder, last_m).number
         assert (np.diff(stamps[:n_edges]) >= 0).all()
@@ -136,8 +137,8 @@ def test_full_arrays_are_reported():
     encoder = Encoder(1e-6, 1e6)
     stamps, words = np.full(4, -1), np.full(4, -1)
     plant, start = system(Device(0.3, bandwidth_hz=200.0), 1e-5, 1e-3), State(0.0, 1.0, (0.0, 0.0, 0.0), 0)
-    at = plant, encoder, start, locate(encoder, 0.0), 0.0, 1e-3
-    assert advance(*at, 0, 1000, stamps[:3], words, 0)[2] == -1
+    moment, interval = Moment(start, locate(encoder, 0.0), 0), Interval(1e-3, 0, 1000)
+    assert advance(plant, encoder, moment, 0.0, interval, Edges(stamps[:3], words)).n_edges == -1
     assert stamps[3] == words[3] == -1
 
 
@@ -145,9 +146,7 @@ def test_a_step_never_spans_a_change_of_the_command():
     """A pulse of 0.3 of the period at a step of the whole period: without a part that resists, the mean is exact."""
     device = Device(0.5, pulse=Pulse(2.0, 1000, 100))
     encoder = COARSE._replace(clock_hz=1e6)
-    cell = locate(encoder, 0.5e9)._replace(lower_m=-1e18)
-    plant = system(device, 1e-3, 1e-3)
-    end = advance(plant, encoder, REST, cell, -0.8, 1e-3, 0, 1000, *NO_EDGES, 0)[0]
+    end = after(system(device, 1e-3, 1e-3), REST, -0.8, 1e-3, 0, 1000, encoder)
     assert end.width == 300
     assert end.velocity_m_per_s == pytest.approx(-0.8 / 0.5 * 1e-3, rel=1e-12)
 

@@ -10,7 +10,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from hardwall.model.compiled import compiled
-from hardwall.sim.world.rigid import Coulomb, Handle, Motion, advance, glide, reach, span, turn, turned
+from hardwall.sim.world.advance import Interval, Moment, advance_quietly
+from hardwall.sim.world.rigid import Coulomb, Handle, Motion, Rigid, glide, reach, span, turn, turned
+from stimuli.moves import ANYWHERE, after
 
 U = 2.0**-53  # half a unit in the last place of 1
 UNIT = Handle(mass_kg=1.0, viscous_n_s_per_m=0.0)
@@ -69,7 +71,7 @@ def test_motion_without_dry_friction_is_the_matrix_exponential():
         expected = expm(system * seconds) @ [*motion, force]
         # expm itself is good to about the norm of its argument, below 1000, in units of U.
         scale = abs(motion.position_m) + (abs(motion.velocity_m_per_s) + abs(force) * seconds / m) * (1 + seconds)
-        assert advance(handle, None, motion, force, span(handle, seconds)) == pytest.approx(
+        assert after(Rigid(handle, None), motion, force, span(handle, seconds)) == pytest.approx(
             expected[:2], rel=0, abs=2000 * U * scale
         )
 
@@ -119,7 +121,7 @@ def test_stick_and_slip_agree_with_numerical_integration():
         force, seconds = float(rng.normal(0, 3)), float(rng.uniform(0.01, 2))
         expected, fate = integrated(handle, level, motion, force, seconds)
         fates[fate] += 1
-        ours = advance(handle, Coulomb(level), motion, force, span(handle, seconds))
+        ours = after(Rigid(handle, Coulomb(level)), motion, force, span(handle, seconds))
         assert ours == pytest.approx(expected, rel=1e-9, abs=1e-9), (handle, motion, level, force, seconds, fate)
         if fate == "sticks":
             assert ours.velocity_m_per_s == 0
@@ -136,9 +138,9 @@ def test_a_split_interval_gives_the_same_motion(level):
         handle, motion, force = random_handle(rng), random_motion(rng), float(rng.normal(0, 1))
         seconds = float(10 ** rng.uniform(-6, 0.5))
         first = seconds * float(rng.uniform(0, 1))
-        whole = advance(handle, coulomb, motion, force, span(handle, seconds))
-        part = advance(handle, coulomb, motion, force, span(handle, first))
-        parts = advance(handle, coulomb, part, force, span(handle, seconds - first))
+        whole = after(Rigid(handle, coulomb), motion, force, span(handle, seconds))
+        part = after(Rigid(handle, coulomb), motion, force, span(handle, first))
+        parts = after(Rigid(handle, coulomb), part, force, span(handle, seconds - first))
         speed = abs(motion.velocity_m_per_s) + (abs(force) + (level or 0.0)) * seconds / handle.mass_kg
         assert parts == pytest.approx(whole, rel=0, abs=200 * U * (speed + abs(motion.position_m) + speed * seconds))
 
@@ -149,7 +151,7 @@ def test_a_stuck_handle_keeps_its_motion_bit_for_bit():
     for position in [0.0, -0.0, 5e-324, *rng.normal(0, 0.1, 20).tolist()]:
         start = motion = Motion(position, 0.0)
         for force in [0.1, -0.1, 0.0, -0.0, *rng.uniform(-0.1, 0.1, 50).tolist()]:  # reversals while stuck among them
-            motion = advance(Handle(0.35, 1.0), Coulomb(0.1), motion, force, interval)
+            motion = after(Rigid(Handle(0.35, 1.0), Coulomb(0.1)), motion, force, interval)
             assert bits(motion) == bits(start)
 
 
@@ -157,8 +159,8 @@ def test_the_level_itself_holds_and_the_next_force_moves():
     interval = span(UNIT, 1.0)
     for sign in (1.0, -1.0):
         above = math.nextafter(0.5, 1.0)
-        assert advance(UNIT, Coulomb(0.5), Motion(2.0, 0.0), sign * 0.5, interval) == (2.0, 0.0)
-        moved = advance(UNIT, Coulomb(0.5), Motion(0.0, 0.0), sign * above, interval)
+        assert after(Rigid(UNIT, Coulomb(0.5)), Motion(2.0, 0.0), sign * 0.5, interval) == (2.0, 0.0)
+        moved = after(Rigid(UNIT, Coulomb(0.5)), Motion(0.0, 0.0), sign * above, interval)
         assert moved == (sign * (above - 0.5) / 2, sign * (above - 0.5))
 
 
@@ -179,7 +181,7 @@ def test_the_level_itself_holds_and_the_next_force_moves():
     ],
 )
 def test_known_stops(level, velocity, force, seconds, expected):
-    assert advance(UNIT, Coulomb(level), Motion(0.0, velocity), force, span(UNIT, seconds)) == expected
+    assert after(Rigid(UNIT, Coulomb(level)), Motion(0.0, velocity), force, span(UNIT, seconds)) == expected
 
 
 def test_the_time_of_a_turn():
@@ -219,7 +221,7 @@ def test_friction_takes_the_kinetic_energy():
     for _ in range(200):
         handle, velocity, level = random_handle(rng), float(rng.normal()), float(rng.uniform(0.1, 2))
         frictionless = handle._replace(viscous_n_s_per_m=0.0)
-        end = advance(frictionless, Coulomb(level), Motion(0.0, velocity), 0.0, span(frictionless, 1e3))
+        end = after(Rigid(frictionless, Coulomb(level)), Motion(0.0, velocity), 0.0, span(frictionless, 1e3))
         assert end.velocity_m_per_s == 0
         assert abs(end.position_m) * level == pytest.approx(handle.mass_kg * velocity**2 / 2, rel=20 * U)
         against = -math.copysign(level, velocity)
@@ -230,11 +232,11 @@ def test_friction_takes_the_kinetic_energy():
 
 def test_heavy_friction_reaches_the_terminal_velocity():
     handle = Handle(1e-6, 10.0)  # z = -1e7 in one second
-    assert advance(handle, None, Motion(0.0, 3.0), 5.0, span(handle, 1.0)) == pytest.approx(
+    assert after(Rigid(handle, None), Motion(0.0, 3.0), 5.0, span(handle, 1.0)) == pytest.approx(
         (0.5 + 2.5e-7, 0.5), rel=1e-15
     )
     # Friction without a force fades the motion but never turns it.
-    end = advance(handle, Coulomb(0.0), Motion(0.0, 3.0), 0.0, span(handle, 1.0))
+    end = after(Rigid(handle, Coulomb(0.0)), Motion(0.0, 3.0), 0.0, span(handle, 1.0))
     assert end == (pytest.approx(3e-7, rel=1e-15), 0.0)
 
 
@@ -242,14 +244,15 @@ def test_many_equal_intervals_do_not_drift():
     # The factor of one interval, rounded, would be off by up to U in the same direction a million times over.
     # Rounding the sums instead is a random walk of steps up to U.
     @compiled
-    def run(handle, motion, interval, steps):
+    def run(plant, moment, interval, steps):
         for _ in range(steps):
-            motion = advance(handle, None, motion, 0.0, interval)
-        return motion
+            moment, _ = advance_quietly(plant, moment, 0.0, interval)
+        return moment.motion
 
     for microseconds in (1.0, 1.7, 2.3):
         handle, steps = Handle(0.35, 1.0), 1_000_000
-        end = run(handle, Motion(0.0, 1.0), span(handle, microseconds * 1e-6), steps)
+        start, interval = Moment(Motion(0.0, 1.0), ANYWHERE, 0), Interval(span(handle, microseconds * 1e-6), 0, 1)
+        end = run(Rigid(handle, None), start, interval, steps)
         exact = math.exp(-steps * microseconds * 1e-6 / 0.35)
         assert end.velocity_m_per_s == pytest.approx(exact, rel=0, abs=5 * math.sqrt(steps) * U)
 
@@ -261,7 +264,7 @@ def test_reach_inverts_the_travel_of_one_direction():
         handle, force = random_handle(rng), float(rng.normal(0, 20))
         velocity, seconds = float(rng.normal() * rng.integers(0, 2)), float(10 ** rng.uniform(-6, 0.5))
         start = Motion(0.0, velocity)
-        end = advance(handle, None, start, force, span(handle, seconds))
+        end = after(Rigid(handle, None), start, force, span(handle, seconds))
         if turned(start, end):
             seconds, end = turn(handle, start, force, seconds)
             turns += 1

@@ -7,11 +7,12 @@ import pytest
 from scipy.linalg import matrix_balance
 
 from hardwall.model.compiled import compiled
+from hardwall.model.stamped import Edges, room_for
 from hardwall.sim.world import rigid
-from hardwall.sim.world.advance import advance
+from hardwall.sim.world.advance import Interval, Moment, advance
 from hardwall.sim.world.device import Device, Hand, Motor, Transmission, equations, fastest_per_s, train
 from hardwall.sim.world.encoder import Encoder, level, locate, offsets
-from hardwall.sim.world.taylor import State, stretch
+from hardwall.sim.world.linear import State, stretch
 from oracles.device import (
     asked_v,
     between,
@@ -23,7 +24,7 @@ from oracles.device import (
     random_motor,
     rates,
 )
-from stimuli.moves import COARSE, NO_EDGES, moved
+from stimuli.moves import ANYWHERE, COARSE, NO_EDGES, after, moved
 
 U = 2.0**-53
 
@@ -171,11 +172,8 @@ def test_a_voltage_that_crosses_all_of_its_range_in_a_leg_is_followed():
         )  # fmt: skip
         state = State(float(rng.normal() * 1e-4), float(rng.normal() * 0.1), (float(rng.normal()), 0.0, 0.0), 0)
         system, command = train(device, 1e-3), float(rng.normal())
-        cell = locate(COARSE, 0.5e9)._replace(lower_m=-1e18)
-        ends = [
-            advance(each, COARSE, state, cell, command, 1e-3, 0, 1, *NO_EDGES, 0)[0]
-            for each in (system, system._replace(leg_s=system.leg_s / 3.7))
-        ]
+        legs = system, system._replace(leg_s=system.leg_s / 3.7)
+        ends = [after(each, state, command, 1e-3) for each in legs]
         scale = max(abs(end.velocity_m_per_s) for end in ends) + 1e-3
         assert abs(ends[0].velocity_m_per_s - ends[1].velocity_m_per_s) < 1e-7 * scale
         apart += ends[0] != ends[1]
@@ -191,7 +189,7 @@ def test_a_handle_alone_moves_as_the_closed_form_has_it(coulomb):
         seconds, force = between(rng, 1e-6, 1e-2), float(rng.normal())
         start = rigid.Motion(float(rng.normal()), float(rng.normal() * rng.integers(0, 2) * 1e-2))
         handle = rigid.Handle(mass, viscous)
-        expected = rigid.advance(handle, friction, start, force, rigid.span(handle, seconds))
+        expected = after(rigid.Rigid(handle, friction), start, force, rigid.span(handle, seconds))
         device = Device(mass, viscous, coulomb, hand=Hand(0.0, 0.0, 0.0, 0.0))
         found = moved(device, State(*start, (0.0, 0.0, 0.0), 0), force, seconds)
         scale = abs(start.velocity_m_per_s) + (abs(force) + (coulomb or 0)) * seconds / mass
@@ -207,18 +205,17 @@ def test_two_masses_on_an_undamped_cable_keep_their_energy(stiffness, mass):
     system, steps = train(device, seconds), 100_000
 
     @compiled
-    def run(system, encoder, state, cell, seconds, steps, clocks, words):
+    def run(system, encoder, moment, interval, steps, edges):
         for _ in range(steps):
-            state, cell, _ = stretch(system, encoder, state, cell, 0.0, 0.0, seconds, 0, 1, clocks, words, 0)
-        return state
+            moment = stretch(system, encoder, moment, 0.0, 0.0, interval.length, interval, edges)
+        return moment
 
     def energy(state):
         v, (stretch_m, stretching, _) = state.velocity_m_per_s, state.others
         return mass * (v**2 + (v + stretching) ** 2) / 2 + stiffness * stretch_m**2 / 2
 
-    cell = locate(COARSE, 0.5e9)._replace(lower_m=-1e18)
     start = State(0.0, 0.3, (1e-3, -0.1, 0.0), 0)
-    end = run(system, COARSE, start, cell, seconds, steps, *NO_EDGES)
+    end = run(system, COARSE, Moment(start, ANYWHERE, 0), Interval(seconds, 0, 1), steps, NO_EDGES).motion
     assert energy(end) == pytest.approx(energy(start), rel=20 * np.sqrt(steps) * U)
     momentum = [mass * (2 * state.velocity_m_per_s + state.others[1]) for state in (start, end)]
     assert momentum[1] == pytest.approx(momentum[0], rel=20 * np.sqrt(steps) * U)
@@ -240,9 +237,10 @@ def test_pins_show_the_geometry_at_every_clock(at_motor):
         start = State(0.0, float(rng.normal() * 0.2), (float(rng.normal() * 1e-3), 0.0, 0.0), 0)
         at = start.others[0] if at_motor else 0.0
         system = train(device, seconds)
-        stamps, words = np.zeros(5000, np.int64), np.zeros(5000, np.int64)
-        cell = locate(encoder, at)
-        _, last, n_edges = advance(system, encoder, start, cell, command, seconds, 0, clocks, stamps, words, 0)
+        found, cell = room_for(5000), locate(encoder, at)
+        interval = Interval(seconds, 0, clocks)
+        _, last, n_edges = advance(system, encoder, Moment(start, cell, 0), command, interval, found)
+        stamps, words = found
         assert n_edges >= 0
         assert (np.diff(stamps[:n_edges]) >= 0).all()
         assert ((stamps[:n_edges] >= 1) & (stamps[:n_edges] <= clocks)).all()
@@ -274,6 +272,7 @@ def test_full_arrays_are_reported():
     device = Device(0.3, bandwidth_hz=200.0)
     encoder = Encoder(1e-6, 1e6)
     stamps, words = np.full(4, -1), np.full(4, -1)
-    arguments = train(device, 1e-3), encoder, State(0.0, 1.0, (0.0, 0.0, 0.0), 0), locate(encoder, 0.0), 0.0, 1e-3
-    assert advance(*arguments, 0, 1000, stamps[:3], words, 0)[2] == -1
+    moment = Moment(State(0.0, 1.0, (0.0, 0.0, 0.0), 0), locate(encoder, 0.0), 0)
+    end = advance(train(device, 1e-3), encoder, moment, 0.0, Interval(1e-3, 0, 1000), Edges(stamps[:3], words))
+    assert end.n_edges == -1
     assert stamps[3] == words[3] == -1

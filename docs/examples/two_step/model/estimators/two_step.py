@@ -1,0 +1,102 @@
+"""Velocity as the mean of the last two differences of counts: a worked example of an estimator.
+
+    v = (f_k - f_{k-2}) / 2                  counts a sample
+
+Formats, derived. The velocity has one fraction bit, so that half a count a sample is exact: nothing is rounded. Its
+range is twice the axis's largest speed, as that of the finite difference.
+
+Ends. The difference is taken modulo the count's width, so the count may wrap. A step, or a speed, of more than twice
+the largest speed saturates, with the flag `velocity_saturated`. The first sample, and one with `restart`, reads 0, and
+the sample after it has only one difference, which counts half. Standstill reads 0.
+
+Source: elementary.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
+from ..compiled import compiled
+from .estimate import EstimatorDesign, EstimatorGains, estimate
+
+if TYPE_CHECKING:
+    from ..spec import AxisSpec
+
+
+@dataclass(frozen=True)
+class Gains(EstimatorGains):
+    """A mean of two differences has no gains."""
+
+    @classmethod
+    def default(cls, axis: "AxisSpec") -> "Gains":
+        return cls()
+
+
+class Params(NamedTuple):
+    """The count's width, and the largest velocity word."""
+
+    count_width: int
+    velocity_max: int
+
+
+class FloatParams(NamedTuple):
+    """The count's width."""
+
+    count_width: int
+
+
+class State(NamedTuple):
+    """Whether a sample was taken, and the last two counts."""
+
+    running: int
+    last: int
+    before: int
+
+
+START = State(0, 0, 0)
+
+
+class Design(EstimatorDesign):
+    """Formats of the mean of two differences for an axis; the module says how they follow."""
+
+    name = "two-step"
+    gains_class = Gains
+    latency = 2
+
+    def __init__(self, axis: "AxisSpec", gains: Gains):
+        super().__init__(axis, gains)
+        self.velocity = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), axis.shrunk(1))
+
+    def params(self, words: Mapping[str, int]) -> Params:
+        return Params(self.count_width, self.velocity.max)
+
+    def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
+        return FloatParams(self.count_width)
+
+    def start(self, floating: bool = False) -> State:
+        return START
+
+
+@compiled
+def _take(width, state, count, restart):
+    """Return the change over two samples, and the state after this one."""
+    if restart or not state.running:
+        return 0, State(1, count, count)
+    return wrap(count - state.before, width), State(1, count, state.last)
+
+
+@estimate.register(Params)
+@compiled
+def step(params, state, seen, restart):
+    # The velocity has one fraction bit: the change over two samples is its word.
+    change, state = _take(params.count_width, state, seen.count, restart)
+    velocity = saturate(change, -params.velocity_max - 1, params.velocity_max)
+    return state, velocity, int(velocity != change)
+
+
+@estimate.register(FloatParams)
+@compiled
+def float_step(params, state, seen, restart):
+    change, state = _take(params.count_width, state, seen.count, restart)
+    return state, change / 2, 0

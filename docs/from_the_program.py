@@ -1,0 +1,184 @@
+"""What pages take from the program itself, so that they cannot fall behind it.
+
+A line `%commands%` in a page becomes every command of the command line with its arguments, options and defaults.
+
+The directive `{scene-section} handle` lists the keys of a section of a scene, with the unit, range and default that the
+schema has; its content is a line `key: meaning` for each. A key without a meaning, or a meaning without a key, is a
+warning, and so fails the build.
+"""
+
+import re
+import types
+import typing
+
+import typer.main
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util import logging
+from sphinx.util.docutils import SphinxDirective
+
+from hardwall.sim.commands.group import app
+from hardwall.sim.scene.schema import Scene
+
+log = logging.getLogger(__name__)
+
+# The ends of keys, longest first, and what they say of the unit.
+UNITS = {
+    "_n_m_per_a": "N m/A",
+    "_sqrt_m_per_s": "m^(1/2)/s",
+    "_n_s_per_m": "N s/m",
+    "_n_per_m": "N/m",
+    "_n_per_s": "N/s",
+    "_m_per_s2": "m/s²",
+    "_m_per_s": "m/s",
+    "_counts": "counts",
+    "_clocks": "clocks",
+    "_ohm": "Ω",
+    "_bits": "bits",
+    "_kg": "kg",
+    "_hz": "Hz",
+    "_mm": "mm",
+    "_n": "N",
+    "_m": "m",
+    "_s": "s",
+    "_h": "H",
+    "_a": "A",
+    "_v": "V",
+}
+RELATIONS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
+
+
+def cell(text: object) -> str:
+    """Return text as it can stand in a cell of a Markdown table."""
+    return " ".join(str(text).split()).replace("|", "\\|").replace("<", "\\<")
+
+
+def code(text: str) -> str:
+    """Return text as code in a cell of a Markdown table."""
+    return f"`{' '.join(text.split())}`".replace("|", "\\|")
+
+
+def table(heads: list[str], rows: list[list[str]]) -> list[str]:
+    """Return the lines of a Markdown table."""
+    return [f"| {' | '.join(line)} |" for line in (heads, ["---"] * len(heads), *rows)]
+
+
+# ---- commands -------------------------------------------------------------------------------------------------------
+
+
+def commands() -> list[str]:
+    """Return the lines of Markdown that describe every command."""
+    group = typer.main.get_command(app)
+    context = group.make_context("hardwall", [], resilient_parsing=True)
+    found = {name: group.resolve_command(context, [name])[1] for name in group.list_commands(context)}
+    shown = {name: command for name, command in found.items() if not command.hidden}
+    firsts = [[f"[{code(name)}](#hardwall-{name})", cell(one.get_short_help_str(200))] for name, one in shown.items()]
+    lines = [*table(["command", "what it does"], firsts), "", "## `hardwall`", "", *_options(group, context), ""]
+    for name, command in shown.items():
+        inner = command.make_context(name, [], parent=context, resilient_parsing=True)
+        usage = " ".join(["hardwall", name, *command.collect_usage_pieces(inner)])
+        lines += [f"(hardwall-{name})=", f"## `hardwall {name}`", "", cell(command.help or ""), ""]
+        lines += ["```text", usage, "```", "", *_options(command, inner), ""]
+    return lines
+
+
+def _options(command, context) -> list[str]:
+    """Return a table of the arguments and options of a command."""
+    rows = []
+    for parameter in command.get_params(context):
+        record = parameter.get_help_record(context)
+        if record is None or getattr(parameter, "hidden", False):
+            continue
+        name, meaning = record
+        # Long lists of choices are told in the meaning, where they can be broken.
+        choices = re.search(r"<([^<>|]+(?:\|[^<>|]+)+)>", name)
+        if choices:
+            name = name.replace(choices[0], "CHOICE")
+            text, bracket, default = meaning.partition(" [")
+            meaning = f"{text.rstrip()}: {', '.join(choices[1].split('|'))}{bracket}{default}"
+        rows.append([code(name), cell(meaning)])
+    return table(["argument or option", "meaning"], rows)
+
+
+def fill(_: Sphinx, __: str, source: list[str]) -> None:
+    """Put the commands where a page wants them."""
+    if "%commands%" in source[0]:
+        source[0] = source[0].replace("%commands%", "\n".join(commands()))
+
+
+# ---- scenes ---------------------------------------------------------------------------------------------------------
+
+
+class SceneSection(SphinxDirective):
+    """The keys of a section of a scene."""
+
+    required_arguments = 1
+    has_content = True
+
+    def run(self) -> list[nodes.Node]:
+        name = self.arguments[0]
+        fields = _sections(Scene)[name].model_fields
+        meanings = dict(re.fullmatch(r"(\w+): (.*)", line).groups() for line in self.content if line.strip())
+        if meanings.keys() != fields.keys():
+            wrong = sorted(meanings.keys() ^ fields.keys())
+            log.warning("section %s of a scene: %s", name, ", ".join(wrong), location=self.get_location())
+        rows = [
+            [f"`{key}`", _unit(key), cell(_range(field)), cell(_default(field)), cell(meanings.get(key, ""))]
+            for key, field in fields.items()
+        ]
+        return self.parse_text_to_nodes("\n".join(table(["key", "unit", "range", "default", "meaning"], rows)))
+
+
+def _sections(model: type) -> dict[str, type]:
+    """Return the sections of a scene by name."""
+    kinds = {name: (field.annotation, *typing.get_args(field.annotation)) for name, field in model.model_fields.items()}
+    return {name: kind for name, several in kinds.items() for kind in several if hasattr(kind, "model_fields")}
+
+
+def _unit(key: str) -> str:
+    return next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
+
+
+def _range(field) -> str:
+    """Return what a field accepts, in words."""
+    return _accepted(field.annotation, field.metadata)
+
+
+def _accepted(kind, metadata=()) -> str:
+    """Return what a type accepts, with the limits that are annotated."""
+    origin, inner = typing.get_origin(kind), typing.get_args(kind)
+    if origin is typing.Annotated:
+        words = _accepted(inner[0], kind.__metadata__)
+    elif origin in (typing.Union, types.UnionType):
+        words = " or ".join(_accepted(one, metadata) for one in inner if one is not type(None))
+    elif origin is typing.Literal:
+        words = ", ".join(code(str(one)) for one in inner)
+    elif kind in (int, float):
+        words = f"{'a whole number' if kind is int else 'a number'} {_limits(metadata)}".strip()
+    elif hasattr(kind, "model_fields"):
+        words = "a section"
+    else:
+        words = {bool: "true or false", str: "a name"}.get(kind, "a list of numbers")
+    return words
+
+
+def _limits(metadata) -> str:
+    """Return the limits among what a field is annotated with, in words."""
+    marks = [mark for data in metadata for mark in (getattr(data, "metadata", None) or [data])]
+    found = [(words, getattr(mark, sign)) for mark in marks for sign, words in RELATIONS.items() if hasattr(mark, sign)]
+    return " and ".join(f"{words} {limit:g}" for words, limit in found)
+
+
+def _default(field) -> str:
+    if field.is_required():
+        return "must be given"
+    if field.default is None or hasattr(field.default, "model_fields"):
+        return "none"
+    return f"`{str(field.default).lower() if isinstance(field.default, bool) else field.default}`"
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Add the directives to Sphinx."""
+    app.connect("source-read", fill)
+    app.add_directive("scene-section", SceneSection)
+    return {"parallel_read_safe": True}

@@ -1,0 +1,56 @@
+"""The registers and wires of `levant_edge`, by the names that the model uses."""
+
+from amaranth.hdl import Array, Signal, signed, unsigned
+
+from hardwall.model.estimators.levant_edge import Design
+
+from ..arithmetic.fixed import shape
+
+
+class Signals:
+    """The registers and wires for a design."""
+
+    def __init__(self, d: Design):
+        self.params = d.params({word.name: word.reset for word in d.words})
+        count, clocks, velocity = signed(d.count_width), unsigned(d.stamp_width), shape(d.velocity)
+
+        # Held from sample to sample: the anchor, the motion there, the places of the four edges.
+        self.running, self.known = Signal(), Signal()
+        self.number, self.stamp, self.kind = Signal(count), Signal(clocks), Signal(2)
+        self.length = Signal(range(d.stamp_width + 1))
+        self.v, self.a = Signal(velocity), Signal(shape(d.acceleration))
+        self.places = Array(Signal(shape(d.place), name=f"place_{n}") for n in range(4))
+
+        # Of the sample. `anchor`: its edge is the new anchor; `loose`: it is not yet.
+        self.fresh, self.full_run, self.rest, self.beyond = Signal(), Signal(), Signal(), Signal()
+        self.correct, self.carry, self.anchor, self.loose = Signal(), Signal(), Signal(), Signal()
+        self.now, self.at, self.waited = Signal(clocks), Signal(clocks), Signal()
+        self.to, self.to_kind, self.passed = Signal(count), Signal(2), Signal(count)
+        self.flags = Signal(2)
+
+        # A time and its length, as it multiplies, and what it makes of an acceleration.
+        self.measure, self.size = Signal(clocks), Signal(range(d.stamp_width + 1))
+        self.cut, self.kept = Signal(range(d.turn_span + 2)), Signal(range(d.turn_span + 1))
+        self.time, self.age_time = Signal(d.mantissa), Signal(d.mantissa)
+        self.drop, self.age_drop = Signal.like(self.kept), Signal.like(self.kept)
+        self.left, self.right = Signal(velocity), Signal(d.mantissa)
+        self.product = Signal(signed(d.velocity.width + d.mantissa))
+        self.turned, self.turn = (Signal(signed(d.velocity.width + 1)) for _ in range(2))
+        self.ahead = Signal(signed(d.velocity.width + 2))
+
+        # The error of place, and what it changes.
+        self.distance, self.apart = Signal(shape(d.distance)), Signal(signed(d.place.width + 1))
+        bits = max(d.distance.width + d.clocks.bit_length() + d.place.f, d.place.width + 1) + 1
+        self.way, self.moved = Signal(signed(bits)), Signal(shape(d.error))
+        self.e, self.e_cut = Signal(shape(d.error)), Signal.like(self.cut)
+        self.start, self.solved, self.root = Signal(), Signal(), Signal(d.root.width)
+        self.root_product = Signal(d.lambda_.width + d.root.width)
+        self.slope, self.far_slope, self.limit = Signal(d.velocity.width - 1), Signal(), Signal(d.velocity.width - 1)
+        self.bent, self.relay = Signal(d.acceleration.width - 1), Signal(d.acceleration.width - 1)
+        self.change, self.bend = Signal(velocity), Signal(shape(d.acceleration))
+        self.here, self.there = Signal(shape(d.place)), Signal(shape(d.place))
+        self.next_here, self.next_there = Signal(shape(d.place)), Signal(shape(d.place))
+
+        # What no further edge allows.
+        self.bound, self.onward = Signal(d.velocity.width - 1), Signal(d.velocity.width - 1)
+        self.line, self.end = Signal(velocity), Signal(signed(d.velocity.width + 1))

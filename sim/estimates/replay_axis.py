@@ -1,0 +1,124 @@
+"""The axis that a recording gets, in units of its own, and a record of counts through it on any backend.
+
+The metre of its `AxisSpec` is a *recorded count* and its second is `SECOND` *sample periods* (so long that no clock
+stamp of an edge wraps meanwhile), which makes one piece of hardware serve any recording. Of counts that were divided by
+N its count is N recorded counts.
+
+What it must cover follows from the recording, each range rounded up to a power of two:
+
+- travel: the span of the recording (at most what a 32-bit count has; beyond, the count wraps, which is no fault);
+- speed: the largest change in a sample, and one count more;
+- clock, in periods a sample: enough for the force path, and for the fastest change through the decoder
+  (`quadrature_speed.max_edge_rate`).
+
+`float` and `fixed` take the counts as they are; `rtl`, and any estimator that uses the stamps of edges, gets them
+`through_pins`.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ...model.arithmetic.fixed import bits_for
+from ...model.axis import Axis
+from ...model.estimators import registry
+from ...model.quadrature_speed import max_edge_rate
+from ...model.spec import AxisSpec
+from ..loop.backends import is_exact, opened
+from ..world.encoder import level
+from .through_pins import DECODER_CLOCKS, GLITCH_CLOCKS, run_pins
+
+SECOND = 1 << 10
+"""Sample periods in a second of the axis."""
+TRAVEL_MAX = 2.0**29
+"""Travel of an axis with a 32-bit count."""
+ACCELERATION_RANGE = 2.0**48
+"""The largest ratio of travel or speed to C, in counts and samples, at which no estimator's words exceed int64."""
+
+
+def _power_of_two(value: float) -> float:
+    """Return the least power of two that is no less than `value`."""
+    return 2.0 ** bits_for(value)
+
+
+def _ranges(counts: np.ndarray) -> tuple[float, float]:
+    """Return the travel, counts, and the speed, counts a sample, of the axis for a recording."""
+    span = int(counts.max()) - int(counts.min())
+    fastest = int(np.abs(np.diff(counts)).max())
+    return min(_power_of_two(max(span, 1)), TRAVEL_MAX), _power_of_two(fastest + 1)
+
+
+def least_bound(counts: np.ndarray) -> float:
+    """Return the least C that is taken from a recording, counts a sample^2."""
+    return max(2 / len(counts) ** 2, max(_ranges(counts)) / ACCELERATION_RANGE)
+
+
+def axis_spec(counts: np.ndarray, count: int, acceleration_max: float, estimator: str) -> AxisSpec:
+    """Return the axis for a recording.
+
+    Args:
+        counts: as the axis sees them, each `count` recorded counts.
+        acceleration_max: C, recorded counts a sample^2.
+    """
+    fastest = int(np.abs(np.diff(counts)).max())
+    travel, speed = _ranges(counts)
+    # The wall and the output stage are there and do nothing: any ranges do.
+    spec = AxisSpec(
+        clock_hz=SECOND << 16,
+        sample_hz=SECOND,
+        actuation_hz=SECOND,
+        count_m=float(count),
+        travel_m=travel * count,
+        speed_max_m_per_s=speed * count * SECOND,
+        acceleration_max_m_per_s2=acceleration_max * SECOND**2,
+        force_max_n=1.0,
+        force_resolution_n=1.0,
+        stiffness_max_n_per_m=1.0 / count,
+        damping_max_n_s_per_m=1.0 / count / SECOND,
+        estimator=estimator,
+    )
+    # The edges of an interval begin before its strobe, and must not reach into the force path of the one before.
+    path = spec.design.latency_to_drive + DECODER_CLOCKS
+    clocks = max(path, fastest / max_edge_rate(1.0, GLITCH_CLOCKS))
+    return replace(spec, clock_hz=int(_power_of_two(clocks)) * SECOND)
+
+
+def needs_pins(estimator: str, backend: str) -> bool:
+    """Return whether the counts go through pins: into hardware, or to be stamped."""
+    return backend == "rtl" or registry.design_of(estimator).uses_stamps()
+
+
+def run(
+    spec: AxisSpec,
+    counts: np.ndarray,
+    backend: str,
+    output: str,
+    progress: Callable[[int], None] | None = None,
+) -> tuple[np.ndarray, int, float]:
+    """Return what an axis makes of a record of counts: (velocity words, or float counts a sample; flags; seconds).
+
+    Args:
+        spec: the axis, with clocks enough in a sample for the largest change.
+        counts: int64, as the axis sees them.
+        backend: one of `backends.BACKENDS`.
+        output: the estimator's output.
+        progress: called with the number of samples done.
+
+    Raises:
+        RuntimeError: if the RTL could not be built.
+    """
+    choice = spec.design.estimator.choose(output)
+    if needs_pins(spec.estimator, backend):
+        choice["encoder_glitch_clocks"] = GLITCH_CLOCKS
+        with opened(spec, backend, choice, int(level(0)), short=True) as (controller, state, _):
+            return run_pins(controller, state, spec.design.timing, counts, progress)
+    axis = Axis(spec, not is_exact(backend), **choice)
+    axis.run(counts[:0])  # compiles
+    began = time.perf_counter()
+    record = axis.run(counts)
+    seconds = time.perf_counter() - began
+    if progress:
+        progress(len(counts))
+    return record.velocity, int(record.flags[-1]), seconds

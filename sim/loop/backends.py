@@ -1,0 +1,70 @@
+"""The backends by name, and the one place where they open.
+
+`float` and `fixed` are the model of decoder and axis, in float64 or in the hardware's integers; `rtl` is the Verilated
+hardware. Whatever runs samples through an axis gets it from here, in the shape that `controllers` takes.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...model import stamped
+from ...model.axis import Axis
+from ...model.spec import AxisSpec
+from ..rtl.verilated import Rtl, RtlState
+
+if TYPE_CHECKING:
+    from ..rtl.library import Hardware
+
+BACKENDS = ("float", "fixed", "rtl")
+
+
+class Opened(NamedTuple):
+    """An axis after reset, ready for its first sample."""
+
+    controller: stamped.Controller | Rtl
+    state: stamped.State | RtlState
+    hardware: "Hardware | None"  # on `rtl`
+
+
+def is_exact(backend: str) -> bool:
+    """Return whether a backend has the hardware's words, rather than float64."""
+    return backend != "float"
+
+
+def number_of(backend: str) -> type:
+    """Return the type of a backend's drives and velocities."""
+    return np.int64 if is_exact(backend) else np.float64
+
+
+@contextmanager
+def opened(
+    spec: AxisSpec,
+    backend: str,
+    parameters: dict[str, float],
+    level: int,
+    traced: bool = False,
+    short: bool = False,
+) -> Iterator[Opened]:
+    """Open an axis on a backend; at the end what it holds is freed.
+
+    Args:
+        spec: the axis.
+        backend: one of `BACKENDS`.
+        parameters: run-time parameters in SI units, by word: see `Axis`.
+        level: of the encoder's pins at reset, a | b << 1.
+        traced, short: of `rtl`: built for waveforms; built quickly rather than for speed.
+
+    Raises:
+        RuntimeError: if the RTL could not be built.
+    """
+    axis = Axis(spec, not is_exact(backend), **parameters)
+    if backend != "rtl":
+        yield Opened(*stamped.controller(axis, level), None)
+        return
+    from ..rtl.library import Hardware  # noqa: PLC0415  (the other backends need neither Amaranth nor a C++ compiler)
+
+    with Hardware(spec, axis.words, level, traced, short) as hardware:
+        yield Opened(hardware.controller, hardware.start, hardware)

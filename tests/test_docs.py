@@ -1,0 +1,123 @@
+"""The pages are true: their Python prints what they say, their commands run, and those that take long are accepted.
+
+A block of commands that takes minutes is marked `{.long}` in the page, one that changes the machine `{.setup}`: the
+commands of these are only parsed.
+"""
+
+import contextlib
+import io
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hardwall.model.compiled import build_dir
+from hardwall.model.estimators.registry import ESTIMATORS
+from stimuli.command_line import call
+from stimuli.pages import PAGES, ROOT, blocks, command_line, commands, text_of
+
+TOOLS = {"cp", "dask", "git", "pip", "pytest", "python", "source"}
+"""What commands that are not run begin with, besides `hardwall` and `make`."""
+EXAMPLES = sorted(path.name for path in (ROOT / "docs/examples").iterdir() if (path / "wiring.patch").exists())
+GUIDES = [name for name in PAGES if name.startswith("docs/")]
+UNRUN = [
+    (name, " ".join(words), words)
+    for name in PAGES
+    for block in blocks(name)
+    if block.language == "sh" and (block.marked or name not in GUIDES)
+    for words in commands(block)
+]
+
+
+@pytest.mark.usefixtures("fresh")
+@pytest.mark.parametrize("name", [name for name in GUIDES if any(not block.marked for block in blocks(name))])
+def test_what_a_page_shows_runs(name, tmp_path, monkeypatch, capsys):
+    """In order, in one folder and one namespace, as a reader would."""
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for block in blocks(name):
+        if block.language == "python":
+            with contextlib.redirect_stdout(io.StringIO()) as out:
+                exec(compile(block.text, name, "exec"), names)
+            assert out.getvalue() == (block.printed or "")
+        elif not block.marked:
+            for words in commands(block):
+                assert words[0] == "hardwall", f"neither run nor marked: {' '.join(words)}"
+                code, _, err = call(monkeypatch, capsys, *words[1:])
+                assert code == 0, f"{' '.join(words)}: {err}"
+
+
+@pytest.mark.parametrize("words", [words for *_, words in UNRUN], ids=[f"{name}: {line}" for name, line, _ in UNRUN])
+def test_a_command_that_is_not_run_is_accepted(words):
+    while "=" in words[0]:
+        words = words[1:]
+    # An estimator of an example is not in this tree.
+    tool, *arguments = ("fdm" if word == "two-step" else word for word in words)
+    if tool == "hardwall":
+        group = command_line()
+        context = group.make_context("hardwall", [], resilient_parsing=True)
+        if arguments[0].startswith("-"):
+            assert arguments[0] in {option for parameter in group.get_params(context) for option in parameter.opts}
+        else:
+            called, command, options = group.resolve_command(context, arguments)
+            command.make_context(called, options, parent=context)
+    elif tool == "make":
+        targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+        assert {word for word in arguments if "=" not in word} <= targets
+    else:
+        assert tool in TOOLS
+        assert [word for word in arguments if word.startswith("docs/") and not (ROOT / word).exists()] == []
+
+
+def test_the_api_has_every_module_of_the_model():
+    shown = {name for page in ("docs/api.md", "docs/api-estimators.md") for name in _modules_on(page)}
+    paths = [path.relative_to(ROOT).with_suffix("") for path in (ROOT / "model").rglob("*.py")]
+    assert shown == {".".join(("hardwall", *path.parts)) for path in paths if path.stem != "__init__"}
+
+
+def _modules_on(page: str) -> list[str]:
+    return re.findall(r"^\.\. automodule:: (\S+)$", text_of(page), re.MULTILINE)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_every_estimator_is_described_measured_and_sourced(estimator):
+    text = text_of("docs/estimators.md")
+    assert len(re.findall(rf"^\|[^|]*`{estimator}`", text, re.MULTILINE)) >= 3, "what it is, a measurement, its costs"
+    assert f"`{estimator}`" in text_of("docs/sources.md")
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_an_example_works_in_a_copy_of_the_project(example, tmp_path):
+    """As its page says: its files into the tree, the patch that wires them; then its own test passes."""
+    left_out = shutil.ignore_patterns("__pycache__", "build")
+    for room in ("hdl", "model", "sim", "tests"):
+        shutil.copytree(ROOT / room, tmp_path / room, ignore=left_out)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    shutil.copytree(ROOT / "docs/examples" / example, tmp_path, dirs_exist_ok=True, ignore=left_out)
+    (tmp_path / "path/hardwall").mkdir(parents=True)
+    for name, room in (("hdl", "hdl"), ("model", "model"), ("sim", "sim"), ("testing", "tests/benches")):
+        (tmp_path / "path/hardwall" / name).symlink_to(tmp_path / room)
+    environ = {
+        **os.environ,
+        "GIT_CEILING_DIRECTORIES": str(tmp_path.parent),
+        "HARDWALL_BUILD": str(build_dir()),
+        "HARDWALL_SAMPLES": "2000",
+        "PYTHONPATH": str(tmp_path / "path"),
+    }
+    _run(["git", "apply", "wiring.patch"], tmp_path, environ)
+    tests = [str(path.relative_to(ROOT / "docs/examples" / example)) for path in _tests_of(example)]
+    quick = ["-q", "-n", "0", "-p", "no:cacheprovider", "-k", "not narrow"]
+    _run([sys.executable, "-m", "pytest", *quick, *tests], tmp_path, environ)
+
+
+def _tests_of(example: str) -> list[Path]:
+    return sorted((ROOT / "docs/examples" / example).rglob("test_*.py"))
+
+
+def _run(words: list[str], folder: Path, environ: dict[str, str]) -> None:
+    done = subprocess.run(words, cwd=folder, env=environ, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
