@@ -9,7 +9,7 @@ import os
 import re
 import sys
 import threading
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from xml.etree import ElementTree
@@ -65,7 +65,7 @@ class Job:
     checks: str | None = None
     log: Path | None = None
     build: Path | None = None
-    more: str = ""
+    more: str = field(default="", repr=False)
 
 
 class CocotbFailedError(RuntimeError):
