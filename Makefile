@@ -41,7 +41,7 @@ STUDIES := cutoff gains rates drop trade
 SEEDS ?= $(shell shuf -i 1-999999999 -n 3)
 SAMPLES ?= 1000000
 ENDURANCE ?= 1000000000
-PYTEST := $(RUN) pytest -n 2 --dist worksteal
+PYTEST := $(RUN) pytest -n logical --maxprocesses 8 --dist worksteal
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
@@ -52,7 +52,7 @@ all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the l
 	@printf '%s\n' $(PICTURES)
 
 test: $(VENV)/.test | tools ## every regression: the model against exact arithmetic, the RTL against the model
-	@$(PYTEST) $(ARGS)
+	@$(PYTEST) $(if $(CI),--junitxml build/junit.xml) $(ARGS)
 
 lint: $(VENV)/.test | tools ## style and common mistakes
 	@failed=0; $(RUN) ruff check . || failed=1; $(RUN) ruff format --check . || failed=1; exit $$failed

@@ -28,11 +28,12 @@ def pytest_report_header() -> str:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark as `rtl` the tests that call `bench.simulate`."""
+    """Mark as `rtl` the tests that call `simulate`, and put them first: they are the longest, and not to come last."""
     for item in items:
         code = getattr(inspect.unwrap(item.obj), "__code__", None)
         if code and "simulate" in code.co_names:
             item.add_marker("rtl")
+    items.sort(key=lambda item: item.get_closest_marker("rtl") is None)
 
 
 @pytest.fixture(scope="session")

@@ -20,6 +20,32 @@ TESTS = sorted((ROOT / "tests").rglob("*.py"))
 FLOORS = ("world", "jobs", "rtl", "loop", "scene", "walls", "estimates", "studies", "pictures", "commands")
 # Of hdl, what is no block of the data path and has no arithmetic to twin; of model, what has no hardware.
 NOT_TWINNED = {"block", "board", "export", "frame", "ports", "estimators/levant_edge_signals"}
+# Tests of more than one source, and what of.
+BROAD = {
+    "commands/test_cli": "every command, as it is called",
+    "commands/test_cli_estimators": "the commands on estimators, as they are called",
+    "estimators/test_levants": "what several of Levant's differentiators promise alike",
+    "pictures/test_draw": "every picture",
+    "test_digests": "whatever the program computes",
+    "test_docs": "the pages",
+    "test_endurance": "every estimator",
+    "test_layout": "the tree",
+    "test_makefile": "the tasks",
+    "test_readme": "the README",
+    "test_typing": "the model's types",
+    "testing/test_examples": "the bench as others use it",
+}
+# Of studies/, what has no test of its own name, and whose test covers it.
+COVERED = {
+    "accuracy": "commands/test_cli_estimators",
+    "bits": "pictures/test_draw",
+    "cocotb_loop": "studies/test_bench",
+    "costs": "rtl/test_synthesis",
+    "drop_result": "studies/test_drop",
+    "shortcuts": "studies/test_trade",
+    "trade_runs": "studies/test_trade",
+    "zwidth": "walls/test_zwidth",
+}
 CONFIG = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS = CONFIG["project"]["optional-dependencies"]
 PROVIDERS = importlib.metadata.packages_distributions()
@@ -122,6 +148,21 @@ def test_a_picture_is_of_a_module_of_its_name():
     drawn = {path.stem for path in (ROOT / "sim/pictures").glob("*.py")} - {"__init__", "labels", "style"}
     shown = {path.stem for room in ("walls", "estimates", "studies") for path in (ROOT / "sim" / room).glob("*.py")}
     assert drawn - shown == set()
+
+
+def test_a_test_has_the_path_of_its_source():
+    sources = set().union(*(paths_below(ROOT / room) for room in ROOMS))
+    sources |= {f"testing/{name}" for name in paths_below(ROOT / "tests/benches")}
+    tested = {str(path.relative_to(ROOT / "tests").with_suffix("")) for path in TESTS if path.stem.startswith("test_")}
+    assert {name for name in tested if name.replace("test_", "", 1) not in sources} == set(BROAD)
+
+
+def test_a_study_has_its_test():
+    without = {
+        name for name in paths_below(ROOT / "sim/studies") if not (ROOT / f"tests/studies/test_{name}.py").exists()
+    }
+    assert without == set(COVERED)
+    assert [name for name in COVERED.values() if not (ROOT / f"tests/{name}.py").exists()] == []
 
 
 def test_the_model_needs_only_numpy_and_numba():

@@ -9,7 +9,7 @@ import os
 import re
 import sys
 import threading
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from xml.etree import ElementTree
@@ -65,7 +65,7 @@ class Job:
     checks: str | None = None
     log: Path | None = None
     build: Path | None = None
-    more: str = ""
+    more: str = field(default="", repr=False)
 
 
 class CocotbFailedError(RuntimeError):
@@ -215,7 +215,11 @@ def _failed(results: Path, job: Job, ended: int) -> dict[str, str]:
     if not cases:
         raise RuntimeError(f"{job.module} ran no test")
     said = {
-        case.get("name"): next((bad.get("message", "") for bad in case if bad.tag in ("failure", "error")), None)
+        case.get("name"): next((_first_line(bad) for bad in case if bad.tag in ("failure", "error")), None)
         for case in cases
     }
     return {name: message for name, message in said.items() if message is not None}
+
+
+def _first_line(bad: ElementTree.Element) -> str:
+    return bad.get("message", "").partition("\n")[0]
