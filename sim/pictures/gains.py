@@ -9,7 +9,7 @@ from matplotlib.patheffects import withStroke
 from ..studies.gains import Search
 from ..studies.lipschitz import least_alpha_m_per_s2
 from .labels import label_points
-from .style import LABEL_PT, new_figure, page
+from .style import new_figure, page
 
 ROWS = {False: "stable walls", True: "stable walls that are in place"}
 MARKS = {"proposed": "o", "adjusted": "s", "best": "*", "best in place": "D", "best within the condition": "P"}
@@ -68,8 +68,7 @@ def _mark(axes: Axes, search: Search, output: str) -> None:
     if curve:
         text = f"above and right of it,\nsufficient for convergence\n(C = {bound:g} m/s²)"
         labels.append((text, curve[len(curve) // 3 :: 10], "white"))
-    for written in label_points(axes, labels, lines=[curve] if curve else []):
-        written.set(path_effects=OUTLINE, fontsize=LABEL_PT)
+    label_points(axes, labels, lines=[curve] if curve else [], ground="black")
 
 
 def _together(names: list[str]) -> str:

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
 
@@ -91,6 +90,7 @@ def label_points(
     labels: Sequence[tuple[str, Sequence, str]],
     avoid: Sequence[tuple[float, float]] = (),
     lines: Sequence[Sequence[tuple[float, float]]] = (),
+    ground: str = "white",
 ) -> list[Annotation]:
     """Write names beside points or curves of a panel, each in the nearest place that is free, with a line where far.
 
@@ -102,6 +102,7 @@ def label_points(
         labels: text, what it names, and colour of each; what it names is a point in data, or the points of a curve.
         avoid: other points, in data.
         lines: other curves, points in data.
+        ground: colour of what is behind the letters.
     """
     figure = axes.figure
     figure.draw_without_rendering()
@@ -134,7 +135,8 @@ def label_points(
             (np.array([box[0], (box[1] + box[3]) / 2]) - anchor) * 72 / figure.dpi,
             textcoords="offset points",
             arrowprops=None if near else line,
-            path_effects=[withStroke(linewidth=2, foreground="white")],
+            # Not an outline: letters with one are no text any more in a file of text.
+            bbox={"fc": ground, "lw": 0, "alpha": 0.65, "pad": 0.5},
             annotation_clip=False,
             color=colour,
             fontsize=LABEL_PT,

@@ -107,7 +107,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
     code, out, _ = call(monkeypatch, capsys, "drop", "--workers", 1, "--resume")
     assert code == 0
-    assert "Coulomb friction x 0.3" in out
+    assert "Coulomb friction x 2" in out
 
 
 @pytest.mark.parametrize(

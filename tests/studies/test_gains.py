@@ -132,7 +132,7 @@ def test_the_sufficient_condition(lam, alpha, meets):
 
 
 def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
-    monkeypatch.setattr(gains, "LAMBDAS", np.array([1.0, 2.0]))
+    monkeypatch.setattr(gains, "LAMBDAS", np.array([1.0, 4.0]))
     monkeypatch.setattr(gains, "ALPHAS", np.array([1.0, 4.0]))
     picture = tmp_path / "gains.svg"
     code, out, _ = call(monkeypatch, capsys, "gains", *SET, "--workers", 1, "--json", "--plot", picture)
