@@ -1,12 +1,12 @@
 """One axis, from counts to drive: estimator, wall and output stage, wired as the hardware wires them.
 
-For one's own studies, `Axis` takes and gives numpy arrays and SI units:
+For studies in Python, `Axis` takes and returns numpy arrays and SI units:
 
     axis = Axis(spec, wall_stiffness=20e3, wall_damping=30.0)
     record = axis.run(counts)
     record.velocity_m_per_s, record.drive_n
 
-The kernels below it (`step` for a sample, `run` for records) are what the closed loop compiles into itself.
+The closed loop compiles the kernels beneath it into itself: `step` takes one sample, `run` takes records.
 """
 
 from dataclasses import dataclass
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
     from .spec import AxisSpec
 
 GLITCH_WIDTH = 4
-"""Bits of the glitch filter's length: up to 15 clocks."""
+"""Bits of the glitch filter's length, which is up to 15 clocks."""
 ILLEGAL_WIDTH = 8
-"""Bits of the count of illegal transitions, which saturates: one is a fault, a full count a broken cable."""
+"""Bits of the count of illegal transitions, which saturates: a count of one is a fault, a full count a broken cable."""
 ENCODER_FLAGS = ("encoder_illegal", "encoder_overspeed")
 
 
 class Params(NamedTuple):
-    """Parameters of the three blocks, all integer words or all float64; and where their flags stand."""
+    """Parameters of the three blocks, all integer words or all float64, and the lowest bits of their flags."""
 
     estimator: tuple
     wall: wall.Params | wall.FloatParams
@@ -43,7 +43,7 @@ class Params(NamedTuple):
 
 
 class State(NamedTuple):
-    """States of the blocks, and the sticky flags (bits as `Design.flags`, after the encoder's)."""
+    """The states of the blocks, and the sticky flags (bits as in `Design.flags`, after the encoder's flags)."""
 
     estimator: tuple
     output: output.State
@@ -51,10 +51,10 @@ class State(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """When an axis takes its samples and changes its drive, in clocks numbered from 0, the first after reset."""
+    """The clocks at which an axis samples and changes its drive; clock 0 is the first one after reset."""
 
     clocks_per_sample: int
-    latency: int  # from a strobe to the changed drive
+    latency: int  # clocks from a strobe to the changed drive
 
 
 @compiled
@@ -68,11 +68,11 @@ class Design:
 
     Attributes:
         decoder: the decoder's `quadrature.Params`.
-        estimator, wall, output: the other blocks' designs.
+        estimator, wall, output: the designs of the other blocks.
         words: every run-time word, in the order of the hardware's ports.
         flags: names of the sticky flags, bit 0 first.
         latency_to_drive: clocks from the sample strobe to the changed drive.
-        timing: that, and the clocks of a sample.
+        timing: the clocks per sample, and `latency_to_drive`.
     """
 
     words: tuple[Word, ...]
@@ -110,11 +110,11 @@ class Design:
         self.timing = Timing(spec.clocks_per_sample, self.latency_to_drive)
 
     def encode(self, **si: float) -> dict[str, int]:
-        """Return every run-time word by name: from SI where given, else as after reset.
+        """Return every run-time word by name: converted from the SI value where one is given, else its reset word.
 
         Raises:
-            TypeError: for a value that is not a number.
-            ValueError: for a name that is not a word, or a value that does not fit; with what is accepted.
+            TypeError: if a value is not a number.
+            ValueError: if a name is not a word, or a value does not fit; the message says what is accepted.
         """
         known = {word.name: word for word in self.words}
         for name in si:
@@ -128,7 +128,7 @@ class Design:
         return Params(*blocks, *self._flag_bits)
 
     def float_params(self, words: dict[str, int], si: dict[str, float]) -> Params:
-        """Return the float64 kernel's parameters: gains as given in `si`, by word's name, not as rounded to `words`."""
+        """Return the float64 kernel's parameters: gains unrounded, as given in `si` by the name of their word."""
         selected = self.estimator.outputs[words.get(self.estimator.output_word(), 0)]
         return Params(
             self.estimator.float_params(self.gains, selected, si),
@@ -138,11 +138,11 @@ class Design:
         )
 
     def start(self, floating: bool = False) -> State:
-        """Return the state before the first sample, for one run: it may hold arrays that the run writes to."""
+        """Return the state before the first sample, for one run only: the run may write to arrays in it."""
         return State(self.estimator.start(floating), output.FLOAT_START if floating else output.START, 0)
 
     def flag_names(self, flags: int) -> list[str]:
-        """Return the names of the flags raised in `flags`."""
+        """Return the names of the flags that are raised in `flags`."""
         return [name for bit, name in enumerate(self.flags) if flags >> bit & 1]
 
 
@@ -153,10 +153,11 @@ def step(
     """Take one sample: return (state, velocity, force); the drive is `state.output.drive`.
 
     Args:
-        params, state: of `Design.params` and `Design.start`, or their float64 counterparts.
-        seen: a `quadrature.Seen`.
-        restart: true where the count was preloaded since the last sample; the estimator starts afresh.
-        fault: the encoder's two sticky flags; any of them forces the drive to zero.
+        params: what `Design.params` or `Design.float_params` returns.
+        state: what `Design.start` or the previous call returned, of the same number type.
+        seen: what the decoder shows at the strobe.
+        restart: true if the count was preloaded since the last sample; the estimator then starts afresh.
+        fault: the encoder's two sticky flags; either of them forces the drive to zero.
         enable: false forces the drive to zero.
     """
     estimator, velocity, estimator_flags = estimate(params.estimator, state.estimator, seen, restart)
@@ -168,7 +169,7 @@ def step(
 
 @compiled
 def run(params, state, counts, velocity, force, drive, flags):
-    """Take a record of `counts` sample by sample; fill the other arrays, of the same length; return the state."""
+    """Take a record of `counts` sample by sample, fill the other arrays (of the same length) and return the state."""
     for k in range(len(counts)):
         state, velocity[k], force[k] = step(params, state, quadrature.seen_count(counts[k]), 0, 0, 1)
         drive[k] = state.output.drive
@@ -178,12 +179,12 @@ def run(params, state, counts, velocity, force, drive, flags):
 
 @dataclass(frozen=True)
 class Record:
-    """What an axis made of a record of counts; arrays of the shape of the counts.
+    """The response of an axis to a record of counts, as arrays of the same shape as the counts.
 
     Attributes:
-        velocity: words of `design.estimator.velocity`; float64 axis: counts a sample.
-        force, drive: force LSB on the handle, before and after the output stage.
-        flags: sticky flags after each sample, bits as `design.flags`.
+        velocity: words of `design.estimator.velocity`; counts a sample if the axis is float64.
+        force, drive: force on the handle, force LSB, before and after the output stage.
+        flags: sticky flags after every sample, bits as in `design.flags`.
     """
 
     design: Design
@@ -211,8 +212,8 @@ class Axis:
 
     Args:
         spec: the axis.
-        floating: true for the same algorithms in float64, gains unrounded and estimator unsaturated.
-        si: run-time parameters, e.g. `wall_stiffness=20e3` (N/m); the rest stay as after reset (the wall off).
+        floating: true for the same algorithms in float64, with gains unrounded and the estimator unsaturated.
+        si: run-time parameters, e.g. `wall_stiffness=20e3` (N/m); the others keep their reset values (the wall is off).
 
     Attributes:
         design: the spec's `Design`.
@@ -220,8 +221,8 @@ class Axis:
         params: parameters of `step`.
 
     Raises:
-        TypeError: if `spec` is not an AxisSpec, or a value not a number.
-        ValueError: for an unknown name or a value out of range.
+        TypeError: if `spec` is not an AxisSpec, or a value is not a number.
+        ValueError: if a name is unknown or a value is out of range.
     """
 
     def __init__(self, spec: "AxisSpec", floating: bool = False, **si: float):
@@ -237,12 +238,12 @@ class Axis:
 
         Args:
             counts: integers, shape (samples,), or (lanes, samples) for independent axes side by side. A count may
-                exceed the count's width: it wraps, as the hardware's does; it may not jump by half of its range.
+                exceed the count's width: it wraps, as in the hardware. It may not jump by half of its range.
 
         Raises:
             TypeError: if the counts are not integers.
-            ValueError: if they have not one or two dimensions, or jump; or if the estimator needs more than counts,
-                the stamps of edges: `hardwall.model.stamped.run` has them.
+            ValueError: if the counts do not have one or two dimensions, or jump; or if the estimator also needs the
+                stamps of edges, which `hardwall.model.stamped.run` has.
         """
         if self.design.estimator.uses_stamps():
             raise ValueError(f"estimator must be one that needs only counts, not {self.design.spec.estimator!r}")

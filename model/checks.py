@@ -1,4 +1,4 @@
-"""What the model checks of what it is given: each error says in one sentence what, the accepted range and the value."""
+"""Checks of the model's arguments: every error names the argument, the accepted range and the value in one sentence."""
 
 from numbers import Real
 
@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 LARGEST = (1 << 62) - 1
-"""The largest count or clock, and less one the least: sums and differences of two fit int64."""
+"""The largest count or clock; the least is -LARGEST - 1. Sums and differences of two such values fit int64."""
 
 
 class FieldError(ValueError):
-    """A value that cannot be: the message begins with the name of its field, which is also an attribute."""
+    """An impossible value of a field: the message begins with the name of the field, which is also an attribute."""
 
     def __init__(self, field: str, message: str):
         super().__init__(field, message)
@@ -21,7 +21,7 @@ class FieldError(ValueError):
 
 
 def check_int(name: str, value: int, least: int, most: int | None = None) -> None:
-    """Raise TypeError unless `value` is an int, ValueError unless it is `least` to `most` (None: no end)."""
+    """Raise TypeError unless `value` is an int, and ValueError unless it is `least` to `most` (None: no limit)."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         raise TypeError(f"{name} must be an int, not {value!r}")
     if value < least or (most is not None and value > most):
@@ -36,10 +36,10 @@ def check_number(name: str, value: float) -> None:
 
 
 def integers(name: str, values: ArrayLike, least: int = -LARGEST - 1, most: int = LARGEST) -> np.ndarray:
-    """Return an array of integers as int64; one without elements may be of any type.
+    """Return an array of integers as int64; an array without elements may be of any type.
 
     Raises:
-        TypeError: if it is not an array of integers.
+        TypeError: if `values` is not an array of integers.
         ValueError: if an element is not within `least` to `most`.
     """
     try:
@@ -59,12 +59,13 @@ def integers(name: str, values: ArrayLike, least: int = -LARGEST - 1, most: int 
 def lanes_of_counts(counts: ArrayLike, width: int, most: int) -> np.ndarray:
     """Return records of counts as int64 words of `width` bits, shape (samples,) or (lanes, samples).
 
-    Counts beyond the width wrap. Between two samples a count may change by less than half of its range, or go round
-    it; where it went round it has changed by at most `most`, as many as the decoder counts in a sample.
+    Counts beyond the width wrap. From one sample to the next a count may change by less than half of its range, or
+    wrap around the end of the range; a wrapped change is at most `most`, the counts that the decoder can make in a
+    sample.
 
     Raises:
-        TypeError: if they are not integers.
-        ValueError: if they have not one or two dimensions, or jump.
+        TypeError: if the counts are not integers.
+        ValueError: if the counts do not have one or two dimensions, or jump.
     """
     array = integers("counts", counts)
     if array.ndim not in (1, 2):

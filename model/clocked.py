@@ -1,4 +1,4 @@
-"""A whole axis, decoder included, clock by clock from its pins: what `hardwall.hdl.axis` is held against."""
+"""A whole axis, decoder included, clock by clock from its pins: the reference that `hardwall.hdl.axis` must equal."""
 
 from typing import NamedTuple
 
@@ -9,9 +9,9 @@ from .compiled import compiled
 
 
 class Pins(NamedTuple):
-    """Inputs of the hardware at every clock, by the same names: int64 arrays.
+    """The inputs of the hardware at every clock, by the same names: int64 arrays.
 
-    `drive_enable` and `clear_flags` change between a changed drive and the next strobe only.
+    `drive_enable` and `clear_flags` may change only between a change of the drive and the next strobe.
     """
 
     encoder_a: np.ndarray
@@ -25,7 +25,7 @@ class Pins(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """Outputs of the hardware after every sample, when its drive has changed, by the same names: int64 arrays."""
+    """The outputs of the hardware after every sample, once its drive has changed, by the same names: int64 arrays."""
 
     drive: np.ndarray
     velocity: np.ndarray
@@ -44,7 +44,7 @@ class Outputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """Decoder and axis; `restart` waits for the next sample after a preload."""
+    """The states of decoder and axis; `restart` is 1 from a preload until the next sample."""
 
     decoder: quadrature.State
     axis: axis.State
@@ -53,7 +53,7 @@ class State(NamedTuple):
 
 @compiled
 def _take(params, state, outputs, k, enable):
-    """Take sample k, fill in what it gives, and return the axis's state."""
+    """Take sample k, store its outputs, and return the axis's state."""
     fault = state.decoder.illegal | state.decoder.overspeed << 1
     outputs.actuated[k] = state.axis.output.phase == 0
     seen = quadrature.seen(state.decoder)
@@ -64,7 +64,7 @@ def _take(params, state, outputs, k, enable):
 
 @compiled
 def _show(outputs, k, decoder):
-    """Fill in what the decoder shows when the drive of sample k has changed."""
+    """Store the decoder's outputs at the clock at which the drive of sample k has changed."""
     outputs.count[k], outputs.illegal_count[k] = decoder.count, decoder.illegal_count
     outputs.index_count[k] = decoder.index_count
     outputs.index_latched[k], outputs.index_armed[k] = decoder.index_latched, decoder.index_armed
@@ -74,12 +74,12 @@ def _show(outputs, k, decoder):
 
 @compiled
 def run(controller, timing, state, pins, outputs, first, until):
-    """Run clocks `first` to `until` (not included); fill `outputs`; return the state.
+    """Run clocks `first` to `until` (not included), fill `outputs` and return the state.
 
     Args:
         controller: a `stamped.Controller`.
-        timing: of the axis's `Design`.
-        state: a `State`.
+        timing: the `timing` of the axis's `Design`.
+        state: the `State` before clock `first`.
         pins: `Pins`, from clock 0 on.
         outputs: `Outputs`, from sample 0 on.
     """

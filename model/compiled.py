@@ -35,7 +35,7 @@ class ByType(Protocol):
 def build_dir() -> Path:
     """Return where generated files go: `$HARDWALL_BUILD`, else `build/` of the source tree, else a folder of the user.
 
-    The last serves an installed copy, whose own folder may not be writable.
+    The user's folder serves an installed copy, whose own folder may not be writable.
     """
     if chosen := os.environ.get("HARDWALL_BUILD"):
         return Path(chosen).absolute()
@@ -70,8 +70,8 @@ def _jit(function: Kernel, folder: str, **options: bool) -> Any:
 def compiled(function: Kernel) -> Kernel:
     """Compile `function` with Numba, cached on disk by the content of the project's sources.
 
-    What takes and gives Python's objects is a third of the compiler's work, and a call from compiled code needs none of
-    it: for such calls there is a second compilation, without.
+    The wrapper that converts Python objects is a third of the compiler's work, and a call from compiled code does not
+    need it: a second compilation, without the wrapper, serves such calls.
     """
     kernel = _jit(function, "called")
     if not config.DISABLE_JIT:
@@ -87,7 +87,7 @@ def by_type(declaration: Callable) -> ByType:
     `@name.register(ClassOfFirstArgument)`, above `@compiled`.
 
     Raises:
-        TypeError: on a call with a class nobody registered.
+        TypeError: if a call's first argument is of a class that has no variant.
     """
     variants: dict[type, Callable] = {}
 
@@ -110,8 +110,8 @@ def by_type(declaration: Callable) -> ByType:
         return body
 
     def register(kind: type) -> Callable:
-        # The names of compiled functions contain those of their arguments' classes, without the module: two classes
-        # of one name and the same fields would run each other's code.
+        # The names of compiled functions contain the names of their arguments' classes, without the module: two
+        # classes of the same name with the same fields would run each other's code.
         kind.__name__ = f"{kind.__module__}.{kind.__qualname__}"
 
         def add(variant: Callable) -> Callable:

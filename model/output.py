@@ -4,8 +4,8 @@ Every `samples_per_actuation` samples the drive follows the force:
 
     drive <- limit(slew(force)):   first |change| <= slew_limit, then |drive| <= force_limit, last
 
-Between, it holds. Without `enable`, or with a fault, the drive is zero at every sample; the slew limit then starts
-again from zero. The force limit is the last thing done to it.
+Between actuations the drive holds. Without `enable`, or with a fault, the drive is zero at every sample; the slew limit
+then starts again from zero. The force limit is applied last.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 FLAGS = ("slew_limited", "force_limited")
 LATENCY = 3
-"""Clocks from strobe to the changed drive: see `hardwall.hdl.output`."""
+"""Clocks from the strobe to the changed drive: see `hardwall.hdl.output`."""
 
 
 class Params(NamedTuple):
-    """Limits in force LSB: integer words, or floats for the float64 axis."""
+    """The limits in force LSB: integer words, or floats for the float64 axis."""
 
     force_limit: float
     slew_limit: float
@@ -69,7 +69,7 @@ class Design:
         return Params(limit, words["output_slew_limit"], self.decimation)
 
     def float_params(self, words: dict[str, int]) -> Params:
-        """Return the same limits as floats."""
+        """Return the limits of `params` as floats."""
         limits = self.params(words)
         return Params(float(limits.force_limit), float(limits.slew_limit), self.decimation)
 
@@ -79,8 +79,8 @@ def step(params, state, force, enable):
     """Take one sample's force: return (state, flags); the drive is `state.drive`.
 
     Args:
-        params: `Params`, of the number type of the force.
-        state: `START`, `FLOAT_START`, or from the previous call.
+        params: `Params`, of the same number type as the force.
+        state: `START`, `FLOAT_START`, or the state that the previous call returned.
         force: the wall's force on the handle, force LSB.
         enable: false forces zero.
     """

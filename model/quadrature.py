@@ -1,8 +1,8 @@
 """Quadrature decoder: pins to count, clock stamps, index and faults; twin of `hardwall.hdl.quadrature`.
 
-One `step` is one clock: the pins are those just before the clock edge, the returned state is that of the registers
-just after it. Words of one bit per channel hold A in bit 0, B in bit 1 and Z in bit 2. How fast the
-encoder may turn is in `quadrature_speed`.
+One `step` is one clock: it takes the levels of the pins just before the clock edge and returns the state of the
+registers just after it. Words of one bit per channel hold A in bit 0, B in bit 1 and Z in bit 2. The module
+`quadrature_speed` says how fast the encoder may turn.
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from .compiled import compiled
 
 
 class Params(NamedTuple):
-    """Widths of the registers, in bits: `count_width` and `stamp_width` at most 62."""
+    """Widths of the registers, in bits; `count_width` and `stamp_width` are at most 62."""
 
     count_width: int
     stamp_width: int
@@ -22,9 +22,9 @@ class Params(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """Pins and settings of a clock, or of as long as nothing changes: inputs of the hardware, by the same names.
+    """Pins and settings in a clock, or for as long as they are constant: inputs of the hardware, by the same names.
 
-    The pins are those just before the clock edge. Compiled code gives all five.
+    The pins have their levels just before the clock edge. Compiled code passes all five fields.
     """
 
     a: int
@@ -35,7 +35,7 @@ class Inputs(NamedTuple):
 
 
 class Strobes(NamedTuple):
-    """What the host asks of the decoder in a clock: inputs of the hardware, by the same names."""
+    """The host's requests to the decoder in a clock: inputs of the hardware, by the same names."""
 
     preload: int = 0
     preload_count: int = 0
@@ -44,7 +44,7 @@ class Strobes(NamedTuple):
 
 
 class State(NamedTuple):
-    """Every register of the decoder; up to `illegal_count` also its outputs, by the same names."""
+    """Every register of the decoder; those up to `illegal_count` are also its outputs, by the same names."""
 
     count: int  # type: ignore[assignment]  # a tuple has a method of this name
     index_count: int
@@ -56,38 +56,38 @@ class State(NamedTuple):
     stamp_a_fall: int
     stamp_b_fall: int
     stepped: int
-    edge: int  # of the last counted edge: A_RISE, B_RISE, A_FALL or B_FALL
-    down: int  # whether it counted -1
-    run: int  # edges in a row that counted that way, at most RUN_MAX; 0: none, or what came before is not known
+    edge: int  # kind of the last counted edge: A_RISE, B_RISE, A_FALL or B_FALL
+    down: int  # whether that edge counted -1
+    run: int  # successive edges that counted in that direction, at most RUN_MAX; 0: none, or the past is not known
     illegal: int
     overspeed: int
     illegal_count: int
     first: int  # stages of the synchronisers
     second: int
     previous: int  # the second stage of A and B, a clock ago
-    level: int  # filtered
+    level: int  # filtered levels
     moved: int  # channels whose filtered level has just changed
-    up: int  # whether that was an edge of increasing count, before `invert`
+    up: int  # whether that change was an edge of increasing count, before `invert`
     pending: int  # channels that have left their filtered level
-    held_a: int  # for how many clocks
+    held_a: int  # clocks since the channel left its filtered level
     held_b: int
     held_z: int
-    crossed: int  # pending channels that have seen an edge of the other one of A and B since
+    crossed: int  # pending channels, of A and B, with an edge of the other channel since they became pending
     starting: int  # clocks until the synchronisers are filled
 
 
 A_RISE, B_RISE, A_FALL, B_FALL = range(4)
 RUN_MAX = 4
-"""A full cycle of the encoder: with so many edges one way, each of the four stamps is of this cycle."""
+"""Edges in a full cycle of the encoder: after this many in one direction, all four stamps are of the last cycle."""
 N_OUTPUTS = State._fields.index("first")
 
 
 class Seen(NamedTuple):
-    """What an estimator may use of the decoder at a strobe: outputs of the hardware, by the same names.
+    """The outputs of the decoder that an estimator may use at a strobe, by the names of the hardware.
 
-    The last edge stands at the scale's edge number `count + down` (cell n lies between edges n and n + 1), and was
-    decoded at the stamp of its kind, `stamp - that` clocks ago, modulo the stamp's width; of kind `edge`. The `run - 1`
-    edges before it stand a count each farther back, and their kinds and stamps go back likewise.
+    The last edge is of kind `edge` and is number `count + down` on the scale (cell n lies between edges n and n + 1).
+    It was decoded at the stamp of its kind, `stamp` less that stamp clocks ago, modulo the stamp's width. The `run - 1`
+    edges before it are one count farther back at a time, and their kinds and stamps go back likewise.
     """
 
     count: int  # type: ignore[assignment]  # a tuple has a method of this name
@@ -107,7 +107,7 @@ START = State(*(3 if name == "starting" else 0 for name in State._fields))
 
 @compiled
 def seen(state: State) -> Seen:
-    """Return what an estimator sees of a decoder's `state`."""
+    """Return the part of a decoder's `state` that an estimator sees."""
     return Seen(
         count=state.count,
         stamp=state.stamp,
@@ -123,7 +123,7 @@ def seen(state: State) -> Seen:
 
 @compiled
 def stamp_of(record, kind):
-    """Return the last stamp of a kind of edge, of a `Seen` or what else has the four fields."""
+    """Return the last stamp of a kind of edge from a `Seen`, or from any record with the same four fields."""
     low = record.stamp_b_rise if kind & 1 else record.stamp_a_rise
     high = record.stamp_b_fall if kind & 1 else record.stamp_a_fall
     return high if kind & 2 else low
@@ -131,26 +131,26 @@ def stamp_of(record, kind):
 
 @compiled
 def seen_count(count: int) -> Seen:
-    """Return what an estimator sees that uses the count alone."""
+    """Return the `Seen` for an estimator that uses the count alone."""
     return Seen(count, 0, 0, 0, 0, 0, 0, 0, 0)
 
 
 def latency(glitch_clocks: int) -> int:
-    """Return the clock edges from the first that sees a pin changed to the new count, both included.
+    """Return the clock edges from the first that sees a pin changed to the one that sets the new count, both included.
 
-    Two in the synchroniser, `glitch_clocks` + 1 in the filter, one to decode and add.
+    The synchroniser takes two, the filter `glitch_clocks` + 1, and decoding and adding one.
     """
     return glitch_clocks + 4
 
 
 @compiled
 def _filtered(state, inputs):
-    """Return (level, accepted, pending, crossing, outrun): what the glitch filter makes of the synchronised pins.
+    """Filter glitches from the synchronised pins: return (level, accepted, pending, crossing, outrun).
 
-    `level` is what had been accepted before, and `outrun` whether a pulse is rejected that an edge of the other channel
-    fell into.
+    `level` is the level accepted before this clock; `outrun` says whether a pulse is rejected during which the other
+    channel had an edge.
     """
-    # While the synchronisers fill, what they show is taken for what has been accepted already.
+    # While the synchronisers fill, their output counts as accepted already.
     level = state.second if state.starting > 0 else state.level
     # A channel is accepted at the (glitch_clocks + 1)th clock in a row away from its level.
     differs = state.second ^ level
@@ -159,7 +159,7 @@ def _filtered(state, inputs):
         | int(state.held_b >= inputs.glitch_clocks) << 1
         | int(state.held_z >= inputs.glitch_clocks) << 2
     )
-    # A pulse is rejected when its channel comes back still pending.
+    # A pulse is rejected when its channel returns to its level while still pending.
     edges = (state.second ^ state.previous) & 3
     crossing = state.crossed | (edges & 1) << 1 | edges >> 1
     outrun = int((state.pending & ~differs & crossing) != 0)
@@ -168,7 +168,7 @@ def _filtered(state, inputs):
 
 @compiled
 def _either(condition, new, old):
-    """Return `new` if the condition holds, else `old`: in the keywords of a call Numba takes no branch."""
+    """Return `new` if the condition holds, else `old`; Numba accepts no conditional in the keywords of a call."""
     return new if condition else old
 
 
@@ -177,7 +177,7 @@ def step(params, state, inputs, strobes):
     """Return the state after one clock of `Inputs` and `Strobes`."""
     level, accepted, pending, crossing, outrun = _filtered(state, inputs)
 
-    # Decode. Exactly one of A and B has moved, or nothing is counted.
+    # Decode. An edge is counted only if exactly one of A and B has moved.
     one = (state.moved ^ state.moved >> 1) & 1
     both = state.moved & state.moved >> 1 & 1
     base = strobes.preload_count if strobes.preload else state.count
@@ -224,14 +224,14 @@ def step(params, state, inputs, strobes):
 
 @compiled
 def settled(state, pins):
-    """Return whether constant `pins` (a word of A, B, Z) can change nothing more but the clock stamp."""
+    """Return whether constant `pins` (a word of A, B, Z) can change only the clock stamp from here on."""
     away = (state.first ^ pins) | (state.second ^ pins) | (state.level ^ pins)
     return (away | state.moved | state.pending | state.starting) == 0
 
 
 @compiled
 def _rest(params, state, pins, clocks):
-    """Return a settled state some clocks, 1 or more, later."""
+    """Return a settled state `clocks` clocks, 1 or more, later."""
     return State(
         count=state.count,
         index_count=state.index_count,
@@ -276,8 +276,8 @@ def _settle(params, state, inputs, pins, clocks):
 def advance(params, state, inputs, clocks):
     """Return the state after `clocks` steps with constant `Inputs` and no strobes; 0 <= clocks < 2**62.
 
-    Exactly that of `step` repeated, in no more steps than `latency`. The settled case stands alone because it is the
-    common one: it compiles to a few instructions in the caller's loop.
+    The result is exactly that of repeated calls of `step`, in no more calls than `latency`. The settled case is
+    separate because it is the common one: it compiles to a few instructions in the caller's loop.
     """
     pins = inputs.a | inputs.b << 1 | inputs.z << 2
     if clocks > 0 and settled(state, pins):
@@ -287,7 +287,7 @@ def advance(params, state, inputs, clocks):
 
 @compiled
 def _run(params, start, inputs, strobes, record):
-    """Fill `record` (field, lane, clock) from `Inputs` and `Strobes` of arrays (lane, clock)."""
+    """Fill `record` (field, lane, clock) from `Inputs` and `Strobes` whose fields are arrays (lane, clock)."""
     for lane in range(record.shape[1]):
         state = start
         for clock in range(record.shape[2]):
@@ -300,10 +300,10 @@ def _run(params, start, inputs, strobes, record):
 
 
 def run(params: Params, inputs: Inputs, strobes: Strobes = NO_STROBES, start: State = START) -> State:
-    """Return, as a State of int64 arrays, the state after every clock of a record of `inputs` and `strobes`.
+    """Return the state after every clock of a record of `inputs` and `strobes`, as a State of int64 arrays.
 
-    Each of their fields is a scalar or an array; together they broadcast to (clocks,) or (lanes, clocks), the shape of
-    what is returned. Every lane begins in `start`.
+    Every field of `inputs` and `strobes` is a scalar or an array; together they broadcast to (clocks,) or
+    (lanes, clocks), the shape of the returned arrays. Every lane begins in `start`.
     """
     columns = np.broadcast_arrays(*(np.asarray(column, np.int64) for column in (*inputs, *strobes)))
     shape = columns[0].shape

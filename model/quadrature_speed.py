@@ -1,20 +1,21 @@
-"""How fast an encoder may turn, for the decoder of `quadrature` to count every edge or raise a flag.
+"""The highest speeds of an encoder at which the decoder of `quadrature` counts every edge or raises a flag.
 
-With rate r in edges (of A and B together) a clock, each level of A and of B lasts 2/r clocks, and one edge follows the
-other after 1/r. A level is accepted if it is seen at glitch_clocks + 1 clocks, which is certain from that many clocks
-of length; two edges are seen apart, in their order, if they are at least one clock apart. Every accepted edge is
-delayed alike, so the count is exact for r <= 1 / max(1, (glitch_clocks + 1) / 2): `max_edge_rate`.
+At a rate of r edges (of A and B together) a clock, every level of A and of B lasts 2/r clocks, and an edge follows the
+previous edge after 1/r clocks. A level is accepted if it is seen at glitch_clocks + 1 clocks, which is certain if it
+lasts that many clocks; two edges are seen separately and in order if they are at least one clock apart. Every accepted
+edge has the same delay, so the count is exact for r <= 1 / max(1, (glitch_clocks + 1) / 2): `max_edge_rate`.
 
-What is promised beyond it, for any motion, steady or not, in which each level of A and of B lasts a clock or more (for
-ideal quadrature: below 2 edges a clock), for any glitch lengths, also if they change on the way: *no count is wrong
-before a flag is up*. For then every edge is seen, and there are three ways to lose one. Two edges accepted in
-one clock are `illegal` in the clock in which they are not counted. A pulse on one channel that the filter rejects, with
-an edge of the other between its two ends, is `overspeed` as it ends; the edge within it is counted later than that. A
-pulse that is rejected without such an edge came and went at one level of the other channel: there and back, nothing is
-lost, no flag. (A flag may thus rise with no count lost, if noise on one channel meets an edge of the other.)
+Beyond that rate the decoder promises, for any motion, steady or not, in which every level of A and of B lasts a clock
+or more (for ideal quadrature: below 2 edges a clock), and for any glitch lengths, even if they change during the
+motion: *no count is wrong before a flag is up*. Every edge is then seen, and there are three ways to lose one. Two
+edges accepted in one clock raise `illegal` in the clock in which they are not counted. A pulse on one channel that the
+filter rejects, with an edge of the other channel between its two ends, raises `overspeed` as it ends; the edge within
+it is counted later than that. A pulse that is rejected without such an edge came and went at one level of the other
+channel: the motion went there and back, no count is lost, and no flag rises. (A flag may thus rise with no count lost,
+if noise on one channel meets an edge of the other.)
 
-Sampled quadrature at r and at r - 4 edges a clock is the same record. So no synchronous decoder can tell a motion
-within `max_edge_rate` of a multiple of 4 edges a clock from a slow one; at every other steady rate of ideal
+Quadrature sampled at r and at r - 4 edges a clock gives the same record. So no synchronous decoder can distinguish a
+motion within `max_edge_rate` of a multiple of 4 edges a clock from a slow motion; at every other steady rate of ideal
 quadrature a flag is up within `clocks_to_fault`.
 """
 
@@ -25,7 +26,7 @@ def max_edge_rate(clock_hz: float, glitch_clocks: int, edge_error: float = 0.0) 
     """Return the highest steady rate of edges, in Hz, at which the count is exact and no flag rises.
 
     `edge_error` is how far, in counts, the encoder's edges may be from their ideal places. It shortens the shortest
-    level from 2 to 2 - 2 `edge_error` counts, the least distance of two edges from 1 to 1 - 2 `edge_error`.
+    level from 2 to 2 - 2 `edge_error` counts, and the least distance of two edges from 1 to 1 - 2 `edge_error` counts.
 
     Raises:
         ValueError: if `edge_error` is not from 0 to less than 0.5.
@@ -38,14 +39,14 @@ def max_edge_rate(clock_hz: float, glitch_clocks: int, edge_error: float = 0.0) 
 
 
 def clocks_to_fault(edges_per_clock: float, glitch_clocks: int) -> float:
-    """Return within how many clocks a flag is up at a steady rate; infinite where there may be none.
+    """Return the number of clocks within which a flag is up at a steady rate; infinite if no flag is certain.
 
-    Holds for ideal quadrature of any rate, and with edges out of place as long as each level lasts a clock or more.
-    The record has rate s, the distance of `edges_per_clock` from the nearest multiple of 4. With a filter: m (even)
-    levels of a channel in a row last 2m/s clocks and hold fewer than 2m/s + 1 samples, so not all can be seen at
-    glitch_clocks + 1 clocks once m >= 1 / (glitch_clocks + 1 - 2/s); one that is running at the start and one
-    out of place come before. Without: m clocks hold more than ms - 2 edges, so one has two once m >= 2 / (s - 1).
-    Two clocks in the synchroniser, one in the filter and one to decode follow.
+    The bound holds for ideal quadrature of any rate, and with edges out of place as long as every level lasts a clock
+    or more. The record has rate s, the distance of `edges_per_clock` from the nearest multiple of 4. With a filter,
+    m (even) successive levels of a channel last 2m/s clocks and hold fewer than 2m/s + 1 samples, so not all of them
+    can be seen at glitch_clocks + 1 clocks once m >= 1 / (glitch_clocks + 1 - 2/s); a level that is under way at the
+    start and a level out of place come before. Without a filter, m clocks hold more than ms - 2 edges, so some clock
+    has two edges once m >= 2 / (s - 1). Two clocks in the synchroniser, one in the filter and one to decode follow.
     """
     rate = abs(edges_per_clock - 4 * round(edges_per_clock / 4))
     if rate <= max_edge_rate(1.0, glitch_clocks):

@@ -8,7 +8,7 @@ Units inside the axis are counts and sample periods, so with q the count size an
 
 Counts. Positions and the wall may lie anywhere in the travel whatever the origin (twice the travel), and an overshoot
 as large again must not alias: the count covers plus and minus four times the travel, halved on each side, which is
-`1 + ceil(log2(4 travel / q))` bits with the sign. It wraps, and all differences are taken modulo its width.
+`1 + ceil(log2(4 travel / q))` bits with the sign. The count wraps, and all differences are taken modulo its width.
 
 Force. The force LSB is `force_resolution_n`; `force` is the format between wall and output stage, with one bit more
 than the largest drive needs, so that a saturated wall force is always beyond the limit that the output stage applies.
@@ -29,7 +29,7 @@ from .estimators.estimate import EstimatorGains
 
 @dataclass(frozen=True, kw_only=True)
 class AxisSpec:
-    """What one axis must do, SI units. Builds the RTL, the model and the host's conversions alike.
+    """The requirements of one axis, in SI units; the RTL, the model and the host's conversions are all built from it.
 
     Attributes:
         clock_hz: FPGA clock, Hz.
@@ -45,12 +45,12 @@ class AxisSpec:
         damping_max_n_s_per_m: largest wall damping, N s/m.
         estimator: name of the velocity estimator.
         gains: that estimator's `Gains`, or None for its default ones.
-        estimator_bits_dropped: fraction bits that the estimator's words are to lack of the derived ones; to see what a
-            bit buys.
+        estimator_bits_dropped: number of fraction bits removed from the derived widths of the estimator's words, to
+            study what a bit is worth.
 
     Raises:
-        TypeError: for a field of the wrong kind.
-        ValueError: for an impossible value; the message names the field and the accepted range.
+        TypeError: if a field is of the wrong type.
+        ValueError: if a value is impossible; the message names the field and the accepted range.
     """
 
     clock_hz: int
@@ -114,10 +114,10 @@ class AxisSpec:
             )
 
     def shrunk(self, derived: int) -> int:
-        """Return the fraction bits of an estimator's word: the derived ones less `estimator_bits_dropped`.
+        """Return the fraction bits of an estimator's word: `derived` less `estimator_bits_dropped`.
 
         Raises:
-            ValueError: if there are not so many to drop.
+            ValueError: if the word has fewer fraction bits than are to be dropped.
         """
         left = derived - self.estimator_bits_dropped
         if self.estimator_bits_dropped and left < 0:
@@ -142,7 +142,7 @@ class AxisSpec:
 
     @property
     def stamp_width(self) -> int:
-        """Bits of a clock stamp: it wraps after a second or more, so edges of less than about 2 Hz read as standing."""
+        """Bits of a clock stamp, which wraps after a second or more: edges below about 2 Hz read as standstill."""
         return bits_for(self.clock_hz)
 
     @property
@@ -156,12 +156,12 @@ class AxisSpec:
 
     @property
     def force_limit_word(self) -> int:
-        """Largest drive word: `force_max_n`, rounded down to the LSB."""
+        """The largest drive word: `force_max_n`, rounded down to the LSB."""
         return math.floor(self.force_max_n / self.force_resolution_n * (1 + 1e-12))
 
     @property
     def force(self) -> SQ:
-        """Format of wall force and drive, in force LSB."""
+        """Format of the wall force and of the drive, in force LSB."""
         return SQ(self.force_limit_word.bit_length() + 2, 0)
 
     @cached_property

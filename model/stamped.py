@@ -1,10 +1,10 @@
-"""An axis driven by the clock-stamped edges of its encoder: decoder and axis in one, a sample at a time.
+"""An axis driven by the clock-stamped edges of its encoder: decoder and axis together, one sample at a time.
 
-The clock is never stepped: between edges the decoder is advanced at once. `run` takes whole records,
+No clock is stepped: the decoder advances from edge to edge in one call. `run` takes whole records,
 
     record = stamped.run(Axis(spec), edge_clocks, edge_levels, samples)
 
-and `sample`, its kernel, is what closes the loop in `hardwall.sim`. `clocked` has the same axis clock by clock.
+and its kernel `sample` closes the loop in `hardwall.sim`. `clocked` has the same axis clock by clock.
 """
 
 from typing import NamedTuple
@@ -17,14 +17,14 @@ from .compiled import compiled
 
 
 class Edges(NamedTuple):
-    """Edges of an encoder: from which clock on the pins show which level. How many there are is said beside it."""
+    """Edges of an encoder: the clocks from which the pins show a new level. Functions take their number separately."""
 
-    clocks: np.ndarray  # int64, never decreasing: when a register at the pins first holds the new level
+    clocks: np.ndarray  # int64, never decreasing: the clocks at which a register at the pins first holds the new level
     levels: np.ndarray  # integers: a | b << 1
 
 
 class Controller(NamedTuple):
-    """Parameters of decoder and axis; integer words make the bit-accurate axis, float64 ones the real algorithm."""
+    """Parameters of decoder and axis: integer words for the bit-accurate axis, float64 for the real algorithm."""
 
     decoder: quadrature.Params
     glitch_clocks: int
@@ -33,20 +33,20 @@ class Controller(NamedTuple):
 
 
 class State(NamedTuple):
-    """Decoder and axis after a sample, and what they show of it."""
+    """The states of decoder and axis after a sample, and the outputs of that sample."""
 
     drive: float  # force LSB
-    velocity: float  # words of the estimator's format; floating axis: counts a sample
+    velocity: float  # word of the estimator's format; counts a sample if the axis is floating
     force: float  # force LSB, before the output stage
     flags: int
     decoder: quadrature.State
     axis: axis.State
-    clock: int  # to which the decoder has been advanced
-    level: int  # of the pins, a | b << 1
+    clock: int  # the clock to which the decoder has been advanced
+    level: int  # level of the pins, a | b << 1
 
 
 def room_for(edges: int) -> Edges:
-    """Return arrays with room for so many edges, none in them yet."""
+    """Return `Edges` with room for that many edges, all zero."""
     return Edges(np.zeros(edges, np.int64), np.zeros(edges, np.int64))
 
 
@@ -66,7 +66,7 @@ def _decode(controller, decoder, level, clocks):
 
 @compiled
 def sample_quietly(controller, state, strobe):
-    """Take the sample at clock `strobe`, with no edges before it: return the state."""
+    """Take the sample at clock `strobe`, with no edge between the last sample and this one: return the state."""
     decoder = _decode(controller, state.decoder, state.level, strobe - state.clock)
     fault = decoder.illegal | decoder.overspeed << 1
     after, velocity, force = axis.step(controller.axis, state.axis, quadrature.seen(decoder), 0, fault, 1)
@@ -75,15 +75,15 @@ def sample_quietly(controller, state, strobe):
 
 @compiled
 def sample(controller, state, edges, n_edges, strobe):
-    """Take the sample at clock `strobe`: return (state, how many edges were taken).
+    """Take the sample at clock `strobe`: return (state, number of edges consumed).
 
     Args:
-        controller, state: of `controller`.
+        controller, state: what `controller` returns; later, the state of the previous call.
         edges: `Edges`.
-        n_edges: how many there are.
+        n_edges: the number of edges.
     """
     decoder, clock, level, taken = state.decoder, state.clock, state.level, 0
-    # The strobe sees registers loaded by the clocks before it: an edge at the strobe's own clock is for the next.
+    # The strobe sees registers loaded by the clocks before it: an edge at the strobe's clock is for the next sample.
     while taken < n_edges and edges.clocks[taken] < strobe:
         if edges.clocks[taken] > clock:
             decoder = _decode(controller, decoder, level, edges.clocks[taken] - clock)
@@ -113,16 +113,16 @@ def run(of: axis.Axis, edge_clocks: ArrayLike, edge_levels: ArrayLike, samples: 
         edge_clocks: integers, shape (edges,): numbers of the clocks, never decreasing and not negative, at which a
             register at the pins first holds the new level.
         edge_levels: integers of the same shape: the pins from then on, a | b << 1.
-        samples: how many to take, 1 or more.
-        level: of the pins at reset.
+        samples: number of samples to take, 1 or more.
+        level: level of the pins at reset, a | b << 1.
 
     Returns:
-        The record, arrays of shape (samples,).
+        The record, with arrays of shape (samples,).
 
     Raises:
-        TypeError: if `of` is not an Axis, or one of the others not an integer or integers.
-        ValueError: if the shapes differ, the clocks decrease or are negative, a level is not 0 to 3, or there are no
-            samples to take.
+        TypeError: if `of` is not an Axis, or another argument is not an integer or integers.
+        ValueError: if the shapes differ, the clocks decrease or are negative, a level is not 0 to 3, or `samples` is
+            less than 1.
     """
     if not isinstance(of, axis.Axis):
         raise TypeError(f"of must be an Axis, not {of!r}")

@@ -4,17 +4,17 @@
     push  = K depth + B side velocity      for depth > 0, else 0
     force = -side push                     on the handle
 
-With `forbid_pull`, push is never negative: a damper that holds the leaving handle back would make the wall sticky.
+With `forbid_pull`, push is never negative: a damper that pulls back a leaving handle would make the wall sticky.
 
 Formats, derived, with the force LSB r, the count q and the sample period tau:
 
 - `stiffness` and `damping` are gain words in force LSB a count and a count/sample.
-- The velocity enters with no more fraction bits than move the push by half a force LSB at the largest damping; the
-  rest is dropped (floor).
+- The velocity keeps only as many fraction bits as can move the push by half a force LSB at the largest damping; the
+  other bits are dropped (floor).
 - The two products are added exactly and rounded once, half up, to a force LSB; then push saturates at the largest
   magnitude of the force format.
 
-Together: fixed point differs from the exact equation on the same words by at most one force LSB.
+In total, fixed point differs from the exact equation on the same words by at most one force LSB.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .spec import AxisSpec
 
 LATENCY = 6
-"""Clocks from strobe to valid: see `hardwall.hdl.wall`."""
+"""Clocks from the strobe to `valid`: see `hardwall.hdl.wall`."""
 
 
 class Params(NamedTuple):
@@ -48,7 +48,7 @@ class Params(NamedTuple):
 
 
 class FloatParams(NamedTuple):
-    """Stiffness in force LSB a count, damping in force LSB a count/sample; both unrounded."""
+    """Float64 parameters: stiffness in force LSB a count, damping in force LSB a count/sample, both unrounded."""
 
     stiffness: float
     damping: float
@@ -63,7 +63,7 @@ class Design:
 
     Attributes:
         stiffness, damping: gain formats.
-        coarse: the velocity as the damper takes it.
+        coarse: format of the velocity as the damper takes it.
         push: fraction bits in which the two products are added.
         words: `wall_stiffness`, `wall_damping`, `wall_position`, `wall_left`, `wall_forbid_pull`.
 
@@ -115,7 +115,7 @@ class Design:
         )
 
     def float_params(self, stiffness_n_per_m: float, damping_n_s_per_m: float, words: dict[str, int]) -> FloatParams:
-        """Return the float64 wall's parameters, gains unrounded."""
+        """Return the float64 kernel's parameters, with gains unrounded."""
         stiffness, damping = self.words[:2]
         return FloatParams(
             stiffness_n_per_m / stiffness.si_per_unit,
@@ -134,7 +134,7 @@ def render(params, count, velocity):
     Args:
         params: `Params` (integer words) or `FloatParams` (float64).
         count: position, counts, as a signed word that may have wrapped.
-        velocity: in words of the estimator's velocity format (float: counts a sample).
+        velocity: word of the estimator's velocity format (float: counts a sample).
     """
 
 

@@ -6,14 +6,14 @@ from .arithmetic.fixed import UQ, Format, bits_for
 from .checks import FieldError, check_number
 
 GAIN_BITS = 16
-"""Bits of a gain word: the part of a multiplier's operand that iCE40UP (16 x 16) and ECP5 (18 x 18) both have."""
+"""Bits of a gain word: an operand that the multipliers of both iCE40UP (16 x 16) and ECP5 (18 x 18) hold."""
 
 
 def gain_format(largest: float) -> UQ:
-    """Return the `GAIN_BITS`-bit format that holds `largest` and resolves best."""
+    """Return the `GAIN_BITS`-bit format that holds `largest` with the finest resolution."""
     i = bits_for(largest)
     fmt = UQ(i, GAIN_BITS - i)
-    # A largest value just under a power of two may round up to it.
+    # A largest value just below a power of two may round up to that power.
     return fmt if largest <= fmt.to_real(fmt.max) else UQ(i + 1, GAIN_BITS - i - 1)
 
 
@@ -22,7 +22,7 @@ class Word:
     """A parameter that the host may change while the axis runs.
 
     Attributes:
-        name: port name, in the field's words.
+        name: name of the port.
         format: fixed-point format of the word.
         si_per_unit: SI value of the format's 1.0.
         unit: SI unit, as text; empty for choices and plain numbers.
@@ -43,24 +43,24 @@ class Word:
 
     @property
     def si_min(self) -> float:
-        """Smallest value, SI."""
+        """The smallest value, in SI units."""
         return self.to_si(self.format.min)
 
     @property
     def si_max(self) -> float:
-        """Largest value, SI."""
+        """The largest value, in SI units."""
         return self.to_si(self.format.max)
 
     def to_si(self, word: int) -> float:
-        """Return what `word` stands for, SI."""
+        """Return the value of `word` in SI units."""
         return self.format.to_real(word) * self.si_per_unit
 
     def from_si(self, value: float) -> int:
         """Return the word nearest to `value` (SI).
 
         Raises:
-            TypeError: if it is not a number.
-            ValueError: if it does not fit, with the accepted range in SI units.
+            TypeError: if `value` is not a number.
+            ValueError: if the value does not fit the word; the message gives the accepted range in SI units.
         """
         check_number(self.name, value)
         try:

@@ -1,8 +1,8 @@
 """Fixed-point formats as types, and the named ways a number may narrow.
 
 A format says how an integer word is read: value = word * 2**-f. `f` may be negative (a word counted in units larger
-than one) or exceed the width (a word of a small fraction). Nothing narrows silently: `saturate` or `wrap`, by name,
-and `shift_floor` or `shift_round_half_up` where fraction bits are dropped.
+than one) or exceed the width (a word of a small fraction). Nothing narrows silently: `saturate` or `wrap` narrows a
+range by name, and `shift_floor` or `shift_round_half_up` drops fraction bits.
 """
 
 import math
@@ -65,7 +65,7 @@ class Format:
 
         Raises:
             TypeError: if the value is not a number.
-            ValueError: if it is not finite or its word is outside the format.
+            ValueError: if the value is not finite or its word is outside the format.
         """
         check_number(f"value for {self}", value)
         if not math.isfinite(value):
@@ -79,19 +79,19 @@ class Format:
 
 
 class SQ(Format):
-    """Signed two's complement: -2**(i-1) <= value < 2**(i-1), in steps of 2**-f."""
+    """A signed two's complement format: -2**(i-1) <= value < 2**(i-1), in steps of 2**-f."""
 
     signed = True
 
 
 class UQ(Format):
-    """Unsigned: 0 <= value < 2**i, in steps of 2**-f."""
+    """An unsigned format: 0 <= value < 2**i, in steps of 2**-f."""
 
     signed = False
 
 
 def bits_for(value: float) -> int:
-    """Return the smallest n (it may be negative) with 2**n >= value > 0."""
+    """Return the smallest n, which may be negative, with 2**n >= value > 0."""
     mantissa, exponent = math.frexp(value)
     return exponent - 1 if mantissa == 0.5 else exponent
 

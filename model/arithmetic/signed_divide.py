@@ -10,7 +10,8 @@ BITS_PER_CLOCK = 2
 def divide(dividend, divisor, fraction):
     """Return dividend 2**fraction / divisor, rounded toward zero, for divisor > 0.
 
-    Whole part and rest are scaled apart: it is enough that the result and divisor 2**fraction fit int64.
+    The whole part and the remainder are scaled separately, so it suffices that the result and divisor 2**fraction fit
+    int64.
     """
     size = abs(dividend)
     quotient = (size // divisor << fraction) + (size % divisor << fraction) // divisor
@@ -20,6 +21,6 @@ def divide(dividend, divisor, fraction):
 def latency(quotient_bits: int) -> int:
     """Return the clocks from `start` to `done` of the hardware division with a magnitude of `quotient_bits`.
 
-    Those of the magnitudes' division, `BITS_PER_CLOCK` bits of it a clock, and one for the sign.
+    The division of the magnitudes makes `BITS_PER_CLOCK` bits a clock; one more clock applies the sign.
     """
     return unsigned_latency(quotient_bits, BITS_PER_CLOCK) + 1

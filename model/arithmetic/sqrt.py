@@ -23,6 +23,6 @@ def isqrt(radicand):
 def latency(width: int) -> int:
     """Return the clocks from `start` to `done` of the hardware root of a `width`-bit radicand.
 
-    One to load, and one for each of the ceil(width / 2) bits of the result.
+    One clock loads the radicand, and one clock makes each of the ceil(width / 2) bits of the result.
     """
     return 1 + (width + 1) // 2
