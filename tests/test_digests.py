@@ -1,20 +1,21 @@
-"""What the program computes is what was recorded; and both the digests and what compares them can tell a change.
+"""The program computes what was recorded, and both the digests and their comparison detect a change.
 
-`HARDWALL_DIGESTS=all` (in `make soak`) holds every case; else those that are quick. See `digests`.
+`HARDWALL_DIGESTS=all` (in `make soak`) checks every case; by default only the quick ones are checked. See `digests`.
 """
 
 import os
 import re
 from pathlib import Path
 
+import digest_driver
 import digests
 import netlists
 import pytest
 
 CASES = {case.name: case for case in digests.cases()}
 EVERY = os.environ.get("HARDWALL_DIGESTS") == "all"
-RECORDED = digests.load()
-EXACT = RECORDED["machine"] == digests.machine()
+RECORDED = digest_driver.load()
+EXACT = RECORDED["machine"] == digest_driver.machine()
 INNER = """
 module inner(input [3:0] a, input [3:0] b, output [3:0] y);
   assign y = a - b;
@@ -43,17 +44,19 @@ VERILOG = INNER + TOP
 
 @pytest.mark.parametrize("name", [name for name, case in CASES.items() if EVERY or case.short])
 def test_it_computes_what_was_recorded(name):
-    recorded = {entry: value for entry, value in RECORDED["entries"].items() if digests.belongs(entry, name)}
+    recorded = {entry: value for entry, value in RECORDED["entries"].items() if digest_driver.belongs(entry, name)}
     assert recorded, "nothing was recorded: make digests"
     found = CASES[name].run()
     lines = []
     for entry, value in recorded.items():
-        lines += digests.differences(value, found[entry], EXACT, entry) if entry in found else [f"{entry}: is gone"]
+        lines += (
+            digest_driver.differences(value, found[entry], EXACT, entry) if entry in found else [f"{entry}: is gone"]
+        )
     assert not lines, "\n".join(["what is computed changed; if it should: make digests", *lines])
 
 
 def test_every_entry_is_of_one_case():
-    owners = {entry: [name for name in CASES if digests.belongs(entry, name)] for entry in RECORDED["entries"]}
+    owners = {entry: [name for name in CASES if digest_driver.belongs(entry, name)] for entry in RECORDED["entries"]}
     assert {entry: names for entry, names in owners.items() if len(names) != 1} == {}
     assert list(RECORDED["entries"]) == sorted(RECORDED["entries"])
 
@@ -64,8 +67,8 @@ def test_what_is_quick_has_every_kind():
     scenes = {name.split("/")[1] for name in quick if name.startswith("hit/")}
     assert scenes >= set(digests.SCENES)
     for estimator, outputs in digests.OUTPUTS.items():
-        wanted = {f"hit/seed-2011/{estimator}:{output}/fixed" for output in outputs} | {f"axis/{estimator}"}
-        assert wanted <= quick
+        required = {f"hit/seed-2011/{estimator}:{output}/fixed" for output in outputs} | {f"axis/{estimator}"}
+        assert required <= quick
 
 
 @pytest.mark.parametrize(
@@ -82,12 +85,12 @@ def test_what_is_quick_has_every_kind():
 )
 @pytest.mark.parametrize("exact", [True, False])
 def test_a_difference_is_named(recorded, found, lines, exact):
-    assert digests.differences(recorded, found, exact) == lines
+    assert digest_driver.differences(recorded, found, exact) == lines
 
 
 def test_floats_are_equal_here_and_near_elsewhere():
     def same(*values, exact):
-        return not digests.differences(*values, exact)
+        return not digest_driver.differences(*values, exact)
 
     near, far = 1.0 + 1e-9, 1.0 + 1e-5
     assert same(1.0, 1.0, exact=True)
