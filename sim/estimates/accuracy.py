@@ -1,9 +1,8 @@
-"""How accurate a velocity estimator is: known motions at any rate, on any backend, held against the exact derivative.
+"""How accurate a velocity estimator is: known motions at any rate, on any backend, against the exact derivative.
 
-Gains are the estimator's default ones for the signal's own bound C on the acceleration, unless others are given. The
-clock is the slowest multiple of the rate that is 50 MHz or more and leaves 50 clocks a sample, enough for every
-estimator's path; above 1 MHz it is faster than that of a real part, and so the stamps are finer. The row says which it
-was.
+Gains are the estimator's defaults for the signal's own bound C on the acceleration, unless others are given. The clock
+is the slowest multiple of the rate that is at least 50 MHz and leaves 50 clocks a sample, enough for every estimator's
+path. Above 1 MHz the clock is faster than that of a real part, so the stamps are finer too. The row reports the clock.
 """
 
 import math
@@ -29,20 +28,20 @@ CLOCK_HZ = 50_000_000
 CLOCKS = 50
 DELAY_MAX_S = 0.1
 COARSEN = 16
-"""A recording's counts are made so much coarser, and judged against the full ones."""
+"""The factor by which a recording's counts are made coarser; the full counts are the reference."""
 
 
 def outputs(text: str) -> list[tuple[str, str]]:
-    """Return the (estimator, output) that `NAME` (every output of it) or `NAME:OUTPUT` stands for.
+    """Return the (estimator, output) pairs of `NAME` (all outputs of that estimator) or `NAME:OUTPUT`.
 
     Raises:
-        ValueError: if there is none.
+        ValueError: if there is no such estimator or output.
     """
     name, _, output = text.partition(":")
     design = registry.design_of(name)
     if output:
         design.choose(output)
-    return [(name, each) for each in ([output] if output else design.outputs)]
+    return [(name, chosen) for chosen in ([output] if output else design.outputs)]
 
 
 def axis_spec(
@@ -52,10 +51,10 @@ def axis_spec(
     gains: dict[str, float] | None = None,
     bits_dropped: int = 0,
 ) -> AxisSpec:
-    """Return the axis: the device of the scene `mhz` at another rate.
+    """Return the specification of the axis: the device of the scene `mhz` at another rate.
 
     Raises:
-        ValueError: if it cannot be; the message names the field.
+        ValueError: if there is no such axis; the message names the field.
     """
     return replace(
         Case.of("mhz").scene.spec,
@@ -70,7 +69,7 @@ def axis_spec(
 
 
 def spec_of(job: dict) -> AxisSpec:
-    """Return the axis that `measure` would measure for these arguments.
+    """Return the specification of the axis that `measure` would measure for these arguments.
 
     Raises:
         ValueError: if there is no such axis; the message names the field.
@@ -85,13 +84,13 @@ def spec_of(job: dict) -> AxisSpec:
 
 @compiled
 def _velocities(motion, times, out):
-    """Fill `out` with the exact velocities at times, s."""
+    """Fill `out` with the exact velocities (m/s) at the times (s)."""
     for i in range(len(out)):
         out[i] = velocity(motion, times[i])
 
 
 def exact_velocity(motion, times: np.ndarray) -> np.ndarray:
-    """Return the exact velocities (m/s) of a motion at times (s)."""
+    """Return the exact velocities (m/s) of a motion at the given times (s)."""
     out = np.empty(len(times))
     _velocities(motion, times, out)
     return out
@@ -108,20 +107,20 @@ def measure(
     gains: dict[str, float] | None = None,
     bits_dropped: int = 0,
 ) -> dict:
-    """Return one row: what was measured, units in the keys; `judge` says what the figures are.
+    """Return one row of measurements, units in the keys; `errors` defines the figures.
 
     Args:
-        estimator, output: their names.
-        signal: as for `signals.load`.
-        sample_hz: rate of the estimator.
+        estimator, output: names of the estimator and of its output.
+        signal: name of the signal, as for `signals.load`.
+        sample_hz: sample rate of the estimator.
         backend: `float`, `fixed` or `rtl`.
-        phase_error_counts: by how much the encoder's channel B is late.
+        phase_error_counts: the distance, in counts, by which the encoder's channel B is late.
         acceleration_max_m_per_s2: C for the default gains; None for the signal's own.
-        gains: others, by the names of the estimator's `Gains`.
-        bits_dropped: fraction bits that the estimator's words are to lack.
+        gains: gains to use instead, by the names of the estimator's `Gains`.
+        bits_dropped: number of fraction bits taken from the estimator's words.
 
     Raises:
-        ValueError: if the axis cannot be; the message names the field.
+        ValueError: if there is no such axis; the message names the field.
         RuntimeError: if the RTL could not be built.
     """
     known = signals.load(signal)
@@ -162,7 +161,7 @@ def measure(
 def _judged(
     known: signals.Signal, begin: int, sample_hz: int, chunks: Iterator[tuple[int, np.ndarray, int]]
 ) -> tuple[Judge, int]:
-    """Return the errors of an estimate from sample `begin` on, and the flags that were raised."""
+    """Return the judge of an estimate from sample `begin` on, and the flags that were raised."""
     judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
     for first, words, flags in chunks:
         raised |= flags
@@ -178,16 +177,17 @@ def measure_recording(
 ) -> dict:
     """Return one row of a recording at its own rate, its counts `COARSEN` times coarser, in recorded counts.
 
-    What a count is in mm the file does not say, so the keys of figures end in `_counts_s`. Held against the zero-phase
-    derivative of the full counts; a recording has no clock stamps, so edges are spread evenly over each sample.
+    The file does not give the size of a count in mm, so the keys of the figures end in `_counts_s`. The reference is
+    the zero-phase derivative of the full counts. A recording has no clock stamps, so edges are spread evenly over each
+    sample.
 
     Args:
         estimator, output, backend: as for `measure`.
-        file, column: of the recording.
-        content: a digest of the file, for a result that is kept to belong to.
+        file, column: the recording's file and its column of counts.
+        content: a digest of the file, which ties a stored result to the file's content.
 
     Raises:
-        RecordingError, ReplayError: in one line, what cannot be and what is accepted.
+        RecordingError, ReplayError: in one line, what is refused and what is accepted.
         RuntimeError: if the RTL could not be built.
     """
     result = replay(recording.load(file, column), estimator, output, backend, coarsen=COARSEN)
@@ -204,7 +204,7 @@ def measure_recording(
         "signal": f"{file}:{column}",
         "rms_counts_s": judge.rms,
         "max_counts_s": judge.largest,
-        "delay_s": judge.delay_s(lambda wanted: np.interp(wanted, times, exact), DELAY_MAX_S),
+        "delay_s": judge.delay_s(lambda at_s: np.interp(at_s, times, exact), DELAY_MAX_S),
         "chatter_counts_s": judge.chatter,
         "acceleration_max_counts_s2": result.acceleration_max_counts_per_s2,
         "gains": result.gains,

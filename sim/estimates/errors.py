@@ -1,13 +1,13 @@
-"""What is said of a velocity estimate that is held against the truth, sample by sample.
+"""The error figures of a velocity estimate, compared with the true velocity sample by sample.
 
 With v the true velocity and w the estimate, over the judged samples:
 
-- `rms`, `largest`: of w - v;
-- `chatter`: RMS of w - v less its mean over each 10 ms: the part that a damper turns into noise;
-- `delay_s`: that d for which v(t - d) correlates best with w(t); None where v does not vary, w is nothing, or no such d
-  is within the limits.
+- `rms`, `largest`: the RMS and the largest magnitude of w - v;
+- `chatter`: the RMS of w - v less its mean over each 10 ms: the part that a damper turns into noise;
+- `delay_s`: the delay d for which v(t - d) correlates best with w(t); None where v does not vary, w is zero, or no such
+  d is within the limits.
 
-The correlation is over means of blocks, at most `DELAY_POINTS` of them; within a block v must be as good as straight.
+The correlation is over means of blocks, at most `DELAY_POINTS` of them; within a block v must be nearly straight.
 """
 
 import math
@@ -22,7 +22,7 @@ DELAY_STEPS = 400
 
 
 class _Means:
-    """Means over blocks of so many samples, of values that come in chunks."""
+    """Means over blocks of `size` samples, of values that arrive in chunks."""
 
     def __init__(self, samples: int, size: int):
         self._size = size
@@ -41,11 +41,11 @@ class _Means:
 
 
 class Judge:
-    """The figures of one estimate, from chunks of it.
+    """The error figures of one estimate, which arrives in chunks.
 
     Args:
-        samples: how many there will be.
-        sample_hz: their rate.
+        samples: number of samples that will be judged.
+        sample_hz: sample rate.
     """
 
     def __init__(self, samples: int, sample_hz: float):
@@ -56,7 +56,7 @@ class Judge:
         self.largest = 0.0
 
     def add(self, first: int, estimate: np.ndarray, exact: np.ndarray) -> None:
-        """Take samples `first` and on."""
+        """Add the samples of a chunk, the first of which has the number `first`."""
         error = estimate - exact
         self._squares += float(error @ error)
         self.largest = max(self.largest, float(np.abs(error).max(initial=0.0)))
@@ -73,11 +73,11 @@ class Judge:
         return math.sqrt(max(self._squares / self._samples - slow, 0.0))
 
     def delay_s(self, exact_at: Callable[[np.ndarray], np.ndarray], within_s: float) -> float | None:
-        """Return the delay.
+        """Return the delay of the estimate, in seconds; None where no delay can be told.
 
         Args:
-            exact_at: gives the true velocity at times in seconds since the first sample.
-            within_s: look for it from minus to plus this; less than half a period of what is periodic.
+            exact_at: returns the true velocity at times in seconds since the first sample.
+            within_s: the largest delay, of either sign, that is tried; less than half a period of a periodic motion.
         """
         times, estimate = self._shape.middles / self._sample_hz, self._shape.values
         if np.ptp(exact_at(times)) < 1e-9 or not estimate.any():
@@ -92,5 +92,5 @@ class Judge:
         if number in (0, DELAY_STEPS):
             return None
         best, step = tried[number], tried[1] - tried[0]
-        found = minimize_scalar(mismatch, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-9})
-        return float(found.x)
+        bounds = best - step, best + step
+        return float(minimize_scalar(mismatch, bounds=bounds, method="bounded", options={"xatol": 1e-9}).x)

@@ -1,12 +1,12 @@
-"""The founding paper's Figures 1 and 2, the second carried on to every estimator and to 10 MHz: what is in them.
+"""The contents of the founding paper's Figures 1 and 2, the second extended to every estimator and to 10 MHz.
 
-Beside the estimators, Figure 2 has two lines that no run gives, for |f''| <= C and noise up to eps = q/2, half a count:
+Besides the estimators, Figure 2 has two lines of theory, for |f''| <= C and noise up to eps = q/2, half a count:
 
-- no causal differentiator can guarantee a largest error under 2 sqrt(C eps): that is so on the worst of such signals,
-  and an RMS error on a given one may well be less;
-- a plain difference over the window W = 2 sqrt(eps/C) attains it. Its RMS error is
-  sqrt(q^2 / (6 W^2) + (a W / 2)^2): that of two roundings, independent and even, and half a window's delay under the
-  signal's RMS acceleration a. W is a whole number of samples, one at least.
+- no causal differentiator can guarantee a largest error under 2 sqrt(C eps). The bound holds for the worst such signal;
+  the RMS error on a particular signal may well be less;
+- a plain difference over the window W = 2 sqrt(eps/C) attains the bound. Its RMS error is
+  sqrt(q^2 / (6 W^2) + (a W / 2)^2): the first term comes from two roundings, independent and uniform, the second from
+  half a window's delay under the signal's RMS acceleration a. W is a whole number of samples, at least one.
 """
 
 import math
@@ -25,11 +25,11 @@ RATES_HZ = {
     2: (*(step * 10**decade for decade in (3, 4, 5, 6) for step in (1, 2, 5)), 10_000_000),
 }
 LAG_HZ = 100.0
-"""Cutoff of Figure 1's filter, assumed: one of those that the paper compares, and slow enough to be seen to lag."""
+"""Assumed cutoff of Figure 1's filter: one of the paper's cutoffs, and slow enough for a visible lag."""
 
 
 def curves(figure: int) -> list[Curve]:
-    """Return the estimators of a figure: the paper's, then for the second all others."""
+    """Return the estimators of a figure: the paper's, followed in Figure 2 by all others."""
     if figure == 1:
         return [
             Curve(f"finite difference, {LAG_HZ:g} Hz Butterworth", "butterworth", "u", {"cutoff_hz": LAG_HZ}),
@@ -52,12 +52,12 @@ def curves(figure: int) -> list[Curve]:
 
 
 def lower_bound_m_per_s(acceleration_max_m_per_s2: float) -> float:
-    """Return the largest error that no causal differentiator can promise to stay under."""
+    """Return the least bound on the largest error that a causal differentiator can guarantee."""
     return 2 * math.sqrt(acceleration_max_m_per_s2 * COUNT_M / 2)
 
 
 def window_floor_m_per_s(signal: signals.Signal, sample_hz: float) -> float:
-    """Return the RMS error of a difference over the minimax window, by its formula."""
+    """Return the RMS error of a difference over the minimax window, from its formula."""
     window_s = 2 * math.sqrt(COUNT_M / 2 / signal.acceleration_max_m_per_s2)
     window_s = max(round(window_s * sample_hz), 1) / sample_hz
     step_s = 1e-5

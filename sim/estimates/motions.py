@@ -1,7 +1,7 @@
 """Known motions of the handle: position and velocity at any time, and the edges that an encoder makes of them.
 
-What an estimator makes of the edges can then be held against the exact derivative. A motion is a tuple of numbers or
-arrays whose class has a `position` and a `velocity`; both compile into the loops that use them.
+An estimate from the edges can then be compared with the exact derivative. A motion is a tuple of numbers or arrays
+whose class has a `position` and a `velocity`; both compile into the loops that use them.
 """
 
 import math
@@ -14,11 +14,11 @@ from ...model.stamped import Edges
 from ..world.encoder import Cell, Encoder, edge, level, locate
 
 BISECTIONS = 200
-"""Most halvings in search of a turn or a passage; stops where float64 does."""
+"""The largest number of halvings in the search for a turn or a passage, which ends earlier at float64's resolution."""
 
 
 class DecayingSine(NamedTuple):
-    """amplitude exp(-decay t) sin(2 pi f t): the motion of the founding paper's figures."""
+    """The motion of the founding paper's figures: amplitude exp(-decay t) sin(2 pi f t)."""
 
     amplitude_m: float
     decay_per_s: float
@@ -26,7 +26,7 @@ class DecayingSine(NamedTuple):
 
 
 class Steady(NamedTuple):
-    """Constant speed, from an arbitrary place in a count."""
+    """Constant speed, starting at an arbitrary position within a count."""
 
     speed_m_per_s: float
     start_m: float
@@ -41,7 +41,7 @@ class Sweep(NamedTuple):
 
 
 class Stop(NamedTuple):
-    """Constant speed until it is braked at a constant deceleration, and rest."""
+    """Constant speed, then constant deceleration, then rest."""
 
     speed_m_per_s: float
     brake_s: float
@@ -59,12 +59,12 @@ class Track(NamedTuple):
 
 @by_type
 def position(motion, time_s):
-    """Return the position at a time, m."""
+    """Return the position (m) at a time (s)."""
 
 
 @by_type
 def velocity(motion, time_s):
-    """Return the exact velocity at a time, m/s."""
+    """Return the exact velocity (m/s) at a time (s)."""
 
 
 @position.register(DecayingSine)
@@ -127,7 +127,7 @@ def _stop_velocity(motion, time_s):
 
 @compiled
 def _piece(motion, time_s):
-    """Return the number of the piece of a track that a time is in, and the fraction of the piece that has passed."""
+    """Return the number of the piece of a track that contains a time, and the fraction of the piece before it."""
     at = (time_s - motion.start_s) / motion.step_s
     piece = min(max(int(at), 0), len(motion.position_m) - 2)
     return piece, at - piece
@@ -143,7 +143,7 @@ def _track_position(motion, time_s):
     if s > 1:
         return x[-1] + v[-1] * (s - 1) * h
     rise = x[i + 1] - x[i]
-    # Hermite's cubic, from its value and slope at both ends.
+    # The Hermite cubic, from its values and slopes at both ends.
     return x[i] + s * (h * v[i] + s * (3 * rise - h * (2 * v[i] + v[i + 1]) + s * (h * (v[i] + v[i + 1]) - 2 * rise)))
 
 
@@ -162,7 +162,7 @@ def _track_velocity(motion, time_s):
 
 @compiled
 def _turn(motion, begin_s, end_s):
-    """Return when, between two times with velocities of different signs, the motion turns."""
+    """Return the time at which the motion turns, between two times with velocities of different signs."""
     upwards = velocity(motion, begin_s) > 0
     for _ in range(BISECTIONS):
         middle = (begin_s + end_s) / 2
@@ -177,9 +177,9 @@ def _turn(motion, begin_s, end_s):
 
 @compiled
 def _passage(motion, begin_s, end_s, at_m, upwards):
-    """Return when the motion, in one direction from `begin_s` to `end_s`, passes a place: the first float64 beyond."""
+    """Return the first float64 time past a position, for a motion in one direction from `begin_s` to `end_s`."""
     for _ in range(BISECTIONS):
-        # A secant's guess, moved into the middle half: a few halvings for a smooth path, and never many.
+        # The secant's guess, kept off the ends: few halvings on a smooth path, and never many.
         here, there = position(motion, begin_s), position(motion, end_s)
         guess = begin_s + (end_s - begin_s) * min(max((at_m - here) / (there - here), 0.02), 0.98)
         if not begin_s < guess < end_s:
@@ -194,7 +194,7 @@ def _passage(motion, begin_s, end_s, at_m, upwards):
 
 @compiled
 def _edges(motion, encoder, step_s, steps, room):
-    """Return (times s, cells entered, how many): the passages over `steps` steps; one more than `room`: too many."""
+    """Return the passages over `steps` steps: (times in s, cells entered, their number, or `room` + 1 for too many)."""
     times, cells = np.empty(room), np.empty(room, np.int64)
     cell, found = locate(encoder, position(motion, 0.0)), 0
     for k in range(steps):
@@ -219,12 +219,12 @@ def _edges(motion, encoder, step_s, steps, room):
 
 
 class Encoded(NamedTuple):
-    """What an encoder makes of a motion.
+    """The output of an encoder for a motion.
 
     Attributes:
-        edges: when a register at the pins first holds which level.
-        start_level: the pins before the first, a | b << 1.
-        start_cell: the count at time 0, which a decoder calls 0.
+        edges: the clocks at which a register at the pins first holds a new level, and the levels.
+        start_level: level of the pins before the first edge, a | b << 1.
+        start_cell: the encoder's count at time 0, where a decoder's count is 0.
     """
 
     edges: Edges
@@ -233,17 +233,17 @@ class Encoded(NamedTuple):
 
 
 def encoded(motion, encoder: Encoder, seconds: float, step_s: float, offset_clocks: int) -> Encoded:
-    """Return the edges of a motion from time 0 on, in their order.
+    """Return the edges of a motion from time 0 on, in order of time.
 
     An edge that is passed at time t is stamped ceil(t clock_hz) + offset_clocks moving up, floor(t clock_hz) + 1 +
     offset_clocks moving down, as everywhere (`sim.world.encoder`).
 
     Args:
-        motion: one of this module's.
+        motion: one of this module's motions.
         encoder: the scale and its clock.
-        seconds: how long; up to the next whole step.
-        step_s: so short that the motion turns at most once in it.
-        offset_clocks: added to every stamp.
+        seconds: duration, rounded up to a whole number of steps.
+        step_s: length of a step, so short that the motion turns at most once in it.
+        offset_clocks: clocks added to every stamp.
     """
     room = 1 << 16
     while True:

@@ -1,7 +1,8 @@
-"""A known motion through an axis on any backend: velocities at every sample, in chunks, with no plant and no wall.
+"""Playback of a known motion through an axis on any backend: velocities in chunks, without a plant or a wall.
 
-The edges are placed such that the count at the strobe of sample k is the position at time k / sample_hz, exactly: the
-decoder's latency is left out, as it is the same for every estimator. A stamp is the clock that decoded its edge.
+The edges are placed so that the count at the strobe of sample k is exactly that of the position at time k / sample_hz.
+The decoder's latency is left out, because it is the same for every estimator. A stamp is the clock in which its edge
+was decoded.
 """
 
 from collections.abc import Iterator
@@ -25,7 +26,7 @@ DECODER_CLOCKS = quadrature.latency(glitch_clocks=0)
 
 @compiled
 def _take(controller, state, timing, edges, taken, first, velocity):
-    """Take samples from `first` on, as many as `velocity` holds, and fill it; return (state, edges taken)."""
+    """Fill `velocity` with the samples from `first` on; return (state, number of edges taken)."""
     for i in range(len(velocity)):
         strobe = strobe_of(timing, first + i)
         left = len(edges.clocks) - taken
@@ -40,7 +41,7 @@ def _take(controller, state, timing, edges, taken, first, velocity):
 
 
 def encoded_signal(signal: Signal, spec: AxisSpec, offsets: tuple[float, float, float, float]) -> Encoded:
-    """Return what the pins of an axis get of a signal, from an encoder with these errors (counts)."""
+    """Return the edges of a signal at the pins of an axis, from an encoder with these errors (counts)."""
     encoder = Encoder(spec.count_m, float(spec.clock_hz), offsets)
     lead = spec.clocks_per_sample - 1 - DECODER_CLOCKS
     return encoded(signal.motion, encoder, signal.seconds, signal.turns_apart_s, lead)
@@ -49,14 +50,14 @@ def encoded_signal(signal: Signal, spec: AxisSpec, offsets: tuple[float, float, 
 def velocities(
     signal: Signal, spec: AxisSpec, output: str, backend: str, offsets: tuple[float, float, float, float]
 ) -> Iterator[tuple[int, np.ndarray, int]]:
-    """Yield (first sample, velocities in m/s, sticky flags) of chunk after chunk of a signal.
+    """Yield the chunks of a signal, each as (first sample, velocities in m/s, sticky flags).
 
     Args:
-        signal: the motion.
-        spec: the axis.
+        signal: the motion and its duration.
+        spec: specification of the axis.
         output: the estimator's output.
         backend: one of `backends.BACKENDS`.
-        offsets: errors of the encoder, counts: `sim.world.encoder.offsets`.
+        offsets: errors of the encoder, in counts, from `sim.world.encoder.offsets`.
 
     Raises:
         RuntimeError: if the RTL could not be built.

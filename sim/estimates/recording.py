@@ -1,22 +1,22 @@
 """Recordings of encoder counts: one column of a CSV file, and the rate at which it was sampled.
 
 The file is UTF-8 text: a header line that names the columns, then one sample a line, cells separated by commas. Counts
-are whole numbers (`1908.0` and `19e2` are whole). A recording spans less than 2**32 counts, and is taken for that of a
-counter of at most 32 bits: a step from one sample to the next is taken modulo 2**32, so a counter that wrapped on the
-way is unwrapped.
+are whole numbers (`1908.0` and `19e2` are whole). A recording spans less than 2**32 counts, and its counter is assumed
+to have at most 32 bits: every step between samples is taken modulo 2**32, so a counter that wrapped is unwrapped.
 
-The rate comes from the column `time_s`, if there is one, in seconds. A stamp is good to one unit,
+The rate comes from the column `time_s`, in seconds, if the file has that column. The resolution of a time stamp is
 
     unit = the coarsest of: its last printed decimal place, the spacing of float64 there, 1e-12 of the whole time
 
-rounded to nearest it is half a unit off at most. So with samples at equal distances
+and a stamp that was rounded to nearest is off by at most half a unit. So if the samples are equally spaced
 
-- against a rate that is given, stamps are off by less than one unit, counted from the first one;
-- against the line through the first and the last stamp, likewise: half of their own, half of the line's ends'.
+- against a given rate, stamps are off by less than one unit, counted from the first stamp;
+- against the line through the first and the last stamp, also by less than one unit: half for the stamp itself and half
+  for the ends of the line.
 
-Beyond that the stamps are not uniform. A lost sample moves all that follow by a whole interval, and the line by half of
-one on either side: it shows where the interval is 2 units or more. Where it is less, without a given rate, the
-intervals must all be printed alike.
+Stamps that are further off are not uniform. A lost sample shifts all later stamps by a whole interval, and the line by
+half an interval on either side: it shows where the interval is 2 units or more. Where the interval is less, and no rate
+is given, all intervals must be printed alike.
 """
 
 import csv
@@ -37,17 +37,17 @@ WHOLE_COUNT = "a count must be a whole number of -2**63 to 2**63 - 1"
 
 
 class RecordingError(ValueError):
-    """A recording that cannot be: one line that names the file, the place, and what is accepted."""
+    """A recording that is refused: one line that names the file, the place in it, and what is accepted."""
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Counts at equal distances in time.
+    """Counts at equally spaced times.
 
     Attributes:
-        file, column: where they are from.
+        file, column: source of the counts.
         counts: int64, unwrapped.
-        rate_hz: samples a second.
+        rate_hz: sample rate.
         start_s: time of the first sample; 0 without a column `time_s`.
     """
 
@@ -59,7 +59,7 @@ class Recording:
 
     @property
     def time_s(self) -> np.ndarray:
-        """Time of each sample."""
+        """The time of every sample, s."""
         return self.start_s + np.arange(len(self.counts)) / self.rate_hz
 
 
@@ -69,7 +69,7 @@ def load(path: str | Path, column: str, rate_hz: float | None = None) -> Recordi
     Args:
         path: the file.
         column: name of the column of counts.
-        rate_hz: samples a second, where the file has no column `time_s`; where it has, the two must agree.
+        rate_hz: sample rate, required if the file has no column `time_s`; if it has that column, the two must agree.
 
     Raises:
         RecordingError: in one line, what is wrong, where, and what is accepted.
@@ -100,7 +100,7 @@ def load(path: str | Path, column: str, rate_hz: float | None = None) -> Recordi
 
 
 def _rows(path: str | Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Return the header, and (line number, cells) of each data line."""
+    """Return the header, and (line number, cells) of every data line."""
     try:
         data = Path(path).read_bytes()
         text = data.decode("utf-8-sig")
@@ -129,16 +129,16 @@ def _rows(path: str | Path) -> tuple[list[str], list[tuple[int, list[str]]]]:
 
 
 def _place(path: str | Path, header: list[str], column: str) -> int:
-    found = header.count(column)
-    if found == 0:
+    occurrences = header.count(column)
+    if occurrences == 0:
         raise RecordingError(f"{path}, line 1: column must be one of {', '.join(map(_shown, header))}, not {column!r}")
-    if found > 1:
-        raise RecordingError(f"{path}, line 1: column {column!r} must be there once, not {found} times")
+    if occurrences > 1:
+        raise RecordingError(f"{path}, line 1: column {column!r} must be there once, not {occurrences} times")
     return header.index(column)
 
 
 def _shown(text: str) -> str:
-    """Return text as it may stand in a message: in one line, and not too long."""
+    """Return a text shortened for a message: printable, on one line, at most 40 characters."""
     plain = text if text.isprintable() and text else repr(text)
     return plain if len(plain) <= 40 else plain[:37] + "..."
 
@@ -148,7 +148,7 @@ def _count(path: str | Path, line: int, column: str, text: str) -> int:
     if digits.isascii() and digits.isdigit() and len(digits) < 19:
         return int(text)
     number = _decimal(text)
-    # The exponent is looked at first: 1e999999 as an integer would fill the memory.
+    # The exponent is checked first: 1e999999 as an integer would fill the memory.
     if number is not None and number.is_finite() and number.adjusted() < 19 and number == number.to_integral_value():
         count = int(number)
         if -(2**63) <= count < 2**63:
@@ -174,8 +174,8 @@ def _decimal(text: str) -> Decimal | None:
 
 
 def _unwrapped(path: str | Path, column: str, lines: list[int], counts: np.ndarray) -> np.ndarray:
-    """Return the counts with each step taken modulo the span."""
-    # Modulo 2**64 a difference of two int64 that is not negative is right as an unsigned one.
+    """Return the counts with every step taken modulo 2**SPAN_BITS."""
+    # A difference of two int64 that is not negative is exact as an unsigned number modulo 2**64.
     spread = np.maximum.accumulate(counts).view(np.uint64) - np.minimum.accumulate(counts).view(np.uint64)
     wide = np.flatnonzero(spread >> np.uint64(SPAN_BITS))
     if len(wide):
@@ -189,7 +189,7 @@ def _unwrapped(path: str | Path, column: str, lines: list[int], counts: np.ndarr
 
 
 def _rate(path: str | Path, lines: list[int], stamps: list[Decimal], given_hz: float | None) -> float:
-    """Return the rate of uniform stamps: that which is given, or that of the first and the last."""
+    """Return the rate of uniform stamps: the given rate, or the rate between the first and the last stamp."""
     where = f"column {TIME_COLUMN}: times must"
     decimals = max(-stamp.as_tuple().exponent for stamp in stamps)
     since = np.array([float(stamp - stamps[0]) for stamp in stamps])
@@ -203,7 +203,7 @@ def _rate(path: str | Path, lines: list[int], stamps: list[Decimal], given_hz: f
     samples = np.arange(len(since))
     mean_s = since[-1] / samples[-1]
     if given_hz is not None:
-        # Less than one unit, and not just because of rounding here.
+        # The tolerance is a little under one unit, for the rounding of this computation.
         off = np.flatnonzero(np.abs(since - samples / given_hz) >= unit * (1 - 1e-6))
         if len(off):
             raise RecordingError(
@@ -221,5 +221,5 @@ def _rate(path: str | Path, lines: list[int], stamps: list[Decimal], given_hz: f
             f"{path}, line {lines[worst + 1]}, {where} be uniform within {unit:g} s, "
             f"not go by {steps[worst]:g} s where {usual_s:g} s is usual"
         )
-    # In decimal, 0.001 s a sample is 1000 Hz, and not one rounding beside it.
+    # In decimal arithmetic, 0.001 s a sample is exactly 1000 Hz.
     return float((len(stamps) - 1) / (stamps[-1] - stamps[0]))

@@ -1,11 +1,10 @@
-"""The reference that estimates are held against, and the bound on the acceleration that is taken from it.
+"""The reference velocity that estimates are compared with, and the bound on the acceleration derived from it.
 
-The reference is the central difference of the recorded counts, through a Butterworth filter of 4th order forward and
-backward: no delay. Its cutoff is `REFERENCE_HZ`, or a quarter of the rate where that is less.
+The reference is the central difference of the recorded counts, through a 4th-order Butterworth filter forward and
+backward, so it has no delay. The cutoff is `REFERENCE_HZ`, or a quarter of the sample rate where that is less.
 
-The bound C on the acceleration is the largest |second derivative| of the reference, after the first second, rounded up
-to two digits: knowledge that a designer would have of the motion, not something that was known to an estimator at the
-time.
+The bound C on the acceleration is the largest |derivative| of the reference velocity after the first second, rounded up
+to two digits. A designer would know it of the motion; an estimator could not know it at the time.
 """
 
 import math
@@ -16,7 +15,7 @@ from scipy import signal
 REFERENCE_HZ = 40.0
 REFERENCE_ORDER = 4
 SETTLE_S = 1.0
-"""Estimates are judged from then on: before, an estimator is still catching up with the start."""
+"""The time from which estimates are judged; before it, an estimator is still settling."""
 
 
 def judged_from(rate_hz: float) -> int:
@@ -25,10 +24,10 @@ def judged_from(rate_hz: float) -> int:
 
 
 def zero_phase_velocity(counts: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
-    """Return the derivative of the counts, counts/s, low-passed forward and backward."""
+    """Return the derivative (counts/s) of the counts, low-pass filtered forward and backward."""
     sections = signal.butter(REFERENCE_ORDER, cutoff_hz, fs=rate_hz, output="sos")
     derivative = np.gradient((counts - counts[0]).astype(np.float64)) * rate_hz
-    # The usual extension at the ends, three times the filter's length, where there are so many samples.
+    # The usual extension at the ends is three times the filter's length, if there are enough samples.
     extension = min(3 * (2 * len(sections) + 1), len(counts) - 1)
     return signal.sosfiltfilt(sections, derivative, padlen=extension)
 
@@ -36,7 +35,7 @@ def zero_phase_velocity(counts: np.ndarray, rate_hz: float, cutoff_hz: float) ->
 def acceleration_bound(velocity: np.ndarray, rate_hz: float) -> float:
     """Return the largest |derivative| of a velocity after the first second, rounded up to two digits.
 
-    A record that is no longer counts from its start.
+    A record no longer than a second is used from its start.
     """
     first = judged_from(rate_hz)
     acceleration = np.gradient(velocity) * rate_hz

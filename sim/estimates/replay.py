@@ -1,13 +1,13 @@
-"""Recorded counts through a velocity estimator, on any backend, and held against a reference that is not causal.
+"""Replay of recorded counts through a velocity estimator, on any backend, compared with a reference that is not causal.
 
 With `coarsen` = N the estimator sees counts // N, and everything that is reported is in recorded counts and true
-seconds, whatever N is. The floor puts coarse counts (N - 1) / 2 recorded counts too low on average: constant, so no
-velocity comes of it. `replay_axis` has the axis.
+seconds, whatever N is. The floor puts coarse counts (N - 1) / 2 recorded counts too low on average; the offset is
+constant, so it adds no velocity. The axis is described in `replay_axis`.
 
-The bound C on the acceleration, from which an estimator gets its gains, is that of `reference`. It can be given
-instead. A recording that hardly accelerates gets a C that moves one count over its whole length, which counts cannot
-tell from none, or the least that words hold beside its travel and speed (`replay_axis.ACCELERATION_RANGE`). A change
-that a clock of `CLOCK_MAX_HZ` does not let through the pins is an error.
+The bound C on the acceleration, from which an estimator gets its gains, is computed by `reference` unless it is given.
+A recording that hardly accelerates gets a C that moves one count over its whole length, which the counts cannot
+distinguish from no acceleration, or the least C that the words can hold with its travel and speed
+(`replay_axis.ACCELERATION_RANGE`). A change too fast for the pins at a clock of `CLOCK_MAX_HZ` is an error.
 """
 
 import hashlib
@@ -31,28 +31,28 @@ from .replay_axis import SECOND, axis_spec, least_bound, needs_pins, run
 from .through_pins import GLITCH_CLOCKS
 
 CLOCK_MAX_HZ = 100e6
-"""Fastest clock of a replay: more counts a second are a fault of the recording, not a motion."""
+"""The fastest clock of a replay; counts that change too fast for it are a fault of the recording, not a motion."""
 
 
 class ReplayError(ValueError):
-    """A replay that cannot be: one line with what is wrong and what is accepted."""
+    """A replay that is refused: one line with what is wrong and what is accepted."""
 
 
 @dataclass(frozen=True, eq=False)
 class Replay(Summary):
-    """What an estimator made of a recording; arrays of the recording's length, in recorded counts and seconds.
+    """The result of a replay; arrays have the recording's length, and are in recorded counts and seconds.
 
     Attributes:
-        coarsen: counts were floor-divided by this before the estimator saw them; None: not, and nothing is judged.
+        coarsen: divisor of the counts that the estimator saw (floor division); None: no divisor, and no judgement.
         acceleration_max_counts_per_s2: the bound C that set the gains.
-        gains: by name, with their units.
-        clock_hz: of the axis; its pins' clock on `rtl`, and nothing to the other backends.
+        gains: the gains by name, with their units.
+        clock_hz: clock of the axis: that of its pins on `rtl`, without meaning on the other backends.
         velocity_counts_per_s: the estimate.
         difference_counts_per_s: the plain finite difference of the same counts.
         reference_counts_per_s: the zero-phase derivative of the recorded counts.
-        flags: sticky flags that are up at the end.
-        velocity_sha256: of the velocity words of all samples, little-endian int64; None for `float`.
-        seconds: wall time of the estimator's run, compiling and building apart.
+        flags: names of the sticky flags that are set at the end.
+        velocity_sha256: digest of the velocity words of all samples, little-endian int64; None for `float`.
+        seconds: wall time of the estimator's run, without compiling and building.
     """
 
     recording: Recording
@@ -77,7 +77,7 @@ class Replay(Summary):
 
     @property
     def judged_from(self) -> int:
-        """Number of the first sample that is judged."""
+        """The number of the first sample that is judged."""
         return judged_from(self.recording.rate_hz)
 
     def _rms(self, velocity: np.ndarray) -> float | None:
@@ -86,29 +86,29 @@ class Replay(Summary):
 
     @cached_property
     def error_rms_counts_per_s(self) -> float | None:
-        """RMS of the estimate's error against the reference, after the first second; None for a shorter recording.
+        """The RMS error of the estimate against the reference, after the first second; None for a shorter recording.
 
-        Without `coarsen` the reference is that of the very counts that the estimator saw.
+        Without `coarsen` the reference comes from the same counts that the estimator saw.
         """
         return self._rms(self.velocity_counts_per_s)
 
     @cached_property
     def error_rms_fdm_counts_per_s(self) -> float | None:
-        """The same of the finite difference."""
+        """The RMS error of the finite difference against the reference, likewise."""
         return self._rms(self.difference_counts_per_s)
 
     @property
     def rms_counts_per_s(self) -> float | None:
-        """The estimate's error where it was judged: None without `coarsen`."""
+        """The RMS error of the estimate if it is judged; None without `coarsen`."""
         return None if self.coarsen is None else self.error_rms_counts_per_s
 
     @property
     def rms_fdm_counts_per_s(self) -> float | None:
-        """The same of the finite difference."""
+        """The RMS error of the finite difference if it is judged; None without `coarsen`."""
         return None if self.coarsen is None else self.error_rms_fdm_counts_per_s
 
     def report(self) -> dict:
-        """Return the summary that the command line prints, units in the keys; counts are recorded counts."""
+        """Return the summary that the command line prints, units in the keys; all counts are recorded counts."""
         samples = len(self.velocity_counts_per_s)
         return {
             "file": self.recording.file,
@@ -135,7 +135,7 @@ class Replay(Summary):
         }
 
     def save(self, path: str | Path) -> None:
-        """Write time, recorded count and velocity of each sample as CSV, and the reference if there is `coarsen`.
+        """Write time, recorded count and velocity of every sample as CSV; with `coarsen`, the reference too.
 
         Raises:
             OSError: if the file cannot be written.
@@ -161,7 +161,7 @@ def _one_of(name: str, value: object, accepted: tuple[str, ...]) -> None:
 
 
 def _check_speed(recording: Recording, counts: np.ndarray, count: int) -> None:
-    """Raise ReplayError, with the sample, if a change is too fast for the pins."""
+    """Raise ReplayError, naming the sample, if a change is too fast for the pins."""
     steps = np.abs(np.diff(counts))
     most = max_edge_rate(CLOCK_MAX_HZ, GLITCH_CLOCKS) / recording.rate_hz
     if steps.max() > most:
@@ -172,6 +172,16 @@ def _check_speed(recording: Recording, counts: np.ndarray, count: int) -> None:
             f"in a sample at {recording.rate_hz:g} Hz (a clock of {CLOCK_MAX_HZ / 1e6:g} MHz), "
             f"not by {steps[k - 1]} at sample {k}, {recording.time_s[k]:g} s"
         )
+
+
+def _check_names(estimator: str, output: str | None, backend: str) -> str:
+    """Return the name of the output, the estimator's first for None; raise ReplayError if a name is unknown."""
+    _one_of("estimator", estimator, tuple(registry.ESTIMATORS))
+    outputs = registry.design_of(estimator).outputs
+    output = outputs[0] if output is None else output
+    _one_of(f"output of {estimator}", output, outputs)
+    _one_of("backend", backend, BACKENDS)
+    return output
 
 
 def _check_numbers(recording: Recording, coarsen: object, bound: float | None, cutoff: float) -> None:
@@ -190,8 +200,16 @@ def _check_numbers(recording: Recording, coarsen: object, bound: float | None, c
         raise ReplayError(f"acceleration_max_counts_per_s2 must be finite and more than 0, not {bound!r}")
 
 
+def _counts_for(recording: Recording, count: int, pins: bool) -> np.ndarray:
+    """Return the counts that the estimator sees; raise ReplayError if they go through pins and change too fast."""
+    counts = recording.counts // count
+    if pins:
+        _check_speed(recording, counts, count)
+    return counts
+
+
 def _axis_for(counts: np.ndarray, count: int, bound: float, rate_hz: float, estimator: str) -> AxisSpec:
-    """Return the axis for counts that are each `count` recorded counts, with a bound in recorded counts a second^2."""
+    """Return the axis for counts of `count` recorded counts each, with a bound C in recorded counts a second^2."""
     try:
         return axis_spec(counts, count, bound / rate_hz**2, estimator)
     except ValueError as error:
@@ -214,32 +232,26 @@ def replay(
     """Put a recording through an estimator.
 
     Args:
-        recording: from `recording.load`.
-        estimator: its name.
-        output: which of its outputs; None for its first.
+        recording: the recording, from `recording.load`.
+        estimator: name of the estimator.
+        output: name of its output; None for its first.
         backend: one of `backends.BACKENDS`.
-        coarsen: floor-divide the counts by this first, and judge the estimate; 1 judges without coarser counts.
-        acceleration_max_counts_per_s2: the bound C that sets the gains; None to take it from the recording.
-        reference_hz: cutoff of the reference; None for the usual one.
-        progress: called with the number of samples done.
+        coarsen: divide the counts by this (floor division), and judge the estimate; 1 judges without coarser counts.
+        acceleration_max_counts_per_s2: the bound C that sets the gains; None to derive it from the recording.
+        reference_hz: cutoff of the reference; None for the usual cutoff.
+        progress: function called with the number of samples done.
 
     Raises:
-        ReplayError: in one line, what cannot be and what is accepted.
+        ReplayError: in one line, what is refused and what is accepted.
         RuntimeError: if the RTL could not be built.
     """
-    _one_of("estimator", estimator, tuple(registry.ESTIMATORS))
-    outputs = registry.design_of(estimator).outputs
-    output = outputs[0] if output is None else output
-    _one_of(f"output of {estimator}", output, outputs)
-    _one_of("backend", backend, BACKENDS)
+    output = _check_names(estimator, output, backend)
     rate, bound = recording.rate_hz, acceleration_max_counts_per_s2
     cutoff = min(REFERENCE_HZ, rate / 4) if reference_hz is None else reference_hz
     _check_numbers(recording, coarsen, bound, cutoff)
 
     count = coarsen or 1
-    counts = recording.counts // count
-    if needs_pins(estimator, backend):
-        _check_speed(recording, counts, count)
+    counts = _counts_for(recording, count, pins=needs_pins(estimator, backend))
     reference = zero_phase_velocity(recording.counts, rate, cutoff)
     if bound is None:
         bound = max(acceleration_bound(reference, rate), least_bound(counts) * count * rate**2)
@@ -269,7 +281,8 @@ def replay(
 
 def _gains(spec: AxisSpec, rate_hz: float) -> dict[str, float]:
     """Return the gains of an axis by name, in counts and true seconds."""
-    powers = {"_per_s2": 2, "_per_s": 1, "_hz": 1, "_s": -1}  # of one over time, by the ending of the name
+    # The power of 1 / time in the unit, by the ending of the name.
+    powers = {"_per_s2": 2, "_per_s": 1, "_hz": 1, "_s": -1}
     return {
         name.replace("_m_", "_counts_"): value
         * (rate_hz / SECOND) ** next((power for ending, power in powers.items() if name.endswith(ending)), 0)

@@ -1,4 +1,4 @@
-"""The signals that estimators are judged on: motions with names, how long they last, and from when they count."""
+"""The signals that estimators are judged on: named motions, their durations, and the times from which errors count."""
 
 import cmath
 import math
@@ -14,26 +14,26 @@ from ..walls.hit import run
 from . import motions
 
 DEVICE_ACCELERATION = 12.0
-"""C of a wall hit, m/s^2: the bound that the founding paper took from a recorded hit."""
+"""C of a wall hit, m/s^2: the bound that the founding paper derived from a recorded hit."""
 PAPER = motions.DecayingSine(50e-3, 1.0, 1.0)
 STEADY_SECONDS = 1.0
 TRACK_LEAD_S = 0.1
-"""How long a recorded path is led up to at constant speed, so that estimators have settled."""
+"""The time at constant speed before a recorded path, in which estimators settle."""
 FLICKER = motions.Sweep(0.3e-6, 50.0, 1e-9)
 
 
 @dataclass(frozen=True)
 class Signal:
-    """A motion to judge on.
+    """A motion that estimators are judged on.
 
     Attributes:
-        name: as on the command line.
-        motion: one of `motion`'s.
-        seconds: length.
-        judged_from_s: errors count from then on.
-        acceleration_max_m_per_s2: C that an estimator gets its gains from.
-        turns_apart_s: the motion turns at most once in so long.
-        delay_max_s: no delay is looked for beyond; less than half a period of what is periodic.
+        name: its name on the command line.
+        motion: one of the motions of `motions`.
+        seconds: duration.
+        judged_from_s: time from which errors count.
+        acceleration_max_m_per_s2: C, from which an estimator gets its gains.
+        turns_apart_s: a time in which the motion turns at most once.
+        delay_max_s: the largest delay that is searched for; less than half a period of a periodic motion.
     """
 
     name: str
@@ -46,8 +46,8 @@ class Signal:
 
 
 def paper() -> Signal:
-    """50 exp(-t) sin(2 pi t) mm, 5 s, judged from 1 s on; C is its largest acceleration."""
-    # f is the imaginary part of A exp(p t); its second derivative is largest where the third first vanishes.
+    """Return 50 exp(-t) sin(2 pi t) mm over 5 s, judged from 1 s on; C is its largest acceleration."""
+    # The motion is the imaginary part of A exp(p t); its second derivative is largest where the third first vanishes.
     p = complex(-PAPER.decay_per_s, math.tau * PAPER.frequency_hz)
     at = (-3 * cmath.phase(p)) % math.pi / p.imag
     largest = abs((PAPER.amplitude_m * p**2 * cmath.exp(p * at)).imag)
@@ -55,33 +55,36 @@ def paper() -> Signal:
 
 
 def steady(speed_mm_per_s: float) -> Signal:
-    """Constant speed, ten counts of it or more judged. A speed of whole counts in so many samples locks to them."""
+    """Return a motion at constant speed, judged over at least ten counts.
+
+    A speed of whole counts in a whole number of samples makes the count lock to the samples.
+    """
     seconds = max(STEADY_SECONDS, 20e-3 / speed_mm_per_s)
     path = motions.Steady(speed_mm_per_s * 1e-3, 0.3e-6)
     return Signal(f"steady:{speed_mm_per_s:g}", path, seconds, seconds / 2, DEVICE_ACCELERATION)
 
 
 def sweep() -> Signal:
-    """A sine of 0.1 mm from 0.5 to 50 Hz in 5 s."""
+    """Return a sine of 0.1 mm from 0.5 to 50 Hz in 5 s."""
     path = motions.Sweep(1e-4, 0.5, math.log(100) / 5)
     return Signal("sweep", path, 5.0, 1.0, DEVICE_ACCELERATION)
 
 
 def stop() -> Signal:
-    """5 mm/s, braked at 1 m/s^2 to rest; judged from 0.1 s after that: nothing should be left."""
+    """Return a motion at 5 mm/s, braked at 1 m/s^2; judged from 0.1 s after it stops: the estimate should be zero."""
     return Signal("stop", motions.Stop(5e-3, 0.5, 1.0), 1.105, 0.605, DEVICE_ACCELERATION)
 
 
 def flicker() -> Signal:
-    """At rest but for a tremor of 0.3 um and 50 Hz, about an edge: the count flickers."""
+    """Return a tremor of 0.3 um and 50 Hz about an edge: the count flickers, with the handle nearly at rest."""
     return Signal("flicker", FLICKER, 1.0, 0.5, DEVICE_ACCELERATION, delay_max_s=8e-3)
 
 
 @cache
 def hit() -> Signal:
-    """The first contact of a closed-loop hit of a 10 kN/m wall at 1 MHz, impact included, as the handle truly moved.
+    """Return the handle's true motion in the first contact of a closed-loop hit of a 10 kN/m wall at 1 MHz.
 
-    C is the largest acceleration on the way.
+    The impact is included. C is the largest acceleration of the path.
     """
     wall = {"wall.stiffness_n_per_m": 10e3, "wall.damping_n_s_per_m": 20.0}
     scene = Case.of("mhz", wall | {"controller.output": "u1"}).scene
@@ -89,7 +92,7 @@ def hit() -> Signal:
     path = motions.Track(TRACK_LEAD_S, 1 / scene.spec.sample_hz, detail.position_m, detail.velocity_m_per_s)
     length = (len(detail.time_s) - 1) / scene.spec.sample_hz
     x, v, h = detail.position_m, detail.velocity_m_per_s, 1 / scene.spec.sample_hz
-    # The cubic's second derivative is largest at an end of a piece.
+    # The second derivative of a cubic is largest at an end of its piece.
     rise = np.diff(x)
     ends = 6 * rise - h * (4 * v[:-1] + 2 * v[1:]), 6 * rise - h * (2 * v[:-1] + 4 * v[1:])
     largest = float(max(np.abs(end).max() for end in ends)) / h**2
@@ -107,17 +110,17 @@ SPEEDS_MM_PER_S = (0.01, 1000.0)
 
 
 def load(name: str) -> Signal:
-    """Return the signal of that name: one of `SIGNALS`, or `steady:SPEED` in mm/s.
+    """Return a signal by its name: one of `SIGNALS`, or `steady:SPEED` in mm/s.
 
     Raises:
-        ValueError: for another name, or a speed out of `SPEEDS_MM_PER_S`.
+        ValueError: if there is no such signal, or its speed is outside `SPEEDS_MM_PER_S`.
     """
     if name in SIGNALS:
         return SIGNALS[name]()
     low, high = SPEEDS_MM_PER_S
-    if found := re.fullmatch(r"steady:([0-9.e+-]+)", name):
+    if match := re.fullmatch(r"steady:([0-9.e+-]+)", name):
         try:
-            speed = float(found[1])
+            speed = float(match[1])
         except ValueError:
             speed = math.nan
         if low <= speed <= high:

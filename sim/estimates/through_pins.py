@@ -1,7 +1,7 @@
 """Recorded counts through a controller's pins.
 
-The change from one sample to the next becomes edges that are spread evenly over the interval, each moved by the
-decoder's latency so that the count at every strobe is the recorded one. The first sample is where the decoder starts.
+The change from one sample to the next becomes edges that are spread evenly over the interval and moved by the
+decoder's latency, so that the count at every strobe is the recorded count. The decoder starts at the first sample.
 """
 
 import time
@@ -18,14 +18,14 @@ from ..world.encoder import level
 
 GLITCH_CLOCKS = 0
 DECODER_CLOCKS = quadrature.latency(GLITCH_CLOCKS)
-"""An edge this long before a strobe is the last that is counted at it."""
+"""The latency of the decoder: an edge this many clocks before a strobe is the last that is counted at it."""
 CHUNK_CLOCKS = 1 << 20
-"""Clocks between two looks at progress."""
+"""The number of clocks between two reports of progress."""
 
 
 @compiled
 def _append_edges(count, next_count, start, clocks, edges, n_edges):
-    """Append the edges from one count to another, spread over clocks start + 1 to start + clocks; return how many."""
+    """Append the edges between two counts, spread over clocks start + 1 to start + clocks; return the new `n_edges`."""
     change = next_count - count
     total, direction = abs(change), 1 if change > 0 else -1
     for i in range(total):
@@ -38,15 +38,16 @@ def _append_edges(count, next_count, start, clocks, edges, n_edges):
 
 @compiled
 def through_pins(controller, state, timing, counts, velocity, edges, n_edges, first, until):
-    """Take samples `first` to `until` of a record through a controller's pins; return (state, edges left).
+    """Run samples `first` to `until` of a record through a controller's pins; return (state, number of edges left).
 
     Args:
-        controller, state: of `sim.loop.controllers`.
-        timing: an `axis.Timing`, its sample as long as the largest change, and as both latencies together.
-        counts: int64 array; the pins begin at the level of count 0, so the first count is to be 0.
-        velocity: array that takes the velocity of every sample.
-        edges: `Edges` with room for twice the largest change: those on their way to the controller.
-        n_edges: how many there are, not yet taken.
+        controller, state: the controller and its state (`sim.loop.controllers`).
+        timing: an `axis.Timing` whose sample has clocks enough for the largest change and for both latencies together.
+        counts: int64 array; the pins begin at the level of count 0, so the first count must be 0.
+        velocity: array that receives the velocity of every sample.
+        edges: `Edges` that the controller has not taken yet, with room for twice the largest change.
+        n_edges: number of these edges.
+        first, until: the samples to run.
     """
     for k in range(first, until):
         strobe = strobe_of(timing, k)
@@ -63,11 +64,11 @@ def through_pins(controller, state, timing, counts, velocity, edges, n_edges, fi
 
 
 def run_pins(controller, state, timing: Timing, counts: np.ndarray, progress: Callable[[int], None] | None = None):
-    """Take a whole record through a controller's pins: return (velocity words, flags, seconds)."""
+    """Run a whole record through a controller's pins; return (velocity words, flags, seconds)."""
     relative = counts - counts[0]
     velocity = np.zeros(len(counts), np.asarray(state.velocity).dtype)
     edges = room_for(2 * int(np.abs(np.diff(relative)).max()) + 1)
-    # Compiling is not running: a call with nothing to do keeps it out of the time.
+    # A call with no samples compiles the function, outside the measured time.
     through_pins(controller, state, timing, relative, velocity, edges, 0, 0, 0)
     began, n_edges = time.perf_counter(), 0
     chunk = max(1, CHUNK_CLOCKS // timing.clocks_per_sample)
