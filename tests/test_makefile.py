@@ -1,4 +1,4 @@
-"""The Makefile: every task has its line in the help; what the system lacks is named before anything starts."""
+"""The Makefile: every task has its line in the help, and missing system packages are named before anything starts."""
 
 import os
 import re
@@ -17,7 +17,7 @@ PACKAGES = {"python3": "python3", "c++": "g++", "perl": "perl"}
 
 @pytest.fixture
 def tree(tmp_path) -> Path:
-    """The files that make reads, in a folder where nothing was installed."""
+    """Return a folder with the files that make reads, where nothing was installed."""
     folder = tmp_path / "tree"
     folder.mkdir()
     for name in NEEDED:
@@ -32,7 +32,7 @@ def run_by(body: str, path: Path) -> None:
 
 
 def make(tree: Path, *arguments: str, path: str | None = None) -> subprocess.CompletedProcess:
-    # Not a part of the make that runs these tests.
+    # The call must not look like a part of the make that runs these tests.
     environ = {name: value for name, value in os.environ.items() if not name.startswith(("MAKE", "MFLAGS", "PYTHON"))}
     environ |= {"PATH": path or os.environ["PATH"], "LC_ALL": "C"}
     return subprocess.run([MAKE, *arguments], cwd=tree, env=environ, capture_output=True, text=True, check=False)

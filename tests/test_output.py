@@ -22,7 +22,7 @@ def make(name: str) -> Output:
 
 
 def stimulus(d: output.Design, samples: int):
-    """Yield (force, fault, force limit, slew limit): extremes in long and short runs, then random ones."""
+    """Yield (force, fault, force limit, slew limit): extremes in long and short runs, then random values."""
     top, limits = d.force.max, [word.format.max for word in d.words]
     for limit in (0, 1, limits[0]):
         for slew in (0, 1, limits[1] // 3, limits[1]):
@@ -69,7 +69,7 @@ async def enable_low_is_zero_at_the_next_clock(dut):
     drive = bench.reader("drive")
     for clock in range(output.LATENCY + 2):
         bench.drive(enable=1)
-        # Actuate until the drive is there, then let one strobe go into the pipeline and pull enable beneath it.
+        # Actuate until the drive is there, then let one strobe enter the pipeline and pull enable low behind it.
         for _ in range(d.decimation):
             await bench.transact("strobe", "valid", force=5, **words)
         assert drive() == 5
@@ -82,11 +82,11 @@ async def enable_low_is_zero_at_the_next_clock(dut):
         bench.drive(enable=1, strobe=0)
         for _ in range(output.LATENCY + 3):
             await RisingEdge(dut.clk)
-            # The actuation that enable was pulled beneath does not bring the old force back.
+            # The actuation that was in the pipeline does not bring the old force back.
             assert drive() == 0
         bench.drive(enable=0)
         await ClockCycles(dut.clk, 2)
-        # Get back to phase 0, with enable low throughout.
+        # Go back to phase 0, with enable low throughout.
         while True:
             await bench.transact("strobe", "valid", force=5, **words)
             assert drive() == 0
@@ -117,7 +117,7 @@ def test_the_drive_never_exceeds_its_limits(name):
         else:
             limit = min(limit, d.force_limit)  # noqa: PLW2901
             assert abs(value) <= limit
-            # The slew limit holds unless the force limit, which comes last, was drawn in beneath the drive.
+            # The slew limit holds unless the force limit, which is applied last, was lowered below the drive.
             assert abs(value - before) <= slew or abs(value) == limit
         before = value
 

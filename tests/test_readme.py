@@ -1,4 +1,4 @@
-"""The README stays short; and it and every page name only what is there: files, tasks of make, commands, pages."""
+"""The README stays short, and it and every page name only existing files, tasks of make, commands and pages."""
 
 import re
 
@@ -7,7 +7,7 @@ import pytest
 from stimuli.pages import PAGES, ROOT, command_line, slugs, text_of
 
 README_LINES = 150
-# Where a page says NAME or PATH, the reader puts in a name.
+# NAME and PATH in a page stand for names that the reader fills in.
 PLACEHOLDER = re.compile(r"NAME|PATH|CHOICE")
 
 

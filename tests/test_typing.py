@@ -1,4 +1,4 @@
-"""The model's public API as a type checker sees it: what is right passes, what is wrong is told, nothing is `Any`."""
+"""The model's public API under a type checker: correct use passes, wrong use is reported, and nothing is `Any`."""
 
 import re
 import subprocess
@@ -77,7 +77,7 @@ def client(spec: AxisSpec, axis: Axis) -> None:
 
 @pytest.fixture(scope="module")
 def said(tmp_path_factory) -> dict[str, list[tuple[int, str, str]]]:
-    """What the type checker says of each file: line, error or note, and the rest."""
+    """Return the type checker's messages on every file: line, error or note, and text."""
     folder = tmp_path_factory.mktemp("typing")
     (folder / "hardwall").mkdir()
     (folder / "hardwall" / "model").symlink_to(ROOT / "model", target_is_directory=True)
