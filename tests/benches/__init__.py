@@ -1,8 +1,8 @@
-"""The test bench: Amaranth components under cocotb on Verilator, held to a model word for word.
+"""The test bench: Amaranth components under cocotb on Verilator, compared with a model word for word.
 
-Two halves in one test file, which is read twice. Under pytest, `simulate` builds the hardware and starts the simulator.
+A test file has two halves and is read twice. Under pytest, `simulate` builds the hardware and starts the simulator.
 There, cocotb runs the tests of the same file: `Bench` clocks, resets and drives the component, its `campaign` puts rows
-of inputs through it, and `check` holds what came out against the model with `==`.
+of inputs through it, and `check` compares the outputs with the model's by `==`.
 
 `HARDWALL_SEED` (default 1) is the seed of everything random; `HARDWALL_SAMPLES` (default 100000) is the length of the
 random campaigns.

@@ -14,11 +14,11 @@ from .packing import Record
 
 PERIOD_NS = 10
 PATIENCE = 10_000
-"""Clocks after which an answer is given up."""
+"""Clocks after which the bench stops waiting for an answer."""
 
 
 class Monitor(Record):
-    """Records at every clock edge at which `strobe` is high, as the component itself sees its ports there."""
+    """Records of the ports at every clock edge where `strobe` is high, as the component itself sees them there."""
 
     def __init__(self, bench: "Bench", strobe: str, names: tuple[str, ...]):
         super().__init__(names, bench.packing, [], [])
@@ -68,7 +68,7 @@ class Bench:
         return round(get_sim_time("ns")) // PERIOD_NS
 
     def reader(self, name: str) -> Callable[[], int]:
-        """Return a function that reads a port as the integer it stands for."""
+        """Return a function that reads a port as the integer that it represents."""
         handle, signed = getattr(self.dut, name), self.packing.shapes[name].signed
 
         def read() -> int:
@@ -77,7 +77,7 @@ class Bench:
         return read
 
     def drive(self, **values: int) -> None:
-        """Set inputs. A negative value is taken modulo the width, as two's complement."""
+        """Set inputs; a negative value is taken modulo the width, as two's complement."""
         for name, value in values.items():
             handle = getattr(self.dut, name)
             handle.value = int(value) & ((1 << len(handle)) - 1)
@@ -91,7 +91,7 @@ class Bench:
         """Drive `values` with a one-clock `strobe` and wait for `done` to rise; with `idle`, until the clock after it.
 
         Raises:
-            AssertionError: if `done` does not rise, as that of a component of latency 0 does not after the strobe.
+            AssertionError: if `done` does not rise; with a latency of 0 it never rises after the strobe.
         """
         self.drive(**values, **{strobe: 1})
         await RisingEdge(self.dut.clk)
@@ -112,27 +112,27 @@ class Bench:
         latency: int | None = None,
         every: int | None = None,
     ) -> tuple[Record, Record]:
-        """Put `rows` of `inputs` through, the next strobe with the last one's answer or a clock later, at random.
+        """Put `rows` of `inputs` through; every strobe comes with the previous answer or a clock later, at random.
 
-        The other inputs stay as they were driven. Much quicker than `transact` between two monitors: Python has a turn
-        every 16 samples.
+        The other inputs stay as they were driven. This is much quicker than `transact` between two monitors, because
+        Python runs only once in 16 samples.
 
         Args:
-            strobe: the input that is high for one clock with each row.
-            done: the output that is high for one clock with each answer.
+            strobe: the input that is high for one clock with every row.
+            done: the output that is high for one clock with every answer.
             inputs: the names of a row's values.
-            outputs: the names of what is recorded at each answer.
-            rows: what to put through.
+            outputs: the names of the ports that are recorded at every answer.
+            rows: the rows of input values.
             latency: the most clocks from a strobe to its answer; default: `latency` of the component. With 0 the answer
                 comes in the strobe's own clock.
-            every: the least clocks between strobes, less than `latency` for a pipeline; default: `latency`, or 1.
+            every: the fewest clocks between strobes, less than `latency` for a pipeline; default: `latency`, or 1.
 
         Returns:
-            What the ports carried at each strobe, and at each answer.
+            The values of the ports at every strobe, and at every answer.
 
         Raises:
             TypeError: if there is no latency, or it is no int.
-            ValueError: if one of the numbers of clocks is out of its range.
+            ValueError: if a number of clocks is out of its range.
             AssertionError: if an answer is missing or late, or comes without a strobe.
         """
         if latency is None:
@@ -154,5 +154,5 @@ class Bench:
         return taken, given
 
     async def rest(self) -> None:
-        """Let the monitors see what the last transaction brought."""
+        """Wait until the monitors have seen the last transaction."""
         await ClockCycles(self.dut.clk, 2)

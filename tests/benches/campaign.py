@@ -1,4 +1,4 @@
-"""Many rows through a component, by batches that the harness's sequencer runs, and what came of each."""
+"""Campaigns: many rows put through a component, in batches that the harness's sequencer runs, and their answers."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -13,15 +13,15 @@ from .verdict import Wrong
 
 
 class Campaign:
-    """A strobe, its answer and their pace; and the records of what was taken and given so far.
+    """A strobe, its answer and their pace, and the records of the inputs taken and the outputs given so far.
 
     Attributes:
-        taken: what the ports carried at every strobe.
-        given: what they carried at every answer.
+        taken: the values of the ports at every strobe.
+        given: the values of the ports at every answer.
 
     Raises:
         TypeError: if `latency` or `every` is no int.
-        ValueError: if one is out of its range.
+        ValueError: if `latency` or `every` is out of its range.
     """
 
     def __init__(self, strobe: str, done: str, taken: Record, given: Record, latency: int, every: int):
@@ -36,7 +36,7 @@ class Campaign:
         self._waiting: deque[int] = deque()
 
     async def run(self, dut, inputs: Packing, seen: Packing, words: Iterable[int], clock_number) -> None:
-        """Put words of inputs through, one a strobe, and fill the records.
+        """Put words of inputs through, one word a strobe, and fill the records.
 
         Raises:
             AssertionError: if an answer is missing or late, or comes without a strobe.
@@ -55,7 +55,7 @@ class Campaign:
             self._sort(seen, start, int(dut.bench_events.value), int(dut.bench_records.value))
 
     def _batches(self, inputs: Packing, words: Iterable[int]) -> Iterator[tuple[int, int]]:
-        """Yield rows and how many: the next strobe comes with the promised answer or a clock later, at random.
+        """Yield batches of rows and their lengths: a strobe comes with the promised answer or a clock later, at random.
 
         The last row of a batch waits until its answer is overdue.
         """
@@ -69,7 +69,7 @@ class Campaign:
             yield rows, len(batch)
 
     def _sort(self, seen: Packing, start: int, events: int, records: int) -> None:
-        """Sort the events of a batch into what was taken and what was given."""
+        """Sort the events of a batch into the records of inputs taken and outputs given."""
         event, kept = event_of(seen), min(events, 2 * BATCH)
         is_strobe, is_done, mask = seen.bit(self.strobe), seen.bit(self.done), (1 << event.width) - 1
         words = [records >> place * event.width & mask for place in range(kept)]
@@ -89,7 +89,7 @@ class Campaign:
             raise Wrong(len(self.given.clocks), f"{events} clocks with {self.strobe} or {self.done} in {BATCH} samples")
 
     def _check_patience(self, now: int | None) -> None:
-        """Fail if the oldest sample's answer is overdue at clock `now`, after which nothing comes if it is None."""
+        """Fail if the oldest sample's answer is overdue at clock `now`; None is the end of a batch."""
         if not self._waiting or (now is not None and now < self._waiting[0] + self.latency):
             return
         sample = len(self.given.clocks)

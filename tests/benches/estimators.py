@@ -1,4 +1,4 @@
-"""What the test of every velocity estimator does alike: rows of inputs through the model, and through the RTL."""
+"""The steps that every test of a velocity estimator shares: rows of inputs through the model, and through the RTL."""
 
 from collections.abc import Iterable
 
@@ -11,7 +11,7 @@ from hardwall.testing import Bench, check
 
 
 def names(design) -> tuple[str, ...]:
-    """Return what a row holds, in order: what the estimator sees of the decoder, the restart, the run-time words."""
+    """Return the names of a row's values, in order: the decoder's outputs, the restart, the run-time words."""
     return (*(f"seen__{name}" for name in design.inputs), "restart", *(word.name for word in design.words))
 
 
@@ -21,7 +21,7 @@ def reset_words(design) -> list[int]:
 
 
 def model(design, rows: Iterable[tuple[int, ...]], start) -> dict[str, np.ndarray]:
-    """Return velocity and flags for rows as `names`, from the state `start`."""
+    """Return velocity and flags for rows in the order of `names`, from the state `start`."""
     state, out, n_seen = start, [], len(design.inputs)
     params, held = None, None
     for row in rows:
@@ -37,7 +37,7 @@ def model(design, rows: Iterable[tuple[int, ...]], start) -> dict[str, np.ndarra
 
 
 async def follow(dut, component: EstimatorBlock, rows: Iterable[tuple[int, ...]], start) -> dict[str, np.ndarray]:
-    """Put rows through the RTL and hold it to the model, exactly; return what the model made of them."""
+    """Put rows through the RTL, check it against the model exactly, and return the model's outputs."""
     design, bench = component.design, Bench(dut, component)
     await bench.reset()
     inputs, outputs = await bench.campaign("strobe", "valid", names(design), ("velocity", "saturated"), rows)

@@ -1,7 +1,8 @@
-"""What is simulated of a component: its own ports, all of them in one word too, and a sequencer for campaigns.
+"""The simulated top around a component: the component's ports, one word that packs them all, and a sequencer.
 
-A turn of cocotb takes longer than many clocks of Verilator. The sequencer is hardware beside the component: it takes
-a batch of rows at a time, puts them through at their clocks, and keeps what the ports carried where it matters.
+A turn of cocotb takes longer than many clocks of Verilator. The sequencer for campaigns is hardware beside the
+component: it takes a batch of rows at a time, puts them through at their clocks, and keeps the values of the ports at
+strobes and answers.
 """
 
 from pathlib import Path
@@ -21,10 +22,10 @@ SEQUENCER = Path(__file__).with_name("sequencer.v")
 
 
 def ports_of(component: wiring.Component) -> dict[str, tuple[Member, Value]]:
-    """Return the ports of a component by their names in Verilog: member `b` of its member `a` is `a__b`.
+    """Return the ports of a component by their names in Verilog, where member `b` of its member `a` is `a__b`.
 
     Raises:
-        ValueError: if a port has a name that the harness keeps for itself.
+        ValueError: if a port has a name that the harness reserves for its own ports.
     """
     ports = {"__".join(map(str, path)): (member, port) for path, member, port in component.signature.flatten(component)}
     for name in ports:
@@ -45,19 +46,19 @@ def inputs_of(component: wiring.Component) -> Packing:
 
 
 def row_of(inputs: Packing) -> Packing:
-    """Return how the sequencer takes a row: the inputs, and how many clocks later than the next the next row comes."""
+    """Return the layout of a row of the sequencer: the inputs, and the extra clocks until the next row."""
     return Packing({"inputs": unsigned(inputs.width), "spacing": unsigned(SPACING_BITS)})
 
 
 def event_of(seen: Packing) -> Packing:
-    """Return how the sequencer gives an event: what all ports carried, and at which clock of the batch."""
+    """Return the layout of an event of the sequencer: the values of all ports, and the clock in the batch."""
     return Packing({"seen": unsigned(seen.width), "clock": unsigned(32)})
 
 
 class Harness(wiring.Component):
-    """A component with its own ports; `bench_seen`, which carries them all; and those of `sequencer.v` as `bench_*`.
+    """A component with its own ports; `bench_seen`, which carries them all; and ports of `sequencer.v` as `bench_*`.
 
-    While `bench_campaign` is high the sequencer drives the component's inputs, else the ports of their names do.
+    While `bench_campaign` is high the sequencer drives the component's inputs, otherwise the ports of the same names.
     """
 
     def __init__(self, component: wiring.Component):

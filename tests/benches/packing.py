@@ -8,7 +8,7 @@ from amaranth.hdl import Shape
 
 
 class Packing:
-    """How signals lie side by side in one word, the first in its lowest bits; their shapes by name, as `shapes`."""
+    """The layout of signals side by side in one word, the first in its lowest bits; `shapes` has the shapes by name."""
 
     def __init__(self, shapes: dict[str, Shape]):
         self.shapes = shapes
@@ -18,7 +18,7 @@ class Packing:
         self._masks = {name: (1 << width) - 1 for name, width in zip(shapes, widths, strict=True)}
 
     def pack(self, values: dict[str, int]) -> int:
-        """Return the word of values by name; a negative one is taken modulo its width, those left out are 0."""
+        """Return the word for values by name; negative values are taken modulo their width, missing ones are 0."""
         word = 0
         for name, value in values.items():
             word |= (int(value) & self._masks[name]) << self._offsets[name]
@@ -29,14 +29,14 @@ class Packing:
         return 1 << self._offsets[name]
 
     def column(self, name: str, words: Iterable[int]) -> list[int]:
-        """Return one signal of many words."""
+        """Return the values of one signal in many words."""
         offset, shape = self._offsets[name], self.shapes[name]
         mask, sign = self._masks[name], (self._masks[name] + 1 >> 1) * shape.signed
         return [((word >> offset & mask) ^ sign) - sign for word in words]
 
 
 class Record:
-    """What signals carried at some clocks.
+    """The values of signals at some clocks.
 
     Attributes:
         names: the signals, in the order of a row.
@@ -48,13 +48,13 @@ class Record:
         self._packing, self._words = packing, words
 
     def add(self, clock: int, word: int) -> None:
-        """Add what was seen at a clock edge, packed."""
+        """Add the packed values at a clock edge."""
         self.clocks.append(clock)
         self._words.append(word)
 
     @property
     def rows(self) -> list[tuple[int, ...]]:
-        """The signals in the order of `names`, record by record."""
+        """Return the values in the order of `names`, record by record."""
         return list(zip(*(self._packing.column(name, self._words) for name in self.names), strict=True))
 
     def column(self, name: str) -> np.ndarray:

@@ -1,7 +1,7 @@
-"""From pytest into the simulator, and what both sides know of the run: its seed, its length and its parameters.
+"""The way from pytest into the simulator, and what both sides know of the run: its seed, length and parameters.
 
-A test file is read twice. Under pytest `simulate` builds the Verilog of a component, once for its content, and starts
-the simulator, in which cocotb reads the file again and runs the tests that `cocotb.test` marks.
+A test file is read twice. Under pytest, `simulate` builds the Verilog of a component, once for every content, and
+starts the simulator, in which cocotb reads the file again and runs the tests that `cocotb.test` marks.
 """
 
 import json
@@ -21,29 +21,29 @@ from .harness import SEQUENCER, Harness
 SEED = int(os.environ.get("HARDWALL_SEED", "1"))
 """The seed of everything random, from `HARDWALL_SEED`."""
 SAMPLES = int(os.environ.get("HARDWALL_SAMPLES", "100000"))
-"""How many samples a random campaign has, from `HARDWALL_SAMPLES`."""
+"""The number of samples in a random campaign, from `HARDWALL_SAMPLES`."""
 TRACED_SAMPLES = int(traced) if (traced := os.environ.get("HARDWALL_TRACED_SAMPLES")) else None
-"""Where a campaign that failed is to end, when it is run again to be traced."""
+"""The sample at which a failed campaign ends when it is run again to be traced."""
 CAMPAIGN = {"timeout_time": SAMPLES + 20_000, "timeout_unit": "us"}
-"""For `cocotb.test` of a campaign: hardware that stops answering fails, instead of hanging, at 100 clocks a sample."""
+"""The timeout of a campaign's `cocotb.test`, 100 clocks a sample: hardware that stops answering fails, not hangs."""
 
 
 def simulate(test_file: str, make: Callable, *, checks: str | None = None, **parameters) -> None:
     """Run the cocotb tests of `test_file` on the hardware that `make(**parameters)` returns.
 
-    What is built goes to `HARDWALL_BUILD`, else to `build/` of the checkout that the test is part of, else to `build/`
-    of the working directory. A failing test is run again with the same seed, up to the sample that is wrong, and
-    leaves its waveform there.
+    Built files go to `HARDWALL_BUILD`, else to `build/` of the checkout that contains the test, else to `build/` of the
+    working directory. A failing test is run again with the same seed, up to the sample that is wrong, and leaves its
+    waveform there.
 
     Args:
         test_file: the caller's `__file__`.
-        make: returns the component; the simulator's side may call it again.
-        checks: a regular expression of the names to run; default: all of the file.
-        parameters: JSON values, for `make`; the simulator's side finds them by the function `parameters`.
+        make: the function that returns the component; the simulator's side may call it again.
+        checks: a regular expression for the names of the tests to run; default: all tests of the file.
+        parameters: JSON values for `make`; the simulator's side reads them by the function `parameters`.
 
     Raises:
-        RuntimeError: if a test fails or none runs; it says what was wrong, the seed, the waveform, and how to run the
-            test again.
+        RuntimeError: if a test fails or none runs; the message gives the fault, the seed, the waveform, and the
+            command that runs the test again.
     """
     file, component = Path(test_file).absolute(), make(**parameters)
     name = type(component).__module__.rsplit(".", 1)[-1]
@@ -65,13 +65,13 @@ def simulate(test_file: str, make: Callable, *, checks: str | None = None, **par
 
 
 def _build_dir(file: Path) -> Path:
-    """Return where what is built for a test file goes."""
+    """Return the folder for the built files of a test file."""
     ours = build_dir()
     return ours if os.environ.get("HARDWALL_BUILD") or file.is_relative_to(ours.parent) else Path("build").absolute()
 
 
 def _again() -> str:
-    """Return how the test that pytest is in is run again, if it is in one."""
+    """Return the command that runs the current pytest test again, or nothing outside a test."""
     test = os.environ.get("PYTEST_CURRENT_TEST", "").rpartition(" ")[0]
     if not test:
         return ""

@@ -1,4 +1,4 @@
-"""The verdict: what the hardware gave against what the model gives, word for word."""
+"""The verdict: the hardware's outputs against the model's, word for word."""
 
 import os
 from pathlib import Path
@@ -9,7 +9,7 @@ from .packing import Record
 
 
 class Wrong(AssertionError):
-    """Hardware that is wrong at a sample; the number is left for whoever runs it again to look at that sample."""
+    """Hardware that is wrong at a sample; the sample's number is kept, so that a second run can trace that sample."""
 
     def __init__(self, sample: int, message: str):
         super().__init__(message)
@@ -18,16 +18,16 @@ class Wrong(AssertionError):
 
 
 def check(inputs: Record, outputs: Record, expected: dict[str, np.ndarray], latency: int | None = None) -> None:
-    """Hold every recorded output against the model's, exactly; fail on a lost, an extra or no output at all.
+    """Compare every recorded output with the model's, exactly; fail on a lost or an extra output, or on none at all.
 
     Args:
-        inputs: what the hardware took.
-        outputs: what it gave.
-        expected: what the model made of `inputs`, by the names of `outputs`.
-        latency: every output must also come so many clocks after its input.
+        inputs: the inputs that the hardware took.
+        outputs: the outputs that it gave.
+        expected: the model's outputs for `inputs`, by the names of `outputs`.
+        latency: the number of clocks after its input at which every output must come; default: not checked.
 
     Raises:
-        AssertionError: if any of it does not hold.
+        AssertionError: if an output differs, is missing, is extra, or comes at another clock.
     """
     assert len(outputs.clocks) > 0, "nothing was compared"
     assert len(inputs.clocks) == len(outputs.clocks), f"{len(inputs.clocks)} inputs but {len(outputs.clocks)} outputs"
