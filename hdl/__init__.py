@@ -1,1 +1,1 @@
-"""What is synthesised: Amaranth components, each held bit for bit to its twin of the same name in `hardwall.model`."""
+"""The hardware: Amaranth components, every one equal bit for bit to its twin of the same name in `hardwall.model`."""

@@ -1,4 +1,4 @@
-"""One axis, pins to force: the blocks in a row, a sample strobe, and parameters that change together."""
+"""One axis, from pins to force: the chain of blocks, a sample strobe, and parameters that change together."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal, signed
 from amaranth.lib import wiring
@@ -15,21 +15,21 @@ from .wall import Wall
 
 
 class Axis(wiring.Component):
-    """Encoder pins in, drive out: decoder, velocity estimator, wall, output stage.
+    """An axis from encoder pins to drive: decoder, velocity estimator, wall and output stage.
 
     Every `spec.clocks_per_sample` clocks a strobe takes the count; `latency` clocks later the drive has changed.
 
-    Parameters at run time: the words of `spec.design.words` are inputs. Pulse `commit` and hold them until
-    `commit_pending` falls: at the next strobe all take effect together, from that sample on. After reset each has its
-    reset word (the wall off).
+    Parameters at run time: the words of `spec.design.words` are inputs. Pulse `commit` and hold the words until
+    `commit_pending` falls: at the next strobe all words take effect together, from that sample on. After reset every
+    parameter has its reset word (the wall is off).
 
-    Faults: an illegal transition or an encoder too fast for the decoder makes the position a guess, so the drive is
-    zero from the next sample on until `clear_flags`. `drive_enable` low makes it zero at the next clock. Saturation in
-    the path raises sticky `flags` and otherwise does what its block says.
+    Faults: after an illegal transition, or if the encoder is too fast for the decoder, the position is unknown, so the
+    drive is zero from the next sample on until `clear_flags`. `drive_enable` low makes the drive zero at the next
+    clock. Saturation in the path raises sticky `flags` and otherwise acts as the block's docstring says.
 
-    Latency: `latency` clocks from the strobe to the changed drive; from a pin to the strobe, the decoder's.
+    Latency: `latency` clocks from the strobe to the changed drive; the decoder's latency from a pin to the strobe.
 
-    Rounding and overflow: those of the blocks.
+    Rounding and overflow: as in the blocks.
 
     Parameters
     ----------
@@ -41,27 +41,28 @@ class Axis(wiring.Component):
     encoder_a, encoder_b, encoder_z : In(1)
         Asynchronous pins.
     drive_enable, clear_flags, commit : In(1)
-        As above; the last two are pulses.
+        As above; `clear_flags` and `commit` are pulses.
     preload, preload_count : In
-        The pulse sets the count; the estimator starts afresh at the next sample.
+        A pulse of `preload` sets the count to `preload_count`; the estimator starts afresh at the next sample.
     index_arm : In(1)
         Pulse: latch the count at the next index edge.
-    one input a word of `spec.design.words` : In
+    one input for each word of `spec.design.words` : In
         Run-time parameters.
     drive : Out(signed)
         Force on the handle, force LSB.
     sampled, actuated : Out(1)
-        High for one clock with the changed drive: after a sample; after one at which the drive follows the force.
+        High for one clock with the changed drive: `sampled` after every sample, `actuated` after a sample at which the
+        drive follows the force.
     count, velocity, wall_force : Out(signed)
-        Live count; the last sample's velocity and wall force.
+        The live count; the last sample's velocity and wall force.
     flags : Out
-        Sticky, bits as `spec.design.flags`; the encoder's as the samples saw them.
+        Sticky flags, bits as in `spec.design.flags`; the encoder's flags as the samples saw them.
     illegal_count : Out
         Illegal transitions since the last clear; saturates.
     index_count, index_armed, index_latched : Out
         The index latch.
     stamp, stamp_a_rise, stamp_b_rise, stamp_a_fall, stamp_b_fall : Out
-        The clock's number, and that of the last edge of each kind.
+        The number of this clock, and the stamp of the last edge of every kind.
     commit_pending : Out(1)
         Parameters wait for the next strobe.
 
@@ -131,7 +132,7 @@ class Axis(wiring.Component):
         m.d.comb += strobe.eq(divider == spec.clocks_per_sample - 1)
         m.d.sync += divider.eq(Mux(strobe, 0, divider + 1))
 
-        # Parameters wait at the inputs and take effect together, at a strobe.
+        # Parameters wait at the inputs and take effect together at a strobe.
         active = {
             word.name: Signal(shape(word.format), init=word.reset, name=f"active_{word.name}") for word in design.words
         }
@@ -145,7 +146,7 @@ class Axis(wiring.Component):
         ):
             m.d.comb += [getattr(block, word.name).eq(active[word.name]) for word in words]
 
-        # A preloaded count is no motion.
+        # A preload changes the count without a motion.
         restart = Signal()
         m.d.sync += restart.eq(self.preload | (restart & ~strobe))
 
@@ -191,7 +192,7 @@ class Axis(wiring.Component):
             self.stamp_b_fall.eq(decoder.seen.stamp_b_fall),
         ]
 
-        # A flag shows with the sample that raised it, and stays.
+        # A flag is visible from the sample that raised it until it is cleared.
         raised = Cat(
             Mux(strobe, Cat(decoder.illegal, decoder.overspeed), 0),
             Mux(estimator.valid, estimator.saturated, 0),

@@ -1,4 +1,4 @@
-"""A component whose formats and latency are those of its twin in `hardwall.model`."""
+"""The base class of components that take their formats and latency from their twin in `hardwall.model`."""
 
 from abc import abstractmethod
 
@@ -7,14 +7,14 @@ from amaranth.lib.wiring import Member
 
 
 class Block(wiring.Component):
-    """A component whose formats and latency come from its twin's `Design`.
+    """A component that takes its formats and latency from its twin's `Design`.
 
-    A subclass names that class as `design_class` and says by `members` what its ports are.
+    A subclass gives that class as `design_class` and its ports by `members`.
 
     Raises
     ------
     TypeError
-        If `design` is not of that class.
+        If `design` is not a `design_class`.
     """
 
     def __init__(self, design):
@@ -31,7 +31,7 @@ class Block(wiring.Component):
 
     @property
     def design(self):
-        """The design that this is the hardware of."""
+        """The design of which this component is the hardware."""
         return self._design
 
     @property

@@ -1,6 +1,6 @@
-"""An axis for real packages: few pins, parameters and telemetry through a serial port, a drive that a filter can take.
+"""An axis for real packages: few pins, a serial port for parameters and telemetry, and a drive that a filter can take.
 
-A `Frame` of the serial port goes each way: `Board.commands` to the axis, `Board.telemetry` from it.
+The serial port has a `Frame` for each direction: `Board.commands` to the axis, `Board.telemetry` from it.
 """
 
 from amaranth.hdl import Cat, ClockDomain, Const, Module, Mux, Shape, Signal, Value
@@ -14,7 +14,7 @@ from .axis import Axis
 from .frame import BYTE, Frame
 
 PULSES = ("commit", "clear_flags", "preload", "index_arm")
-"""What a frame can do besides being read; the first bits of it."""
+"""The pulses that a frame can give to the axis: the first bits of the frame."""
 TELEMETRY = (
     "drive",
     "count",
@@ -37,32 +37,33 @@ class Board(wiring.Component):
     """One axis behind a dozen pins.
 
     Serial port: an SPI device, mode 0, most significant bit first. One frame of `frame_bits`, a whole number of bytes,
-    goes each way. While `scan_select_n` is high the shift register follows the telemetry; its fall freezes that
-    moment, and every rise of `scan_clock` then gives one bit out and takes one in. When `scan_select_n` rises after
-    exactly a frame whose last bit is 0, the pulses whose bits are set in it are given to the axis, all at one clock,
-    with the words that came with them: a `commit` makes the axis take every parameter at its next sample. After any
-    other frame, or number of bits, nothing happens: so one of zeros, one broken off and a line stuck high only read.
+    goes in each direction. While `scan_select_n` is high the shift register follows the telemetry; its fall freezes
+    the telemetry, and every rise of `scan_clock` then shifts one bit out and one bit in. When `scan_select_n` rises
+    after exactly one frame whose last bit is 0, the pulses whose bits are set in the frame go to the axis, all at one
+    clock, with the words of the same frame: a `commit` makes the axis take every parameter at its next sample. After
+    any other frame, or any other number of bits, nothing happens: a frame of zeros, an incomplete frame and a line
+    stuck high only read telemetry.
 
-    While a commit waits for its sample the register holds the words, deaf: a frame begun then is no frame, its
-    answer is not telemetry, and nothing comes of it. So a host leaves a sample period between frames.
+    While a commit waits for its sample the register holds the words and ignores the port: a frame begun then is not
+    taken, its answer is not telemetry, and it has no effect. So a host leaves a sample period between frames.
 
-    Every level of `scan_clock` and `scan_select_n` must last 3 clocks, and `scan_in` be stable from a clock before the
-    rise of `scan_clock` to 2 after it; `scan_out` follows that rise by 2 to 4 clocks. So the serial clock may have up
-    to a sixth of the clock's rate.
+    Every level of `scan_clock` and `scan_select_n` must last 3 clocks, and `scan_in` must be stable from 1 clock before
+    the rise of `scan_clock` to 2 clocks after it; `scan_out` follows that rise by 2 to 4 clocks. So the serial clock
+    may run at up to a sixth of the clock's rate.
 
-    Drive: first-order sigma-delta of the drive word, sign and magnitude. With N = `drive_bits`, per clock,
+    Drive: first-order sigma-delta modulation of the drive word, as sign and magnitude. With N = `drive_bits`, per clock
 
         sum <- sum mod 2**N + |drive|        drive_pdm = (sum >= 2**N)
 
-    so the density of ones is exactly |drive| / 2**N: over 2**N clocks of a steady drive, |drive| ones.
+    so the density of ones is exactly |drive| / 2**N: 2**N clocks of a steady drive have |drive| ones.
 
     Latency: `latency` clocks from the sample strobe to the first pulse that the changed drive makes. `drive_enable` low
     makes `drive_pdm` low at once, through a gate that needs no clock, and the drive zero `enable_latency` clocks later.
 
-    Rounding and overflow: none; what a pulse did not carry yet stays in the sum, less than one pulse, also through a
-    change of sign. The axis limits the drive to less than 2**N.
+    Rounding and overflow: none; the remainder that no pulse has carried yet, less than one pulse, stays in the sum,
+    also when the sign changes. The axis limits the drive to less than 2**N.
 
-    Reset: `rst` resets all but the synchronisers, 2 to 3 clocks later; so does power-up.
+    Reset: `rst` resets everything but the synchronisers, 2 to 3 clocks later; power-up does the same.
 
     Parameters
     ----------
@@ -72,19 +73,19 @@ class Board(wiring.Component):
     Members
     -------
     clk : In(1)
-        Clock, of `spec.clock_hz`.
+        Clock of `spec.clock_hz`.
     rst : In(1)
         Asynchronous pin; resets while high.
     encoder_a, encoder_b, encoder_z : In(1)
         Asynchronous pins.
     drive_enable : In(1)
-        Asynchronous pin; low: no drive. Must read low when nothing is connected.
+        Asynchronous pin; low turns the drive off. It must read low when nothing is connected.
     scan_select_n, scan_clock, scan_in : In(1)
         Asynchronous pins of the serial port.
     scan_out : Out(1)
         The serial port's answer.
     drive_pdm : Out(1)
-        Pulses, of density |drive| / 2**N.
+        Pulses of density |drive| / 2**N.
     drive_sign : Out(1)
         1: the drive is negative.
 
@@ -131,27 +132,27 @@ class Board(wiring.Component):
 
     @property
     def enable_latency(self) -> int:
-        """Clock edges from the first that sees `drive_enable` low to the drive of zero, both included."""
+        """Clock edges from the first that sees `drive_enable` low to the one that zeroes the drive, both included."""
         return 3
 
     @property
     def drive_bits(self) -> int:
-        """Bits of the drive's magnitude, N above: those of its largest limit."""
+        """Bits of the drive's magnitude (N above), which are the bits of its largest limit."""
         return self._spec.force.width - 2
 
     @property
     def commands(self) -> Frame:
-        """A frame to the axis."""
+        """The frame to the axis."""
         return self._commands
 
     @property
     def telemetry(self) -> Frame:
-        """A frame from the axis."""
+        """The frame from the axis."""
         return self._telemetry
 
     @property
     def frame_bits(self) -> int:
-        """Bits of a frame, each way: whole bytes, of which the last bit is unused."""
+        """Bits of a frame in either direction: whole bytes, whose last bit is unused."""
         return self._commands.bits
 
     def elaborate(self, platform):
@@ -177,7 +178,7 @@ class Board(wiring.Component):
             axis.drive_enable.eq(enable),
         ]
 
-        # The first field of a frame is at the top of the register, whence it leaves.
+        # The first field of a frame is at the top of the register, where bits leave it.
         frame = Signal(self.frame_bits)
         taken = Signal(range(self.frame_bits + 2))
         select_n_before, clock_before = Signal(init=1), Signal()
@@ -188,13 +189,13 @@ class Board(wiring.Component):
             given.eq(select_n & ~select_n_before & (taken == self.frame_bits) & ~frame[0]),
         ]
         with m.If(given):
-            # Once given, a frame is none any more.
+            # A frame acts only once: the number of bits is now one that no frame has.
             m.d.sync += taken.eq(self.frame_bits + 1)
         with m.Elif(~axis.commit_pending):
             with m.If(select_n & select_n_before):
                 m.d.sync += [frame.eq(_packed([getattr(axis, name) for name in TELEMETRY], len(frame))), taken.eq(0)]
             with m.Elif(~select_n & clock & ~clock_before):
-                # Beyond a frame the number of bits stays one more.
+                # Beyond a frame the number of bits stays at a frame's plus one.
                 m.d.sync += [frame.eq(Cat(bit, frame)), taken.eq(Mux(taken > self.frame_bits, taken, taken + 1))]
         m.d.comb += self.scan_out.eq(frame[-1])
 
@@ -202,7 +203,7 @@ class Board(wiring.Component):
             field = frame[low : low + shape.width]
             m.d.comb += getattr(axis, name).eq(field & given if name in PULSES else field)
 
-        # The axis limits the drive, so its magnitude has the bits of the limit.
+        # The axis limits the drive, so its magnitude needs only the bits of the limit.
         total = Signal(self.drive_bits + 1)
         magnitude = Signal(self.drive_bits)
         negative = Signal()
@@ -217,6 +218,6 @@ class Board(wiring.Component):
 
 
 def _packed(fields: list[Value], bits: int) -> Value:
-    """Return the fields in one word of so many bits, the first at the top, zeros below the last."""
+    """Return the fields in one word of `bits` bits, the first field at the top and zeros below the last."""
     used = sum(map(len, fields))
     return Cat(Const(0, bits - used), *reversed(fields))

@@ -1,10 +1,10 @@
-"""Readable Verilog of a component, and the files that describe an axis to whoever instantiates it."""
+"""Readable Verilog of a component, and the files that a user needs to instantiate an axis."""
 
 import dataclasses
 import os
 from pathlib import Path
 
-# The Yosys that ships with Amaranth as a wheel: the same version, and so the same text, on every machine.
+# Use the Yosys wheel that comes with Amaranth: the same version, and so the same text, on every machine.
 os.environ.setdefault("AMARANTH_USE_YOSYS", "builtin")
 
 from amaranth.back import verilog
@@ -18,15 +18,15 @@ from .ports import frame_table, port_table
 
 
 def to_verilog(component: wiring.Component, name: str) -> str:
-    """Return Verilog of `component` as module `name`, with ports `clk` and `rst` beside its members.
+    """Return the Verilog of `component` as module `name`, with ports `clk` and `rst` besides its members.
 
-    Source attributes are left out, so that the text depends on the design alone and can be cached by its content.
+    Source attributes are left out, so that the text depends only on the design and can be cached by its content.
     """
     return verilog.convert(component, name=name, emit_src=False, strip_internal_attrs=True)
 
 
 def _facts(spec: AxisSpec) -> list[str]:
-    """Return the fields of the spec, one line each, with the gains that it stands for."""
+    """Return the fields of the spec, one line each, with the gains that are in use."""
     fields = {field.name: getattr(spec, field.name) for field in dataclasses.fields(spec)}
     fields["gains"] = spec.design.gains
     return [f"{name} = {value!r}" for name, value in fields.items()]
@@ -38,9 +38,9 @@ def _source(component: Axis | Board, name: str, what: str) -> str:
 
 
 def write(spec: AxisSpec, folder: Path) -> tuple[Path, ...]:
-    """Write `axis.v`, `board.v` and `ports.md` into `folder`, which is made if need be; return their paths.
+    """Write `axis.v`, `board.v` and `ports.md` into `folder`, which is made if it is missing; return their paths.
 
-    The text depends on the spec and the versions of this project and its Yosys alone.
+    The text depends only on the spec and on the versions of this project and its Yosys.
 
     Raises:
         TypeError: if `spec` is not an AxisSpec.

@@ -1,4 +1,4 @@
-"""A frame of a serial port: named fields side by side in one word, and what a host does with it."""
+"""A frame of a serial port: named fields side by side in one word, and the host's conversions to and from bytes."""
 
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
@@ -9,7 +9,7 @@ BYTE = 8
 
 
 class Place(NamedTuple):
-    """Where a field lies: its lowest bit in the frame; and how it is read."""
+    """The place of a field: its lowest bit in the frame, and the shape of its value."""
 
     name: str
     low: int
@@ -17,7 +17,7 @@ class Place(NamedTuple):
 
 
 class Frame:
-    """Fields in the order on the wire, the most significant bit of the first one first; unused bits follow the last.
+    """Fields in the order on the wire, most significant bit of the first field first; unused bits come last.
 
     Attributes:
         fields: shapes by name.
@@ -40,10 +40,10 @@ class Frame:
         return self.bits - sum(shape.width for shape in self.fields.values())
 
     def encode(self, values: Mapping[str, int]) -> bytes:
-        """Return the frame of `values`, by name; what is not named is zero.
+        """Return the frame with `values`, by name; a field without a value is zero.
 
         Raises:
-            ValueError: for a name that is no field, or a value that does not fit its field.
+            ValueError: if a name is not a field, or a value does not fit its field.
         """
         for name in values:
             if name not in self.fields:
@@ -60,7 +60,7 @@ class Frame:
         """Return the values of a frame, by name.
 
         Raises:
-            ValueError: if it has not the length of a frame.
+            ValueError: if `frame` does not have the length of a frame.
         """
         if len(frame) * BYTE != self.bits:
             raise ValueError(f"frame must have {self.bits // BYTE} bytes, not {len(frame)!r}")

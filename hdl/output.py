@@ -1,4 +1,4 @@
-"""From the wall's force to the drive."""
+"""The output stage, from the wall's force to the drive."""
 
 from amaranth.hdl import Module, Mux, Signal, signed
 from amaranth.lib.wiring import In, Member, Out
@@ -10,20 +10,20 @@ from .block import Block
 
 
 class Output(Block):
-    """Decimation, slew limit and, last of all, the force limit.
+    """The output stage: decimation, then the slew limit and, last, the force limit.
 
-    Equation, every `design.decimation` strobes, the first included:
+    Equation, every `design.decimation` strobes, beginning with the first:
 
         drive <- force, changed by at most output_slew_limit, then held within +-output_force_limit
 
-    No limit at run time exceeds `design.force_limit`. Between, the drive holds. A strobe with `fault` makes it zero at
-    `valid`. `enable` low makes it zero at the next clock, and it stays so until an actuation has `enable` from strobe
-    to `valid`. Slewing starts again from zero.
+    No force limit at run time exceeds `design.force_limit`. Between actuations the drive holds. A strobe with `fault`
+    makes the drive zero at `valid`. `enable` low makes the drive zero at the next clock, and it stays zero until
+    `enable` is high from strobe to `valid` of an actuation. Slewing starts again from zero.
 
     Latency: `latency` clocks from `strobe` to the changed `drive`, with `valid`; the next `strobe` may come with
     `valid`.
 
-    Rounding and overflow: exact; the limits are defined above and raise `limited`.
+    Rounding and overflow: all values are exact; the limits above raise `limited` when they act.
 
     Parameters
     ----------
@@ -33,21 +33,21 @@ class Output(Block):
     Members
     -------
     strobe : In(1)
-        Takes a force.
+        Pulse: take a force.
     force : In(SQ)
         The wall's force on the handle, force LSB.
     fault : In(1)
         With `strobe`: this sample's drive is zero.
     enable : In(1)
-        Low forces the drive to zero, at once.
+        Low forces the drive to zero at the next clock.
     output_force_limit : In(UQ)
-        Largest drive either way, force LSB; beyond `design.force_limit` it is that.
+        Largest drive in either direction, force LSB; a larger word acts as `design.force_limit`.
     output_slew_limit : In(UQ)
-        Largest change an actuation, force LSB.
+        Largest change of the drive in an actuation, force LSB.
     drive : Out(SQ)
-        What leaves the FPGA, force LSB.
+        The drive that leaves the FPGA, force LSB.
     limited : Out(2)
-        With `valid`: bit 0, the slew limit acted; bit 1, the force limit did.
+        With `valid`: bit 0, the slew limit acted; bit 1, the force limit acted.
     actuated : Out(1)
         With `valid`: this was an actuation.
     valid : Out(1)
@@ -56,7 +56,7 @@ class Output(Block):
     Raises
     ------
     TypeError
-        If `design` is not of that class.
+        If `design` is of another class.
     """
 
     design_class = Design
@@ -91,7 +91,7 @@ class Output(Block):
             """Return whether the value is above bound, and whether it is below -bound."""
             return value > bound, value + bound < 0
 
-        # Comparisons and sums side by side: either alone is a carry chain.
+        # The comparisons and the sums work in parallel: either alone is a carry chain.
         rises, falls = outside(change, slew)
         above, below = outside(slewed, limit)
 

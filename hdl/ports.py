@@ -1,4 +1,4 @@
-"""Tables of the ports of a component's Verilog, and of the frames of a board's serial port, in Markdown."""
+"""Markdown tables of the ports of a component's Verilog, and of the frames of a board's serial port."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -51,11 +51,11 @@ MEANINGS = {
     "drive_pdm": "pulses; their density is the magnitude of the drive",
     "drive_sign": "1: the drive is negative",
 }
-"""What each port is; a run-time word says it itself."""
+"""The meaning of every port; a run-time word has its own text."""
 
 
 class Quantity(NamedTuple):
-    """How a port's word is read."""
+    """The quantity that a port's word stands for."""
 
     format: Format
     si_per_unit: float
@@ -64,7 +64,7 @@ class Quantity(NamedTuple):
 
 
 def _quantities(spec: AxisSpec) -> dict[str, Quantity]:
-    """Return the ports of an axis that carry numbers; the others are bits."""
+    """Return the quantities of an axis's ports that carry numbers, by name; all other ports are bits."""
     count = Quantity(SQ(spec.count_width, 0), spec.count_m, "m")
     force = Quantity(spec.force, spec.force_resolution_n, "N")
     stamp = Quantity(UQ(spec.stamp_width, 0), 1 / spec.clock_hz, "s")

@@ -1,6 +1,6 @@
-"""Quadrature decoder: the pins of an incremental encoder to a count, with clock stamps, index and faults.
+"""Quadrature decoder: from the pins of an incremental encoder to a count, with clock stamps, index and faults.
 
-`Seen` is the bus from it to the estimators.
+`Seen` is the bus from the decoder to the estimators.
 """
 
 from amaranth.hdl import Cat, Module, Mux, Signal, signed
@@ -13,7 +13,7 @@ from hardwall.model.checks import check_int
 
 
 class Seen(wiring.Signature):
-    """What an estimator may use of the decoder, valid at every clock; the twin of `hardwall.model.quadrature.Seen`.
+    """The decoder's outputs that an estimator may use, valid at every clock; twin of `hardwall.model.quadrature.Seen`.
 
     Parameters
     ----------
@@ -27,14 +27,14 @@ class Seen(wiring.Signature):
     stamp : Out(stamp_width)
         Clocks since reset.
     stamp_a_rise, stamp_b_rise, stamp_a_fall, stamp_b_fall : Out(stamp_width)
-        `stamp` in the clock that decoded the last edge of that kind, one before its count is out.
+        `stamp` in the clock that decoded the last edge of that kind, one clock before the edge's count is out.
     edge : Out(2)
-        Kind of the last counted edge: 0 A rose, 1 B rose, 2 A fell, 3 B fell. Its stamp is that of this kind.
+        Kind of the last counted edge: 0 A rose, 1 B rose, 2 A fell, 3 B fell. Its stamp is the stamp of this kind.
     down : Out(1)
         Whether that edge counted -1.
     run : Out(3)
-        Edges in a row that counted that way, at most 4: so many stamps are of this run. 0 before the first edge, and
-        after an illegal change.
+        Successive edges that counted in that direction, at most 4: that many stamps belong to this run. It is 0 before
+        the first edge, and after an illegal change.
     """
 
     def __init__(self, count_width: int, stamp_width: int):
@@ -59,30 +59,31 @@ class Quadrature(wiring.Component):
     Equation: with (A, B) in the order 00, 10, 11, 01, 00 every edge of the filtered pins counts +1, in the other order
     -1; `invert` swaps the signs. So in a cycle of 4 counts A rises at 0, B rises at 1, A falls at 2, B falls at 3.
 
-    Latency: `latency(glitch_clocks)` = glitch_clocks + 4 clock edges, from the first that sees a pin changed to that
-    after which the new count is out, both included: two of the synchroniser, glitch_clocks + 1 of the filter, one
-    that decodes and adds. Throughput: one edge a clock. The three pins are delayed alike.
+    Latency: `latency(glitch_clocks)` = glitch_clocks + 4 clock edges, from the first that sees a pin changed to the
+    one after which the new count is out, both included: two for the synchroniser, glitch_clocks + 1 for the filter and
+    one to decode and add. Throughput: one edge a clock. All three pins have the same delay.
 
-    Filter: a channel takes a new level once it was seen there at glitch_clocks + 1 clocks in a row. A pulse
-    shorter than glitch_clocks clocks never passes, one longer than glitch_clocks + 1 always does, whatever its phase.
-    The limit may change at any time: edges keep their order. If it is lowered while edges of both A and B wait, both
-    pass at once, which is `illegal` like any other such pair.
+    Filter: a channel takes a new level once that level was seen at glitch_clocks + 1 successive clocks. A pulse
+    shorter than glitch_clocks clocks never passes, and a pulse longer than glitch_clocks + 1 clocks always passes,
+    whatever its phase. `glitch_clocks` may change at any time: edges keep their order. If it is lowered while edges of
+    both A and B wait, both pass at once, which is `illegal` like any other such pair.
 
     Speed: the count is exact up to 1 / max(1, (glitch_clocks + 1) / 2) edges a clock (`max_edge_rate` of the model,
-    where all of this is derived, also for edges out of place). Beyond, as long as each level of A and of B lasts a
-    clock or more (below 2 edges a clock), whatever the motion: `fault` is up no later than the first wrong count. At a
-    steady rate of ideal quadrature above 2 edges a clock it is up within `clocks_to_fault` of the model, unless the
-    rate is within the exact range of a multiple of 4, where the samples are those of a slow motion. Two flags do
-    this. `illegal`: A and B changed in one clock; nothing is counted or stamped. `overspeed`: the filter rejected a
-    pulse on A or B during which, its first and last clocks included, the other one had an edge. A lone glitch raises
-    neither; one that meets an edge of the other channel cannot be told from speed, and raises `overspeed`.
+    which derives all of this, also for edges out of place). Beyond that rate, as long as every level of A and of B
+    lasts a clock or more (below 2 edges a clock), `fault` is up no later than the first wrong count, whatever the
+    motion. At a steady rate of ideal quadrature above 2 edges a clock it is up within `clocks_to_fault` of the model,
+    unless the rate is within the exact range of a multiple of 4, where the samples equal those of a slow motion. Two
+    flags make up `fault`. `illegal`: A and B changed in one clock; nothing is counted or stamped. `overspeed`: the
+    filter rejected a pulse on A or B during which, its first and last clocks included, the other channel had an edge.
+    A lone glitch raises neither flag; a glitch that meets an edge of the other channel cannot be distinguished from
+    speed, and raises `overspeed`.
 
-    Start: the pins as sampled by the first clock after a reset are where counting starts, whatever their levels.
+    Start: counting starts from the pins as sampled by the first clock after a reset, whatever their levels.
 
-    Rounding and overflow: none rounds. `count`, `index_count` and the stamps wrap, `illegal_count` saturates.
+    Rounding and overflow: nothing is rounded. `count`, `index_count` and the stamps wrap, `illegal_count` saturates.
 
-    At the same time: an edge decoded in the clock of `preload` is added to `preload_count`, so no motion is lost; an
-    edge decoded in the clock of the index is in `index_count`; `arm` wins over an index, which is then not latched;
+    Coincidences: an edge decoded in the clock of `preload` is added to `preload_count`, so no motion is lost; an edge
+    decoded in the clock of the index is in `index_count`; `arm` has priority over an index, which is then not latched;
     a fault in the clock of `clear` stays.
 
     Parameters
@@ -101,13 +102,13 @@ class Quadrature(wiring.Component):
     a, b, z : In(1)
         Pins, asynchronous.
     glitch_clocks : In(glitch_width)
-        Most clocks at which a pulse may be seen and still be rejected; 0 filters nothing.
+        Largest number of clocks at which a pulse may be seen and still be rejected; 0 filters nothing.
     invert : In(1)
         Reverses the direction of the edges decoded from now on; neither the count nor the stamps change.
     preload : In(1)
         Strobe: sets the count.
     preload_count : In(signed(count_width))
-        Counts.
+        The new count, counts.
     arm : In(1)
         Strobe: arms the index latch.
     clear : In(1)
@@ -117,13 +118,13 @@ class Quadrature(wiring.Component):
     index_count : Out(signed(count_width))
         Position at the first rising edge of Z after `arm`, counts.
     index_armed, index_latched : Out(1)
-        The latch is waiting for that edge; it has seen it.
+        The latch is waiting for that edge; the latch has seen that edge.
     stepped : Out(1)
         High for one clock with the count of a new edge.
     illegal, overspeed : Out(1)
         Sticky flags, see above.
     fault : Out(1)
-        illegal or overspeed.
+        `illegal` or `overspeed`.
     illegal_count : Out(fault_width)
         Illegal changes since `clear`.
 
@@ -134,8 +135,8 @@ class Quadrature(wiring.Component):
     ValueError
         If a width is out of its range.
 
-    Source: decoding by 4 and the filter of consecutive equal samples are those of decoder chips (HCTL-2022 data sheet,
-    Avago, "Digital Noise Filter", fixed there at 3 samples); the flag for what such a filter hides is derived in the
+    Source: decoding by 4 and the filter of consecutive equal samples as in decoder chips (HCTL-2022 data sheet, Avago,
+    "Digital Noise Filter", fixed there at 3 samples); the flag for edges that such a filter hides is derived in the
     model.
     """
 
@@ -193,20 +194,20 @@ class Quadrature(wiring.Component):
         return model.Params(self._count_width, self._stamp_width, self._fault_width)
 
     def latency(self, glitch_clocks: int) -> int:
-        """Clock edges from the first that sees a pin changed to the new `seen.count`, both included."""
+        """Return the clock edges from the first that sees a pin changed to the new `seen.count`, both included."""
         return model.latency(glitch_clocks)
 
     def elaborate(self, platform):
         m = Module()
         seen = self.seen
         pins = Signal(3)
-        # Three independent bits, so they may share a synchroniser. A reset does not reach it: the start outlasts it.
+        # Three independent bits may share a synchroniser. A reset does not clear it, but `starting` lasts long enough.
         m.submodules.synchroniser = FFSynchronizer(Cat(self.a, self.b, self.z), pins)
         starting = Signal(range(model.START.starting + 1), init=model.START.starting)
         running = starting == 0
 
-        # Filter. The comparison with >= of a counter that runs upwards keeps edges in their order when the limit
-        # changes: of two pending channels the one that left first has waited longer, whatever the limit.
+        # Filter. The counters run upwards and are compared by >=, which keeps edges in order when the limit changes:
+        # of two pending channels the first to leave its level has waited longer, whatever the limit.
         level = Signal(3)
         differs = Signal(3)
         accepted = Signal(3)
@@ -225,7 +226,7 @@ class Quadrature(wiring.Component):
             up.eq(level[0] ^ accepted[0] ^ level[1]),
         ]
 
-        # A pulse is rejected when its channel comes back while pending.
+        # A pulse is rejected when its channel returns to its level while pending.
         previous = Signal(2)
         crossed = Signal(2)
         edges = pins[:2] ^ previous
@@ -238,7 +239,7 @@ class Quadrature(wiring.Component):
             starting.eq(Mux(running, 0, (starting - 1)[: len(starting)])),
         ]
 
-        # Decode, a clock after the filter: the comparison there and the addition here each have a clock of their own.
+        # Decode, a clock after the filter: the filter's comparison and this addition have a clock each.
         one = moved[0] ^ moved[1]
         both = moved[0] & moved[1]
         down = Signal()
@@ -265,7 +266,7 @@ class Quadrature(wiring.Component):
             m.d.sync += [
                 seen.edge.eq(Cat(moved[1], ~(moved[:2] & level[:2]).any())),
                 seen.down.eq(down),
-                # Saturates: RUN_MAX is a power of two.
+                # The top bit stops the count: RUN_MAX is a power of two.
                 seen.run.eq(Mux(seen.down == down, seen.run + ~seen.run[-1], 1)),
             ]
         with m.Elif(both):

@@ -12,7 +12,7 @@ from .block import Block
 class Wall(Block):
     """The force of a unilateral spring and damper on the handle.
 
-    Equation, with side = +1 where the wall fills greater positions, else -1:
+    Equation, with side = +1 if the wall fills greater positions, else -1:
 
         depth = side (count - wall_position)
         push  = wall_stiffness depth + wall_damping side velocity     for depth > 0, else 0
@@ -20,11 +20,11 @@ class Wall(Block):
 
     `wall_forbid_pull` holds push at 0 or more.
 
-    Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier serves
+    Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
     both products in turn.
 
     Rounding and overflow: low bits of the velocity beyond `design.coarse` are dropped; the exact sum of the products
-    rounds once, half up, to a force LSB, then saturates at the force format.
+    is rounded once, half up, to a force LSB, then saturates at the force format.
 
     Parameters
     ----------
@@ -34,28 +34,28 @@ class Wall(Block):
     Members
     -------
     strobe : In(1)
-        Takes a sample.
+        Pulse: take a sample.
     count : In(signed)
         Position, counts; may wrap.
     velocity : In(SQ)
-        Counts a sample.
+        Velocity, counts a sample.
     wall_stiffness, wall_damping : In(UQ)
-        Force LSB a count, and a count/sample.
+        Force LSB a count, and force LSB a count/sample.
     wall_position : In(signed)
-        Surface, counts.
+        Surface of the wall, counts.
     wall_left : In(1)
         1: side is -1.
     wall_forbid_pull : In(1)
         1: the wall only pushes.
     force : Out(SQ)
-        On the handle, force LSB; valid from `valid` until the next.
+        Force on the handle, force LSB; constant from one `valid` to the next.
     valid : Out(1)
         High for one clock.
 
     Raises
     ------
     TypeError
-        If `design` is not of that class.
+        If `design` is of another class.
 
     Source: Chawda, Celik, O'Malley, World Haptics 2011, the virtual wall.
     """
@@ -105,14 +105,14 @@ class Wall(Block):
                 m.d.sync += [gain.eq(self.wall_damping), operand.eq(inward)]
                 m.next = "SUM"
             with m.State("SUM"):
-                # With half of a force LSB, so that the sum, rounded down, is the sum rounded half up.
+                # Half a force LSB is added, so that rounding the sum down rounds half up.
                 m.d.sync += spring.eq((product << spring_shift) + half)
                 m.next = "PUSH"
             with m.State("PUSH"):
                 m.d.sync += total.eq(spring + (product << damper_shift))
                 m.next = "FORCE"
             with m.State("FORCE"):
-                # The sign and the limits side by side: either alone is a carry chain.
+                # The sign and the limits are computed in parallel: either alone is a carry chain.
                 top, left = design.force.max, self.wall_left
                 rounded = shift_floor(total, design.push)
                 push = rounded[: design.force.width].as_signed()
@@ -125,6 +125,6 @@ class Wall(Block):
                     self.valid.eq(1),
                 ]
                 m.next = "DEPTH"
-        # The multiplier, registered on both sides: its result is there two clocks after its operands are chosen.
+        # The multiplier has registers on both sides: its result is ready two clocks after its operands are chosen.
         m.d.sync += product.eq(gain * operand)
         return m

@@ -1,4 +1,4 @@
-"""Unsigned integer division, rounded down: one quotient bit a clock, or a few."""
+"""Unsigned integer division, rounded down: one or a few quotient bits a clock."""
 
 from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import wiring
@@ -9,27 +9,28 @@ from hardwall.model.checks import check_int
 
 
 class Divide(wiring.Component):
-    """The exact quotient of two words, rounded down, in as many bits as are wanted.
+    """The exact quotient of two words, rounded down, in a chosen number of bits.
 
-    Equation: quotient = min(floor(dividend / divisor), 2**quotient_width - 1); a division by 0 gives the latter.
+    Equation: quotient = min(floor(dividend / divisor), 2**quotient_width - 1); division by 0 gives
+    2**quotient_width - 1.
 
-    Latency: `latency` clocks from `start` to `done`: one to load, one for each `bits_per_clock` bits of the quotient,
-    however wide the operands. The next `start` may come with `done`.
+    Latency: `latency` clocks from `start` to `done`: one to load, and one for every `bits_per_clock` bits of the
+    quotient, however wide the operands. The next `start` may come with `done`.
 
-    Rounding and overflow: rounds down, exactly; a quotient that does not fit, that of 0 by 0 included, saturates and
-    raises `saturated`.
+    Rounding and overflow: rounds down, exactly; a quotient that does not fit saturates and raises `saturated`, as does
+    0 divided by 0.
 
     Parameters
     ----------
     dividend_width, divisor_width, quotient_width : int
-        Bits, 1 or more each.
+        Bits of each word, 1 or more.
     bits_per_clock : int
-        Of the quotient, 1 or more: each is a subtraction more between two registers.
+        Quotient bits a clock, 1 or more: each adds a subtraction between two registers.
 
     Members
     -------
     start : In(1)
-        Takes `dividend` and `divisor`. A start while busy abandons the quotient in hand.
+        Pulse: take `dividend` and `divisor`. A start while busy abandons the division under way.
     dividend : In(dividend_width)
         Unsigned.
     divisor : In(divisor_width)
@@ -46,9 +47,9 @@ class Divide(wiring.Component):
     TypeError
         If a parameter is not an int.
     ValueError
-        If it is less than 1.
+        If a parameter is less than 1.
 
-    Source: restoring division in base 2, the school's long division.
+    Source: restoring division in base 2, as in long division on paper.
     """
 
     def __init__(self, dividend_width: int, divisor_width: int, quotient_width: int, bits_per_clock: int = 1):
@@ -101,8 +102,8 @@ class Divide(wiring.Component):
         digits = Signal(steps * self.bits_per_clock)
         left = Signal(range(steps + 1))
 
-        # The dividend's low bits leave at the top of the register that the quotient enters; what stands above them is
-        # the first remainder. The quotient fits if what stands above *its* bits is less than the divisor.
+        # The dividend's low bits leave at the top of the register that the quotient enters; the bits above them are
+        # the first remainder. The quotient fits if the dividend's bits above *quotient_width* are less than the divisor.
         rest, shifted = remainder, digits
         for _ in range(self.bits_per_clock):
             taken = Cat(shifted[-1], rest)

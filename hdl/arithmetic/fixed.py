@@ -11,7 +11,7 @@ def shape(fmt: Format) -> Shape:
 
 
 def saturate(value: Value, low: int, high: int) -> Value:
-    """Return `value` held within the constants `low` to `high`; as wide as the wider of the three."""
+    """Return `value` held within the constants `low` to `high`, as wide as the widest of the three."""
     return Mux(value < low, Const(low), Mux(value > high, Const(high), value))
 
 
@@ -26,7 +26,7 @@ def shift_round_half_up(value: Value, shift: int) -> Value:
 
 
 def length_of(value: Value) -> Value:
-    """Return the bits of an unsigned `value`: the least n with value < 2**n."""
+    """Return the number of bits of an unsigned `value`: the least n with value < 2**n."""
     if len(value) == 1:
         return value
     half = len(value) // 2
@@ -34,12 +34,12 @@ def length_of(value: Value) -> Value:
 
 
 def at_most(value: Value, bits: int) -> Value:
-    """Return an unsigned `value`, or the largest word of `bits` where it is more."""
+    """Return an unsigned `value`, or the largest word of `bits` bits if `value` is larger."""
     return Mux(value[bits:].any(), (1 << bits) - 1, value[:bits])
 
 
 def fitted(value: Value, bits: int) -> Value:
-    """Return a signed `value` held within `bits` of two's complement: its top bits tell, no comparison is needed."""
+    """Return a signed `value` held within `bits` of two's complement: its top bits decide, no comparison is needed."""
     if len(value) <= bits:
         return value
     top = value[bits - 1 :]

@@ -1,4 +1,4 @@
-"""Division of a signed by an unsigned integer: the magnitudes' division, and the sign."""
+"""Division of a signed by an unsigned integer: a division of the magnitudes, and the sign."""
 
 from amaranth.hdl import Module, Mux, Signal, signed
 from amaranth.lib import wiring
@@ -11,14 +11,14 @@ from .divide import Divide
 
 
 class SignedDivide(wiring.Component):
-    """The quotient of two integers with fraction bits.
+    """The quotient of two integers, with fraction bits.
 
     Equation: quotient = dividend 2**fraction / divisor.
 
     Latency: `latency` clocks from `start` to `done`. The next `start` may come with `done`.
 
-    Rounding and overflow: rounds toward zero. The quotient must be less than 2**quotient_bits in magnitude: beyond, and
-    by zero, the magnitude saturates.
+    Rounding and overflow: rounds toward zero. A magnitude of 2**quotient_bits or more saturates, as does division by
+    zero.
 
     Parameters
     ----------
@@ -27,18 +27,18 @@ class SignedDivide(wiring.Component):
     divisor_width : int
         Bits of the divisor, 1 or more.
     fraction : int
-        0 or more.
+        Fraction bits of the quotient, 0 or more.
     quotient_bits : int
         Bits of the quotient's magnitude: no fewer than `fraction`, and 1 or more.
 
     Members
     -------
     start : In(1)
-        Takes the operands. A start while busy abandons the quotient in hand.
+        Pulse: take the operands. A start while busy abandons the division under way.
     dividend : In(signed)
     divisor : In(unsigned)
     quotient : Out(signed)
-        Valid from `done` until the next.
+        Valid from one `done` to the next.
     done : Out(1)
         High for one clock.
 
@@ -47,9 +47,9 @@ class SignedDivide(wiring.Component):
     TypeError
         If a parameter is not an int.
     ValueError
-        If it is out of range.
+        If a parameter is out of range.
 
-    Source: that of `Divide`.
+    Source: as of `Divide`.
     """
 
     def __init__(self, dividend_width: int, divisor_width: int, fraction: int, quotient_bits: int):

@@ -13,8 +13,8 @@ class Sqrt(wiring.Component):
 
     Equation: root = floor(sqrt(radicand)).
 
-    Latency: `latency` clocks from `start` to `done`: one to load, one a result bit. The next `start` may come
-    with `done`.
+    Latency: `latency` clocks from `start` to `done`: one to load, and one for every bit of the result. The next `start`
+    may come with `done`.
 
     Rounding and overflow: rounds down, exactly; every radicand has a root that fits.
 
@@ -26,7 +26,7 @@ class Sqrt(wiring.Component):
     Members
     -------
     start : In(1)
-        Takes `radicand`. A start while busy abandons the root in hand.
+        Pulse: take `radicand`. A start while busy abandons the root under way.
     radicand : In(width)
         Unsigned.
     root : Out((width + 1) // 2)
@@ -68,7 +68,7 @@ class Sqrt(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         bits = len(self.root)
-        # The radicand leaves at the top, two bits a clock, into a remainder that never exceeds twice the root so far.
+        # The radicand moves, two bits a clock, from its top into a remainder that never exceeds twice the root so far.
         digits = Signal(2 * bits)
         remainder = Signal(bits + 2)
         left = Signal(range(bits + 1))
