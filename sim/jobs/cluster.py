@@ -1,4 +1,4 @@
-"""Workers for many independent runs: a Dask cluster of this machine's cores, or one that runs already."""
+"""Workers for many independent runs: a Dask cluster of this machine's cores, or a cluster that already runs."""
 
 import logging
 import os
@@ -16,7 +16,7 @@ TIMEOUT_S = 10
 
 
 def dask_setup(worker: Worker) -> None:
-    """Leave interrupts to the process that waits: Dask calls this in each worker of a cluster of ours."""
+    """Leave interrupts to the waiting process; Dask calls this function in every worker of a local cluster."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -24,30 +24,30 @@ def result_of(future: Future) -> dict:
     """Return the result of a job.
 
     Raises:
-        RuntimeError: in a line, if the cluster could not run it.
-        Exception: what the job itself raised.
+        RuntimeError: if the cluster could not run the job; the message is one line.
+        Exception: the exception that the job itself raised.
     """
     try:
         return future.result()
     except (KilledWorker, FutureCancelledError, ModuleNotFoundError) as error:
-        said = " ".join(str(error).split()) or type(error).__name__
-        raise RuntimeError(f"the Dask cluster could not run a hit: {said}") from None
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise RuntimeError(f"the Dask cluster could not run a hit: {reason}") from None
 
 
 @contextmanager
 def client(jobs: int, workers: int | None = None, scheduler: str | None = None) -> Iterator[Client | None]:
-    """Give a client of a cluster; None where one process does it all.
+    """Provide a client of a cluster, or None if this process does all the work.
 
     Args:
-        jobs: how many there are at a time: more workers have nothing to do.
-        workers: processes of a cluster that lasts as long; None for one a core.
-        scheduler: address of a cluster in place of that, e.g. tcp://10.0.0.7:8786. Its workers need this project.
+        jobs: number of jobs at a time; more workers than jobs would have nothing to do.
+        workers: processes of a cluster that lasts as long as the context; None for one a core.
+        scheduler: address of a cluster to use instead, e.g. tcp://10.0.0.7:8786. Its workers need this project.
 
     Raises:
-        RuntimeError: if no cluster answers there, or it has no workers.
-        Interrupted: by the user; the workers are ended.
+        RuntimeError: if no cluster answers at that address, or it has no workers.
+        Interrupted: if the user interrupts; the workers are ended.
     """
-    # This process only waits, so that here an interrupt may be raised: compiled code would not survive it.
+    # This process only waits, so an interrupt may be raised in it; compiled code would not survive one.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         if scheduler is not None:
@@ -64,12 +64,12 @@ def client(jobs: int, workers: int | None = None, scheduler: str | None = None) 
             return
         workers = min(workers or os.cpu_count() or 1, jobs)
         if workers == 1:
-            # Here compiled code runs: an interrupt ends the process, and the store has what was done.
+            # Compiled code runs in this process: an interrupt ends it, and the store has the results so far.
             signal.signal(signal.SIGINT, before)
             yield None
             return
         options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
-        # No limit of memory: a hit needs little, and a share of it on many cores less than Python itself.
+        # No memory limit: a hit needs little, but on many cores a worker's share is less than Python itself needs.
         options |= {"preload": [__name__], "memory_limit": 0}
         with LocalCluster(n_workers=workers, **options) as local, Client(local) as connected:
             yield connected

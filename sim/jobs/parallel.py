@@ -1,4 +1,4 @@
-"""Independent jobs on several processes, their results kept as they come."""
+"""Independent jobs on several processes; every result is kept as soon as it arrives."""
 
 import multiprocessing
 import os
@@ -12,17 +12,17 @@ from .store import Store
 
 
 class Interrupted(RuntimeError):
-    """The user wants no more; what was done is kept."""
+    """The user interrupted the run; the results so far are kept."""
 
 
 def _alone() -> None:
-    """Make a worker the head of its own group, which the parent ends as a whole; leave interrupts to the parent."""
+    """Make a worker the leader of its own process group, which the parent ends as a whole, and ignore interrupts."""
     os.setpgrp()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _end(worker: multiprocessing.Process) -> None:
-    """End a worker, and what it has started."""
+    """End a worker and all processes that it has started."""
     with suppress(ProcessLookupError):
         os.killpg(worker.pid, signal.SIGKILL)
     worker.kill()
@@ -35,22 +35,22 @@ def run(
     workers: int | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> list[Any]:
-    """Return `function(**job)` for each job, in the order of the jobs; what the store has is not computed again.
+    """Return `function(**job)` for every job, in the order of the jobs; results in the store are not computed again.
 
     Args:
-        function: of a module, with JSON values in and out: it is called in other processes.
-        jobs: its keyword arguments.
-        store: where results are kept.
-        workers: processes; None for one a core. With 1, everything runs in this process.
+        function: a module-level function with JSON values in and out, because other processes call it.
+        jobs: keyword arguments of the calls.
+        store: the store of the results.
+        workers: number of processes; None for one a core. With 1, everything runs in this process.
         progress: called with the number of jobs done.
 
     Raises:
-        Exception: of the first job that fails; what others gave until then is kept.
-        Interrupted: by the user; the workers are ended.
+        Exception: the exception of the first job that fails; the results of the others so far are kept.
+        Interrupted: if the user interrupts; the workers are ended.
     """
     jobs = list(jobs)
-    left = [job for index, job in enumerate(jobs) if job not in store and job not in jobs[:index]]
-    done = len(jobs) - len(left)
+    missing = [job for index, job in enumerate(jobs) if job not in store and job not in jobs[:index]]
+    done = len(jobs) - len(missing)
 
     def keep(job: dict, result: Any) -> None:
         nonlocal done
@@ -59,16 +59,16 @@ def run(
         if progress:
             progress(done)
 
-    workers = min(workers or os.cpu_count() or 1, len(left))
+    workers = min(workers or os.cpu_count() or 1, len(missing))
     if workers <= 1:
-        for job in left:
+        for job in missing:
             keep(job, function(**job))
     else:
-        # Spawned: a fork would copy a process that has threads.
+        # The workers are spawned, because a fork would copy a process that has threads.
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(workers, mp_context=context, initializer=_alone) as pool:
-            futures = {pool.submit(function, **job): job for job in left}
-            # This process only waits, so that here an interrupt may be raised: compiled code would not survive it.
+            futures = {pool.submit(function, **job): job for job in missing}
+            # This process only waits, so an interrupt may be raised in it; compiled code would not survive one.
             before = signal.signal(signal.SIGINT, signal.default_int_handler)
             try:
                 for future in as_completed(futures):

@@ -1,10 +1,10 @@
-"""What a study gives: a report for programs, tables and notes for people."""
+"""The result of a study: a report for programs, tables and notes for people."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 NOTHING = 1e-12
-"""Numbers that are less, in any unit of a report, are what rounding leaves of nothing."""
+"""Smaller numbers, in any unit of a report, are zero within rounding."""
 
 
 class Table(NamedTuple):
@@ -15,20 +15,20 @@ class Table(NamedTuple):
 
 
 class Result(Protocol):
-    """What every study gives."""
+    """The interface of every study's result."""
 
     def report(self) -> Any:
-        """Return what is printed as JSON, units in the keys."""
+        """Return the values that are printed as JSON, with units in the keys."""
 
     def tables(self) -> list[Table]:
-        """Return what is printed for people."""
+        """Return the tables that are printed for people."""
 
     def notes(self) -> list[str]:
-        """Return what is to be known beside the tables, a line each."""
+        """Return remarks on the tables, one line for each."""
 
 
 class Summary:
-    """A result whose table is its report, key by key."""
+    """A result with its report as its only table, one row for every key."""
 
     def tables(self) -> list[Table]:
         return [Table({}, [[key, text_of(value)] for key, value in self.report().items()])]
@@ -39,7 +39,7 @@ class Summary:
 
 @dataclass(frozen=True)
 class Values(Summary):
-    """Values by key, which are the report."""
+    """A result with a report of given values, by key."""
 
     values: dict[str, Any]
 
@@ -48,7 +48,7 @@ class Values(Summary):
 
 
 def text_of(value: Any) -> str:
-    """Return a value of a report as people read it: numbers of six digits, lists in a row, a dash for what is not."""
+    """Return a value of a report as text for people: numbers with six digits, lists in a row, a dash for no value."""
     if value is None or value == []:
         return "-"
     if isinstance(value, bool):
@@ -56,10 +56,10 @@ def text_of(value: Any) -> str:
     if isinstance(value, float):
         return f"0 (< {NOTHING:g})" if 0 < abs(value) < NOTHING else f"{value:.6g}"
     if isinstance(value, dict):
-        return ", ".join(f"{key} {text_of(each)}" for key, each in value.items())
+        return ", ".join(f"{key} {text_of(member)}" for key, member in value.items())
     return ", ".join(map(text_of, value)) if isinstance(value, list) else str(value)
 
 
 def table_of(left: tuple[str, ...], right: tuple[str, ...], rows: list[list[str]]) -> Table:
-    """Return a table of columns of words, on the left, and of numbers."""
+    """Return a table with columns of words, aligned left, and columns of numbers, aligned right."""
     return Table(dict.fromkeys(left, "left") | dict.fromkeys(right, "right"), rows)

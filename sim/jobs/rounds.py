@@ -1,6 +1,6 @@
-"""What is timed side by side, in rounds: medians of contestants that are taken in turns.
+"""Timing of contestants side by side, in rounds, with the median of each.
 
-In each round every contestant runs once, so that a machine that slows down slows them all.
+In every round each contestant runs once, so that a machine that slows down slows them all.
 """
 
 import statistics
@@ -10,16 +10,16 @@ from collections.abc import Callable, Hashable
 def medians(
     contestants: dict[Hashable, Callable[[], float]], rounds: int, progress: Callable[[str], None]
 ) -> dict[Hashable, float]:
-    """Return the median over the rounds of what each contestant gives.
+    """Return the median over the rounds of every contestant's results.
 
     Args:
-        contestants: by name.
-        rounds: how often each runs.
-        progress: called with what runs next.
+        contestants: functions by name, each of which returns one result.
+        rounds: number of runs of every contestant.
+        progress: called with a text that names the next run.
     """
-    given: dict[Hashable, list[float]] = {name: [] for name in contestants}
+    results: dict[Hashable, list[float]] = {name: [] for name in contestants}
     for number in range(rounds):
         for name, run in contestants.items():
             progress(f"round {number + 1} of {rounds}: {name}")
-            given[name].append(run())
-    return {name: statistics.median(values) for name, values in given.items()}
+            results[name].append(run())
+    return {name: statistics.median(values) for name, values in results.items()}

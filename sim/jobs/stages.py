@@ -1,7 +1,7 @@
-"""What takes a while is said: what is being done once it has taken a second, and how long it took at its end.
+"""Messages about long stages of work: their name after a second, and the time that they took at their end.
 
-Messages go to the logger of the project at level INFO. Who wants them gives it a handler, as the command line does; in
-a worker process or in a study of one's own nobody hears them.
+Messages go to the logger of the project at level INFO. They are shown only where that logger has a handler: the
+command line adds one; a worker process or a user's own study has none.
 """
 
 import logging
@@ -16,7 +16,7 @@ PATIENCE_S = 1.0
 
 @contextmanager
 def stage(doing: str) -> Iterator[None]:
-    """Say what is being done in the block, and when it is done how long it took; nothing of what is soon over."""
+    """Log the name of the block's work, and its time at the end; log nothing if it takes less than `PATIENCE_S`."""
     begins = threading.Timer(PATIENCE_S, logger.info, [f"{doing} ..."])
     begins.daemon = True
     begins.start()

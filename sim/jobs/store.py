@@ -1,8 +1,8 @@
-"""Results that took time, kept on disk as they come: an interrupted run loses none, and its repetition none again.
+"""Expensive results, kept on disk as they come: an interrupted run loses none, and a repetition computes none again.
 
-A store is a file of one JSON line a result, found by its job's digest. It belongs to the exact sources of this project
-and the versions of its tools: any change begins a new one. Every line begins with its end, so that a piece of one, left
-by a process that was killed while it wrote, spoils no other.
+A store is a file of one JSON line for each result, found by the digest of its job. It belongs to the exact sources of
+this project and the versions of its tools: any change begins a new store. The line break comes before the text of a
+line, so that a part of a line, left by a process that was killed while it wrote, spoils no other line.
 """
 
 import hashlib
@@ -25,7 +25,7 @@ TOOLS = (
 
 @cache
 def sources() -> str:
-    """Return a digest of every source and of the versions of what computes."""
+    """Return a digest of every source and of the versions of the tools."""
     digest = hashlib.sha256()
     root = Path(__file__).absolute().parents[2]
     for path in sorted(path for room in ROOMS for path in (root / room).rglob("*") if path.suffix in SUFFIXES):
@@ -40,8 +40,8 @@ class Store:
     """Results of one kind.
 
     Args:
-        kind: names the file.
-        known: whether what an earlier process left is used; else it is made anew.
+        kind: the kind, which names the file.
+        known: whether to use the results of earlier processes; otherwise they are computed again.
     """
 
     def __init__(self, kind: str, known: bool = True):
@@ -57,11 +57,11 @@ class Store:
 
     @staticmethod
     def _key(job: dict) -> str:
-        """Return a digest: a job may have a whole scene in it, and a study many thousands of jobs."""
+        """Return the digest of a job, because a job may hold a whole scene, and a study many thousands of jobs."""
         return hashlib.sha256(json.dumps(job, sort_keys=True).encode()).hexdigest()[:32]
 
     def __contains__(self, job: dict) -> bool:
-        """Whether there is a result of a job."""
+        """Return whether there is a result of a job."""
         return self._key(job) in self._known
 
     def get(self, job: dict) -> Any | None:

@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Files that are written completely or not at all."""
 
 import os
 from collections.abc import Iterator
@@ -8,10 +8,10 @@ from pathlib import Path
 
 @contextmanager
 def whole_file(path: str | Path) -> Iterator[Path]:
-    """Give a file beside `path` to write to; put it in the place of `path` once it is whole.
+    """Provide a temporary file beside `path` to write to; rename it to `path` once it is complete.
 
     Raises:
-        OSError: in one line, if that cannot be done.
+        OSError: if the file cannot be written; the message is one line.
     """
     part = Path(path).with_name(f".{Path(path).stem}-{os.getpid()}{Path(path).suffix}")
     try:

@@ -1,7 +1,7 @@
-"""Calling a C function by its address, from compiled code and from plain Python alike.
+"""Calls of a C function by its address, from compiled code and from plain Python alike.
 
 Numba can call a ctypes function only as a global, which ties the compiled code to one address and keeps it out of the
-disk cache; an address as an argument does neither.
+disk cache. An address as an argument has neither drawback.
 """
 
 import ctypes
@@ -15,7 +15,7 @@ _FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * ARGUMENTS)
 
 
 def call(address, a, b, c, d, e):
-    """Return what the C function `int64_t f(int64_t, ... five in all)` at `address` returns."""
+    """Return the result of the C function `int64_t f(int64_t, ... five in all)` at `address`."""
     return _FUNCTION(int(address))(int(a), int(b), int(c), int(d), int(e))
 
 

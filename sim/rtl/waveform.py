@@ -1,7 +1,7 @@
 """Waveforms: the VCD that Verilator writes, as the compact FST that GTKWave and Surfer open.
 
-Verilator writes one declaration or change a line, so a line is what is read here. Signals that Yosys had to invent a
-name for (they begin with `$`) say nothing to a reader and are left out.
+Verilator writes one declaration or change a line, so the VCD is read line by line. Signals with a name that Yosys had
+to invent (it begins with `$`) mean nothing to a reader and are left out.
 """
 
 from itertools import islice
@@ -14,7 +14,7 @@ _EXPONENTS = {"1s": 0, "1ms": -3, "1us": -6, "1ns": -9, "1ps": -12, "1fs": -15}
 
 
 def vcd_to_fst(vcd: Path, fst: Path, most: int | None = None) -> int:
-    """Write the named signals of waveform `vcd` as `fst`, its first `most` lines; return the number of value changes.
+    """Write the named signals in the first `most` lines of `vcd` as `fst`; return the number of value changes.
 
     Raises:
         OSError: if `fst` cannot be created.
@@ -31,7 +31,7 @@ def vcd_to_fst(vcd: Path, fst: Path, most: int | None = None) -> int:
 
 
 def _declare(writer, lines) -> dict[str, tuple[int, int]]:
-    """Declare scopes and signals; return handle and width of each by its code in the VCD."""
+    """Declare scopes and signals; return the handle and width of every signal by its code in the VCD."""
     handles: dict[str, tuple[int, int]] = {}
     for line in lines:
         match line.split():
@@ -42,7 +42,7 @@ def _declare(writer, lines) -> dict[str, tuple[int, int]]:
             case ["$upscope", "$end"]:
                 _LIB.fstWriterSetUpscope(writer)
             case ["$var", _, width, code, *name, "$end"] if not name[0].startswith("$"):
-                # A port and the net behind it share a code, and so a handle.
+                # A port and the net behind it share a code, and therefore a handle.
                 same = handles.get(code, (0, 0))[0]
                 text = " ".join(name).encode()
                 wire, implicit = _LIB.FST_VT_VCD_WIRE, _LIB.FST_VD_IMPLICIT
@@ -54,7 +54,7 @@ def _declare(writer, lines) -> dict[str, tuple[int, int]]:
 
 
 def _change(writer, handles: dict[str, tuple[int, int]], line: str) -> int:
-    """Pass on one line of the body; return the number of changes in it, 0 or 1."""
+    """Write one line of the VCD's body; return the number of changes in it, 0 or 1."""
     if line.startswith("#"):
         _LIB.fstWriterEmitTimeChange(writer, int(line[1:]))
         return 0
