@@ -1,4 +1,4 @@
-"""What the tests of the linear filters share: whole records through a kernel, impulse responses."""
+"""Helpers that the tests of the linear filters share: whole records through a kernel, impulse responses."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from hardwall.model.estimators.estimate import estimate
 from hardwall.model.quadrature import seen_count
 
 SECONDS = {1_000: 5.0, 10_000: 5.0, 100_000: 2.0, 1_000_000: 1.25, 10_000_000: 0.5}
-"""How much of the paper's signal is run at each rate, s; it is judged from a fifth on."""
+"""The length of the paper's signal that is run at each rate, s; the first fifth is not judged."""
 
 
 @compiled
@@ -18,7 +18,7 @@ def _run(params, state, counts, velocity, flags):
 
 
 def run(params, state, counts: np.ndarray):
-    """Return (state, velocity, flags) of a record through a kernel, from `state`; counts wrap."""
+    """Run a record through a kernel from `state`, and return (state, velocity, flags); counts wrap."""
     width = params.count_width
     half = 1 << (width - 1)
     wrapped = ((np.asarray(counts, np.int64) + half) & (2 * half - 1)) - half
@@ -28,7 +28,7 @@ def run(params, state, counts: np.ndarray):
 
 
 def impulse(a: np.ndarray, b, samples: int) -> np.ndarray:
-    """Return the states b, a b, a^2 b, ... of a linear system, one a column, at least `samples` of them."""
+    """Return the states b, a b, a^2 b, ... of a linear system as columns, at least `samples` of them."""
     states, power = np.array(b, float).reshape(-1, 1), np.array(a, float)
     while states.shape[1] < samples:
         states, power = np.concatenate([states, power @ states], 1), power @ power
@@ -36,7 +36,7 @@ def impulse(a: np.ndarray, b, samples: int) -> np.ndarray:
 
 
 def norms(a: np.ndarray, b, samples: int) -> np.ndarray:
-    """Return the sum of absolute values of each state's impulse response."""
+    """Return the sum of absolute values of every state's impulse response."""
     return np.abs(impulse(a, b, samples)).sum(1)
 
 

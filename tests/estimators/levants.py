@@ -1,4 +1,4 @@
-"""What the tests of Levant's differentiator and of its kin share: their campaigns, promises, and word-length error."""
+"""Helpers that the tests of Levant's differentiator and its variants share: campaigns, promises, word-length error."""
 
 import math
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from hardwall.testing.estimators import follow, reset_words
 from stimuli.papers_signal import axis_at, swing
 
 TURN_S = 1 + math.atan(2 * math.pi) / (2 * math.pi)
-"""When the paper's signal turns: its velocity is 0."""
+"""The time at which the paper's signal turns, so that its velocity is 0."""
 REFUSED = [
     ({"lambda_sqrt_m_per_s": -1.0, "alpha_m_per_s2": 1.0}, "lambda_sqrt_m_per_s"),
     ({"lambda_sqrt_m_per_s": 1.0, "alpha_m_per_s2": math.nan}, "alpha_m_per_s2"),
@@ -26,7 +26,7 @@ REFUSED = [
     ({"lambda_sqrt_m_per_s": 1.0, "alpha_m_per_s2": 1e-12}, "alpha_m_per_s2 must be .* to .*, not"),
     ({"lambda_sqrt_m_per_s": 1e-12, "alpha_m_per_s2": 1.0}, "lambda_sqrt_m_per_s must be .* to .*, not"),
 ]
-"""Gains that cannot be held, and how the message begins."""
+"""Gains that no word can hold, and the beginning of the error message."""
 
 
 def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
@@ -35,7 +35,7 @@ def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
     half, fast = 1 << (d.count_width - 1), d.velocity.max >> d.velocity.f
     reset = reset_words(d)[:2]
     top = [d.lambda_.max, d.alpha.max]
-    # Nominal gains follow a smooth motion, through the wrap of the count.
+    # A smooth motion through the wrap of the count, with nominal gains.
     t = np.arange(samples // 4)
     smooth = np.floor(half * (1 + 0.5 * np.sin(t * min(1, fast / half) / 2)) + random.random(len(t))).astype(np.int64)
     for count in smooth.tolist():
@@ -47,7 +47,7 @@ def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
     # A ramp faster than the velocity format, long enough for alpha alone to carry u1 to its end.
     for k in range(d.velocity.max // top[1] + 50):
         yield -k * (fast + 1), 0, *top, 0
-    # A walk with jumps, gains anywhere, restarts.
+    # A random walk with jumps, gains anywhere in their range, and restarts.
     count = 0
     for _ in range(samples - samples // 4 - samples // 10):
         count += int(
@@ -58,15 +58,15 @@ def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
 
 
 def wrapped(d: levant.Design, rows) -> list[tuple[int, ...]]:
-    """Return rows with their counts as the port carries them."""
+    """Return rows with their counts wrapped to the width of the port."""
     half = 1 << (d.count_width - 1)
     return [((count + half) % (2 * half) - half, *rest) for count, *rest in rows]
 
 
 def campaign(make, start, rows=stimulus, fewer: tuple[str, ...] = ("narrow",)):
-    """Return the two cocotb tests of an estimator that `make` makes for a named axis; a tenth of the rows for `fewer`.
+    """Return the two cocotb tests of an estimator that `make` makes for a named axis.
 
-    Where words are a few bits wide, everything saturates and wraps so often that a tenth sees it all.
+    Axes in `fewer` get a tenth of the rows: their words are a few bits wide, so everything saturates and wraps often.
     """
 
     @cocotb.test(**CAMPAIGN)
@@ -75,7 +75,7 @@ def campaign(make, start, rows=stimulus, fewer: tuple[str, ...] = ("narrow",)):
         component = make(name)
         samples = SAMPLES // 10 if name in fewer else SAMPLES
         expected = await follow(dut, component, rows(component.design, samples), start)
-        # The campaign is worth its name only if it reached both saturations, and the quiet track too.
+        # The campaign must reach both saturations, and the quiet track too.
         assert 0 in expected["saturated"]
         assert np.bitwise_or.reduce(expected["saturated"]) == 0b11
 
@@ -96,12 +96,12 @@ def campaign(make, start, rows=stimulus, fewer: tuple[str, ...] = ("narrow",)):
 
 
 def axis(axis_spec: AxisSpec, output: str = "u", floating: bool = False) -> Axis:
-    """Return an axis with that output selected."""
+    """Return an axis with the given output selected."""
     return Axis(axis_spec, floating, **axis_spec.design.estimator.choose(output))
 
 
 def rms_errors(axis_spec: AxisSpec, output: str, seconds: float, runs: int = 1) -> tuple[float, float]:
-    """Return the RMS errors on the paper's signal, m/s, in float64 and in fixed point, over runs of differing phase."""
+    """Return the RMS errors on the paper's signal, m/s, in float64 and in fixed point, over runs with random phases."""
     random, squares = rng(), np.zeros(2)
     both = [axis(axis_spec, output, floating) for floating in (True, False)]
     for _ in range(runs):
@@ -112,7 +112,7 @@ def rms_errors(axis_spec: AxisSpec, output: str, seconds: float, runs: int = 1) 
 
 
 def displacements(axis_spec: AxisSpec, counts: np.ndarray) -> Iterator[tuple[float, float, float]]:
-    """Yield (sign, |b|, u - u1) of each sample in which b is not 0, in counts; of the kin that project."""
+    """Yield (sign, |b|, u - u1) of every sample with nonzero b, in counts, for the variants that project."""
     d = axis_spec.design.estimator
     params, state = d.params({word.name: word.reset for word in d.words}), d.start()
     for count in counts.tolist():
@@ -125,9 +125,10 @@ def displacements(axis_spec: AxisSpec, counts: np.ndarray) -> Iterator[tuple[flo
 
 
 def oracle_run(d: levant.Design, rows, step) -> Iterator[tuple[int, int]]:
-    """Yield (velocity word, flags) of the projecting kin in exact rationals, on the unwrapped position.
+    """Yield (velocity word, flags) of the variants that project, in exact rationals, on the unwrapped position.
 
-    `step(lambda, alpha, b, first)` returns (near, g): what alpha and the root take of |b|, rounded as documented.
+    `step(lambda, alpha, b, first)` returns (near, g), the parts of |b| that alpha and the root take, rounded as
+    documented.
     """
     lsb = Fraction(1, 2**d.velocity.f)
     v_max, e_max = d.velocity.max * lsb, d.error.max * lsb
@@ -154,7 +155,7 @@ def oracle_run(d: levant.Design, rows, step) -> Iterator[tuple[int, int]]:
 
 
 def check_wrap_and_restart(axis_spec: AxisSpec) -> None:
-    """The count may wrap anywhere, and a restart in mid-motion is a start."""
+    """Check that the count may wrap anywhere, and that a restart in mid-motion is a start."""
     counts, _ = swing(axis_spec.sample_hz, 0.2, TURN_S)
     one, half = axis(axis_spec), 1 << (axis_spec.count_width - 1)
     expected = one.run(counts).velocity
@@ -169,7 +170,7 @@ def check_wrap_and_restart(axis_spec: AxisSpec) -> None:
 
 
 def check_no_drift(axis_spec: AxisSpec) -> None:
-    """From standstill to the largest speed, and at the smallest, the velocities sum up to the counts moved."""
+    """Check that velocities sum up to the counts moved, from standstill to the largest speed and at the smallest."""
     rate, tau = axis_spec.sample_hz, 1 / axis_spec.sample_hz
     top, steep = axis_spec.speed_max_m_per_s / axis_spec.count_m, axis_spec.acceleration_max_m_per_s2 / 2
     ramp = np.minimum(np.arange(rate) * tau * steep / axis_spec.count_m, top)
@@ -182,7 +183,10 @@ def check_no_drift(axis_spec: AxisSpec) -> None:
 
 
 def check_finite_difference_in_the_band(estimator: str) -> None:
-    """At 1 kHz alpha is 13 counts: where the count's second difference is less, there is no memory and no chatter."""
+    """Check that there is no memory and no chatter where the count's second difference is below alpha.
+
+    At 1 kHz alpha is 13 counts.
+    """
     axis_spec = axis_at(estimator, 1_000, 12.0)
     d = axis_spec.design.estimator
     assert d.alpha.to_real(d.words[1].reset) > 12
@@ -195,7 +199,7 @@ def check_finite_difference_in_the_band(estimator: str) -> None:
 
 
 def check_standstill(estimator: str, rate: int) -> None:
-    """A count that stands after 30 mm/s gives exactly 0 on both outputs, after 0.1 s at the latest; `levant` never."""
+    """Check that both outputs are exactly 0 from 0.1 s after a stop from 30 mm/s on; `levant` never comes to 0."""
     axis_spec = axis_at(estimator, rate)
     ramp = np.floor(np.arange(rate // 20) * 0.03 / rate / axis_spec.count_m)
     counts = np.concatenate([ramp, np.full(rate // 4, ramp[-1])]).astype(np.int64)

@@ -39,7 +39,7 @@ def stimulus(name: str, samples: int):
     top = [word.format.max for word in d.words]
     lowest, highest = (list(words(d, hz).values()) for hz in (d.cutoff_min_hz, d.cutoff_max_hz))
     reset = reset_words(d)
-    # Standing at any count, from the first sample on.
+    # A standstill at any count, from the first sample on.
     for _ in range(20):
         yield half - 1, 0, *reset
     # A smooth motion through the wrap of the count.
@@ -48,12 +48,12 @@ def stimulus(name: str, samples: int):
     smooth = np.floor(half * (1 + 0.5 * np.sin(t * turn)) + random.random(len(t))).astype(np.int64)
     for count in smooth.tolist():
         yield count, 0, *reset
-    # Full swings, worst for overflow at some cutoff; at the ends of the cutoff, and of the words.
+    # Full swings, the worst case for overflow at some cutoff; at the ends of the cutoff and of the words.
     for period in (1, 2, 3, 7, 50):
         for chosen in (reset, lowest, highest, top, [0, *top[1:]], [top[0], 0, 0]):
             for k in range(samples // 200):
                 yield (-half, half // 2 - 1, half - 1)[k // period % 3], 0, *chosen
-    # A walk with jumps and restarts, words of any cutoff and of none.
+    # A random walk with jumps and restarts, with words that belong to a cutoff and words that belong to none.
     count, chosen = 0, reset
     for _ in range(samples // 2):
         jump = random.random() < 0.01
@@ -70,7 +70,7 @@ async def follows_model(dut):
     name = parameters()["name"]
     samples = SAMPLES if name == "mhz" else SAMPLES // 10
     expected = await follow(dut, make(name), stimulus(name, samples), START)
-    # The campaign is worth its name only if it reached each saturation, and the quiet track too.
+    # The campaign must reach every saturation, and the quiet track too.
     assert {0b00, 0b01, 0b10, 0b11} == set(expected["saturated"].tolist())
 
 
@@ -94,7 +94,7 @@ def test_rtl(name):
 
 
 def oracle(d: Design, rows):
-    """The module's equations in exact rationals, rounded only where it says so."""
+    """Yield the outputs of the module's equations in exact rationals, rounded only where the module documents it."""
     fine, coarse, out = (Fraction(1, 2**fmt.f) for fmt in (d.state, d.operand, d.velocity))
     most, modulus, half = d.velocity.max * out, 2**d.count_width, 2 ** (d.count_width - 1)
     last = d1 = d2 = w = y = None
@@ -127,30 +127,30 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
 @pytest.mark.parametrize("sample_hz", RATES)
 @pytest.mark.parametrize("ratio", [30.0, None, 0.1, CUTOFF_MAX], ids=["30 Hz", "default", "0.1 fs", "0.4 fs"])
 def test_the_algorithm_is_scipys(sample_hz, ratio):
-    """Of a random walk of the count, from rest."""
+    """Both filter a random walk of the count, from rest."""
     gains = None if ratio is None else Gains(ratio if ratio > 1 else ratio * sample_hz)
     axis = axis_at("butterworth", sample_hz, gains=gains)
     steps = rng().integers(-1, 2, 20_000)
     seen = Axis(axis, floating=True).run(np.cumsum(steps)).velocity
     cutoff = axis.design.gains.cutoff_hz
     expected = sosfilt(butter(2, cutoff, fs=sample_hz, output="sos"), [0, *steps[1:]])
-    # Its direct form rounds among 1/gamma^2 as the module says, in float64; 8 covers its few operations.
+    # SciPy's direct form rounds numbers of the size 1/gamma^2 in float64, as the module says; 8 covers its operations.
     gamma = coefficients(cutoff / sample_hz)[0]
     assert np.abs(seen - expected).max() <= 8 * 2.0**-53 * max(gamma**-2, 1) * max(np.abs(expected).max(), 1) + 1e-14
 
 
 def system(gamma: float, beta: float):
-    """Return the matrix of the states (w, y), and the columns by which an x, and errors, enter them."""
+    """Return the matrix of the states (w, y), and the columns by which the input x and the errors enter them."""
     a = np.array([[1 - beta, -gamma], [gamma * (1 - beta), 1 - gamma**2]])
     in_w, in_y = np.array([1, gamma]), np.array([0, 1])
     return a, gamma * in_w, in_w, in_y
 
 
 def rounding(gamma: float, beta: float):
-    """Return the norms at y of an operand LSB and of an accumulator LSB, every floor at its worst."""
+    """Return the norms at y of an operand LSB and of an accumulator LSB, with the worst error of every floor."""
     a, x, in_w, in_y = system(gamma, beta)
     samples = int(40 / gamma) + 200
-    # An operand w enters y at once, and w by beta a sample later.
+    # An error of the operand w enters y at once, and enters w a sample later, times beta.
     first, later = impulse(a, gamma * in_y, samples), impulse(a, -beta * in_w, samples)
     shared = np.abs(first[1, 0]) + np.abs(first[1, 1:] + later[1, :-1]).sum()
     # The floors of push and drag have opposite signs.
@@ -172,14 +172,14 @@ def test_the_norms_are_those_of_the_module():
     bounds = np.array([butterworth.STATE_NORM, butterworth.OPERAND_NORM, butterworth.PRODUCT_NORM])
     assert (largest <= bounds).all()
     assert (largest > 0.95 * bounds).all()
-    # What they are for: all errors together are less than half an LSB, for 2**reach >= max(1/gamma, 2).
+    # Their purpose: all errors together are less than half an LSB, for 2**reach >= max(1/gamma, 2).
     assert (bounds[1] + bounds[2]) * 2.0**-butterworth.GUARD_BITS < 0.5
 
 
 @pytest.mark.parametrize("sample_hz", RATES)
 @pytest.mark.parametrize("cutoff", ["30 Hz", "default", "0.4 fs"])
 def test_fixed_is_float_within_the_derived_bound(sample_hz, cutoff):
-    """On the paper's signal: rounding within its norms, coefficients by their response; all within 1 % of the error."""
+    """On the paper's signal, rounding is within its norms; with coefficients' errors it is within 1 % of the error."""
     gains = {"30 Hz": Gains(30.0), "default": None, "0.4 fs": Gains(CUTOFF_MAX * sample_hz)}[cutoff]
     axis = axis_at("butterworth", sample_hz, gains=gains)
     d = axis.design.estimator
@@ -210,7 +210,7 @@ def test_figure_2_at_its_crossing(floating):
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
 def test_every_state_settles_to_the_exact_speed(name):
-    """From anywhere, at any cutoff: no cycle and no dead zone is left in the velocity."""
+    """No limit cycle and no dead zone remains in the velocity, from any state and at any cutoff."""
     d, random = design(name), rng()
     for cutoff in np.geomspace(d.cutoff_min_hz, d.cutoff_max_hz, 8):
         params = d.params(words(d, cutoff))
@@ -226,7 +226,7 @@ def test_every_state_settles_to_the_exact_speed(name):
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
 def test_no_input_overflows(name):
-    """The worst input for each state, at the ends of the cutoff and between: the signs of its impulse response."""
+    """The worst input for a state, the signs of its impulse response, at the ends of the cutoff and between."""
     d = design(name)
     reached = 0.0
     for cutoff in (d.cutoff_min_hz, 0.1 * d.cutoff_max_hz, d.cutoff_max_hz):
@@ -238,12 +238,12 @@ def test_no_input_overflows(name):
             state, _, flags = run(params, START, np.cumsum([0, *(d.step_max * worst)]))
             assert not flags.any()
             reached = max(reached, abs(state.w), abs(state.y))
-    # The room is used.
+    # The range of the states is used.
     assert reached > 0.97 * butterworth.STATE_NORM * d.step_max * 2**d.state.f
 
 
 def test_the_largest_step_and_a_change_of_cutoff():
-    """A jump of the count is a step of `step_max`, flagged; another cutoff takes over without one at constant speed."""
+    """A jump of the count acts as a step of `step_max` with a flag; a new cutoff makes no step at constant speed."""
     d = design("mhz")
     params = d.params(words(d, d.cutoff_max_hz))
     state, velocity, flags = run(params, START, [0] * 5 + [1 << (d.count_width - 2)] * 50_000)
@@ -270,7 +270,7 @@ def test_default_cutoff_has_half_the_minimax_window_for_delay():
     delay = math.sqrt(2) / (2 * math.pi * Gains.default(axis).cutoff_hz)
     assert delay == pytest.approx(math.sqrt(axis.count_m / axis.acceleration_max_m_per_s2))
     assert Gains.default(axis_at("butterworth", 500)).cutoff_hz == 200
-    # A host asks for a cutoff and gets it.
+    # A host sets a cutoff and reads it back.
     host = Axis(axis, floating=True, **axis.design.estimator.words_for(30.0))
     other = Axis(axis_at("butterworth", 1_000_000, gains=Gains(30.0)), floating=True)
     assert host.params.estimator[:2] == pytest.approx(other.params.estimator[:2])

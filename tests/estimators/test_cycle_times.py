@@ -1,4 +1,4 @@
-"""Times of encoder cycles: RTL against model; the model itself is held to every edge there was by the estimators."""
+"""Times of encoder cycles: RTL against model; the estimators' tests check the model itself against all edges."""
 
 from itertools import chain
 from typing import NamedTuple
@@ -33,7 +33,7 @@ def model(widths: Widths, cycles_max: int, inputs) -> dict[str, np.ndarray]:
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     component, random = CycleTimes(**parameters()), rng()
-    # The longest sample that stamps tell.
+    # The longest sample that the stamps can measure.
     clocks = 1 << min(component.stamp_width - 2, 6)
     widths = Widths(component.count_width, component.stamp_width, clocks)
     bench = Bench(dut, component)

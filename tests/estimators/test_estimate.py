@@ -1,4 +1,4 @@
-"""The contract that every registered estimator keeps: its gains, its design, its kernels, its component."""
+"""The contract that every registered estimator fulfils: its gains, its design, its kernels, its component."""
 
 from dataclasses import fields, is_dataclass
 
@@ -31,7 +31,7 @@ def reset_words(d: EstimatorDesign) -> dict[str, int]:
 
 
 def flat(value) -> list:
-    """Return the numbers of a tuple of tuples, those of an array one by one."""
+    """Return the numbers in a tuple of tuples, with arrays flattened."""
     if isinstance(value, tuple):
         return [number for part in value for number in flat(part)]
     return value.tolist() if isinstance(value, np.ndarray) else [value]
@@ -117,7 +117,7 @@ def test_both_kernels_begin_with_zero_and_keep_the_kinds_of_their_state(name):
             assert isinstance(velocity, float | np.floating) == floating
             assert flags == 0
             assert count == 6 or velocity == 0
-        # A restart forgets: it is the first sample again.
+        # A restart forgets the past: its sample is the first again.
         _, velocity, _ = estimate(params, state, seen_count(-1000), 1)
         assert velocity == 0
 

@@ -16,7 +16,7 @@ from stimuli.papers_signal import RATES, axis_at, piece
 from stimuli.specs import spec
 
 WINDOWS = {"mhz": None, "narrow": None, "paper": 3.0}
-"""In s, or the default: 3 s at 10 kHz are more samples than the memory holds."""
+"""Windows in s, or None for the default; 3 s at 10 kHz are more samples than the memory holds."""
 
 
 def design(name: str) -> foaw.Design:
@@ -29,7 +29,7 @@ def make(name: str) -> Estimator:
 
 
 def stimulus(name: str, samples: int):
-    """Yield (count, restart, output, band, window): lines and bends, the worst signs, words at their ends, wraps."""
+    """Yield (count, restart, output, band, window): lines and parabolas, the worst signs, extreme words, wraps."""
     d, random = design(name), rng()
     half, fast = 1 << (d.count_width - 1), d.history.change.max
     _, reset_band, reset_window = reset_words(d)
@@ -39,7 +39,7 @@ def stimulus(name: str, samples: int):
     bends = half + 40 * reach / foaw.TAPS * np.sin(t / reach * 3) + fast * t / 8
     for k, count in enumerate(np.floor(bends).astype(np.int64).tolist()):
         yield count, 0, k >> 3 & 1, reset_band, reset_window
-    # The largest speeds and beyond, both ways, and one way after the other within a window; and at a standstill.
+    # The largest speeds and larger ones, in both directions, also one after the other within a window; and standstill.
     count = 0
     for way in (fast, -fast, fast + 1, -fast - 1, 0, 1, -1):
         for k in range(samples // 28):
@@ -87,7 +87,7 @@ def test_rtl(name):
 
 
 def published(positions: list[int], k: int, tap: int, band: Fraction, longest: int, best: bool):
-    """The published algorithm, a search whose every step looks at every sample: (slope in counts a tap, window)."""
+    """Return (slope in counts a tap, window) by the published algorithm, which checks every sample at every step."""
 
     def at(i: int) -> int:
         return positions[k - i * tap] if k > i * tap else 0
@@ -106,7 +106,7 @@ def published(positions: list[int], k: int, tap: int, band: Fraction, longest: i
 
 
 def oracle(d: foaw.Design, rows):
-    """Velocity, flag and window of the rows, from lists of plain integers."""
+    """Yield velocity, flag and window of every row, from lists of plain integers."""
     half, most, every = 1 << (d.count_width - 1), d.history.change.max, d.history.every
     tap = d.spacing * every
     positions, last, velocity, window = [], None, 0, 1
@@ -206,7 +206,7 @@ def test_nothing_drifts_in_long_runs_at_the_ends(output):
         record = Axis(axis, foaw_output=output).run(k * speed)
         assert (record.velocity[n:] == speed << d.velocity.f).all()
         assert record.flags[-1] == 0
-    # One count in many windows: each shows once, and then is forgotten.
+    # One count in many windows: every count appears once and is then forgotten.
     slow = Axis(axis, foaw_output=output).run(k // 5000).velocity
     assert slow.min() == 0
     assert (slow.reshape(-1, 5000)[:, n:] == 0).all()

@@ -11,7 +11,7 @@ from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from stimuli.specs import spec
 
 WINDOWS = {"paper": 2e-3, "narrow": 40e-6, "mhz": 20e-3}
-"""In s: 20, 20 and 20000 samples, of which the last are too many for the memory."""
+"""Windows in s: 20, 20 and 20000 samples; the last are too many for the memory."""
 
 
 def design(name: str) -> history.Design:
@@ -23,7 +23,7 @@ def make(name: str) -> History:
 
 
 def rows(d: history.Design, samples: int):
-    """Yield (count, restart, age): motion, jumps, wraps, restarts; ages from all of the memory."""
+    """Yield (count, restart, age): motion, jumps, wraps, restarts, and ages over the whole memory."""
     random, half, fast = rng(), 1 << (d.count_width - 1), d.change.max
     count = 0
     for k in range(samples):
@@ -90,7 +90,7 @@ def test_memory_is_within_its_limit():
     assert [every for every, _, _ in sizes.values()] == [1, 1, 16]
     for name, (every, age_bits, width) in sizes.items():
         assert width << age_bits <= history.MEMORY_BITS
-        # It was not thinned out without need.
+        # The memory is not thinned out more than necessary.
         assert every == 1 or (width << age_bits) * 4 > history.MEMORY_BITS
         window = WINDOWS[name] * spec(name).sample_hz
         assert abs(design(name).longest * every - window) <= every / 2

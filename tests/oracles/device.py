@@ -1,4 +1,4 @@
-"""The same devices in laboratory coordinates, written down a second time, and integrators that know nothing of ours.
+"""The devices again in laboratory coordinates, with integrators that are independent of the code under test.
 
 The state is x, v of the handle, x, v of the motor's side, and the motor's force (N at the handle). Where there is no
 cable the motor's side is the handle itself.
@@ -15,7 +15,7 @@ from hardwall.sim.world.linear import State
 
 
 def between(rng, low, high):
-    """Return a number from `low` to `high`, even in its logarithm."""
+    """Return a random number from `low` to `high`, uniform in its logarithm."""
     return float(math.exp(rng.uniform(math.log(low), math.log(high))))
 
 
@@ -31,7 +31,7 @@ def random_cable(rng, stiffness=(1.0, 1e8), mass=(1e-3, 100.0), damping=1e4):
 
 
 def rates(device: Device, limited: int = 0, stuck: bool = False) -> np.ndarray:
-    """Return (5, 7): d/dt of the laboratory state, of the state, of 1 and of the command."""
+    """Return a matrix (5, 7) that maps the laboratory state, 1 and the command to d/dt of the laboratory state."""
     m, b = device.mass_kg, device.viscous_n_s_per_m
     table = np.zeros((5, 7))
     handle, motor = np.zeros(7), np.zeros(7)
@@ -71,14 +71,14 @@ def rates(device: Device, limited: int = 0, stuck: bool = False) -> np.ndarray:
 
 
 def laboratory(device: Device, state: State) -> np.ndarray:
-    """Return our state in laboratory coordinates."""
+    """Return the simulation's state in laboratory coordinates."""
     x, v, others = state.position_m, state.velocity_m_per_s, list(state.others)
     stretch, stretching = (others.pop(0), others.pop(0)) if device.transmission else (0.0, 0.0)
     return np.array([x, v, x + stretch, v + stretching, others[0]])
 
 
 def ours(device: Device, y) -> State:
-    """Return a laboratory state as ours."""
+    """Return a laboratory state as the simulation's state."""
     others = [float(y[2] - y[0]), float(y[3] - y[1])] if device.transmission else []
     others += [y[4]] if device.bandwidth_hz is not None or device.motor else []
     return State(float(y[0]), float(y[1]), tuple(float(v) for v in [*others, 0.0, 0.0, 0.0][:3]), 0)
@@ -127,7 +127,7 @@ def asked_v(device: Device, y, command: float) -> float:
 
 
 def integrated(device: Device, y, command: float, seconds: float) -> tuple[np.ndarray, list[str]]:
-    """Return the laboratory state after an interval, by numerical integration with events, and what happened."""
+    """Return the laboratory state after an interval, by numerical integration with events, and the events' names."""
     y, left, happened = np.array(y, float), seconds, []
     level = device.coulomb_n or 0.0
     volts = device.motor is not None and device.bandwidth_hz is not None
@@ -149,7 +149,7 @@ def integrated(device: Device, y, command: float, seconds: float) -> tuple[np.nd
         stuck = device.coulomb_n is not None and y[1] == 0 and abs(force) <= level and happened[-1:] != ["breaks"]
         along = 0 if stuck or device.coulomb_n is None else float(np.sign(y[1] if y[1] != 0 else force))
         if along and y[1] == 0:
-            y[1] = along * 1e-15  # an event that begins at its own value is not found
+            y[1] = along * 1e-15  # SciPy does not find an event that begins at its own value
         table = rates(device, limited, stuck)
         friction = np.zeros(5)
         friction[1 if device.transmission else slice(1, 4, 2)] = -along * level / mass
@@ -157,7 +157,7 @@ def integrated(device: Device, y, command: float, seconds: float) -> tuple[np.nd
         def change(_, state, table=table, friction=friction):
             return table @ [*state, *inputs] + friction
 
-        # (what is watched, the value at which it happens, from which side, its name)
+        # (function, the value at which the event happens, its direction, its name)
         watched = []
         if device.coulomb_n is not None and not stuck:
             watched = [(lambda s: s[1], 0.0, -along, "rests")]
@@ -168,7 +168,7 @@ def integrated(device: Device, y, command: float, seconds: float) -> tuple[np.nd
         elif volts:
             watched += [(voltage, side * limit, side, "limits") for side in (-1, 1)]
         events = [_event(*each[:3]) for each in watched]
-        # An event is found by its sign at the ends of a step: two in one are missed, so none may be long.
+        # An event is found by its sign at the ends of a step: two in one step are missed, so steps must be short.
         options = {"events": events, "rtol": 1e-11, "atol": 1e-13, "max_step": seconds / 50}
         solution = solve_ivp(change, (0, left), y, "DOP853", **options)
         y, left = solution.y[:, -1], left - solution.t[-1]

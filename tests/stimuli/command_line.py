@@ -3,7 +3,7 @@
 from hardwall.sim.commands import app
 
 WIDTH = 80
-"""Of a terminal that is not there."""
+"""The width of output in columns where there is no terminal."""
 
 
 def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:

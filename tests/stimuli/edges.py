@@ -1,4 +1,4 @@
-"""For the estimators that time edges: those of a wheel that turns at random, and known motions in both arithmetics."""
+"""Stimuli for estimators that time edges: the edges of a wheel that turns at random, and known motions."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from hardwall.sim.estimates import accuracy, motions, playback, signals
 
 @dataclass(frozen=True)
 class Edge:
-    """When it was decoded (clocks, without wrap), where it stands (counts, without wrap), its kind and direction."""
+    """An edge: when it was decoded (clocks, unwrapped), its position (counts, unwrapped), its kind and direction."""
 
     at: int
     number: int
@@ -20,7 +20,7 @@ class Edge:
 
 @dataclass(frozen=True)
 class Strobe:
-    """A sample: when, whether it restarts, and how many edges came before it."""
+    """A sample: its clock, whether it restarts the estimator, and the number of edges before it."""
 
     at: int
     restart: int
@@ -30,10 +30,10 @@ class Strobe:
 def turn(
     design, random: np.random.Generator, samples: int, invert: bool = False, most: int | None = None
 ) -> tuple[list[Strobe], list[Edge]]:
-    """Return strobes and edges: steady and bent motions of all speeds, turns within a count, bursts, stops, pauses.
+    """Return strobes and edges: steady and accelerated motions of all speeds, turns within a count, stops, pauses.
 
-    A sample lasts any time that the design allows, and has fewer edges than `most`, half the counter's range or one a
-    clock, whichever is least.
+    A sample lasts any time that the design allows, and has fewer edges than `most`, half the counter's range or one
+    edge a clock, whichever is least.
     """
     modulus, clocks = 1 << design.stamp_width, design.clocks
     most = min(clocks, (1 << (design.count_width - 1)) - 2, most or clocks)
@@ -74,7 +74,7 @@ def turn(
 
 
 def run_length(edges: list[Edge]) -> int:
-    """Return how many of the last edges went the same way, at most 4."""
+    """Return how many of the last edges have the same direction, at most 4."""
     run = 0
     for edge in reversed(edges[-4:]):
         if edge.down != edges[-1].down:
@@ -84,7 +84,7 @@ def run_length(edges: list[Edge]) -> int:
 
 
 def rows(design, strobes: list[Strobe], edges: list[Edge]):
-    """Yield what an estimator gets, as its inputs are listed."""
+    """Yield the estimator's inputs at every strobe, in the order of its ports."""
     modulus, half = 1 << design.stamp_width, 1 << (design.count_width - 1)
     stamps, taken = [0, 0, 0, 0], 0
     for strobe in strobes:
@@ -98,7 +98,7 @@ def rows(design, strobes: list[Strobe], edges: list[Edge]):
 
 
 def anything(design, random: np.random.Generator, samples: int):
-    """Yield rows that no encoder gives: every input anywhere in its range, often at its ends."""
+    """Yield rows that no encoder gives: every input anywhere in its range, often at the ends of the range."""
     half, stamps = 1 << (design.count_width - 1), 1 << design.stamp_width
     count = stamp = 0
     for _ in range(samples):
@@ -120,16 +120,16 @@ def anything(design, random: np.random.Generator, samples: int):
 
 @dataclass(frozen=True)
 class Sight:
-    """What can be known at a strobe, exact, from every edge there was, unwrapped.
+    """The exact knowledge at a strobe, from all edges so far, unwrapped.
 
     Attributes:
-        restart: whether nothing before counts.
+        restart: whether all earlier samples are to be forgotten.
         count: the count, without wrap.
         down: the last edge's direction.
-        ages: of those of the last edges that went one way, at most 4, that are known; the newest first; clocks. Empty
-            where the last edge itself is not.
+        ages: the ages in clocks, newest first, of the last edges in one direction, at most 4, that are known; empty if
+            the last edge itself is not known.
         news: whether there were edges since the strobe before.
-        cycle: (counts, clocks) over whole cycles up to the last edge, if all of them went one way.
+        cycle: (counts, clocks) over whole cycles up to the last edge, if all of their edges have one direction.
     """
 
     restart: bool
@@ -141,7 +141,7 @@ class Sight:
 
 
 def sights(design, strobes: list[Strobe], edges: list[Edge]) -> Iterator[Sight]:
-    """Yield what each strobe sees: an edge is known from a restart on until it is 3/4 of the stamp's range old."""
+    """Yield the knowledge at every strobe: edges after a restart are known until 3/4 of the stamp's range old."""
     limit = 3 * (1 << design.stamp_width) // 4
     before, since = None, 0
     for strobe in strobes:
@@ -183,7 +183,7 @@ def exact(signal, axis, samples):
 
 
 def check_rounding_is_the_only_difference(name: str, rate: int) -> None:
-    """At most half an LSB in every sample of the paper's signal; and 1 % of the estimator's own error."""
+    """Check that `fixed` is within half an LSB of `float`, and within 1 % of the estimator's own error in RMS."""
     signal = replace(signals.paper(), seconds=0.3)
     axis = accuracy.axis_spec(name, rate, signal.acceleration_max_m_per_s2)
     fixed, flags = velocities(signal, axis, "fixed")
@@ -191,6 +191,6 @@ def check_rounding_is_the_only_difference(name: str, rate: int) -> None:
     assert flags == 0
     half_lsb = axis.design.estimator.velocity.lsb / 2 * axis.velocity_unit_m_per_s
     assert np.abs(fixed - real).max() <= half_lsb * (1 + 1e-9)
-    first = rate // 100  # the signal starts at full speed: before the first edges the error is all of it
+    first = rate // 100  # the signal starts at full speed, so the error is the whole speed until the first edges
     own = real[first::7] - exact(signal, axis, len(real))[first::7]
     assert np.sqrt(np.mean((fixed - real) ** 2)) <= 0.01 * np.sqrt(np.mean(own**2))

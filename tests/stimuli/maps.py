@@ -1,10 +1,10 @@
-"""Maps that took nothing to make: what studies are given in place of hits."""
+"""Maps that need no computation, for studies to use in place of hits."""
 
 from hardwall.sim.walls.zwidth import Effort
 
 
 class Known:
-    """A `zwidth.Mapping` but for its maps."""
+    """A `zwidth.Mapping` without maps; subclasses add them."""
 
     def effort(self) -> Effort:
         return Effort("fixed", 0, 0.0)

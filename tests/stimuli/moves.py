@@ -6,9 +6,9 @@ from hardwall.sim.world.device import train
 from hardwall.sim.world.encoder import Encoder, locate
 from hardwall.sim.world.linear import State
 
-COARSE = Encoder(1e9, 1e6)  # no edge anywhere
+COARSE = Encoder(1e9, 1e6)  # so coarse that no edge is near
 ANYWHERE = locate(COARSE, 0.5e9)._replace(lower_m=-1e18)
-"""The cell that every device of the tests is in."""
+"""The encoder's cell in which every device of the tests starts."""
 NO_EDGES = room_for(0)
 
 

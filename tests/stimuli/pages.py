@@ -1,4 +1,4 @@
-"""The pages as tests read them: their blocks of commands and of Python, and the command line they speak of."""
+"""The pages as tests read them: their blocks of commands and of Python, and the command line that they describe."""
 
 import re
 import shlex
@@ -17,9 +17,9 @@ PAGES = sorted(
 
 
 class Block(NamedTuple):
-    """A block of a page: its language, its text, whether its mark keeps it from being run, and what it shall print.
+    """A block of a page: its language, its text, whether a mark keeps it from being run, and its expected output.
 
-    Marks are `long`, for what takes minutes, and `setup`, for what changes the reader's machine.
+    The marks are `long`, for blocks that take minutes, and `setup`, for blocks that change the reader's machine.
     """
 
     language: str
@@ -49,7 +49,7 @@ def commands(block: Block) -> list[list[str]]:
 
 @cache
 def command_line():
-    """Return the command line, as the library of options has it."""
+    """Return the command line as an object of the library that parses its options."""
     return typer.main.get_command(app)
 
 

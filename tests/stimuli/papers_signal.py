@@ -9,24 +9,24 @@ from stimuli.specs import PAPER
 
 RATES = (1_000, 10_000, 100_000, 1_000_000, 10_000_000)
 BOUND = 1.6785
-"""C: its largest acceleration, m/s^2."""
+"""The signal's largest acceleration C, m/s^2."""
 
 
 @cache
 def axis_at(estimator: str, sample_hz: int, bound: float = BOUND, gains=None) -> AxisSpec:
-    """Return the device at a rate, with the gains that follow from a bound on the acceleration, or others."""
+    """Return the device at a rate, with the given gains or those that follow from a bound on the acceleration."""
     rates = {"clock_hz": 10**9 if sample_hz > 10**6 else 50_000_000, "sample_hz": sample_hz, "actuation_hz": sample_hz}
     fields = PAPER | rates | {"acceleration_max_m_per_s2": bound}
     return AxisSpec(**fields, estimator=estimator, gains=gains)
 
 
 def swing(sample_hz: int, seconds: float, from_s: float = 0.0, phase: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Return counts and exact velocity, m/s; `phase` moves the scale, in counts."""
+    """Return counts and exact velocity, m/s; `phase` shifts the encoder's scale, in counts."""
     t = from_s + np.arange(round(seconds * sample_hz)) / sample_hz
     sine, cosine, decay = np.sin(2 * np.pi * t), np.cos(2 * np.pi * t), 50e-3 * np.exp(-t)
     return np.floor(decay * sine / PAPER["count_m"] + phase).astype(np.int64), decay * (2 * np.pi * cosine - sine)
 
 
 def piece(sample_hz: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return counts and exact velocity from 1 s on: of half a second, or of a fifth at 10 MHz."""
+    """Return half a second of counts and exact velocity from 1 s on; above 1 MHz, a fifth of a second."""
     return swing(sample_hz, 0.2 if sample_hz > 10**6 else 0.5, from_s=1.0)

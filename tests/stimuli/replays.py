@@ -1,4 +1,4 @@
-"""Recordings to replay: made ones with the ranges of a real drive's; and the reference, found another way."""
+"""Synthetic recordings with the ranges of a real drive's, and the reference velocity by an independent method."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from hardwall.sim.estimates.recording import Recording
 from stimuli.specs import EVERY_OUTPUT
 
 COARSEN = 16
-# About the largest of the recordings' own. One for all, so that one piece of hardware an estimator serves every test.
+# About the largest bound of the real recordings. All tests share it, so that every estimator needs only one build.
 BOUND = 1e6
 EVERY = pytest.mark.parametrize(("estimator", "output"), EVERY_OUTPUT)
 
@@ -23,7 +23,7 @@ def swing(samples=3000, amplitude=700 * COARSEN) -> Recording:
 
 
 def reference_of(recorded: Recording) -> np.ndarray:
-    """Return the derivative that estimates are held against, by the filter's polynomials instead of its sections."""
+    """Return the reference velocity, computed by the filter's polynomials instead of its sections."""
     b, a = signal.butter(4, 40.0, fs=recorded.rate_hz)
     counts = recorded.counts.astype(float)
     central = (np.roll(counts, -1) - np.roll(counts, 1)) / 2

@@ -1,4 +1,4 @@
-"""Small results of studies, made by hand: what pictures are drawn from, without a run."""
+"""Small results of studies, made by hand, from which pictures are drawn without a run."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ NOTHING = Effort("fixed", 0, 0.0)
 
 
 def hit(rms_m: float = 0.0, reached: bool = True) -> Hit:
-    """Return a hit of 20 ms of contact, its estimate with noise."""
+    """Return a hit with 20 ms of contact and a noisy estimate."""
 
     def trace(times: np.ndarray) -> Trace:
         position, velocity = 1e-3 * np.sin(150 * times), 0.15 * np.cos(150 * times)
@@ -35,7 +35,7 @@ def hit(rms_m: float = 0.0, reached: bool = True) -> Hit:
 
 
 def map_of(method: str, stiffest_n_per_m: float, last_n_s_per_m: float, case: Case | None = None) -> Map:
-    """Return the map of a method on seed-2011: K rises and falls over B."""
+    """Return the map of a method on seed-2011, whose K rises and falls over B."""
     if case is None:
         curve = methods()[method]
         case = Case(curve.label, "seed-2011", read("seed-2011"), curve.changes)
@@ -46,7 +46,7 @@ def map_of(method: str, stiffest_n_per_m: float, last_n_s_per_m: float, case: Ca
 
 
 def zwidth(maps: list[Map]) -> ZWidth:
-    """Return maps as the study of them has them."""
+    """Return maps as a result of the study `zwidth`."""
     return ZWidth(load("seed-2011"), maps, [], NOTHING)
 
 
@@ -57,7 +57,7 @@ def maps() -> ZWidth:
 
 
 def rows() -> Accuracy:
-    """Return what is measured for Figure 2."""
+    """Return the rows that are measured for Figure 2."""
     found = [
         curve.job("paper", rate) | {"rms_mm_s": 1e4 / rate / (1 + number), "backend": "float"}
         for number, curve in enumerate(figures.curves(2))
@@ -68,7 +68,7 @@ def rows() -> Accuracy:
 
 
 def bits_dropped() -> bits.Bits:
-    """Return what bits buy two estimators."""
+    """Return the errors and sizes of two estimators with some bits of velocity dropped."""
     rows = [
         {"estimator": estimator, "output": output, "sample_hz": 1_000_000, "velocity_bits": 20 - dropped}
         | {"rms_mm_s": (0.1 + dropped) * scale, "lut4": 500 * scale - dropped}
@@ -79,7 +79,7 @@ def bits_dropped() -> bits.Bits:
 
 
 def devices() -> cutoff.Cutoffs:
-    """Return two devices: one whose best cutoff is inside, and one whose best is at the end."""
+    """Return the cutoffs of two devices: one optimum inside the range, and one at its end."""
     scene = load("seed-2011")
     found = []
     for best in (500, 4000):
@@ -89,7 +89,7 @@ def devices() -> cutoff.Cutoffs:
 
 
 def search() -> gains.Search:
-    """Return a search of few gains, the best of which is within the condition, too."""
+    """Return a search of few gains, where the best gains also meet the condition."""
     scene, lambdas, alphas = load("seed-2011"), np.geomspace(1, 100, 5), np.geomspace(1, 1000, 6)
     pairs = [Gains(lam, alpha) for lam in lambdas.tolist() for alpha in alphas.tolist()]
     own = {pair: map_of("adjusted", 500 * pair.lambda_sqrt_m_per_s, 180) for pair in pairs}
@@ -100,7 +100,7 @@ def search() -> gains.Search:
 
 
 def dropped() -> Drop:
-    """Return the four experiments, with a handle that fled, and a law without end."""
+    """Return the four experiments, with a handle that left the wall, and a law without an end."""
     scene = load("seed-2011")
     curves = drop.curves(scene)
     found = {}
@@ -127,7 +127,7 @@ def fit() -> lipschitz.Lipschitz:
 
 
 def rate_gains() -> rates.Rates:
-    """Return what rate buys two methods, and the linear limits, one of which leaves the picture."""
+    """Return the maps of two methods over the rate, and the linear limits, one of which leaves the picture."""
     hz = [1_000, 10_000, 1_000_000]
     found = []
     for method, scale in (("adjusted", 1.0), ("fdm-500", 1.1)):
@@ -138,7 +138,7 @@ def rate_gains() -> rates.Rates:
 
 
 def traded() -> trade.Trade:
-    """Return a trade of every shortcut of drive-2011, of times and errors by chance."""
+    """Return a trade of every shortcut of drive-2011, with random times and errors."""
     scene = load("drive-2011")
     chance = np.random.default_rng(2)
     points = []

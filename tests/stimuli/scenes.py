@@ -1,4 +1,4 @@
-"""Changes of scenes that more than one test makes: the parts of a device, and short protocols."""
+"""Changes of scenes that several tests share: the parts of a device, and short protocols."""
 
 AMPLIFIER = {"amplifier.bandwidth_hz": 400.0}
 CABLE = {

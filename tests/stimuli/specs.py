@@ -1,4 +1,4 @@
-"""Axes to test on: the founding paper's device at two rates, and formats at their extremes."""
+"""Axes for tests: the founding paper's device at two rates, and formats at their extremes."""
 
 import math
 from functools import cache
@@ -47,7 +47,7 @@ EVERY_OUTPUT = [(name, output) for name in registry.ESTIMATORS for output in reg
 
 @cache
 def spec(name: str, estimator: str = "levant") -> AxisSpec:
-    """Return the axis of that name; gains only where the estimator has them."""
+    """Return the axis of that name, with gains only where the estimator has them."""
     fields = dict(SPECS[name])
     if estimator != "levant":
         fields.pop("gains", None)
