@@ -40,7 +40,7 @@ def stimulus(name: str, samples: int):
     reset, top = reset_words(d), [word.format.max for word in d.words]
     two = d.words_for(spec(name, "kalman").design.gains, integrators=2)
     double = [word.from_si(two[word.name]) for word in d.words]
-    # Standing at any count, from the first sample on.
+    # A standstill at any count, from the first sample on.
     for _ in range(20):
         yield half - 1, 0, *reset
     # A smooth motion through the wrap of the count.
@@ -49,16 +49,16 @@ def stimulus(name: str, samples: int):
     smooth = np.floor(half * (1 + 0.5 * np.sin(t * turn)) + random.random(len(t))).astype(np.int64)
     for k, count in enumerate(smooth.tolist()):
         yield count, 0, *(double if k > samples // 8 else reset)
-    # Full swings, worst for overflow of one or the other; with words at their ends, until everything saturates.
+    # Full swings, the worst case for overflow of some state, with words at their ends, until everything saturates.
     for period in (1, 2, 3, 7, 50):
         for chosen in (reset, double, top, [0, *top[1:]], [top[0], 0, 0], [top[0], 0, top[2]]):
             for k in range(samples // 200):
                 yield (-half, half // 2 - 1, half - 1)[k // period % 3], 0, *chosen
-    # Faster than the axis, held: the count outruns a position that does not follow, and one that does.
+    # Long runs faster than the axis allows: the count outruns a position that follows, and one that does not.
     for chosen in ([0, 0, 0], [0, top[1], 0], [0, 0, top[2]], [1, 1, 1], top):
         for k in range(min(samples // 20, 2 * d.lead.max // (d.step_max << d.lead.f))):
             yield k * (d.step_max + 1), 0, *chosen
-    # A walk with jumps and restarts, gains anywhere.
+    # A random walk with jumps and restarts, with gains anywhere in their range.
     count, chosen = 0, reset
     for _ in range(samples // 2):
         jump = random.random() < 0.01
@@ -73,7 +73,7 @@ async def follows_model(dut):
     name = parameters()["name"]
     samples = SAMPLES if name == "mhz" else SAMPLES // 10
     expected = await follow(dut, make(name), stimulus(name, samples), START)
-    # The campaign is worth its name only if it reached each saturation, and the quiet track too.
+    # The campaign must reach every saturation, and the quiet track too.
     assert 0 in expected["saturated"]
     assert np.bitwise_or.reduce(expected["saturated"]) == 0b111
 
@@ -98,7 +98,7 @@ def test_rtl(name):
 
 
 def oracle(d: Design, rows):
-    """The module's equations in exact rationals, rounded only where it says so, on the unwrapped position."""
+    """Yield the outputs of the module's equations in exact rationals, rounded as documented, on unwrapped positions."""
     fine_x, fine_v, fine_a = (Fraction(1, 2**fmt.f) for fmt in (d.lead, d.v, d.a))
     coarse, out = Fraction(1, 2**d.operand.f), Fraction(1, 2**d.velocity.f)
     far, fast, hard = d.lead.max * fine_x, d.velocity.max * out, d.a.max * fine_a
@@ -137,7 +137,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
 
 @pytest.mark.parametrize("index", 2.0 ** np.arange(-8, 7, 2))
 def test_gains_are_those_of_the_riccati_equation(index):
-    """To a hundredth of what a gain word resolves."""
+    """The gains agree to a hundredth of a gain word's resolution."""
     h = float(index)
     a = np.array([[1, h, h**2 / 2], [0, 1, h], [0, 0, 1]])
     q = np.array([[h**5 / 20, h**4 / 8, h**3 / 6], [h**4 / 8, h**3 / 3, h**2 / 2], [h**3 / 6, h**2 / 2, h]])
@@ -159,7 +159,7 @@ def test_default_bandwidth_is_that_of_the_bound_at_any_rate():
     for rate in (100_000, 1_000_000, 10_000_000):
         axis = axis_at("kalman", rate)
         expected = math.sqrt(BOUND / axis.count_m) / rate
-        # tanh, exp and coth are linear to the ratio of a sample to the minimax window.
+        # tanh, exp and coth are linear up to a relative error of a sample over the minimax window.
         assert axis.design.gains.index(axis) == pytest.approx(expected, rel=expected)
 
 
@@ -173,18 +173,21 @@ def test_the_algorithm_is_the_textbooks():
         state = PREDICT @ state
         state += gains * (count - state[0])
         expected[k] = state[1]
-    # Its position rounds to float64's 53 bits of the distance covered, some times a sample.
+    # The textbook's position rounds some times a sample to float64's 53 bits of the distance covered.
     assert np.abs(seen - expected).max() <= 64 * 2.0**-53 * np.abs(counts).max()
 
 
 def system(gains):
-    """Return the matrix of the states (x, v, a) after an update, the update's, and the first samples of an input d."""
+    """Return the matrix of the states (x, v, a) after an update, that of the update, and the response to an input d."""
     update = np.eye(3) - np.outer(gains, [1, 0, 0])
     return update @ PREDICT, update, update @ np.array([-1, 0, 0])
 
 
 def rounding(d_bits: tuple[int, int, int], gains, samples: int) -> float:
-    """Return the most that all floors come to at v, in LSB of lead; bits that (v, a, operand) have beyond lead's."""
+    """Return the largest error at v from all floors, in LSB of lead.
+
+    `d_bits` holds the fraction bits that (v, a, operand) have in addition to those of lead.
+    """
     a, update, lead = system(gains)
     v_bits, a_bits, operand_bits = d_bits
 
@@ -194,7 +197,7 @@ def rounding(d_bits: tuple[int, int, int], gains, samples: int) -> float:
     of_x = at_v(lead) + at_v([1, 0, 0])
     of_v = at_v([0, 1, 0])
     if gains[2] == 0:
-        # a is 0, exactly.
+        # The acceleration a is exactly 0.
         return of_x + of_v * 2.0**-v_bits + at_v(gains) * 2.0**-operand_bits
     of_v += at_v(update @ [0.5, 1, 0])
     return of_x + of_v * 2.0**-v_bits + at_v([0, 0, 1]) * 2.0**-a_bits + at_v(gains) * 2.0**-operand_bits
@@ -217,7 +220,7 @@ def test_the_norms_are_those_of_the_module(integrators):
         error = rounding((reach, 2 * reach, -max(reach - 1, 0)), gains, samples)
         assert error <= kalman.ERROR_NORM
         used.append([v / bounds[0], error / kalman.ERROR_NORM])
-    # What they are for: all errors together are less than half an LSB.
+    # Their purpose: all errors together are less than half an LSB.
     assert kalman.ERROR_NORM * 2.0**-kalman.GUARD_BITS < 0.5
     assert integrators == 2 or (np.max(used, 0) > 0.95).all()
 
@@ -228,7 +231,7 @@ SLOW = Gains.default(axis_at("fdm", 1_000_000)).__dict__ | {"acceleration_time_s
 @pytest.mark.parametrize("sample_hz", RATES)
 @pytest.mark.parametrize("gains", [None, Gains(**SLOW)], ids=["default", "slow"])
 def test_fixed_is_float_within_the_derived_bound(sample_hz, gains):
-    """On the paper's signal: rounding within its norms, gains by their exact response; all within 1 % of the error."""
+    """On the paper's signal, rounding is within its norms; with the gains' errors it is within 1 % of the error."""
     axis = axis_at("kalman", sample_hz, gains=gains)
     d = axis.design.estimator
     counts, truth = swing(sample_hz, SECONDS[sample_hz])
@@ -242,7 +245,7 @@ def test_fixed_is_float_within_the_derived_bound(sample_hz, gains):
     bits = tuple(fmt.f - d.lead.f for fmt in (d.v, d.a, d.operand))
     samples = int(60 / min(axis.design.gains.index(axis), 1)) + 200
     bound = rounding(bits, np.array(params[:3]), samples) * d.lead.lsb + d.velocity.lsb / 2
-    # Float64 itself is short of the states' bits by little.
+    # Float64 itself has slightly fewer bits than the states need.
     assert np.abs(fixed.velocity * d.velocity.lsb - as_rounded).max() <= bound * (1 + 1e-6)
     assert not fixed.flags.any()
     judged = slice(len(counts) // 5, None)
@@ -251,7 +254,7 @@ def test_fixed_is_float_within_the_derived_bound(sample_hz, gains):
 
 
 def test_three_integrators_are_better_than_two():
-    """On the paper's signal, by the same noise model."""
+    """Both filter the paper's signal with the same noise model."""
     axis = axis_at("kalman", 100_000)
     counts, truth = swing(100_000, 5.0)
     two = axis.design.estimator.words_for(axis.design.gains, integrators=2)
@@ -261,7 +264,7 @@ def test_three_integrators_are_better_than_two():
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
 def test_every_state_settles_to_the_exact_speed(name):
-    """From anywhere: no cycle and no dead zone is left in the velocity."""
+    """No limit cycle and no dead zone remains in the velocity, from any state."""
     axis, random = spec(name, "kalman"), rng()
     d = axis.design.estimator
     settled = int(80 / min(axis.design.gains.index(axis), 1)) + 1000
@@ -280,7 +283,7 @@ def test_every_state_settles_to_the_exact_speed(name):
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
 def test_no_input_overflows(name):
-    """The worst input for each state: the signs of its impulse response."""
+    """The worst input for a state has the signs of its impulse response."""
     d = design(name)
     params = reset_params(d)
     a, _, first = system([word.reset * word.format.lsb for word in d.words])

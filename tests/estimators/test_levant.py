@@ -38,7 +38,7 @@ def test_rtl(name):
 
 
 def oracle(d: levant.Design, rows):
-    """The module's equations in exact rationals, rounded only where it says so, on the unwrapped position."""
+    """Yield the outputs of the module's equations in exact rationals, rounded as documented, on unwrapped positions."""
     lsb = Fraction(1, 2**d.velocity.f)
     v_max, e_max = d.velocity.max * lsb, d.error.max * lsb
     modulus, half = 2**d.count_width, 2 ** (d.count_width - 1)
@@ -52,7 +52,7 @@ def oracle(d: levant.Design, rows):
         last = count
         e = max(-e_max, min(e_max, x - position))
         flags = int(e != x - position)
-        # The root down to its LSB, and half of it added back.
+        # The root is rounded down to its LSB, and half an LSB is added back.
         scale = 2**d.root.f
         root = Fraction(math.isqrt(math.floor(abs(e) * scale**2)), scale) + Fraction(1, 2 * scale)
         step = math.floor(lam * root / lsb + Fraction(1, 2)) * lsb
@@ -74,7 +74,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
 
 @pytest.mark.parametrize("name", ["paper", "proposed", "mhz"])
 def test_rounding_is_a_small_change_of_position(name):
-    """Every u follows exactly, without rounding, from an error changed by no more than the derived eta."""
+    """Every u is the unrounded output for an error changed by no more than the derived eta."""
     d, axis = design(name), spec(name)
     lam = words(name)["levant_lambda"] * d.lambda_.lsb
     delta = lam * 2.0 ** -(d.root.f + 1) + 2.0 ** -(d.velocity.f + 1)
@@ -94,7 +94,7 @@ def test_rounding_is_a_small_change_of_position(name):
             assert eta <= 2 * math.sqrt(abs(e)) * delta / lam + (delta / lam) ** 2 + 1e-9
             if abs(e) <= 1:
                 largest = max(largest, eta)
-    # The bound is no luxury: a good part of the budget is used.
+    # The bound is needed: a good part of the budget is used.
     assert levant.POSITION_BUDGET / 8 < largest <= levant.POSITION_BUDGET + (delta / lam) ** 2
 
 

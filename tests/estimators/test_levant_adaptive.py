@@ -31,12 +31,12 @@ def make(name: str) -> Estimator:
 
 
 def stimulus(d: levant_adaptive.Design, samples: int):
-    """Yield the rows of the family; then calm to the last level, losses of all sizes out of it, and a restart there."""
+    """Yield the family's rows, then calm down to the last level, losses of all sizes from it, and a restart there."""
     yield from levants.stimulus(d, samples // 2)
     random, reset, count = rng(), reset_words(d)[:2], 0
     most = max(samples // 20, 1)
     for run in range(10):
-        # The first samples after a jump are there to be tracked, the rest for calm.
+        # The first samples after a jump are for tracking, the rest for calm.
         for k in range(most):
             count += int(random.random() < 0.01) if run % 2 else 0
             yield count, int(k == 0 and run == 4), *reset, k & 1
@@ -55,7 +55,7 @@ def test_rtl(name):
 
 
 def visit(d: levant_adaptive.Design, counts) -> list[levant_adaptive.State]:
-    """Return the states after each of the counts, words as after reset."""
+    """Return the state after every count, with the words as after reset."""
     params, state, states = d.params({word.name: word.reset for word in d.words}), START, []
     for count in counts:
         state, _, _ = estimate(params, state, seen_count(int(count)), 0)
@@ -73,7 +73,7 @@ def test_the_campaign_sees_every_level():
 
 
 class Law:
-    """The law as its module words it, from the whole history of signs and sizes since the start."""
+    """The law as its module states it, from the whole history of signs and sizes since the start."""
 
     def __init__(self, d):
         self.d = d
@@ -122,7 +122,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
 
 @pytest.mark.parametrize("rate", [10_000, 100_000])
 def test_rounding_is_a_small_change_of_position(rate):
-    """Every u follows exactly, without rounding, from a beyond changed by no more than the derived eta."""
+    """Every u is the unrounded output for a `beyond` changed by no more than the derived eta."""
     axis = axis_at(NAME, rate, 12.0)
     d = axis.design.estimator
     t = np.arange(20_000) / axis.sample_hz
@@ -138,7 +138,7 @@ def test_rounding_is_a_small_change_of_position(rate):
         lam = d.lambda_.to_real(d.words[0].reset) * 2.0 ** (-level / 2)
         near = min(abs(b), (d.words[1].reset >> level) * d.velocity.lsb)
         beyond, g = abs(b) - near, math.copysign(1, b) * (lead.u1 - velocity) * d.velocity.lsb
-        # At odd levels the root is that of half the radicand.
+        # At odd levels the root is taken of half the radicand.
         delta = lam * 2.0 ** -(d.root.f + 1) * math.sqrt(1 + level % 2) + 2.0 ** -(d.velocity.f + 1)
         eta = abs(max((g / lam) ** 2, g) - beyond)
         assert eta <= max(2 * math.sqrt(beyond) * delta / lam + (delta / lam) ** 2, delta) + 1e-9
@@ -147,7 +147,7 @@ def test_rounding_is_a_small_change_of_position(rate):
 @pytest.mark.parametrize("bound", [BOUND, 12.0])
 @pytest.mark.parametrize(("rate", "runs"), [*zip(RATES, (200, 200, 40, 8, 2), strict=True)])
 def test_word_length_costs_a_hundredth_at_every_rate(rate, runs, bound):
-    """Of many runs: a rounding that tips a loss makes another run of it, 2 to 8 % better or worse below 1 MHz."""
+    """Errors are RMS over many runs: a rounding that tips a loss changes a run by 2 to 8 % either way below 1 MHz."""
     exact, fixed = levants.rms_errors(axis_at(NAME, rate, bound), "u", 0.4, runs)
     assert abs(fixed - exact) <= 0.01 * exact
 
@@ -155,7 +155,10 @@ def test_word_length_costs_a_hundredth_at_every_rate(rate, runs, bound):
 @pytest.mark.parametrize("acceleration", [0.1, -1.0, 10.0])
 @pytest.mark.parametrize("rate", [10_000, 100_000])
 def test_a_step_of_acceleration_after_rest_is_seen_within_the_derived_error_and_time(rate, acceleration):
-    """sqrt(2 (LOST + 1) A q) and sqrt(2 (LOST + 1) q / A), a sample more; and as it is seen, lambda_j's step."""
+    """The error is sqrt(2 (LOST + 1) A q) and the time sqrt(2 (LOST + 1) q / A), each plus a sample.
+
+    At the sample that detects the step, lambda_j's step may exceed the error.
+    """
     axis_spec = axis_at(NAME, rate, 12.0)
     d, tau, steep = axis_spec.design.estimator, 1 / rate, abs(acceleration)
     error = math.sqrt(2 * (LOST + 1) * steep * COUNT_M) + steep * tau
@@ -175,7 +178,7 @@ def test_a_step_of_acceleration_after_rest_is_seen_within_the_derived_error_and_
 
 
 def rms(name: str, rate: int, bound: float, counts: np.ndarray, truth: np.ndarray, first: int = 0) -> float:
-    """Return the RMS error of u, m/s, from a sample on."""
+    """Return the RMS error of u, m/s, from sample `first` on."""
     velocity = levants.axis(axis_at(name, rate, bound)).run(counts).velocity_m_per_s
     return math.sqrt(np.mean((velocity - truth)[first:] ** 2))
 
@@ -195,7 +198,7 @@ def test_slow_constant_speeds_are_ten_times_quieter(speed):
 
 
 def test_a_hit_is_followed():
-    """0.3 m/s into 10 kN/m with 0.35 kg, then rest: no worse than gains made for it, and quieter after it."""
+    """A hit of 0.35 kg at 0.3 m/s into 10 kN/m, then rest: no worse than gains made for it, and quieter afterwards."""
     rate, speed, omega = 100_000, 0.3, math.sqrt(10e3 / 0.35)
     t = np.arange(round(0.6 * rate)) / rate - 0.3
     braking = np.clip(t, 0, np.pi / 2 / omega)

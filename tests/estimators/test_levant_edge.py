@@ -32,7 +32,7 @@ def make(name: str) -> Estimator:
 
 
 class Scale:
-    """A decoder's outputs, made by hand: edges pass, time goes by, and any of it wraps."""
+    """A decoder's outputs, made by hand: edges pass, time goes by, and both count and stamps wrap."""
 
     def __init__(self, d: levant_edge.Design, now: int = 0, count: int = 0):
         self.d, self.now, self.count = d, now, count
@@ -52,12 +52,12 @@ class Scale:
 
 
 def stimulus(d: levant_edge.Design, samples: int):
-    """Yield rows: motion at every pace, through every wrap; rests, vibration, noise; gains at their ends."""
+    """Yield rows: motion at every speed, through every wrap; rests, vibration, noise; gains at their ends."""
     random = rng()
     half, top = 1 << (d.count_width - 1), [word.format.max for word in d.words]
     scale = Scale(d, now=(1 << d.stamp_width) - 3 * d.clocks, count=half - 5)
     gains, restart = reset_words(d), 0
-    # Faster than the velocity format either way, long enough for the shortest interval in use.
+    # Motion faster than the velocity format in both directions, long enough for the shortest interval in use.
     fast = (d.velocity.max >> d.velocity.f) + 2
     for k in range(6 * ((4 << d.shortest) // d.clocks + 20)):
         scale.now += d.clocks
@@ -69,7 +69,7 @@ def stimulus(d: levant_edge.Design, samples: int):
         draw = random.random()
         gains = reset_words(d) if draw < 0.6 else [int(random.integers(0, most + 1)) for most in top]
         gains = [0, 0] if draw > 0.98 else top if draw > 0.9 else gains
-        # A rest, up to where stamps come round.
+        # A rest, at most until the stamps wrap.
         scale.now += int(2.0 ** random.uniform(0, d.stamp_width)) if random.random() < 0.3 else 0
         for _ in range(int(random.integers(5, 60))):
             scale.now += d.clocks
@@ -94,8 +94,8 @@ async def follows_model(dut):
     name = parameters()["name"]
     samples = SAMPLES // 10 if name == "narrow" else SAMPLES
     expected = await follow(dut, make(name), stimulus(design(name), samples), START)
-    # The campaign is worth its name only if it reached both saturations, and the quiet track too. The narrow count
-    # can hardly tell so many edges in the shortest interval as would be an error beyond the velocity's format.
+    # The campaign must reach both saturations, and the quiet track too. The narrow count can hardly hold enough edges
+    # in the shortest interval for an error beyond the velocity's format.
     assert 0 in expected["saturated"]
     seldom = 0b01 if name == "narrow" else 0
     assert np.bitwise_or.reduce(expected["saturated"]) | seldom == 0b11
@@ -128,7 +128,7 @@ def test_rtl(name):
 
 
 class Oracle:
-    """The module's equations in exact rationals, rounded down to an LSB where it says so; positions not wrapped."""
+    """The module's equations in exact rationals, rounded down to an LSB as documented, on unwrapped positions."""
 
     def __init__(self, d: levant_edge.Design):
         self.d, self.known = d, None
@@ -145,7 +145,7 @@ class Oracle:
         return clocks // unit * unit, unit
 
     def turn(self, clocks):
-        """Of the product, the bits below those that the longest time leaves are dropped first."""
+        """Return the change of velocity; the product first loses the bits below those that the longest time leaves."""
         v, (time, unit) = self.d.velocity, self.time(clocks)
         kept = self.down_to(self.a * time / unit, v, v.f + self.d.turn_span)
         return self.fit(self.down_to(kept * unit, v), v.i + 1, v.f)
@@ -242,9 +242,9 @@ def _run(params, state, columns, out):
 
 
 def columns(axis, passed, samples: int) -> np.ndarray:
-    """Return what every strobe sees (fields of `Seen`, samples) of edges of a motion; found without a decoder.
+    """Return the decoder's outputs at every strobe (fields of `Seen`, samples) for a motion's edges, without a decoder.
 
-    An edge passed by clock n is stamped n, and the strobe of sample k sees those passed by clock k D.
+    An edge passed by clock n is stamped n, and the strobe of sample k sees the edges passed by clock k D.
     """
     assert passed.start_cell % 4 == 0
     clocks = passed.edges.clocks - axis.clocks_per_sample + 1 + DECODER_CLOCKS
@@ -269,7 +269,7 @@ def columns(axis, passed, samples: int) -> np.ndarray:
 
 
 def run(axis, seen: np.ndarray, floating: bool) -> tuple[np.ndarray, int]:
-    """Return the velocities (m/s) and the flags that were raised."""
+    """Return the velocities (m/s) and all flags raised."""
     d, out = axis.design.estimator, np.zeros(seen.shape[1], np.float64 if floating else np.int64)
     if floating:
         params, state = d.float_params(axis.design.gains, "u", {}), FLOAT_START
@@ -281,7 +281,7 @@ def run(axis, seen: np.ndarray, floating: bool) -> tuple[np.ndarray, int]:
 
 @cache
 def motion(name: str, sample_hz: int, seconds: float, phase: float = 0.0, clock_hz: int = 0):
-    """Return (axis, what it sees, the exact velocities) of a signal, with gains for the C of a wall hit."""
+    """Return (axis, decoder's outputs, exact velocities) of a signal, with gains for the C of a wall hit."""
     axis = accuracy.axis_spec("levant-edge", sample_hz, signals.DEVICE_ACCELERATION)
     axis = replace(axis, clock_hz=clock_hz) if clock_hz else axis
     signal = replace(signals.load(name), seconds=seconds)
@@ -298,7 +298,7 @@ def rms(values) -> float:
 @pytest.mark.parametrize(("phase", "wanted"), [(0.0, 0.10e-3), (0.25, 0.15e-3)])
 @pytest.mark.parametrize("floating", [True, False])
 def test_the_paper_s_signal_at_1_mhz(floating, phase, wanted):
-    """Gains for 12 m/s^2, not for the 1.7 of the signal. What is measured is far better: the module has the table."""
+    """The gains are for 12 m/s^2, not for the signal's 1.7; the module's table has the far smaller measured errors."""
     axis, seen, exact = motion("paper", 1_000_000, 5.0, phase)
     velocity, flags = run(axis, seen, floating)
     assert flags == 0
@@ -321,13 +321,14 @@ def test_words_cost_a_hundredth_of_the_error_at_most(sample_hz, seconds, judged_
 
 @pytest.mark.parametrize("sample_hz", [1_000, 10_000, 100_000, 1_000_000, 10_000_000])
 def test_one_sample_of_words_is_within_the_derived_bound_of_the_algorithm(sample_hz):
-    """From one and the same state, with the gains as the words have them.
+    """Both take a sample from the same state, with the gains of the words.
 
-    With d the LSB of the velocity: a change over T clocks is rounded twice, 2 d in all, and half of it once more; the
-    error of place once, after the multiplier and after its place, by 2**(1 - shortest) of an LSB of d T each, so it is
-    off by (2 + 1 + 2) d T at most; the quotient once: 6 d. The root's limit is off by the root's LSB and by that of
-    the radicand, which is no more, and once by d. The acceleration is off by 2**-L of what the slope is, and its LSB;
-    over the age it makes the rest, with 2 d more. Times that are cut move all by 2**(1 - mantissa) of what they are of.
+    Let d be the LSB of the velocity. A change over T clocks is rounded twice, 2 d in all, and its half once more. The
+    error of position is rounded after the multiplier and after its place, by 2**(1 - shortest) of an LSB of d T each,
+    so it is off by at most (2 + 1 + 2) d T; the quotient is rounded once: 6 d. The root's limit is off by the root's
+    LSB, by that of the radicand, which is no larger, and once by d. The acceleration is off by 2**-L of the slope's
+    error and by its own LSB; over the age it gives the rest, with 2 d more. Cut times change every term by a relative
+    2**(1 - mantissa).
     """
     axis, seen, _ = motion("paper", sample_hz, 0.4 if sample_hz > 1_000_000 else 5.0)
     d, words = axis.design.estimator, {word.name: word.reset for word in axis.design.estimator.words}
@@ -372,7 +373,7 @@ def walk(name: str, rows):
 
 
 def steady(d, samples: int, every: int, scale: Scale | None = None, up: bool = True):
-    """Yield rows of an axis with an edge every so many samples."""
+    """Yield rows of an axis with an edge every `every` samples."""
     scale = scale or Scale(d)
     for k in range(samples):
         scale.now += d.clocks
@@ -386,14 +387,14 @@ def test_start_makes_no_transient_and_the_second_edge_gives_a_velocity():
     seen = walk("mhz", steady(d, 60_000, 100))
     assert seen[:199] == [(0, 0)] * 199
     assert seen[199][0] > 0
-    # Learning rests once less than half an LSB is left to learn: two places may be so far off. The rest is rounding.
+    # Learning stops when less than half an LSB remains, so two places may be that far off. The rest is rounding.
     unlearnt = 2.0**LEARN_SHIFT * d.place.lsb / (100 * d.clocks) / d.velocity.lsb
     assert max(abs(velocity - 2**d.velocity.f / 100) for velocity, _ in seen[50_000:]) <= unlearnt + 6
 
 
 @pytest.mark.parametrize("every", [50, 1000])
 def test_an_axis_that_stops_reads_exactly_zero(every):
-    """At constant speed, after twice the last interval and a half, rounded up; and it stays so."""
+    """After a stop from constant speed, the velocity is 0 within five times the last interval, and stays 0."""
     d = design("mhz")
     scale = Scale(d)
     moving = list(steady(d, 8 * every, every, scale))
@@ -432,7 +433,7 @@ def test_restart_mid_motion_starts_afresh():
 
 @pytest.mark.parametrize(("name", "tolerance"), [("steady:1000", 2e-3), ("steady:0.1", 0.05)])
 def test_no_drift_at_the_ends_of_speed(name, tolerance):
-    """Relative: at speed the stamp over the shortest interval, below, how far 8 edges have come."""
+    """The relative error is the stamp's over the shortest interval at speed, and that of 8 edges when slow."""
     axis, seen, exact = motion(name, 1_000_000, 1.0)
     velocity, flags = run(axis, seen, False)
     assert flags == 0

@@ -55,7 +55,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
 
 
 def test_the_closed_form_solves_the_generalised_equation():
-    """With z and gains that float64 holds exactly: e+ and a selection S of the set-valued sign, for every b."""
+    """Every b has a solution e+ and a selection S of the set-valued sign, for z and gains exact in float64."""
     random = rng()
     for _ in range(2000):
         lam, alpha = (float(2.0 ** random.integers(-6, 6)) for _ in range(2))
@@ -63,7 +63,7 @@ def test_the_closed_form_solves_the_generalised_equation():
         size = alpha * float(random.integers(0, 17)) / 16 if z == 0 else alpha + lam * z + z**2
         b = float(random.choice([-1, 1])) * size
         params = levant_implicit.FloatParams(lam, alpha, 0, 40)
-        # From e+ + u1 = b with the count at rest, u1 = 0.
+        # The start is e+ + u1 = b with the count at rest and u1 = 0.
         state, u, _ = estimate(params, FLOAT_START._replace(running=1, lead=b), seen_count(0), 0)
         after, selection, g = state.lead - state.u1, -state.u1 / alpha, state.u1 - u
         assert abs(selection) <= 1
@@ -74,7 +74,7 @@ def test_the_closed_form_solves_the_generalised_equation():
 
 @pytest.mark.parametrize("name", ["paper", "mhz"])
 def test_rounding_is_a_small_change_of_position(name):
-    """Every u follows exactly, without rounding, from a beyond changed by no more than the derived eta."""
+    """Every u is the unrounded output for a `beyond` changed by no more than the derived eta."""
     d, axis = design(name), spec(name, NAME)
     lam, alpha = d.lambda_.to_real(d.words[0].reset), d.alpha.to_real(d.words[1].reset)
     delta = lam * 2.0 ** -(d.root.f + 1) + 2 * 2.0 ** -(d.velocity.f + 1)
@@ -89,5 +89,5 @@ def test_rounding_is_a_small_change_of_position(name):
         assert eta <= slope * delta / lam + (delta / lam) ** 2 + floor + 1e-9
         if beyond <= 1:
             largest = max(largest, eta)
-    # The bound is no luxury: a good part of the budget is used.
+    # The bound is needed: a good part of the budget is used.
     assert POSITION_BUDGET / 8 < largest <= POSITION_BUDGET + (delta / lam) ** 2 + floor

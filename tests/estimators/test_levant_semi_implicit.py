@@ -53,7 +53,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
 
 
 def test_the_projection_solves_the_generalised_equation():
-    """With rationals whose root is one: e+ and a selection S of the set-valued sign, for every b."""
+    """Every b has a solution e+ and a selection S of the set-valued sign, for rationals with rational roots."""
     random = rng()
     for _ in range(2000):
         lam, alpha = (float(2.0 ** random.integers(-6, 6)) for _ in range(2))
@@ -62,7 +62,7 @@ def test_the_projection_solves_the_generalised_equation():
             alpha * float(random.integers(0, 17)) / 16 if root == 0 else alpha + root**2
         )
         params = levant_semi_implicit.FloatParams(lam, alpha, 0, 40)
-        # From e+ + u1 = b with the count at rest, u1 = 0.
+        # The start is e+ + u1 = b with the count at rest and u1 = 0.
         state, u, _ = estimate(params, FLOAT_START._replace(running=1, lead=b), seen_count(0), 0)
         after, selection, g = state.lead - state.u1, -state.u1 / alpha, state.u1 - u
         assert abs(selection) <= 1
@@ -72,7 +72,7 @@ def test_the_projection_solves_the_generalised_equation():
 
 @pytest.mark.parametrize("name", ["paper", "mhz"])
 def test_rounding_is_a_small_change_of_position(name):
-    """Every u follows exactly, without rounding, from a beyond changed by no more than the derived eta."""
+    """Every u is the unrounded output for a `beyond` changed by no more than the derived eta."""
     d, axis = design(name), spec(name, NAME)
     lam, alpha = d.lambda_.to_real(d.words[0].reset), d.alpha.to_real(d.words[1].reset)
     delta = lam * 2.0 ** -(d.root.f + 1) + 2.0 ** -(d.velocity.f + 1)
@@ -85,5 +85,5 @@ def test_rounding_is_a_small_change_of_position(name):
         assert eta <= max(2 * math.sqrt(beyond) * delta / lam + (delta / lam) ** 2, delta) + 1e-9
         if beyond <= 1:
             largest = max(largest, eta)
-    # The bound is no luxury: a good part of the budget is used.
+    # The bound is needed: a good part of the budget is used.
     assert POSITION_BUDGET / 8 < largest <= max(POSITION_BUDGET, delta) + (delta / lam) ** 2

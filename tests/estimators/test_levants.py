@@ -1,4 +1,4 @@
-"""What several of Levant's differentiators promise alike; each has a test of its own for the rest."""
+"""Promises that several of Levant's differentiators share; every one has its own test for the rest."""
 
 import levants
 import pytest

@@ -46,7 +46,7 @@ async def follows_model(dut):
 
 
 def on_pins(seen: dict[str, int]) -> dict[str, int]:
-    """Return what is seen of the decoder by the names of the ports."""
+    """Return the decoder's outputs by the names of the ports."""
     return {f"seen__{name}": value for name, value in seen.items()}
 
 
@@ -112,7 +112,7 @@ def test_fixed_point_is_the_algorithm_rounded(rate):
 @pytest.mark.parametrize("rate", [1_000, 1_000_000])
 @pytest.mark.parametrize("speed", [1.03, 29.7, 973.0])
 def test_misplaced_edges_change_nothing_at_constant_speed(speed, rate):
-    """Within the stamp's own error, v / D, of the exact speed, whatever phase and duty are."""
+    """The speed is within the stamp's own error, v / D, of the exact one, for any errors of phase and duty."""
     signal = replace(signals.steady(speed), seconds=0.05 if speed > 2 else 0.5)
     axis = accuracy.axis_spec(NAME, rate, signals.DEVICE_ACCELERATION)
     v = speed * 1e-3 / axis.count_m / axis.clock_hz  # counts a clock
@@ -126,7 +126,7 @@ def test_misplaced_edges_change_nothing_at_constant_speed(speed, rate):
 
 
 def test_misplaced_edges_change_little_on_the_way():
-    """On the paper's signal the RMS error is as with ideal edges but for the few of each turn."""
+    """On the paper's signal the RMS error is that of ideal edges except for the few edges of every turn."""
     signal, rate = signals.paper(), 10_000
     axis = accuracy.axis_spec(NAME, rate, signal.acceleration_max_m_per_s2)
     true = exact(signal, axis, int(signal.seconds * rate))[rate:]
@@ -173,7 +173,7 @@ def test_first_sample_and_restart_read_zero(start):
 
 
 def test_an_old_edge_never_comes_back_as_a_new_one():
-    """Through many turns of the stamp, an axis at rest stays at 0, and one edge after that says nothing yet."""
+    """Through many wraps of the stamp, an axis at rest reads 0, and one edge after that gives no velocity yet."""
     d = design("mhz")
     params, state = d.params({}), START
     earlier = {"stamp_a_rise": 1, "stamp_b_rise": 1, "stamp_a_fall": 1, "stamp_b_fall": 1}

@@ -33,7 +33,7 @@ def make(name: str) -> Estimator:
 
 
 def with_words(d: period_count.Design, plain, random: np.random.Generator):
-    """Yield rows with a word: the reset one for most of the time, any for the rest."""
+    """Yield rows with a word: mostly the reset value, otherwise any value."""
     switch = reset_words(d)[0]
     for row in plain:
         if random.random() < 0.002:
@@ -63,7 +63,7 @@ def test_rtl(name):
 def speeds(d: period_count.Design, strobes, edges, switch: int):
     """Yield (velocity in counts a sample, whether counted), as the module's equations give them, unrounded."""
     cycle, counting, moved = None, False, 0
-    counts = []  # at the window's strobes
+    counts = []  # counts at the window's strobes
     for sight in sights(d, strobes, edges):
         if sight.restart:
             counting, moved, counts = False, 0, []
@@ -86,7 +86,7 @@ def speeds(d: period_count.Design, strobes, edges, switch: int):
 def test_model_is_the_exact_speed_rounded(name, switch):
     d, random = design(name), rng()
     switch = switch or reset_words(d)[0]
-    # No window may alias: that is the axis's range of speeds.
+    # No window may alias, so the speeds stay within the axis's range.
     strobes, edges = turn(d, random, 20_000, most=2 if name == "narrow" else None)
     seen = model(d, [(*row, switch) for row in rows(d, strobes, edges)], START)
     modes = {False: 0, True: 0}
@@ -106,7 +106,7 @@ def test_fixed_point_is_the_algorithm_rounded(rate):
 
 @pytest.mark.parametrize("rate", [10_000, 1_000_000])
 def test_errors_and_jumps_are_within_the_bounds(rate):
-    """Braked through the switching speed at the axis's acceleration: each mode keeps its promise."""
+    """Both modes keep their promise while the axis brakes through the switching speed at its largest acceleration."""
     bound = 12.0
     axis = accuracy.axis_spec(NAME, rate, bound)
     d, unit = axis.design.estimator, axis.velocity_unit_m_per_s
@@ -130,7 +130,7 @@ def test_errors_and_jumps_are_within_the_bounds(rate):
 
 @pytest.mark.parametrize("errors", [(0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.4)])
 def test_misplaced_edges_change_nothing_below_the_switching_speed(errors):
-    """Within the stamp's own error, v / D, of the exact speed."""
+    """The speed is within the stamp's own error, v / D, of the exact one."""
     signal = replace(signals.steady(29.7), seconds=0.05)
     axis = accuracy.axis_spec(NAME, 100_000, signals.DEVICE_ACCELERATION)
     seen, _ = velocities(signal, axis, "float", offsets(*errors))
@@ -142,7 +142,7 @@ def test_misplaced_edges_change_nothing_below_the_switching_speed(errors):
 
 @pytest.mark.parametrize(("name", "switch"), [("paper", None), ("narrow", 5)])
 def test_constant_speed_does_not_chatter(name, switch):
-    """Around the switching speed, with edges out of place by a quarter count: one switch at most."""
+    """There is at most one switch around the switching speed, with edges misplaced by a quarter count."""
     d = design(name)
     window, switch, half = 1 << d.window_bits, switch or reset_words(d)[0], 1 << (d.count_width - 1)
     params, late, counted = d.params({"period_count_switch": switch}), offsets((0.0, 0.25, 0.0, -0.25)), []

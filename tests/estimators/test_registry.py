@@ -1,4 +1,4 @@
-"""One list of estimators on each side, by the same names; no other is known."""
+"""The lists of estimators of hardware and model have the same names, and no other name is known."""
 
 import pytest
 

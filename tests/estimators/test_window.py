@@ -16,7 +16,7 @@ from stimuli.papers_signal import RATES, axis_at, piece
 from stimuli.specs import spec
 
 WINDOWS = {"mhz": None, "narrow": None, "paper": 3.0}
-"""In s, or the default: 3 s at 10 kHz are more samples than the memory holds."""
+"""Windows in s, or None for the default; 3 s at 10 kHz are more samples than the memory holds."""
 
 
 def design(name: str) -> window.Design:
@@ -37,7 +37,7 @@ def stimulus(name: str, samples: int):
     smooth = np.floor(half * (1 + 0.5 * np.sin(t * min(1, fast / half) / 2)) + random.random(len(t))).astype(np.int64)
     for count in smooth.tolist():
         yield count, 0, reset
-    # The largest speeds and beyond, both ways, for longer than any window where that is short; and at a standstill.
+    # The largest speeds and larger ones, in both directions, for longer than any short window; and a standstill.
     count = 0
     for way in (fast, -fast, fast + 1, -fast - 1, 0, 1, -1):
         for k in range(samples // 28):
@@ -78,7 +78,7 @@ def test_rtl(name):
 
 
 def oracle(d: window.Design, rows):
-    """The module's equations on lists of plain integers and exact rationals."""
+    """Yield the outputs of the module's equations on lists of plain integers and exact rationals."""
     half, most, every = 1 << (d.count_width - 1), d.history.change.max, d.history.every
     positions, last, velocity = [], None, 0
     for count, restart, length in rows:
@@ -119,7 +119,7 @@ def test_fixed_point_costs_less_than_an_lsb_and_a_hundredth_of_the_error(rate_hz
 
 @pytest.mark.parametrize("rate_hz", RATES)
 def test_the_error_is_within_the_guaranteed_bound(rate_hz):
-    """On the paper's signal, and on the parabola that attains the bound but for the rounding of counts."""
+    """The bound holds on the paper's signal, and on the parabola that attains it except for the rounding of counts."""
     axis, (counts, exact) = axis_at("window", rate_hz), piece(rate_hz)
     d, c = axis.design.estimator, axis.acceleration_max_m_per_s2 / axis.count_m / rate_hz**2
     (word,) = d.words
@@ -127,12 +127,12 @@ def test_the_error_is_within_the_guaranteed_bound(rate_hz):
     bound = c * (n / 2 + d.history.every - 1) + 2 * window.EPS_COUNTS / n + d.velocity.lsb
     velocity = Axis(axis).run(counts).velocity * d.velocity.lsb
     assert np.abs(velocity - exact / axis.velocity_unit_m_per_s)[n:].max() <= bound
-    # As long as the speed is within its range, and for a few windows at least.
+    # The parabola lasts as long as the speed is within its range, and at most 20 windows.
     k = np.arange(int(min(axis.speed_max_counts_per_sample / c, 20 * n)) + 1)
     parabola = np.floor(c * k**2 / 2).astype(np.int64)
     error = np.abs(Axis(axis).run(parabola).velocity * d.velocity.lsb - c * k)[n:].max()
     assert c * n / 2 <= error <= bound
-    # The default window is the minimax one, so that no other length promises less; and the bound is its minimum.
+    # The default window is the minimax one, so no other length promises a smaller error; the bound is its minimum.
     lengths = np.array([max(n - 1, 1), n, n + 1])
     promised = c * lengths / 2 + 2 * window.EPS_COUNTS / lengths
     if d.history.every == 1:
@@ -164,7 +164,7 @@ def test_a_start_or_restart_in_motion_rises_from_zero_without_a_transient():
 
 
 def test_nothing_drifts_in_long_runs_at_the_ends():
-    """The fastest, past every wrap of count and position, and the slowest: whatever the sum, the window forgets it."""
+    """The fastest motion, past every wrap of count and position, and the slowest: the window forgets any sum."""
     axis = spec("mhz", "window")
     d, n = axis.design.estimator, axis.design.estimator.history.longest
     k = np.arange(2_000_000)
