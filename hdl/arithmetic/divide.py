@@ -103,7 +103,7 @@ class Divide(wiring.Component):
         left = Signal(range(steps + 1))
 
         # The dividend's low bits leave at the top of the register that the quotient enters; the bits above them are
-        # the first remainder. The quotient fits if the dividend's bits above *quotient_width* are less than the divisor.
+        # the first remainder. The quotient fits if the dividend's bits above the quotient's are less than the divisor.
         rest, shifted = remainder, digits
         for _ in range(self.bits_per_clock):
             taken = Cat(shifted[-1], rest)

@@ -1,16 +1,16 @@
-"""Times of whole encoder cycles from the clock stamps of their edges: what a sample's stamps say, exactly.
+"""Times of whole encoder cycles from the clock stamps of their edges, exact to the stamps.
 
-An encoder's four edges of a cycle (A rise, B rise, A fall, B fall) may be out of place, each by its own error, but an
-edge is exactly 4 counts from the one of its kind in the next cycle: so a cycle is the time between two of one kind.
-`observe` subtracts the stamp of the last edge and the one of its kind that the sample before knew. That is a number of
-cycles only if all edges between went one way, as far as samples tell: the direction did not change, and the decoder's
-run covers the counts between.
+The four edges of an encoder's cycle (A rise, B rise, A fall, B fall) may be out of place, each kind by its own error,
+but an edge is exactly 4 counts from the edge of its kind in the next cycle, so the time of a cycle is the time between
+two edges of one kind. `observe` subtracts, from the stamp of the last edge, the stamp of its kind at the previous
+sample. The difference spans a whole number of cycles only if all edges between went in one direction, as far as samples
+show: the direction did not change, and the decoder's run covers the counts between.
 
-A stamp wraps after 2**stamp_width clocks. An edge is forgotten in the last quarter of that time (AGE_LIMIT of it: the
-two top bits of its age), for which a sample must be no longer than such a quarter; older ones cannot alias. At the
-first sample, and with a restart, all are forgotten: an edge is known once its stamp has changed since. An illegal
-transition ends the run of known edges; one that is followed within its sample by four more edges is known by the
-decoder's flag alone.
+A stamp wraps after 2**stamp_width clocks. An edge is forgotten in the last quarter of that time (after AGE_LIMIT of it:
+the two top bits of its age are set), so a sample must be no longer than that quarter; older edges cannot alias. At the
+first sample, and with a restart, all edges are forgotten: an edge is known once its stamp has changed since then. An
+illegal transition ends the run of known edges; if four more edges follow it within its sample, only the decoder's flag
+shows it.
 
 Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992, fixed-position methods.
 """
@@ -22,13 +22,13 @@ from ..compiled import compiled
 from ..quadrature import RUN_MAX, stamp_of
 
 AGE_LIMIT = 0.75
-"""Part of the stamp's range after which an edge is forgotten: its two top bits set."""
+"""Part of the stamp's range after which an edge is forgotten: the two top bits of its age are set."""
 LATENCY = 6
-"""Clocks from a strobe to its `Times`: see `hardwall.hdl.estimators.cycle_times`."""
+"""Clocks from the strobe to the `Times`: see `hardwall.hdl.estimators.cycle_times`."""
 
 
 class Memory(NamedTuple):
-    """What is kept of the last sample's `Seen`, and which kinds' stamps are known (bit k: kind k) and not too old."""
+    """The fields kept from the last sample's `Seen`; bit k of `fresh`: the stamp of kind k is known and not too old."""
 
     running: int
     count: int  # type: ignore[assignment]  # a tuple has a method of this name
@@ -42,14 +42,14 @@ class Memory(NamedTuple):
 
 
 class Times(NamedTuple):
-    """What a sample's stamps say: times in clocks, numbers of edges and cycles; 0 where there is none."""
+    """Times and numbers of cycles from a sample's stamps; times in clocks, 0 if not known."""
 
     news: int  # whether there is a new edge
-    cycles: int  # in `cycle`
+    cycles: int  # number of whole cycles in the time `cycle`
     cycle: int
-    gap: int
-    age: int  # of the last edge
-    cycle_age: int  # of the edge three before it
+    gap: int  # time between the last two edges
+    age: int  # age of the last edge
+    cycle_age: int  # age of the edge three before the last
 
 
 NOTHING = Memory(0, 0, 0, 0, 0, 0, 0, 0, 0)
@@ -59,7 +59,7 @@ NOTHING = Memory(0, 0, 0, 0, 0, 0, 0, 0, 0)
 def observe(params, memory, seen, restart):
     """Take the stamps of a sample, a `quadrature.Seen`: return (memory, `Times`).
 
-    Of `params`, `count_width` and `stamp_width` are used.
+    `params` may be any tuple with `count_width` and `stamp_width`.
     """
     modulus = (1 << params.stamp_width) - 1
     first = restart or not memory.running
@@ -76,7 +76,8 @@ def observe(params, memory, seen, restart):
     right_age = (seen.stamp - stamp_of(seen, right)) & modulus
     left_known, right_known = fresh >> left & 1, fresh >> right & 1
 
-    # A neighbour of the last edge's kind is the edge before it, or the one three before; which, their ages tell.
+    # The two kinds next to the last edge's are those of the edge before it and of the edge three before it; the ages
+    # tell which is which.
     left_first = left_known and not (right_known and right_age < left_age)
     before = left_age if left_first else right_age
     run = seen.run if fresh >> kind & 1 else 0
@@ -86,7 +87,7 @@ def observe(params, memory, seen, restart):
     moved = wrap(seen.count - memory.count, params.count_width)
     forward = -moved if seen.down else moved
     one_way = seen.down == memory.down and forward > 0 and (run == RUN_MAX or run == memory.run + forward)
-    # The edge of this kind that the last sample knew stands so many counts before the last one that it saw.
+    # The edge of this kind that the last sample knew is (-forward & 3) counts before the last edge of that sample.
     known = memory.fresh >> kind & 1 and -forward & 3 < memory.run
     cycles = (forward + 3) >> 2 if one_way and known else 0
 

@@ -1,8 +1,8 @@
-"""What every velocity estimator is in the model: its gains, its design, and one step of its kernel.
+"""The contract of a velocity estimator in the model: its gains, its design, and one step of its kernel.
 
-`EstimatorGains` and `EstimatorDesign` are the contract; `estimate` is the kernel of which each estimator registers two
-variants, one for the integer words of the hardware and one for the same algorithm in float64. To add an estimator, see
-`registry`.
+`EstimatorGains` and `EstimatorDesign` are the contract; `estimate` is the kernel for which every estimator registers
+two variants, one for the integer words of the hardware and one for the same algorithm in float64. To add an estimator,
+see `registry`.
 """
 
 import math
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class EstimatorGains(ABC):
-    """The gains of an estimator in SI units, which the names of the fields tell.
+    """The gains of an estimator in SI units; the name of every field ends in its unit.
 
     Raises:
-        ValueError: for a field that is not finite and more than 0.
+        ValueError: if a field is not finite and more than 0.
     """
 
     def __post_init__(self) -> None:
@@ -36,24 +36,24 @@ class EstimatorGains(ABC):
     @classmethod
     @abstractmethod
     def default(cls, axis: "AxisSpec") -> Self:
-        """Return the gains for an axis that names none, from its rates, ranges and count size alone."""
+        """Return the default gains for an axis, from its rates, ranges and count size alone."""
 
 
 class EstimatorDesign(ABC):
     """Formats, run-time words and latency of an estimator, derived from an axis and gains.
 
     Attributes of the class:
-        name: the estimator's in the registry; the names of its words begin with it, hyphens as underscores.
-        gains_class: its `EstimatorGains`.
-        outputs: names of its selectable outputs, the default first; the word `output_word()` selects one of several.
-        inputs: names of what it uses of `quadrature.Seen`.
-        flags: names of its saturation flags, bit 0 first.
+        name: name in the registry; the names of the estimator's words begin with it, hyphens as underscores.
+        gains_class: the estimator's `EstimatorGains`.
+        outputs: names of the selectable outputs, the default first; the word `output_word()` selects one of several.
+        inputs: names of the fields of `quadrature.Seen` that the estimator uses.
+        flags: names of the saturation flags, bit 0 first.
 
     Attributes:
         count_width, stamp_width: bits of the decoder's count and of its stamps.
         velocity: format of the velocity, counts a sample.
-        words: its run-time words, in the order of the hardware's ports.
-        latency: clocks from strobe to valid.
+        words: the run-time words, in the order of the hardware's ports.
+        latency: clocks from the strobe to `valid`.
 
     Raises:
         ValueError: if the gains or the axis do not fit what int64 and the hardware hold, with the accepted range.
@@ -73,7 +73,7 @@ class EstimatorDesign(ABC):
     @property
     @abstractmethod
     def latency(self) -> int:
-        """Clocks from strobe to valid."""
+        """Clocks from the strobe to `valid`."""
 
     @abstractmethod
     def params(self, words: Mapping[str, int]) -> tuple:
@@ -81,15 +81,15 @@ class EstimatorDesign(ABC):
 
     @abstractmethod
     def float_params(self, gains: Any, output: str, si: Mapping[str, float]) -> tuple:
-        """Return the float64 kernel's parameters: gains unrounded, those of `si`, by word, before the designed."""
+        """Return the float64 kernel's parameters: unrounded gains, from `si` by word where given, else from `gains`."""
 
     @abstractmethod
     def start(self, floating: bool = False) -> tuple:
-        """Return the state before the first sample, for one run: it may hold arrays that the run writes to."""
+        """Return the state before the first sample, for one run only: the run may write to arrays in it."""
 
     @classmethod
     def uses_stamps(cls) -> bool:
-        """Return whether it needs the clock stamps of edges, beside the count."""
+        """Return whether the estimator needs the clock stamps of edges besides the count."""
         return cls.inputs != ("count",)
 
     @classmethod
@@ -99,7 +99,7 @@ class EstimatorDesign(ABC):
 
     @classmethod
     def choose(cls, output: str) -> dict[str, int]:
-        """Return the run-time word, by name, that selects an output; none where there is one only.
+        """Return the run-time word, by name, that selects an output; empty if the estimator has only one output.
 
         Raises:
             ValueError: if there is no such output.
@@ -115,8 +115,8 @@ def estimate(params, state, seen, restart):
 
     Args:
         params: what a design's `params` (integer words) or `float_params` (the same algorithm in float64) returns.
-        state: its state, from `start` or the previous call; an array in it is written in place.
-        seen: a `quadrature.Seen`; its count is a signed word that may have wrapped.
+        state: the state from `start` or from the previous call; an array in it is written in place.
+        seen: what the decoder shows; its count is a signed word that may have wrapped.
         restart: true to forget the past: this sample counts as the first.
 
     Returns:

@@ -1,8 +1,8 @@
-"""Velocity as the difference of successive counts: the baseline that every estimator is held against.
+"""Velocity as the difference of successive counts: the baseline to which every estimator is compared.
 
-Ends. The difference is taken modulo the count's width, so the count may wrap. A step, or a speed, of more than twice
-the largest speed saturates for that sample alone. The first sample, and one with `restart`, reads 0, and so does
-standstill; a reset in motion is right from the second sample on.
+Limits. The difference is taken modulo the count's width, so the count may wrap. A step, or a speed, of more than twice
+the largest speed saturates for that sample alone. The first sample, a sample with `restart`, and standstill all read 0;
+after a reset in motion the velocity is right from the second sample on.
 """
 
 from collections.abc import Mapping
@@ -47,7 +47,7 @@ class Design(EstimatorDesign):
     """Formats of the finite difference for an axis.
 
     The velocity is a whole number of counts a sample; its range is twice the axis's largest speed, so that a loop that
-    overshoots still reads true. It saturates beyond, with the flag `velocity_saturated`.
+    overshoots is still read correctly. Beyond that range the velocity saturates, with the flag `velocity_saturated`.
     """
 
     name = "fdm"

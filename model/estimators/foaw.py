@@ -9,33 +9,35 @@ Per sample, with f the count, d the band, T the spacing of the taps in samples a
     end-fit    v = D_n / (n T)
     best-fit   v = 6 sum_i (2 i - n) D_i / (n (n + 1) (n + 2) T)  the least-squares line's slope
 
-Both outputs use the window that the end-fit's check found. (The check of the least-squares line itself would take
-work that grows with the square of n, and gave no smaller error on the paper's signal at 1 and 10 kHz.) Carrying on to
-the largest n that passes, as the definition may be read, gave the same error or a larger one.
+Both outputs use the window that the check of the end-fit gives. (A check of the least-squares line itself would take
+work that grows with the square of n, and gave no smaller error on the paper's signal at 1 and 10 kHz.) Continuing the
+search to the largest n that passes, as the definition may be read, gave the same error or a larger one.
 
-`band_counts`, d: **a count is the position rounded down, so the counts of a uniform motion keep within one count of
-the line through any two of them**, and no less will do: two roundings in [0, 1) differ by less than 1. With half
-a count uniform motion itself cuts the window short. So d = 1; an encoder whose edges are displaced needs that more.
+`band_counts`, d: **a count is the position rounded down, so the counts of a uniform motion stay within one count of
+the line through any two of them**, and a smaller band does not suffice: two roundings in [0, 1) differ by less than 1.
+With half a count, uniform motion itself shortens the window. So d = 1; an encoder whose edges are displaced needs a
+band larger by that displacement.
 
-`window_s`, N T: a line through the ends of a parabola |f''| = C leaves it by C n^2 / 8, which is d / 2 at
-n = 2 sqrt(d / C): half of the band for curvature, half for the rounding. Beyond, the check keeps only what happens
-to fit. At high rates that is thousands of samples: `TAPS` of them, T apart, are searched, anew at every sample.
+`window_s`, N T: a line through the ends of a parabola |f''| = C departs from it by C n^2 / 8, which is d / 2 at
+n = 2 sqrt(d / C): half of the band is for curvature, half for the rounding. In a longer window only an accidental fit
+passes the check. At high rates the window is thousands of samples: `TAPS` of them, T apart, are searched, anew at every
+sample.
 
-Past counts come from `history`, which says what happens before the window is full, at a wrap of the count, beyond the
-largest speed, and where it stores every M-th only.
+Past counts come from `history`, which defines the behaviour before the window is full, at a wrap of the count, beyond
+the largest speed, and if only every M-th position is stored.
 
 Formats, derived:
 
 - Slopes are compared in units of 1 / lcm(1 ... TAPS), in which D_i / i are whole: **the check is exact**. D_i's weight
-  then has 15 bits, one multiplier of either device: that is why TAPS is 12, for with 13 it would have 19.
+  then has 15 bits, one multiplier of either device. This is why TAPS is 12: with 13 the weight would have 19 bits.
 - `foaw_band` UQ(4, 2): quarter counts, to nearly four periods of the encoder.
 - `foaw_window`: N at run time, in taps; 0 counts as 1, more than TAPS as TAPS.
-- `velocity` SQ(i, f): i that of `history.change`, for both fits are averages of the changes with positive weights.
+- `velocity` SQ(i, f): i as in `history.change`, since both fits are averages of the changes with positive weights.
 - f: rounding toward zero, by less than 2**-ROUNDING_BITS of a count over the longest window, as in `window`.
 
-Ends. Standing for the window gives exactly 0. A step of more than two bands leaves one tap: it reads as its counts / T
-for T samples, then not at all; of one beyond twice the largest speed the part up to that counts. After the first
-sample or a restart in motion the axis counts as having stood: as after a step of velocity.
+Limits. Standing for the window gives exactly 0. A step of more than two bands leaves one tap: it reads as its
+counts / T for T samples, then as 0; of a step beyond twice the largest speed, only the part up to that counts. After
+the first sample or a restart in motion the axis counts as having stood, as after a step of velocity.
 
 Source: Janabi-Sharifi, Hayward, Chen, Discrete-time adaptive windowing for velocity estimation, IEEE Transactions on
 Control Systems Technology 2000.
@@ -62,25 +64,25 @@ if TYPE_CHECKING:
     from ..spec import AxisSpec
 
 TAPS = 12
-"""Most steps back that are searched, one a clock."""
+"""Largest number of steps back that are searched, one a clock."""
 UNIT = math.lcm(*range(1, TAPS + 1))
-"""Slopes are compared in 1 / UNIT."""
+"""Slopes are compared in units of 1 / UNIT."""
 BAND_COUNTS = 1.0
 BAND = UQ(4, 2)
 ROUNDING_BITS = 8
 """An LSB of the velocity is less than 2**-ROUNDING_BITS counts over the longest window."""
 STEPS = 6
-"""Clocks of the sequence besides history, one a tap, and division: see `hardwall.hdl.estimators.foaw`."""
+"""Clocks of the sequence besides the history, one a tap, and the division: see `hardwall.hdl.estimators.foaw`."""
 WEIGHTS = np.array([0, *(UNIT // i for i in range(1, TAPS + 1))])
-"""Of D_i in 1 / UNIT, by i."""
+"""Weights of D_i in 1 / UNIT, by i."""
 
 
 @dataclass(frozen=True)
 class Gains(EstimatorGains):
-    """Band, counts, and longest window, s.
+    """The band, counts, and the longest window, s.
 
     Raises:
-        ValueError: if the band is not what its word holds, or the window not finite and more than 0.
+        ValueError: if the band does not fit its word, or the window is not finite and more than 0.
     """
 
     band_counts: float
@@ -96,12 +98,12 @@ class Gains(EstimatorGains):
 
     @classmethod
     def default(cls, axis: "AxisSpec") -> "Gains":
-        """Return a band of one count, and the window in which half of it is for the axis's largest acceleration."""
+        """Return a band of one count, and the window in which the largest acceleration takes half of that band."""
         return cls(BAND_COUNTS, 2 * math.sqrt(BAND_COUNTS * axis.count_m / axis.acceleration_max_m_per_s2))
 
 
 class Params(NamedTuple):
-    """`band` in 1 / `scale` counts; `spacing` in stored positions; `fraction` bits of the quotient."""
+    """Parameters of the integer kernel: `band` in 1 / `scale` counts, `spacing` in stored positions."""
 
     history: history.Params
     output: int
@@ -118,7 +120,7 @@ class State(NamedTuple):
 
 
 class FloatParams(NamedTuple):
-    """`band` in counts, so `scale` is 1; `spacing` in stored positions, `samples` the same in samples."""
+    """Parameters of the float64 kernel: `band` in counts, so `scale` is 1; `samples` is `spacing` in samples."""
 
     history: history.Params
     output: int
@@ -130,7 +132,7 @@ class FloatParams(NamedTuple):
 
 
 class Design(EstimatorDesign):
-    """Formats, run-time words and latency of FOAW for an axis: the module says how they follow.
+    """Formats, run-time words and latency of FOAW for an axis, derived as the module says.
 
     Attributes:
         history: the `history.Design`.
@@ -176,7 +178,7 @@ class Design(EstimatorDesign):
         return Params(self.history.params(), output, band, 1 << BAND.f, window, self.spacing, self.fraction)
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
-        """Return the float64 algorithm's parameters: the same taps, the band unrounded; `si` before the designed."""
+        """Return the float64 kernel's parameters: the same taps, the band unrounded, from `si` where given."""
         _, band, window = self.words
         taps = window.from_si(si["foaw_window"]) if "foaw_window" in si else window.reset
         return FloatParams(
@@ -192,7 +194,7 @@ class Design(EstimatorDesign):
 
 @compiled
 def _fit(params, past):
-    """Return the slope that fits, in counts a tap, as (numerator, denominator)."""
+    """Return the slope over the longest fitting window, in counts a tap, as (numerator, denominator)."""
     newest = change_over(params.history, past, params.spacing)
     taps, last, total, sums = 1, newest, newest, 0
     slope, margin = params.scale * newest * UNIT, params.band * UNIT
@@ -204,7 +206,7 @@ def _fit(params, past):
         if not low <= slope <= high:
             break
         low, high = max(low, slope - margin), min(high, slope + margin)
-        # total is the sum of D_1 ... D_i, sums that of the totals before: i total - 2 sums = sum_j (2 j - i) D_j.
+        # total is D_1 + ... + D_i, sums is the sum of the earlier totals: i total - 2 sums = sum_j (2 j - i) D_j.
         sums += total
         total += change
         taps, last = i, change
@@ -227,7 +229,7 @@ def step(params, state, seen, restart):
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
-    """The same in float64, unlimited and unrounded; its slopes are whole as well, so its windows are the same."""
+    """Take one sample in float64, unlimited and unrounded; its slopes are whole too, so its windows are the same."""
     past, stored, _ = take(params.history, state.history, seen.count, restart)
     velocity = state.velocity
     if stored:

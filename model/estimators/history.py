@@ -1,27 +1,27 @@
-"""The positions of the past, in block RAM: what an estimator over a window differences.
+"""The past positions of an axis in block RAM, from which an estimator takes the change over a window.
 
-A position is the sum of the count's changes since the start, each limited to +-`change.max`:
+A position is the sum of the count's changes since the start, every change limited to +-`change.max`:
 
     position_k = position_{k-1} + limit(count_k - count_{k-1})         modulo 2**width; 0 at the first sample
 
-Every `every`-th position is stored, the first one first. Whoever asks for the one `age` stored positions before the
-newest gets 0, the position at the start, where there is none yet: **before the start the axis counts as standing where
-it was first seen**. A window that begins before the start so estimates too little, never too much, and there is no
-transient in a start from rest.
+Every `every`-th position is stored, beginning with the first. The position `age` stored positions before the newest
+reads as 0, the position at the start, if there is none yet: **before the start the axis counts as standing where it was
+first seen**. A window that begins before the start therefore estimates too little, never too much, and a start from
+rest has no transient.
 
 Formats, derived:
 
-- `change` SQ(i, 0), i.e. what a sample may change: twice the largest speed (a loop that overshoots still reads true),
-  and one count at least, for however slow an axis is, its count steps by one. Beyond, the change is limited (flag
-  `velocity_saturated`) and the rest of that step is forgotten. So the change over a window always fits, and what is too
-  fast reads as the largest velocity, not as an alias.
-- `age_bits`: the fewest that count the wanted window in stored positions. The memory has 2**age_bits words.
+- `change` SQ(i, 0), the change of the count in a sample: i holds twice the largest speed (a loop that overshoots is
+  still read correctly), and at least one count, since the count of the slowest axis still steps by one. A larger change
+  is limited (flag `velocity_saturated`) and the rest of that step is forgotten. So the change over a window always
+  fits, and a motion that is too fast reads as the largest velocity, not as an alias.
+- `age_bits`: the fewest bits that hold the window's length in stored positions. The memory has 2**age_bits words.
 - `width`: the change over the longest window is less than 2**(i-1) 2**age_bits every, so one more bit, the sign, makes
-  the difference of two positions exact modulo 2**width: i + age_bits + log2(every). How far the axis goes in all, and
-  how often its count wraps, does not matter.
-- `every`, a power of two: 1, unless 2**age_bits words of `width` bits are more than `MEMORY_BITS`. Then estimates are
-  made every `every` samples, and held between, so that a window remains a whole number of stored positions, and a
-  difference over it exact. The hold adds at most every - 1 samples to the age of a window of thousands.
+  the difference of two positions exact modulo 2**width: i + age_bits + log2(every). The total travel of the axis and
+  the number of wraps of its count do not matter.
+- `every`, a power of two: 1, unless 2**age_bits words of `width` bits are more than `MEMORY_BITS`. Otherwise estimates
+  are made every `every` samples and held between, so that a window remains a whole number of stored positions and the
+  difference over it exact. The hold adds at most every - 1 samples to the age of a window of thousands of samples.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -38,11 +38,11 @@ if TYPE_CHECKING:
 MEMORY_BITS = 1 << 16
 """Largest memory: 16 of the 30 blocks of 4 kbit in an iCE40UP5K, 4 of the 56 of 18 kbit in an ECP5-25F."""
 LATENCY = 3
-"""Clocks from strobe to valid: see `hardwall.hdl.estimators.history`."""
+"""Clocks from the strobe to `valid`: see `hardwall.hdl.estimators.history`."""
 WIDTH_MAX = 48
-"""Largest `width`: leaves int64 the fraction bits, weights and sums that an estimator adds to a position."""
+"""Largest `width`, which leaves room in int64 for the fraction bits, weights and sums of an estimator."""
 UNLIMITED = 1 << 40
-"""More than any change of a 32-bit count, for the float64 algorithm."""
+"""A limit larger than any change of a 32-bit count, for the float64 algorithm."""
 
 
 class Params(NamedTuple):
@@ -53,9 +53,9 @@ class Params(NamedTuple):
 
 
 class State(NamedTuple):
-    """`head` is where the newest stored position is, `known` how many there are before it (saturates).
+    """The state: `head` is the place of the newest stored position, `known` the number of those before it (saturates).
 
-    `positions` belongs to one run, and is written in place.
+    `positions` belongs to one run and is written in place.
     """
 
     running: int
@@ -73,14 +73,14 @@ class Design:
     Args:
         axis: the `spec.AxisSpec`.
         window_s: longest time to look back, s.
-        steps: the window is to be a multiple of so many samples.
+        steps: the window is a multiple of this number of samples.
 
     Attributes:
-        change, every, age_bits, width: as the module says.
+        change, every, age_bits, width: formats and sizes that the module derives.
         longest: the window in stored positions.
 
     Raises:
-        ValueError: if int64 does not hold what is computed from so long a window, with the accepted range.
+        ValueError: if the window is too long for the estimator's arithmetic in int64, with the accepted range.
     """
 
     latency = LATENCY
@@ -88,7 +88,7 @@ class Design:
     def __init__(self, axis: "AxisSpec", window_s: float, steps: int = 1):
         self.count_width = axis.count_width
         self.change = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), 0)
-        # Rounded to whole steps, a window may grow by half, or to the one step that it has at least.
+        # Rounding to whole steps may lengthen a window by half, or to the least length of one step.
         most = 2.0 ** (WIDTH_MAX - 1 - self.change.i) / axis.sample_hz
         if not 0 < window_s <= most:
             raise FieldError("window_s", f"must be more than 0 and at most {most:g} at these rates, not {window_s!r}")
@@ -103,16 +103,16 @@ class Design:
 
     @property
     def age_max(self) -> int:
-        """Largest age that can be asked for, in stored positions."""
+        """The largest age that can be read, in stored positions."""
         return (1 << self.age_bits) - 1
 
     @property
     def fraction(self) -> int:
-        """Fraction bits with which an LSB is less than one count over the longest window, in counts a sample."""
+        """Fraction bits of counts a sample whose LSB is less than one count over the longest window."""
         return self.age_bits + self.every.bit_length() - 1
 
     def params(self, floating: bool = False) -> Params:
-        """Return the kernels' parameters; floating: nothing is limited, and no word is too narrow."""
+        """Return the kernels' parameters; if `floating`, nothing is limited and no word is too narrow."""
         if floating:
             return Params(self.count_width, UNLIMITED, self.every, 62)
         return Params(self.count_width, self.change.max, self.every, self.width)
@@ -127,11 +127,12 @@ def take(params, state, count, restart):
     """Take one sample: return (state, whether its position was stored, whether its change was limited).
 
     Args:
-        params, state: of `Design`.
+        params: what `Design.params` returns.
+        state: what `Design.start` or the previous call returned.
         count: a signed word that may have wrapped.
         restart: true to forget the past: this sample counts as the first.
     """
-    # Taken out once: each mention of an array in a state costs the compiled closed loop its reference counting.
+    # Unpack once: every access to an array in a state costs the compiled closed loop its reference counting.
     running, last_count, position, phase, head, known, positions = state
     last = len(positions) - 1
     limited = False
@@ -152,7 +153,7 @@ def take(params, state, count, restart):
 
 @compiled
 def change_over(params, state, age):
-    """Return the change of position since `age` stored positions ago, 1 to `Design.age_max`; from a stored one."""
+    """Return the change since `age` stored positions ago, 1 to `Design.age_max`, at a sample that stores its position."""
     if age > state.known:
         return state.position
     positions = state.positions

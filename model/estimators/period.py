@@ -1,44 +1,45 @@
 """Velocity from the time of whole encoder cycles between the clock stamps of their edges, in fixed point.
 
-Only edges of one kind are subtracted, so it is immune to misplaced ones: see `cycle_times`. With c clocks a sample,
-velocities in counts a sample and times in clocks:
+Only edges of the same kind are subtracted, so the estimator is immune to misplaced edges: see `cycle_times`. With c
+clocks a sample, velocities in counts a sample and times in clocks:
 
-    cycle    v = 4 m c / D      the last edge, and the last one of its kind that the sample before knew: m cycles in D
-    gap      v = c / g          until there is such a cycle in this direction: the last two edges, g apart
+    cycle    v = 4 m c / D      from the last edge of its kind at the previous sample to the last edge: m cycles in D
+    gap      v = c / g          until there is such a cycle in this direction: the last two edges are g apart
     bound    |v| <= 3 c / 2 A   the last edge was A ago, and the next is at most 1.5 counts from it
-             |v| <= 4 c / B     the edge three before it was B ago, and the next is of one kind with that
+             |v| <= 4 c / B     the edge three before it was B ago, and the next is of the same kind as that edge
 
-A cycle is used only if all its edges went one way, as far as samples tell: where one hides a turn and a turn back, v is
-the mean over it. Of the cycles that lie in one sample all are used (m > 1), so the mean is over a sample or a cycle,
-whichever is longer. A gap is off by twice the encoder's error, relative; it serves for at
-most four edges after a turn (for the paper's signal at 1 MHz, RMS in mm/s: nothing until there is a cycle 0.120, half
-of the gap's speed 0.101, all edges since the turn 0.094, the gap 0.092). With one edge in this direction v = 0.
+A cycle is used only if all its edges went in one direction, as far as samples show: if a sample hides a turn and a turn
+back, v is the mean over it. All cycles within one sample are used (m > 1), so the mean is over a sample or a cycle,
+whichever is longer. The relative error of a gap is twice the encoder's error; gaps are used for at most four edges
+after a turn (RMS error for the paper's signal at 1 MHz, in mm/s: v = 0 until there is a cycle 0.120, half of the
+gap's speed 0.101, all edges since the turn 0.094, the gap 0.092). With only one edge in this direction v = 0.
 
-Both bounds hold for every place that edges may take: the first one for errors up to a quarter of a count, the second
-for any. At constant speed the second is reached as the next edge is due and not before; the first overtakes it as the
-axis slows (without it 0.097 instead of 0.092; the bound c / A, which holds for an ideal encoder alone, gives 0.086
-there and 1.25 with a phase error of a quarter count).
+Both bounds hold wherever the edges are: the first for errors up to a quarter of a count, the second for any error. At
+constant speed the second bound is reached just as the next edge is due; the first becomes the tighter one as the axis
+slows (without the first bound 0.097 instead of 0.092; the bound c / A, which holds only for an ideal encoder, gives
+0.086 there and 1.25 with a phase error of a quarter count).
 
-Accuracy: a stamp is late by less than a clock, so a cycle's v is off by less than v / D: v^2 / 4 c counts a sample; and
-it is that of D / 2 ago, at most C D / 2 off where |f''| <= C. The two are equal at v = (4 c C)^(1/3), the design speed.
+Accuracy: a stamp is late by less than a clock, so a cycle's v is off by less than v / D, that is v^2 / 4 c counts a
+sample; and v is the velocity of D / 2 ago, off by at most C D / 2 if |f''| <= C. The two errors are equal at
+v = (4 c C)^(1/3), the design speed.
 
 Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992, fixed-position methods; Ohmae et al. 1982,
-the M/T method; the time since the last edge as a bound is classical.
+the M/T method; the bound by the time since the last edge is classical.
 
 Formats, derived.
 
-- `velocity` SQ(i, f): i holds twice the largest speed. Its rounding, half an LSB, is at most ERROR_SHARE of the stamp's
-  own error v^2 / 4 c at the design speed (or the largest one, if that is less); but no finer than ERROR_SHARE of the
-  slowest speed that reads at all, one cycle in the age limit.
-- The quotient has one bit more, for rounding half up, so its width is that of `velocity`.
-- Cycles: the decoder counts an edge a clock at most, so ceil(c / 4); more are held to that.
+- `velocity` SQ(i, f): i holds twice the largest speed. The rounding, half an LSB, is at most ERROR_SHARE of the stamp's
+  error v^2 / 4 c at the design speed (or at the largest speed, if that is less), but need not be finer than ERROR_SHARE
+  of the slowest readable speed, one cycle in the age limit.
+- The quotient is unsigned and has one bit more for rounding half up, so it is as wide as `velocity`.
+- Cycles: the decoder counts at most one edge a clock, so a sample has at most ceil(c / 4) cycles; more are limited.
 
 At standstill v = 0, exactly, once the last edge is AGE_LIMIT of the stamp's range ago, or earlier if the bound is less
-than half an LSB. An axis whose cycle is longer reads by gaps, and one whose gap is longer reads 0. Twice the largest
-speed fits the format; the largest step of position is a cycle's mean like any other.
+than half an LSB. If a cycle lasts longer than that, v is read from gaps; if a gap lasts longer, v = 0. Twice the
+largest speed fits the format; the largest step of position is a cycle's mean like any other.
 
-The velocity saturates at its format's largest word, either sign, with the flag `velocity_saturated`. Count and stamps
-may wrap. At the first sample, and with a restart, what came before is forgotten: 0 until two new edges.
+The velocity saturates at its format's largest word, with either sign, and the flag `velocity_saturated`. Count and
+stamps may wrap. The first sample, and a sample with a restart, forget the past: v = 0 until there are two new edges.
 """
 
 from collections.abc import Mapping
@@ -59,16 +60,17 @@ if TYPE_CHECKING:
     from ..spec import AxisSpec
 
 ERROR_SHARE = 0.01
-"""How much rounding may add to the stamp's own error."""
+"""Rounding error, as a part of the stamp's error."""
 DIVIDEND_BITS = 56
-"""Of stamp and sample: a dividend, at most c 4 ceil(c / 4) 2**(f + 1) < 2**(stamp_width + 6) c, is then an int64."""
+"""Most bits of stamp and sample together: a dividend, at most c 4 ceil(c / 4) 2**(f + 1) < 2**(stamp_width + 6) c, is
+then an int64."""
 STEPS = cycle_times.LATENCY + 2
 """Clocks of the sequence besides the division."""
 
 
 @dataclass(frozen=True)
 class Gains(EstimatorGains):
-    """Periods have no gains."""
+    """The gains of `period`: none."""
 
     @classmethod
     def default(cls, axis: "AxisSpec") -> "Gains":
@@ -76,7 +78,7 @@ class Gains(EstimatorGains):
 
 
 class Params(NamedTuple):
-    """Widths of counts, stamps and quotient; the latter's fraction bits, and the largest number of cycles."""
+    """Parameters of the integer kernel: widths, clocks a sample, most cycles in a sample, and the quotient's format."""
 
     count_width: int
     stamp_width: int
@@ -94,7 +96,7 @@ class FloatParams(NamedTuple):
 
 
 class State(NamedTuple):
-    """`speed` is that of the last cycle or gap, without bound and sign: a quotient (float: counts a sample)."""
+    """The state; `speed` is the speed of the last cycle or gap, without bound and sign (float: counts a sample)."""
 
     memory: Memory
     speed: float
@@ -105,7 +107,7 @@ FLOAT_START = State(NOTHING, 0.0)
 
 
 def check_stamps(axis) -> None:
-    """Raise ValueError if the samples of an axis are too long for its stamps to tell edges."""
+    """Raise ValueError if the samples of an axis are too long for its stamps to distinguish edges."""
     longest = 1 << min(axis.stamp_width - 2, DIVIDEND_BITS - axis.stamp_width)
     if axis.clocks_per_sample > longest:
         raise FieldError(
@@ -118,7 +120,7 @@ def velocity_format(axis, least_fraction: int = 0) -> SQ:
     """Return the format that the module derives, with `least_fraction` fraction bits or more.
 
     Raises:
-        ValueError: if int64 cannot hold it.
+        ValueError: if int64 cannot hold a word of that format.
     """
     clocks, speed = axis.clocks_per_sample, axis.speed_max_counts_per_sample
     acceleration = axis.acceleration_max_m_per_s2 / (axis.count_m * axis.sample_hz**2)
@@ -133,7 +135,7 @@ def velocity_format(axis, least_fraction: int = 0) -> SQ:
 
 
 class Design(EstimatorDesign):
-    """Formats and latency for an axis: the module says how they follow.
+    """Formats and latency for an axis, derived as the module says.
 
     Raises:
         ValueError: if a sample is too long for the stamps, or the dividend for int64, with the accepted range.
@@ -169,7 +171,7 @@ class Design(EstimatorDesign):
 
 @compiled
 def bound(times):
-    """Return the bound on the speed as (twice its counts, clocks): the tighter one."""
+    """Return the tighter of the two bounds on the speed, as (twice its counts, clocks)."""
     tighter = times.cycle_age and 8 * times.age < 3 * times.cycle_age
     return (8, times.cycle_age) if tighter else (3, times.age)
 
@@ -198,7 +200,7 @@ def step(params, state, seen, restart):
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
-    """The same in float64, unsaturated."""
+    """Take one sample in float64, unsaturated: the same algorithm."""
     memory, times = observe(params, state.memory, seen, restart)
     speed = state.speed
     if times.age == 0:

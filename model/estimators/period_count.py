@@ -1,36 +1,38 @@
-"""Velocity by the time of one encoder cycle when slow, by the counts of a window when fast: the classical switching.
+"""Velocity by the time of one encoder cycle at low speed, and by the counts of a window at high speed: the classical
+switching.
 
 With c clocks a sample, velocities in counts a sample and times in clocks:
 
-    slow    v = 4 c / max(D, B)     D: from the last edge back to the one of its kind a cycle before, all of it one way
+    slow    v = 4 c / max(D, B)     D: from the last edge back to the one of its kind a cycle before, in one direction
                                     B: from now back to the edge three before the last; the next completes a cycle
     fast    v = n / w               n: counts moved in the last full window of w = 2**k samples, held for the next
 
-D needs no multiplication: one division of a constant, by the larger of D and B. It is immune to misplaced edges as
-`period` is, for it subtracts stamps of one kind alone; but after a turn it reads 0 until there is a cycle in the new
-direction.
+The slow speed needs no multiplication, only one division of a constant by the larger of D and B. Like `period` it is
+immune to misplaced edges, because it subtracts only stamps of the same kind; but after a turn it reads 0 until there is
+a cycle in the new direction.
 
-Errors, with |f''| <= C in counts and samples. A cycle's stamps are late by less than a clock, v^2 / 4 c, and it is of
-D / 2 and up to a gap ago, 3 C / v. A window's counts are off by less than one, 1 / w, and it is of w / 2 to 3 w / 2
-ago, 3 C w / 2. So w = sqrt(2 / 3 C) is the best window, and above the v at which v^2 / 4 c is what it then costs,
-1 / w + 3 C w / 2, counting is the better of the two: the switching speed. It is also at most CYCLE_SPEED, as an axis
-that does more than a cycle in a sample leaves no single cycle to be timed.
+Errors, with |f''| <= C in counts and samples. A cycle's stamps are late by less than a clock, an error of v^2 / 4 c,
+and its speed is that of D / 2 and up to a gap ago, an error of 3 C / v. A window's counts are off by less than one, an
+error of 1 / w, and its speed is that of w / 2 to 3 w / 2 ago, an error of 3 C w / 2. So w = sqrt(2 / 3 C) is the best
+window, and counting is the better of the two above the speed at which v^2 / 4 c equals the window's error,
+1 / w + 3 C w / 2: the switching speed. It is also at most CYCLE_SPEED, since an axis that makes more than a cycle in a
+sample leaves no single cycle to be timed.
 
-It counts from the window on that has more than `switch` counts, and times again from one with fewer than `switch` - 1:
-a hysteresis of two counts, by which windows at constant speed do not differ (the floor of a length takes two values,
-a quarter count of misplacement makes it three). At a switch v jumps by at most the sum of both errors.
+Counting begins with a window of more than `switch` counts, and timing again with a window of fewer than `switch` - 1: a
+hysteresis of two counts, by which windows at constant speed do not differ (the floor of a length takes two values;
+with edges a quarter count out of place, three). At a switch v jumps by at most the sum of both errors.
 
-`period` uses all cycles in a sample, so its stamps cost v / c at most where a window of one sample is off by 1: with
-the same stamps it beats counting at all speeds (v <= c), unless the window is longer than its mean over a sample or a
-cycle. This is the published scheme to hold it against.
+`period` uses all cycles in a sample, so its stamps cost at most v / c where a window of one sample is off by 1: with
+the same stamps `period` is better than counting at all speeds (v <= c), unless the window is longer than its mean over
+a sample or a cycle. This estimator is the published scheme for comparison.
 
 Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992: fixed time, fixed position, switching.
 
-Formats. `velocity` as that of `period`, with at least k fraction bits, so that n / w is exact. A window may be no
+Formats. `velocity` is derived as in `period`, with at least k fraction bits, so that n / w is exact. A window may be no
 longer than half the counter's range at twice the largest speed, so that n does not alias. D, B and ages are as in
-`period`: v = 0, exactly, when B is AGE_LIMIT of the stamp's range. Count and stamps may wrap; the largest step is a
-fast window, and no cycle. Both speeds saturate at the format, with the flag `velocity_saturated`. First sample and
-restart: 0 until there are five edges in one direction, or a fast window.
+`period`: v = 0, exactly, when B is AGE_LIMIT of the stamp's range. Count and stamps may wrap; the largest step makes a
+fast window, and no cycle. Both speeds saturate at the format, with the flag `velocity_saturated`. After the first
+sample or a restart, v = 0 until there are five edges in one direction, or a fast window.
 """
 
 import math
@@ -54,23 +56,23 @@ if TYPE_CHECKING:
     from ..spec import AxisSpec
 
 CYCLE_SPEED = 3.0
-"""Counts a sample at which switching is due: with a misplaced edge still no more than the four of a cycle."""
+"""Highest switching speed, counts a sample: even with a misplaced edge a sample has at most the four of a cycle."""
 SWITCH_MIN = 2
-"""Counts a window to switch at: with fewer the hysteresis would hold it in counting for good."""
+"""Fewest counts a window at which to switch: with fewer, the hysteresis would never return to timing."""
 STEPS = cycle_times.LATENCY + 2
 """Clocks of the sequence besides the division: see `hardwall.hdl.estimators.period_count`."""
 
 
 @dataclass(frozen=True)
 class Gains(EstimatorGains):
-    """The window to count over, held to a power of two of samples; and the speed above which to count."""
+    """The window to count over, rounded to a power of two of samples, and the speed above which to count."""
 
     window_s: float
     switch_m_per_s: float
 
     @classmethod
     def default(cls, axis: "AxisSpec") -> "Gains":
-        """Return the best window for the axis's bound on the acceleration, and where it beats a cycle."""
+        """Return the best window for the axis's bound on the acceleration, and the speed at which it beats a cycle."""
         acceleration = axis.acceleration_max_m_per_s2 / (axis.count_m * axis.sample_hz**2)
         window = 1 << min(max(round(math.log2(2 / (3 * acceleration)) / 2), 0), _window_bits_max(axis))
         error = 1 / window + 1.5 * acceleration * window
@@ -86,7 +88,7 @@ class Params(NamedTuple):
     switch: int
     dividend: int
     quotient_width: int
-    shift: int  # of a window's counts to the velocity's format
+    shift: int  # left shift from a window's counts to the velocity's format
     velocity_max: int
 
 
@@ -99,7 +101,7 @@ class FloatParams(NamedTuple):
 
 
 class State(NamedTuple):
-    """`cycle`: D, clocks, 0 for none; `first`: the count as the window began; `moved`: counts of the last full one."""
+    """The state: `cycle` is D (0: none), `first` the window's first count, `moved` the counts of the last full window."""
 
     memory: Memory
     cycle: int
@@ -118,21 +120,21 @@ def _window_bits_max(axis) -> int:
 
 
 class Design(EstimatorDesign):
-    """Formats, run-time word and latency for an axis: the module says how they follow.
+    """Formats, run-time word and latency for an axis, derived as the module says.
 
     Attributes:
         window_bits: log2 of the window, samples.
         words: `period_count_switch`.
 
     Raises:
-        ValueError: if the gains, or the axis, do not fit formats that int64 can hold, with the accepted range.
+        ValueError: if the gains or the axis do not fit formats that int64 can hold, with the accepted range.
     """
 
     name = "period-count"
     gains_class = Gains
     inputs = Seen._fields
     cycles_max = 2
-    """More than one cycle in a sample is not timed; how many there are is all the same."""
+    """More than one cycle in a sample is not timed, so only 0, 1 and more must be distinguished."""
 
     def __init__(self, axis: "AxisSpec", gains: Gains):
         super().__init__(axis, gains)
@@ -162,7 +164,7 @@ class Design(EstimatorDesign):
 
     @property
     def dividend(self) -> int:
-        """The constant that D or B divides: 4 c, with a fraction bit more than the velocity."""
+        """The constant that is divided by D or B: 4 c, with one fraction bit more than the velocity."""
         return 4 * self.clocks << (self.velocity.f + 1)
 
     @property
@@ -182,7 +184,7 @@ class Design(EstimatorDesign):
         )
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
-        """Return the float64 algorithm's parameters; it counts as the integer one does, so switches at whole counts."""
+        """Return the float64 kernel's parameters; like the integer kernel it switches at whole counts."""
         switch = self.switch.from_si(si.get("period_count_switch", gains.switch_m_per_s))
         return FloatParams(self.count_width, self.stamp_width, 1 << self.window_bits, switch, self.clocks)
 
@@ -192,7 +194,7 @@ class Design(EstimatorDesign):
 
 @compiled
 def _count(params, state, seen, restart):
-    """Return (samples of the window so far, count as it began, counts of the last full one, whether to count)."""
+    """Return (samples of the window so far, count at its begin, counts of the last full window, whether to count)."""
     if restart or not state.memory.running:
         return 0, seen.count, 0, 0
     if state.samples < params.window - 1:
@@ -204,10 +206,10 @@ def _count(params, state, seen, restart):
 
 @compiled
 def _sample(params, state, seen, restart):
-    """Take a sample: return (state, the time of a cycle by which v is bound; 0 for none)."""
+    """Take one sample: return (state, the clocks of a cycle that give the slow speed; 0: none)."""
     samples, first, moved, counting = _count(params, state, seen, restart)
     memory, times = observe(params, state.memory, seen, restart)
-    # More than one cycle in a sample: the last one timed stands, until it is counted.
+    # With more than one cycle in a sample the last timed cycle stays, until counting begins.
     cycle = state.cycle if times.age and (not times.news or times.cycles > 1) else 0
     if times.age and times.news and times.cycles == 1:
         cycle = times.cycle
@@ -231,7 +233,7 @@ def step(params, state, seen, restart):
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
-    """The same in float64, unsaturated."""
+    """Take one sample in float64, unsaturated: the same algorithm."""
     state, clocks = _sample(params, state, seen, restart)
     if state.counting:
         return state, state.moved / params.window, 0

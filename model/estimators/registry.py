@@ -1,9 +1,9 @@
 """The velocity estimators, by the name used in scenes and on the command line.
 
-To add one: `hdl/estimators/NAME.py`, `model/estimators/NAME.py` and `tests/estimators/test_NAME.py`, and one line here
-and in `hdl/estimators/registry.py`. The model's file has the design, a `estimate.EstimatorDesign`, with its gains and
-its two kernels; the hardware's the component of that design. `tests/estimators/test_estimate.py` holds every one of
-them to the contract.
+To add an estimator, write `hdl/estimators/NAME.py`, `model/estimators/NAME.py` and `tests/estimators/test_NAME.py`, and
+add one line here and one in `hdl/estimators/registry.py`. The model's file has the design, an
+`estimate.EstimatorDesign`, with its gains and its two kernels; the hardware's file has the component of that design.
+`tests/estimators/test_estimate.py` tests every estimator against the contract.
 """
 
 from . import (

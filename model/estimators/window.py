@@ -2,35 +2,35 @@
 
     v = (f_k - f_{k-n}) / n                  counts a sample; f the count, n the window in samples
 
-What it guarantees. Let |f''| <= c counts/sample^2 and let the count be the position displaced by at most eps either
-way. Then v errs by at most
+Guarantee. Let |f''| <= c counts/sample^2 and let the count be the position displaced by at most eps in either
+direction. Then the error of v is at most
 
     c n / 2 + 2 eps / n                      least, 2 sqrt(c eps), at n = 2 sqrt(eps / c)
 
-and no causal estimator can promise less than that least. **A count is the position rounded down**, in [0, 1) below it:
-a constant half count, of which no velocity comes, and eps = 1/2 count either way. So the designed window, `window_s`,
-is 2 sqrt(eps / C) = sqrt(2 q / C), rounded to n >= 1 whole samples. An encoder whose edges are displaced by h counts
-has eps = (1 + h) / 2, where h is the largest difference of two displacements.
+and no causal estimator can guarantee less than this minimum. **A count is the position rounded down**, in [0, 1) below
+it: a constant half count, which adds no velocity, and eps = 1/2 count in either direction. So the designed window,
+`window_s`, is 2 sqrt(eps / C) = sqrt(2 q / C), rounded to n >= 1 whole samples. An encoder whose edges are displaced by
+h counts has eps = (1 + h) / 2, where h is the largest difference of two displacements.
 
-Past counts come from `history`, which says what happens before the first n samples are there, at a wrap of the count,
-and beyond the largest speed. Where it stores every M-th only, n is a multiple of M and v is held between: that adds
+Past counts come from `history`, which defines the behaviour during the first n samples, at a wrap of the count, and
+beyond the largest speed. If it stores only every M-th position, n is a multiple of M and v is held between: that adds
 at most c (M - 1) to the error, a fraction 1 / (n / M) of it or less, and n / M is a thousand or more.
 
 Formats, derived:
 
 - `window_length`, n / M, is a run-time word; `history.age_max` is its largest value, and 0 counts as 1. v is *divided*
-  by n (`divide`), so this one word changes the window: no reciprocal has to follow it.
-- `velocity` SQ(i, f): i that of `history.change`, which no average of changes can leave, so v cannot overflow.
-- f: v is rounded toward zero, so it errs by less than an LSB, in RMS 0.58 of it. Quantisation alone makes v err by
-  0.41 / n in RMS (two independent errors of a uniform count). An LSB of 2**-ROUNDING_BITS / n_max, with n_max the
-  longest window that the word can set, keeps rounding below 0.6 % of that for every n. A count of motion over the
-  window is never less than 2**ROUNDING_BITS LSB, so there is no dead zone; standing for n samples gives exactly 0.
+  by n (`divide`), so this word alone changes the window: no reciprocal has to change with it.
+- `velocity` SQ(i, f): i as in `history.change`, whose range no average of changes can exceed, so v cannot overflow.
+- f: v is rounded toward zero, an error of less than an LSB, in RMS 0.58 LSB. Quantisation alone gives v an RMS error of
+  0.41 / n (two independent errors of a uniform count). An LSB of 2**-ROUNDING_BITS / n_max, with n_max the longest
+  window that the word can set, keeps rounding below 0.6 % of that for every n. A count of motion over the window is
+  never less than 2**ROUNDING_BITS LSB, so there is no dead zone; standing for n samples gives exactly 0.
 
-Ends. v never leaves its format. A step shows as its counts / n for n samples, then is gone; of one beyond twice the
-largest speed the part up to that. After the first sample or a restart in motion v is too small for n samples, in
-proportion to the motion seen.
+Limits. v never leaves its format. A step reads as its counts / n for n samples, then 0; of a step beyond twice the
+largest speed, only the part up to that is read. After the first sample or a restart in motion v is too small for n
+samples, in proportion to the motion seen.
 
-Source: elementary; the bound is Taylor's formula and the triangle inequality.
+Source: elementary; the bound follows from Taylor's formula and the triangle inequality.
 """
 
 import math
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     from ..spec import AxisSpec
 
 EPS_COUNTS = 0.5
-"""Largest distance between a count and the position, half a count apart."""
+"""Largest distance, counts, between the position and the count plus half a count."""
 ROUNDING_BITS = 8
 """An LSB of the velocity is less than 2**-ROUNDING_BITS counts over the longest window."""
 STEPS = 2
@@ -60,7 +60,7 @@ STEPS = 2
 
 @dataclass(frozen=True)
 class Gains(EstimatorGains):
-    """The window, s."""
+    """The length of the window, s."""
 
     window_s: float
 
@@ -71,7 +71,7 @@ class Gains(EstimatorGains):
 
 
 class Params(NamedTuple):
-    """`length` in stored positions; `fraction` bits of the quotient by it."""
+    """Parameters of the integer kernel: `length` in stored positions, and the quotient's `fraction` bits."""
 
     history: history.Params
     length: int
@@ -84,7 +84,7 @@ class State(NamedTuple):
 
 
 class FloatParams(NamedTuple):
-    """`length` in stored positions, `samples` the same in samples."""
+    """Parameters of the float64 kernel: `length` in stored positions, `samples` the same length in samples."""
 
     history: history.Params
     length: int
@@ -92,7 +92,7 @@ class FloatParams(NamedTuple):
 
 
 class Design(EstimatorDesign):
-    """Formats, run-time word and latency of the window for an axis: the module says how they follow.
+    """Formats, run-time word and latency of the window for an axis, derived as the module says.
 
     Attributes:
         history: the `history.Design`.
@@ -135,7 +135,7 @@ class Design(EstimatorDesign):
         return Params(self.history.params(), max(words["window_length"], 1), self.fraction)
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
-        """Return the float64 algorithm's parameters: the same whole number of samples, `si` before the designed."""
+        """Return the float64 kernel's parameters: whole samples as in the integer kernel, from `si` where given."""
         (word,) = self.words
         length = max(word.from_si(si["window_length"]) if "window_length" in si else word.reset, 1)
         return FloatParams(self.history.params(floating=True), length, float(length * self.history.every))
@@ -154,7 +154,7 @@ def step(params, state, seen, restart):
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
-    """The same in float64, unlimited and unrounded."""
+    """Take one sample in float64, unlimited and unrounded: the same algorithm."""
     past, stored, _ = take(params.history, state.history, seen.count, restart)
     velocity = state.velocity
     if stored:
