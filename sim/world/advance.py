@@ -13,16 +13,16 @@ from .encoder import Cell
 class Interval(NamedTuple):
     """A length of time under one force."""
 
-    length: object  # what the solver takes: a `rigid.Span` for a `rigid.Rigid`, else seconds
+    length: object  # in the form that the solver takes: a `rigid.Span` for a `rigid.Rigid`, else seconds
     clock: int  # number of the clock at which it starts
     clocks: int  # its length in clocks of the encoder, at least 1
 
 
 class Moment(NamedTuple):
-    """Where plant and encoder are between two intervals."""
+    """The state of plant and encoder between two intervals."""
 
-    motion: object  # a `rigid.Motion` of a `rigid.Rigid`, else a `linear.State`
-    cell: Cell  # the encoder's, which holds its position; `encoder.locate` gives the first
+    motion: object  # a `rigid.Motion` for a `rigid.Rigid`, else a `linear.State`
+    cell: Cell  # the encoder's cell, which holds its position; `encoder.locate` gives the first
     n_edges: int  # edges that are on their way to the controller; negative: edges were lost
 
 
@@ -30,9 +30,9 @@ class Moment(NamedTuple):
 def advance_quietly(plant, moment, force_n, interval):
     """Return (moment, quiet): the moment after an interval, and whether it is certain that nothing happened meanwhile.
 
-    Where `quiet` is false (an edge or a turn is likely) the result means nothing and the interval is for `advance`.
-    This is the path of nearly every interval of a closed loop, so it handles no array: merely to pass an array to
-    a compiled function costs more than to advance the handle.
+    Where `quiet` is false (an edge or a turn is likely) the result means nothing and the interval is left to `advance`.
+    Nearly every interval of a closed loop takes this path, so it handles no array: passing an array to a compiled
+    function costs more than advancing the handle.
     """
 
 
@@ -44,10 +44,10 @@ def advance(plant, encoder, moment, force_n, interval, edges):
         plant: a `rigid.Rigid`, a `taylor.Train` or a `euler.Stepped`.
         encoder: an `Encoder`.
         moment: the `Moment` at the start.
-        force_n: motor and wall together (N), positive towards positive positions.
+        force_n: force of motor and wall together (N), positive towards positive positions.
         interval: an `Interval`.
         edges: `Edges` of the model's `stamped`, which hold `moment.n_edges` already; new ones are appended. Their
             clocks never decrease: interval.clock < clock <= interval.clock + interval.clocks. Where several share one
-            clock, the pins show the last. Where the arrays are full `n_edges` is -1, and stays so: edges were lost,
-            and the cell is that of the last one kept.
+            clock, the pins show the last. Once the arrays are full `n_edges` is -1 and stays -1: edges were lost, and
+            the cell belongs to the last edge kept.
     """

@@ -1,4 +1,4 @@
-"""What leaves the FPGA for the amplifier: the command as steps of a converter, or as pulses."""
+"""The output from FPGA to amplifier: the command as steps of a converter, or as pulses."""
 
 import math
 from typing import NamedTuple
@@ -7,20 +7,20 @@ from ...model.compiled import compiled
 
 
 class Converter(NamedTuple):
-    """A digital-to-analogue converter: its code is the nearest to the command, half a step up."""
+    """A digital-to-analogue converter: its code is the nearest to the command, and half a step rounds up."""
 
     step_n: float
-    lowest: int  # codes
-    highest: int
+    lowest: int  # code
+    highest: int  # code
 
 
 class Pulse(NamedTuple):
-    """Pulses: in every period of the carrier one level for a part of it, and its opposite for the rest.
+    """Pulses: the output is at one level for a part of every carrier period, and at its opposite for the rest.
 
-    The width is taken from the command as the period begins, in whole steps.
+    The width is taken from the command at the beginning of the period, in whole steps.
     """
 
-    level_n: float  # the command that is all pulse
+    level_n: float  # the command whose pulse fills the period
     period: int  # clocks; 0 for an output that gives the command as it is
     step: int  # clocks
 
@@ -30,7 +30,7 @@ AS_IT_IS = Pulse(0.0, 0, 0)
 
 @compiled
 def converted(converter, command_n):
-    """Return what a converter makes of a command; without one, the command."""
+    """Return the output of a converter for a command; without a converter, the command itself."""
     if converter is None:
         return command_n
     code = min(max(command_n / converter.step_n + 0.5, converter.lowest), converter.highest)
@@ -39,7 +39,7 @@ def converted(converter, command_n):
 
 @compiled
 def width_of(pulse, command_n):
-    """Return the width (clocks) of the pulse that stands for a command; what is beyond the level is all pulse."""
+    """Return the width (clocks) of the pulse for a command; a command beyond the level saturates."""
     steps = pulse.period // pulse.step
-    wanted = (command_n / pulse.level_n + 1.0) * 0.5 * steps + 0.5
-    return pulse.step * math.floor(min(max(wanted, 0.0), steps))
+    width = (command_n / pulse.level_n + 1.0) * 0.5 * steps + 0.5
+    return pulse.step * math.floor(min(max(width, 0.0), steps))

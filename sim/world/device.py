@@ -1,19 +1,20 @@
 """The device of a scene with more than a rigid handle: its parts as matrices, for `taylor` to advance.
 
-From the command u (N), what the controller asks of the motor with the steady push, to the handle, in that order. All
-is in terms of the handle's straight line: with the pulley's radius r, the motor's torque constant gives kf = Kt / r.
+The parts follow in order from the command u (N), which the controller and the steady push give, to the handle. All
+quantities refer to the handle's straight line: with the pulley's radius r, the motor's torque constant gives
+kf = Kt / r.
 
-- Amplifier: |u| <= kf I. Of bandwidth w (1/s): df/dt = w (u - f). Without a bandwidth and a motor, f = u.
-- Motor of resistance R, inductance L and voltage limit V, its force f. With a voltage given as the force that it would
-  hold at standstill, e = kf V / R, and the motor's speed vm: L/R df/dt = e - f - (kf^2 / R) vm. An amplifier with a
-  bandwidth is a current loop that asks for the e that makes df/dt = w (u - f), and gets no more than its limit; one
-  without asks for e = u, whatever the current is then: a voltage drive, damped by the motor.
-- Transmission: a cable of stiffness k and damping d. The motor's side is a mass of its own: with s its position less
-  the handle's, and w = ds/dt, mm d(v + w)/dt = f - c - bm (v + w), c = k s + d w. Without it c = f.
-- Hand: a mass that moves with the handle, held by a spring and a damper: the force kh (rest - x) - bh v.
-- Handle: m dv/dt = c + hand - b v - Fc sign(v), and rests for as long as v = 0 and what acts on it is within Fc.
+- Amplifier: |u| <= kf I. With a bandwidth w (1/s), df/dt = w (u - f). With neither a bandwidth nor a motor, f = u.
+- Motor: its resistance is R, its inductance L, its voltage limit V and its force f. A voltage is given as the force
+  that it would hold at standstill, e = kf V / R; with the motor's speed vm, L/R df/dt = e - f - (kf^2 / R) vm. An
+  amplifier with a bandwidth is a current loop that asks for the e that makes df/dt = w (u - f), and gets no more than
+  its limit. An amplifier without a bandwidth asks for e = u at any current: a voltage drive, damped by the motor.
+- Transmission: a cable of stiffness k and damping d. The motor's side is a separate mass: with s its position less the
+  handle's, and w = ds/dt, mm d(v + w)/dt = f - c - bm (v + w), c = k s + d w. Without a transmission c = f.
+- Hand: a mass that moves with the handle, held by a spring and a damper, with the force kh (rest - x) - bh v.
+- Handle: m dv/dt = c + hand - b v - Fc sign(v); it rests for as long as v = 0 and the force on it is within Fc.
 
-A converter or pulses come before all of these, on the command; pulses are given to what follows as they are.
+A converter or pulses act on the command before all of these parts; pulses reach the parts unsmoothed.
 
 The state is x, v; s, w with a transmission; f with a lag or a motor: a part that is absent has no row.
 """
@@ -30,17 +31,17 @@ from .polynomials import FIRST
 from .taylor import Train
 
 LEG_RATE = 1.0
-"""Of a leg, the longest time that one Taylor polynomial serves: its length times the fastest rate."""
+"""The longest leg that one Taylor polynomial serves: its length times the fastest rate."""
 LEGS_MAX = 25_000
-"""Legs of a sample that the solver takes on: 1 g on a damper of 1e4 N s/m for 1 ms, and a little more."""
+"""The most legs in a sample that the solver accepts: 1 g on a damper of 1e4 N s/m for 1 ms, and a little more."""
 BEYOND = 1e100
-"""A rate of change, 1/s or N/s or whatever, with which no matrix can be balanced any more."""
+"""A rate of change, in 1/s, N/s or any other unit, that is too large for balancing a matrix."""
 TRUNCATION = 2.0**-54
 
 
 @dataclass(frozen=True)
 class Motor:
-    """A brushed DC motor and its pulley; Attributes: by their names, as on its data sheet."""
+    """A brushed DC motor and its pulley; the attributes are named as on a data sheet."""
 
     resistance_ohm: float
     inductance_h: float
@@ -50,12 +51,12 @@ class Motor:
 
     @property
     def newtons_per_ampere(self) -> float:
-        """Force at the handle of each ampere."""
+        """Force at the handle per ampere."""
         return self.torque_constant_n_m_per_a / self.pulley_radius_m
 
     @property
     def stall_n(self) -> float:
-        """Force at standstill at the voltage's limit."""
+        """Force at standstill at the voltage limit."""
         return self.newtons_per_ampere * self.voltage_limit_v / self.resistance_ohm
 
     @property
@@ -65,7 +66,7 @@ class Motor:
 
     @property
     def damping_n_s_per_m(self) -> float:
-        """What the motor's own voltage takes of its force as it moves, with the winding shorted."""
+        """Damping by the motor's own voltage as it moves with the winding shorted."""
         return self.newtons_per_ampere**2 / self.resistance_ohm
 
 
@@ -81,7 +82,7 @@ class Transmission:
 
 @dataclass(frozen=True)
 class Hand:
-    """What holds the handle."""
+    """A hand that holds the handle."""
 
     mass_kg: float
     damping_n_s_per_m: float
@@ -91,14 +92,14 @@ class Hand:
 
 @dataclass(frozen=True)
 class Device:
-    """The parts; None for those that are absent.
+    """The parts of a device; a part that is absent is None.
 
     Attributes:
-        mass_kg, viscous_n_s_per_m, coulomb_n: of the handle; `coulomb_n` is None without dry friction.
-        bandwidth_hz, force_limit_n: of the amplifier.
+        mass_kg, viscous_n_s_per_m, coulomb_n: the handle's mass and friction; `coulomb_n` is None without dry friction.
+        bandwidth_hz, force_limit_n: the amplifier's bandwidth and largest force.
         motor, transmission, hand: see their classes.
         encoder_at_motor: whether the encoder is on the motor's side of the transmission.
-        pulse: what a pulse-width output makes of the command.
+        pulse: the pulses that a pulse-width output makes of the command.
     """
 
     mass_kg: float
@@ -114,19 +115,19 @@ class Device:
 
     @property
     def command_limit_n(self) -> float:
-        """What of a command is passed on: the amplifier's current, or a voltage drive's voltage, as a force."""
+        """The largest command that is passed on: the limit of the amplifier's current, or a voltage drive's voltage."""
         voltage_drive = self.motor is not None and self.bandwidth_hz is None
         return self.motor.stall_n if voltage_drive else self.force_limit_n
 
 
 @dataclass(frozen=True)
 class Equations:
-    """A device in one phase; every quantity is a row, its coefficients of the state, of 1, and of the command.
+    """A device in one phase; every quantity is a row of the coefficients of the state, of 1, and of the command.
 
     Attributes:
-        rates: of change of the state.
-        on_handle: what acts on the handle, N, without Coulomb friction.
-        voltage: that the current loop asks for, N at standstill; None without one that has a limit.
+        rates: the state's rates of change.
+        on_handle: the force on the handle, N, without Coulomb friction.
+        voltage: the voltage that the current loop asks for, N at standstill; None without a current loop and its limit.
         seen: the encoder's position, m.
     """
 
@@ -137,11 +138,11 @@ class Equations:
 
 
 def equations(device: Device, along: int | None = None, limited: int = 0) -> Equations:
-    """Return the device's equations, those of this file's beginning.
+    """Return the device's equations, as the beginning of this file gives them.
 
     Args:
         device: its parts.
-        along: which way the handle moves, -1 or 1, or 0 where friction holds it; None for no Coulomb friction.
+        along: direction of the handle's motion, -1 or 1, or 0 where friction holds it; None for no Coulomb friction.
         limited: -1 or 1 where a current loop's voltage is at that limit, else 0.
     """
     cable, hand, motor = device.transmission, device.hand, device.motor
@@ -181,8 +182,10 @@ def equations(device: Device, along: int | None = None, limited: int = 0) -> Equ
 
 
 def fastest_per_s(device: Device) -> float:
-    """Return a bound on how fast the device changes: the largest 1-norm of its balanced matrices, 1/s;
-    infinite where a matrix has no numbers to balance."""
+    """Return a bound on the device's rates of change, 1/s: the largest 1-norm of its balanced matrices.
+
+    The bound is infinite where the rates are too large for balancing.
+    """
     norms = []
     for along in (0, 1):
         for limited in (0, 1):
@@ -196,13 +199,13 @@ def fastest_per_s(device: Device) -> float:
 
 
 def train(device: Device, longest_s: float) -> Train:
-    """Return the device as `taylor` advances it.
+    """Return the device in the form that `taylor` advances.
 
     Args:
         device: its parts.
         longest_s: the longest interval of constant command.
 
-    A leg's polynomial ends where the rest of its series is under 2^-54 of what it moves.
+    The polynomial of a leg ends where the rest of its series is under 2^-54 of the change over the leg.
     """
     fastest = fastest_per_s(device)
     leg_s = min(longest_s, LEG_RATE / fastest) if fastest else longest_s
@@ -212,7 +215,7 @@ def train(device: Device, longest_s: float) -> Train:
         rest = reach**order / math.factorial(order + 1) / (1 - LEG_RATE / 2)
     free = equations(device)
     n = len(free.rates)
-    # Coefficients of the state, with room for states that it lacks; of 1, and of the command.
+    # The columns are the coefficients of the state, with room for states that it lacks, of 1, and of the command.
     columns = [*range(n), STATES, STATES + 1]
     tables = np.zeros((PHASES, QUANTITIES, STATES + 2))
     for along in (-1, 0, 1):

@@ -1,4 +1,4 @@
-"""An incremental encoder in quadrature: exact motion in, clock-stamped edges out.
+"""An incremental encoder in quadrature, from exact motion to clock-stamped edges.
 
 Edge n stands at (n + offset[n mod 4]) counts, and cell n is the half-open stretch from edge n to edge n + 1. Moving
 up, edge n raises A, raises B, lowers A, lowers B for n mod 4 = 0, 1, 2, 3, so the levels (A, B) go
@@ -15,20 +15,20 @@ from typing import NamedTuple
 
 from ...model.compiled import compiled
 
-# Counts by which each edge must follow the one before: less, and the pair is a glitch rather than quadrature.
+# The least distance (counts) from one edge to the next: a closer pair is a glitch rather than quadrature.
 MARGIN = 0.05
 
 
 class Encoder(NamedTuple):
     """The scale and the clock that samples its outputs."""
 
-    count_m: float  # one edge to the next of an ideal scale, > 0
+    count_m: float  # distance from one edge to the next on an ideal scale, > 0
     clock_hz: float  # > 0
     offsets: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)  # counts: A rise, B rise, A fall, B fall
 
 
 class Cell(NamedTuple):
-    """Where the handle is on the scale: `lower_m` <= position < `upper_m`."""
+    """The cell of the scale that holds the position: `lower_m` <= position < `upper_m`."""
 
     number: int
     lower_m: float
@@ -39,13 +39,13 @@ def offsets(phase_error_counts=0.0, duty_error_counts: float = 0.0) -> tuple[flo
     """Return the `Encoder.offsets` (counts) of a scale with these errors.
 
     Args:
-        phase_error_counts: a number by which channel B is late against A in upward motion; or four, one for each edge
-            kind A rise, B rise, A fall, B fall.
-        duty_error_counts: by how much longer than 2 counts both channels are high; the rises come half of it earlier
-            and the falls half later.
+        phase_error_counts: the number of counts by which channel B is late against A in upward motion; or four
+            numbers, one for each edge kind A rise, B rise, A fall, B fall.
+        duty_error_counts: the excess of the high part of both channels over 2 counts; the rises come half of it
+            earlier and the falls half later.
 
     Raises:
-        ValueError: if any edge would not follow the one before by at least 0.05 counts.
+        ValueError: if any edge would not follow the edge before it by at least 0.05 counts.
     """
     phase = phase_error_counts
     late = (0.0, phase, 0.0, phase) if isinstance(phase, int | float) else tuple(phase)
@@ -89,7 +89,7 @@ def level(number):
 
 @compiled
 def next_cell(encoder, cell, upwards):
-    """Return the cell above, or below."""
+    """Return the cell above if `upwards`, else the cell below."""
     if upwards:
         return Cell(cell.number + 1, cell.upper_m, edge(encoder, cell.number + 2))
     return Cell(cell.number - 1, edge(encoder, cell.number - 1), cell.lower_m)
@@ -97,9 +97,9 @@ def next_cell(encoder, cell, upwards):
 
 @compiled
 def stamp(encoder, upwards, at_s, clocks):
-    """Return the clock of an edge passed `at_s` into an interval, from the interval's first: 1 to `clocks`.
+    """Return the clock of an edge passed `at_s` into an interval, counted from the interval's first: 1 to `clocks`.
 
-    Rounding may put it outside, but it is not.
+    The result is clamped to that range, because rounding may put it outside.
     """
     at = at_s * encoder.clock_hz
     return min(max(math.ceil(at) if upwards else math.floor(at) + 1, 1), clocks)

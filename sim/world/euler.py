@@ -1,17 +1,17 @@
-"""A linear device in fixed steps of semi-implicit Euler: the ordinary way, to hold `taylor` against.
+"""A linear device in fixed steps of semi-implicit Euler, the usual method, for comparison with `taylor`.
 
-From the same tables, in steps of `step_s`; the last before the command changes is what is left:
+It uses the same tables in steps of `step_s`; the last step before the command changes is the rest of the interval:
 
-- velocities, and the motor's force, go by their rates of change at the step's beginning;
-- positions go by the new velocities, straight over the step, and edges are passed where that line passes them (all at
-  the step's end would be an illegal transition of the pins for a handle that passes two in a step);
-- Coulomb friction is clamped: where a step would turn the handle, and friction could hold it, it rests; it breaks
-  loose with the first step whose force is beyond friction;
-- the voltage is within its limits, or at one, for a whole step.
+- velocities, and the motor's force, change by their rates at the beginning of the step;
+- positions change linearly by the new velocities, and edges are passed where that line passes them (stamping all edges
+  at the step's end would be an illegal transition of the pins for a handle that passes two in a step);
+- Coulomb friction is clamped: where a step would turn the handle, and friction could hold it, the handle rests; it
+  breaks loose in the first step whose force exceeds friction;
+- the voltage is within its limits, or at one of them, for a whole step.
 
-The error is of the order of a step. Steps in which a device diverges of itself are no scene (`longest_s`). In others a
-force that is limited moves it by no more than a bounded amount, so that a run has numbers to its end: a wall that is
-unstable is a verdict, as ever.
+The error is of the order of a step. A scene may not have steps in which the device itself diverges (`longest_s`). In
+shorter steps a limited force moves the device by a bounded amount, so that a run has numbers to its end and an unstable
+wall gets its verdict, as with the other solvers.
 """
 
 import math
@@ -41,19 +41,20 @@ from .linear import (
 from .taylor import Train
 
 ROUNDING = 1e-6
-"""By which an eigenvalue of 1 may seem larger: where it is double, the root of a unit in the last place, and more."""
+"""The excess that rounding may add to an eigenvalue of 1: the root of a unit in the last place if it is double, and a
+little more."""
 BISECTIONS = 50
 
 
 class Stepped(NamedTuple):
-    """A device as `stepped` makes it; fields as those of `taylor.Train`."""
+    """A device in the form that `stepped` makes; its fields have the same meaning as in `taylor.Train`."""
 
     tables: np.ndarray
     coulomb_n: float
     voltage_limit_n: float
     command_limit_n: float
     pulse: Pulse
-    cable: bool  # whether the state has a stretch and its rate
+    cable: bool  # whether the state has a cable's stretch and its rate
     step_s: float
 
 
@@ -62,11 +63,11 @@ advance.register(Stepped)(advance_in_stretches)
 
 
 def stepped(train: Train, cable: bool, step_s: float) -> Stepped:
-    """Return a device as this file advances it.
+    """Return a device in the form that this solver advances.
 
     Args:
-        train: as `device.train` makes it.
-        cable: whether it has a transmission.
+        train: the result of `device.train`.
+        cable: whether the device has a transmission.
         step_s: length of a step.
     """
     return Stepped(
@@ -75,7 +76,7 @@ def stepped(train: Train, cable: bool, step_s: float) -> Stepped:
 
 
 def growth(device: Device, step_s: float) -> float:
-    """Return by how much a step may grow the state of a device left alone: its largest eigenvalue in any phase."""
+    """Return the factor by which a step may grow the state without a command: its largest eigenvalue in any phase."""
     places, largest = ([0, 2] if device.transmission else [0]), 0.0
     for along, limited in product((0, 1), (0, 1)):
         rates = equations(device, along, limited).rates
@@ -89,7 +90,7 @@ def growth(device: Device, step_s: float) -> float:
 
 
 def longest_s(device: Device, most_s: float) -> float:
-    """Return the longest step, up to `most_s`, in which a device does not diverge of itself, s."""
+    """Return the longest step (s), up to `most_s`, in which the device itself does not diverge."""
     if growth(device, most_s) <= 1 + ROUNDING:
         return most_s
     low, high = 0.0, most_s
@@ -106,7 +107,7 @@ def step(plant, state, command_n, seconds):
     along, limited = along_of(plant, state, command_n), limited_of(plant, state, command_n)
     phase = phase_number(along, limited)
     velocity = state.velocity_m_per_s + seconds * quantity(tables, phase, 1, state, command_n)
-    # Without friction its level is negative, and holds nothing.
+    # Without friction the level is negative, and nothing is held.
     held = velocity * along <= 0.0 and abs(quantity(tables, STUCK, GRIP, state, command_n)) <= plant.coulomb_n
     stopped = velocity if held else 0.0
     velocity -= stopped
@@ -123,7 +124,7 @@ def step(plant, state, command_n, seconds):
 
 @compiled
 def _seen(plant, state):
-    """Return the encoder's position: that of the handle, or with the stretch that of the motor's side."""
+    """Return the encoder's position: the handle's, or with the stretch added the position of the motor's side."""
     return state.position_m + plant.tables[STUCK, SEEN, 2] * state.others[0]
 
 
@@ -132,7 +133,7 @@ def _seen(plant, state):
 def _stretch(plant, encoder, moment, command_n, since_s, until_s, interval, edges):
     state, cell, n_edges = moment
     room = min(len(edges.clocks), len(edges.levels))
-    # A whole number of steps has no rest, whatever rounding says.
+    # The margin keeps rounding from adding a step to a whole number of steps.
     steps = math.ceil((until_s - since_s) / plant.step_s * (1 - 1e-9))
     for number in range(steps):
         begin_s = since_s + number * plant.step_s

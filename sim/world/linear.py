@@ -1,8 +1,8 @@
 """Devices whose state has a rate of change that is linear in the state and the command, in each of nine phases.
 
-The phases are sliding up, sliding down or stuck; and the voltage within its limits, or at one. `taylor` and `euler`
-both solve such a device, from the same tables: here is what they share. An interval is a stretch of one command, or
-with pulses several, and a solver registers how it advances one.
+A phase combines the handle (sliding up, sliding down or stuck) with the voltage (within its limits, or at one of them).
+`taylor` and `euler` both solve such a device from the same tables, and share the code of this file. An interval is one
+stretch of constant command, or with pulses several, and a solver registers its function that advances a stretch.
 """
 
 from typing import NamedTuple
@@ -15,9 +15,10 @@ from .converter import width_of
 
 PHASES = 9
 STATES = 5
-"""Room for the state; known when compiling, so that its loops are unrolled."""
+"""Number of states that the tables have room for; known when compiling, so that loops over them are unrolled."""
 SEEN, GRIP, VOLTAGE, QUANTITIES = 5, 6, 7, 8
-"""After the state: the encoder's position; what decides on sticking; the voltage; and how many quantities there are."""
+"""The quantities after the state: the encoder's position, the one that decides on sticking, and the voltage; then the
+number of quantities."""
 
 
 class State(NamedTuple):
@@ -25,8 +26,8 @@ class State(NamedTuple):
 
     position_m: float
     velocity_m_per_s: float
-    others: tuple[float, float, float]  # the rest of y: what `device` has, then zeros
-    width: int  # clocks that the pulse lasts
+    others: tuple[float, float, float]  # the rest of the state as in `device`, then zeros
+    width: int  # length of the pulse, clocks
 
 
 @compiled
@@ -35,12 +36,12 @@ def phase_number(along, limited):
     return 3 * (along + 1) + limited + 1
 
 
-STUCK, SLIDING = 4, 7  # phase_number(0, 0) and phase_number(1, 0), which are not worth compiling
+STUCK, SLIDING = 4, 7  # phase_number(0, 0) and phase_number(1, 0), written out rather than compiled
 
 
 @compiled
 def quantity(tables, phase, number, state, command_n):
-    """Return the value in a phase of a quantity: of a state, its rate of change."""
+    """Return the value of a quantity in a phase; for a state this is its rate of change."""
     result = tables[phase, number, STATES] + tables[phase, number, STATES + 1] * command_n
     result += tables[phase, number, 0] * state.position_m + tables[phase, number, 1] * state.velocity_m_per_s
     for i in range(STATES - 2):
@@ -50,7 +51,8 @@ def quantity(tables, phase, number, state, command_n):
 
 @compiled
 def along_of(plant, state, command_n):
-    """Return which way the handle moves or is about to, -1 or 1, or 0 for stuck; 1 without Coulomb friction."""
+    """Return the direction in which the handle moves or is about to, -1 or 1, or 0 if stuck; 1 without Coulomb
+    friction."""
     if plant.coulomb_n < 0.0:
         return 1
     if state.velocity_m_per_s != 0.0:
@@ -63,7 +65,7 @@ def along_of(plant, state, command_n):
 
 @compiled
 def limited_of(plant, state, command_n):
-    """Return at which limit the voltage is, -1 or 1, or 0."""
+    """Return the limit at which the voltage is, -1 or 1, or 0 within the limits."""
     if plant.voltage_limit_n == np.inf:
         return 0
     voltage_n = quantity(plant.tables, SLIDING, VOLTAGE, state, command_n)
@@ -72,9 +74,9 @@ def limited_of(plant, state, command_n):
 
 @by_type
 def stretch(plant, encoder, moment, command_n, since_s, until_s, interval, edges):
-    """Return the `Moment` after the part of an interval from `since_s` to `until_s`, the command constant.
+    """Return the `Moment` after the part of an interval from `since_s` to `until_s`, under a constant command.
 
-    The moment is that at `since_s`; the other arguments are those of `advance`.
+    `moment` is the state at `since_s`; the other arguments are as in `advance`.
     """
 
 
@@ -86,7 +88,7 @@ def never_quietly(plant, moment, force_n, interval):
 
 @compiled
 def advance_in_stretches(plant, encoder, moment, force_n, interval, edges):
-    """Advance device and encoder by as many stretches as the interval has commands: of pulses, one for each level."""
+    """Advance device and encoder by one stretch for every command in the interval; with pulses, one for each level."""
     pulse, limit_n = plant.pulse, plant.command_limit_n
     if pulse.period == 0:
         command_n = min(max(force_n, -limit_n), limit_n)

@@ -1,19 +1,19 @@
-"""Polynomials over a leg, its time 0 to 1: what is sure of them without looking closer, and where they pass a value.
+"""Polynomials over a leg, in its time 0 to 1: bounds that are cheap to compute, and the times of passing a value.
 
-An array holds a polynomial a column: three sums, then the coefficients. It is filled by who expands a motion.
+An array holds one polynomial in each column: three sums, then the coefficients. The expansion of a motion fills it.
 """
 
 from ...model.compiled import compiled
 
 END, BEND, STEEPENING, FIRST = 0, 1, 2, 3
-"""Of a polynomial: its value at the end; two sums of its coefficients' sizes; and its first coefficient."""
+"""The rows of a polynomial: its value at the end; two sums of its coefficients' sizes; and its first coefficient."""
 NEVER, UNSURE = 2.0, -1.0
-"""In place of a time."""
+"""Values in place of a time: the polynomial does not pass the bound, or the leg is too long to tell."""
 
 
 @compiled
 def measure(series):
-    """Fill `END`, `BEND` and `STEEPENING` of each polynomial; the last terms first, for they are the smallest."""
+    """Fill `END`, `BEND` and `STEEPENING` of every polynomial, with the last terms first as they are the smallest."""
     for row in range(FIRST):
         for number in range(series.shape[1]):
             series[row, number] = 0.0
@@ -30,7 +30,7 @@ def measure(series):
 
 @compiled
 def halve(series):
-    """Make the polynomials those of the leg's first half."""
+    """Restrict the polynomials to the leg's first half."""
     share = 1.0
     for j in range(FIRST + 1, len(series)):
         share *= 0.5
@@ -57,7 +57,7 @@ def at(series, number, time):
 
 @compiled
 def stays(series, number, low, high):
-    """Return whether a polynomial is sure to stay within low <= p < high, and whether it goes one way all the leg."""
+    """Return whether a polynomial surely stays within low <= p < high, and whether it is monotone over the leg."""
     start, slope, bend = series[FIRST, number], series[FIRST + 1, number], series[BEND, number]
     inside = low <= start + min(slope, 0.0) - bend and start + max(slope, 0.0) + bend < high
     return inside, abs(slope) > series[STEEPENING, number]
@@ -65,7 +65,7 @@ def stays(series, number, low, high):
 
 @compiled
 def root(series, number, wanted, after):
-    """Return the time, `after` to 1, at which a polynomial that goes one way passes `wanted`: Newton's method."""
+    """Return the time, `after` to 1, at which a monotone polynomial passes `wanted`, by Newton's method."""
     low, high = after, 1.0
     rising = series[FIRST + 1, number] > 0.0
     time = 0.5 * (low + high)
@@ -88,7 +88,7 @@ def root(series, number, wanted, after):
 
 @compiled
 def leaves(series, number, low, high, surely):
-    """Return when (0 to 1) a polynomial leaves low <= p < high: `NEVER`, or `UNSURE`, which `surely` excludes."""
+    """Return the time (0 to 1) when a polynomial leaves low <= p < high, or `NEVER`, or `UNSURE` unless `surely`."""
     inside, one_way = stays(series, number, low, high)
     if inside:
         return NEVER
@@ -98,7 +98,7 @@ def leaves(series, number, low, high, surely):
     if low <= end < high:
         return NEVER
     bound = low if end < low else high
-    # A rounding may have begun it outside on that side; on the other, it crosses all of the range.
+    # Rounding may have put its start outside on this side; from the other side it crosses the whole range.
     if (start < low and bound == low) or (start >= high and bound == high):
         return 0.0
     return root(series, number, bound, 0.0)

@@ -2,7 +2,7 @@
 
     m dv/dt = F - b v - Fc sign(v),   dx/dt = v,   and v = 0 for as long as the handle rests and |F| <= Fc
 
-The applied force F is constant over an interval (zero-order hold), so the motion is not integrated but known. With
+The applied force F is constant over an interval (zero-order hold), so the motion is known in closed form. With
 z = -b t / m, phi1(z) = (e^z - 1) / z and phi2(z) = (phi1(z) - 1) / z (the first columns of the matrix exponential),
 and `net` the force left after Coulomb friction,
 
@@ -39,7 +39,7 @@ class Coulomb(NamedTuple):
 
 
 class Rigid(NamedTuple):
-    """A handle that is driven by the force itself: the device with the least in it."""
+    """A handle that the force drives directly: the simplest device."""
 
     handle: Handle
     coulomb: Coulomb | None
@@ -53,7 +53,7 @@ class Motion(NamedTuple):
 
 
 class Span(NamedTuple):
-    """What a length of time does to a motion: the coefficients of the two equations of this file."""
+    """A length of time and its coefficients in the two equations of this file."""
 
     seconds: float
     decay: float  # e^z - 1: the part of the velocity that viscous friction takes, from 0 to -1
@@ -87,10 +87,10 @@ def span(handle, seconds):
 
 @compiled
 def glide(motion, net_n, interval):
-    """Return the `Motion` after the span `interval` under a constant net force, whatever its velocity passes through.
+    """Return the `Motion` after the span `interval` under a constant net force, also if the velocity passes zero.
 
-    The change of velocity is added to the old one: multiplying by e^z instead would repeat that factor's rounding in
-    every interval, a bias of the friction by up to 2**-53 / |z| of itself.
+    The change of velocity is added to the old velocity: multiplying by e^z instead would repeat that factor's rounding
+    in every interval, a bias of the friction by up to 2**-53 / |z| of itself.
     """
     change = motion.velocity_m_per_s * interval.decay + net_n * interval.velocity_per_newton
     travel = motion.velocity_m_per_s * interval.coast_s + net_n * interval.position_per_newton
@@ -134,7 +134,7 @@ def turn(handle, motion, net_n, seconds):
     """
     velocity = motion.velocity_m_per_s
     at = seconds
-    if net_n < 0.0 < velocity or velocity < 0.0 < net_n:  # else it was fading to nothing, and is taken to have done so
+    if net_n < 0.0 < velocity or velocity < 0.0 < net_n:  # otherwise the velocity faded to zero at the end
         slowness = -velocity / net_n
         growth = handle.viscous_n_s_per_m * slowness
         if growth < 1e-17:
@@ -204,7 +204,7 @@ def _advance(plant, encoder, moment, force_n, interval, edges):
     seconds = interval.length.seconds
     net_n = net_force(coulomb, motion, force_n)
     whole = glide(motion, net_n, interval.length)
-    # A leg is a motion in one direction under one net force. A turn makes two of the interval.
+    # A leg is a motion in one direction under one net force. A turn divides the interval into two legs.
     start, since_s = motion, 0.0
     end, until_s = whole, seconds
     turning = turned(motion, whole)

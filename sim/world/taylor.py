@@ -1,10 +1,10 @@
-"""A linear device and its encoder, solved to rounding: with friction that sticks and a voltage that has a limit.
+"""A linear device with sticking friction and a limited voltage, and its encoder, solved to rounding.
 
-In each phase a Taylor polynomial gives the state over a leg to rounding: a leg is so short that its series ends. What
-may happen in a leg is watched as polynomials too: the encoder passes an edge, the handle comes to rest or breaks loose,
-the voltage meets or leaves its limit. For each, either the size of its coefficients excludes it, or its slope keeps one
-sign and the ends tell; else the leg is halved. Then the earliest event is found by Newton's method, and the next leg
-begins there.
+In each phase a Taylor polynomial gives the state over a leg to rounding: a leg is short enough for a series of fixed
+length. The quantities that decide on events are polynomials too: the encoder passes an edge, the handle comes to rest
+or breaks loose, the voltage meets or leaves its limit. For every event, either the size of the coefficients excludes
+it, or the slope keeps one sign and the values at the ends decide; otherwise the leg is halved. Then Newton's method
+finds the earliest event, and the next leg begins there.
 """
 
 from typing import NamedTuple
@@ -33,17 +33,17 @@ from .linear import (
 from .polynomials import FIRST, NEVER, UNSURE, at, halve, leaves, measure, root, stays
 
 HALVINGS = 40
-"""Of a leg, before it is taken as decided: by then it is as short as rounding."""
+"""Halvings of a leg after which the values at its ends alone decide: by then it is as short as rounding."""
 STALLED = 8
-"""Events one after another, each as good as at the time of the last, before a moment passes without any."""
+"""Events in a row, each within `BRIEF` of the one before, after which a leg of that length passes without events."""
 BRIEF = 1e-6
-"""The part of a leg that is such a moment."""
+"""The length of such a brief leg, as a part of the longest leg."""
 
 
 class Train(NamedTuple):
-    """A linear device as `device.train` makes it."""
+    """A linear device in the form that `device.train` makes."""
 
-    tables: np.ndarray  # (PHASES, QUANTITIES, STATES + 2): dy/dt, and what is watched, of y, of 1, of the command
+    tables: np.ndarray  # (PHASES, QUANTITIES, STATES + 2): dy/dt and watched quantities, by y, by 1, by the command
     series: np.ndarray  # scratch, (FIRST + order + 1, QUANTITIES): the polynomials of the leg
     coulomb_n: float  # negative for none
     voltage_limit_n: float
@@ -77,7 +77,7 @@ def expand(tables, series, phase, state, command_n, seconds):
             elif j < last:
                 series[j + 1, number] = share * change
     if state.velocity_m_per_s == 0.0 and phase // 3 != STUCK // 3:
-        # v / t has the sign of v, which begins at zero and has none yet: else a leg is halved and halved after a break.
+        # At a break v begins at zero, without a sign. v / t has the sign of v, and watching it avoids many halvings.
         for j in range(FIRST, last):
             series[j, GRIP] = series[j + 1, 1]
         series[last, GRIP] = 0.0
@@ -86,7 +86,7 @@ def expand(tables, series, phase, state, command_n, seconds):
 
 @compiled
 def _breaks(series, coulomb_n, along, surely):
-    """Return when the handle comes to rest, or breaks loose: see `leaves`."""
+    """Return the time at which the handle comes to rest, or breaks loose: see `leaves`."""
     if coulomb_n < 0.0:
         return NEVER
     if along == 0:
@@ -96,7 +96,7 @@ def _breaks(series, coulomb_n, along, surely):
 
 @compiled
 def _switches(series, most, limited, surely):
-    """Return when the voltage meets its limit, or leaves it."""
+    """Return the time at which the voltage meets its limit, or leaves it: see `leaves`."""
     if most == np.inf:
         return NEVER
     if limited == 0:
@@ -109,9 +109,9 @@ def _emit(train, encoder, cell, n_edges, leg, interval, edges):
     """Append the edges that the encoder passes in a leg; return (cell, n_edges).
 
     Args:
-        leg: (when it begins, s of the interval; how long it is, s; until which time of it, 0 to 1).
+        leg: (its beginning in the interval, s; its length, s; its time of 0 to 1 at which the search ends).
 
-    Where the arrays are full n_edges is -1.
+    If the arrays are full, the returned n_edges is -1.
     """
     series, (now_s, seconds, end) = train.series, leg
     room = min(len(edges.clocks), len(edges.levels))
