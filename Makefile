@@ -1,15 +1,15 @@
-# Every task of the project; `make help` lists them. Names here are relative, so that `make -C` works from anywhere.
+# Every task of the project; `make help` lists them. Paths here are relative, so that `make -C` works from anywhere.
 #
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
 #   ARGS="-k levant"          more options for pytest (test, soak)
-#   ONLY=hit/mhz              which cases are recorded anew: those whose names begin so (digests)
+#   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests)
 #   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
-#                             which seeds, how many samples each, and how many of endurance (soak)
+#                             the seeds, the samples for every seed, and the samples of endurance (soak)
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
 MAKEFLAGS += --no-builtin-rules --no-builtin-variables --no-print-directory
-# Verilator calls make itself, which must not think that it is part of this run.
+# Verilator calls make itself, and that make must not take itself for a part of this run.
 unexport MAKEFLAGS MFLAGS MAKELEVEL
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := all
@@ -20,8 +20,8 @@ RUN := $(VENV)/bin/python -m
 HARDWALL := $(VENV)/bin/hardwall
 SOURCES := $(wildcard $(addsuffix .py,hdl/* hdl/*/* model/* model/*/* sim/* sim/*/*) sim/rtl/*.cpp sim/scene/builtin/*.toml)
 
-# The main job: the paper's device with the generated hardware in the loop, and beside it the same axis at 1 MHz on the
-# bit-accurate model, which gives the hardware's words in a twentieth of the time.
+# The main job: the paper's device with the generated hardware in the loop, and for comparison the same axis at 1 MHz on
+# the bit-accurate model, which gives the hardware's words in a twentieth of the time.
 SCENE := seed-2011
 ESTIMATORS := levant fdm
 REPORTS := $(ESTIMATORS:%=build/hit-%.json) $(ESTIMATORS:%=build/mhz-%.json)
@@ -32,7 +32,7 @@ ON_ECP5 := --device ecp5-25k
 ON_ICE40 := --device ice40-up5k $(addprefix --set controller.,clock_hz=24000000 sample_hz=500000 actuation_hz=500000)
 
 comma := ,
-# Every estimator on one map, which the best of them leave unless it is larger than the paper's.
+# Every estimator on one map; it is larger than the paper's because the best estimators leave that one.
 ALL_ON_THE_MAP := --estimators all $(addprefix --set zwidth., \
   stiffness_to_n_per_m=150e3 stiffness_step_n_per_m=2e3 damping_step_n_s_per_m=12.0 walls_below=8)
 MAPPED := seed-2011 fit-2011 drive-2011
@@ -106,9 +106,9 @@ help: ## this list
 	@sed -n 's/^\([a-z]*\):.* ## \(.*\)/\1:\2/p' Makefile | while IFS=: read -r task what; do \
 	  printf '  make %-10s %s\n' "$$task" "$$what"; done
 
-# ---- the main job: one report and one picture an estimator ----------------------------------------------------------
+# ---- the main job: a report and a picture for every estimator -------------------------------------------------------
 
-# Two targets of one pattern are made together. The report comes last and whole: without it nothing looks done.
+# The two targets of a pattern are made together. The report comes last and whole, so an interrupted run starts again.
 define hit
 @mkdir -p build
 @rm -f $(basename $@).json
@@ -123,9 +123,9 @@ build/hit-%.json build/hit-%.png: $(SOURCES) $(VENV)/.sim | tools
 build/mhz-%.json build/mhz-%.png: $(SOURCES) $(VENV)/.sim | tools
 	$(call hit,mhz,fixed,its bit-accurate model)
 
-# ---- the tools, by need: .sim runs the loop, .test the regressions, .synth place and route, .docs the pages ----------
+# ---- the tools: .sim for the loop, .test for the regressions, .synth for place and route, .docs for the pages --------
 
-# .venv is made anew for another PYTHON, when its own is gone, and in a tree that was moved or copied.
+# .venv is made anew for another PYTHON, when its interpreter is gone, and in a tree that was moved or copied.
 MADE_IN := $(file <$(VENV)/.made)
 MADE_BY := $(file <$(VENV)/.python)
 ifneq ($(MADE_IN),$(CURDIR))
@@ -142,7 +142,7 @@ $(VENV)/.made: $(if $(STALE),FORCE) | tools
 	@printf '%s\n' "$(PYTHON)" >$(VENV)/.python
 	@printf '%s\n' "$(CURDIR)" >$@
 
-# One pip at a time, whatever make does in parallel; of what it says, the names of the packages that it gets.
+# Only one pip runs at a time, even in a parallel make; of its output, only the names of the packages are shown.
 SAYS := s/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  unpacking all of these/p
 define install
 @echo "Installing into $(VENV), once: $(2) ..."; began=$$SECONDS; \
@@ -164,9 +164,9 @@ $(VENV)/.synth: pyproject.toml $(VENV)/.sim | tools
 $(VENV)/.docs: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)docs,the tools of the pages)
 
-# ---- what only the system can give, named before anything starts ----------------------------------------------------
+# ---- system packages, checked before anything starts ----------------------------------------------------------------
 
-# cocotb embeds Python in the simulator.
+# These tasks embed Python in the simulator, by cocotb.
 EMBEDDED := $(filter test bench soak,$(MAKECMDGOALS))
 
 define CHECK_PYTHON

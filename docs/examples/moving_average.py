@@ -1,4 +1,4 @@
-"""A block of one's own, and its model."""
+"""A custom block and its model."""
 
 import numpy as np
 from amaranth.hdl import Module, Signal, signed
@@ -27,5 +27,5 @@ class MovingAverage(wiring.Component):
 
 
 def moving_average(samples: np.ndarray) -> np.ndarray:
-    """Return what the block gives for samples after a reset."""
+    """Return the block's outputs for samples after a reset."""
     return np.convolve(samples, np.ones(4, np.int64))[: len(samples)] >> 2

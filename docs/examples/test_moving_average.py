@@ -1,4 +1,4 @@
-"""The block is its model, word for word."""
+"""The block gives its model's outputs, word for word."""
 
 import cocotb
 from moving_average import MovingAverage, moving_average

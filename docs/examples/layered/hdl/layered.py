@@ -17,7 +17,7 @@ class Layered(Block):
 
     Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`.
 
-    Rounding and overflow: those of `Wall` in each layer; the exact sum saturates at the force format.
+    Rounding and overflow: every layer rounds and saturates as `Wall`; the exact sum saturates at the force format.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class Layered(Block):
     Members
     -------
     strobe, count, velocity, force, valid
-        Those of `Wall`.
+        The same as in `Wall`.
     one input for each of `design.words` : In
         Run-time parameters.
     """

@@ -3,12 +3,12 @@
     depth = side (count - wall)              side = +1: the wall fills position > wall; -1: position < wall
     push  = K depth + B side velocity + K_core (depth - core_depth)
 
-The first two terms count for depth > 0, the last for depth > core_depth. Each layer is a `wall`, with its formats and
-its rounding; their forces are added exactly and saturate at the largest magnitude of the force format. So fixed point
-differs from the exact equation on the same words by at most two force LSB where neither layer saturates.
+The first two terms act for depth > 0, the last for depth > core_depth. Every layer is a `wall`, with its formats and
+its rounding; the layers' forces are added exactly and saturate at the largest magnitude of the force format. So fixed
+point differs from the exact equation on the same words by at most two force LSB where neither layer saturates.
 
-`core_depth` has the bits that hold the travel, rounded up to a power of two: so a handle that is anywhere in the travel
-is less than half of the count's range away from the core, and a core never pushes in free space.
+`core_depth` has the bits that hold the travel, rounded up to a power of two. So a handle anywhere in the travel is less
+than half of the count's range away from the core, and a core never pushes in free space.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ from .wall import render
 from .words import Word
 
 LATENCY = wall.LATENCY + 1
-"""Clocks from strobe to valid: those of a layer, and one for the sum."""
+"""Clocks from strobe to valid: the clocks of a layer, and one for the sum."""
 
 
 class Params(NamedTuple):
@@ -44,7 +44,7 @@ class Design:
 
     Attributes:
         layer: the `wall.Design` of either layer.
-        words: those of the wall, and `core_stiffness` and `core_depth`.
+        words: the words of the wall, and `core_stiffness` and `core_depth`.
     """
 
     latency = LATENCY
@@ -60,7 +60,7 @@ class Design:
         )
 
     def _core(self, words: Mapping[str, int]) -> dict[str, int]:
-        """Return the run-time words of the core, as those of a wall."""
+        """Return the core's run-time words by the names that a wall's words have."""
         inwards = -words["core_depth"] if words["wall_left"] else words["core_depth"]
         position = wrap(words["wall_position"] + inwards, self.count_width)
         return {**words, "wall_stiffness": words["core_stiffness"], "wall_damping": 0, "wall_position": position}
@@ -70,7 +70,7 @@ class Design:
         return Params(self.layer.params(words), self.layer.params(self._core(words)), self.force.max)
 
     def float_params(self, stiffness_n_per_m: float, damping_n_s_per_m: float, words: Mapping[str, int]) -> FloatParams:
-        """Return the float64 wall's parameters; the core's stiffness is that of its word."""
+        """Return the float64 wall's parameters; the core's stiffness is taken from its word."""
         core_stiffness = next(word for word in self.words if word.name == "core_stiffness")
         core_n_per_m = core_stiffness.to_si(words["core_stiffness"])
         return FloatParams(

@@ -1,4 +1,4 @@
-"""The layered wall: RTL against model, model against the float64 equation, and what a core must never do."""
+"""The layered wall: RTL against model, model against the float64 equation, and no push of the core in free space."""
 
 import cocotb
 import pytest
@@ -20,7 +20,7 @@ def make(name: str) -> Layered:
 
 
 def stimulus(d: Design, samples: int):
-    """Yield (count, velocity, *words): near the surface, near the core, at the ends of the count, and anywhere."""
+    """Yield (count, velocity, *words) near the surface, near the core, at the ends of the count, and anywhere."""
     random, half = rng(), 1 << (d.count_width - 1)
     for k in range(samples):
         words = [int(random.integers(word.format.min, word.format.max + 1)) for word in d.words]

@@ -44,7 +44,7 @@ class Estimator(EstimatorBlock):
                 running.eq(1),
             ]
 
-        # The velocity has one fraction bit: the change over two samples is its word.
+        # The velocity has one fraction bit, so its word is the change over two samples.
         limited = saturate(change, fmt.min, fmt.max)
         m.d.sync += self.valid.eq(taken)
         with m.If(taken):

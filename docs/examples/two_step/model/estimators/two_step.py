@@ -3,11 +3,11 @@
     v = (f_k - f_{k-2}) / 2                  counts a sample
 
 Formats, derived. The velocity has one fraction bit, so that half a count a sample is exact: nothing is rounded. Its
-range is twice the axis's largest speed, as that of the finite difference.
+range is twice the axis's largest speed, like the range of the finite difference.
 
 Ends. The difference is taken modulo the count's width, so the count may wrap. A step, or a speed, of more than twice
-the largest speed saturates, with the flag `velocity_saturated`. The first sample, and one with `restart`, reads 0, and
-the sample after it has only one difference, which counts half. Standstill reads 0.
+the largest speed saturates, with the flag `velocity_saturated`. The first sample, and every sample with `restart`,
+reads 0, and the sample after it has only one difference, which counts half. Standstill reads 0.
 
 Source: elementary.
 """
@@ -58,7 +58,7 @@ START = State(0, 0, 0)
 
 
 class Design(EstimatorDesign):
-    """Formats of the mean of two differences for an axis; the module says how they follow."""
+    """Formats of the mean of two differences for an axis, as the module derives them."""
 
     name = "two-step"
     gains_class = Gains
@@ -89,7 +89,7 @@ def _take(width, state, count, restart):
 @estimate.register(Params)
 @compiled
 def step(params, state, seen, restart):
-    # The velocity has one fraction bit: the change over two samples is its word.
+    # The velocity has one fraction bit, so its word is the change over two samples.
     change, state = _take(params.count_width, state, seen.count, restart)
     velocity = saturate(change, -params.velocity_max - 1, params.velocity_max)
     return state, velocity, int(velocity != change)
