@@ -13,7 +13,7 @@ from stimuli.specs import ADJUSTED, MHZ, spec
 
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
 SLACK = 12
-"""Clocks of each sample after the drive has changed, in which the host may act."""
+"""Clocks of every sample after the drive has changed, in which the host may act."""
 
 
 def busy(estimator: str) -> AxisSpec:
@@ -29,7 +29,7 @@ def make(estimator: str) -> Axis:
 
 
 def random_words(design: axis.Design, random: np.random.Generator) -> dict[str, int]:
-    """Return words for a wall that is often hit, with gains from nothing to the most."""
+    """Return words for a wall that is often hit, with gains from zero to the largest."""
     words = {word.name: word.reset for word in design.words}
     for name in ("wall_stiffness", "wall_damping", "output_force_limit", "output_slew_limit"):
         top = next(word.format.max for word in design.words if word.name == name)
@@ -45,7 +45,7 @@ def random_words(design: axis.Design, random: np.random.Generator) -> dict[str, 
 
 
 class Events:
-    """What the pins did, as the simulator saw it: (clock whose edge sees it first, row in PINS, value)."""
+    """Changes of the pins in the simulator: (clock whose edge sees the change first, row in PINS, value)."""
 
     def __init__(self, bench: Bench):
         self.rows: list[tuple[int, int, int]] = []
@@ -67,7 +67,7 @@ class Events:
 
 
 def reference(spec: AxisSpec, pins: np.ndarray, commits: list[tuple[int, dict[str, int]]], samples: int) -> np.ndarray:
-    """Return OUTPUTS of each sample, from the model; `commits` says at which strobe which words take effect."""
+    """Return the model's OUTPUTS of every sample; `commits` says at which strobe which words take effect."""
     design = spec.design
     words = {word.name: word.reset for word in design.words}
     state = clocked.State(quadrature.START, design.start(), 0)
@@ -84,7 +84,7 @@ def reference(spec: AxisSpec, pins: np.ndarray, commits: list[tuple[int, dict[st
 
     for strobe, new in commits:
         run_to(strobe, words, words)
-        # The strobe's sample has the new words; the decoder has them from the next clock on.
+        # The strobe's sample uses the new words; the decoder uses them from the next clock on.
         run_to(strobe + 1, words, new)
         words = new
     run_to(pins.shape[1], words, words)
@@ -100,7 +100,7 @@ async def motion(bench: Bench, spec: AxisSpec, samples: int, random: np.random.G
         if random.random() < 0.02:
             spacing = float(random.choice([4, 8, 15, 40, 200])) if random.random() < 0.98 else 1.0
             direction = int(random.choice([-1, 1]))
-        # Now and then both pins at once: an illegal transition, whatever else comes.
+        # Both pins change at once now and then, which is always an illegal transition.
         quarter = (quarter + direction * (2 if random.random() < 0.002 else 1)) % 4
         a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[quarter]
         bench.drive(encoder_a=a, encoder_b=b)
@@ -110,13 +110,13 @@ async def motion(bench: Bench, spec: AxisSpec, samples: int, random: np.random.G
 
 
 async def committed_with(dut) -> None:
-    """Check that a commit is over when the next sample is."""
+    """Check that a commit has ended when the next sample has."""
     await RisingEdge(dut.sampled)
     assert not int(dut.commit_pending.value)
 
 
 async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Generator, commits: list) -> None:
-    """Act in the slack of the samples: commit words, preload, clear, arm, take the enable away and give it back."""
+    """Act in the slack of the samples: commit words, preload, clear, arm, drop the enable and raise it again."""
     dut, sampled = bench.dut, bench.dut.sampled
     half = 1 << (spec.count_width - 1)
     for sample in range(samples - 1):
@@ -153,7 +153,7 @@ async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Gen
 @cocotb.test()
 async def follows_model(dut):
     spec = busy(**parameters())
-    # Each estimator has a campaign of its own: here it is the wiring that is tested.
+    # Every estimator has its own campaign; this one tests the wiring.
     samples, random = SAMPLES // (5 if spec.estimator in ("levant", "fdm") else 100), rng()
     bench = Bench(dut, Axis(spec))
     await bench.reset()
@@ -178,7 +178,7 @@ async def follows_model(dut):
         found = seen.column(name)[:kept]
         wrong = np.flatnonzero(found != expected[row, :kept])
         assert not len(wrong), f"{name}: {len(wrong)} of {kept} differ, first at sample {wrong[:1]}"
-    # It was worth it: forces acted both ways, both faults of the encoder rose, and both limits acted.
+    # The run must show forces in both directions, both faults of the encoder, and both limits.
     assert (seen.column("drive") > 0).any()
     assert (seen.column("drive") < 0).any()
     rose = spec.design.flag_names(int(np.bitwise_or.reduce(seen.column("flags"))))
@@ -187,7 +187,7 @@ async def follows_model(dut):
     assert {(clock - first_clock - latency + 1) % spec.clocks_per_sample for clock in seen.clocks} == {0}
 
 
-# One of each kind of estimator: by the count alone, by a memory, by the stamps. `test_loop` has every one of them.
+# One estimator of every kind: on the count alone, with a memory, on the stamps. `test_loop` runs all estimators.
 @pytest.mark.parametrize("estimator", ["levant", "fdm", "window", "levant-edge"])
 def test_rtl(estimator):
     simulate(__file__, make, estimator=estimator)

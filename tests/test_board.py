@@ -14,9 +14,9 @@ from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from stimuli.specs import spec
 
 HALF = 3
-"""Clocks of a level on the serial port: the fewest allowed."""
+"""The fewest clocks allowed for a level on the serial port."""
 SYNCHRONISER = 2
-"""Clock edges from a change of a pin to the last that does not act on it."""
+"""Clock edges from a change of a pin to the last edge that does not act on it."""
 
 
 def make(name: str) -> Board:
@@ -24,9 +24,9 @@ def make(name: str) -> Board:
 
 
 class Twin:
-    """What the board's axis holds and its pulses, clock for clock, from the models alone.
+    """The state of the board's axis and its pulses, clock for clock, from the models alone.
 
-    The blocks have benches of their own; what is added here is at which clock edge their results can be seen.
+    The blocks have their own benches; the twin adds the clock edge at which their results can be seen.
     """
 
     def __init__(self, name: str):
@@ -42,7 +42,7 @@ class Twin:
         self.sum = self.magnitude = self.negative = self.pulse = self.sign = 0
 
     def telemetry(self) -> dict[str, int]:
-        """Return what a capture at the next edge takes."""
+        """Return the telemetry that a capture at the next edge takes."""
         own = {
             "drive": self.drive,
             "velocity": self.velocity,
@@ -53,11 +53,11 @@ class Twin:
 
     @property
     def strobe(self) -> bool:
-        """Whether the next edge takes a sample."""
+        """Return whether the next edge takes a sample."""
         return self.clocks % self.spec.clocks_per_sample == self.spec.clocks_per_sample - 1
 
     def _raised(self) -> int:
-        """Return the flags that rise with the next edge; the pin shows them already."""
+        """Return the flags that rise with the next edge; the pin already shows them."""
         encoder = self.decoder.illegal | self.decoder.overspeed << 1
         return self.raised.get(self.clocks, 0) | (encoder if self.strobe else 0)
 
@@ -77,7 +77,7 @@ class Twin:
         self.raised[now + d.latency_to_drive] = limited << params.output_bit
 
     def edge(self, a: int, b: int, z: int, given: dict[str, int]) -> None:
-        """One clock edge, with what a frame gives to the axis at it, if anything."""
+        """Advance by one clock edge, with the values that a frame gives to the axis at this edge, if any."""
         bits = self.spec.force.width - 2
         self.sum = self.sum % 2**bits + self.magnitude
         self.pulse, self.sign = self.sum >> bits, self.negative
@@ -102,7 +102,7 @@ class Twin:
 
 
 class Host:
-    """The world around the board: a serial host, a turning encoder; and the twin beside it, compared at every edge."""
+    """The world around the board: a serial host, a turning encoder, and the twin, compared at every edge."""
 
     def __init__(self, dut, name: str):
         self.dut, self.board, self.random = dut, make(name), rng()
@@ -118,12 +118,12 @@ class Host:
     async def reset(self):
         await self.bench.reset()
         self.bench.drive(scan_select_n=1, drive_enable=1)
-        # So long the reset is seen inside; the first edge without it is the twin's first.
+        # The reset is seen inside for as long as this; the first edge without it is the twin's first.
         for _ in range(SYNCHRONISER):
             await RisingEdge(self.dut.clk)
 
     def _turn(self) -> None:
-        """Move the encoder, at random, by an edge; seldom by two at once."""
+        """Move the encoder at random by one edge, seldom by two at once."""
         if self.random.random() >= self.rate:
             return
         z = self.pins[2] ^ int(self.random.random() < 0.1)
@@ -134,7 +134,7 @@ class Host:
         self.bench.drive(encoder_a=a, encoder_b=b, encoder_z=z)
 
     async def edges(self, count: int):
-        """Let `count` clock edges pass; the twin goes along."""
+        """Let `count` clock edges pass on the board and on the twin."""
         for _ in range(count):
             await RisingEdge(self.dut.clk)
             seen = int(self.dut.drive_pdm.value), int(self.dut.drive_sign.value)
@@ -146,15 +146,15 @@ class Host:
             self._turn()
 
     async def exchange(self, values: dict[str, int], bits: int | None = None, heard: bool = True, stuck: int = 0):
-        """Send a frame, or its first `bits`, or zeros before it; return the answer, and the telemetry it should be.
+        """Send a frame, or its first `bits`, or zeros before it; return the answer and the expected telemetry.
 
-        Bits set in `stuck` are sent as ones. Unless `heard`, or if it is no whole frame, the axis is to get nothing.
+        Bits set in `stuck` are sent as ones. The axis must get nothing unless `heard`, or if the frame is not whole.
         """
         frame = int.from_bytes(self.board.commands.encode(values), "big") | stuck
         length = self.board.frame_bits
         bits = length if bits is None else bits
-        # The twin has seen `clocks` edges; the next has that number. The first edge to act on a change is number
-        # `clocks` + SYNCHRONISER; the register followed the telemetry up to the one before.
+        # The twin has seen `clocks` edges, so the next edge has that number. The first edge to act on a change is
+        # number `clocks` + SYNCHRONISER; the register followed the telemetry up to the edge before.
         frozen = self.twin.clocks + SYNCHRONISER - 1
         self.captured[frozen] = None
         self.bench.drive(scan_select_n=0)
@@ -169,7 +169,7 @@ class Host:
         self.bench.drive(scan_clock=0)
         await self.edges(HALF)
         if heard and bits == length:
-            # An edge to see the rise, and the pulses are there at the next.
+            # One edge sees the rise, and the pulses are there at the next.
             self.given[self.twin.clocks + SYNCHRONISER + 1] = values
         self.bench.drive(scan_select_n=1)
         await self.edges(HALF)
@@ -178,7 +178,7 @@ class Host:
         return telemetry, expected
 
     async def commit(self, **values: int):
-        """Send words, the others as after reset, and wait until they hold and have reached the pulses."""
+        """Send words, with the others as after reset, and wait until they hold and have reached the pulses."""
         reset = {word.name: word.reset for word in self.twin.design.words}
         answer = await self.exchange({"commit": 1, "clear_flags": 1, **reset, **values})
         await self.edges(self.settling)
@@ -186,7 +186,7 @@ class Host:
 
     @property
     def settling(self) -> int:
-        """Clocks after which a commit has taken effect on the pulses, however long it waited for its sample."""
+        """Return the most clocks until a commit has taken effect on the pulses, including the wait for its sample."""
         axis = self.twin.spec
         return (axis.samples_per_actuation + 1) * axis.clocks_per_sample + self.board.latency + 4
 
@@ -215,18 +215,18 @@ async def random_frames_reach_the_axis_and_telemetry_comes_back(dut):
     host = Host(dut, **parameters())
     await host.reset()
     read = []
-    # Fewer do not go everywhere.
+    # Fewer frames do not reach every case.
     while host.twin.clocks < max(2 * SAMPLES, 200_000):
         host.rate = float(host.random.choice((0.0, 0.02, 0.3, 1.0), p=(0.1, 0.4, 0.4, 0.1)))
         host.illegal_rate = float(host.random.choice((0.0, 0.01)))
         answer, expected = await host.exchange(random_frame(host))
         assert answer == expected, {n: (v, expected[n]) for n, v in answer.items() if v != expected[n]}
         read.append(answer)
-        # The least pause, to the edge: the register is free again when the words have been taken.
+        # The shortest pause, exact to the edge: the register is free again when the words have been taken.
         await host.edges(host.twin.spec.clocks_per_sample + SYNCHRONISER + 1)
         if host.random.random() < 0.5:
             await host.edges(host.settling)
-    # The campaign is worth its name only if it went everywhere.
+    # The campaign must reach every case.
     assert len({row["drive"] for row in read}) > 3
     assert {bool(row["illegal_count"]) for row in read} == {False, True}
     assert {row["index_latched"] for row in read} == {0, 1}
@@ -247,7 +247,7 @@ async def anything_but_a_whole_frame_only_reads(dut):
         await host.edges(host.settling)
         answer, expected = await host.exchange({})
         assert answer == expected, f"after {bits} bits"
-    # A line stuck high is told by the last bit.
+    # The last bit reveals a line that is stuck high.
     for stuck in (1, (1 << length) - 1):
         await host.exchange(random_frame(host) | {"commit": 1, "preload": 1}, heard=False, stuck=stuck)
         await host.edges(host.settling)
@@ -278,7 +278,7 @@ async def the_density_of_pulses_is_the_drive(dut):
     fields = host.board.commands.fields
     half = 1 << (fields["wall_position"].width - 1)
     stiffest = 2 ** fields["wall_stiffness"].width - 1
-    # The limit sets the magnitude: the wall pushes with all it has.
+    # The force limit sets the magnitude, because the wall pushes with its largest force.
     drives = range(-top, top + 1) if top < 100 else (-top, full // math.pi // 1)
     for drive in map(int, drives):
         await host.commit(
@@ -318,7 +318,7 @@ async def enable_low_is_no_drive(dut):
         host.pulses.clear()
         await host.edges(late)
         answer, _ = await host.exchange({})
-        # Captured so many edges after the fall of the pin.
+        # The telemetry is captured this many edges after the fall of the pin.
         assert (answer["drive"] == 0) == (late + SYNCHRONISER > host.board.enable_latency)
         assert (1, 0) not in host.pulses
         assert (1, 1) not in host.pulses

@@ -1,4 +1,4 @@
-"""What the model refuses, and how it says so: what, the accepted range and the value, in one sentence."""
+"""Inputs that the model refuses, and its messages: the name, the accepted range and the value, in one sentence."""
 
 import math
 

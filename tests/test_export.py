@@ -1,4 +1,4 @@
-"""Verilog, and the table of its ports: each has what the other has, and both are the same every time."""
+"""Verilog and the table of its ports: they list the same ports, and both are the same every time."""
 
 import re
 import subprocess
@@ -15,7 +15,7 @@ from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from stimuli.specs import spec
 
 TOPS = {"axis": Axis, "board": Board}
-# Whoever instantiates the axis depends on these names; the words are those of its estimator.
+# Designs that instantiate the axis depend on these names; the words depend on its estimator.
 AXIS_PORTS = """
 clk rst encoder_a encoder_b encoder_z drive_enable clear_flags preload preload_count index_arm commit
 encoder_glitch_clocks encoder_invert levant_lambda levant_alpha levant_output wall_stiffness wall_damping wall_position
@@ -29,7 +29,7 @@ clk rst encoder_a encoder_b encoder_z drive_enable scan_select_n scan_clock scan
 
 
 def rows(table: str) -> list[dict[str, str]]:
-    """Return a Markdown table's rows by column."""
+    """Return the rows of a Markdown table, with their cells by column."""
     lines = [[cell.strip() for cell in line.strip("|\n").split(" | ")] for line in table.splitlines()]
     assert tuple(lines[0]) == COLUMNS
     assert set(lines[1]) == {"---"}
@@ -37,7 +37,7 @@ def rows(table: str) -> list[dict[str, str]]:
 
 
 def verilog_ports(text: str, module: str) -> dict[str, tuple[str, int]]:
-    """Return direction and width of each port of a module, by name."""
+    """Return direction and width of every port of a module, by name."""
     names, body = re.search(rf"^module {module}\((.*?)\);(.*?)^endmodule", text, re.S | re.M).groups()
     declared = re.findall(r"^  (input|output) (?:\[(\d+):0\] )?(\S+?) ?;", body, re.M)
     ports = {name.lstrip("\\"): (way.removesuffix("put"), int(top or 0) + 1) for way, top, name in declared}

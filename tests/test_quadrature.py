@@ -1,4 +1,4 @@
-"""The quadrature decoder: RTL against model at every clock, and what the model means, clock by clock."""
+"""The quadrature decoder: RTL against model at every clock, and the model's behaviour, clock by clock."""
 
 import hashlib
 import os
@@ -27,9 +27,9 @@ OUTPUTS = (*State._fields[: model.N_OUTPUTS], "fault")
 WIDE = {"count_width": 32, "stamp_width": 24}
 NARROW = {"count_width": 4, "stamp_width": 5, "glitch_width": 4, "fault_width": 2}
 PARAMS = Quadrature(**NARROW).params
-TO_COUNT = model.latency(0) - 1  # clocks between the one that samples a pin and the one that counts, unfiltered
+TO_COUNT = model.latency(0) - 1  # clocks from the one that samples a pin to the one that counts, without a filter
 
-# Stimuli: arrays over clocks, one for each input and one for the reset.
+# Stimuli: arrays over clocks, one for every input and one for the reset.
 
 
 def stimulus(clocks: int, **columns) -> dict[str, np.ndarray]:
@@ -63,24 +63,24 @@ def pulses(channel: str, glitch_clocks: int) -> dict[str, np.ndarray]:
 
 
 def turning(way: int) -> dict[str, np.ndarray]:
-    """Return 40 counts, 5 clocks each, from 3 counts before the narrow counter wraps."""
+    """Return a motion of 40 counts with 5 clocks a count, from 3 counts before the narrow counter wraps."""
     return stimulus(200, preload=at(200, 1), preload_count=4 * way, **pins(way * (np.arange(200) // 5)))
 
 
 def jumping(state: int) -> dict[str, np.ndarray]:
-    """Return both pins changing together, there and back, every 5 clocks from 10 on."""
+    """Return both pins changing together, there and back, every 5 clocks from clock 10 on."""
     clock = np.arange(40)
     return stimulus(40, **pins(state + 2 * (np.maximum(clock // 5 - 1, 0) % 2)))
 
 
 def starting(levels: int, edge: int, glitch_clocks: int) -> dict[str, np.ndarray]:
-    """Return pins at any levels, and a change of A at the clock `edge` after the reset."""
+    """Return pins at the given levels, and a change of A at the clock `edge` after the reset."""
     a = (np.arange(30) > edge) ^ (levels & 1)
     return stimulus(30, a=a, b=levels >> 1 & 1, z=levels >> 2, glitch_clocks=glitch_clocks)
 
 
 def meeting(strobe: str, when: int) -> dict[str, np.ndarray]:
-    """Return a strobe at any clock of: counts 1 to 6 at clocks 12 to 17, armed for the index; a jump; an overspeed."""
+    """Return counts 1 to 6 at clocks 12 to 17, an index, a jump and an overspeed, with a strobe at clock `when`."""
     clock = np.arange(60)
     columns = {
         **pins(np.clip(clock - 11, 0, 6) + 2 * (clock >= 30)),
@@ -124,7 +124,7 @@ def random_stimulus(generator: np.random.Generator, clocks: int, width: int) -> 
 
 
 def expected(params: Params, inputs: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the outputs after every clock; a reset, which must come first, leaves those of START."""
+    """Return the outputs after every clock; a reset, which must come first, leaves the outputs of START."""
     resets = np.flatnonzero(inputs["reset"])
     record = np.empty((model.N_OUTPUTS, len(inputs["reset"])), np.int64)
     for begin, end in zip(resets, [*resets[1:], record.shape[1]], strict=True):
@@ -136,7 +136,7 @@ def expected(params: Params, inputs: dict[str, np.ndarray]) -> dict[str, np.ndar
 
 
 def run_all(params: Params, columns: dict[str, np.ndarray]) -> State:
-    """Return the states of a record of all inputs, by name."""
+    """Return the states after every clock of a record of all inputs, by name."""
     return run(params, *(kind(*(columns[name] for name in kind._fields)) for kind in (Inputs, Strobes)))
 
 
@@ -144,11 +144,11 @@ def run_all(params: Params, columns: dict[str, np.ndarray]) -> State:
 
 
 class Recorded(wiring.Component):
-    """The decoder with its inputs in one word and all it sees and shows in another: one write and one read a clock."""
+    """The decoder with its inputs in one word and its outputs in another, for one write and one read a clock."""
 
     def __init__(self, **widths: int):
         self.decoder = Quadrature(**widths)
-        # What the estimators see is a bus of the decoder; here its members go by their own names, as the model's.
+        # The estimators' inputs are a bus of the decoder; here its members have their own names, as in the model.
         self.ports = {name.removeprefix("seen__"): port for name, (_, port) in ports_of(self.decoder).items()}
         shapes = {name: port.shape() for name, port in self.ports.items()}
         self.stimuli = Packing({name: shapes[name] for name in INPUTS})
@@ -173,7 +173,7 @@ async def play(dut, inputs: dict[str, np.ndarray]) -> tuple[Quadrature, Record, 
         dut.stimulus.value = component.stimuli.pack(row)
         dut.rst.value = reset
         await RisingEdge(dut.clk)
-        # As it was before the edge: the inputs that this edge takes, the outputs that the last one made.
+        # The values before the edge: the inputs that this edge takes, the outputs that the last edge made.
         words.append(int(dut.record.value))
     clocks = list(range(len(words) - 1))
     taken = Record(("reset", *INPUTS), component.records, words[:-1], clocks)
@@ -202,7 +202,7 @@ def test_rtl(widths):
     simulate(__file__, Recorded, **widths)
 
 
-# What the model means, clock by clock; `directed` holds the RTL to the same.
+# The model's behaviour, clock by clock; by `directed` the RTL is checked on the same stimuli.
 
 
 @pytest.mark.parametrize("glitch_clocks", range(16))
@@ -234,7 +234,7 @@ def test_count_and_stamps_wrap(way):
 
 @pytest.mark.parametrize("way", [1, -1])
 def test_the_last_edge_is_named_and_its_run_counted(way):
-    """There and back, 10 counts each way."""
+    """The motion goes 10 counts there and 10 counts back."""
     clock = np.arange(100)
     position = way * np.minimum(clock // 5, np.maximum(20 - clock // 5, 0))
     seen = expected(PARAMS, stimulus(100, **pins(position)))
@@ -245,7 +245,7 @@ def test_the_last_edge_is_named_and_its_run_counted(way):
         assert seen["run"][now] == min(run, 4)
         if run:
             assert seen["down"][now] == (ways[-1] < 0)
-            # Upwards, A rises as position 1 is entered; downwards, what rises upwards falls.
+            # Upwards, A rises as position 1 is entered; downwards, every edge is reversed.
             assert seen["edge"][now] == (position[now - TO_COUNT] + (2 if ways[-1] < 0 else 3)) % 4
 
 
@@ -264,7 +264,7 @@ def test_the_pins_first_sampled_are_the_start(edge, glitch_clocks):
     for levels in range(8):
         seen = expected(PARAMS, starting(levels, edge, glitch_clocks))
         up = 1 if (levels & 1) == (levels >> 1 & 1) else -1
-        # The first clock after the reset takes the start; what differs from it later is motion.
+        # The first clock after the reset samples the start; later differences from it are motion.
         assert seen["count"][-1] == (0 if edge == 0 else up)
         assert seen["stepped"].sum() == (0 if edge == 0 else 1)
         assert not any(seen[name].any() for name in ("fault", "index_count", "illegal_count"))

@@ -1,4 +1,4 @@
-"""The quadrature decoder's model at any speed: the count is exact, or a flag comes up."""
+"""The quadrature decoder's model at any speed: the count is exact, or a flag rises."""
 
 import math
 
@@ -26,9 +26,10 @@ ONE = 1 << 32
 
 @compiled
 def turn(params, glitch_clocks, rate, places, clocks):
-    """Turn steadily; return the clocks at which the count is first wrong and a flag is first up, else `clocks`.
+    """Turn steadily; return the clocks of the first wrong count and of the first flag, or `clocks` if there is none.
 
-    places: where A rises, B rises, A falls and B falls in a cycle of 4 counts.
+    Args:
+        places: the positions where A rises, B rises, A falls and B falls in a cycle of 4 counts.
     """
     state = START
     delay = glitch_clocks + 3
@@ -51,7 +52,7 @@ def turn(params, glitch_clocks, rate, places, clocks):
 
 
 def edge_rates(glitch_clocks: int, edge_error: float) -> np.ndarray:
-    """Return rates up to 4 edges a clock: at the limits, close to them, simple fractions, and anything between."""
+    """Return rates up to 4 edges a clock: at the limits, close to them, simple fractions, and random rates between."""
     limits = [max_edge_rate(1.0, glitch_clocks, error) for error in (0.0, edge_error)]
     limits += [4 - limits[0], 2 - 2 * edge_error]
     near = [limit * (1 + way * 10.0**-k) for limit in limits for way in (1, -1) for k in range(1, 5)]
@@ -98,11 +99,11 @@ def motion(before, now):
 
 @compiled
 def explore(shortest, longest, memory):
-    """Try all pins A and B and all limits from `shortest` to `longest` at every clock, without end, until a flag is up.
+    """Try all pins A and B and all limits from `shortest` to `longest` at every clock, until a flag rises.
 
-    Return how many different states were met; from how many of them the pins could rest, no flag come up, and the
-    count be wrong or a jump be unseen; and in how many the count was no position of the time it may lag behind. A
-    state is that of the decoder, the pins of the last `memory` clocks, and the error of the count.
+    Return three numbers: the different states met; the states from which the pins could rest without a flag while the
+    count is wrong or a jump is missed; and the states in which the count is no position within the time that it may
+    lag. A state is the state of the decoder, the pins of the last `memory` clocks, and the error of the count.
     """
     params = Params(4, 1, 1)
     met = {np.int64(-1)}

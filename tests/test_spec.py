@@ -31,7 +31,7 @@ def test_every_extreme_value_of_the_axis_fits_its_format(name, estimator):
     words = {word.name: word for word in design.words}
     for name_, si in (("wall_stiffness", axis.stiffness_max_n_per_m), ("wall_damping", axis.damping_max_n_s_per_m)):
         assert words[name_].to_si(words[name_].from_si(si)) == pytest.approx(si, abs=words[name_].to_si(1))
-    # The largest damping on half a velocity LSB of the damper moves the force by half an LSB at most.
+    # The largest damping times half a velocity LSB of the damper moves the force by at most half an LSB.
     half = design.wall.coarse.lsb / 2 if design.wall.coarse.f < design.estimator.velocity.f else 0
     assert axis.damping_max_n_s_per_m / words["wall_damping"].si_per_unit * half <= 0.5
 
@@ -43,7 +43,7 @@ def test_gain_words_are_as_close_as_promised(name):
     gains = axis.design.gains
     assert lam.to_si(lam.reset) == pytest.approx(gains.lambda_sqrt_m_per_s, rel=2.0**-14)
     assert alpha.to_si(alpha.reset) == pytest.approx(gains.alpha_m_per_s2, rel=2.0**-10)
-    # Two bits of headroom.
+    # The words have two bits of headroom.
     assert lam.si_max >= 3.9 * gains.lambda_sqrt_m_per_s
     assert alpha.si_max >= 3.9 * gains.alpha_m_per_s2
 
@@ -104,7 +104,7 @@ def test_lanes_are_independent_axes_side_by_side():
 
 
 def figure_2_counts(estimator: str = "levant") -> tuple[np.ndarray, AxisSpec]:
-    """Return the counts of that figure's signal, and the axis that it is estimated by."""
+    """Return the counts of the signal of Figure 2, and the axis for its estimate."""
     return swing(10_000, 5.0)[0], axis_at(estimator, 10_000)
 
 
@@ -120,10 +120,10 @@ def test_fixed_point_gives_the_same_finite_difference():
 
 
 def test_fixed_point_costs_levant_no_more_than_its_rounding_is_worth():
-    """The fixed-point estimator is the exact one on a position displaced by eta (`model.levant`, held by test_levant).
+    """The fixed-point estimator is the exact one on a position displaced by eta (`model.levant`, by test_levant).
 
-    Quantisation displaces it by up to half a count about its mean. An error of Levant's that goes with the square root
-    of the displacement grows by no more than sqrt(1 + eta / 0.5), eta being the largest that this record's errors
+    Quantisation displaces the position by up to half a count about its mean. Levant's error goes with the square root
+    of the displacement, so it grows by no more than sqrt(1 + eta / 0.5), with the largest eta that this record's errors
     allow; gains that are off by up to 2**-10 change it in proportion.
     """
     floating, fixed = (figure_2("levant", floating) for floating in (True, False))
@@ -152,7 +152,7 @@ def test_float_takes_the_gains_that_it_is_given():
     designed, given = (Axis(axis, True, **si).run(counts) for si in ({}, {"levant_lambda": 5.0, "levant_alpha": 20.0}))
     fixed = Axis(axis, levant_lambda=5.0, levant_alpha=20.0).run(counts)
     assert np.abs(given.velocity_m_per_s - designed.velocity_m_per_s).max() > 1e-3
-    # Until a rounding tips the first sign, the two are the same algorithm.
+    # The two are the same algorithm until a rounding tips the first sign.
     assert np.abs(given.velocity_m_per_s - fixed.velocity_m_per_s)[:20].max() < 1e-3
 
 
@@ -163,7 +163,7 @@ def test_the_same_spec_at_two_rates_has_the_same_si_gains():
 
 
 def test_plain_python_gives_the_same_words():
-    """With the JIT off, the same kernels run as ordinary Python, on numpy's scalars too."""
+    """Without the JIT the same kernels run as ordinary Python, also on NumPy's scalars."""
     code = (
         "import sys, numpy as np; sys.path.insert(0, sys.argv[1]); from stimuli.specs import spec; "
         "from hardwall.model.axis import Axis; "

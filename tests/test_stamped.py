@@ -1,4 +1,4 @@
-"""An axis on a record of stamped edges: decoder and axis, clock by clock and all at once, give the same."""
+"""An axis on a record of stamped edges: decoder and axis give the same clock by clock and all at once."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ UPWARDS = [0b00, 0b01, 0b11, 0b10]
 
 
 def walk(samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return edges of a random walk, at most one a clock, and the count from each of its clocks on."""
+    """Return edges of a random walk, at most one a clock, and the count from every edge on."""
     random = rng()
     clocks = np.flatnonzero(random.random(samples * SPEC.clocks_per_sample) < 0.006)
     clocks = clocks[clocks > 10]
@@ -27,7 +27,7 @@ def test_records_are_the_decoders_clocks_and_the_axis_samples(floating):
     clocks, levels, _ = walk(samples)
     of = Axis(SPEC, floating, wall_stiffness=5e3, wall_damping=3.0, encoder_glitch_clocks=2, wall_position=10e-6)
     seen = stamped.run(of, clocks, levels, samples)
-    # Every clock on its own.
+    # One clock at a time.
     pins = np.zeros(samples * period, np.int64)
     for clock, level in zip(clocks, levels, strict=True):
         pins[clock:] = level

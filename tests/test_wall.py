@@ -1,4 +1,4 @@
-"""The virtual wall: RTL against model, model against exact rationals, and what a wall must never do."""
+"""The virtual wall: RTL against model, model against exact rationals, and a wall that may not pull never pulls."""
 
 import math
 from fractions import Fraction
@@ -24,7 +24,7 @@ def make(name: str, estimator: str = "levant") -> Wall:
 
 
 def stimulus(d: wall.Design, samples: int):
-    """Yield (count, velocity, *words): every combination of extremes, rounding ties, then random ones near and far."""
+    """Yield (count, velocity, *words): every combination of extremes, rounding ties, random rows near and far."""
     half = 1 << (d.count_width - 1)
     gains = d.stiffness.max, d.damping.max
     for k in (0, 1, gains[0]):
@@ -41,7 +41,7 @@ def stimulus(d: wall.Design, samples: int):
                                 position,
                                 *divmod(sides, 2),
                             )
-    # Ties: a spring alone, with half a force LSB left over.
+    # Ties: the force of a spring alone, with a remainder of half a force LSB.
     tie = 1 << max(d.stiffness.f - 1, 0)
     for odd in (1, 3, 5):
         for left in (0, 1):
@@ -81,7 +81,7 @@ def test_rtl(name, estimator):
 
 
 def oracle(d: wall.Design, row) -> int:
-    """The module's equations in exact rationals, rounded only where it says so."""
+    """Return the force by the module's equations in exact rationals, rounded only where the module documents it."""
     count, velocity, k, b, position, left, forbid_pull = row
     side, half = (-1 if left else 1), 1 << (d.count_width - 1)
     depth = (side * (count - position) + half) % (2 * half) - half
@@ -106,7 +106,7 @@ def test_model_is_the_exact_equation_rounded_as_documented(name, estimator):
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "wide"])
 def test_fixed_point_is_within_a_force_lsb_of_float(name):
-    """The promise of the module's docstring, on the same words, wherever neither saturates."""
+    """The module's docstring promises this on the same words, wherever neither saturates."""
     d, compared = design(name), 0
     for count, velocity, *words in stimulus(d, 20_000):
         named = dict(zip(NAMES, words, strict=True))
