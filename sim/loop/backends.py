@@ -1,7 +1,7 @@
-"""The backends by name, and the one place where they open.
+"""The backends by name, and the only code that opens them.
 
 `float` and `fixed` are the model of decoder and axis, in float64 or in the hardware's integers; `rtl` is the Verilated
-hardware. Whatever runs samples through an axis gets it from here, in the shape that `controllers` takes.
+hardware. Any code that runs samples through an axis opens it here, in the form that `controllers` takes.
 """
 
 from collections.abc import Iterator
@@ -26,11 +26,11 @@ class Opened(NamedTuple):
 
     controller: stamped.Controller | Rtl
     state: stamped.State | RtlState
-    hardware: "Hardware | None"  # on `rtl`
+    hardware: "Hardware | None"  # None on other backends than `rtl`
 
 
 def is_exact(backend: str) -> bool:
-    """Return whether a backend has the hardware's words, rather than float64."""
+    """Return whether a backend computes in the hardware's words rather than in float64."""
     return backend != "float"
 
 
@@ -48,14 +48,14 @@ def opened(
     traced: bool = False,
     short: bool = False,
 ) -> Iterator[Opened]:
-    """Open an axis on a backend; at the end what it holds is freed.
+    """Open an axis on a backend, and free its resources at the end.
 
     Args:
         spec: the axis.
         backend: one of `BACKENDS`.
         parameters: run-time parameters in SI units, by word: see `Axis`.
-        level: of the encoder's pins at reset, a | b << 1.
-        traced, short: of `rtl`: built for waveforms; built quickly rather than for speed.
+        level: level of the encoder's pins at reset, a | b << 1.
+        traced, short: options of `rtl`: built for waveforms; built quickly rather than for speed.
 
     Raises:
         RuntimeError: if the RTL could not be built.

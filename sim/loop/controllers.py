@@ -1,4 +1,4 @@
-"""The three controllers that can close the loop: pins and a sample strobe in, drive out.
+"""The three controllers that can close the loop, from pins and a sample strobe to the drive.
 
 `float` and `fixed` are the models of decoder and axis (`hardwall.model.stamped`), in float64 or in the hardware's
 integers; `rtl` is the Verilated hardware behind function pointers; `backends` opens them. All take the same
@@ -14,37 +14,37 @@ from ..rtl.verilated import Rtl, RtlState
 
 @by_type
 def sample(controller, state, edges, n_edges, strobe):
-    """Take one sample: return (state, taken), `taken` being the number of edges used up.
+    """Take one sample; return (state, taken), where `taken` is the number of edges used up.
 
     Args:
         controller: `stamped.Controller` or `Rtl`.
         state: `stamped.State` or `RtlState`.
         edges: `stamped.Edges` of int64.
-        n_edges: edges in them: those that the last call did not take, and those since.
+        n_edges: number of edges in them: the edges that the last call did not take, and the new ones.
         strobe: number of the clock at which the count is sampled.
     """
 
 
 @by_type
 def sample_quietly(controller, state, strobe):
-    """Take one sample with no edges: return the state. Passing no array makes it much the cheaper call."""
+    """Take one sample with no edges; return the state. The call passes no array, which makes it much cheaper."""
 
 
 @compiled
 def taken_off(edges, n_edges, taken):
-    """Move the edges after the first `taken` to the front; return how many they are."""
-    left = n_edges - taken
-    for i in range(left):
+    """Move the edges after the first `taken` to the front; return their number."""
+    remaining = n_edges - taken
+    for i in range(remaining):
         edges.clocks[i] = edges.clocks[taken + i]
         edges.levels[i] = edges.levels[taken + i]
-    return left
+    return remaining
 
 
 sample.register(stamped.Controller)(stamped.sample)
 sample_quietly.register(stamped.Controller)(stamped.sample_quietly)
 
 
-# What `read` of sim/rtl/library.cpp answers.
+# The values that `read` of sim/rtl/library.cpp returns, by number.
 READ_DRIVE, READ_VELOCITY, READ_FLAGS = 0, 1, 2
 
 
@@ -57,7 +57,7 @@ def _read(controller):
     )
 
 
-# The hardware is run until its drive has changed; edges from then on are for the next sample.
+# The hardware runs until its drive has changed; later edges are for the next sample.
 
 
 @sample_quietly.register(Rtl)

@@ -4,7 +4,7 @@ Time is the FPGA's clock. Sample k is taken at the strobe, clock (k + 1) D - 1, 
 follows from it changes `latency` clocks later, on every backend. The plant is advanced exactly over the two intervals
 between those instants, under a constant force in each.
 
-What a scene lacks is None here (`converter`, `delay`, a record), and is not in the machine code.
+A part that a scene lacks (`converter`, `delay`, a record) is None here, and has no machine code.
 """
 
 from typing import NamedTuple
@@ -24,19 +24,19 @@ from .controllers import sample, sample_quietly, taken_off
 from .record import Record, keep
 
 EDGE_CAPACITY = 1 << 14
-"""Edges that one sample may bring before the loop gives up: with any decoder, far beyond its limit."""
+"""The most edges in one sample before the loop gives up, far beyond the limit of any decoder."""
 
 
 class World(NamedTuple):
-    """What the controller is connected to, and when.
+    """The plant and parts that the controller is connected to, with their timing.
 
-    `before` is the length from a changed drive to the next strobe, `after` that from the strobe to the changed drive.
+    `before` is the time from a changed drive to the next strobe, `after` the time from the strobe to the changed drive.
     """
 
     plant: Rigid | Train | Stepped
     encoder: Encoder
     converter: Converter | None
-    push_n: float  # of the motor, besides the wall
+    push_n: float  # steady push of the motor, added to the wall's force
     force_lsb_n: float
     timing: Timing
     before: Span | float  # a `Span` for a `Rigid`, else s
@@ -44,7 +44,7 @@ class World(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """Where the loop stands: between the drive's change after sample `sample - 1`, and the strobe of `sample`."""
+    """The state of the loop between the drive's change after sample `sample - 1` and the strobe of `sample`."""
 
     sample: int
     moment: Moment
@@ -54,10 +54,11 @@ class Progress(NamedTuple):
 class Memory(NamedTuple):
     """The arrays that a run writes to.
 
-    They stand apart from what it returns: an array that is handed back for every sample costs more than the sample.
+    They are apart from the values that it returns, because returning an array for every sample would cost more than the
+    sample.
     """
 
-    edges: Edges  # on their way to the controller
+    edges: Edges  # the edges on their way to the controller
     delay: np.ndarray | None  # the drives that a late amplifier still holds, by sample number
     overview: Record | None
     detail: Record | None
@@ -67,7 +68,7 @@ class Memory(NamedTuple):
 
 @compiled
 def _delayed(delay, k, drive):
-    """Return what an amplifier passes on that is as many samples late as `delay` is long."""
+    """Return the drive that a late amplifier passes on; its delay in samples is the length of `delay`."""
     if delay is None:
         return drive
     slot = k % len(delay)
@@ -82,10 +83,11 @@ def run(world, controller, state, progress, memory, until):
 
     Args:
         world: a `World`.
-        controller, state: of `sim.loop.controllers`.
+        controller, state: as in `sim.loop.controllers`.
         progress: a `Progress`.
         memory: a `Memory`.
-        until: number of the first sample not to take, within what the arrays hold. Stops early if edges were lost.
+        until: number of the first sample not to take, within the arrays' length. The run stops early if edges were
+            lost.
     """
     plant, timing, edges = world.plant, world.timing, memory.edges
     first, moment, force_n = progress

@@ -1,4 +1,4 @@
-"""What a run keeps of its samples, for pictures and traces."""
+"""Records of a run's samples, for pictures and traces."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from ...model.spec import AxisSpec
 
 
 class Record(NamedTuple):
-    """Where every `stride`-th sample is kept from when the handle first passes `trigger_m` on, until it is full."""
+    """Arrays that keep every `stride`-th sample, from when the handle first passes `trigger_m` until they are full."""
 
     trigger_m: float
     stride: int
@@ -29,9 +29,9 @@ class Trace:
 
     Attributes:
         time_s: time of each sample.
-        position_m, velocity_m_per_s: of the handle, as they truly are.
+        position_m, velocity_m_per_s: the handle's true position and velocity.
         estimate_m_per_s: the estimator's output.
-        force_n: of the wall on the handle, as the drive shows it after the sample.
+        force_n: force of the wall on the handle, by the drive after the sample.
     """
 
     time_s: np.ndarray
@@ -42,7 +42,7 @@ class Trace:
 
 
 def new(spec: AxisSpec, number: type, trigger_m: float, stride: int, room: int) -> Record:
-    """Return an empty record for `room` samples, its estimates of a type of number."""
+    """Return an empty record for `room` samples, with estimates of the type `number`."""
     position, velocity, force = (np.zeros(room) for _ in range(3))
     mark, sample = np.array([0, -1]), np.zeros(room, np.int64)
     return Record(
@@ -51,7 +51,7 @@ def new(spec: AxisSpec, number: type, trigger_m: float, stride: int, room: int) 
 
 
 def trace_of(record: Record, spec: AxisSpec) -> Trace:
-    """Return what a record kept, in SI units."""
+    """Return the samples of a record in SI units."""
     lsb = 1.0 if record.estimate.dtype == np.float64 else spec.design.estimator.velocity.lsb
     kept = slice(0, record.mark[0])
     return Trace(

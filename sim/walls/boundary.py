@@ -1,14 +1,14 @@
-"""Tracing the edge of the stable region of walls, as the founding paper does: which wall to hit next, and when to end.
+"""The trace of the edge of the stable region of walls, by the founding paper's method: the walls to hit, in order.
 
-Stiffness K and damping B go in steps. From a stable wall, raise K until one is unstable; then raise B by a step, and
-from that K go down to the first stable wall if it is unstable, else up to the first unstable one. At each B the lowest
-unstable K found so is the marginal one. The end is where no K is stable, or the last B. The stable wall to start from
-is the softest of the first B; where that one is not, K is doubled, then B raised, until one is.
+Stiffness K and damping B go in steps. From a stable wall, raise K until a wall is unstable; then raise B by a step, and
+from that K go down to the first stable wall if the wall there is unstable, else up to the first unstable wall. At each
+B the lowest unstable K found in this way is the marginal K. The trace ends where no K is stable, or at the last B. It
+starts from the softest wall of the first B; if that wall is unstable, K is doubled, then B raised, until one is stable.
 
-The edge is the upper one. Walls below it may be unstable all the same, which a trace does not see: `below` hits some.
+The edge is the upper edge. Walls below it may still be unstable, which a trace does not see: `below` hits some of them.
 
 Nothing here hits a wall: `trace` is a generator that yields walls and is sent verdicts, so the map does not depend on
-who answers, or in which order several maps are answered.
+the source of the verdicts, or on the order in which several maps get theirs.
 """
 
 import math
@@ -19,9 +19,9 @@ from itertools import pairwise
 
 @dataclass(frozen=True)
 class Grid:
-    """Steps and ends of a map; B from `damping_from_n_s_per_m` to `damping_to_n_s_per_m`, K from a step to its end.
+    """Steps and ends of a map: B from `damping_from_n_s_per_m` to `damping_to_n_s_per_m`, K from one step to its end.
 
-    Of each B, `walls_below` the edge are hit as well.
+    At each B, `walls_below` walls below the edge are hit as well.
     """
 
     stiffness_step_n_per_m: float
@@ -44,7 +44,7 @@ class Grid:
 
 
 def _whole(steps: float) -> int:
-    """Return how many whole steps there are, where a division may have lost the last bit of one."""
+    """Return the number of whole steps; the margin covers a division that lost the last bit of a step."""
     return math.floor(steps * (1 + 1e-12))
 
 
@@ -54,9 +54,9 @@ class Edge:
 
     Attributes:
         damping_n_s_per_m: B.
-        stable_n_per_m: the largest stable K under the marginal one; 0 where none is.
+        stable_n_per_m: the largest stable K under the marginal K; 0 if no K is stable.
         marginal_n_per_m: the lowest unstable K above it; None where the largest K of the map is still stable.
-        held: of the walls below that were hit as well, the part that is stable; None where none was.
+        held: the part of the walls hit below the edge that is stable; None if no wall below was hit.
     """
 
     damping_n_s_per_m: float
@@ -66,7 +66,7 @@ class Edge:
 
 
 def trace(grid: Grid) -> Generator[tuple[float, float], bool, list[Edge]]:
-    """Yield walls (K, B) to be hit, be sent whether each is stable, and return the edge, by B.
+    """Yield walls (K, B) to hit, receive whether each is stable, and return the edge, by B.
 
     The walls below the edge that the grid asks for come last.
     """
@@ -77,10 +77,10 @@ def trace(grid: Grid) -> Generator[tuple[float, float], bool, list[Edge]]:
             if row == 0:
                 edges.append(Edge(damping, 0.0, step))
                 continue
-            found = True
+            starts_stable = True
         else:
-            found = yield row * step, damping
-        if found:
+            starts_stable = yield row * step, damping
+        if starts_stable:
             stable = row
             while stable < grid.rows and (yield (stable + 1) * step, damping):
                 stable += 1
@@ -96,7 +96,7 @@ def trace(grid: Grid) -> Generator[tuple[float, float], bool, list[Edge]]:
 
 
 def _first(grid: Grid, damping: float) -> Generator[tuple[float, float], bool, int]:
-    """Yield walls of one B, K doubled each time; return the number of the first stable one, 0 if none is."""
+    """Yield walls of one B, with K doubled each time; return the row of the first stable wall, 0 if none is stable."""
     row = 1
     while row <= grid.rows:
         if (yield row * grid.stiffness_step_n_per_m, damping):
@@ -106,20 +106,20 @@ def _first(grid: Grid, damping: float) -> Generator[tuple[float, float], bool, i
 
 
 def below(edges: list[Edge], grid: Grid) -> Generator[tuple[float, float], bool, list[Edge]]:
-    """Yield as many walls below each edge as the grid asks for, even in K; return the edges with what `held`."""
-    step, found = grid.stiffness_step_n_per_m, []
+    """Yield as many walls below each edge as the grid asks for, evenly spaced in K; return the edges with `held`."""
+    step, checked = grid.stiffness_step_n_per_m, []
     for edge in edges:
         top = round(edge.stable_n_per_m / step)
         rows = sorted({round(top * n / (grid.walls_below + 1)) for n in range(1, grid.walls_below + 1)} - {0, top})
         stable = 0
         for row in rows:
             stable += yield row * step, edge.damping_n_s_per_m
-        found.append(replace(edge, held=stable / len(rows)) if rows else edge)
-    return found
+        checked.append(replace(edge, held=stable / len(rows)) if rows else edge)
+    return checked
 
 
 def area(edges: list[Edge]) -> float:
-    """Return the area under the largest stable K, N^2 s/m^2: trapezoids between the values of B."""
+    """Return the area under the largest stable K, N^2 s/m^2, by trapezoids between the values of B."""
     return sum(
         (right.damping_n_s_per_m - left.damping_n_s_per_m) * (left.stable_n_per_m + right.stable_n_per_m) / 2
         for left, right in pairwise(edges)

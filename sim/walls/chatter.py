@@ -1,8 +1,8 @@
 """The chatter of a velocity estimate at rest, as the force sees it, and the walls in which a handle can rest with it.
 
-At a constant count some estimators do not come to rest: they go through a cycle of a few samples, one of several. The
-force is updated every so many samples, and takes one of its values each time. That is the cycle's alias, which may
-be a single value, a velocity that is not there.
+At a constant count some estimators do not come to rest: they go through one of several cycles of a few samples. The
+force is updated only once in several samples, and takes one value of the cycle each time. These values are the cycle's
+alias, which may be a single value: a constant velocity where there is none.
 
 A handle with Coulomb friction f_c, pushed by P into a wall (K, B), rests at x if for every value u that the force takes
 
@@ -13,7 +13,8 @@ There is such an x if and only if
     B (max u - min u) <= 2 f_c     friction holds against the swing
     B max u < P + f_c              and the mean does not hold the handle out of the wall.
 
-K is not in it. That a handle cannot rest does not make a wall unstable: it may be shaken by less than the threshold.
+The condition does not depend on K. A wall in which a handle cannot rest may still be stable, as the handle may be
+shaken by less than the threshold.
 """
 
 from dataclasses import dataclass
@@ -24,20 +25,20 @@ from ...model.axis import Axis
 from ..scene.schema import Scene
 
 LANES = 200
-"""Motions from which the estimator comes to rest: enough to meet every cycle."""
+"""Number of motions that come to rest, enough to meet every cycle."""
 SPEEDS_M_PER_S = (3e-4, 0.1)
 FADING_S = (1e-3, 0.02)
-"""Those motions begin at a speed and fade with a time constant."""
+"""The ranges of the motions' first speeds, and of the time constants with which the speeds fade."""
 SETTLING_S, SEEN_S = 0.3, 0.3
 SEED = 1
 
 
 @dataclass(frozen=True)
 class Chatter:
-    """What the force takes for the velocity of a handle at rest: the ends of every cycle that was met.
+    """The velocity that the force sees for a handle at rest: the ends of every cycle that was met.
 
     Attributes:
-        least_m_per_s, most_m_per_s: shape (cycles,), one for each motion that came before.
+        least_m_per_s, most_m_per_s: shape (cycles,), one value for each preceding motion.
     """
 
     least_m_per_s: np.ndarray
@@ -45,7 +46,7 @@ class Chatter:
 
     @property
     def swing_m_per_s(self) -> np.ndarray:
-        """From the least to the most of every cycle."""
+        """The difference between the most and the least of every cycle."""
         return self.most_m_per_s - self.least_m_per_s
 
     @property
@@ -54,11 +55,11 @@ class Chatter:
         return (self.most_m_per_s + self.least_m_per_s) / 2
 
     def rests_up_to(self, coulomb_n: float, push_n: float) -> np.ndarray:
-        """Return for every cycle the largest B (N s/m) of a wall in which the handle can rest; infinite without end.
+        """Return for every cycle the largest B (N s/m) of a wall in which the handle can rest; infinite if any B does.
 
         Args:
-            coulomb_n: friction.
-            push_n: that the handle is held to the wall with.
+            coulomb_n: Coulomb friction.
+            push_n: the force that holds the handle to the wall.
         """
         with np.errstate(divide="ignore", over="ignore"):
             swing = 2 * coulomb_n / self.swing_m_per_s
@@ -67,9 +68,9 @@ class Chatter:
 
 
 def motions(scene: Scene) -> np.ndarray:
-    """Return the counts of motions that came to rest, shape (motions, samples), after `SETTLING_S` constant.
+    """Return the counts of motions that came to rest, shape (motions, samples); they are constant after `SETTLING_S`.
 
-    An estimator that never saw a count change has nothing to chatter about, so there are none that did not move.
+    Motions without a change of count are left out, because an estimator that never saw a change does not chatter.
     """
     spec, dice = scene.spec, np.random.default_rng(SEED)
     speed = np.exp(dice.uniform(*np.log(SPEEDS_M_PER_S), LANES)) * dice.choice((-1, 1), LANES)
@@ -87,7 +88,7 @@ def at_rest(scene: Scene, backend: str) -> Chatter:
     """Return the chatter of a scene's estimator.
 
     Args:
-        scene: its estimator, gains, output and rates.
+        scene: the scene, of which estimator, gains, output and rates are used.
         backend: `float` or `fixed`.
 
     Raises:
@@ -95,7 +96,7 @@ def at_rest(scene: Scene, backend: str) -> Chatter:
     """
     spec = scene.spec
     velocity = Axis(spec, backend == "float", **scene.parameters).run(motions(scene)).velocity_m_per_s
-    # The force follows the first sample, and then one of every so many.
+    # The force follows the first sample of every actuation period.
     seen = velocity[:, :: spec.samples_per_actuation]
     seen = seen[:, round(SETTLING_S * spec.actuation_hz) :]
     return Chatter(seen.min(axis=1), seen.max(axis=1))

@@ -1,18 +1,18 @@
-"""What the founding paper's Figure 5 shows of its six methods, eight facts, and whether maps show them too.
+"""Eight facts that the founding paper's Figure 5 shows of its six methods, and whether maps show them too.
 
-The paper's B axis is known but for zeros that may be missing. So the facts are judged over a range that the maps
-themselves give: from their first B to where Levant with adjusted gains ends, which in the figure is about all of it.
+The paper's B axis is known except for zeros that may be missing. So the facts are judged over a range that the maps
+themselves give: from their first B to the end of Levant with adjusted gains, which in the figure is about all of it.
 
-Each fact has a shortfall: 0 where it is held, 1 where nothing of it is there, and between them how much is lacking:
+Every fact has a shortfall: 0 if it holds, 1 if nothing of it is there, and between them the part that is lacking:
 
-- a region that is to grow: the part by which it shrinks;
-- areas that are to be equal: the part by which they differ beyond `ABOUT`;
-- a region that is to enclose others: the part of their area in the range that is outside it;
-- a sharp drop: what its place is off beyond `ABOUT`, and what K a step before it lacks to half of the largest; where
-  the region has not ended, the last K over the largest;
-- 500 Hz that is to go on: the part of the range by which it ends early; where it goes on too stiff, the part by which K
-  exceeds the largest of Levant's;
-- K that is to rise and fall: a quarter for each rise or fall that is missing.
+- a region that should grow: the part by which it shrinks;
+- areas that should be equal: the part by which they differ beyond `ABOUT`;
+- a region that should enclose others: the part of their area in the range that is outside it;
+- a sharp drop: the error of its place beyond `ABOUT`, and the part of the largest K that is lacking to half of it a
+  step before the drop; where the region has not ended, the last K over the largest;
+- 500 Hz that should go on: the part of the range by which it ends early; where it goes on too stiff, the part by which
+  K exceeds Levant's largest;
+- K that should rise and fall: a quarter for each rise or fall that is missing.
 """
 
 from dataclasses import dataclass
@@ -23,16 +23,16 @@ import numpy as np
 from .zwidth import Map
 
 ABOUT = 0.1
-"""Areas that differ by no more than this part are about equal; so are places on the range."""
+"""Areas that differ by no more than this part are about equal, and so are places on the range."""
 FILTERS = ("fdm-30", "fdm-100", "fdm-500", "fdm-1000")
 
 Judged = tuple[bool, float, str]
-"""Whether a fact is held; its shortfall; the numbers that say so."""
+"""Whether a fact is held; its shortfall; the numbers that show it."""
 
 
 @dataclass(frozen=True)
 class Fact:
-    """Attributes: what the paper's figure shows; whether the maps do; what they lack, 0 to 1; numbers that say so."""
+    """A fact of the paper's figure, whether the maps show it, their shortfall from 0 to 1, and the numbers."""
 
     text: str
     held: bool
@@ -41,10 +41,10 @@ class Fact:
 
 
 def facts(maps: dict[str, Map]) -> list[Fact]:
-    """Return the eight facts; none is held where Levant with adjusted gains is stable nowhere.
+    """Return the eight facts; none is held if Levant with adjusted gains is stable nowhere.
 
     Args:
-        maps: by the names of `figures.methods`, all of one grid.
+        maps: the maps by the names of `figures.methods`, all on the same grid.
     """
     seen = _Regions(maps)
     judged = (
@@ -69,12 +69,12 @@ class _Regions:
     """Stable stiffness (kN/m) by method on the longest map's B (N s/m), 0 where a region has ended."""
 
     def __init__(self, maps: dict[str, Map]):
-        longest = max(maps.values(), key=lambda each: len(each.edges))
+        longest = max(maps.values(), key=lambda region: len(region.edges))
         self.dampings = np.array([edge.damping_n_s_per_m for edge in longest.edges])
         self.stiffness = {name: np.zeros(len(self.dampings)) for name in maps}
-        for name, each in maps.items():
-            self.stiffness[name][: len(each.edges)] = [edge.stable_n_per_m / 1e3 for edge in each.edges]
-        self.ends = {name: each.damping_n_s_per_m for name, each in maps.items()}
+        for name, region in maps.items():
+            self.stiffness[name][: len(region.edges)] = [edge.stable_n_per_m / 1e3 for edge in region.edges]
+        self.ends = {name: region.damping_n_s_per_m for name, region in maps.items()}
         self.end = self.ends["adjusted"]
         self.inside = self.dampings <= self.end
 
@@ -104,14 +104,15 @@ class _Regions:
         return not len(short), _part(outside, within[where].sum()), numbers
 
     def drops(self) -> Judged:
-        """Sharp: a step of B before its last stable wall, K is half of its largest or more."""
+        """Judge the drops; a drop is sharp if K is at least half of its largest one step of B before the last stable
+        wall."""
         held, lack, numbers = True, 0.0, []
-        for name, wanted in (("proposed", 0.9), ("adjusted", 1.0)):
+        for name, paper_place in (("proposed", 0.9), ("adjusted", 1.0)):
             values, place = self.stiffness[name], self.ends[name] / self.end if self.end else 0.0
             last = int(np.flatnonzero(values > 0)[-1]) if (values > 0).any() else 0
             before, ended = values[max(last - 1, 0)], last + 1 < len(values)
-            held = held and ended and before >= values.max() / 2 and abs(place - wanted) <= ABOUT
-            lack += max(abs(place - wanted) - ABOUT, 0.0) + _part(values.max() / 2 - before, values.max())
+            held = held and ended and before >= values.max() / 2 and abs(place - paper_place) <= ABOUT
+            lack += max(abs(place - paper_place) - ABOUT, 0.0) + _part(values.max() / 2 - before, values.max())
             lack += 0.0 if ended else _part(values[last], values.max())
             numbers.append(f"{name}: {before:g}, {values[last]:g}, {'0' if ended else 'on'} kN/m at {place:.2f}")
         return held, lack, "; ".join(numbers)
@@ -135,7 +136,7 @@ class _Regions:
 
 
 def _part(lack: float, whole: float) -> float:
-    """Return what is lacking as a part of a whole: 0 where nothing lacks, 1 where there is no whole."""
+    """Return a lack as a part of the whole: 0 if nothing is lacking, 1 if there is no whole."""
     if lack <= 0:
         return 0.0
     return lack / whole if whole else 1.0

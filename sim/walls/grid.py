@@ -1,4 +1,4 @@
-"""The grids of maps of stable walls: a scene's own, and one that a region ends on."""
+"""The grids of maps of stable walls: a scene's own grid, and a wider grid on which a region ends."""
 
 from typing import Any
 
@@ -7,11 +7,11 @@ from ..scene.schema import Scene
 from .boundary import Grid
 
 WIDER = 3.0
-"""The grid of a study goes so much farther than the scene's, in K and in B: some of the paper's regions leave that."""
+"""The factor, in K and in B, from the scene's grid to a study's: some of the paper's regions leave the scene's grid."""
 
 
 def grid_of(scene: Scene) -> Grid:
-    """Return the steps of a scene's maps.
+    """Return the grid of a scene's maps.
 
     Raises:
         SceneError: if it has no section `zwidth`.
@@ -22,7 +22,7 @@ def grid_of(scene: Scene) -> Grid:
 
 
 def wider_grid(scene: Scene, coarser: float) -> dict[str, Any]:
-    """Return changes of a scene, by dotted key: a larger grid of so much longer steps, on a controller made for it.
+    """Return changes of a scene, by dotted key: a wider grid with steps `coarser` times as long, and limits for it.
 
     Raises:
         SceneError: if it has no section `zwidth`.

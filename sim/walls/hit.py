@@ -1,4 +1,4 @@
-"""Hitting the wall: the founding paper's protocol on any scene and backend."""
+"""Hits of the wall by the founding paper's protocol, on any scene and backend."""
 
 import json
 import math
@@ -23,19 +23,19 @@ from ..world.encoder import level
 from .tally import Tally
 
 CHUNK = 1 << 16
-"""Samples between two looks at progress, and at whether the user wants no more; fewer of those that take long."""
+"""Most samples in one call of the loop, between two checks for an interrupt; fewer if a sample takes long."""
 LOOKS = 100
-"""Into how many pieces a run is divided for someone who watches it."""
+"""Number of progress reports in a run."""
 LOOK_S = 0.1
-"""Time between two looks at whether the verdict is sure."""
+"""Time between two checks whether the verdict is sure."""
 OVERVIEW_POINTS = 6000
 DETAIL_FROM_M = -0.2e-3
 DETAIL_S = 0.1
 WAVEFORM_CLOCKS = 60_000
-"""Length of a waveform; a fifth of it before the contact."""
+"""Length of a waveform; a fifth of it is before the contact."""
 
 Marks = Iterable[tuple[int, Callable[[], None]]]
-"""At which samples to do what."""
+"""Actions, each with the number of the sample at which to do it."""
 
 
 @dataclass
@@ -43,12 +43,12 @@ class Hit(Summary):
     """Result of a run; `report` is its summary.
 
     Attributes:
-        seconds: wall time of the loop, compiling and building apart.
+        seconds: wall time of the loop, without compiling and building.
         mean_m: mean position before the settling mark, m; positive is inside the wall.
-        rms_m: RMS distance from it after the mark, m.
+        rms_m: RMS distance from that mean after the mark, m.
         touched: whether the handle ever was within the wall, or felt it.
-        force_sha256: of the drive words of every actuation, little-endian int32; None for `float`.
-        overview, detail: if asked for, samples of the whole run, and every one of the contact.
+        force_sha256: digest of the drive words of every actuation, little-endian int32; None for `float`.
+        overview, detail: if asked for, samples of the whole run, and every sample of the contact.
     """
 
     scene: Scene
@@ -73,10 +73,10 @@ class Hit(Summary):
     def in_place(self) -> bool:
         """Whether the handle rests where the wall's spring alone would hold it.
 
-        At rest the velocity is 0, and the spring carries the push and the hand, but for the friction that sticks, a
-        step of the output and what a count hides. A wall may be stable and felt elsewhere: where the estimate is not 0
-        at rest, its damper carries a part. The mean after the settling mark is not farther from the one before it than
-        the RMS.
+        At rest the velocity is 0, and the spring carries the push and the hand, up to the friction that sticks, a step
+        of the output and the position hidden in a count. A stable wall may be felt elsewhere: where the estimate is not
+        0 at rest, its damper carries a part. The mean after the settling mark is not farther from the mean before it
+        than the RMS.
         """
         scene, stiffness = self.scene, self.scene.wall.stiffness_n_per_m
         hand, cable = scene.hand, scene.transmission
@@ -90,13 +90,13 @@ class Hit(Summary):
 
     @property
     def contact_s(self) -> float:
-        """Time of the first sample inside the wall, of those that `detail` has; else of the end."""
+        """Time of the first sample in `detail` inside the wall; if there is none, time of the run's end."""
         inside = np.flatnonzero(self.detail.position_m > 0)
         return float(self.detail.time_s[inside[0]]) if len(inside) else self.samples / self.scene.spec.sample_hz
 
     @property
     def estimate_rms_m_per_s(self) -> float | None:
-        """RMS error of the velocity estimate over `detail`, the first contact; None without traces, or a contact."""
+        """RMS error of the velocity estimate over `detail`, the first contact; None without traces or a contact."""
         if self.detail is None or not len(self.detail.time_s):
             return None
         return float(np.sqrt(np.mean((self.detail.estimate_m_per_s - self.detail.velocity_m_per_s) ** 2)))
@@ -113,7 +113,7 @@ class Hit(Summary):
             np.savez_compressed(file, report=json.dumps(self.report()), **arrays)
 
     def report(self) -> dict:
-        """Return the summary that the command line prints, units in the keys."""
+        """Return the summary that the command line prints, with units in the keys."""
         error = self.estimate_rms_m_per_s
         return {
             "scene": self.scene.name,
@@ -137,7 +137,7 @@ class Hit(Summary):
 
 
 class _Loop:
-    """The closed loop of a scene on a backend: where it stands, the arrays that it writes to, and its tally."""
+    """The closed loop of a scene on a backend: its progress, the arrays that it writes to, and its tally."""
 
     def __init__(self, scene: Scene, backend: str, traces: bool, until_sure: bool):
         self.scene, self.backend, self.until_sure = scene, backend, until_sure
@@ -163,14 +163,14 @@ class _Loop:
         )
 
     def run(self, axis: Opened, marks: Marks, progress: Callable[[int], None] | None) -> Hit:
-        """Run the loop in chunks that end at the `marks`, and return what came of it.
+        """Run the loop in chunks that end at the `marks`, and return the result.
 
         Raises:
             RuntimeError: if the handle outran every decoder's limit by far.
         """
         controller, state, _ = axis
         actions, total = dict(marks), self.scene.samples
-        # Compiling is not running: a call with nothing to do keeps it out of the time.
+        # A first call without samples compiles the loop, so that compiling is not in the measured time.
         with stage("compiling the loop, once"):
             loop.run(self.world, controller, state, self.at, self.memory, 0)
         began = time.perf_counter()
@@ -186,7 +186,7 @@ class _Loop:
         return self._hit(time.perf_counter() - began, int(state.flags))
 
     def _chunk(self, controller, state, until: int, progress: Callable[[int], None] | None):
-        """Run to the end of a chunk, in pieces where somebody watches; return the controller's state."""
+        """Run to the end of a chunk, in pieces if progress is reported; return the controller's state."""
         first, memory = self.at.sample, self.memory
         piece = max(1, self.scene.samples // LOOKS) if progress else self.chunk
         while self.at.sample < until and not self.lost_edges:
@@ -233,16 +233,16 @@ def run(
     waveform: Path | None = None,
     until_sure: bool = False,
 ) -> Hit:
-    """Hit the wall of `scene` and return what came of it.
+    """Hit the wall of `scene` and return the result.
 
     Args:
-        scene: from `scene.load`.
+        scene: a scene from `scene.load`.
         backend: one of `backends.BACKENDS`.
         traces: keep samples of the whole run and of the contact.
         progress: called with the number of samples done.
-        waveform: for `rtl`, an FST file to write, of every signal around the contact.
-        until_sure: end a run that is unstable for certain, or whose handle outruns the encoder by far; its `rms_m` is
-            that until then, or infinite.
+        waveform: for `rtl`, an FST file to write, with every signal around the contact.
+        until_sure: end a run that is certainly unstable, or whose handle outruns the encoder by far; `rms_m` is then
+            the RMS up to that point, or infinite.
 
     Raises:
         RuntimeError: if the handle outran every decoder's limit by far, or the RTL could not be built.
@@ -250,7 +250,7 @@ def run(
     closed = _Loop(scene, backend, traces, until_sure)
     traced = waveform is not None
     with opened(scene.spec, backend, scene.parameters, closed.start_level, traced) as axis, _vcd(waveform) as vcd:
-        # What the hardware will do is known before it runs: the contact is where the bit-accurate model has it.
+        # The contact is known before the hardware runs, because the bit-accurate model has it at the same sample.
         result = closed.run(axis, _waveform_marks(scene, axis.hardware, vcd) if traced else (), progress)
         if traced:
             axis.hardware.end_trace()
@@ -259,7 +259,7 @@ def run(
 
 @contextmanager
 def _vcd(waveform: Path | None) -> Iterator[Path | None]:
-    """Give a VCD file to write to; turn it into `waveform` at the end."""
+    """Provide a VCD file to write to, and convert it to `waveform` at the end."""
     if waveform is None:
         yield None
         return
@@ -272,7 +272,7 @@ def _vcd(waveform: Path | None) -> Iterator[Path | None]:
 
 
 def _waveform_marks(scene: Scene, hardware, vcd: Path) -> Marks:
-    """Return at which samples to do what for a waveform around the contact."""
+    """Return the marks that begin and end a waveform around the contact."""
     length = max(1, WAVEFORM_CLOCKS // scene.spec.clocks_per_sample)
     contact = round(run(scene, "fixed", traces=True).contact_s * scene.spec.sample_hz)
     first = max(contact - length // 5, 0)

@@ -1,4 +1,4 @@
-"""The methods of the founding paper's Figure 5: estimators and gains by which a wall is rendered."""
+"""The methods of the founding paper's Figure 5: estimators and gains with which a wall is rendered."""
 
 import math
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from ..scene.schema import Scene
 PROPOSED = {"lambda_sqrt_m_per_s": math.sqrt(12.0), "alpha_m_per_s2": 13.2}
 """The paper's proposed gains, for its C of 12 m/s^2."""
 ADJUSTED = {"lambda_sqrt_m_per_s": 500 * math.sqrt(1e-3), "alpha_m_per_s2": 50.0}
-"""The paper's adjusted gains; its alpha was lost, and this one satisfies the condition that it names."""
+"""The paper's adjusted gains; its alpha was lost, and this value satisfies the condition that the paper names."""
 
 
 @dataclass(frozen=True)
@@ -18,10 +18,10 @@ class Curve:
     """One estimator of a figure.
 
     Attributes:
-        label: in the legend.
+        label: label in the legend.
         estimator, output: their names.
-        gains: others than the default ones, by name.
-        cutoff_of_rate: a cutoff, as a share of the sample rate, in their place.
+        gains: gains that differ from the default ones, by name.
+        cutoff_of_rate: a cutoff, as a share of the sample rate, in place of gains.
     """
 
     label: str
@@ -32,7 +32,7 @@ class Curve:
 
     @property
     def changes(self) -> dict[str, Any]:
-        """What it changes in a scene, by dotted key; without a cutoff as a share of the rate."""
+        """The changes to a scene, by dotted key; they leave out a cutoff that is a share of the rate."""
         gains = {f"controller.gains.{self.estimator}": self.gains} if self.gains else {}
         return {"controller.estimator": self.estimator, "controller.output": self.output, **gains}
 
@@ -53,7 +53,8 @@ def methods(scene: Scene | None = None) -> dict[str, Curve]:
     """Return the methods of the paper's Figure 5, by the name used on the command line.
 
     Args:
-        scene: its own gains of Levant's are the adjusted ones, if it has any: their alpha was lost, and is its to say.
+        scene: a scene whose own gains for Levant, if any, are the adjusted gains: their alpha was lost, and a scene may
+            choose it.
     """
     own = scene and scene.controller.gains.levant
     adjusted = own.model_dump() if own else ADJUSTED
@@ -68,5 +69,5 @@ def methods(scene: Scene | None = None) -> dict[str, Curve]:
 
 
 def label(estimator: str, output: str) -> str:
-    """Return what an estimator's output is called: its name alone where it has one output."""
+    """Return the label of an estimator's output: the estimator's name alone if it has one output."""
     return estimator if len(registry.design_of(estimator).outputs) == 1 else f"{estimator} {output}"

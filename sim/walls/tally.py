@@ -1,4 +1,4 @@
-"""What a hit comes to, sample by sample: its mean, its RMS, its largest force and its force words."""
+"""The statistics of a hit, sample by sample: its mean, its RMS, its largest force and its force words."""
 
 import hashlib
 import math
@@ -12,11 +12,11 @@ class Tally:
     """Mean, RMS, largest force and force words of a run, chunk by chunk.
 
     Args:
-        scene: what is run.
+        scene: the scene of the run.
         exact: whether the drives are the hardware's words, which have a digest.
 
     Attributes:
-        largest_drive: force LSB.
+        largest_drive: the largest magnitude of the drive, force LSB.
         farthest_m: the largest position.
     """
 
@@ -33,22 +33,22 @@ class Tally:
 
     @property
     def mean_m(self) -> float:
-        """The mean position before the settling mark; of what was added."""
+        """The mean position before the settling mark, over the samples added."""
         return self._sum / (self._settled - self._mean_from)
 
     @property
     def rms_m(self) -> float:
-        """RMS distance from the mean after the settling mark, of what was added; infinite if nothing was."""
+        """RMS distance from the mean after the settling mark, over the samples added; infinite if there are none."""
         return (self._squares / self._measured) ** 0.5 if self._measured else math.inf
 
     @property
     def sure_unstable(self) -> bool:
-        """Whether the rest of the run cannot make it stable: its squares already exceed what the threshold allows."""
+        """Whether the run is unstable whatever its rest: its sum of squares has reached the threshold's limit."""
         return self._squares >= self._hopeless
 
     @property
     def force_sha256(self) -> str | None:
-        """Digest of the drive of every actuation, little-endian int32; None without the hardware's words."""
+        """Digest of the drives of all actuations, little-endian int32; None without the hardware's words."""
         return self._digest and self._digest.hexdigest()
 
     def add(self, first: int, positions: np.ndarray, drives: np.ndarray) -> None:

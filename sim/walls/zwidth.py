@@ -1,8 +1,8 @@
-"""Z-width: of each case, a scene with its changes, the edge of the region of walls that its hits leave stable.
+"""Z-width: the edge of the region of stable walls for each case, a scene with its changes.
 
 A map is a trace, and a trace asks for one hit at a time. Hits of different traces run side by side on the workers of a
 Dask cluster; every verdict is kept as it comes. A verdict depends on the scene and the wall alone, so the map is the
-same whatever the number of workers, and an interrupted one goes on where it was.
+same for any number of workers, and an interrupted map continues where it was.
 """
 
 import platform
@@ -25,11 +25,11 @@ class Map:
     """The edge of one stable region.
 
     Attributes:
-        case: what it is of.
-        edges: by B.
-        hits: walls that were hit for it.
-        in_place: of each edge, whether its largest stable wall holds the handle there: see `hit.Hit.in_place`.
-        seconds: wall time of its hits, wherever and whenever they were run; no part of what a map is.
+        case: the case that was mapped.
+        edges: the edges, by B.
+        hits: number of walls that were hit for it.
+        in_place: for each edge, whether its largest stable wall holds the handle there: see `hit.Hit.in_place`.
+        seconds: wall time of its hits, wherever and whenever they ran; maps are compared without it.
     """
 
     case: Case
@@ -40,12 +40,12 @@ class Map:
 
     @property
     def area(self) -> float:
-        """Under the edge, N^2 s/m^2, whether or not all walls there are stable."""
+        """The area under the edge, N^2 s/m^2, whether or not all walls there are stable."""
         return area(self.edges)
 
     @property
     def area_held(self) -> float | None:
-        """Under the edge, N^2 s/m^2, as far as the walls below it that were hit are stable; None where none was."""
+        """The area under the edge, N^2 s/m^2, times the stable part of the walls hit below it; None if none was hit."""
         if all(edge.held is None for edge in self.edges):
             return None
         parts = [1.0 if edge.held is None else edge.held for edge in self.edges]
@@ -54,7 +54,7 @@ class Map:
 
     @property
     def area_in_place(self) -> float:
-        """Under the edge but for each B whose largest stable wall is not in place, N^2 s/m^2."""
+        """The area under the edge, N^2 s/m^2, with K = 0 at each B whose largest stable wall is not in place."""
         kept = [
             edge if in_place else replace(edge, stable_n_per_m=0.0)
             for edge, in_place in zip(self.edges, self.in_place, strict=True)
@@ -63,28 +63,29 @@ class Map:
 
     @property
     def damping_n_s_per_m(self) -> float:
-        """The largest B with a stable K; 0 where none has."""
+        """The largest B with a stable K; 0 if no B has one."""
         return max((edge.damping_n_s_per_m for edge in self.edges if edge.stable_n_per_m), default=0.0)
 
     @property
     def leaves(self) -> bool:
-        """Whether K or B goes on beyond the map."""
+        """Whether the region continues beyond the map in K or B."""
         return self.edges[-1].stable_n_per_m > 0 or self.clipped
 
     @property
     def clipped(self) -> bool:
-        """Whether K goes on beyond the map."""
+        """Whether the region continues beyond the map in K."""
         return any(edge.marginal_n_per_m is None for edge in self.edges)
 
     @property
     def largest_n_per_m(self) -> float:
-        """The largest stable stiffness; larger than that where the map is `clipped`."""
+        """The largest stable stiffness on the map; the true one is larger if the map is `clipped`."""
         return max(edge.stable_n_per_m for edge in self.edges)
 
     def report(self) -> dict[str, Any]:
         """Return the map as the command line prints it.
 
-        The boundary is in [B (N s/m), K (N/m)], K the largest stable; it is larger than that where it leaves the map.
+        The boundary is a list of [B (N s/m), K (N/m)], with K the largest stable; the true K is larger where the
+        boundary leaves the map.
         """
         return {
             "label": self.case.label,
@@ -102,7 +103,7 @@ class Map:
 
 
 class Effort(NamedTuple):
-    """What maps took: the backend they were made on, their hits, and how long it was until the last of them, s."""
+    """The effort for maps: their backend, the number of their hits, and the time until the last of them, s."""
 
     backend: str
     hits: int
@@ -110,32 +111,32 @@ class Effort(NamedTuple):
 
 
 class Mapping(Protocol):
-    """What makes maps for a study."""
+    """The function that makes maps for a study."""
 
     def __call__(self, title: str, cases: list[Case]) -> list[Map]:
-        """Return the map of each case; the title is for the one who waits."""
+        """Return the map of each case; the title is shown with the progress."""
 
     def effort(self) -> Effort:
-        """Return what the maps took until now."""
+        """Return the effort for the maps so far."""
 
 
 class NeverReached(RuntimeError):
-    """The handle did not come to the wall in the time of the protocol: such a hit says nothing of the wall."""
+    """The handle did not reach the wall in the time of the protocol: such a hit says nothing about the wall."""
 
 
 def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float, damping: float, backend: str) -> dict:
-    """Hit a wall; return whether it is `stable`, then `in_place` at rest, its `rms_mm` up to where that was sure, and
+    """Hit a wall; return whether it is `stable`, then `in_place` at rest, its `rms_mm` until the verdict was sure, and
     the `seconds` it took.
 
     Args:
-        scene, text, changes: of a `Case`.
-        sources: what `store.sources` gives where the map is made: results are kept under it.
-        stiffness, damping: of the wall, N/m and N s/m.
+        scene, text, changes: attributes of a `Case`.
+        sources: the result of `store.sources` where the map is made; results are kept under it.
+        stiffness, damping: the wall's, N/m and N s/m.
         backend: one of `backends.BACKENDS`.
 
     Raises:
-        SceneError: if the scene cannot be.
-        NeverReached: if the handle did not come to the wall.
+        SceneError: if the scene is not valid.
+        NeverReached: if the handle did not reach the wall.
         RuntimeError: if the worker has other sources of the project.
     """
     if sources != store.sources():
@@ -149,7 +150,7 @@ def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float
 
 
 class _Tracing:
-    """One trace on its way: which wall it asks for, and what it found at the end."""
+    """A trace in progress: the job that it asks for next, and at the end its map."""
 
     def __init__(self, case: Case, backend: str):
         self._case, self._grid = case, grid_of(case.scene)
@@ -162,7 +163,7 @@ class _Tracing:
         self._send(None)
 
     def answer(self, result: dict) -> None:
-        """Go on from the verdict on the wall that was wanted."""
+        """Continue the trace with the verdict on the wall that it asked for."""
         self._hits += 1
         self._seconds += result["seconds"]
         self._in_place[self.wanted["stiffness"], self.wanted["damping"]] = result["in_place"]
@@ -179,7 +180,7 @@ class _Tracing:
 
     @property
     def done(self) -> float:
-        """The part of the values of B that the trace is through with."""
+        """The part of the values of B that the trace has finished."""
         dampings = self._grid.dampings
         return dampings.index(self.wanted["damping"]) / len(dampings) if self.wanted else 1.0
 
@@ -194,27 +195,28 @@ def run(
     """Return the map of each case.
 
     Args:
-        cases: what to map; the grid is each scene's own.
+        cases: the cases to map, each on its scene's grid.
         backend: one of `backends.BACKENDS`.
-        known: where verdicts are kept, and looked for.
-        client: of a Dask cluster; None for this process alone.
-        progress: called after every verdict with how many maps are done, parts of one counted too.
+        known: the store of verdicts.
+        client: a client of a Dask cluster; None for this process alone.
+        progress: called after every verdict with the number of maps done, unfinished maps counted in part.
 
     Raises:
-        SceneError: if a case cannot be, or its scene has no section `zwidth`.
-        NeverReached: if in one of them the handle does not come to the wall.
+        SceneError: if a case is not valid, or its scene has no section `zwidth`.
+        NeverReached: if the handle does not reach the wall in a case.
     """
     traces = [_Tracing(case, backend) for case in cases]
 
     def forward(tracing: _Tracing) -> dict | None:
-        """Answer what the store can; return the hit that is wanted next."""
+        """Answer the trace from the store as far as possible; return the next hit to run, or None at its end."""
         while tracing.wanted and tracing.wanted in known:
             tracing.answer(known.get(tracing.wanted))
         if progress:
-            progress(sum(each.done for each in traces))
+            progress(sum(running.done for running in traces))
         return tracing.wanted
 
-    def taken(tracing: _Tracing, result: dict) -> dict | None:
+    def keep(tracing: _Tracing, result: dict) -> dict | None:
+        """Keep a verdict; return the next hit to run, or None at the end of the trace."""
         known.put(tracing.wanted, result)
         return forward(tracing)
 
@@ -222,14 +224,16 @@ def run(
         for tracing in traces:
             job = forward(tracing)
             while job:
-                job = taken(tracing, verdict(**job))
+                job = keep(tracing, verdict(**job))
     else:
-        # Every hit is a run of its own, also one that another trace has asked for.
-        waiting = {client.submit(verdict, **job, pure=False): each for each in traces if (job := forward(each))}
+        # Every hit is a separate run, even if another trace has asked for the same hit.
+        waiting = {
+            client.submit(verdict, **job, pure=False): tracing for tracing in traces if (job := forward(tracing))
+        }
         queue = as_completed(waiting)
         for future in queue:
             tracing = waiting.pop(future)
-            if job := taken(tracing, result_of(future)):
+            if job := keep(tracing, result_of(future)):
                 following = client.submit(verdict, **job, pure=False)
                 waiting[following] = tracing
                 queue.add(following)
