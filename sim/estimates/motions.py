@@ -196,7 +196,7 @@ def _passage(motion, begin_s, end_s, at_m, upwards):
 def _edges(motion, encoder, step_s, steps, room):
     """Return the passages over `steps` steps: (times in s, cells entered, their number, or `room` + 1 for too many)."""
     times, cells = np.empty(room), np.empty(room, np.int64)
-    cell, found = locate(encoder, position(motion, 0.0)), 0
+    cell, passages = locate(encoder, position(motion, 0.0)), 0
     for k in range(steps):
         begin_s, stop_s = k * step_s, (k + 1) * step_s
         while begin_s < stop_s:
@@ -207,15 +207,15 @@ def _edges(motion, encoder, step_s, steps, room):
             since_s = begin_s
             while not cell.lower_m <= target < cell.upper_m:
                 upwards = target >= cell.upper_m
-                if found == room:
+                if passages == room:
                     return times, cells, room + 1
                 since_s = _passage(motion, since_s, end_s, cell.upper_m if upwards else cell.lower_m, upwards)
                 number = cell.number + (1 if upwards else -1)
                 cell = Cell(number, edge(encoder, number), edge(encoder, number + 1))
-                times[found], cells[found] = since_s, number
-                found += 1
+                times[passages], cells[passages] = since_s, number
+                passages += 1
             begin_s = end_s
-    return times, cells, found
+    return times, cells, passages
 
 
 class Encoded(NamedTuple):
@@ -247,11 +247,11 @@ def encoded(motion, encoder: Encoder, seconds: float, step_s: float, offset_cloc
     """
     room = 1 << 16
     while True:
-        times, cells, found = _edges(motion, encoder, step_s, math.ceil(seconds / step_s), room)
-        if found <= room:
+        times, cells, passages = _edges(motion, encoder, step_s, math.ceil(seconds / step_s), room)
+        if passages <= room:
             break
         room *= 4
-    times, cells = times[:found], cells[:found]
+    times, cells = times[:passages], cells[:passages]
     start = locate(encoder, position(motion, 0.0)).number
     upwards = np.diff(cells, prepend=start) > 0
     at = times * encoder.clock_hz

@@ -29,10 +29,10 @@ def _take(controller, state, timing, edges, taken, first, velocity):
     """Fill `velocity` with the samples from `first` on; return (state, number of edges taken)."""
     for i in range(len(velocity)):
         strobe = strobe_of(timing, first + i)
-        left = len(edges.clocks) - taken
-        if left > 0 and edges.clocks[taken] < strobe + timing.latency:
+        remaining = len(edges.clocks) - taken
+        if remaining > 0 and edges.clocks[taken] < strobe + timing.latency:
             rest = Edges(edges.clocks[taken:], edges.levels[taken:])
-            state, some = sample(controller, state, rest, left, strobe)
+            state, some = sample(controller, state, rest, remaining, strobe)
             taken += some
         else:
             state = sample_quietly(controller, state, strobe)

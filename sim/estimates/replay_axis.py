@@ -1,7 +1,7 @@
 """The axis for a recording, in units of its own, and the run of recorded counts through it on any backend.
 
-In its `AxisSpec` a metre is a *recorded count* and a second is `SECOND` *sample periods* (a time in which no clock stamp
-of an edge wraps), so the same hardware serves any recording. If the counts were divided by N, the axis' count is N
+In its `AxisSpec` a metre is a *recorded count* and a second is `SECOND` *sample periods* (a time in which no stamp of
+an edge wraps), so the same hardware serves any recording. If the counts were divided by N, the axis' count is N
 recorded counts.
 
 The ranges of the axis follow from the recording, each rounded up to a power of two:
