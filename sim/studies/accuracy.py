@@ -1,4 +1,4 @@
-"""How accurate estimators are, side by side: every one on every signal, at every rate."""
+"""How accurate estimators are, side by side: every estimator on every signal, at every rate."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,13 +9,13 @@ from ..walls.methods import Curve
 
 @dataclass(frozen=True)
 class Accuracy:
-    """What was measured.
+    """The measurements.
 
     Attributes:
-        figure: of the founding paper, which it reproduces; None for others.
+        figure: number of the founding paper's figure that they reproduce; None for none.
         curves: the estimators.
-        rows: of `accuracy.measure` and `accuracy.measure_recording`, those of recordings last.
-        labels: of the curve of each row of a known motion.
+        rows: results of `accuracy.measure`, followed by those of `accuracy.measure_recording`.
+        labels: labels of the curves, one for every row of a known motion.
     """
 
     figure: int | None
@@ -28,7 +28,7 @@ class Accuracy:
         return self.rows
 
     def tables(self) -> list[Table]:
-        """Return a table of the known motions, and one of the recordings, whose unit is another."""
+        """Return a table of the known motions, and a table of the recordings, which have another unit."""
         ordered = sorted(self.rows, key=lambda row: (row["signal"], row["sample_hz"]))
         by_unit = {unit: [row for row in ordered if f"rms_{unit}" in row] for unit in ("mm_s", "counts_s")}
         return [_table(rows, unit) for unit, rows in by_unit.items() if rows]
@@ -52,9 +52,9 @@ def _table(rows: list[dict[str, Any]], unit: str) -> Table:
 
 
 def jobs(curves: list[Curve], names: list[str], rates_hz: list[int], options: dict) -> list[tuple[str, dict]]:
-    """Return the label and the arguments of `accuracy.measure` for each estimator on each known motion at each rate.
+    """Return label and arguments of `accuracy.measure` for every estimator on every known motion at every rate.
 
-    The fastest rates take longest: they go first.
+    The fastest rates come first, because they take longest.
     """
     return [
         (curve.label, curve.job(name, rate, **options))

@@ -1,4 +1,4 @@
-"""How fast the closed loop runs, and what each optional part of a scene costs; measured side by side in one run.
+"""How fast the closed loop runs, and what every optional part of a scene costs, measured side by side in one run.
 
 Every figure is a median over rounds in which the contestants take turns: see `jobs.rounds`.
 """
@@ -20,12 +20,12 @@ from ..walls import hit
 
 ROUNDS = 5
 SECONDS_OF_SCENE = {"float": 6.0, "fixed": 6.0, "rtl": 0.2}
-"""Simulated time a round, by backend: the whole protocol of the model's, enough of the RTL's to time it."""
+"""Simulated time (s) of a round, by backend: the whole protocol for the models, enough to time the RTL."""
 COCOTB_SAMPLES = 2000
 
 
 def _parts(sample_s: float) -> dict[str, dict]:
-    """Return changes that leave a scene one optional part each, so slight that the motion is as without; then all."""
+    """Return changes that give a scene one optional part, too slight to alter the motion; the last has all of them."""
     bare = {"handle.coulomb_n": None, "amplifier": None}
     cable = {"transmission.stiffness_n_per_m": 1e6, "transmission.damping_n_s_per_m": 10.0}
     motor = {"resistance_ohm": 2.0, "inductance_h": 3e-4, "torque_constant_n_m_per_a": 0.04}
@@ -47,13 +47,13 @@ def _parts(sample_s: float) -> dict[str, dict]:
 
 
 def _scene(name: str, changes: dict, seconds: float) -> Scene:
-    """Return a scene that lasts `seconds`, halved between settling and measuring."""
+    """Return a scene that lasts `seconds`, half of them for settling and half for measuring."""
     half = {"protocol.settle_s": seconds / 2, "protocol.mean_s": seconds / 4, "protocol.measure_s": seconds / 2}
     return load(name, changes | half)
 
 
 def _hits(scene: Scene, backend: str) -> Callable[[], float]:
-    """Return a run of the closed loop, in samples a second."""
+    """Return a function that runs the closed loop and returns its speed in samples a second."""
 
     def run() -> float:
         result = hit.run(scene, backend)
@@ -64,7 +64,7 @@ def _hits(scene: Scene, backend: str) -> Callable[[], float]:
 
 
 def _cocotb(name: str) -> Callable[[], float]:
-    """Return a run of the same closed loop under cocotb, in samples a second; its force words must be the model's."""
+    """Return the same for the loop under cocotb, which raises RuntimeError if the force words are not the model's."""
     scene = load(name)
     words = hit.run(_scene(name, {}, COCOTB_SAMPLES / scene.spec.sample_hz), "fixed").force_sha256
 
@@ -72,8 +72,8 @@ def _cocotb(name: str) -> Callable[[], float]:
         with tempfile.TemporaryDirectory() as folder:
             report = Path(folder) / "report.json"
             # The simulator runs in a folder of its own.
-            found = str(Path(name).absolute()) if name.endswith(".toml") else name
-            order = {"scene": found, "samples": COCOTB_SAMPLES, "report": str(report)}
+            source = str(Path(name).absolute()) if name.endswith(".toml") else name
+            order = {"scene": source, "samples": COCOTB_SAMPLES, "report": str(report)}
             environ = {"HARDWALL_LOOP": json.dumps(order), "COCOTB_LOG_LEVEL": "WARNING"}
             log = build_dir() / "cocotb" / "bench.log"
             simulate_axis(scene.spec, Job("hardwall.sim.studies.cocotb_loop", Path(folder), environ, log=log))
@@ -87,13 +87,13 @@ def _cocotb(name: str) -> Callable[[], float]:
 
 @dataclass(frozen=True)
 class Speeds:
-    """What was measured.
+    """The measured speeds.
 
     Attributes:
         scene: name of the scene.
-        samples_per_s: by backend, and under cocotb.
-        clocks_per_sample: of the hardware.
-        ns_per_sample_of_parts: by optional part.
+        samples_per_s: speed by backend, and under cocotb.
+        clocks_per_sample: clocks of the hardware in a sample.
+        ns_per_sample_of_parts: time of a sample by optional part.
     """
 
     scene: str
@@ -111,7 +111,7 @@ class Speeds:
         return head | self._ratios() | {"ns_per_sample_of_parts": self.ns_per_sample_of_parts}
 
     def tables(self) -> list[Table]:
-        """Return the same, a line a number."""
+        """Return the same numbers, one a line."""
         speeds = {f"{name} (samples/s)": value for name, value in self.samples_per_s.items()}
         costs = {f"{name} (ns/sample)": value for name, value in self.ns_per_sample_of_parts.items()}
         lines = {"scene": self.scene, "rounds": ROUNDS} | self._ratios() | speeds | costs
@@ -125,11 +125,11 @@ def study(scene: str, progress: Callable[[str], None]) -> Speeds:
     """Return samples a second by backend, and nanoseconds a sample by optional part.
 
     Args:
-        scene: its name or file.
-        progress: called with what is measured next.
+        scene: name or file of the scene.
+        progress: function called with the name of the next measurement.
 
     Raises:
-        RuntimeError: if the RTL under cocotb makes other force words than the model.
+        RuntimeError: if the force words of the RTL under cocotb differ from the model's.
     """
     spec = load(scene).spec
     progress("compiling and building")

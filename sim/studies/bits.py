@@ -1,4 +1,4 @@
-"""What a bit buys: an estimator's error and its logic against the width of its words, bit by bit below the derived."""
+"""What a bit buys: an estimator's error and logic as its words shrink, bit by bit, from the derived widths."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -16,7 +16,7 @@ DROPPED = range(13)
 
 @dataclass(frozen=True)
 class Bits:
-    """What bits buy: rows of `bit`."""
+    """Errors and logic by width: rows of `bit`."""
 
     rows: list[dict[str, Any]]
 
@@ -25,7 +25,7 @@ class Bits:
         return self.rows
 
     def tables(self) -> list[Table]:
-        """Return the rows."""
+        """Return a table of the rows."""
         columns = ("bits_dropped", "velocity_bits", "rms_mm_s", "lut4", "ff", "dsp")
         lines = [
             [f"{row['estimator']} {row['output']}", *(f"{row[name]:.5g}" for name in columns)] for row in self.rows
@@ -38,7 +38,7 @@ class Bits:
 
 
 def jobs(curves: list[Curve], sample_hz: int) -> list[dict[str, Any]]:
-    """Return the arguments of `bit` for each estimator, bit by bit."""
+    """Return the arguments of `bit` for every estimator and number of bits dropped."""
     return [
         {"estimator": curve.estimator, "output": curve.output, "sample_hz": sample_hz, "bits_dropped": dropped}
         for curve in curves
@@ -47,12 +47,12 @@ def jobs(curves: list[Curve], sample_hz: int) -> list[dict[str, Any]]:
 
 
 def bit(estimator: str, output: str, sample_hz: int, bits_dropped: int) -> dict | None:
-    """Return error and logic of an estimator whose words lack so many fraction bits; None if there are not so many.
+    """Return error and logic of an estimator with fraction bits dropped; None if its words have too few to drop.
 
     Returns:
         estimator, output, sample_hz, bits_dropped: what was measured.
-        velocity_bits: width of the velocity's word.
-        rms_mm_s: error on the signal `paper`, in fixed point.
+        velocity_bits: width of the velocity word.
+        rms_mm_s: RMS error on the signal `paper`, in fixed point.
         lut4, ff, dsp: cells of the estimator alone.
 
     Raises:

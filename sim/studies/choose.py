@@ -1,7 +1,7 @@
-"""The table to choose an estimator by: its error in each situation, with one set of gains, beside what it costs.
+"""The table to choose an estimator by: its errors in several situations, with one set of gains, and its cost.
 
-The gains are those for the bound C on the acceleration that the impact asks for: a device has to live with its gains in
-every situation. Errors are RMS, mm/s.
+The gains follow from the bound C on the acceleration of the impact: a device keeps its gains in every situation. Errors
+are RMS, in mm/s.
 """
 
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ SITUATIONS = {
     "standstill": {"signal": "flicker"},
     "bad encoder": {"signal": "paper", "phase_error_counts": PHASE_ERROR_COUNTS},
 }
-"""What a handle does: about 1 and 300 mm/s (no round speeds, whose counts lock to the samples), the paper's swing, a
-wall, a count that flickers, the swing seen badly."""
+"""Motions of a handle: about 1 and 300 mm/s (not round speeds, whose counts lock to the samples), the paper's swing, a
+hit of a wall, a count that flickers, and the swing seen by a bad encoder."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Choice:
         return self.rows
 
     def tables(self) -> list[Table]:
-        """Return the errors, and the costs."""
+        """Return the table of errors and the table of costs."""
         names = list(SITUATIONS)
         best = {name: min(row["rms_mm_s"][name] for row in self.rows) for name in names}
         errors, costs = [], []
@@ -53,12 +53,12 @@ class Choice:
         ]
 
     def notes(self) -> list[str]:
-        """Return what a star is."""
+        """Return the meaning of a star."""
         return ["*: the least error"]
 
 
 def jobs(pairs: list[tuple[str, str]], sample_hz: int, backend: str) -> list[dict]:
-    """Return the arguments of `accuracy.measure`, situation by situation for each (estimator, output)."""
+    """Return the arguments of `accuracy.measure` for every situation of every (estimator, output) pair."""
     bound = signals.load("hit").acceleration_max_m_per_s2
     common = {"sample_hz": sample_hz, "backend": backend, "acceleration_max_m_per_s2": bound}
     return [
@@ -69,17 +69,17 @@ def jobs(pairs: list[tuple[str, str]], sample_hz: int, backend: str) -> list[dic
 
 
 def table(pairs: list[tuple[str, str]], measured: list[dict], costs: list[dict]) -> list[dict]:
-    """Return a row for each (estimator, output): its errors by situation, its delay and its cost.
+    """Return a row for every (estimator, output) pair: its errors by situation, its delay and its cost.
 
     Args:
-        pairs: estimators and outputs.
-        measured: what `accuracy.measure` gave for `jobs`, in that order.
-        costs: what `costs.cost` gave, one for each estimator.
+        pairs: estimators and their outputs.
+        measured: results of `accuracy.measure` for `jobs`, in the same order.
+        costs: results of `costs.cost`, one for every estimator.
     """
     by_name = {row["estimator"]: row for row in costs}
-    rows, each = [], len(SITUATIONS)
+    rows, situations = [], len(SITUATIONS)
     for index, (estimator, output) in enumerate(pairs):
-        own = dict(zip(SITUATIONS, measured[index * each : (index + 1) * each], strict=True))
+        own = dict(zip(SITUATIONS, measured[index * situations : (index + 1) * situations], strict=True))
         cost = by_name[estimator]
         rows.append(
             {

@@ -1,8 +1,8 @@
-"""The closed loop with the RTL under cocotb: what the compiled loop is measured against, and must agree with.
+"""The closed loop with the RTL under cocotb, with which the compiled loop must agree and is compared in speed.
 
-The plant is the same compiled code, called sample by sample; the RTL is clocked by cocotb's own clock in C++ and
-waited for with timers, one for every change of a pin and two for a sample, which is the least Python that cocotb can
-do with. Runs inside the simulator; `sim.studies.bench` starts it.
+The plant is the same compiled code, called sample by sample. The RTL is clocked by cocotb's own clock in C++ and
+awaited with timers, one for every change of a pin and two for every sample: the least Python with which cocotb works.
+The module runs inside the simulator; `sim.studies.bench` starts it.
 """
 
 import hashlib
@@ -27,18 +27,18 @@ from ..world.converter import converted
 from ..world.encoder import level
 
 PERIOD_NS = 10
-"""Of the simulated clock; only its number of cycles matters."""
+"""The period of the simulated clock; only the number of cycles matters."""
 
 
 @cocotb.test()
 async def closed_loop(dut):
-    """Close the loop for some samples; write the force words' digest and the seconds taken."""
+    """Close the loop for some samples; write the digest of the force words and the wall time."""
     order = json.loads(os.environ["HARDWALL_LOOP"])
     scene = load(order["scene"])
     world, edges = world_of(scene), room_for(loop.EDGE_CAPACITY)
     _, moment, force_n = start_of(scene, world)
     await _open(dut, scene, int(level(moment.cell.number)))
-    # `_open` has run clock 0. Half a period on, a pin is set between two rising edges: in clock n, for edge n to see.
+    # `_open` has run clock 0. Half a period later, pins change between two rising edges: in clock n, before edge n.
     await Timer(PERIOD_NS // 2, "ns")
 
     now = 1
@@ -66,9 +66,9 @@ async def closed_loop(dut):
         words.append(drive)
         late.append(drive)
         force_n = converted(world.converter, world.push_n + world.force_lsb_n * late.pop(0))
-        left = world.timing.clocks_per_sample - world.timing.latency
-        if left:
-            interval = Interval(world.before, until, left)
+        remaining = world.timing.clocks_per_sample - world.timing.latency
+        if remaining:
+            interval = Interval(world.before, until, remaining)
             moment = advance(world.plant, world.encoder, moment, force_n, interval, edges)
     seconds = time.perf_counter() - began
     actuations = np.array(words[:: scene.spec.samples_per_actuation], "<i4")

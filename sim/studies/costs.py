@@ -1,4 +1,4 @@
-"""What a velocity estimator costs in logic: alone, as synthesised, and as part of a board, placed and routed."""
+"""The logic cost of a velocity estimator: synthesised alone, and placed and routed as part of a board."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ RATES = {
         "controller.actuation_hz": 500_000,
     },
 }
-"""By device: what differs from the scene `mhz`, which is too fast for the slower one."""
+"""Changes of the scene `mhz` by device: it is too fast for the slower device."""
 
 
 @dataclass(frozen=True)
 class Costs:
-    """What estimators take of devices: rows of `cost`."""
+    """Costs of estimators on devices: rows of `cost`."""
 
     rows: list[dict[str, Any]]
 
@@ -30,7 +30,7 @@ class Costs:
         return self.rows
 
     def tables(self) -> list[Table]:
-        """Return two tables for each device: of the estimators alone, and of the board with each."""
+        """Return two tables for every device: the estimators alone, and the board with each estimator."""
         tables = []
         for device in dict.fromkeys(row["device"] for row in self.rows):
             own = [row for row in self.rows if row["device"] == device]
@@ -57,21 +57,21 @@ def _board(row: dict[str, Any]) -> list[str]:
 
 
 def jobs(estimators: list[str], device: str, seeds: int) -> list[dict[str, Any]]:
-    """Return the arguments of `cost` for each estimator."""
+    """Return the arguments of `cost` for every estimator."""
     return [{"estimator": name, "device": device, "seeds": list(range(1, seeds + 1))} for name in estimators]
 
 
 def cost(estimator: str, device: str, seeds: Iterable[int]) -> dict:
-    """Return what an estimator takes of a device, at the rates of the scene `mhz` or the slower device's.
+    """Return the cost of an estimator on a device, at the rates of the scene `mhz` or of the slower device.
 
     Returns:
         estimator, device, clock_mhz, sample_hz: what was synthesised.
         lut4, ff, dsp, bram: cells of the estimator alone, before placing.
-        latency_clocks: of the estimator, strobe to valid.
+        latency_clocks: latency of the estimator, from strobe to valid.
         board: the report of `synthesis.synthesise`.
 
     Raises:
-        SynthesisError: if a tool is missing or fails, as when the board does not fit.
+        SynthesisError: if a tool is missing or fails, for instance because the board does not fit.
     """
     scene = load("mhz", RATES[device] | {"controller.estimator": estimator, "controller.output": None})
     return {

@@ -1,12 +1,12 @@
-"""The best cutoff of the filter behind a finite difference: area of the stable region against it, device by device.
+"""The best cutoff of the filter behind a finite difference: area of the stable region against cutoff, by device.
 
-First a sweep, the founding paper's cutoffs among it; its maps are independent, so they run side by side. Then bounded
-minimisation (SciPy: golden section and parabolas) of minus the area over the logarithm of the cutoff, between the
-neighbours of the sweep's best. It asks for no derivative, which a staircase has not: every area is a sum of steps of
-the map. For the same reason it ends early: nearer to each other than `TOLERANCE`, cutoffs differ by chance. The best is
-the best of all maps, those of the sweep too.
+The search begins with a sweep, which includes the founding paper's cutoffs; its maps are independent, so they run side
+by side. Then bounded minimisation (SciPy: golden section and parabolas) of minus the area over the logarithm of the
+cutoff searches between the neighbours of the sweep's best. The method needs no derivative, and the area has none: every
+area is a sum of steps of the map. For the same reason the search ends early: cutoffs closer than `TOLERANCE` differ by
+chance. The best cutoff is the best of all maps, including the sweep's.
 
-The grid is wider than the scene's, and coarser: see `study`.
+The grid is wider and coarser than the scene's: see `_Cases`.
 """
 
 import math
@@ -26,15 +26,15 @@ from ..walls.zwidth import Effort, Map, Mapping
 from .zwidth import area_text, plus_of_areas
 
 SCENES = ("seed-2011", "desktop-arm", "maglev")
-"""The paper's device, and two that differ from it in mass, friction, count and rates."""
+"""The paper's device, and two devices with another mass, friction, count and rates."""
 PAPERS_HZ = (30.0, 100.0, 500.0, 1000.0)
 SWEEP_HZ = (30, 40, 50, 70, 100, 140, 200, 300, 400, 500, 700, 1000, 1400, 2000, 2800, 4000)
 COARSER = 2.0
-"""Steps of the maps, of the scene's."""
+"""The steps of the maps, as a multiple of the scene's steps."""
 TOLERANCE = 0.03
 EVALUATIONS = 10
 LEVEL = 0.05
-"""Cutoffs whose areas are less by no more than this part of the best are as good."""
+"""The share of the best area by which an area may be less and count as equally good."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class Device:
     """The areas of one scene.
 
     Attributes:
-        scene: as it was mapped.
-        maps: by cutoff in Hz, ascending; of the sweep and of the search.
-        unfiltered: of the finite difference alone.
+        scene: the scene as it was mapped.
+        maps: maps of the sweep and of the search, by cutoff in Hz, ascending.
+        unfiltered: map of the finite difference alone.
     """
 
     scene: Scene
@@ -53,21 +53,21 @@ class Device:
 
     @cached_property
     def best_hz(self) -> float:
-        """The cutoff with the largest region; the lowest of several."""
+        """The cutoff with the largest region, the lowest of several equal ones."""
         return max(self.maps, key=lambda cutoff_hz: self.maps[cutoff_hz].area)
 
     @property
     def best(self) -> Map:
-        """The largest region behind a filter."""
+        """The map with the largest region behind a filter."""
         return self.maps[self.best_hz]
 
     @cached_property
     def level_hz(self) -> tuple[float, float]:
-        """From where to where, around the best cutoff, the others are as good; the ends where it does not end before.
+        """The range of cutoffs around the best that are equally good, limited to the cutoffs that were mapped.
 
-        Between two maps the area is taken to be straight over the logarithm of the cutoff.
+        Between two maps the area is interpolated linearly over the logarithm of the cutoff.
         """
-        cutoffs, areas = list(self.maps), [each.area for each in self.maps.values()]
+        cutoffs, areas = list(self.maps), [a_map.area for a_map in self.maps.values()]
         enough = (1 - LEVEL) * self.best.area
 
         def end(direction: int) -> float:
@@ -83,7 +83,7 @@ class Device:
 
     @property
     def at_end(self) -> bool:
-        """Whether the best cutoff is the first or the last: a better one may be beyond."""
+        """Whether the best cutoff is the first or the last, so that a better cutoff may lie beyond."""
         return self.best_hz in (next(iter(self.maps)), next(reversed(self.maps)))
 
     def report(self) -> dict[str, Any]:
@@ -104,7 +104,7 @@ class Device:
 
 @dataclass(frozen=True)
 class Cutoffs:
-    """What was found: the devices, and what their maps took."""
+    """The result of the study: the devices, and the effort of their maps."""
 
     devices: list[Device]
     effort: Effort
@@ -114,7 +114,7 @@ class Cutoffs:
         return self.effort._asdict() | {"devices": [each.report() for each in self.devices]}
 
     def tables(self) -> list[Table]:
-        """Return the best cutoff of each device, and the areas at every cutoff."""
+        """Return the best cutoff of every device, and the areas at every cutoff."""
         numbers = ("best (Hz)", "its area (kN/m N s/m)", "within 5 %, from (Hz)", "to (Hz)", "no filter: area")
         rows = []
         for each in self.devices:
@@ -130,12 +130,12 @@ class Cutoffs:
         return [table_of(("device",), numbers, rows), table_of((), columns, areas)]
 
     def notes(self) -> list[str]:
-        """Return what a + is."""
-        return plus_of_areas(found for each in self.devices for found in (*each.maps.values(), each.unfiltered))
+        """Return the meaning of a +."""
+        return plus_of_areas(a_map for device in self.devices for a_map in (*device.maps.values(), device.unfiltered))
 
 
 class _Cases:
-    """The cases of one scene."""
+    """The cases of one scene, on a grid that is wider and coarser than the scene's."""
 
     def __init__(self, case: Case):
         self._case = case.changed(wider_grid(case.scene, COARSER))
@@ -149,9 +149,9 @@ class _Cases:
         return self._of(f"{cutoff_hz:g} Hz", {"controller.estimator": "butterworth", **gains})
 
     def sweep(self) -> dict[float, Case]:
-        """Return the sweep's cases by cutoff: those that the rate allows, the highest of them at its end."""
+        """Return the sweep's cases by cutoff, up to the highest cutoff that the sample rate allows."""
         end = min(float(SWEEP_HZ[-1]), CUTOFF_MAX * self.scene.controller.sample_hz)
-        cutoffs = [*(float(each) for each in SWEEP_HZ if each < end), end]
+        cutoffs = [*(float(cutoff_hz) for cutoff_hz in SWEEP_HZ if cutoff_hz < end), end]
         return accepted({cutoff_hz: self.filtered(cutoff_hz) for cutoff_hz in cutoffs})
 
     def _of(self, label: str, changes: dict[str, Any]) -> Case:
@@ -159,41 +159,41 @@ class _Cases:
 
 
 def study(cases: list[Case], mapping: Mapping) -> Cutoffs:
-    """Return the areas of every scene against the cutoff, the best cutoff of each among them.
+    """Return the areas of every scene against the cutoff, including the best cutoff of every scene.
 
     Args:
         cases: the scenes.
-        mapping: makes the maps.
+        mapping: function that makes the maps.
 
     Raises:
-        SceneError: if a scene cannot be, or has no section `zwidth`.
+        SceneError: if a scene is not valid, or has no section `zwidth`.
     """
     devices = [_Cases(case) for case in cases]
     sweeps = [device.sweep() for device in devices]
-    # The largest regions take longest: they go first.
+    # The largest regions come first, because they take longest.
     swept = {(place, cutoff): sweep[cutoff] for place, sweep in enumerate(sweeps) for cutoff in reversed(sweep)}
     swept |= {(place, None): device.unfiltered() for place, device in enumerate(devices)}
-    found = dict(zip(swept, mapping("sweep of cutoffs", list(swept.values())), strict=True))
+    maps = dict(zip(swept, mapping("sweep of cutoffs", list(swept.values())), strict=True))
     searched = [
-        _searched(device, {cutoff: found[place, cutoff] for cutoff in sweeps[place]}, found[place, None], mapping)
+        _searched(device, {cutoff: maps[place, cutoff] for cutoff in sweeps[place]}, maps[place, None], mapping)
         for place, device in enumerate(devices)
     ]
     return Cutoffs(searched, mapping.effort())
 
 
 def _searched(device: _Cases, sweep: dict[float, Map], unfiltered: Map, mapping: Mapping) -> Device:
-    """Return the areas of a device, those around the sweep's best one searched."""
+    """Return the areas of a device: the sweep, and a search around the sweep's best cutoff."""
     maps = dict(sweep)
 
     def loss(log_cutoff: float) -> float:
-        # What is tried is what is printed.
+        # The cutoff that is tried is exactly the one that is printed.
         cutoff_hz = float(f"{math.exp(log_cutoff):.4g}")
         if cutoff_hz not in maps:
             case = device.filtered(cutoff_hz)
             (maps[cutoff_hz],) = mapping(f"search: {case.label}", [case])
         return -maps[cutoff_hz].area
 
-    cutoffs, areas = list(sweep), [each.area for each in sweep.values()]
+    cutoffs, areas = list(sweep), [a_map.area for a_map in sweep.values()]
     top = areas.index(max(areas))
     bounds = [math.log(cutoffs[min(max(place, 0), len(cutoffs) - 1)]) for place in (top - 1, top + 1)]
     if areas[top] > 0 and bounds[0] < bounds[1]:

@@ -1,16 +1,16 @@
-"""Why the stable region of Levant's differentiator ends at one B, in a sharp drop, and what has none.
+"""Why the stable region of Levant's differentiator ends at one B, in a sharp drop, and which estimators have no drop.
 
-The explanation under test is `chatter`: at rest its u goes on chattering, and times B that is a force which friction
-holds, or not, whatever the stiffness. Four experiments:
+The explanation under test is `chatter`: at rest the output u still chatters, and B times the chatter is a force that
+friction either holds or does not, whatever the stiffness. There are four experiments:
 
-- *Shaken.* One wall, B ever larger: RMS of position after the settling mark, for Levant's u, for the same
-  differentiator with the same gains whose implicit Euler does not chatter at rest, and for others.
-- *Ends.* The B up to which three of four hits come to rest, and up to which they are stable, from soft walls to stiff
-  ones: a handle that is shaken by less than the threshold is stable, too.
-- *Laws.* The B up to which three of four hits come to rest, measured in the closed loop, against that up to which
-  `chatter` lets three of four cycles rest, predicted from the estimator alone: where friction, push, gains and the
-  number of samples a force change, which are in the law; and mass, count, delay and stiffness, which are not.
-- *Maps.* The stable region of each, as the founding paper traces it.
+- *Shaken.* One wall with increasing B: the RMS of position after the settling mark, for Levant's u, for the same
+  differentiator and gains with an implicit Euler step, which does not chatter at rest, and for other estimators.
+- *Ends.* The B up to which three of four hits come to rest, and the B up to which they are stable, from soft walls to
+  stiff walls: a handle that is shaken by less than the threshold is stable too.
+- *Laws.* The B up to which three of four hits come to rest, measured in the closed loop, against the B up to which
+  `chatter` lets three of four cycles rest, predicted from the estimator alone. The changes are of friction, push, gains
+  and the number of samples a force, which are in the law, and of mass, count, delay and stiffness, which are not.
+- *Maps.* The stable region of every method, as the founding paper traces it.
 """
 
 import math
@@ -34,16 +34,16 @@ from .drop_result import STIFFNESS_N_PER_M, Drop, End, Law, Shaken
 
 DAMPINGS_N_S_PER_M = np.geomspace(3, 400, 18).round(1)
 STARTS = 8
-"""Hits of one wall. Each starts by `APART` counts farther off: which cycle the chatter falls into is chance."""
+"""The number of hits of a wall. Every hit starts `APART` counts farther off, as the cycle of the chatter is chance."""
 APART = 13.7
 REST_COUNTS = 0.1
-"""A handle whose RMS is less has come to rest."""
+"""A handle whose RMS of position is less has come to rest."""
 ENOUGH = 0.75
-"""The part of hits, and of cycles, that is to rest."""
+"""The share of the hits, and of the cycles, that must come to rest."""
 HALVINGS = 5
-"""Of the range of B, to find where that ends."""
+"""The number of bisections of the range of B in the search for its end."""
 COARSER = 4.0
-"""Steps of the maps, of the scene's."""
+"""The steps of the maps, as a multiple of the scene's steps."""
 TIMES = {
     "Coulomb friction": ("handle.coulomb_n", (0.3, 0.5, 2.0, 3.0)),
     "push": ("protocol.push_n", (0.7, 1.5, 2.0)),
@@ -52,21 +52,21 @@ TIMES = {
     "delay": ("amplifier.delay_s", (0.0, 2.0)),
     "stiffness": ("wall.stiffness_n_per_m", (0.5, 2.0, 3.0)),
 }
-"""What is changed, by how many times."""
+"""The changes of the scene: a key and the factors that multiply its value."""
 GAINS = {"lambda": ("lambda_sqrt_m_per_s", (0.7, 1.5)), "alpha": ("alpha_m_per_s2", (0.4, 2.0, 4.0))}
 SAMPLES_A_FORCE = (8, 9, 11, 20)
 PAPERS = ("proposed", "adjusted")
-"""What the ends and the laws are of, by the names of `curves`."""
+"""The methods whose ends and laws are studied, by the names of `curves`."""
 STIFFNESSES_N_PER_M = (2.5e3, 5e3, 10e3, 20e3, 30e3)
 ENDS_N_S_PER_M = np.geomspace(20, 240, 14).round(1)
-"""Of the walls whose ends are looked for."""
+"""The dampings of the walls in the experiment on ends."""
 
 Striking = Callable[[str, list[dict]], list[dict]]
-"""What makes the result of `strike` for each job; the text is for the one who waits."""
+"""A function that returns the result of `strike` for every job; its text is the title of the progress bar."""
 
 
 def curves(scene: Scene) -> dict[str, Curve]:
-    """Return what is compared: the paper's methods, the same gains without chatter, and other estimators."""
+    """Return the methods that are compared: the paper's, the same gains without chatter, and other estimators."""
     papers = methods(scene)
     adjusted = papers["adjusted"].gains
     return {
@@ -83,12 +83,12 @@ def curves(scene: Scene) -> dict[str, Curve]:
 
 
 def strike(scene: str, text: str, changes: dict[str, Any], damping: float, start: int, backend: str) -> dict:
-    """Hit a scene's wall; return whether it `rests` and is `stable`, and its `rms_m`, null where the handle fled.
+    """Hit a scene's wall; return whether the handle `rests` and is `stable`, and its `rms_m`, None if it fled.
 
     Args:
-        scene, text, changes: of a `Case`.
-        damping: of the wall, N s/m.
-        start: which of the starts.
+        scene, text, changes: fields of a `Case`.
+        damping: damping of the wall, N s/m.
+        start: number of the start, from 0 to `STARTS` - 1.
         backend: `float` or `fixed`.
     """
     case = Case("", scene, text, changes)
@@ -107,11 +107,11 @@ def study(case: Case, backend: str, striking: Striking, mapping: Mapping) -> Dro
     Args:
         case: the scene.
         backend: `float` or `fixed`.
-        striking: makes single hits.
-        mapping: makes maps, on the same backend.
+        striking: function that makes single hits.
+        mapping: function that makes maps, on the same backend.
 
     Raises:
-        SceneError: if the scene cannot be, or has no section `zwidth`, or no Coulomb friction.
+        SceneError: if the scene is not valid, or has no section `zwidth`, or no Coulomb friction.
     """
     soft = case.changed({"wall.stiffness_n_per_m": STIFFNESS_N_PER_M})
     plain = soft.scene
@@ -130,7 +130,7 @@ def study(case: Case, backend: str, striking: Striking, mapping: Mapping) -> Dro
     maps = mapping("maps", [wider.changed(curve.changes, curve.label) for curve in compared.values()])
     return Drop(
         plain,
-        {name: at_rest(each.scene, backend) for name, each in cases.items()},
+        {name: at_rest(own.scene, backend) for name, own in cases.items()},
         _shaken(cases, backend, striking),
         _ends(cases, backend, striking),
         _laws(changed, backend, striking),
@@ -140,22 +140,22 @@ def study(case: Case, backend: str, striking: Striking, mapping: Mapping) -> Dro
 
 
 def _changes(scene: Scene, curve: Curve) -> dict[tuple[str, str], dict[str, Any]]:
-    """Return what is changed of a scene, by factor and value."""
-    found = {}
+    """Return the changes of a scene, by factor and value."""
+    changes = {}
     for factor, (key, values) in TIMES.items():
         section, name = key.split(".")
         own = getattr(getattr(scene, section), name, None)
         if own is not None:
-            found |= {(factor, f"x {times:g}"): {key: own * times} for times in values}
+            changes |= {(factor, f"x {times:g}"): {key: own * times} for times in values}
     for factor, (gain, values) in GAINS.items():
         for times in values:
             gains = {**curve.gains, gain: curve.gains[gain] * times}
-            found[factor, f"x {times:g}"] = replace(curve, gains=gains).changes
+            changes[factor, f"x {times:g}"] = replace(curve, gains=gains).changes
     for samples in SAMPLES_A_FORCE:
         rate = samples * scene.controller.actuation_hz
         clock = rate * round(scene.controller.clock_hz / rate)
-        found["samples a force", f"{samples}"] = {"controller.sample_hz": rate, "controller.clock_hz": clock}
-    return found
+        changes["samples a force", f"{samples}"] = {"controller.sample_hz": rate, "controller.clock_hz": clock}
+    return changes
 
 
 def _job(case: Case, damping: float, start: int, backend: str) -> dict:
@@ -170,14 +170,14 @@ def _shaken(cases: dict[str, Case], backend: str, striking: Striking) -> list[Sh
 
 
 def _ends(cases: dict[str, Case], backend: str, striking: Striking) -> list[End]:
-    """Return the ends: every damping is tried, for a stiff wall has a least one, too."""
+    """Return the ends; every damping is tried, because a stiff wall has a least damping too."""
     walls = {}
     for name, stiffness in product(PAPERS, STIFFNESSES_N_PER_M):
         walls[name, stiffness] = cases[name].changed({"wall.stiffness_n_per_m": stiffness})
-    asked = list(product(walls, ENDS_N_S_PER_M.tolist(), range(STARTS)))
-    results = striking("ends", [_job(walls[key], damping, start, backend) for key, damping, start in asked])
+    hits = list(product(walls, ENDS_N_S_PER_M.tolist(), range(STARTS)))
+    results = striking("ends", [_job(walls[key], damping, start, backend) for key, damping, start in hits])
     counts = {"rests": Counter(), "stable": Counter()}
-    for (key, damping, _), result in zip(asked, results, strict=True):
+    for (key, damping, _), result in zip(hits, results, strict=True):
         for what, count in counts.items():
             count[key, damping] += result[what]
 
@@ -189,15 +189,15 @@ def _ends(cases: dict[str, Case], backend: str, striking: Striking) -> list[End]
 
 
 def _laws(changed: dict[tuple[str, str, str], Case], backend: str, striking: Striking) -> list[Law]:
-    """Return what is predicted and what is measured for every change: by bisection, a step of all of them at once."""
+    """Return prediction and measurement for every change; the bisections of all changes go side by side."""
     least, most = DAMPINGS_N_S_PER_M[[0, -1]].tolist()
     low, high = dict.fromkeys(changed, least), dict.fromkeys(changed, most)
     for step in range(HALVINGS):
         middle = {key: float(f"{math.sqrt(low[key] * high[key]):.4g}") for key in changed}
-        asked = list(product(changed, range(STARTS)))
-        jobs = [_job(changed[key], middle[key], start, backend) for key, start in asked]
+        hits = list(product(changed, range(STARTS)))
+        jobs = [_job(changed[key], middle[key], start, backend) for key, start in hits]
         resting = dict.fromkeys(changed, 0)
-        for (key, _), result in zip(asked, striking(f"laws, {step + 1} of {HALVINGS}", jobs), strict=True):
+        for (key, _), result in zip(hits, striking(f"laws, {step + 1} of {HALVINGS}", jobs), strict=True):
             resting[key] += result["rests"]
         for key, count in resting.items():
             side = low if count >= ENOUGH * STARTS else high
@@ -212,6 +212,6 @@ def _laws(changed: dict[tuple[str, str, str], Case], backend: str, striking: Str
 
 
 def _predicted(scene: Scene, backend: str) -> float:
-    """Return the B up to which enough of the cycles let the handle rest."""
+    """Return the B up to which a share `ENOUGH` of the cycles lets the handle rest."""
     ends = np.sort(at_rest(scene, backend).rests_up_to(scene.handle.coulomb_n, scene.protocol.push_n))
     return float(ends[math.floor((1 - ENOUGH) * len(ends))])

@@ -1,4 +1,4 @@
-"""What the experiments on the drop of a stable region found: see `drop`, which makes them."""
+"""The results of the experiments on the drop of a stable region, which `drop` makes."""
 
 import math
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from ..walls.chatter import Chatter
 from ..walls.zwidth import Effort, Map
 
 STIFFNESS_N_PER_M = 5e3
-"""Of the walls that are hit one by one: soft enough that without chatter they are stable by far."""
+"""The stiffness of the walls that are hit one by one, soft enough to be stable by far without chatter."""
 
 
 @dataclass(frozen=True)
 class Shaken:
-    """One hit of the first experiment: RMS of position after the settling mark; None if the handle fled."""
+    """One hit of the first experiment: the RMS of position after the settling mark, None if the handle fled."""
 
     method: str
     damping_n_s_per_m: float
@@ -26,7 +26,7 @@ class Shaken:
 
 @dataclass(frozen=True)
 class End:
-    """The largest B of `ENDS_N_S_PER_M` with which enough of the hits come to rest, and are stable; 0 without any."""
+    """The largest B of `ENDS_N_S_PER_M` at which enough of the hits come to rest, or are stable; 0 if there is none."""
 
     method: str
     stiffness_n_per_m: float
@@ -36,13 +36,13 @@ class End:
 
 @dataclass(frozen=True)
 class Law:
-    """One change of the scene, and up to which B the handle comes to rest.
+    """One change of the scene, and the B up to which the handle comes to rest.
 
     Attributes:
-        factor, value: what was changed, and how.
-        method: by name.
-        predicted_n_s_per_m: up to which enough of the cycles let it rest; infinite without end.
-        measured_n_s_per_m: up to which enough of the hits came to rest; 0 if under the least B tried, infinite if
+        factor, value: the quantity that was changed, and its change.
+        method: name of the method.
+        predicted_n_s_per_m: the B up to which enough of the cycles let the handle rest; infinite without end.
+        measured_n_s_per_m: the B up to which enough of the hits came to rest; 0 if under the least B tried, infinite if
             beyond the largest.
     """
 
@@ -55,14 +55,14 @@ class Law:
 
 @dataclass(frozen=True)
 class Drop:
-    """What was found.
+    """The result of the study.
 
     Attributes:
-        scene: as it was hit.
-        chatters: by the names of `curves`.
-        shaken, ends, laws: of the first three experiments.
-        maps: by the names of `curves`.
-        effort: what the maps took.
+        scene: the scene as it was hit.
+        chatters: chatter at rest, by the names of `curves`.
+        shaken, ends, laws: results of the first three experiments.
+        maps: stable regions, by the names of `curves`.
+        effort: effort of the maps.
     """
 
     scene: Scene
@@ -74,30 +74,30 @@ class Drop:
     effort: Effort
 
     def agreement(self) -> list[float]:
-        """Return what was measured over what was predicted where both are known: least, quartiles and most."""
+        """Return the ratios of measured to predicted B, where both are known: least, quartiles and most."""
         ratios = [
-            each.measured_n_s_per_m / each.predicted_n_s_per_m
-            for each in self.laws
-            if 0 < each.measured_n_s_per_m < math.inf and each.predicted_n_s_per_m < math.inf
+            law.measured_n_s_per_m / law.predicted_n_s_per_m
+            for law in self.laws
+            if 0 < law.measured_n_s_per_m < math.inf and law.predicted_n_s_per_m < math.inf
         ]
         return np.quantile(ratios, (0, 0.25, 0.5, 0.75, 1)).tolist() if ratios else []
 
     def before_the_end(self, name: str) -> float | None:
-        """Return K a step of B before a map's last stable wall, over its largest: a sharp drop has half or more.
+        """Return K one step of B before the end of a stable region, over its largest K: a sharp drop has half or more.
 
-        None where the region leaves the map, or has no two dampings.
+        Return None where the region leaves the map, or has fewer than two dampings.
         """
         edges = self.maps[name].edges
         stable = [edge.stable_n_per_m for edge in edges if edge.stable_n_per_m]
         return None if edges[-1].stable_n_per_m or len(stable) < 2 else stable[-2] / max(stable)
 
     def of_papers(self, name: str) -> float | None:
-        """Return a map's area as a multiple of the paper's best, that of Levant with adjusted gains; None without."""
+        """Return a map's area over that of Levant with adjusted gains, the paper's best; None where that is 0."""
         papers = self.maps["adjusted"].area
         return self.maps[name].area / papers if papers else None
 
     def report(self) -> dict[str, Any]:
-        """Return what the command line prints; null for what is infinite."""
+        """Return what the command line prints, with null for infinite values."""
         return {
             **self.effort._asdict(),
             "scene": self.scene.name,
@@ -121,12 +121,12 @@ class Drop:
         }
 
     def tables(self) -> list[Table]:
-        """Return the laws beside the chatter that they come of, the ends, and the maps."""
+        """Return the laws with the chatter that causes them, the ends, and the maps."""
         return [self._table_of_laws(), self._table_of_ends(), self._table_of_maps()]
 
     def notes(self) -> list[str]:
-        """Return how well the laws hold."""
-        ratios = ", ".join(f"{each:.2f}" for each in self.agreement())
+        """Return how well the predictions agree with the measurements."""
+        ratios = ", ".join(f"{ratio:.2f}" for ratio in self.agreement())
         return [f"measured over predicted, least, quartiles and most: {ratios}"]
 
     def _table_of_laws(self) -> Table:

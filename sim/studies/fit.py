@@ -1,16 +1,18 @@
-"""What the founding paper does not give, searched for what shows the eight facts of its Figure 5: a fit.
+"""A fit of the parameters that the founding paper does not give, so that the eight facts of its Figure 5 hold.
 
-The search is SciPy's differential evolution, seeded, over the ranges of `PARAMETERS`. What it makes small is a sum: the
-shortfalls of the facts (`figure_5`), `MISSED` for each that is not held, and how far the maps are off the paper's axes:
+The search is SciPy's differential evolution, seeded, over the ranges of `PARAMETERS`. It minimises a sum: the
+shortfalls of the facts (`figure_5`), `MISSED` for every fact that does not hold, and two distances of the maps from the
+paper's axes:
 
-- Levant with adjusted gains is to end where the B axis does. Zeros of that may have been lost, so it has two readings,
-  each searched on its own. Off by the logarithm of the ratio, less what counts as about equal;
-- its largest K is to be on the K axis. Off by the logarithm of the ratio.
+- the region of Levant with adjusted gains should end where the B axis ends. The axis may have lost zeros, so there are
+  two readings of it, each with its own search. The distance is the logarithm of the ratio, less what counts as about
+  equal;
+- the largest K of that region should be on the K axis. The distance is the logarithm of the ratio.
 
-The scene's own values are one of the first trials, so a fit can go on from a fit. Trials are mapped in coarse steps, on
-a protocol cut short. Where Levant with adjusted gains ends far (`FAR`) from where the B axis does, the other maps are
-not made, and no fact is held. The `FINALISTS` with the least sum are then judged in full: in fine steps, on the scene's
-own protocol.
+The scene's own values are one of the first trials, so a fit can continue from an earlier fit. Trials are mapped in
+coarse steps, on a shortened protocol. If the region of Levant with adjusted gains ends far (`FAR`) from the end of the
+B axis, the other maps are not made, and no fact holds. The `FINALISTS` with the least sum are then judged in full: in
+fine steps, on the scene's own protocol.
 """
 
 import math
@@ -30,41 +32,41 @@ from ..walls.methods import Curve, methods
 from ..walls.zwidth import Effort, Map, Mapping, NeverReached
 
 READINGS = {"3-30": (3.0, 30.0), "30-300": (30.0, 300.0)}
-"""Ends of the paper's B axis, N s/m."""
+"""The readings of the paper's B axis: its first and its last damping, N s/m."""
 STIFFNESS_AXIS_N_PER_M = 60e3
 BEYOND = 1.3
-"""Maps go so much farther than the axes: a region is to be seen to end."""
+"""The factor by which maps extend beyond the axes, so that the end of a region is seen."""
 COARSE, FULL = 12, 54
-"""Steps of B of a map."""
+"""The numbers of steps of B in a map."""
 STIFFNESS_STEP_N_PER_M = 1e3
 SHORT = {"protocol.settle_s": 2.5, "protocol.mean_s": 0.25, "protocol.measure_s": 0.5}
 MISSED = 0.05
 FAR = math.log(1.5)
 HOPELESS = math.log(1e3)
-"""How far off the axes maps are taken to be where there are none: no such scene, or the handle does not reach walls."""
+"""The distance from the axes where there are no maps: the scene is not valid, or the handle does not reach walls."""
 EIGHT = 8
 FINALISTS = 4
 MEMBERS = 4
-"""Of the population, for each parameter."""
+"""The number of members of the population for every parameter."""
 
 
 @dataclass(frozen=True)
 class Range:
-    """Where a parameter is searched: from `low` to `high`; `scale` is log, linear, or samples, linear in whole ones."""
+    """The range of a parameter, `low` to `high`; `scale` is log, linear, or samples: linear in whole samples."""
 
     low: float
     high: float
     scale: str
 
     def at(self, part: float, sample_hz: int) -> float:
-        """Return the value at a part, 0 to 1, of the range; of three digits, for what is tried is what is printed."""
+        """Return the value at a fraction of the range, 0 to 1, rounded to the three digits that are printed."""
         if self.scale == "log":
             return float(f"{self.low * (self.high / self.low) ** part:.3g}")
         value = self.low + (self.high - self.low) * part
         return round(value * sample_hz) / sample_hz if self.scale == "samples" else float(f"{value:.3g}")
 
     def part(self, value: float) -> float:
-        """Return at which part of the range a value is, 0 or 1 if beyond it."""
+        """Return the fraction of the range at which a value lies, 0 or 1 if it is outside."""
         inside = min(max(value, self.low), self.high)
         if self.scale == "log":
             return math.log(inside / self.low) / math.log(self.high / self.low)
@@ -79,18 +81,18 @@ PARAMETERS = {
     "protocol.threshold_mm": Range(0.3e-3, 0.1, "log"),
     "controller.gains.levant.alpha_m_per_s2": Range(17.7, 400.0, "log"),
 }
-"""What is searched, by key of the scene."""
+"""The ranges that are searched, by key of the scene."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """Values of the parameters, and what Figure 5 is like with them.
+    """Values of the parameters, and the Figure 5 that they give.
 
     Attributes:
-        values: by key of the scene.
-        facts: the eight; none where nothing but Levant with adjusted gains was mapped, or nothing could be.
-        off_b, off_k: how far the maps are off the axes, logarithms of ratios.
-        maps: by the names of `figures.methods`.
+        values: values of the parameters, by key of the scene.
+        facts: the eight facts; empty where only Levant with adjusted gains was mapped, or no map was possible.
+        off_b, off_k: distances of the maps from the ends of the axes, logarithms of ratios.
+        maps: maps by the names of `methods`.
     """
 
     values: dict[str, float]
@@ -101,12 +103,12 @@ class Trial:
 
     @property
     def held(self) -> int:
-        """How many facts are held."""
+        """The number of facts that hold."""
         return sum(fact.held for fact in self.facts)
 
     @property
     def score(self) -> float:
-        """What the search makes small."""
+        """The sum that the search minimises."""
         lacking = sum(fact.shortfall for fact in self.facts) if self.facts else EIGHT
         return lacking + MISSED * (EIGHT - self.held) + self.off_b + self.off_k
 
@@ -124,14 +126,14 @@ class Trial:
 
 @dataclass(frozen=True)
 class Fit:
-    """What a search found for one reading of the B axis.
+    """The result of the search for one reading of the B axis.
 
     Attributes:
-        reading: of `READINGS`.
-        own: values of the scene as it is, by key.
-        before: the scene as it is, judged in full.
-        trials: of the search, in their order.
-        finalists: judged in full, the best first.
+        reading: name of the reading in `READINGS`.
+        own: the scene's own values, by key.
+        before: the trial of the scene's own values, judged in full.
+        trials: trials of the search, in their order.
+        finalists: trials judged in full, the best first.
     """
 
     reading: str
@@ -141,11 +143,11 @@ class Fit:
     finalists: list[Trial]
 
     def least_shortfalls(self) -> list[float | None]:
-        """Return for each fact how little it lacked in any trial that held all the others; None if none did.
+        """Return for every fact its least shortfall in the trials where all the other facts hold; None without any.
 
-        A fact with more than 0 there stood against the others.
+        A fact with more than 0 there is in conflict with the others.
         """
-        found: list[float | None] = []
+        least: list[float | None] = []
         for number in range(EIGHT):
             among = [trial.facts for trial in self.trials if trial.facts]
             lacks = [
@@ -153,8 +155,8 @@ class Fit:
                 for each in among
                 if all(fact.held for index, fact in enumerate(each) if index != number)
             ]
-            found.append(min(lacks, default=None))
-        return found
+            least.append(min(lacks, default=None))
+        return least
 
     def report(self) -> dict[str, Any]:
         """Return the fit as the command line prints it."""
@@ -169,7 +171,7 @@ class Fit:
         }
 
     def tables(self) -> list[Table]:
-        """Return the best finalist: its values, and the facts with them."""
+        """Return the values of the best finalist, and its facts."""
         best = self.finalists[0]
         values = [[key, f"{self.own[key]:g}", f"{value:g}"] for key, value in best.values.items()]
         lacks = self.least_shortfalls()
@@ -190,7 +192,7 @@ def _held(fact: Fact) -> str:
 
 @dataclass(frozen=True)
 class Fits:
-    """The fits of a scene, one for each reading of the B axis that was searched, by one seed."""
+    """The fits of a scene with one seed: one for every reading of the B axis that was searched."""
 
     scene: Scene
     fits: list[Fit]
@@ -203,16 +205,16 @@ class Fits:
         return keys | {"backend": self.effort.backend, "seconds": self.effort.seconds}
 
     def tables(self) -> list[Table]:
-        """Return those of each fit."""
+        """Return the tables of every fit."""
         return [table for each in self.fits for table in each.tables()]
 
     def notes(self) -> list[str]:
-        """Return what the searches took."""
+        """Return the effort of the searches."""
         return [f"{sum(len(each.trials) for each in self.fits)} evaluations, {self.effort.seconds:.0f} s"]
 
 
 class _Judge:
-    """Maps a scene with some values, and judges the maps."""
+    """A judge that maps a scene with given values of the parameters, and compares the maps with Figure 5."""
 
     def __init__(self, case: Case, reading: str, mapping: Mapping):
         self._case, self._mapping = case, mapping
@@ -229,7 +231,7 @@ class _Judge:
         }
 
     def coarsely(self, values: dict[str, float]) -> Trial:
-        """Return a trial of the search."""
+        """Return a trial in coarse steps, on a shortened protocol."""
         case = self._case.changed(self._grid(COARSE) | SHORT | values)
         try:
             papers = methods(case.scene)
@@ -245,7 +247,7 @@ class _Judge:
         """Return a trial in fine steps, on the scene's own protocol.
 
         Raises:
-            SceneError: if the scene cannot be.
+            SceneError: if the scene is not valid.
         """
         case = self._case.changed(self._grid(FULL) | values)
         return self._judged(values, methods(case.scene), case)
@@ -259,7 +261,7 @@ class _Judge:
         return dict(zip(names, self._mapping("fit", cases), strict=True))
 
     def _off(self, adjusted: Map) -> tuple[float, float]:
-        """Return how far the map of Levant with adjusted gains is off the B axis' end, and off the K axis."""
+        """Return the distances of the map of Levant with adjusted gains from the ends of the B axis and the K axis."""
         if not adjusted.damping_n_s_per_m:
             return HOPELESS, 0.0
         along = abs(math.log(adjusted.damping_n_s_per_m / self._end)) - math.log1p(ABOUT)
@@ -272,16 +274,16 @@ def study(
     """Return the fit of a scene for one reading of the B axis.
 
     Args:
-        case: the scene; a key that is searched has the searched value, whatever its changes say.
-        reading: of `READINGS`.
-        evaluations: of the search, about so many: whole generations.
-        seed: of the search.
-        mapping: makes the maps, and keeps what it made.
-        progress: called after every evaluation with how many are done.
+        case: the scene; a key that is searched has the searched value, whatever the case's changes say.
+        reading: name of the reading in `READINGS`.
+        evaluations: approximate number of evaluations, rounded to whole generations.
+        seed: seed of the search.
+        mapping: function that makes the maps, and keeps them.
+        progress: function called after every evaluation with the number of evaluations done.
 
     Raises:
-        SceneError: if the scene cannot be, or lacks a key that is searched.
-        zwidth.NeverReached: if its handle, with its own values, does not come to the wall.
+        SceneError: if the scene is not valid, or lacks a key that is searched.
+        zwidth.NeverReached: if the handle, with the scene's own values, does not reach the wall.
     """
     judge, plain = _Judge(case, reading, mapping), case.scene
     own = {key: _value(plain, key) for key in PARAMETERS}
@@ -299,16 +301,16 @@ def study(
     options = {"popsize": MEMBERS, "maxiter": generations, "rng": seed, "tol": 0, "polish": False}
     begin = [PARAMETERS[key].part(value) for key, value in own.items()]
     differential_evolution(score, [(0.0, 1.0)] * len(PARAMETERS), x0=begin, **options)
-    best = {tuple(trial.values.items()): trial for trial in sorted(trials, key=lambda each: -each.score)}
+    best = {tuple(trial.values.items()): trial for trial in sorted(trials, key=lambda trial: -trial.score)}
     finalists = [judge.fully(trial.values) for trial in list(best.values())[::-1][:FINALISTS]]
-    return Fit(reading, own, before, trials, sorted(finalists, key=lambda each: each.score))
+    return Fit(reading, own, before, trials, sorted(finalists, key=lambda trial: trial.score))
 
 
 def _value(scene: Scene, key: str) -> float:
     """Return the value of a key of a scene.
 
     Raises:
-        SceneError: if the scene has none.
+        SceneError: if the scene has no value for the key.
     """
     value: Any = scene
     for name in key.split("."):

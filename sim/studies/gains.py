@@ -1,16 +1,16 @@
 """A full search of Levant's gains: area of the stable region over lambda and alpha, for both outputs.
 
-The gains go in equal ratios around those that the founding paper derives from C, the bound on the acceleration:
-lambda = sqrt(C) and alpha = 1.1 C. Pairs that no words can be derived for are left out. The paper's two pairs and the
-best of what was searched are then mapped again in finer steps: the best of hundreds of coarse maps owes some of its
-area to chance.
+The gains are spaced in equal ratios around those that the founding paper derives from C, the bound on the acceleration:
+lambda = sqrt(C) and alpha = 1.1 C. Pairs for which no words can be derived are left out. The paper's two pairs and the
+best pairs of the search are then mapped again in finer steps: the best of hundreds of coarse maps owes some of its area
+to chance.
 
 The sufficient condition for convergence is alpha > C and lambda^2 >= 4 C (alpha + C) / (alpha - C).
 
-An area may mislead. At rest u chatters, with a period of two samples where the gains are large; a force that is updated
-every so many samples, an even number, always sees the same side of it: a velocity that is not there, whose force holds
-the handle still, but in another place than the wall's. So each pair has two areas, that of stable walls, which is the
-paper's, and that of those which are also in place (`hit.Hit.in_place`).
+An area may mislead. At rest u chatters, with a period of two samples if the gains are large. A force that is updated
+once in an even number of samples always sees the same side of the chatter: a false velocity, whose force holds the
+handle still, but in the wrong position. So every pair has two areas: that of the stable walls, as in the paper, and
+that of the stable walls whose handle is also in place (`hit.Hit.in_place`).
 """
 
 from dataclasses import asdict, dataclass
@@ -30,17 +30,17 @@ from .lipschitz import least_alpha_m_per_s2
 from .zwidth import area_text, plus_of_areas
 
 LAMBDAS = np.geomspace(0.3, 100, 16)
-"""Of sqrt(C)."""
+"""The values of lambda, as multiples of sqrt(C)."""
 ALPHAS = np.geomspace(0.03, 300, 17)
-"""Of C."""
+"""The values of alpha, as multiples of C."""
 COARSER, FINER = 4.0, 2.0
-"""Steps of the maps, of the scene's: of the search, and of those that are mapped again."""
+"""The steps of the search's maps and of the final maps, as multiples of the scene's steps."""
 PAPERS = ("proposed", "adjusted")
 
 
 @dataclass(frozen=True)
 class Pick:
-    """Gains that are worth a name, and their map in finer steps."""
+    """Gains with a name, and their map in finer steps."""
 
     gains: Gains
     map: Map
@@ -48,14 +48,14 @@ class Pick:
 
 @dataclass(frozen=True)
 class Search:
-    """What was found.
+    """The result of the search.
 
     Attributes:
-        scene: as it was searched.
-        lambdas, alphas: that were tried, ascending, m^(1/2)/s and m/s^2.
-        maps: in coarse steps, by output and gains; without those that no words can be derived for.
-        picks: the paper's gains and the best, by output and by what they are.
-        effort: what the maps took.
+        scene: the scene as it was searched.
+        lambdas, alphas: the gains that were tried, ascending, m^(1/2)/s and m/s^2.
+        maps: maps in coarse steps, by output and gains; without gains for which no words can be derived.
+        picks: the paper's gains and the best gains, by output and name.
+        effort: effort of the maps.
     """
 
     scene: Scene
@@ -67,32 +67,32 @@ class Search:
 
     @property
     def coarse_grid(self) -> Grid:
-        """Of the search."""
+        """The grid of the search."""
         return grid_of(next(iter(self.maps["u"].values())).case.scene)
 
     @property
     def bound_m_per_s2(self) -> float:
-        """C."""
+        """The bound C on the acceleration."""
         return self.scene.controller.acceleration_max_m_per_s2
 
     def areas(self, output: str, in_place: bool) -> np.ndarray:
-        """Return an output's areas, N^2 s/m^2, shape (alphas, lambdas); NaN where gains were refused."""
-        found = self.maps[output]
-        rows = [[found.get(Gains(lam, alpha)) for lam in self.lambdas.tolist()] for alpha in self.alphas.tolist()]
-        return np.array([[_area(each, in_place) if each else np.nan for each in row] for row in rows])
+        """Return the areas (N^2 s/m^2) of an output, shape (alphas, lambdas); NaN where gains were refused."""
+        maps = self.maps[output]
+        rows = [[maps.get(Gains(lam, alpha)) for lam in self.lambdas.tolist()] for alpha in self.alphas.tolist()]
+        return np.array([[_area(a_map, in_place) if a_map else np.nan for a_map in row] for row in rows])
 
     def at_edge(self, gains: Gains) -> bool:
-        """Whether gains are at the edge of what was tried: better ones may be beyond."""
+        """Return whether gains are at the edge of the range that was tried, so that better gains may lie beyond."""
         ends = (self.lambdas[[0, -1]], gains.lambda_sqrt_m_per_s), (self.alphas[[0, -1]], gains.alpha_m_per_s2)
         return any(value in pair for pair, value in ends)
 
     def of_papers(self, pick: Pick) -> float | None:
-        """Return an area as a multiple of that of the paper's better pair with the paper's output, u; None without."""
+        """Return an area over that of the paper's better pair with the paper's output, u; None where that is 0."""
         papers = max((self.picks["u"][name].map.area for name in PAPERS if name in self.picks["u"]), default=0.0)
         return pick.map.area / papers if papers else None
 
     def report(self) -> dict[str, Any]:
-        """Return what the command line prints, units in the keys; rows of areas go by alpha."""
+        """Return what the command line prints, units in the keys; every row of areas has one alpha."""
         return {
             **self.effort._asdict(),
             "scene": self.scene.name,
@@ -104,7 +104,7 @@ class Search:
 
     def _report(self, output: str) -> dict[str, Any]:
         def rows(in_place: bool) -> list[list[float | None]]:
-            return [[None if np.isnan(each) else each for each in row] for row in self.areas(output, in_place).tolist()]
+            return [[None if np.isnan(area) else area for area in row] for row in self.areas(output, in_place).tolist()]
 
         picks = {
             name: {
@@ -122,7 +122,7 @@ class Search:
         return [(output, name, pick) for output, picks in self.picks.items() for name, pick in picks.items()]
 
     def tables(self) -> list[Table]:
-        """Return the gains that have a name."""
+        """Return the table of the gains that have a name."""
         numbers = ("lambda (m^.5/s)", "alpha (m/s^2)", "area (kN/m N s/m)", "of the paper's", "in place")
         rows = []
         for output, name, pick in self._picks():
@@ -133,7 +133,7 @@ class Search:
         return [table_of(("output", "gains"), numbers, rows)]
 
     def notes(self) -> list[str]:
-        """Return which gains are at the edge of what was tried, and what a + is."""
+        """Return which gains are at the edge of the range that was tried, and the meaning of a +."""
         return [
             f"{output}, {name}: at the edge of what was tried; better gains may lie beyond"
             for output, name, pick in self._picks()
@@ -142,7 +142,7 @@ class Search:
 
 
 def converges(gains: Gains, bound_m_per_s2: float) -> bool:
-    """Return whether gains satisfy the sufficient condition for signals whose acceleration has a bound."""
+    """Return whether gains satisfy the sufficient condition for signals with a bound on the acceleration."""
     least = least_alpha_m_per_s2(gains.lambda_sqrt_m_per_s, bound_m_per_s2)
     return least is not None and gains.alpha_m_per_s2 >= least
 
@@ -152,10 +152,10 @@ def study(case: Case, mapping: Mapping) -> Search:
 
     Args:
         case: the scene.
-        mapping: makes the maps.
+        mapping: function that makes the maps.
 
     Raises:
-        SceneError: if the scene cannot be, with none of the gains either, or has no section `zwidth`.
+        SceneError: if the scene is not valid, alone or with any of the gains, or has no section `zwidth`.
     """
     plain = case.scene
     bound = plain.controller.acceleration_max_m_per_s2
@@ -191,7 +191,7 @@ def _area(each: Map, in_place: bool) -> float:
 
 
 def _best(found: dict[Gains, Map], bound_m_per_s2: float) -> dict[str, Gains]:
-    """Return the gains with the largest areas, by what is asked of them."""
+    """Return the gains with the largest areas: of all, within the condition, and in place."""
     sure = [gains for gains in found if converges(gains, bound_m_per_s2)]
     best = {"best": max(found, key=lambda gains: found[gains].area)}
     if sure:

@@ -3,9 +3,9 @@
 The wall is hit with a finite difference filtered at 500 Hz; a sum of seven sines is fitted to the recorded positions,
 and C is the largest magnitude of its second derivative (Figure 4).
 
-What that is worth: seven sines cannot follow an impact, so C is less than the acceleration that the handle really had,
-and falls with the length of the record that they have to share. Both are reported, and the amplitudes: two sines of
-almost one frequency may be metres large and cancel, which is a curve that fits and no spectrum.
+The estimate has limits: seven sines cannot follow an impact, so C is less than the handle's true acceleration, and
+falls as the fitted record grows longer. Both accelerations are reported. The amplitudes are reported too: two sines of
+almost the same frequency may be metres large and cancel, so the fit is a curve and not a spectrum.
 """
 
 import math
@@ -23,20 +23,20 @@ from .sines import Sines, fit
 
 METHOD = "fdm-500"
 POINTS = 500
-"""At most so many positions are fitted; sines of a record this long need no more."""
+"""The largest number of positions that are fitted; the sines need no more."""
 
 
 @dataclass(frozen=True)
 class Lipschitz(Summary):
-    """What a hit says of C.
+    """The bound C from a hit.
 
     Attributes:
-        scene: that was hit.
-        times_s: of the record, 0 at the contact.
-        positions_m: recorded, whole counts.
-        velocities_m_per_s: of the handle, as they truly were.
-        sines: fitted to them, in time from the record's begin.
-        peak_m_per_s2: the largest acceleration that the handle had, over a sample.
+        scene: the scene with the wall that was hit.
+        times_s: times of the record, 0 at the contact.
+        positions_m: recorded positions, whole counts.
+        velocities_m_per_s: true velocities of the handle.
+        sines: sines fitted to the positions, in time from the start of the record.
+        peak_m_per_s2: the handle's largest true acceleration, over one sample.
     """
 
     scene: Scene
@@ -47,16 +47,16 @@ class Lipschitz(Summary):
     peak_m_per_s2: float
 
     def fitted(self, order: int) -> np.ndarray:
-        """Return the fit at the record's times, or its derivative of an order."""
+        """Return the fit at the times of the record, or its derivative of the given order."""
         return self.sines.derivative(self.times_s - self.times_s[0], order)
 
     @property
     def bound_m_per_s2(self) -> float:
-        """C."""
+        """The bound C on the acceleration."""
         return float(np.abs(self.fitted(2)).max())
 
     def report(self) -> dict[str, Any]:
-        """Return what the command line prints: C, how good it is, and the gains that follow."""
+        """Return what the command line prints: C, the quality of the fit, and the gains that follow."""
         bound, adjusted = self.bound_m_per_s2, ADJUSTED["lambda_sqrt_m_per_s"]
         return {
             "scene": self.scene.name,
@@ -78,21 +78,21 @@ class Lipschitz(Summary):
 
 
 def least_alpha_m_per_s2(lambda_sqrt_m_per_s: float, bound_m_per_s2: float) -> float | None:
-    """Return the least alpha that satisfies lambda^2 >= 4 C (alpha + C) / (alpha - C), or None where none does."""
+    """Return the least alpha with lambda^2 >= 4 C (alpha + C) / (alpha - C), or None if there is none."""
     square, four = lambda_sqrt_m_per_s**2, 4 * bound_m_per_s2
     return bound_m_per_s2 * (square + four) / (square - four) if square > four else None
 
 
 def study(case: Case, before_s: float, after_s: float, count: int) -> Lipschitz:
-    """Hit the wall of a scene, and fit sines to what was recorded around the contact.
+    """Hit the wall of a scene, and fit sines to the positions recorded around the contact.
 
     Args:
-        case: the scene; the estimator is the paper's for this, a difference filtered at 500 Hz.
-        before_s, after_s: how much of the record is fitted, before and after the first contact.
-        count: of sines.
+        case: the scene; the estimator is the paper's for this purpose, a difference filtered at 500 Hz.
+        before_s, after_s: lengths of the fitted record before and after the first contact.
+        count: number of sines.
 
     Raises:
-        SceneError: if there is no such scene.
+        SceneError: if the scene is not valid.
         RuntimeError: if the handle never reached the wall, or the record is too short.
     """
     method = methods()[METHOD]

@@ -1,7 +1,7 @@
-"""What rate buys a stiff wall: maps from 1 kHz to 1 MHz, estimator and force at one rate, beside the scene's own rates.
+"""What the rate buys: maps from 1 kHz to 1 MHz, estimator and force at the same rate, and at the scene's own rates.
 
-A rigid device flatters a fast loop. So the scene's is meant to have an amplifier and a cable, and the linear loop's
-limit without either, with one, and with both, tells which of them ends the gain.
+A rigid device flatters a fast loop. So the scene's device should have an amplifier and a cable; the limit of the linear
+loop without them, with either, and with both shows which of them ends the gain.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from ..walls.zwidth import Effort, Map, Mapping
 RATES_HZ = (1_000, 2_500, 10_000, 25_000, 100_000, 250_000, 1_000_000)
 METHODS = ("fdm", "butterworth", "adjusted", "levant:u1", "kalman", "levant-edge")
 CLOCK_HZ = 50_000_000
-"""A clock that all of the rates divide."""
+"""A clock rate that all of the rates divide."""
 FINE = {
     "zwidth.stiffness_step_n_per_m": 10e3,
     "zwidth.stiffness_to_n_per_m": 500e3,
@@ -27,30 +27,30 @@ FINE = {
     "zwidth.damping_step_n_s_per_m": 20.0,
     "controller.stiffness_max_n_per_m": 500e3,
 }
-"""Steps of the maps: finer in K than in B, for the largest K is what is asked."""
+"""The grid of the maps: finer in K than in B, because the largest K is of interest."""
 SHORT = {"protocol.settle_s": 1.5, "protocol.mean_s": 0.25, "protocol.measure_s": 0.5}
-"""A third of the paper's protocol: the handle comes to the wall after half a second, and a hit at 1 MHz takes long."""
+"""A third of the paper's protocol: the handle reaches the wall after half a second, and a hit at 1 MHz takes long."""
 FINER = 5
-"""So many times finer are the steps of K at the scene's own rates: its walls are softer."""
+"""The factor by which the steps of K are finer at the scene's own rates, where the walls are softer."""
 GAINED = 0.95
-"""Of the largest K at any rate: at the first rate with so much, an estimator has as good as all that it gains."""
+"""The share of the largest K at any rate; the first rate that reaches it has almost all of the gain."""
 
 
 def at_rate(rate_hz: int) -> dict[str, Any]:
-    """Return what a rate changes in a scene; no force is late any more but by its own path."""
+    """Return the changes of a scene for a rate; the force has no delay but that of its own path."""
     rates = {"controller.sample_hz": rate_hz, "controller.actuation_hz": rate_hz}
     return {"controller.clock_hz": CLOCK_HZ, "amplifier.delay_s": 0.0, **rates}
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What rate buys one method.
+    """What the rate buys with one method.
 
     Attributes:
-        label: of the method.
-        rates_hz: in ascending order.
+        label: label of the method.
+        rates_hz: the rates, ascending.
         own: the map at the scene's own rates.
-        maps: at each of the rates.
+        maps: the maps at the rates.
     """
 
     label: str
@@ -60,22 +60,22 @@ class Gain:
 
     @property
     def largest_n_per_m(self) -> list[float]:
-        """The largest stable stiffness at each rate."""
-        return [each.largest_n_per_m for each in self.maps]
+        """The largest stable stiffness at every rate."""
+        return [a_map.largest_n_per_m for a_map in self.maps]
 
     @property
     def ends_at_hz(self) -> int | None:
-        """The lowest rate with as good as the largest stiffness of any; None where a map is clipped."""
-        if any(each.clipped for each in self.maps):
+        """The lowest rate at which the stiffness is almost the largest of all; None where a map is clipped."""
+        if any(a_map.clipped for a_map in self.maps):
             return None
         enough = GAINED * max(self.largest_n_per_m)
         return next(rate for rate, value in zip(self.rates_hz, self.largest_n_per_m, strict=True) if value >= enough)
 
     @property
     def ratio(self) -> float | None:
-        """The largest stiffness at the highest rate over that at the scene's own.
+        """The largest stiffness at the highest rate over that at the scene's own rates.
 
-        None where that is 0, or a map is clipped.
+        It is None where the latter is 0, or a map is clipped.
         """
         if not self.own.largest_n_per_m or self.own.clipped or self.maps[-1].clipped:
             return None
@@ -97,13 +97,13 @@ class Gain:
 
 @dataclass(frozen=True)
 class Rates:
-    """What was found.
+    """The result of the study.
 
     Attributes:
-        scene: as it is.
-        gains: what rate buys each method.
-        limits: the linear loop's largest stiffness (N/m) at each rate, by what is left of the device.
-        effort: what the maps took.
+        scene: the scene with its own rates.
+        gains: what the rate buys with every method.
+        limits: the linear loop's largest stiffness (N/m) at every rate, by the remaining parts of the device.
+        effort: effort of the maps.
     """
 
     scene: Scene
@@ -117,7 +117,7 @@ class Rates:
         return self.effort._asdict() | {"methods": methods, "linear_limits": self.limits}
 
     def tables(self) -> list[Table]:
-        """Return the largest K by rate."""
+        """Return the table of the largest K by rate."""
         rates = [f"{rate / 1e3:g} kHz" for rate in self.gains[0].rates_hz]
         rows = []
         for each in self.gains:
@@ -125,27 +125,27 @@ class Rates:
             ratio = "" if each.ratio is None else f"{each.ratio:.2f}"
             ends = "" if each.ends_at_hz is None else f"{each.ends_at_hz / 1e3:g}"
             rows.append([each.label, *values, ratio, ends])
-        for left, limit in self.limits.items():
-            rows.append([f"linear: {left}", "", *(f"{value / 1e3:.0f}" for value in limit), "", ""])
+        for parts, limit in self.limits.items():
+            rows.append([f"linear: {parts}", "", *(f"{value / 1e3:.0f}" for value in limit), "", ""])
         return [table_of(("largest K (kN/m)",), ("own", *rates, "ratio", "gains to (kHz)"), rows)]
 
     def notes(self) -> list[str]:
-        """Return what a + is."""
-        clipped = any(each.clipped for gain in self.gains for each in (gain.own, *gain.maps))
+        """Return the meaning of `own` and of a +."""
+        clipped = any(a_map.clipped for gain in self.gains for a_map in (gain.own, *gain.maps))
         return ["own: at the scene's own rates"] + ["+: K goes on beyond the map"] * clipped
 
 
 def study(case: Case, curves: list[Curve], rates_hz: list[int], mapping: Mapping) -> Rates:
-    """Return what rate buys each method.
+    """Return what the rate buys with every method.
 
     Args:
         case: the scene; it need not have a section `zwidth`.
         curves: the methods.
-        rates_hz: ascending.
-        mapping: makes the maps.
+        rates_hz: the rates, ascending.
+        mapping: function that makes the maps.
 
     Raises:
-        SceneError: if a case cannot be.
+        SceneError: if a case is not valid.
     """
     limits, common = linear_limits(case, rates_hz), case.with_defaults(FINE | SHORT)
     step = "zwidth.stiffness_step_n_per_m"
@@ -164,19 +164,19 @@ WITHOUT = {
     "without the amplifier's lag": LAG,
     "rigid": CABLE | LAG,
 }
-"""Parts that are taken out, by what is left."""
+"""The changes that take parts out of a device, by the remaining parts."""
 
 
 def linear_limits(case: Case, rates_hz: list[int]) -> dict[str, list[float]]:
-    """Return the linear loop's largest stiffness (N/m) over all dampings of the map, at each rate, by what is left.
+    """Return the linear loop's largest stiffness (N/m) at every rate, by the remaining parts of the device.
 
-    The estimator is the plain difference; friction that sticks is left out.
+    It is the largest over all dampings of the map. The estimator is the plain difference, without Coulomb friction.
     """
     fdm = {"controller.estimator": "fdm", "controller.output": None}
     common = case.with_defaults(FINE | SHORT).changed(fdm)
     return {
-        left: [_limit(common.changed(at_rate(rate_hz) | taken_out(case.scene, without)).scene) for rate_hz in rates_hz]
-        for left, without in WITHOUT.items()
+        parts: [_limit(common.changed(at_rate(rate_hz) | taken_out(case.scene, without)).scene) for rate_hz in rates_hz]
+        for parts, without in WITHOUT.items()
     }
 
 
@@ -187,7 +187,7 @@ def _limit(scene: Scene) -> float:
 
 
 def taken_out(scene: Scene, without: dict[str, Any]) -> dict[str, Any]:
-    """Return what takes parts out of a scene; without a cable the motor's side is the handle's."""
+    """Return the changes that remove parts of a scene; without a cable the handle gets the motor's mass and damping."""
     handle, cable = scene.handle, scene.transmission
     if "transmission" not in without or cable is None:
         return without

@@ -1,7 +1,7 @@
-"""Ways to make a simulation cheaper, by what they leave out, and what each changes in a scene.
+"""Shortcuts that make a simulation cheaper, grouped by what they leave out, and their changes of a scene.
 
-Each axis has its boldest first; these are also taken in pairs. Two more changes, `scatter`, are so slight that nobody
-could measure them on a bench: what they do to a verdict is chance, and no shortcut can be judged finer.
+Every axis of shortcuts begins with its boldest; the boldest are also combined in pairs. Two more changes, `scatter`,
+are too slight to be measured on a bench: their effect on a verdict is chance, and no shortcut can be judged finer.
 """
 
 from collections.abc import Callable
@@ -20,29 +20,29 @@ PARTS = {
     "no output steps": {"output": None},
 }
 SLOWER = 2, 5
-"""Times by which the samples are fewer."""
+"""The factors by which the sample rate is lower."""
 CLOCK = 4
-"""Times by which the clock is slower."""
+"""The factor by which the clock is slower."""
 STEPS = 1, 10, 100
-"""Of a fixed-step solver, a sample."""
+"""The numbers of steps of a fixed-step solver in a sample."""
 COARSER = 5, 2
-"""Times by which the steps of K are longer."""
+"""The factors by which the steps of K are longer."""
 UNKNOWN = 1e-3
-"""Of the handle's mass."""
+"""The relative change of the handle's mass in the scatter."""
 SCATTER = "scatter"
-"""Name of an axis."""
+"""The name of the axis of changes too slight to be measured."""
 
 
 @dataclass(frozen=True)
 class Shortcut:
-    """One way.
+    """A shortcut.
 
     Attributes:
-        axis: of what it is a shortcut.
-        label: in tables and pictures; no two have the same.
-        changes: of the scene, by dotted key.
+        axis: name of the axis: what the shortcut simplifies.
+        label: unique label in tables and pictures.
+        changes: changes of the scene, by dotted key.
         backend: one of `backends.BACKENDS`.
-        coarser: times by which a map's steps of K are longer.
+        coarser: factor by which a map's steps of K are longer.
     """
 
     axis: str
@@ -56,11 +56,11 @@ REFERENCE = Shortcut("reference", "all parts, fixed, exact solver", {})
 
 
 def shortcuts(scene: Scene, accepted: Callable[[Shortcut], bool]) -> list[Shortcut]:
-    """Return the reference and what is held against it, of one axis after the other.
+    """Return the reference and the shortcuts that are compared with it, axis by axis.
 
     Args:
-        scene: with the grid of its maps.
-        accepted: whether a shortcut is one of this scene: all may be no scene, or change nothing.
+        scene: the scene, with the grid of its maps.
+        accepted: returns whether the scene has a shortcut, which may be not valid or change nothing.
     """
     beside = _scatter(scene), _backends(scene)
     bold = [list(filter(accepted, axis)) for axis in (_parts(scene), _rates(scene), _steps(scene), _grids(scene))]
@@ -74,23 +74,23 @@ def _backends(scene: Scene) -> list[Shortcut]:
 
 
 def _slow_clock(scene: Scene) -> list[tuple[str, dict]]:
-    """Return the label and the changes of a slower clock, if there is one."""
+    """Return the label and the changes of a slower clock, if the clock can be divided."""
     clock_hz, rest = divmod(scene.controller.clock_hz, CLOCK)
     return [] if rest else [(f"clock of {clock_hz / 1e6:g} MHz", {"controller.clock_hz": clock_hz})]
 
 
 def _parts(scene: Scene) -> list[Shortcut]:
-    found = []
+    parts = []
     for label, without in PARTS.items():
-        there = {key: value for key, value in without.items() if getattr(scene, key.split(".")[0]) is not None}
-        changes = taken_out(scene, there)
-        if changes and all(changes != each.changes for each in found):
-            found.append(Shortcut("parts", label, changes))
-    return found
+        present = {key: value for key, value in without.items() if getattr(scene, key.split(".")[0]) is not None}
+        changes = taken_out(scene, present)
+        if changes and all(changes != other.changes for other in parts):
+            parts.append(Shortcut("parts", label, changes))
+    return parts
 
 
 def _rates(scene: Scene) -> list[Shortcut]:
-    found, old = [], scene.controller
+    rates, old = [], scene.controller
     for slower in SLOWER:
         sample_hz, rest = divmod(old.sample_hz, slower)
         both = sample_hz % old.actuation_hz != 0
@@ -100,18 +100,18 @@ def _rates(scene: Scene) -> list[Shortcut]:
         if both:
             changes["controller.actuation_hz"] = old.actuation_hz // slower
         what = "samples and force" if both else "samples"
-        found.append(Shortcut("rate", f"{what} at {sample_hz / 1e3:g} kHz", changes))
-    return found + [Shortcut("rate", label, changes) for label, changes in _slow_clock(scene)]
+        rates.append(Shortcut("rate", f"{what} at {sample_hz / 1e3:g} kHz", changes))
+    return rates + [Shortcut("rate", label, changes) for label, changes in _slow_clock(scene)]
 
 
 def _steps(scene: Scene) -> list[Shortcut]:
-    lengths = [1 / (each * scene.controller.sample_hz) for each in STEPS]
-    return [Shortcut("step", f"steps of {each * 1e6:g} us", {"solver.step_s": each}) for each in lengths]
+    lengths_s = [1 / (steps * scene.controller.sample_hz) for steps in STEPS]
+    return [Shortcut("step", f"steps of {step_s * 1e6:g} us", {"solver.step_s": step_s}) for step_s in lengths_s]
 
 
 def _grids(scene: Scene) -> list[Shortcut]:
     step = scene.zwidth.stiffness_step_n_per_m
-    return [Shortcut("K step", f"K by {each * step / 1e3:g} kN/m", {}, coarser=each) for each in COARSER]
+    return [Shortcut("K step", f"K by {factor * step / 1e3:g} kN/m", {}, coarser=factor) for factor in COARSER]
 
 
 def _scatter(scene: Scene) -> list[Shortcut]:

@@ -2,8 +2,9 @@
 
     f(t) = sum_i a_i sin(w_i t) + b_i cos(w_i t)
 
-For given w_i the a_i and b_i are linear least squares, so only the w_i are searched (variable projection). The search
-begins where the record's own spectrum is strongest, one sine after the other, each on what the ones before have left.
+For given w_i the a_i and b_i follow from linear least squares, so only the w_i are searched (variable projection). The
+sines are found one after the other; the search for a sine begins where the spectrum of the residual of the previous
+sines is strongest.
 """
 
 from dataclasses import dataclass
@@ -14,10 +15,10 @@ from scipy.optimize import least_squares
 
 @dataclass(frozen=True)
 class Sines:
-    """A fit.
+    """A sum of sines.
 
     Attributes:
-        rad_per_s: w, ascending.
+        rad_per_s: angular frequencies w, ascending.
         sine, cosine: amplitudes a and b, in the unit of the record.
     """
 
@@ -26,7 +27,7 @@ class Sines:
     cosine: np.ndarray
 
     def derivative(self, times_s: np.ndarray, order: int = 0) -> np.ndarray:
-        """Return the fit, or its derivative of any order, at times (s)."""
+        """Return the sum, or its derivative of any order, at the given times (s)."""
         phase, factor = np.multiply.outer(times_s, self.rad_per_s) + order * np.pi / 2, self.rad_per_s**order
         return np.sin(phase) @ (self.sine * factor) + np.cos(phase) @ (self.cosine * factor)
 
@@ -41,12 +42,12 @@ def _amplitudes(times_s: np.ndarray, values: np.ndarray, rad_per_s: np.ndarray) 
 
 
 def fit(times_s: np.ndarray, values: np.ndarray, count: int = 7) -> Sines:
-    """Return the sum of `count` sines that fits a record best, near where its spectrum is strongest.
+    """Return the sum of `count` sines that fits a record best near the peaks of its spectrum.
 
     Args:
-        times_s: evenly spaced, s.
-        values: the record, at least four times as many as sines.
-        count: of sines.
+        times_s: evenly spaced times, s.
+        values: the record, with at least four values for every sine.
+        count: number of sines.
 
     Raises:
         ValueError: if the record is too short.
@@ -54,24 +55,28 @@ def fit(times_s: np.ndarray, values: np.ndarray, count: int = 7) -> Sines:
     if len(values) < 4 * count:
         raise ValueError(f"values must be at least {4 * count} for {count} sines, not {len(values)}")
     span_s = times_s[-1] - times_s[0]
-    # A quarter of a turn in the record at least: slower ones are one another's equal.
+    # A sine has at least a quarter of a turn in the record; slower sines cannot be told apart.
     slowest, fastest = np.pi / 2 / span_s, np.pi / np.diff(times_s).mean()
     candidates = slowest * np.arange(1, min(8 * len(values) // 2, 2000))
     candidates = candidates[candidates < fastest]
-    found = np.empty(0)
+    frequencies = np.empty(0)
     for _ in range(count):
-        rest = values - _basis(times_s, found) @ _amplitudes(times_s, values, found) if len(found) else values
+        rest = (
+            values - _basis(times_s, frequencies) @ _amplitudes(times_s, values, frequencies)
+            if len(frequencies)
+            else values
+        )
         turn = np.exp(-1j * np.multiply.outer(candidates, times_s))
-        free = np.array([np.min(np.abs(each - found), initial=np.inf) > slowest / 2 for each in candidates])
-        found = np.append(found, candidates[free][np.argmax(np.abs(turn[free] @ rest))])
-        found = _searched(times_s, values, found, slowest, fastest)
-    found = np.sort(found)
-    amplitudes = _amplitudes(times_s, values, found)
-    return Sines(found, amplitudes[:count], amplitudes[count:])
+        free = np.array([np.min(np.abs(new - frequencies), initial=np.inf) > slowest / 2 for new in candidates])
+        frequencies = np.append(frequencies, candidates[free][np.argmax(np.abs(turn[free] @ rest))])
+        frequencies = _searched(times_s, values, frequencies, slowest, fastest)
+    frequencies = np.sort(frequencies)
+    amplitudes = _amplitudes(times_s, values, frequencies)
+    return Sines(frequencies, amplitudes[:count], amplitudes[count:])
 
 
 def _searched(times_s, values, start, slowest, fastest) -> np.ndarray:
-    """Return the frequencies near `start` with which least squares leave least."""
+    """Return the frequencies near `start` with the least squared residual."""
 
     def residual(rad_per_s):
         return _basis(times_s, rad_per_s) @ _amplitudes(times_s, values, rad_per_s) - values

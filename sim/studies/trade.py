@@ -1,4 +1,4 @@
-"""Speed against accuracy: what each shortcut of a simulation costs and gets wrong, and which are best for what."""
+"""Speed against accuracy: the cost and the error of every shortcut of a simulation, and the best for every purpose."""
 
 import math
 import statistics
@@ -14,15 +14,15 @@ from .shortcuts import SCATTER, Shortcut
 
 @dataclass(frozen=True)
 class Point:
-    """What a shortcut costs, and how wrong it is; by estimator where it says so.
+    """The cost and the error of a shortcut.
 
     Attributes:
-        shortcut: what it is.
-        hit_s: of a hit, the mean over the estimators.
-        hits: of the estimators' maps.
-        map_s: of these maps, in one process.
-        differ: by estimator, the share of the walls whose verdict is another than the reference's.
-        errors: by estimator, those of K at the edge at each B, relative to the reference's.
+        shortcut: the shortcut.
+        hit_s: time of a hit, the mean over the estimators.
+        hits: number of hits in the maps of all estimators.
+        map_s: time of these maps, in one process.
+        differ: by estimator, the share of the walls whose verdict differs from the reference's.
+        errors: by estimator, the errors of K at the edge at every B, relative to the reference's K.
     """
 
     shortcut: Shortcut
@@ -33,7 +33,7 @@ class Point:
     errors: dict[str, list[float]]
 
     def of_stiffness(self, label: str) -> dict[str, float]:
-        """Return the `median` and the `largest` error of K with an estimator."""
+        """Return the `median` and the `largest` error of K for an estimator."""
         return {"median": statistics.median(self.errors[label]), "largest": max(self.errors[label])}
 
     def report(self) -> dict[str, Any]:
@@ -44,7 +44,7 @@ class Point:
 
 
 class Question(NamedTuple):
-    """What a simulation is for: its cost, s, and how wrong it is with an estimator."""
+    """A purpose of a simulation, with its cost (s) and its error for an estimator."""
 
     name: str
     cost_s: Callable[[Point], float]
@@ -58,14 +58,14 @@ QUESTIONS = HIT, MAP
 
 @dataclass(frozen=True)
 class Trade:
-    """What was found.
+    """The result of the study.
 
     Attributes:
-        scene: with the grid of the maps.
-        points: the reference first.
-        walls: by estimator, how many verdicts were compared.
-        words_checked: hits of the hardware, each with the force words of `fixed`.
-        seconds: what all of it took.
+        scene: the scene, with the grid of the maps.
+        points: the points, the reference first.
+        walls: by estimator, the number of verdicts that were compared.
+        words_checked: number of hits of the hardware, all with the force words of `fixed`.
+        seconds: wall time of the study.
     """
 
     scene: Scene
@@ -75,11 +75,11 @@ class Trade:
     seconds: float = 0.0
 
     def scatter(self, question: Question, label: str) -> float:
-        """Return the larger error of the two changes that nobody could measure: less than this is none."""
+        """Return the larger error of the two changes too slight to be measured; a smaller error counts as none."""
         return max(question.error(point, label) for point in self.points if point.shortcut.axis == SCATTER)
 
     def best(self, question: Question, label: str) -> list[Point]:
-        """Return the points than which none is as fast and as right for an estimator, within the scatter."""
+        """Return the points for which no other is as fast and as accurate for an estimator, within the scatter."""
         none = self.scatter(question, label)
         return best(self.points, question.cost_s, lambda point: max(question.error(point, label), none))
 
@@ -87,21 +87,21 @@ class Trade:
         """Return the trade as the command line prints it."""
         marks = [{f"best_for_{question.name}s": [] for question in QUESTIONS} for _ in self.points]
         for question, label in product(QUESTIONS, self.walls):
-            found = self.best(question, label)
+            best_points = self.best(question, label)
             for point, mark in zip(self.points, marks, strict=True):
-                mark[f"best_for_{question.name}s"] += [label] * (point in found)
+                mark[f"best_for_{question.name}s"] += [label] * (point in best_points)
         points = [point.report() | mark for point, mark in zip(self.points, marks, strict=True)]
         keys = {"scene": self.scene.name, "walls": self.walls, "rtl_hits_with_the_words_of_fixed": self.words_checked}
         return keys | {"settings": points, "seconds": self.seconds}
 
     def tables(self) -> list[Table]:
-        """Return what each shortcut costs and gets wrong: of the verdicts of hits, then of the edges of maps."""
+        """Return the costs and errors of the shortcuts: a table of hits' verdicts, and a table of maps' edges."""
         hits, maps = [], []
         for point in self.points:
-            share = [f"{self._star(HIT, label, point)}{each:.0%}" for label, each in point.differ.items()]
+            share = [f"{self._star(HIT, label, point)}{part:.0%}" for label, part in point.differ.items()]
             hits.append([point.shortcut.label, f"{point.hit_s * 1e3:.1f}", *share])
             ends = {label: "{median:.0%} to {largest:.0%}".format(**point.of_stiffness(label)) for label in self.walls}
-            wrong = [f"{self._star(MAP, label, point)}{each}" for label, each in ends.items()]
+            wrong = [f"{self._star(MAP, label, point)}{text}" for label, text in ends.items()]
             maps.append([point.shortcut.label, str(point.hits), f"{point.map_s:.1f}", *wrong])
         return [
             table_of(("setting",), ("hit (ms)", *(f"{label}: verdicts" for label in self.walls)), hits),
@@ -112,7 +112,7 @@ class Trade:
         return "* " * (point in self.best(question, label))
 
     def notes(self) -> list[str]:
-        """Return what the columns are."""
+        """Return the meaning of the columns."""
         walls = ", ".join(f"{count} walls with {label}" for label, count in self.walls.items())
         return [
             f"verdicts: how many differ, of {walls}. K: its error at the edge of the map, median to largest over B. "
@@ -122,10 +122,10 @@ class Trade:
 
 
 def best(points: list[Point], cost: Callable[[Point], float], error: Callable[[Point], float]) -> list[Point]:
-    """Return the points than which no other is as good in both, by rising cost and falling error."""
-    found, least = [], math.inf
-    for point in sorted(points, key=lambda each: (cost(each), error(each))):
+    """Return the points for which no other is as good in both, by rising cost and falling error."""
+    front, least = [], math.inf
+    for point in sorted(points, key=lambda point: (cost(point), error(point))):
         if error(point) < least:
-            found.append(point)
+            front.append(point)
             least = error(point)
-    return found
+    return front

@@ -1,13 +1,13 @@
-"""What is run to trade speed for accuracy: the shortcuts of a scene's simulation, held against the most exact there is.
+"""The runs that trade speed for accuracy: shortcuts of a scene's simulation, compared with the most exact simulation.
 
-The reference is the bit-accurate model with every part of the scene, the exact solver, the scene's own rates and steps
-of K. Against it, for two estimators:
+The reference is the bit-accurate model with every part of the scene, the exact solver, and the scene's own rates and
+steps of K. Three things are compared with it, for two estimators:
 
 - the verdicts on walls around the reference's edge, from 0.7 times as stiff to 1 / 0.7 times;
-- K at the edge of the shortcut's own map, at each B where the reference has one;
-- the time of a hit, the mean over a wall of every B; and of a map, so many times the number of its hits.
+- K at the edge of the shortcut's own map, at every B where the reference has an edge;
+- the time of a hit, the mean over a wall of every B, and the time of a map: that of a hit times its number of hits.
 
-The hardware has the verdicts of `fixed`, for it has its force words: here that is checked on every hit of it.
+The hardware has the verdicts of `fixed`, because it has its force words: every hit of the hardware checks that.
 """
 
 import json
@@ -34,37 +34,37 @@ GRID = {
     "zwidth.damping_to_n_s_per_m": 70.0,
     "zwidth.damping_step_n_s_per_m": 15.0,
 }
-"""Few B, for there are many maps: those at which both estimators have an edge on the paper's device with its drive."""
+"""A grid with few B, as there are many maps; both estimators have an edge at these on the paper's device and drive."""
 AROUND = 0.7, 0.85, 0.95, 1 / 0.95, 1 / 0.85, 1 / 0.7
-"""Walls whose verdicts are compared, as multiples of the reference's edge."""
+"""The walls whose verdicts are compared, as multiples of the reference's edge."""
 ROUNDS = 3
 RTL_WALLS = 2
-"""On which the hardware is timed, once, for each estimator: a hit takes seconds."""
+"""The number of walls on which the hardware is timed, once, for every estimator: a hit takes seconds."""
 
 Wall = tuple[float, float]
-"""K (N/m) and B (N s/m)."""
+"""The stiffness K (N/m) and the damping B (N s/m) of a wall."""
 
 
 class Runs(Protocol):
-    """What runs a study's hits, and shows how far it is."""
+    """A runner of the study's hits, which shows its progress."""
 
     def maps(self, backend: str, cases: list[Case]) -> list[Map]:
-        """Return the map of each case."""
+        """Return the map of every case."""
 
     def verdicts(self, jobs: list[dict]) -> list[dict]:
-        """Return the results of jobs for `zwidth.verdict`."""
+        """Return the results of `zwidth.verdict` for the jobs."""
 
     def medians(self, contestants: dict[Hashable, Callable[[], float]], rounds: int) -> dict[Hashable, float]:
-        """Return the median over the rounds of what each gives, taken in turns: `rounds.medians`."""
+        """Return the median of every contestant's results over rounds in which they take turns: `rounds.medians`."""
 
 
 class _Contest:
-    """A scene, the shortcuts that it has, and the estimators that they are tried with.
+    """A scene, its shortcuts, and the estimators with which the shortcuts are tried.
 
     Attributes:
-        scene: with the grid of the maps.
+        scene: the scene, with the grid of the maps.
         curves: the estimators, labelled as on the command line.
-        shortcuts: all of them; `computed` are those of a model, `hardware` those of the RTL.
+        shortcuts: all shortcuts; `computed` are those of a model, `hardware` those of the RTL.
     """
 
     def __init__(self, case: Case):
@@ -77,7 +77,7 @@ class _Contest:
         self.hardware = [each for each in self.shortcuts if each.backend == "rtl"]
 
     def _differs(self, shortcut: Shortcut) -> bool:
-        """Whether a shortcut is a scene, and not the reference's."""
+        """Return whether a shortcut is valid for the scene, and differs from the reference."""
         try:
             own, reference = (
                 [self.case_of(each, curve).scene for curve in self.curves] for each in (shortcut, REFERENCE)
@@ -87,20 +87,20 @@ class _Contest:
         return own != reference or shortcut.backend != REFERENCE.backend or shortcut.coarser > 1
 
     def case_of(self, shortcut: Shortcut, curve: Curve) -> Case:
-        """Return what a shortcut makes of the scene with an estimator."""
+        """Return the case of a shortcut with an estimator."""
         changes = curve.changes | shortcut.changes
         if shortcut.coarser > 1:
             changes["zwidth.stiffness_step_n_per_m"] = shortcut.coarser * self._grid.stiffness_step_n_per_m
         return self._case.changed(changes, curve.label)
 
     def model_of(self, shortcut: Shortcut) -> Shortcut:
-        """Return the shortcut whose verdicts one has: its own, or those of the hardware's model."""
+        """Return the shortcut that computes the verdicts of another: itself, or the model of the hardware."""
         if shortcut.backend != "rtl":
             return shortcut
         return next(each for each in self.computed if (each.backend, each.changes) == ("fixed", shortcut.changes))
 
     def walls_around(self, edge: dict[float, float]) -> list[list[Wall]]:
-        """Return the walls around an edge, by B."""
+        """Return the walls around an edge, in one list for every B."""
         step, walls = self._grid.stiffness_step_n_per_m, []
         for damping, stiffness in edge.items():
             rows = (min(max(round(times * (stiffness / step + 0.5)), 1), self._grid.rows) for times in AROUND)
@@ -108,30 +108,30 @@ class _Contest:
         return walls
 
     def hit(self, shortcut: Shortcut, curve: Curve, wall: Wall) -> hit.Hit:
-        """Hit a wall."""
+        """Hit a wall with a shortcut and an estimator."""
         return hit.run(self.case_of(shortcut, curve).hitting(*wall), shortcut.backend, until_sure=True)
 
 
 def _edge(of: Map) -> dict[float, float]:
-    """Return the largest stable K by B, where there is one."""
+    """Return the largest stable K by B, where a wall is stable."""
     return {edge.damping_n_s_per_m: edge.stable_n_per_m for edge in of.edges if edge.stable_n_per_m}
 
 
 def _hits_of(shortcut: Shortcut) -> str:
-    """Return a name for the hits of a shortcut: two that differ in the map's steps alone have the same."""
+    """Return a name for the hits of a shortcut; shortcuts that differ only in the steps of the map share the name."""
     return json.dumps([shortcut.backend, shortcut.changes], sort_keys=True)
 
 
 def study(case: Case, runs: Runs) -> Trade:
-    """Return the trade of a scene.
+    """Return the trade of speed for accuracy on a scene.
 
     Args:
         case: the scene.
-        runs: what runs the hits.
+        runs: runner of the hits.
 
     Raises:
-        SceneError: if the scene cannot be, or has no section `zwidth`.
-        RuntimeError: if none of its walls is stable, or the hardware's force words are not those of `fixed`.
+        SceneError: if the scene is not valid, or has no section `zwidth`.
+        RuntimeError: if no wall of a map is stable, or the hardware's force words are not those of `fixed`.
     """
     began, contest = time.perf_counter(), _Contest(case)
     maps = _maps(contest, runs)
@@ -143,7 +143,7 @@ def study(case: Case, runs: Runs) -> Trade:
             )
     around = {label: contest.walls_around(edge) for label, edge in edges.items()}
     verdicts = _verdicts(contest, around, runs)
-    # One wall of each B, each at another distance from the edge.
+    # The timed walls: one for every B, at varying distances from the edge.
     timed = {label: [at[n % len(at)] for n, at in enumerate(walls)] for label, walls in around.items()}
     seconds = _seconds(contest, timed, runs)
     points = []
@@ -154,8 +154,8 @@ def study(case: Case, runs: Runs) -> Trade:
         point = Point(
             shortcut,
             hit_s=statistics.mean(hit_s.values()),
-            hits=sum(each.hits for each in own.values()),
-            map_s=sum(each.hits * hit_s[label] for label, each in own.items()),
+            hits=sum(a_map.hits for a_map in own.values()),
+            map_s=sum(a_map.hits * hit_s[label] for label, a_map in own.items()),
             differ={
                 label: _share_that_differs(verdicts[_hits_of(model), label], verdicts[_hits_of(REFERENCE), label])
                 for label in edges
@@ -173,22 +173,22 @@ def _share_that_differs(verdicts: list[bool], truth: list[bool]) -> float:
 
 
 def _errors(edge: dict[float, float], truth: dict[float, float]) -> list[float]:
-    """Return the relative errors of K at each B where the true edge is; a region that has ended there is wrong by 1."""
+    """Return the relative errors of K at every B where the true edge has one; 1 where the region has already ended."""
     return [abs(edge.get(damping, 0.0) / stiffness - 1) for damping, stiffness in truth.items()]
 
 
 def _maps(contest: _Contest, runs: Runs) -> dict[tuple[str, str], Map]:
-    """Return the maps by the labels of shortcut and estimator."""
+    """Return the maps, by the labels of shortcut and estimator."""
     maps = {}
     for backend in dict.fromkeys(each.backend for each in contest.computed):
         keys = [(each, curve) for each in contest.computed if each.backend == backend for curve in contest.curves]
-        found = runs.maps(backend, [contest.case_of(*key) for key in keys])
-        maps |= {(each.label, curve.label): one for (each, curve), one in zip(keys, found, strict=True)}
+        made = runs.maps(backend, [contest.case_of(*key) for key in keys])
+        maps |= {(each.label, curve.label): a_map for (each, curve), a_map in zip(keys, made, strict=True)}
     return maps
 
 
 def _verdicts(contest: _Contest, around: dict[str, list[list[Wall]]], runs: Runs) -> dict[tuple[str, str], list[bool]]:
-    """Return whether each wall is stable, by `_hits_of` a shortcut and the estimator's label."""
+    """Return the verdicts on the walls, by `_hits_of` a shortcut and the estimator's label."""
     common = {"sources": sources()}
     cases = {
         (_hits_of(each), curve.label): contest.case_of(each, curve).job() | common | {"backend": each.backend}
@@ -207,7 +207,7 @@ def _verdicts(contest: _Contest, around: dict[str, list[list[Wall]]], runs: Runs
 
 
 def _seconds(contest: _Contest, timed: dict[str, list[Wall]], runs: Runs) -> dict[tuple[str, str], float]:
-    """Return the time of a hit, the mean over the walls, by `_hits_of` a shortcut and the estimator's label."""
+    """Return the mean time of a hit over the walls, by `_hits_of` a shortcut and the estimator's label."""
 
     def contestants(shortcuts: list[Shortcut], walls: int | None, seconds_of: Callable[..., float]) -> dict:
         return {
@@ -227,9 +227,9 @@ def _seconds(contest: _Contest, timed: dict[str, list[Wall]], runs: Runs) -> dic
             raise RuntimeError(f"the RTL and the model differ in their force words: {where}")
         return result.seconds
 
-    found = runs.medians(contestants(contest.computed, None, model), ROUNDS)
-    found |= runs.medians(contestants(contest.hardware, RTL_WALLS, hardware), 1)
+    times = runs.medians(contestants(contest.computed, None, model), ROUNDS)
+    times |= runs.medians(contestants(contest.hardware, RTL_WALLS, hardware), 1)
     means: dict[tuple[str, str], list[float]] = {}
-    for (hits, label, _), seconds in found.items():
+    for (hits, label, _), seconds in times.items():
         means.setdefault((hits, label), []).append(seconds)
-    return {key: statistics.mean(each) for key, each in means.items()}
+    return {key: statistics.mean(seconds) for key, seconds in means.items()}

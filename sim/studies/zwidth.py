@@ -1,4 +1,4 @@
-"""Z-width of several methods on one scene: their maps side by side, and what the paper's six show of its Figure 5."""
+"""Z-width of several methods on one scene: their maps side by side, and the facts of the paper's Figure 5."""
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
@@ -14,13 +14,13 @@ from ..walls.zwidth import Effort, Map, Mapping
 
 @dataclass(frozen=True)
 class ZWidth:
-    """What was found.
+    """The result of the study.
 
     Attributes:
-        scene: whose handle and rates it is of.
-        maps: of each method.
-        facts: of the paper's Figure 5, where the methods are the paper's.
-        effort: what the maps took.
+        scene: the scene, with its handle and rates.
+        maps: the maps of the methods.
+        facts: the facts of the paper's Figure 5, where the methods are the paper's; else empty.
+        effort: effort of the maps.
     """
 
     scene: Scene
@@ -34,7 +34,7 @@ class ZWidth:
         return {"scene": self.scene.name} | self.effort._asdict() | maps
 
     def tables(self) -> list[Table]:
-        """Return the maps in numbers, and the facts if there are some."""
+        """Return a table of the maps, and a table of the facts if there are any."""
         areas = ("area (kN/m N s/m)", "held", "in place")
         rows = [
             [
@@ -56,7 +56,7 @@ class ZWidth:
         return tables
 
     def notes(self) -> list[str]:
-        """Return what a + is."""
+        """Return the meaning of a +."""
         return plus_of_areas(self.maps)
 
 
@@ -66,10 +66,10 @@ def study(case: Case, curves: list[Curve] | None, mapping: Mapping) -> ZWidth:
     Args:
         case: the scene.
         curves: the methods; None for those of the paper's Figure 5.
-        mapping: makes the maps.
+        mapping: function that makes the maps.
 
     Raises:
-        SceneError: if the scene cannot be with one of the methods, or has no section `zwidth`.
+        SceneError: if the scene is not valid with one of the methods, or has no section `zwidth`.
     """
     scene = case.scene
     papers = methods(scene)
@@ -80,10 +80,10 @@ def study(case: Case, curves: list[Curve] | None, mapping: Mapping) -> ZWidth:
 
 
 def area_text(each: Map) -> str:
-    """Return the area of a map in kN/m N s/m, with a + where the region leaves the map."""
+    """Return the area of a map as text, in kN/m N s/m, with a + where the region leaves the map."""
     return f"{each.area / 1e3:.0f}" + "+" * each.leaves
 
 
 def plus_of_areas(maps: Iterable[Map]) -> list[str]:
-    """Return what the + of `area_text` is, as notes, if there was one."""
+    """Return the meaning of the + of `area_text` as a list of notes, empty if no map has it."""
     return ["+: the region goes on beyond the map"] if any(each.leaves for each in maps) else []
