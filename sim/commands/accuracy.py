@@ -17,7 +17,7 @@ from .options import BackendOption, EstimatorsOption, curves_of, rates_of
 from .study import StudyOptions, study
 
 DRAWN_HZ_MAX = 100_000
-"""Figure 1 is drawn sample by sample."""
+"""The highest rate at which Figure 1 is drawn, sample by sample."""
 
 
 @study("workers", "plot")
@@ -62,7 +62,7 @@ def command(
     labels, jobs = [label for label, _ in labelled], [job for _, job in labelled]
     try:
         offsets(encoder_phase_error)
-        # What cannot be is said before anything long begins.
+        # Invalid input is reported before anything long begins.
         for job in jobs:
             spec_of(job)
         files = [job | {"backend": backend} for job in _recording_jobs(curves, recorded)]
@@ -74,7 +74,7 @@ def command(
 
 
 def _signals(names: list[str]) -> tuple[list[str], list[tuple[str, str]]]:
-    """Return the known motions, and file and column of each recording `FILE.csv:COLUMN`; a column may have a colon."""
+    """Return the known motions, and (file, column) of every recording `FILE.csv:COLUMN`; a column may have a colon."""
     known, recorded = [], []
     for name in names:
         stem, colon, column = name.partition(".csv:")
@@ -90,10 +90,10 @@ def _signals(names: list[str]) -> tuple[list[str], list[tuple[str, str]]]:
 
 
 def _recording_jobs(curves: list, recorded: list[tuple[str, str]]) -> list[dict]:
-    """Return the arguments of `measure_recording` but for the backend.
+    """Return the arguments of `measure_recording` without the backend, for every estimator and recording.
 
     Raises:
-        RecordingError: if there is no such recording.
+        RecordingError: if a recording is not valid.
     """
     jobs = []
     for file, column in recorded:

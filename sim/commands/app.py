@@ -1,6 +1,7 @@
-"""The command line. Results go to stdout, everything else to stderr; exit codes: 0, 1 failed run, 2 bad input.
+"""The command line. Results go to stdout, everything else to stderr.
 
-Nothing is imported here that comes with an extra: one that is not installed is named.
+The exit codes are 0, 1 for a failed run, and 2 for bad input. This module imports nothing that comes with an extra, so
+that it can name an extra that is not installed.
 """
 
 import importlib.metadata
@@ -15,7 +16,7 @@ from .errors import BadInput
 
 
 def main() -> None:
-    """Run the command line; every failure is one line on stderr and an exit code."""
+    """Run the command line; report every failure as one line on stderr and an exit code."""
     signal.signal(signal.SIGINT, _interrupted)
     try:
         import_module(".group", __package__).run()
@@ -36,18 +37,18 @@ def main() -> None:
 
 
 def _interrupted(*_: object) -> None:
-    """Stop at once: raising KeyboardInterrupt into compiled code, or into its compiler, crashes the process."""
-    # A bar may have hidden the cursor.
+    """Stop at once: a KeyboardInterrupt raised in compiled code, or in its compiler, crashes the process."""
+    # A progress bar may have hidden the cursor.
     shown = "\x1b[?25h" if sys.stderr.isatty() else ""
     print(f"{shown}hardwall: error: interrupted", file=sys.stderr, flush=True)
     os._exit(1)
 
 
 def _extra_of(module: str | None) -> str | None:
-    """Return the extra of this project that a module comes with; None for what comes with none."""
+    """Return the extra of this project that installs a module; None if no extra does."""
     name = (module or "").partition(".")[0].replace("_", "-").lower()
     for requirement in importlib.metadata.requires("hardwall") or []:
-        found = re.fullmatch(r"([\w-]+)==.*extra == ['\"](\w+)['\"]", requirement)
-        if found and found[1].replace("_", "-").lower() == name:
-            return found[2]
+        match = re.fullmatch(r"([\w-]+)==.*extra == ['\"](\w+)['\"]", requirement)
+        if match and match[1].replace("_", "-").lower() == name:
+            return match[2]
     return None

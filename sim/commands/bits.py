@@ -10,5 +10,5 @@ from .study import StudyOptions, study
 def command(options: StudyOptions, rate: RateOption = 1e6, wanted: EstimatorsOption = None) -> None:
     (sample_hz,) = rates_of(str(rate), "--rate")
     jobs = bits.jobs(curves_of(wanted), sample_hz)
-    found = options.results("bits", bits.bit, jobs, Store("bits"))
-    options.finish(bits.Bits([row for row in found if row]))
+    rows = options.results("bits", bits.bit, jobs, Store("bits"))
+    options.finish(bits.Bits([row for row in rows if row]))

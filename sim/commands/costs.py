@@ -24,6 +24,6 @@ def command(
 
 
 def costs_of(options: StudyOptions, names: list[str], device: str, seeds: int) -> list[dict]:
-    """Return what each estimator costs on a device: one after the other, for each places with its own processes."""
+    """Return the costs of estimators on a device, one after the other: placement runs in processes of its own."""
     alone = replace(options, workers=1)
     return alone.results(f"costs on {device}", costs.cost, costs.jobs(names, device, seeds), Store("costs"))

@@ -1,5 +1,5 @@
-"""What is wrong with what was given."""
+"""The error for invalid input."""
 
 
 class BadInput(Exception):
-    """One line: what is wrong with what was given, and what is accepted."""
+    """Invalid input: one line that says what is wrong with it, and what is accepted."""

@@ -1,4 +1,4 @@
-"""The commands by name. The module of one is imported only when it runs, or shows its own help."""
+"""The commands by name. The module of a command is imported only when the command runs, or shows its own help."""
 
 import importlib.metadata
 from importlib import import_module
@@ -34,24 +34,24 @@ COMMANDS = {
     "drop": "Why Levant's stable region ends at one damping, in a sharp drop; and estimators that have none.",
     "fit": "Search what the paper does not give (mass, friction, delay ...) for a device that shows its Figure 5.",
 }
-"""What each is for, in a line: all of its help but for the options."""
+"""The purpose of every command in one line, which is all of its help except the options."""
 
 
 class LazyGroup(TyperGroup):
-    """Commands that are names and a line of help until one is called."""
+    """A group of commands that are a name and a line of help until they are called."""
 
     def __init__(self, **settings: Any):
         stubs = {name: TyperCommand(name=name, help=line) for name, line in COMMANDS.items()}
         super().__init__(**settings | {"commands": stubs})
 
     def resolve_command(self, context: Any, words: list[str]) -> tuple[str | None, Any, list[str]]:
-        """Return the command that is called, with its options, and what is left of the words."""
+        """Return the name of the command that is called, the command with its options, and the remaining words."""
         name, stub, rest = super().resolve_command(context, words)
         return name, stub and _loaded(name), rest
 
 
 def _loaded(name: str) -> Any:
-    """Return a command with its options, its module imported."""
+    """Import the module of a command; return the command with its options."""
     alone = typer.Typer(add_completion=False)
     alone.command(name, help=COMMANDS[name])(import_module(f".{name}", __package__).command)
     return typer.main.get_command(alone)
@@ -84,7 +84,7 @@ def run() -> None:
     """Run the command that is called.
 
     Raises:
-        BadInput: for a command, an option or an argument that cannot be; without words where help was all that came.
+        BadInput: if a command, an option or an argument is not valid; without a message if only help was shown.
     """
     hear_stages()
     try:

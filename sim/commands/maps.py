@@ -1,4 +1,4 @@
-"""What the commands about stable walls share: maps, made on a cluster as the options say."""
+"""The maps of stable walls that several commands make, on a cluster chosen by the options."""
 
 import time
 from contextlib import AbstractContextManager
@@ -17,14 +17,14 @@ from .terminal import progress
 
 
 def cluster_for(options: StudyOptions, jobs: int) -> AbstractContextManager[Client | None]:
-    """Return `cluster.client` as `--workers` or `--scheduler` ask for it."""
+    """Return `cluster.client` for the options `--workers` and `--scheduler`."""
     if options.workers and options.scheduler is not None:
         raise BadInput(f"--scheduler {options.scheduler} has workers of its own: give it or --workers, not both")
     return cluster.client(jobs, options.workers, options.scheduler)
 
 
 class Maps:
-    """Makes maps as the options say, and knows what they took: a `zwidth.Mapping`."""
+    """A `zwidth.Mapping` that makes maps as the options say, and records their effort."""
 
     def __init__(self, options: StudyOptions, backend: str):
         self._options, self._backend = options, backend
@@ -32,9 +32,9 @@ class Maps:
 
     def __call__(self, title: str, cases: list[Case]) -> list[Map]:
         for case in cases:
-            grid_of(case.scene)  # before a cluster is started
+            grid_of(case.scene)  # raises SceneError before a cluster is started
         maps = self._made(f"{title}, {self._backend}", cases)
-        self._hits += sum(each.hits for each in maps)
+        self._hits += sum(a_map.hits for a_map in maps)
         return maps
 
     def _made(self, title: str, cases: list[Case]) -> list[Map]:
@@ -43,12 +43,12 @@ class Maps:
             return zwidth.run(cases, self._backend, known, client, advance)
 
     def effort(self) -> Effort:
-        """Return what the maps took until now."""
+        """Return the effort of the maps so far."""
         return Effort(self._backend, self._hits, time.perf_counter() - self._began)
 
 
 class MapsOnOneCluster(Maps):
-    """The same on a cluster that is there already, with no bar of their own: for very many maps."""
+    """Maps on a cluster that runs already, without a progress bar of their own: for very many maps."""
 
     def __init__(self, options: StudyOptions, backend: str, known: Store, client: Client | None):
         super().__init__(options, backend)

@@ -1,4 +1,4 @@
-"""The options of the commands, and the checks of what is given with them."""
+"""The options of the commands, and the checks of their values."""
 
 import tomllib
 from pathlib import Path
@@ -42,7 +42,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="print JSON on stdout, 
 
 
 def changes_of(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
-    """Return scene changes from `--set` and from options of their own (None: not given)."""
+    """Return scene changes from `--set` and from options for single keys (None: not given)."""
     changes = {}
     for assignment in assignments or []:
         key, equals, text = assignment.partition("=")
@@ -61,24 +61,24 @@ WALL = ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m")
 
 
 def refuse(changes: dict[str, Any], keys: tuple[str, ...], instead: str) -> None:
-    """Refuse changes of a scene that the command makes itself."""
+    """Refuse changes of scene keys that the command sets itself; `instead` is the reason."""
     for key in changes:
         if key.startswith(keys):
             raise BadInput(f"--set {key} is what this command sets itself: {instead}")
 
 
 def refuse_for_maps(changes: dict[str, Any], estimators: str) -> None:
-    """Refuse changes of methods, for a reason that is given, and of walls."""
+    """Refuse changes of methods, for the reason `estimators`, and changes of walls."""
     refuse(changes, GAINS, estimators)
     refuse(changes, WALL, "see the scene's section zwidth")
 
 
 def curves_of(wanted: str | None, papers: dict[str, Curve] | None = None) -> list[Curve]:
-    """Return the estimators of a list NAME[:OUTPUT], of which `all` is every one.
+    """Return the estimators of a list NAME[:OUTPUT],...; the name `all` stands for all of them.
 
     Args:
-        wanted: the list; None is all.
-        papers: methods of the founding paper that are also names.
+        wanted: the list; None for all.
+        papers: methods of the founding paper, whose names are accepted too.
     """
     papers, curves = papers or {}, []
     try:
@@ -87,7 +87,7 @@ def curves_of(wanted: str | None, papers: dict[str, Curve] | None = None) -> lis
                 curves.append(papers[name])
                 continue
             every = registry.ESTIMATORS if name == "all" else [name]
-            curves += [Curve(label(*pair), *pair) for each in every for pair in outputs(each)]
+            curves += [Curve(label(*pair), *pair) for estimator in every for pair in outputs(estimator)]
     except ValueError as error:
         also = f", or of {', '.join(papers)}" if papers else ""
         raise BadInput(f"--estimators: {error}{also}") from None
@@ -95,7 +95,7 @@ def curves_of(wanted: str | None, papers: dict[str, Curve] | None = None) -> lis
 
 
 def rates_of(text: str, option: str) -> list[int]:
-    """Return the rates (Hz) of a list in an option."""
+    """Return the rates (Hz) of a list given with an option."""
     rates = []
     for word in text.split(","):
         try:
@@ -109,7 +109,7 @@ def rates_of(text: str, option: str) -> list[int]:
 
 
 def output_file(path: Path | None, option: str, suffixes: tuple[str, ...]) -> Path | None:
-    """Return the path, its folder made; bad input if nothing could be written there."""
+    """Make the folder of an output file and return its path; raise BadInput if the file could not be written."""
     if path is None:
         return None
     if path.suffix not in suffixes:

@@ -1,4 +1,4 @@
-"""One way to run a study: the options that studies share as one value, and one end for all of their results."""
+"""The common way to run a study: its shared options as one value, and the output of its result."""
 
 import functools
 import inspect
@@ -26,14 +26,14 @@ from .terminal import log, progress, show
 
 @dataclass(frozen=True, kw_only=True)
 class StudyOptions:
-    """The options that studies share; those that a command has not are as they are here.
+    """The options that studies share; an option that a command lacks has its default.
 
     Attributes:
-        study: the command's name, which its picture has too.
-        workers, scheduler: processes for its jobs; or the Dask cluster that runs them.
-        resume: whether results of an earlier run are known.
+        study: name of the command and of its picture module.
+        workers, scheduler: number of processes for the jobs, or the Dask cluster that runs them.
+        resume: whether results of an earlier run are used.
         set_: changes of the scene, as they were given.
-        plot: the picture's file.
+        plot: file of the picture.
         as_json: whether the result is printed as JSON.
     """
 
@@ -46,21 +46,21 @@ class StudyOptions:
     as_json: JsonOption = False
 
     def __post_init__(self):
-        # What cannot be drawn is said before anything long begins.
+        # A picture that cannot be written is reported before anything long begins.
         if self.plot:
             output_file(self.plot, "--plot", _picture("style").SUFFIXES)
 
     def changes(self, **options: Any) -> dict[str, Any]:
-        """Return the changes of a scene, those of a command's other options among them: see `changes_of`."""
+        """Return the changes of a scene, including those of a command's other options: see `changes_of`."""
         return changes_of(self.set_, **options)
 
     def results(self, title: str, function: Callable[..., Any], jobs: list[dict], store: Store) -> list[Any]:
-        """Return the result of each job, with a bar of what is done."""
+        """Return the result of every job, and show a progress bar meanwhile."""
         with progress(title, len(jobs)) as advance:
             return parallel.run(function, jobs, store, self.workers, advance)
 
     def finish(self, result: Result) -> None:
-        """Print a result, and draw it: whatever becomes of the picture, what was computed is out."""
+        """Print a result, then draw it: the result is printed even if drawing fails."""
         if self.as_json:
             print(json.dumps(result.report()))
         else:
@@ -74,34 +74,34 @@ class StudyOptions:
 
 
 def _picture(name: str) -> Any:
-    """Return a module of pictures: Matplotlib is loaded only where something is drawn."""
+    """Return a module of pictures; Matplotlib is loaded only if something is drawn."""
     return import_module(f"...pictures.{name}", __name__)
 
 
-SHARED = {each.name: each for each in fields(StudyOptions) if each.name != "study"}
+SHARED = {field.name: field for field in fields(StudyOptions) if field.name != "study"}
 
 
 def study(*shared: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make a command of a function whose first argument is a `StudyOptions`.
+    """Return a decorator that makes a command of a function whose first argument is a `StudyOptions`.
 
     Args:
-        shared: names of the options that it has of these, beside `as_json`, which all have.
+        shared: names of the shared options that the command has, besides `as_json`, which all commands have.
     """
 
     def command_of(function: Callable[..., None]) -> Callable[..., None]:
         name = function.__module__.rpartition(".")[2]
-        taken = [each for key, each in SHARED.items() if key in shared or key == "as_json"]
+        known = [field for key, field in SHARED.items() if key in shared or key == "as_json"]
 
         @functools.wraps(function)
         def command(**given: Any) -> None:
-            options = StudyOptions(study=name, **{each.name: given.pop(each.name) for each in taken})
+            options = StudyOptions(study=name, **{field.name: given.pop(field.name) for field in known})
             function(options, **given)
 
         own = list(inspect.signature(function).parameters.values())[1:]
         kind = inspect.Parameter.KEYWORD_ONLY
-        added = [inspect.Parameter(each.name, kind, default=each.default, annotation=each.type) for each in taken]
-        command.__signature__ = inspect.Signature([each.replace(kind=kind) for each in own] + added)
-        command.__annotations__ = {each.name: each.annotation for each in own + added}
+        added = [inspect.Parameter(field.name, kind, default=field.default, annotation=field.type) for field in known]
+        command.__signature__ = inspect.Signature([parameter.replace(kind=kind) for parameter in own] + added)
+        command.__annotations__ = {parameter.name: parameter.annotation for parameter in own + added}
         return command
 
     return command_of

@@ -11,7 +11,7 @@ from .errors import BadInput
 from .terminal import log, show
 
 REST_MM = 1e-6
-"""A handle whose RMS is less is at rest: it has moved by a nanometre."""
+"""The RMS of position (mm) below which a handle is called at rest: one nanometre."""
 NUMBERS = ("K (N/m)", "B (N s/m)", "wall", "RMS (mm)", "peak force (N)", "velocity error (mm/s)", "force words")
 NOTES = (
     "RMS: distance of the handle from its mean once it has settled in the wall; less than a nanometre is at rest.",

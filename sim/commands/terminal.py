@@ -1,4 +1,4 @@
-"""What people see: tables on stdout, everything else on stderr."""
+"""Output for people: tables on stdout, everything else on stderr."""
 
 import logging
 import time
@@ -17,15 +17,15 @@ from ..jobs.stages import logger
 
 log = Console(stderr=True, highlight=False, markup=False)
 SILENCE_S = 10.0
-"""How long nothing may be said where there is no bar to look at."""
+"""The time between two lines of progress where there is no progress bar."""
 GAP, EDGE = 2, 1
-"""Spaces between two columns, and on either side of a table."""
+"""The numbers of spaces between two columns, and on either side of a table."""
 WORD_MAX = 20
-"""A longer word may be broken, so that a name without spaces, of a file perhaps, leaves room for the numbers."""
+"""The length above which a word may be broken, so that a long name, of a file perhaps, leaves room for the numbers."""
 
 
 def show(table: Table) -> None:
-    """Print a table as wide as the terminal, or several that are: no number is broken, and no word of usual length."""
+    """Print a table in the terminal's width, in several parts if needed, without breaking numbers or usual words."""
     console = Console(highlight=False)
     if not table.columns:
         drawn = rich.table.Table(box=None, show_header=False, pad_edge=False)
@@ -33,7 +33,7 @@ def show(table: Table) -> None:
         drawn.add_column(overflow="fold")
         _print(console, drawn, table.rows)
         return
-    columns = [_Column(*each, [row[place] for row in table.rows]) for place, each in enumerate(table.columns.items())]
+    columns = [_Column(*head, [row[place] for row in table.rows]) for place, head in enumerate(table.columns.items())]
     for part in _parts(columns, console.width - 2 * EDGE):
         drawn = rich.table.Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
         for column, width in _widths(part, console.width - 2 * EDGE):
@@ -55,62 +55,62 @@ class _Column:
 
     @property
     def least(self) -> int:
-        """How narrow it may be: as its numbers, or its longest word."""
+        """The least width: that of the numbers, or of the longest word."""
         words = [word[:WORD_MAX] for cell in self.cells for word in cell.split()]
         return max(map(len, [*(words if self.justify == "left" else self.cells), *self.heading.split()]), default=1)
 
     @property
     def most(self) -> int:
-        """How wide it is with nothing in two lines."""
+        """The width at which no text is broken into lines."""
         return max(map(len, [self.heading, *self.cells]))
 
 
 def _parts(columns: list[_Column], width: int) -> list[list[_Column]]:
-    """Return the columns that fit side by side: all those of words, and as many of numbers as there is room for."""
+    """Return the columns in parts that fit the width: all columns of words, and as many columns of numbers as fit."""
     words = [column for column in columns if column.justify == "left"]
     room = width + GAP - sum(column.least + GAP for column in words)
-    parts, left = [list(words)], room
+    parts, remaining = [list(words)], room
     for column in columns:
         if column.justify == "left":
             continue
-        if column.least + GAP > left and len(parts[-1]) > len(words):
+        if column.least + GAP > remaining and len(parts[-1]) > len(words):
             parts.append(list(words))
-            left = room
+            remaining = room
         parts[-1].append(column)
-        left -= column.least + GAP
+        remaining -= column.least + GAP
     return parts
 
 
 def _widths(columns: list[_Column], width: int) -> list[tuple[_Column, int]]:
-    """Return each column with its width: what is left over goes to words first, as they need it."""
+    """Return every column with its width; spare width goes to words first, according to their need."""
     spare = width + GAP - sum(column.least + GAP for column in columns)
     widths = {column.heading: column.least for column in columns}
     for justify in ("left", "right"):
-        wanted = {each.heading: each.most - each.least for each in columns if each.justify == justify}
-        part = min(max(spare, 0) / max(sum(wanted.values()), 1), 1.0)
-        for heading, more in wanted.items():
+        lacking = {column.heading: column.most - column.least for column in columns if column.justify == justify}
+        part = min(max(spare, 0) / max(sum(lacking.values()), 1), 1.0)
+        for heading, more in lacking.items():
             widths[heading] += int(part * more)
             spare -= int(part * more)
     return [(column, widths[column.heading]) for column in columns]
 
 
 class _Stages(logging.Handler):
-    """Prints what the program says that it is doing."""
+    """A log handler that prints the stages of the program."""
 
     def emit(self, record: logging.LogRecord) -> None:
         log.print(record.getMessage(), style="dim")
 
 
 def hear_stages() -> None:
-    """Print on stderr what takes a while: see `jobs.stages`."""
+    """Print long stages of the program on stderr: see `jobs.stages`."""
     logger.handlers = [_Stages()]
     logger.setLevel(logging.INFO)
 
 
 class progress:
-    """What is done while a run lasts, on stderr: a bar in a terminal, elsewhere a line now and then.
+    """The progress of a run on stderr: a bar in a terminal, elsewhere a line every `SILENCE_S`.
 
-    It gives the function that is to be called with how much is done.
+    As a context it returns the function to call with the amount done.
     """
 
     def __init__(self, title: str, total: int):

@@ -14,7 +14,7 @@ from .terminal import progress
 
 
 class _Runs:
-    """Runs a study's hits as the options say: a `trade_runs.Runs`. What is timed runs alone, in this process."""
+    """A `trade_runs.Runs` that runs hits as the options say; timed hits run alone, in this process."""
 
     def __init__(self, options: StudyOptions):
         self._options = options
@@ -23,7 +23,7 @@ class _Runs:
         return Maps(self._options, backend)("maps", cases)
 
     def verdicts(self, jobs: list[dict]) -> list[dict]:
-        # Many have just been hit for a map.
+        # Many of these walls have just been hit for a map.
         return self._options.results("walls around the edge", verdict, jobs, Store("zwidth"))
 
     def medians(self, contestants: dict[Hashable, Callable[[], float]], times: int) -> dict[Hashable, float]:
