@@ -15,25 +15,25 @@ from .labels import label_right
 from .style import LABEL_PT, MARK, THEORY, TRUTH, looks, name_above, new_figure, page
 
 PIECES = {"from the start": (0.0, 0.06), "where it turns": (1.2, 1.28)}
-"""Pieces of Figure 1 that are enlarged, s."""
+"""The pieces of Figure 1 that are enlarged, s."""
 LEAST_MM_S = 1e-6
-"""What is less is drawn as this: an axis of decades has no zero."""
+"""The least error that is drawn, also for smaller errors: a logarithmic axis has no zero."""
 
 
 @page
 def draw(accuracy: Accuracy) -> Figure:
-    """Return the founding paper's first figure, if that is what was measured; else the error against the rate."""
+    """Return the founding paper's Figure 1 if it was measured, else the picture of the error against the rate."""
     if accuracy.figure == 1:
         return _figure_1(accuracy.curves, accuracy.rows)
     return _against_rate(accuracy.rows, accuracy.labels)
 
 
 def _figure_1(curves: list[Curve], rows: list[dict]) -> Figure:
-    """Return the paper's first figure: estimates of a decaying sine over time, their error, and pieces enlarged.
+    """Return the paper's Figure 1: estimates of a decaying sine over time, their error, and enlarged pieces.
 
     Args:
-        curves: what to draw.
-        rows: of `accuracy.measure`, one for each: at which rate, on which backend, with which gains and encoder.
+        curves: the estimators.
+        rows: results of `accuracy.measure`, one for every curve, with its rate, backend, gains and encoder.
     """
     signal, backend, sample_hz = signals.load("paper"), rows[0]["backend"], rows[0]["sample_hz"]
     title = f"50 exp(-t) sin(2πt) mm, counts of 1 µm at {sample_hz / 1e3:g} kHz, {backend}"
@@ -49,12 +49,12 @@ def _figure_1(curves: list[Curve], rows: list[dict]) -> Figure:
         spec = axis_spec(row["estimator"], sample_hz, row["acceleration_max_mm_s2"] / 1e3, row["gains"])
         parts = velocities(signal, spec, row["output"], backend, offsets(row["encoder_phase_error_counts"]))
         estimate = np.concatenate([part for _, part, _ in parts]) * 1e3
-        # The first on top: what chatters would hide what lags, and lets the truth be seen through it.
+        # The first curve is on top, as a chattering curve would hide a lagging curve; the others are translucent.
         line = {"color": style["color"], "lw": 0.9, "zorder": 3 - index / len(curves), "alpha": 0.5 if index else 1.0}
         for axes in drawn:
             axes.plot(times, estimate, label=curve.label, **line)
         panels["e"].plot(times, estimate - exact, label=f"{curve.label}: RMS {row['rms_mm_s']:.3g} mm/s", **line)
-    # An estimate begins far off: the error is framed from where it counts.
+    # An estimate begins far off, so the error is framed from where it is judged.
     judged = times >= signal.judged_from_s
     _frame(panels["e"], [line.get_ydata()[judged] for line in panels["e"].lines])
     for axes in panels.values():
@@ -78,18 +78,18 @@ def _figure_1(curves: list[Curve], rows: list[dict]) -> Figure:
 
 
 def _frame(axes: Axes, curves: list[np.ndarray]) -> None:
-    """Frame a panel by these curves, alike on both sides of zero."""
+    """Set the limits of a panel by these curves, symmetric about zero."""
     largest = 1.1 * max(float(np.abs(curve).max()) for curve in curves)
     axes.set_ylim(-largest, largest)
     axes.axhline(0, color="black", lw=0.6)
 
 
 def _against_rate(rows: list[dict], labels: list[str]) -> Figure:
-    """Return the picture of the RMS error against the sample rate, a curve for each label.
+    """Return the picture of the RMS error against the sample rate, with a curve for every label.
 
     Args:
-        rows: of `accuracy.measure`, all of one signal.
-        labels: what each row is called.
+        rows: results of `accuracy.measure`, all of one signal.
+        labels: labels of the rows.
     """
     first = rows[0]
     phase = first["encoder_phase_error_counts"]
@@ -120,7 +120,7 @@ def _against_rate(rows: list[dict], labels: list[str]) -> Figure:
 
 
 def _bounds(axes: Axes, rows: list[dict]) -> list[tuple[str, float, str]]:
-    """Draw the two lines of theory; return their labels."""
+    """Draw the two lines of theory; return their labels, heights and colours."""
     signal = signals.load(rows[0]["signal"])
     rates = sorted({row["sample_hz"] for row in rows})
     bound = lower_bound_m_per_s(signal.acceleration_max_m_per_s2) * 1e3

@@ -10,7 +10,7 @@ from .style import looks, new_figure, page
 
 @page
 def draw(bits: Bits) -> Figure:
-    """Return the picture, a curve for each estimator's output."""
+    """Return the picture, with a curve for every output of an estimator."""
     rows = bits.rows
     title = f"the paper's signal at {rows[0]['sample_hz'] / 1e6:g} MHz; circles: the derived widths"
     picture = new_figure(5.5, title)
@@ -22,9 +22,9 @@ def draw(bits: Bits) -> Figure:
         errors = [row["rms_mm_s"] for row in own]
         for axes, key in ((by_width, "velocity_bits"), (by_logic, "lut4")):
             axes.plot([row[key] for row in own], errors, label=label(*curve), **style)
-            # The widths that follow from the spec.
+            # The circle marks the widths that follow from the spec.
             axes.plot(own[0][key], errors[0], marker="o", ms=9, mfc="none", mec=style["color"])
-        # The curve ends, at the right, where its logic is largest.
+        # The right end of the curve is where its logic is largest.
         ends.append((label(*curve), max(own, key=lambda row: row["lut4"])["rms_mm_s"], style["color"]))
     by_width.set_xlabel("bits of the velocity")
     by_logic.set_xlabel("LUT4 of the estimator alone (ECP5)")

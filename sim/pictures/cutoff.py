@@ -14,7 +14,7 @@ FILTERED, UNFILTERED = COLOURS["butterworth"], COLOURS["fdm"]
 
 @page
 def draw(cutoffs: Cutoffs) -> Figure:
-    """Return the picture: a panel a device, over one axis of cutoffs."""
+    """Return the picture: one panel a device, with a common axis of cutoffs."""
     devices = cutoffs.devices
     title = "Area of the stable region of walls (K, B) behind a finite difference and a filter"
     picture = new_figure(0.9 + 2.2 * len(devices), title)
@@ -22,7 +22,7 @@ def draw(cutoffs: Cutoffs) -> Figure:
     for axes, device in zip(panels, devices, strict=True):
         _draw(axes, device)
     panels[-1].set_xscale("log")
-    panels[-1].set_xticks(TICKS_HZ, [f"{each}" for each in TICKS_HZ])
+    panels[-1].set_xticks(TICKS_HZ, [f"{tick_hz}" for tick_hz in TICKS_HZ])
     panels[-1].xaxis.set_minor_formatter(NullFormatter())
     panels[-1].set_xlabel("cutoff of the second-order Butterworth filter (Hz); dotted: the founding paper's")
     picture.align_ylabels(panels)
@@ -33,11 +33,11 @@ def draw(cutoffs: Cutoffs) -> Figure:
 
 def _areas(device: Device) -> dict[float, float]:
     """Return the areas by cutoff, in kN/m N s/m."""
-    return {cutoff_hz: each.area / 1e3 for cutoff_hz, each in device.maps.items()}
+    return {cutoff_hz: a_map.area / 1e3 for cutoff_hz, a_map in device.maps.items()}
 
 
 def _draw(axes: Axes, device: Device) -> None:
-    """Draw one device's areas."""
+    """Draw the areas of a device."""
     areas, unfiltered = _areas(device), device.unfiltered.area / 1e3
     for cutoff_hz in PAPERS_HZ:
         axes.axvline(cutoff_hz, color=THEORY, ls=":", lw=0.9)
@@ -54,7 +54,7 @@ def _draw(axes: Axes, device: Device) -> None:
 
 
 def _label(axes: Axes, device: Device) -> None:
-    """Name the best cutoff, what is as good, the area without a filter, and what leaves the map."""
+    """Label the best cutoff, the equally good range, the area without a filter, and the first region beyond the map."""
     areas, (low, high) = _areas(device), device.level_hz
     unfiltered = device.unfiltered.area / 1e3
     best = f"best: {device.best_hz:.0f} Hz, {areas[device.best_hz]:.0f}" + ", at the end" * device.at_end
@@ -70,7 +70,7 @@ def _label(axes: Axes, device: Device) -> None:
 
 
 def _settings(device: Device) -> str:
-    """Return which device it is, and how it was mapped."""
+    """Return the title of a panel: the device, and the grid of its maps."""
     handle, controller, grid = device.scene.handle, device.scene.controller, device.scene.zwidth
     friction = f"{handle.coulomb_n:g} N" if handle.coulomb_n else "no"
     return (

@@ -1,4 +1,4 @@
-"""Pictures of why a stable region ends in a drop, one of each experiment."""
+"""Pictures of why a stable region ends in a drop, one for every experiment."""
 
 import math
 
@@ -12,7 +12,7 @@ from .labels import label_points
 from .style import AT_REST_M, COLOURS, LABEL_PT, THEORY, ink, length_text, looks, new_figure, page, plain_decades
 
 OUTSIDE = ("mass", "count", "delay", "stiffness")
-"""What was changed that is not in the law."""
+"""The changed quantities that are not in the law."""
 KINDS = {
     "changed: friction, push, gains, samples a force": (
         lambda factor: factor not in (*OUTSIDE, "none"),
@@ -24,11 +24,11 @@ KINDS = {
     ),
     "as it is": (lambda factor: factor == "none", {"marker": "D", "color": "black", "ms": 5}),
 }
-"""Which of the things that were changed have which style."""
+"""The styles of the changed quantities, by label: which factors are meant, and how they are drawn."""
 BAND = 2.0
-"""Laws that are wrong by more times than this have their names."""
+"""The factor of error above which a law is labelled with its name."""
 COLUMNS = 3
-"""Of panels."""
+"""The number of columns of panels."""
 
 
 @page
@@ -38,7 +38,7 @@ def draw(drop: Drop) -> dict[str, Figure]:
 
 
 def _inks(drop: Drop) -> dict[str, str]:
-    """Return the colour in which each method is written, by name."""
+    """Return the colours in which the methods are written, by name."""
     return {name: ink(each.case.scene.controller.estimator) for name, each in drop.maps.items()}
 
 
@@ -51,12 +51,12 @@ def _setting(drop: Drop) -> str:
 
 
 def _predicted(drop: Drop) -> dict[str, float]:
-    """Return up to which B the handle is predicted to rest, by method; infinite without end."""
+    """Return the B up to which the handle is predicted to rest, by method; infinite without end."""
     return {each.method: each.predicted_n_s_per_m for each in drop.laws if each.factor == "none"}
 
 
 def _rest(drop: Drop) -> Figure:
-    """Return the picture of the hits of one wall: a row a method, B along it, and what became of each hit."""
+    """Return the picture of the hits of one wall: a row for every method, B along it, and the outcome of every hit."""
     title = (
         f"What becomes of the handle in a wall of K = {STIFFNESS_N_PER_M / 1e3:g} kN/m and more and more damping, "
         f"two hits each\n{_setting(drop)}"
@@ -73,7 +73,7 @@ def _rest(drop: Drop) -> Figure:
     for kind, style in zip(range(len(kinds)), kinds.values(), strict=True):
         spots = []
         for row, name in enumerate(rows):
-            # The two hits of a wall stand one over the other.
+            # The two hits of a wall are drawn one above the other.
             hits = [each for each in drop.shaken if each.method == name]
             for number, each in enumerate(hits):
                 if _kind(each.rms_m, threshold_m) == kind:
@@ -99,7 +99,7 @@ def _rest(drop: Drop) -> Figure:
 
 
 def _kind(rms_m: float | None, threshold_m: float) -> int:
-    """Return whether a handle was at rest (0), was shaken by less than the threshold (1), or by more, or fled (2)."""
+    """Return 0 if a handle is at rest, 1 if it is shaken by less than the threshold, 2 if by more or if it fled."""
     if rms_m is None or rms_m >= threshold_m:
         return 2
     return int(rms_m >= AT_REST_M)
@@ -110,7 +110,7 @@ def _finite(law: Law) -> bool:
 
 
 def _law(drop: Drop) -> Figure:
-    """Return the picture of the law: measured against predicted, one thing changed at a time, a panel a method."""
+    """Return the picture of the law: measured against predicted B, one change at a time, a panel for every method."""
     title = (
         "Up to which B the handle comes to rest: predicted from the estimator alone, measured in the closed loop\n"
         f"{_setting(drop)}; one thing changed at a time"
@@ -152,7 +152,7 @@ def _spot(law: Law) -> tuple[float, float]:
 
 
 def _ends(drop: Drop) -> Figure:
-    """Return the picture of where rest ends, and where stability does, from soft walls to stiff ones."""
+    """Return the picture of the ends of rest and of stability, from soft walls to stiff walls."""
     title = (
         f"Up to which B three of four of {STARTS} hits come to rest, and are stable, at K of "
         f"{', '.join(f'{k / 1e3:g}' for k in STIFFNESSES_N_PER_M)} kN/m\n{_setting(drop)}"
@@ -185,7 +185,7 @@ def _ends(drop: Drop) -> Figure:
 
 
 def _maps(drop: Drop) -> Figure:
-    """Return the picture of the stable regions: a panel a method, the others pale behind it."""
+    """Return the picture of the stable regions: a panel for every method, with the others pale behind it."""
     grid = grid_of(next(iter(drop.maps.values())).case.scene)
     title = (
         "The stable region of each method; in brackets its area, as a multiple of the paper's best\n"

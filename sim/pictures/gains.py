@@ -13,13 +13,13 @@ from .style import new_figure, page
 
 ROWS = {False: "stable walls", True: "stable walls that are in place"}
 MARKS = {"proposed": "o", "adjusted": "s", "best": "*", "best in place": "D", "best within the condition": "P"}
-"""The gains that have a name; a pair with several names has the marker of the first."""
+"""The markers of the gains that have a name; a pair with several names has the marker of the first."""
 OUTLINE = [withStroke(linewidth=2, foreground="black")]
 
 
 @page
 def draw(search: Search) -> Figure:
-    """Return the picture: a column an output; above the paper's area, below that of the walls in place."""
+    """Return the picture: a column for every output, with the paper's area above and the area in place below."""
     controller, grid = search.scene.controller, search.coarse_grid
     title = (
         f"Levant's gains on {search.scene.name}: samples at {controller.sample_hz / 1e3:g} kHz, force at "
@@ -29,7 +29,7 @@ def draw(search: Search) -> Figure:
     picture = new_figure(6.8, title)
     panels = picture.subplots(len(ROWS), len(search.maps), sharex=True, sharey=True)
     colours = mpl.colormaps["viridis"].with_extremes(bad="0.8")
-    # The areas in place are parts of these.
+    # The areas in place are never larger than these.
     largest = max(np.nanmax(search.areas(output, in_place=False)) for output in search.maps) / 1e3 or 1.0
     for row, (in_place, text) in zip(panels, ROWS.items(), strict=True):
         for axes, output in zip(row, search.maps, strict=True):
@@ -51,7 +51,7 @@ def draw(search: Search) -> Figure:
 
 
 def _mark(axes: Axes, search: Search, output: str) -> None:
-    """Draw the sufficient condition's boundary, and the gains that have a name, all with their names."""
+    """Draw the boundary of the sufficient condition and the gains that have a name, with labels."""
     bound = search.bound_m_per_s2
     lambdas = np.geomspace(search.lambdas[0], search.lambdas[-1], 500)
     least = np.array([least_alpha_m_per_s2(each, bound) or np.nan for each in lambdas])
@@ -72,6 +72,6 @@ def _mark(axes: Axes, search: Search, output: str) -> None:
 
 
 def _together(names: list[str]) -> str:
-    """Return the names of one pair as a label, a line each: `best, in place, within the condition`."""
+    """Return the names of one pair as a label, one a line: `best, in place, within the condition`."""
     first, *others = names
     return ",\n".join([first, *(other.removeprefix("best ") if first == "best" else other for other in others)])

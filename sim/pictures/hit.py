@@ -1,4 +1,4 @@
-"""The picture of a hit: position, velocity, the estimate's error and the force, of the whole run and of the contact."""
+"""The picture of a hit: position, velocity, error of the estimate, and force, over the whole run and the contact."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,8 +16,8 @@ UNITS = ("position (mm)", "velocity (m/s)", "error (mm/s)", "force (N)")
 def draw(hit: Hit) -> Figure:
     """Return the picture of a hit with traces: the whole run on the left, its first contact on the right.
 
-    Under the estimate stands its error, and beside that the error of the finite difference of counts without encoder
-    errors, the baseline that an estimator is to beat.
+    Below the estimate is its error, together with the error of the finite difference of counts without encoder errors:
+    the baseline that an estimator should beat.
     """
     figure = new_figure(7.5, _title(hit))
     axes = figure.subplots(4, 2, sharex="col", width_ratios=(1, 1.25), height_ratios=(1, 1.2, 1, 1))
@@ -46,13 +46,13 @@ def draw(hit: Hit) -> Figure:
 
 
 def _first_contact(trace: Trace) -> Trace:
-    """Return the trace up to a quarter of the contact's length after the handle has left the wall again."""
+    """Return the trace until the handle has left the wall for a quarter of the contact's length."""
     inside = trace.position_m > 0
     entered = int(np.argmax(inside))
-    left = entered + int(np.argmin(inside[entered:]))
-    if left == entered:
+    exited = entered + int(np.argmin(inside[entered:]))
+    if exited == entered:
         return trace
-    last = left + (left - entered) // 4
+    last = exited + (exited - entered) // 4
     return Trace(**{key: array[:last] for key, array in vars(trace).items()})
 
 
@@ -70,7 +70,7 @@ def _title(hit: Hit) -> str:
 
 
 def _column(axes: np.ndarray, trace: Trace, time: np.ndarray, hit: Hit, zoomed: bool) -> None:
-    """Fill one column of four panels; the names of lines are in the right one, which has room for them."""
+    """Fill one column of four panels; the names of the lines are in the right column, which has room for them."""
     position, velocity, error, force = axes
     position.plot(time, trace.position_m * 1e3, color="black", lw=1)
     low, high = position.get_ylim()
@@ -90,7 +90,7 @@ def _column(axes: np.ndarray, trace: Trace, time: np.ndarray, hit: Hit, zoomed: 
     if zoomed and name != "fdm":
         q, rate = hit.scene.spec.count_m, hit.scene.spec.sample_hz
         baseline = (np.diff(np.floor(trace.position_m / q)) * (q * rate) - true[1:]) * 1e3
-        # The smaller of the two lies on top.
+        # The smaller of the two errors lies on top.
         below = np.std(baseline) > np.std(wrong)
         line = {"color": "0.6", "lw": 0.7, "zorder": 2.1 if below else 2.3}
         error.plot(time[1:], baseline, label="plain difference", **line)
@@ -114,7 +114,7 @@ def _drive_label(hit: Hit) -> str:
 
 
 def _frame(axis: Axes, *curves: np.ndarray) -> None:
-    """Frame a panel by these curves alone; the rest may leave it."""
+    """Set the limits of a panel by these curves alone; other curves may leave it."""
     low, high = min(map(np.min, curves)), max(map(np.max, curves))
     margin = 0.08 * max(high - low, 1e-9)
     axis.set_ylim(low - margin, high + margin)

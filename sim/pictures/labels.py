@@ -1,4 +1,4 @@
-"""Names at what they name: beside the ends of lines, and beside points, where they touch and hide nothing."""
+"""Labels beside the ends of lines and beside points, placed so that they touch and hide nothing."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -12,22 +12,22 @@ from matplotlib.transforms import Bbox
 from .style import LABEL_PT
 
 LEADING = 1.3
-"""From one line of a column of labels to the next, in heights of its letters."""
+"""The distance between two lines of labels, in heights of their letters."""
 
 
 def label_right(axes: Axes, labels: Sequence[tuple[str, float, str]]) -> None:
-    """Write names right of a panel, each at the height where its line ends there, moved apart where they would touch.
+    """Write labels to the right of a panel at the heights where their lines end, moved apart where they would touch.
 
     The panel's limits must be final.
 
     Args:
         axes: the panel.
-        labels: text, height in data, and colour of each.
+        labels: (text, height in data coordinates, colour) of every label.
     """
     scale = axes.transScale.transform
     low, high = (scale((1.0, value))[1] for value in axes.get_ylim())
     heights = [(scale((1.0, value))[1] - low) / (high - low) for _, value, _ in labels]
-    # The first place is for the layout, which needs the widths, and gives the panel its height.
+    # The first position serves the layout, which needs the widths, and gives the panel its height.
     texts = [
         axes.annotate(
             text,
@@ -51,11 +51,11 @@ def label_right(axes: Axes, labels: Sequence[tuple[str, float, str]]) -> None:
 
 
 def spread(heights: Sequence[float], sizes: Sequence[float]) -> list[float]:
-    """Return heights for labels of these sizes, in the same order and apart, as near as can be to the given ones."""
+    """Return heights for labels of these sizes, in the same order and apart, as near as possible to those given."""
     groups: list[tuple[float, list[int]]] = []
     for index in sorted(range(len(heights)), key=lambda index: heights[index]):
         group = (heights[index], [index])
-        # Groups that would touch become one, around the mean of what they ask for.
+        # Groups that would touch become one group, around the mean of their given heights.
         while groups and groups[-1][0] + _half(groups[-1], sizes) > group[0] - _half(group, sizes):
             below = groups.pop()
             members = below[1] + group[1]
@@ -71,7 +71,7 @@ def spread(heights: Sequence[float], sizes: Sequence[float]) -> list[float]:
 
 
 def _half(group: tuple[float, list[int]], sizes: Sequence[float]) -> float:
-    """Return half of the height of a group of labels."""
+    """Return half the height of a group of labels."""
     return sum(sizes[index] for index in group[1]) / 2
 
 
@@ -80,9 +80,9 @@ AROUND = [
     for radius in (0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 2.8, 3.5, 4.5, 5.5, 7.0, 8.5, 10.5, 13.0, 16.0)
     for angle in np.linspace(0, 2 * np.pi, 16, endpoint=False)
 ]
-"""Where a label may stand, from the point that it names to its own nearest edge, in heights of its letters."""
+"""The possible offsets of a label, from the point that it names to its own nearest edge, in heights of its letters."""
 CLEAR_PX = 5.0
-"""So far is a label from what it must not cover."""
+"""The distance, in pixels, between a label and anything that it must not cover."""
 
 
 def label_points(
@@ -92,17 +92,18 @@ def label_points(
     lines: Sequence[Sequence[tuple[float, float]]] = (),
     ground: str = "white",
 ) -> list[Annotation]:
-    """Write names beside points or curves of a panel, each in the nearest place that is free, with a line where far.
+    """Write labels beside points or curves of a panel, at the nearest free position, with a leader where it is far.
 
-    A place is free that is in the panel, covers nothing, and is nearer to what the name is of than to anything else.
-    The panel's limits must be final, and whatever is right of it or below drawn.
+    A position is free if it is in the panel, covers nothing, and is nearer to the label's own point or curve than to
+    anything else. The panel's limits must be final, and everything to its right or below it must be drawn already.
 
     Args:
         axes: the panel.
-        labels: text, what it names, and colour of each; what it names is a point in data, or the points of a curve.
-        avoid: other points, in data.
-        lines: other curves, points in data.
-        ground: colour of what is behind the letters.
+        labels: (text, target, colour) of every label; the target is a point in data coordinates, or the points of a
+            curve.
+        avoid: other points, in data coordinates.
+        lines: other curves, as points in data coordinates.
+        ground: colour behind the letters.
     """
     figure = axes.figure
     figure.draw_without_rendering()
@@ -126,7 +127,7 @@ def label_points(
         taken.append(box)
         others.append(_leader(box, anchor))
         near = _gap(box, anchor[None]) < 1.2 * height and panel.nearest(box)
-        # The line begins where the label is nearest to what it names.
+        # The leader begins where the label is nearest to its target.
         begin = np.clip((anchor - box[:2]) / (box[2:] - box[:2]), 0, 1)
         line = {"arrowstyle": "-", "color": colour, "lw": 0.6, "relpos": begin, "shrinkA": 0, "shrinkB": 3}
         written = axes.annotate(
@@ -135,7 +136,7 @@ def label_points(
             (np.array([box[0], (box[1] + box[3]) / 2]) - anchor) * 72 / figure.dpi,
             textcoords="offset points",
             arrowprops=None if near else line,
-            # Not an outline: letters with one are no text any more in a file of text.
+            # A box and not an outline: letters with an outline are no longer text in an SVG file.
             bbox={"fc": ground, "lw": 0, "alpha": 0.65, "pad": 0.5},
             annotation_clip=False,
             color=colour,
@@ -148,7 +149,7 @@ def label_points(
 
 
 class _Panel(NamedTuple):
-    """What is in a panel, in pixels: its frame, the labels that stand, what a label is of, and everything else."""
+    """The contents of a panel, in pixels: its frame, the placed labels, the target of a label, and everything else."""
 
     frame: Bbox
     taken: list[np.ndarray]
@@ -156,7 +157,7 @@ class _Panel(NamedTuple):
     foreign: np.ndarray
 
     def free(self, box: np.ndarray) -> bool:
-        """Return whether a label has room: within the frame, over no other label and over no point."""
+        """Return whether a label has room: within the frame, away from other labels and points."""
         left, bottom, right, top = box
         if left < self.frame.x0 or right > self.frame.x1 or bottom < self.frame.y0 or top > self.frame.y1:
             return False
@@ -166,26 +167,26 @@ class _Panel(NamedTuple):
         return _gap(box, self.own) > CLEAR_PX and _gap(box, self.foreign) > CLEAR_PX
 
     def clear(self, line: np.ndarray) -> bool:
-        """Return whether the line from a label to what it names runs through no label, and past nothing else."""
+        """Return whether the leader from a label to its target crosses no label, and is not close to other points."""
         if any(_gap(box, line) == 0 for box in self.taken):
             return False
-        # What lies at its end may be close to what it names.
+        # Other points may be close to the end of the leader, at the target.
         points = line[: len(line) * 2 // 3]
         return all(_gap(np.tile(point, 2), self.foreign) > CLEAR_PX for point in points)
 
     def nearest(self, box: np.ndarray) -> bool:
-        """Return whether a label is clearly nearer to what it is of than to anything else."""
+        """Return whether a label is clearly nearer to its target than to anything else."""
         return _gap(box, self.foreign) > 1.5 * _gap(box, self.own)
 
 
 def _place(size: np.ndarray, height: float, panel: _Panel) -> tuple[np.ndarray, np.ndarray]:
-    """Return the point at which a label stands, and its box: left, bottom, right, top."""
-    # Where two curves run together, a name would be of either.
+    """Return the point that a label names, and the box of the label: left, bottom, right, top."""
+    # Where two curves run together, a label would be ambiguous.
     alone = [point for point in panel.own if _gap(np.tile(point, 2), panel.foreign) > 0.7 * height]
     anchors, led, free = alone or list(panel.own), [], []
     for away in AROUND:
         for anchor in anchors:
-            # The text is on that side of the place to which it leads.
+            # The text lies on the side of the anchor to which the offset points.
             low = anchor + np.array(away) * height - size * (1 - np.sign(np.round(away, 6))) / 2
             box = np.concatenate([low, low + size])
             if not panel.free(box):
@@ -200,19 +201,19 @@ def _place(size: np.ndarray, height: float, panel: _Panel) -> tuple[np.ndarray, 
 
 
 def _leader(box: np.ndarray, anchor: np.ndarray) -> np.ndarray:
-    """Return points of the line from a label to what it names."""
+    """Return points of the leader from a label to its target."""
     begin = np.clip(anchor, box[:2], box[2:])
     return begin + (anchor - begin) * np.linspace(0, 1, 20)[:, None]
 
 
 def _gap(box: np.ndarray, points: np.ndarray) -> float:
-    """Return how far a box is from the nearest of points; infinite without any."""
+    """Return the distance from a box to the nearest of some points; infinite without points."""
     away = np.maximum(np.maximum(box[:2] - points, points - box[2:]), 0)
     return float(np.hypot(*away.T).min(initial=np.inf))
 
 
 def _along(corners: np.ndarray, step: float) -> np.ndarray:
-    """Return points along a curve, so near to each other that no label fits between two."""
+    """Return points along a curve, so close together that no label fits between two of them."""
     pieces = [corners]
     for begin, end in pairwise(corners):
         if np.isfinite(begin).all() and np.isfinite(end).all():

@@ -11,7 +11,7 @@ FIT = {"color": WALL, "lw": 1.1}
 
 @page
 def draw(fit: Lipschitz) -> Figure:
-    """Return the picture: position, velocity and acceleration of the fit over what was recorded, or true."""
+    """Return the picture: position, velocity and acceleration of the fit over the recorded or true values."""
     wall = fit.scene.wall
     title = (
         f"{fit.scene.name}: {len(fit.sines.rad_per_s)} sines fitted to a hit of "

@@ -1,4 +1,4 @@
-"""The picture of what rate buys: the largest stable stiffness against the rate, and what ends it."""
+"""The picture of what the rate buys: the largest stable stiffness against the rate, and the parts that limit it."""
 
 from matplotlib.figure import Figure
 
@@ -8,13 +8,13 @@ from .style import THEORY, ink, looks, new_figure, page
 
 STYLES = "-", "--", "-.", ":"
 OWN = 0.45
-"""Where the stiffness at the scene's own rates stands, as a share of the lowest rate."""
+"""The abscissa of the stiffness at the scene's own rates, as a share of the lowest rate."""
 TOP_KN_PER_M = 1500.0
 
 
 @page
 def draw(rates: Rates) -> Figure:
-    """Return the picture."""
+    """Return the picture of the largest stable stiffness against the rate."""
     gains, limits = rates.gains, rates.limits
     scene = gains[0].own.case.scene
     rates_khz = [rate / 1e3 for rate in gains[0].rates_hz]
@@ -45,13 +45,15 @@ def draw(rates: Rates) -> Figure:
     axes.set_xlabel("rate of estimator and force (kHz)")
     axes.set_ylabel("largest stable stiffness K of the map (kN/m)")
     leaving = []
-    for style, (left, limit) in zip(STYLES, limits.items(), strict=True):
+    for style, (parts, limit) in zip(STYLES, limits.items(), strict=True):
         values = [k / 1e3 for k in limit]
         axes.plot(rates_khz, values, color=THEORY, ls=style, lw=1, zorder=1.5)
         if values[-1] < TOP_KN_PER_M:
-            ends.append((f"linear: {left}", values[-1], THEORY))
+            ends.append((f"linear: {parts}", values[-1], THEORY))
         else:
-            leaving.append((f"linear: {left}\n(leaves the picture)", list(zip(rates_khz, values, strict=True)), THEORY))
+            leaving.append(
+                (f"linear: {parts}\n(leaves the picture)", list(zip(rates_khz, values, strict=True)), THEORY)
+            )
     label_right(axes, ends)
     inside = [list(zip(rates_khz, [k / 1e3 for k in gain.largest_n_per_m], strict=True)) for gain in gains]
     inside += [list(zip(rates_khz, [k / 1e3 for k in limit], strict=True)) for limit in limits.values()]

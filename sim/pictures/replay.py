@@ -1,4 +1,4 @@
-"""The picture of a replay: counts and velocities over the recording, a piece of it enlarged, and the error there."""
+"""The picture of a replay: counts and velocities over the recording, an enlarged piece of it, and the error there."""
 
 from pathlib import Path
 
@@ -81,7 +81,7 @@ def _lines(result: Replay) -> list[tuple[str, np.ndarray, dict]]:
 
 
 def _interesting(result: Replay) -> tuple[int, int]:
-    """Return the ends of the piece over which the reference changes most, after the first second if there is more."""
+    """Return the ends of the piece in which the reference changes most, after the first second of a longer record."""
     reference, rate = result.reference_counts_per_s, result.recording.rate_hz
     length = min(max(round(DETAIL_S * rate), 2), len(reference))
     begin = judged_from(rate) if len(reference) > judged_from(rate) + length else 0

@@ -1,8 +1,8 @@
 """The style of all pictures: sizes of a page, fonts, colours of estimators, and files.
 
 A picture is `PAGE_IN` wide, for a page that shows it 700 pixels wide: its smallest letters are then as high as those of
-a footnote. Colours are those of Okabe and Ito and of Tol, which the colour-blind tell apart; a marker says the same as
-a colour does. An estimator has the same colour and marker in every picture.
+a footnote. The colours are those of Okabe and Ito and of Tol, which colour-blind people can distinguish; a marker
+repeats what the colour says. An estimator has the same colour and marker in every picture.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ SUFFIXES = (".pdf", ".png", ".svg")
 PAGE_IN = 7.0
 DPI = 150
 TEXT_PT, LABEL_PT = 9.0, 8.0
-"""Sizes of letters: of titles and axes, and of labels and ticks."""
+"""The sizes of the letters of titles and axes, and of labels and ticks."""
 SETTINGS = {
     "font.size": TEXT_PT,
     "axes.titlesize": TEXT_PT,
@@ -47,9 +47,9 @@ SETTINGS = {
 }
 
 TRUTH = {"color": "0.72", "lw": 3.0}
-"""The style of what is true: a broad pale line, over which a thin estimate is seen and which is seen beside it."""
+"""The style of true values: a broad pale line that stays visible on both sides of a thin estimate."""
 THEORY = "0.35"
-"""The colour of what no run gives."""
+"""The colour of theory, which comes from no run."""
 WALL, FORCE, MARK = "#D55E00", "#000000", "#009E73"
 COLOURS = {
     "fdm": "#444444",
@@ -67,15 +67,15 @@ COLOURS = {
 }
 MARKERS = dict(zip(COLOURS, "ovsD<>^phXP*", strict=True))
 OTHER = {"color": "#000000", "marker": "."}
-"""An estimator that has no colour here yet."""
+"""The style of an estimator that has no colour here yet."""
 FADED = 0.5
-"""The part of white in the palest of several lines of one estimator."""
+"""The share of white in the palest of several lines of one estimator."""
 AT_REST_M = 1e-9
-"""A handle whose RMS of position is less is called at rest."""
+"""The RMS of position below which a handle is called at rest."""
 
 
 def looks(curves: Sequence[tuple[str, str]]) -> list[dict]:
-    """Return the line style of each (estimator, output) of a picture.
+    """Return the line styles of the (estimator, output) pairs of a picture.
 
     Several lines of one estimator's output, with other gains, go from pale to full in their order. A second output is
     dashed, and its markers are open.
@@ -93,12 +93,12 @@ def looks(curves: Sequence[tuple[str, str]]) -> list[dict]:
 
 
 def ink(estimator: str) -> str:
-    """Return the colour in which an estimator is written: the full one, where its line may be pale."""
+    """Return the colour in which an estimator is written: the full colour, even where its line is pale."""
     return COLOURS.get(estimator, OTHER["color"])
 
 
 def page(draw: Callable) -> Callable:
-    """Make a function that returns a figure, or figures by name, draw in the style of all pictures."""
+    """Decorate a function that returns a figure, or figures by name, so that it draws in the style of all pictures."""
 
     @wraps(draw)
     def drawn(*arguments, **options):
@@ -109,15 +109,15 @@ def page(draw: Callable) -> Callable:
 
 
 def new_figure(height_in: float, title: str) -> Figure:
-    """Return a figure as wide as a page, with nothing in it but its title."""
+    """Return a figure as wide as a page, empty except for its title."""
     figure = Figure(figsize=(PAGE_IN, height_in), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)  # which measures text
+    FigureCanvasAgg(figure)  # a canvas that can measure text
     figure.suptitle(title, x=0.01, ha="left")
     return figure
 
 
 def name_above(axes: Axes, columns: int = 2) -> None:
-    """Write the names of a panel's lines above it, where they hide nothing."""
+    """Write the names of a panel's lines above the panel, where they hide nothing."""
     axes.legend(
         loc="lower left",
         bbox_to_anchor=(0.0, 0.98),
@@ -131,24 +131,24 @@ def name_above(axes: Axes, columns: int = 2) -> None:
 
 
 def plain_decades(axis: Axis) -> None:
-    """Give a logarithmic axis whole numbers as its ticks, in place of powers of ten."""
+    """Give a logarithmic axis ticks with plain numbers instead of powers of ten."""
     axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 
 
 def length_text(length_m: float) -> str:
-    """Return a length as text, in a unit that leaves significant digits; `at rest` for what is no motion."""
+    """Return a length as text, in a unit that shows its significant digits; `at rest` for less than `AT_REST_M`."""
     if length_m < AT_REST_M:
         return "at rest"
     return f"{length_m * 1e3:.3g} mm" if length_m >= 1e-4 else f"{length_m * 1e6:.3g} µm"
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a picture: text as text, and nothing in it that varies from run to run.
+    """Write a picture, with text as text, and without anything that varies from run to run.
 
     Raises:
-        ValueError: if its name does not end in one of `SUFFIXES`.
+        ValueError: if the name of the file does not end in one of `SUFFIXES`.
         OSError: if the file cannot be written.
     """
     if path.suffix not in SUFFIXES:
@@ -159,7 +159,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def save_all(drawn: Figure | dict[str, Figure], path: Path) -> list[Path]:
-    """Write what a picture module's `draw` gave, several as STEM-NAME.SUFFIX; return the files that were written.
+    """Write the result of a picture module's `draw`, several figures as STEM-NAME.SUFFIX; return the written files.
 
     Raises:
         ValueError: if the path does not end in one of `SUFFIXES`.

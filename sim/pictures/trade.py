@@ -1,4 +1,4 @@
-"""Pictures of speed against accuracy: what each shortcut of a simulation saves, and how wrong it is."""
+"""Pictures of speed against accuracy: the time and the error of every shortcut of a simulation."""
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -10,7 +10,7 @@ from .labels import label_points
 from .style import COLOURS, LABEL_PT, THEORY, new_figure, page, plain_decades
 
 NAMED = 8
-"""At most so many settings of a panel have their names."""
+"""The largest number of settings of a panel that are labelled."""
 BEST, PLAIN = COLOURS["butterworth"], "0.55"
 NOTES = (
     "blue, on the line: no setting is both faster and more right; those without a name are in the command's table\n"
@@ -24,7 +24,7 @@ QUESTIONS = {
 
 @page
 def draw(trade: Trade) -> dict[str, Figure]:
-    """Return a picture a question, `hit` and `map`: a panel an estimator, error against time."""
+    """Return the pictures of the questions, `hit` and `map`: a panel for every estimator, error against time."""
     return {question.name: _picture(trade, question) for question in QUESTIONS}
 
 
@@ -54,19 +54,20 @@ def _picture(trade: Trade, question: Question) -> Figure:
 
 
 def _spot(point: Point, question: Question, label: str) -> tuple[float, float]:
-    """Return where a point is: time (ms of a hit, s of maps) and error (%)."""
+    """Return the coordinates of a point: time (ms for a hit, s for maps) and error (%)."""
     return question.cost_s(point) * (1e3 if question is HIT else 1.0), question.error(point, label) * 100
 
 
 def _shown(trade: Trade, question: Question) -> list[Point]:
-    """Return a panel's points: a map's steps are nothing to a hit."""
+    """Return the points of a panel; shortcuts of a map's steps are left out for a hit, which they do not change."""
     return [point for point in trade.points if question is MAP or point.shortcut.coarser == 1]
 
 
 def named(trade: Trade, question: Question, label: str) -> list[Point]:
-    """Return the points of a panel that have their names, at most `NAMED`.
+    """Return the points of a panel that are labelled, at most `NAMED`.
 
-    They are the reference, the best, the slowest, and of each axis of shortcuts the boldest, which comes first in it.
+    They are the reference, the best, the slowest, and the boldest shortcut of every axis, which is the first of the
+    axis.
     """
     best, shown = trade.best(question, label), _shown(trade, question)
     chosen = [trade.points[0], best[0], best[-1], max(shown, key=question.cost_s), *best]
@@ -76,7 +77,7 @@ def named(trade: Trade, question: Question, label: str) -> list[Point]:
 
 
 def _draw(axes: Axes, trade: Trade, question: Question, label: str) -> None:
-    """Draw a panel's points, the line through the best, and the scatter."""
+    """Draw the points of a panel, the line through the best points, and the scatter."""
     scatter = trade.scatter(question, label) * 100
     axes.axhspan(-100, scatter, color="0.92", lw=0)
     best = trade.best(question, label)
@@ -93,7 +94,7 @@ def _draw(axes: Axes, trade: Trade, question: Question, label: str) -> None:
 
 
 def _name(axes: Axes, trade: Trade, question: Question, label: str) -> None:
-    """Write the names of a panel's points beside them."""
+    """Write labels beside the points of a panel."""
     best, names = trade.best(question, label), named(trade, question, label)
     labels = [
         (point.shortcut.label, _spot(point, question, label), BEST if point in best else "0.25") for point in names

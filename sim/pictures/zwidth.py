@@ -1,4 +1,4 @@
-"""The picture of a Z-width map: the stable region of each method, and what theory says of it."""
+"""The picture of a Z-width map: the stable region of every method, and the limits from theory."""
 
 from collections.abc import Sequence
 
@@ -15,9 +15,9 @@ from .labels import label_points
 from .style import LABEL_PT, THEORY, ink, looks, new_figure, page
 
 ROOM = 8
-"""So many maps are named at their lines; the names of more stand beside the panel, in the order of their areas."""
+"""The largest number of maps labelled at their lines; more are labelled beside the panel, in order of their areas."""
 SEEN = 0.02
-"""What is lower than this part of the panel is written, not drawn."""
+"""The share of the panel's height below which a limit is written and not drawn."""
 
 
 @page
@@ -67,7 +67,7 @@ def _linear(scene: Scene, dampings: list[float]) -> list[float] | None:
 
 
 def _passive(axes: Axes, scene: Scene, dampings: list[float]) -> list[str]:
-    """Draw the passivity limits where they are high enough to be seen; return in words what they are."""
+    """Draw the passivity limits if they are high enough to be seen; return a description of them."""
     colgate = np.array([theory.colgate_schenkel_n_per_m(scene, damping) for damping in dampings]) / 1e3
     abbott = theory.abbott_okamura_n_per_m(scene) / 1e3
     top = axes.get_ylim()[1]
