@@ -1,4 +1,4 @@
-"""What a scene says of the world, as the loop takes it: parts that it lacks are not there."""
+"""The world of a scene in the form that the loop takes; parts that the scene lacks are left out."""
 
 from ..loop import loop
 from ..world import device
@@ -12,7 +12,7 @@ from .schema import Scene
 
 
 def device_of(scene: Scene) -> device.Device | None:
-    """Return the scene's device; None where it is a rigid handle that the drive's force acts on, advanced exactly."""
+    """Return the scene's device; None for a rigid handle under the drive's force itself, for `rigid`."""
     amplifier, motor, cable, hand = scene.amplifier, scene.motor, scene.transmission, scene.hand
     pulse = _pulse(scene)
     bandwidth_hz = amplifier and amplifier.bandwidth_hz
@@ -49,7 +49,7 @@ def _converter(scene: Scene) -> Converter | None:
 
 
 def output_step_n(scene: Scene) -> float:
-    """Return by how much a command must change to be sure to be felt; 0 where it leaves as it is."""
+    """Return the change of a command (N) that surely changes the output; 0 without a section `output`."""
     output = scene.output
     if output is None:
         return 0.0
@@ -57,7 +57,7 @@ def output_step_n(scene: Scene) -> float:
 
 
 def work_of(world: loop.World) -> int:
-    """Return how many steps of the solver a sample takes, about."""
+    """Return about how many steps of the solver a sample takes."""
     plant = world.plant
     if isinstance(plant, Rigid):
         return 1
@@ -93,7 +93,7 @@ def world_of(scene: Scene) -> loop.World:
 
 
 def start_of(scene: Scene, world: loop.World) -> loop.Progress:
-    """Return where a run begins: at rest, under the push alone."""
+    """Return the start of a run: at rest, under the push alone."""
     position_m, push_n = scene.protocol.start_m, converted(world.converter, world.push_n)
     motion = Motion(position_m, 0.0)
     if not isinstance(world.plant, Rigid):

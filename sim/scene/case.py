@@ -1,4 +1,4 @@
-"""A scene as a value: its text and what is changed of it, of which any process makes the same scene."""
+"""A scene as a value: its text and the changes to it, from which any process makes the same scene."""
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -14,12 +14,12 @@ Key = TypeVar("Key")
 
 @dataclass(frozen=True)
 class Case:
-    """What is hit or mapped.
+    """A scene with changes, to be hit or mapped.
 
     Attributes:
-        label: in tables, legends and errors.
-        source, text: the scene's name or file, and what is in it: the file need not be where a worker runs.
-        changes: of the scene, by dotted key; a value of None takes the key out.
+        label: name of the case in tables, legends and errors.
+        source, text: the scene's name or file, and the file's text, because a worker need not have the file.
+        changes: changes to the scene, by dotted key; a value of None takes the key out.
     """
 
     label: str
@@ -29,10 +29,10 @@ class Case:
 
     @classmethod
     def of(cls, source: str, changes: dict[str, Any] | None = None, label: str = "") -> "Case":
-        """Return the case of a scene by its name or file, which is read here and nowhere else.
+        """Return the case of a scene by its name or file; this is the only place that reads the file.
 
         Raises:
-            SceneError: if there is no such scene, or it cannot be.
+            SceneError: if there is no such scene, or it is not valid.
         """
         case = cls(label, source, read(source), changes or {})
         _ = case.scene
@@ -40,10 +40,10 @@ class Case:
 
     @property
     def scene(self) -> Scene:
-        """The scene, changed; it is made once a process.
+        """The scene with its changes; it is made once a process.
 
         Raises:
-            SceneError: if it cannot be.
+            SceneError: if the scene is not valid.
         """
         try:
             return _scene(_Recipe(self.source, self.text, self.changes))
@@ -55,11 +55,11 @@ class Case:
         return replace(self, changes=self.changes | changes, label=self.label if label is None else label)
 
     def with_defaults(self, changes: dict[str, Any]) -> "Case":
-        """Return the case with changes that give way to its own."""
+        """Return the case with more changes, which its own changes override."""
         return replace(self, changes=changes | self.changes)
 
     def job(self) -> dict[str, Any]:
-        """Return the case as keys of a job, of which a worker makes it again."""
+        """Return the case as keys of a job, from which a worker makes it again."""
         return {"scene": self.source, "text": self.text, "changes": self.changes}
 
     def hitting(
@@ -68,10 +68,10 @@ class Case:
         damping_n_s_per_m: float | None = None,
         start_m: float | None = None,
     ) -> Scene:
-        """Return the scene for a hit of another wall, or from another start; of the scene, these alone are checked.
+        """Return the scene for a hit of another wall, or from another start; only wall and start are checked again.
 
         Raises:
-            SceneError: if there can be no such hit.
+            SceneError: if wall or start are not valid.
         """
         scene = self.scene
         own = scene.wall.stiffness_n_per_m, scene.wall.damping_n_s_per_m, scene.protocol.start_m
@@ -86,7 +86,7 @@ class Case:
 
 @dataclass(frozen=True)
 class _Recipe:
-    """What a scene is made of, with a digest of what Python cannot digest itself."""
+    """The source, text and changes of a scene, with a hash, which Python does not have for `changes`."""
 
     source: str
     text: str
@@ -102,10 +102,10 @@ def _scene(recipe: _Recipe) -> Scene:
 
 
 def accepted(cases: dict[Key, Case]) -> dict[Key, Case]:
-    """Return the cases that can be: words for extreme gains may not fit.
+    """Return the valid cases; a case is not valid if, for example, the words for extreme gains do not fit.
 
     Raises:
-        SceneError: if none can.
+        SceneError: if no case is valid.
     """
     possible, refusal = {}, None
     for key, case in cases.items():

@@ -1,4 +1,4 @@
-"""What is wrong with a scene, in a sentence that begins with the key and says what is accepted."""
+"""Checks of a scene; every error is a sentence that begins with the key and says what is accepted."""
 
 import difflib
 import math
@@ -14,11 +14,11 @@ from .build import device_of
 from .schema import Scene
 
 SAMPLES_MAX = 10**9
-"""Of a run's settling or measuring: a minute or two of the model's time, hours of the RTL's."""
+"""The most samples in a run's settling or measuring: a minute or two with the model, hours with the RTL."""
 STEPS_MAX = 10_000
-"""Of a map, in either direction; of a fixed-step solver, a sample."""
+"""The most steps of a map in either direction, and the most steps of a fixed-step solver in a sample."""
 
-# Which scene key the model's words and fields are, where the names differ.
+# The scene keys of the model's words and fields, where the names differ.
 KEYS = {
     "wall_stiffness": "wall.stiffness_n_per_m",
     "wall_damping": "wall.damping_n_s_per_m",
@@ -28,7 +28,7 @@ KEYS = {
 
 
 def _key_of(field: str, scene: Scene) -> str:
-    """Return the scene key of a word of the axis, or of a field of it or of its gains."""
+    """Return the scene key of a word of the axis, or of a field of the axis or its gains."""
     if field in KEYS:
         return KEYS[field]
     controller = scene.controller
@@ -37,7 +37,7 @@ def _key_of(field: str, scene: Scene) -> str:
 
 
 def check(scene: Scene) -> None:
-    """Raise ValueError for what the sections of a `Scene` cannot see alone; the message begins with the key."""
+    """Raise ValueError for errors that the sections of a `Scene` cannot see alone; the message begins with the key."""
     _check_axis(scene)
     _check_protocol(scene)
     _check_wall(scene)
@@ -74,7 +74,7 @@ def _check_axis(scene: Scene) -> None:
 
 
 def check_hit(scene: Scene) -> None:
-    """Raise ValueError for a start or a wall that cannot be, on a scene that can; the message begins with the key."""
+    """Raise ValueError for an invalid start or wall of an otherwise valid scene; the message begins with the key."""
     _check_start(scene)
     _check_wall(scene)
 
@@ -220,7 +220,7 @@ def sentence(error: dict[str, Any], scene: type[BaseModel]) -> str:
 
 
 def _suggestion(location: tuple, scene: type[BaseModel]) -> str:
-    """Return which keys the section of a misspelt one has, and the nearest first."""
+    """Return a suggestion for a misspelt key: the nearest key of its section, or all keys of the section."""
     section: Any = scene
     for part in location[:-1]:
         kinds = [section.model_fields[part].annotation, *getattr(section.model_fields[part].annotation, "__args__", ())]

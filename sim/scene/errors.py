@@ -1,5 +1,5 @@
-"""What is wrong with a scene."""
+"""The error of a scene."""
 
 
 class SceneError(ValueError):
-    """A scene that cannot be: one line, naming the file, the key and what is accepted."""
+    """A scene is not valid; the message is one line that names the file, the key and what is accepted."""

@@ -1,4 +1,4 @@
-"""Reading scenes: the text of a TOML file, some of its keys changed, as a checked `Scene`.
+"""Reading of scenes: a TOML file, with some of its keys changed, becomes a checked `Scene`.
 
 Every error is one line that names the file, the key and what is accepted.
 """
@@ -22,23 +22,23 @@ def names() -> list[str]:
 
 
 def load(scene: str, changes: dict[str, Any] | None = None) -> Scene:
-    """Return the scene of that name, or in that file, with some keys changed.
+    """Return the scene of a name, or in a file, with some keys changed.
 
     Args:
         scene: one of `names()`, or the path of a TOML file.
         changes: values by dotted key, e.g. `{"handle.mass_kg": 0.5}`; a value of None takes the key out.
 
     Raises:
-        SceneError: in one line, what is wrong, where, and what is accepted.
+        SceneError: if the scene is not valid; the message is one line on what is wrong, where, and what is accepted.
     """
     return parse(scene, read(scene), changes)
 
 
 def read(scene: str) -> str:
-    """Return the text of the scene of that name, or in that file.
+    """Return the text of the scene of a name, or in a file.
 
     Raises:
-        SceneError: if there is none.
+        SceneError: if there is no such scene.
     """
     try:
         return _path(scene).read_text(encoding="utf-8")
@@ -53,10 +53,10 @@ def _path(scene: str) -> Path:
 
 
 def parse(scene: str, text: str, changes: dict[str, Any] | None = None) -> Scene:
-    """Return the scene of a text, with some keys changed: `load` without the file, which messages still name.
+    """Return the scene of a text, with some keys changed: `load` without reading `scene`, which messages still name.
 
     Raises:
-        SceneError: as `load`.
+        SceneError: as in `load`.
     """
     try:
         content = tomllib.loads(text)
@@ -76,7 +76,7 @@ def parse(scene: str, text: str, changes: dict[str, Any] | None = None) -> Scene
         result = Scene(name=_path(scene).stem, **{key: value for key, value in content.items() if key != "name"})
         check(result)
     except ValidationError as error:
-        # A misspelt key is also a missing one: the misspelling says more.
+        # A misspelt key also makes a key missing; the message about the misspelling says more.
         worst = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
         raise SceneError(f"{scene}: {sentence(worst, Scene)}") from None
     except ValueError as error:

@@ -1,4 +1,4 @@
-"""Scenes: TOML files that say what is modelled. A section or key that is absent is not modelled.
+"""Scenes: TOML files that state what is modelled. A section or key that is absent is not modelled.
 
 Units are in the keys. Every error is one line that names the file, the key and what is accepted.
 """
@@ -39,7 +39,7 @@ class EncoderSection(Section):
 
     @cached_property
     def offsets(self) -> tuple[float, float, float, float]:
-        """Where the edges of the four kinds are, counts from their ideal places."""
+        """The distances of the four kinds of edges from their ideal positions, counts."""
         return offsets(self.phase_error_counts, self.duty_error_counts)
 
 
@@ -57,7 +57,7 @@ GainsSection = create_model(
 
 
 class ControllerSection(Section):
-    """The axis: see `hardwall.model.spec.AxisSpec`. Gains go by estimator, `[controller.gains.levant]`."""
+    """The axis: see `hardwall.model.spec.AxisSpec`. Gains are given by estimator, as in `[controller.gains.levant]`."""
 
     clock_hz: Rate
     sample_hz: Rate
@@ -85,7 +85,7 @@ class WallSection(Section):
 
 
 class AmplifierSection(Section):
-    """Of what it lacks it has none: no delay, no lag, no limit. A current's limit needs a motor and a bandwidth."""
+    """The amplifier; a key that is absent means no delay, lag or limit. A current limit needs motor and bandwidth."""
 
     delay_s: NotNegative = 0.0
     bandwidth_hz: Positive | None = None
@@ -103,7 +103,7 @@ class MotorSection(Section):
 
 
 class TransmissionSection(Section):
-    """A cable between motor and handle; the motor's mass is that of rotor and pulley as felt at the handle."""
+    """A cable between motor and handle; the motor's mass is rotor and pulley as felt at the handle."""
 
     stiffness_n_per_m: Positive
     damping_n_s_per_m: NotNegative = 0.0
@@ -113,7 +113,7 @@ class TransmissionSection(Section):
 
 
 class HandSection(Section):
-    """It moves with the handle and holds it, with a spring to `rest_m` and a damper."""
+    """A hand that moves with the handle and holds it, by a spring to `rest_m` and a damper."""
 
     mass_kg: NotNegative
     damping_n_s_per_m: NotNegative
@@ -122,7 +122,7 @@ class HandSection(Section):
 
 
 class OutputSection(Section):
-    """Steps of a converter (`dac_bits`), or pulses (`pwm_carrier_hz`, `pwm_steps` of a period); full scale is +-."""
+    """Steps of a converter (`dac_bits`), or pulses (`pwm_carrier_hz`, `pwm_steps` a period), up to +- full scale."""
 
     full_scale_n: Positive
     dac_bits: Annotated[int, Field(ge=2, le=32)] | None = None
@@ -131,15 +131,15 @@ class OutputSection(Section):
 
 
 class SolverSection(Section):
-    """The device in steps of semi-implicit Euler, no longer than `step_s`, as most simulations have it; without this
-    section it is advanced exactly from event to event."""
+    """Steps of semi-implicit Euler, no longer than `step_s`, as in most simulations; without this section the device is
+    advanced exactly from event to event."""
 
     step_s: Positive
 
 
 class ProtocolSection(Section):
-    """A hit: from rest at `start_m`, pushed towards the wall; the mean over `mean_s` before `settle_s` is held against
-    the `measure_s` after it. A wall whose RMS is under the threshold is stable."""
+    """A hit from rest at `start_m`, pushed towards the wall. A wall is stable if the RMS distance over `measure_s` after
+    `settle_s`, from the mean over `mean_s` before it, is under the threshold."""
 
     start_m: Annotated[float, Field(lt=0, allow_inf_nan=False)]
     push_n: Positive
@@ -150,7 +150,7 @@ class ProtocolSection(Section):
 
 
 class ZWidthSection(Section):
-    """Steps of a map of stable walls, and how many below its edge are hit too: see `hardwall.sim.walls.boundary`."""
+    """Steps of a map of stable walls, and the number of walls hit below its edge: see `hardwall.sim.walls.boundary`."""
 
     stiffness_step_n_per_m: Positive
     stiffness_to_n_per_m: Positive
@@ -195,7 +195,7 @@ class Scene(Section):
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Run-time parameters in SI units, by word; the count is 0 at the start, so the wall is so far from there."""
+        """Run-time parameters in SI units, by word; the count is 0 at the start, so the wall is at -`start_m`."""
         si = {
             "encoder_glitch_clocks": self.controller.glitch_clocks,
             "wall_stiffness": self.wall.stiffness_n_per_m,
@@ -210,7 +210,7 @@ class Scene(Section):
 
     @property
     def words(self) -> dict[str, int]:
-        """The same as the hardware takes them."""
+        """The run-time parameters as the hardware's words."""
         return self.spec.design.encode(**self.parameters)
 
     def hitting(self, stiffness_n_per_m: float, damping_n_s_per_m: float, start_m: float) -> "Scene":
@@ -221,11 +221,11 @@ class Scene(Section):
 
     @property
     def delay_samples(self) -> int:
-        """Samples by which the amplifier is late."""
+        """Delay of the amplifier, in samples."""
         return 0 if self.amplifier is None else round(self.amplifier.delay_s * self.controller.sample_hz)
 
     @property
     def samples(self) -> int:
-        """Samples of the protocol: those to settle, and those to measure."""
+        """Number of samples of the protocol, for settling and measuring together."""
         rate = self.controller.sample_hz
         return round(self.protocol.settle_s * rate) + round(self.protocol.measure_s * rate)
