@@ -138,8 +138,8 @@ class SolverSection(Section):
 
 
 class ProtocolSection(Section):
-    """A hit from rest at `start_m`, pushed towards the wall. A wall is stable if the RMS distance over `measure_s` after
-    `settle_s`, from the mean over `mean_s` before it, is under the threshold."""
+    """A hit from rest at `start_m`, pushed towards the wall. A wall is stable if the RMS distance over `measure_s`
+    after `settle_s`, from the mean over `mean_s` before it, is under the threshold."""
 
     start_m: Annotated[float, Field(lt=0, allow_inf_nan=False)]
     push_n: Positive
