@@ -59,20 +59,16 @@ def fit(times_s: np.ndarray, values: np.ndarray, count: int = 7) -> Sines:
     slowest, fastest = np.pi / 2 / span_s, np.pi / np.diff(times_s).mean()
     candidates = slowest * np.arange(1, min(8 * len(values) // 2, 2000))
     candidates = candidates[candidates < fastest]
-    frequencies = np.empty(0)
+    omegas = np.empty(0)
     for _ in range(count):
-        rest = (
-            values - _basis(times_s, frequencies) @ _amplitudes(times_s, values, frequencies)
-            if len(frequencies)
-            else values
-        )
+        rest = values - _basis(times_s, omegas) @ _amplitudes(times_s, values, omegas) if len(omegas) else values
         turn = np.exp(-1j * np.multiply.outer(candidates, times_s))
-        free = np.array([np.min(np.abs(new - frequencies), initial=np.inf) > slowest / 2 for new in candidates])
-        frequencies = np.append(frequencies, candidates[free][np.argmax(np.abs(turn[free] @ rest))])
-        frequencies = _searched(times_s, values, frequencies, slowest, fastest)
-    frequencies = np.sort(frequencies)
-    amplitudes = _amplitudes(times_s, values, frequencies)
-    return Sines(frequencies, amplitudes[:count], amplitudes[count:])
+        free = np.array([np.min(np.abs(new - omegas), initial=np.inf) > slowest / 2 for new in candidates])
+        omegas = np.append(omegas, candidates[free][np.argmax(np.abs(turn[free] @ rest))])
+        omegas = _searched(times_s, values, omegas, slowest, fastest)
+    omegas = np.sort(omegas)
+    amplitudes = _amplitudes(times_s, values, omegas)
+    return Sines(omegas, amplitudes[:count], amplitudes[count:])
 
 
 def _searched(times_s, values, start, slowest, fastest) -> np.ndarray:
