@@ -155,7 +155,7 @@ def study(case: Case, mapping: Mapping) -> Search:
         mapping: function that makes the maps.
 
     Raises:
-        SceneError: if the scene is not valid, alone or with any of the gains, or has no section `zwidth`.
+        SceneError: if the scene is not valid, or is refused with all of the gains, or has no section `zwidth`.
     """
     plain = case.scene
     bound = plain.controller.acceleration_max_m_per_s2
