@@ -196,7 +196,8 @@ def _timing(device: Device, report: dict) -> tuple[float, str]:
     """Return a report's longest delay between registers, in ns, and the two ends of its path."""
     clock, fmax = min(report["fmax"].items(), key=lambda item: item[1]["achieved"])
     longest = 1e3 / fmax["achieved"]
-    path = next(each["path"] for each in report["critical_paths"] if each["from"] == each["to"] == f"posedge {clock}")
+    paths = report["critical_paths"]
+    path = next(entry["path"] for entry in paths if entry["from"] == entry["to"] == f"posedge {clock}")
     ends = f"{_signal(path[0]['from'])} to {_signal(path[-1]['to'])}"
     if device.multiplier_ns is not None:
         # Blocks without registers have no clock: nextpnr treats them as clocked by a constant.
@@ -261,7 +262,7 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
         glitch_clocks: the decoder's glitch filter, which is part of the latency.
 
     Returns:
-        estimator, device: what was placed where.
+        estimator, device: names of the estimator and the device.
         seeds, fmax_mhz_seeds: the highest clock with each seed; fmax_mhz: their median.
         clock_mhz, slack_ns: the axis's clock, and its period less the period of fmax_mhz; ok: whether the slack is at
             least 0.

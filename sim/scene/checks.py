@@ -208,15 +208,15 @@ def sentence(error: dict[str, Any], scene: type[BaseModel]) -> str:
     if key == "encoder.phase_error_counts":
         return f"{key} must be a finite number, or a list of four, not {error['input']!r}"
     relations = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
-    wanted = " and ".join(f"{words} {limits[short]:g}" for short, words in relations.items() if short in limits)
-    if not wanted:
-        wanted = (
+    accepted = " and ".join(f"{words} {limits[short]:g}" for short, words in relations.items() if short in limits)
+    if not accepted:
+        accepted = (
             error["msg"]
             .removeprefix("Input should be ")
             .replace("a valid ", "a ")
             .replace("a integer", "a whole number")
         )
-    return f"{key} must be {wanted}, not {error['input']!r}"
+    return f"{key} must be {accepted}, not {error['input']!r}"
 
 
 def _suggestion(location: tuple, scene: type[BaseModel]) -> str:

@@ -77,7 +77,7 @@ def parse(scene: str, text: str, changes: dict[str, Any] | None = None) -> Scene
         check(result)
     except ValidationError as error:
         # A misspelt key also makes a key missing; the message about the misspelling says more.
-        worst = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
+        worst = min(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
         raise SceneError(f"{scene}: {sentence(worst, Scene)}") from None
     except ValueError as error:
         raise SceneError(f"{scene}: {error}") from None
