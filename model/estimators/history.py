@@ -153,7 +153,7 @@ def take(params, state, count, restart):
 
 @compiled
 def change_over(params, state, age):
-    """Return the change since `age` stored positions ago, 1 to `Design.age_max`, at a sample that stores its position."""
+    """Return the change since `age` stored positions ago, 1 to `Design.age_max`, at a sample that is stored."""
     if age > state.known:
         return state.position
     positions = state.positions

@@ -7,35 +7,37 @@ Per sample, with f the count, x its tracked value, u1 the integral state, all in
     x  <- x + u
     u1 <- u1 - alpha sign(e)                 sign(0) = 0
 
-The tracked x is held as its distance to the last count, `lead = x - f`, so that the count may wrap: e = lead - (new
-count - last count). Selectable outputs: `u`, the paper's, and `u1`, the integral state after this sample's update.
+The tracked x is held as its distance from the last count, `lead = x - f`, so that the count may wrap: e = lead - (new
+count - last count). Selectable outputs: `u`, as in the paper, and `u1`, the integral state after this sample's update.
 
 Source: Chawda, Celik, O'Malley, World Haptics 2011, equations of the first-order differentiator; Levant 1998.
 
 Formats, derived. Let lam = lambda tau / sqrt(q) and alp = alpha tau^2 / q be the gains per sample.
 
-- `velocity` SQ(i, f): i holds twice the largest speed, since u swings about the true velocity.
+- `velocity` SQ(i, f): i holds twice the largest speed, since u oscillates about the true velocity.
 - f, the fraction bits of e, u and u1 alike (x + u and u1 - alpha are then exact): alpha's word is at least
-  2**ALPHA_BITS, so it is off by at most 2**-(ALPHA_BITS+1); and rounding u to f bits costs no more position than below.
+  2**ALPHA_BITS, so its relative error is at most 2**-(ALPHA_BITS+1); and rounding u to f bits stays within the position
+  budget below.
 - `root`, the format of sqrt(|e|), and f. The integer root rounds down, so half of its LSB is added back (a constant
-  bit below it): no bias, and an error of at most half an LSB. With half an LSB of u, rounding moves u by at most
-  delta = lam 2**-(root.f+1) + 2**-(f+1). The same u follows exactly from an e smaller or larger by
+  bit below it): no bias, and an error of at most half an LSB. Together with half an LSB of u, rounding changes u by at
+  most delta = lam 2**-(root.f+1) + 2**-(f+1). The same u follows exactly from an e smaller or larger by
   eta <= 2 sqrt(|e|) delta / lam + (delta / lam)^2: *the fixed-point estimator is the exact one on a position perturbed
-  by eta*. At |e| = 1 count, where quantisation keeps it, each of the two parts is held to POSITION_BUDGET / 2 counts.
-- `error` SQ(i, f): lam sqrt(e_max) is at least twice the largest speed, so a velocity step from end to end is still
-  caught; but never more than the count can tell. Beyond, e saturates (flag `error_saturated`), which drags x along.
-- `lambda` UQ, GAIN_BITS wide, with two bits of headroom above the designed gain for changes at run time;
-  `alpha` likewise.
+  by eta*. At |e| = 1 count, where quantisation keeps e, either part is held to POSITION_BUDGET / 2 counts.
+- `error` SQ(i, f): lam sqrt(e_max) is at least twice the largest speed, so a velocity step across the whole range is
+  still followed; but e_max is never more than the range of the count. A larger e saturates (flag `error_saturated`),
+  which drags x along.
+- `lambda` UQ, GAIN_BITS wide, with two bits of headroom above the designed gain for changes at run time; `alpha` has
+  the same headroom.
 
 Both states saturate at the velocity format (flag `velocity_saturated`).
 
-Ends. The count may wrap. The first sample, and one with `restart`, begins with x = count and u1 = 0: from rest there is
-no transient; out of a motion u0 it is that of a step of u0, which u overshoots by about 40 % and follows in about
-2 u0 / alpha, as it does the largest step (0.3 m/s with C = 12 m/s^2: 0.42 m/s at most, 43 ms). Up to the largest speed
-nothing saturates once that is over. At standstill u and u1 never come to rest but chatter by lambda sqrt(alpha tau^2)
-and alpha tau: see `levant_semi_implicit` for what does.
+Limits. The count may wrap. The first sample, and a sample with `restart`, begin with x = count and u1 = 0: a start from
+rest has no transient; a start in motion at u0 has the transient of a step of u0, which u overshoots by about 40 % and
+follows in about 2 u0 / alpha, as it does the largest step (0.3 m/s with C = 12 m/s^2: 0.42 m/s at most, 43 ms). Up to
+the largest speed nothing saturates after that transient. At standstill u and u1 never come to rest but chatter by
+lambda sqrt(alpha tau^2) and alpha tau; `levant_semi_implicit` comes to rest.
 
-`levant_semi_implicit`, `levant_implicit` and `levant_adaptive` take from here what they have in common with it.
+`levant_semi_implicit`, `levant_implicit` and `levant_adaptive` share this module's gains, design and helper functions.
 """
 
 import math
@@ -55,9 +57,9 @@ if TYPE_CHECKING:
     from ..spec import AxisSpec
 
 ALPHA_BITS = 9
-"""The designed alpha's word has at least this many bits below its top one: it is off by 0.1 % at most."""
+"""The designed alpha's word has at least this many bits below its top bit: its error is at most 0.1 %."""
 POSITION_BUDGET = 2.0**-5
-"""How far, in counts, all rounding may displace the position at |e| = 1 count."""
+"""Largest displacement of the position, in counts, by all rounding at |e| = 1 count."""
 HEADROOM_BITS = 2
 """A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
 STEPS = 7
@@ -66,14 +68,14 @@ STEPS = 7
 
 @dataclass(frozen=True)
 class Gains(EstimatorGains):
-    """Gains in SI units: lambda in m^(1/2)/s, alpha in m/s^2."""
+    """The gains in SI units: lambda in m^(1/2)/s, alpha in m/s^2."""
 
     lambda_sqrt_m_per_s: float
     alpha_m_per_s2: float
 
     @classmethod
     def default(cls, axis: "AxisSpec") -> "Gains":
-        """Return the paper's proposed gains for |f''| <= C, the axis's bound: lambda = sqrt(C), alpha = 1.1 C."""
+        """Return the gains proposed by the paper for |f''| <= C, the axis's bound: lambda = sqrt(C), alpha = 1.1 C."""
         bound = axis.acceleration_max_m_per_s2
         return cls(math.sqrt(bound), 1.1 * bound)
 
@@ -93,7 +95,7 @@ class Params(NamedTuple):
 
 
 class State(NamedTuple):
-    """`lead` and `u1` have the fraction bits of the velocity format (float: counts); `count` is the last one."""
+    """The state; `lead` and `u1` have the velocity's fraction bits (float: counts), `count` is the last count."""
 
     running: int
     count: int  # type: ignore[assignment]  # a tuple has a method of this name
@@ -113,19 +115,20 @@ FLOAT_START = State(0, 0, 0.0, 0.0)
 
 
 class Design(EstimatorDesign):
-    """Formats, run-time words and latency of the differentiator for an axis: the module says how they follow.
+    """Formats, run-time words and latency of the differentiator for an axis, derived as the module says.
 
-    Its kin of other kernels differ in the attributes of the class and in the methods that begin with one underscore.
+    The designs of the other kernels of the family override the attributes of the class and the methods that begin with
+    one underscore.
 
     Attributes:
         steps: clocks of the sequence besides the root.
-        roundings: how often u is rounded to its fraction bits.
-        velocity, error, root, radicand: formats of u and u1, e, sqrt(|e|) and its integer radicand.
+        roundings: number of roundings of u to its fraction bits.
+        velocity, error, root, radicand: formats of u and u1, e, sqrt(|e|), and the root's integer radicand.
         product: fraction bits of lambda times twice the root.
         words: `levant_lambda`, `levant_alpha`, `levant_output`.
 
     Raises:
-        ValueError: if the gains do not fit any format that int64 can hold, with the accepted range.
+        ValueError: if the gains fit no format that int64 can hold, with the accepted range.
     """
 
     name = "levant"
@@ -143,7 +146,7 @@ class Design(EstimatorDesign):
         speed = axis.speed_max_counts_per_sample
 
         i = 1 + bits_for(max(2 * speed, 2.0))
-        # A gain that moves u across its whole range in a sample is no gain; one too small needs more than int64.
+        # A gain may not move u across its whole range in a sample; a gain too small needs more bits than int64 has.
         f_max = 60 - max(axis.count_width, i)
         largest = 2.0 ** (i - 1)
         least_lam, least_alpha = self._least(f_max)
@@ -154,7 +157,7 @@ class Design(EstimatorDesign):
         self.lambda_ = UQ(lam_i, GAIN_BITS - lam_i)
         error_i = 1 + min(max(bits_for(self._catch(2 * speed, lam)), 1), axis.count_width - 1)
         radicand_i = self._radicand_i(error_i)
-        # A radicand is one of 62 bits at most.
+        # A radicand has at most 62 bits.
         root_f = min(bits_for(self._position_per_root(lam) / POSITION_BUDGET), (62 - radicand_i) // 2)
         root_f = max(root_f - axis.estimator_bits_dropped, 0)
         self.product = self.lambda_.f + root_f + 1
@@ -164,7 +167,7 @@ class Design(EstimatorDesign):
         self.error = SQ(error_i, f)
         self.radicand = UQ(radicand_i, 2 * root_f)
         self.root = UQ((self.radicand.width + 1) // 2 - root_f, root_f)
-        # The step of u before it is limited, and one bit: in int64.
+        # The step of u before its limit, and one more bit, must fit int64.
         _check(
             gains.lambda_sqrt_m_per_s,
             "lambda_sqrt_m_per_s",
@@ -194,7 +197,7 @@ class Design(EstimatorDesign):
         return self.roundings * 2 / (2.0**f_max * POSITION_BUDGET), 2.0 ** (ALPHA_BITS - f_max)
 
     def _position_per_root(self, lam: float) -> float:
-        """Return by how many counts a root's error of 1 displaces the position at |e| = 1 count."""
+        """Return the displacement of the position, in counts, by an error of 1 in the root at |e| = 1 count."""
         return 2.0
 
     def _fraction(self, axis, lam: float, alpha: float, f_max: int) -> int:
@@ -207,7 +210,7 @@ class Design(EstimatorDesign):
         return (step / lam) ** 2
 
     def _radicand_i(self, error_i: int) -> int:
-        """Return the integer bits of the radicand, with those of the error."""
+        """Return the integer bits of the radicand for an error of `error_i` integer bits."""
         return error_i - 1
 
     @property
@@ -221,7 +224,7 @@ class Design(EstimatorDesign):
         return self._float_common(gains, output, si)
 
     def _common(self, words: Mapping[str, int]) -> Params:
-        """Return what every integer kernel of the family takes."""
+        """Return the parameters that all integer kernels of the family share."""
         lam, alpha, output = (words[word.name] for word in self.words)
         return Params(
             lambda_=lam,
@@ -236,7 +239,7 @@ class Design(EstimatorDesign):
         )
 
     def _float_common(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
-        """Return what every float64 kernel of the family takes, gains per sample."""
+        """Return the parameters that all float64 kernels of the family share, with gains per sample."""
         lam, alpha, _ = self.words
         return FloatParams(
             lambda_=si.get(lam.name, gains.lambda_sqrt_m_per_s) / lam.si_per_unit,
@@ -258,14 +261,14 @@ def _check(value: float, name: str, low: float, high: float, scaled: float) -> N
 
 @compiled
 def sign_of(value):
-    """Return -1, 0 or 1."""
-    # int() for plain Python on numpy scalars, whose truths do not subtract.
+    """Return the sign of `value`: -1, 0 or 1."""
+    # int() is for plain Python on numpy scalars, whose bools cannot be subtracted.
     return int(value > 0) - int(value < 0)
 
 
 @compiled
 def arrive(params, state, seen, restart):
-    """Return (counts moved since the last sample, lead, u1), all 0 at the first sample; of either kernel."""
+    """Return (counts moved since the last sample, lead, u1), all 0 at the first sample, for either kernel."""
     fresh = restart or not state.running
     moved = 0 if fresh else wrap(seen.count - state.count, params.count_width)
     return moved, 0 if fresh else state.lead, 0 if fresh else state.u1
@@ -292,7 +295,7 @@ def step(params, state, seen, restart):
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
-    """The paper's algorithm in float64, unsaturated: the reference for what fixed point costs."""
+    """Take one sample by the paper's algorithm in float64, unsaturated: the reference for the cost of fixed point."""
     moved, lead, u1 = arrive(params, state, seen, restart)
 
     error = lead - moved

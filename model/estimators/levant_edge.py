@@ -1,49 +1,53 @@
 """Velocity from the clock stamps of the encoder's edges: a sliding-mode differentiator of events, in fixed point.
 
-At an edge the position is known, to a clock; between edges, not at all. So the error is that of the place which the
-estimate predicted for an edge, over the time T that it took, and nothing is corrected in between. With D clocks a
-sample, v in counts a sample, a in that a clock, T and s in clocks, L the bits of T (2**(L-1) <= T < 2**L), and n the
-edges passed (0 where the same edge is crossed back), at each edge in use:
+At an edge the position is known to a clock; between edges it is not known. So the error is taken at an edge, between
+the place predicted for it over the interval T and its true place, and nothing is corrected between edges. With D clocks
+a sample, v in counts a sample, a in counts a sample per clock, T and s in clocks, L the bits of T
+(2**(L-1) <= T < 2**L), and n the edges passed (0 if the same edge is crossed back), at every edge in use:
 
     E = (v + a T/2) T - (n D + place[this edge] - place[last edge])
     v <- v + a T - min(|E| / T, lambda sqrt(|E| 2**L)) sign(E)
     a <- a - min(|E| / T / 2**L, alpha 2**L) sign(E)                      |a| <= 2**ACCELERATION_BITS C, or next above
 
-and at every sample, s clocks after it, u = v + a s: that line is the output, `u`.
+and at every sample, s clocks after that edge (the anchor), u = v + a s; this line is the output, `u`.
 
-The two minima are the sliding mode: sqrt and sign of the error, and where those would carry past the surface E = 0,
-the step that ends on it (the implicit discretisation: no chatter at any rate). |E| / T alone gives v = n D / T + a T/2:
-the mean velocity of the interval, carried on by half of it. In a, dividing by 2**L instead of T needs no second
-division, and saves the loop: for constant T and g = T / 2**L in (1/2, 1], z^2 - (1 - g/2) z + g/2 = 0, |z| <= 0.71.
-For an interval of more than `mantissa` bits there is no limit: no error that an axis makes reaches it.
+The two minima are the sliding mode: the square root and the sign of the error, or, where those would pass the surface
+E = 0, the step that ends on it (the implicit discretisation: no chatter at any rate). |E| / T alone gives
+v = n D / T + a T/2: the mean velocity of the interval, extrapolated by half of it. In a, division by 2**L instead of T
+needs no second division, and it stabilises the loop: for constant T and g = T / 2**L in (1/2, 1],
+z^2 - (1 - g/2) z + g/2 = 0, |z| <= 0.71. In an interval of more than `mantissa` bits the limits do not apply: no error
+that an axis makes reaches them.
 
-Which edges. The stamp is off by up to a clock, so over T the velocity by speed / T: intervals of less than
-2**shortest clocks are not used, with 2**shortest the T at which that equals what C changes over T, at the largest
-speed: sqrt(speed / (clock C)); but not more than a quarter of the time in which C moves a count, sqrt(q / C). An edge
-too close that stays the last for twice as long becomes the anchor, with nothing corrected.
+Edges in use. A stamp is off by up to a clock, so the velocity over T is off by speed / T: intervals of less than
+2**shortest clocks are not used. 2**shortest is the T at which, at the largest speed, that error equals the change of
+velocity by C over T: sqrt(speed / (clock C)); but at most a quarter of the time in which C moves a count, sqrt(q / C).
+An edge too close to the anchor that stays the last edge for twice as long becomes the anchor, without a correction.
 
-The places of edges. A real scale has its four kinds of edges (by pin and polarity, in the upward sense) off their
-places, by up to half a count. `place` holds them, times D; with a full cycle in one direction behind it, an edge moves
-the place of its own kind and that of the last one apart by E 2**-LEARN_SHIFT, at most D/4 to D/2 of E; four unknowns,
-one of which is the origin, which the symmetric step leaves. For the two patterns of a cycle that steady speed shows,
-the loop from places over v and a to E is 2 and (1 + j) / (1 - g/2): positive real part, so learning is stable with any
-step less than 1/4; it takes some ten cycles. (With g = 1 and v corrected by a as well it is not: the table.) A
-residual of an interval cut by k bits counts 2**-k of itself: slow motion learns slowly.
+The places of edges. On a real scale the four kinds of edges (by pin and polarity, in the upward sense) are out of
+place by up to half a count. `place` holds the displacements, times D. After a full cycle in one direction, an edge
+moves the place of its own kind and that of the last edge apart by E 2**-LEARN_SHIFT, with |E| limited to D/4 to D/2.
+One of the four unknowns is the origin, which the symmetric step does not move. For the two patterns of a cycle that
+steady speed excites, the loop from places over v and a to E is 2 and (1 + j) / (1 - g/2): its real part is positive, so
+learning is stable with any step less than 1/4; it takes some ten cycles. (With g = 1, and v corrected by a as well, it
+is not stable: see the table.) The residual of an interval cut by k bits is weighted by 2**-k: slow motion learns
+slowly.
 
-What no further edge allows. With v at the anchor and no edge for s clocks, constant deceleration that stops within
-the cell leaves at most 2 D/s - |v|; and one that turns within it returns no faster than v. The line is held within -v
-and (5/2) D 2**-l - v, where 2**l <= s < 2**(l+1): never tighter than a cell a quarter too wide. An axis rests, v = a =
-0, once s has more than REST_BITS bits more than the last T: for a parabola through the cell it never does (its longest
-interval is 4.8 times the one before); and, edges slower than that not being told from rest, after half the range of
-the stamp. A stop from constant speed reads exactly 0 after 2.5 to 5 times the time of a count (and two of the shortest
-intervals, where a count takes less), at the latest after 16 intervals; until then it reads the old speed.
+The bound without a further edge. With v at the anchor and no edge for s clocks, a constant deceleration that stops
+within the cell leaves at most 2 D/s - |v|, and a motion that turns within the cell returns no faster than v. The line
+is held within -v and (5/2) D 2**-l - v, where 2**l <= s < 2**(l+1): never tighter than for a cell a quarter too wide.
+An axis is at rest, v = a = 0, once s has more than REST_BITS bits more than the last T, which never happens in a
+parabola through the cell (its longest interval is 4.8 times the one before); and also after half the range of the
+stamp, since slower edges cannot be distinguished from rest. A stop from constant speed reads exactly 0 after 2.5 to 5
+times the time of a count (plus two of the shortest intervals, if a count takes less), and at the latest after 16
+intervals; until then it reads the old speed.
 
 Guarantee. For |f''| <= C, place errors up to p counts and E on the surface, |u - f'| <= (C + |a|)(T/2 + s) + 2 p D / T
-with T the last interval in use; the motion is reached within a few edges, as each step takes at least lambda or alpha's
-share. (|a| is near the true one, so this is far from tight; but an a of any size in the format breaks nothing.)
+with T the last interval in use; the motion is reached within a few edges, as every step takes at least the share of
+lambda or alpha. (|a| is near the true value, so this is far from tight; but no a within the format breaks the bound.)
 
-Measured, RMS error in mm/s. 50 exp(-t) sin(2 pi t) mm, t in [1, 5] s, 1 um, 1 MHz, gains for C = 12 m/s^2, 50 MHz
-stamps, then with B late by 0.25 count; hit: 0.35 kg at 0.3 m/s on 10 kN/m and 20 N s/m (up to 68 m/s^2), then so too.
+Measured RMS error in mm/s. Paper: 50 exp(-t) sin(2 pi t) mm, t in [1, 5] s, 1 um, 1 MHz, gains for C = 12 m/s^2,
+50 MHz stamps; hit: 0.35 kg at 0.3 m/s on 10 kN/m and 20 N s/m (up to 68 m/s^2); late: the same with B late by
+0.25 count.
 
     design, float                                                 paper    late     hit     late
     levant on the count, u / u1                                   1.75 / 0.58       177 / 258
@@ -60,21 +64,22 @@ stamps, then with B late by 0.25 count; hit: 0.35 kg at 0.3 m/s on 10 kN/m and 2
     this one, float and fixed                                     0.0065   0.0063   0.060   0.059
       20 MHz stamps                                               0.013    0.013    0.095   0.43
 
-Where it is worse than `levant` u1: at constant speed of a metre a second (0.22 against 0.013: the stamp over the
-shortest interval), for vibration of a count or so at hundreds of hertz (12 m/s^2 up to 1 kHz: 1.7 to 2.2 against 1.2,
-peaks of 17), in the intervals after a stop from a millimetre a second or less; and on recorded counts, whose edges have
-no stamps of their own: those made up between two samples are no better than the sample.
+This estimator is worse than `levant` u1 at a constant speed of a metre a second (0.22 against 0.013: the stamp's error
+over the shortest interval), for vibration of about a count at hundreds of hertz (12 m/s^2 up to 1 kHz: 1.7 to 2.2
+against 1.2, peaks of 17), in the intervals after a stop from a millimetre a second or less, and on recorded counts,
+whose edges have no stamps: stamps interpolated between two samples are no better than the samples.
 
 Source: Levant 1998 for the law; implicit discretisation of sliding modes after Acary and Brogliato; its use on
 stamped edges with learnt places is this project's.
 
-Saturation. v and u at the velocity format (flag `velocity_saturated`); the distance, or |E| / T at the velocity format
-(flag `error_saturated`), after which a motion within the format is found again at the next edges. Acceleration, places
-and what is learnt saturate silently: as limits they are part of the law, in float64 too.
+Saturation. v and u saturate at the velocity format (flag `velocity_saturated`); the distance saturates at its format
+and |E| / T at the velocity format (flag `error_saturated`), after which the next edges recover a motion within the
+format. Acceleration, places and the learning step saturate silently: as limits they are part of the law, in float64
+too.
 
-Ends. The count may wrap, and the stamp: differences are modulo their widths. The first sample, and one with `restart`,
-forgets all, the places too; u = 0 until the second edge in use after it, so a reset in motion is no transient. An
-interval of half the stamp's range or more says only where the axis is.
+Limits. The count and the stamp may wrap: differences are modulo their widths. The first sample, and a sample with
+`restart`, forget everything, the places included; u = 0 until the second edge in use after it, so a reset in motion
+causes no transient. An interval of half the stamp's range or more only sets a new anchor.
 """
 
 import math
@@ -90,17 +95,17 @@ from .levant_edge_design import LEARN_SHIFT, Design, FloatParams, Gains, Params,
 
 __all__ = ["Design", "Gains"]
 REST_BITS = 3
-"""An axis rests when 2**REST_BITS of the last intervals, rounded up to a power of two, have brought no edge."""
+"""An axis is at rest after 2**REST_BITS times the last interval, rounded up to a power of two, without an edge."""
 LEFT_MAX = 46
-"""No left shift of a gain word exceeds this, beyond which all of them saturate: 16 + 46 bits fit int64."""
+"""Largest left shift of a gain word, beyond which every result saturates anyway: 16 + 46 bits fit int64."""
 ANCHOR, FIRST, TIMED, CARRIED, LOOSE = range(5)
-"""What the last edge is: the anchor itself; the first known; one to correct by; one too close that has stayed the last
-for long, a new anchor as well; one too close as yet."""
+"""The last edge is: the anchor itself; the first known edge; an edge to correct by; an edge too close to the anchor that
+has long stayed the last and becomes the anchor; an edge that is still too close."""
 
 
 @compiled
 def _length(value):
-    """Return the bits of a word: the least n with value < 2**n."""
+    """Return the number of bits of a word: the least n with value < 2**n."""
     n = 0
     while value >> n:
         n += 1
@@ -115,20 +120,20 @@ def _number(params, seen):
 
 @compiled
 def _kind(seen):
-    """Return which of the four edges of a cycle of the scale the last one was: the kind it is upwards."""
+    """Return the kind that the last edge has in upward motion, one of the four in a cycle of the scale."""
     return seen.edge ^ seen.down << 1
 
 
 @compiled
 def _started(params, seen, zero):
-    """Return the state of a first sample: its edge is where time and position count from, but was not seen to come."""
+    """Return the state at a first sample: time and position count from its last edge, whose arrival was not seen."""
     number, stamp, kind = _number(params, seen), stamp_of(seen, seen.edge), _kind(seen)
     return State(1, 0, number, stamp, kind, 0, zero, zero, (zero, zero, zero, zero))
 
 
 @compiled
 def _met(params, state, seen):
-    """Return (what the last edge is to this sample, clocks and edges from the anchor to it)."""
+    """Return (what the last edge is, ANCHOR to LOOSE; clocks from the anchor to it; edges from the anchor to it)."""
     mask = (1 << params.stamp_width) - 1
     interval = (stamp_of(seen, seen.edge) - state.stamp) & mask
     passed = wrap(_number(params, seen) - state.number, params.count_width)
@@ -144,7 +149,7 @@ def _met(params, state, seen):
 
 @compiled
 def _anchor(params, state, seen, met):
-    """Return (number, stamp, kind) of the anchor from here on, and the clocks since."""
+    """Return (number, stamp, kind) of the anchor from this sample on, and the clocks since that anchor."""
     number, stamp, kind = state.number, state.stamp, state.kind
     if met not in (ANCHOR, LOOSE):
         number, stamp, kind = _number(params, seen), stamp_of(seen, seen.edge), _kind(seen)
@@ -153,7 +158,7 @@ def _anchor(params, state, seen, met):
 
 @compiled
 def _shifted(places, to, since, by, low, high):
-    """Return the places with that of kind `to` higher and that of kind `since` lower, within `low` to `high`."""
+    """Return the places, kind `to` raised and kind `since` lowered by `by`, held within `low` to `high`."""
     return (
         saturate(places[0] + by * (int(to == 0) - int(since == 0)), low, high),
         saturate(places[1] + by * (int(to == 1) - int(since == 1)), low, high),
@@ -164,7 +169,7 @@ def _shifted(places, to, since, by, low, high):
 
 @compiled
 def _within(line, velocity, bound):
-    """Return the extrapolated `line` held to what no further edge allows: see the module."""
+    """Return the extrapolated `line` held within the bound that the module gives for no further edge."""
     if velocity < 0:
         return saturate(line, -max(bound + velocity, 0), -velocity)
     return saturate(line, -velocity, max(bound - velocity, 0))
@@ -172,13 +177,13 @@ def _within(line, velocity, bound):
 
 @compiled
 def _fitted(value, most):
-    """Return `value` held within the two's complement word whose largest is `most`."""
+    """Return `value` held within the two's complement format whose largest word is `most`."""
     return saturate(value, ~most, most)
 
 
 @compiled
 def _turn(params, acceleration, time):
-    """Return the change of velocity over `time` clocks: velocity words, rounded down, with one bit more."""
+    """Return the change of velocity over `time` clocks in velocity LSB, rounded down, with one bit more of range."""
     shift = max(_length(time) - params.mantissa, 0)
     coarse = shift_floor(acceleration * (time >> shift), params.turn_shift)
     return _fitted(shift_floor(coarse, params.turn_span - shift), 2 * params.velocity_max + 1)
@@ -186,7 +191,7 @@ def _turn(params, acceleration, time):
 
 @compiled
 def _correct(params, state, seen, interval, passed):
-    """Return (velocity, acceleration, places, flags) at the new edge, `interval` clocks and `passed` edges on."""
+    """Return (velocity, acceleration, places, flags) at the new edge, `interval` clocks and `passed` edges later."""
     velocity, acceleration, places = state.velocity, state.acceleration, state.places
     kind = _kind(seen)
     length = _length(interval)
@@ -276,7 +281,7 @@ def _float_correct(params, state, seen, interval, passed):
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
-    """The same algorithm in float64, unsaturated: the reference for what fixed point costs."""
+    """Take one sample in float64, unsaturated: the same algorithm, as a reference for the cost of fixed point."""
     if restart or not state.running:
         state = _started(params, seen, 0.0)
     met, interval, passed = _met(params, state, seen)

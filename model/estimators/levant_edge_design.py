@@ -1,18 +1,18 @@
-"""Gains, formats, run-time words and state of `levant_edge`, derived from the axis; that module says the law.
+"""Gains, formats, run-time words and state of `levant_edge`, derived from the axis; `levant_edge` defines the law.
 
-Symbols as there: v, a, E, T, L, D, C; q is a count, u the velocity out.
+The symbols v, a, E, T, L, D and C are those of `levant_edge`; q is a count, u the velocity output.
 
 - `velocity` SQ(i, f): i holds twice the largest speed; f resolves sqrt(C q), the speed that C gives within half a
   count, to 2**-SPEED_BITS, and at least the slowest edges. `acceleration` has the same width, so that one multiplier
-  serves, and i for 2**ACCELERATION_BITS C. Both at most WIDTH_MAX bits, and so wide that their product with a time
-  fits int64.
-- `mantissa`: a time multiplies and divides by so many top bits. A T cut to them is off by 2**(1 - mantissa) of itself,
-  and the speed of a count in it, D/T, is then moved by no more than 4 LSB of velocity; at least four samples and four
-  shortest intervals are exact.
-- `error`, E over 2**k where k bits are cut: i for |v| 2**mantissa and the place it is held against, f as many less than
-  velocity's as the shortest interval has bits, less one: half an LSB of velocity after the division.
+  suffices for both, and its i holds 2**ACCELERATION_BITS C. Both have at most WIDTH_MAX bits, and no more than let
+  their product with a time fit int64.
+- `mantissa`: number of top bits of a time that multiply and divide. A T cut to these bits has a relative error of
+  2**(1 - mantissa), which changes the speed of one count in it, D/T, by no more than 4 LSB of velocity; times of at
+  least four samples and four shortest intervals are exact.
+- `error`, E over 2**k if k bits are cut: i holds |v| 2**mantissa and the place from which it is subtracted; f is less
+  than velocity's by the bits of the shortest interval less one: half an LSB of velocity after the division.
 - `place`: half a count, in steps of 2**-PLACE_BITS. `distance`: edges at twice the largest speed in two samples and two
-  shortest intervals; more saturate.
+  shortest intervals; a larger number saturates.
 - `radicand`, `root`: the least error that lambda limits, lambda^2 T^3 at the shortest T, is resolved in its root to
   2**-ROOT_BITS.
 - `lambda`, `alpha` UQ, GAIN_BITS wide, with HEADROOM_BITS above the designed gain for changes at run time.
@@ -39,31 +39,31 @@ HEADROOM_BITS = 2
 SPEED_BITS = 18
 """The velocity resolves sqrt(C q), the speed that C gives within half a count, to 2**-SPEED_BITS."""
 WIDTH_MAX = 40
-"""Most bits of velocity and acceleration."""
+"""Largest width of velocity and acceleration, bits."""
 ACCELERATION_BITS = 3
-"""The acceleration may reach 2**ACCELERATION_BITS C: an impact exceeds the C of a motion."""
+"""The acceleration may reach 2**ACCELERATION_BITS C, since an impact exceeds the C of a motion."""
 ROOT_BITS = 5
-"""The root resolves the least error that it limits to 2**-ROOT_BITS."""
+"""The root of the least error that it limits is resolved to 2**-ROOT_BITS."""
 LEARN_SHIFT = 5
-"""An edge's residual moves the two places that it depends on by 2**-LEARN_SHIFT of it."""
+"""An edge's error moves the two places on which it depends by 2**-LEARN_SHIFT of that error."""
 PLACE_BITS = 21
 """Places of edges resolve 2**-PLACE_BITS counts."""
 QUOTIENT_BITS = 2
-"""Bits of the quotient that a clock brings."""
+"""Quotient bits a clock."""
 STEPS = 19
 """Clocks of the sequence besides the root's or the quotient's: see `hardwall.hdl.estimators.levant_edge`."""
 
 
 @dataclass(frozen=True)
 class Gains(EstimatorGains):
-    """Gains in SI units: lambda in m^(1/2)/s^(3/2), alpha in m/s^3."""
+    """The gains in SI units: lambda in m^(1/2)/s^(3/2), alpha in m/s^3."""
 
     lambda_sqrt_m_per_s3: float
     alpha_m_per_s3: float
 
     @classmethod
     def default(cls, axis: "AxisSpec") -> "Gains":
-        """Return alpha = 2 C / sqrt(q / C) and Levant's lambda = 1.5 sqrt(alpha), with C and q the axis's."""
+        """Return alpha = 2 C / sqrt(q / C) and Levant's lambda = 1.5 sqrt(alpha), with C and q of the axis."""
         bound = axis.acceleration_max_m_per_s2
         alpha = 2 * bound * math.sqrt(bound / axis.count_m)
         return cls(1.5 * math.sqrt(alpha), alpha)
@@ -112,10 +112,10 @@ class FloatParams(NamedTuple):
 
 
 class State(NamedTuple):
-    """The anchor (`known` if it was seen to come), the motion there, and the places of the four kinds of edges.
+    """The anchor (`known` if its arrival was seen), the motion there, and the places of the four kinds of edges.
 
-    Velocity, acceleration and places are words (float: counts a sample, that a clock, counts times clocks a sample);
-    `length` is that of the last interval used, bits.
+    Velocity, acceleration and places are words (float: counts a sample, counts a sample per clock, counts times clocks
+    a sample); `length` is the length of the last interval in use, bits.
     """
 
     running: int
@@ -134,19 +134,19 @@ FLOAT_START = State(0, 0, 0, 0, 0, 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
 
 
 class Design(EstimatorDesign):
-    """Formats, run-time words and latency of the differentiator for an axis: the module says how they follow.
+    """Formats, run-time words and latency of the differentiator for an axis, derived as the module says.
 
     Attributes:
-        velocity, acceleration, error, place: formats of v, of a, of E over 2**k, of an edge's place times D.
-        mantissa: bits of a time as it multiplies and divides.
-        shortest: bits below those of the shortest interval used, 2**shortest clocks.
-        distance: format of the edges passed in an interval.
-        root, radicand: formats of the root and its integer radicand.
+        velocity, acceleration, error, place: formats of v, a, E over 2**k, and an edge's place times D.
+        mantissa: bits of a time when it multiplies and divides.
+        shortest: log2 of the shortest interval in use, clocks.
+        distance: format of the number of edges passed in an interval.
+        root, radicand: formats of the root and of its integer radicand.
         lambda_, alpha: gain formats.
         words: `levant_edge_lambda`, `levant_edge_alpha`.
 
     Raises:
-        ValueError: if the gains or the rates do not fit any format that int64 can hold, with the accepted range.
+        ValueError: if the gains or the rates fit no format that int64 can hold, with the accepted range.
     """
 
     name = "levant-edge"
@@ -165,7 +165,7 @@ class Design(EstimatorDesign):
         self._derive_gains(axis, gains)
 
     def _derive_times(self, axis: "AxisSpec") -> None:
-        """Derive how a time, in clocks, is held as it multiplies and divides."""
+        """Derive the width of a time, in clocks, when it multiplies and divides."""
         clock, bound, q = axis.clock_hz, axis.acceleration_max_m_per_s2, axis.count_m
         window = clock * min(math.sqrt(axis.speed_max_m_per_s / (clock * bound)), math.sqrt(q / bound) / 4)
         self.shortest = min(max(math.floor(math.log2(max(window, 2.0))), 1), axis.stamp_width - 3)
@@ -187,7 +187,7 @@ class Design(EstimatorDesign):
         self.acceleration = SQ(i, self.velocity.width - i)
 
     def _derive_places(self, axis: "AxisSpec") -> None:
-        """Derive the formats of errors and places of edges, in counts times D, and of edges passed."""
+        """Derive the formats of errors and places, in counts times D, and of the number of edges passed."""
         f = self.velocity.f
         self.error = SQ(self.velocity.i + self.mantissa + 2, f - min(max(self.shortest - 1, 0), f))
         fine = PLACE_BITS - math.floor(math.log2(self.clocks))
@@ -264,7 +264,7 @@ class Design(EstimatorDesign):
         )
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
-        """Return the float64 algorithm's parameters: gains unrounded, those of `si` before the designed."""
+        """Return the float64 kernel's parameters: unrounded gains, from `si` where given, else as designed."""
         lam, alpha = self.words
         return FloatParams(
             si.get("levant_edge_lambda", gains.lambda_sqrt_m_per_s3) / lam.si_per_unit,
@@ -284,7 +284,7 @@ class Design(EstimatorDesign):
 
 
 def _gain(name: str, value: float, scaled: float) -> UQ:
-    """Return the format of a gain of `value` SI and `scaled` in counts, samples and clocks."""
+    """Return the format of a gain: `value` in SI units, `scaled` in counts, samples and clocks."""
     if not 2.0**-60 <= scaled <= 2.0**20:
         unit = value / scaled
         raise FieldError(name, f"must be {2.0**-60 * unit:g} to {2.0**20 * unit:g} at these rates, not {value!r}")

@@ -101,7 +101,7 @@ class FloatParams(NamedTuple):
 
 
 class State(NamedTuple):
-    """The state: `cycle` is D (0: none), `first` the window's first count, `moved` the counts of the last full window."""
+    """The state: `cycle` is D (0: none), `first` the window's first count, `moved` the counts of the last window."""
 
     memory: Memory
     cycle: int
