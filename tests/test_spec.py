@@ -136,7 +136,7 @@ def test_fixed_point_costs_levant_no_more_than_its_rounding_is_worth():
 
 
 def largest_error(design) -> float:
-    """Return the largest |e|, counts, from 1 s on in the record of the second figure."""
+    """Return the largest |e| in counts, from 1 s on in the record of Figure 2."""
     counts, axis = figure_2_counts()
     params, state, largest = design.params({w.name: w.reset for w in design.words}), levant.START, 0.0
     for k, count in enumerate(counts.tolist()):

@@ -1,4 +1,4 @@
-"""The benchmark: it runs on any scene, its cocotb loop makes the model's words, and it reports what it promises."""
+"""The benchmark: it runs on any scene, its cocotb loop gives the model's words, and its report is as promised."""
 
 import json
 import shutil

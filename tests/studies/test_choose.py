@@ -1,4 +1,4 @@
-"""The table to choose by, from made-up results."""
+"""The table for the choice of an estimator, from made-up results."""
 
 from hardwall.sim.studies import choose
 

@@ -1,4 +1,4 @@
-"""The best cutoff: found on areas that are known, and what is printed and drawn of areas that are measured."""
+"""The best cutoff: the search on known areas, and the table and picture of measured areas."""
 
 import json
 import math
@@ -15,7 +15,7 @@ from stimuli.maps import Known
 
 
 def map_of(case: Case, area: float, leaves: bool = False) -> Map:
-    """Return a map of an area."""
+    """Return a map that has the given area."""
     return Map(
         case, [Edge(0.0, area, None if leaves else 2 * area), Edge(1.0, area, 1.0), Edge(1.0, 0.0, 1.0)], 1, [None] * 3
     )
@@ -27,7 +27,7 @@ def cutoff_of(case: Case) -> float | None:
 
 
 class Areas(Known):
-    """Maps of areas that are a function of the cutoff; None for no filter."""
+    """Maps whose areas are a function of the cutoff; None stands for no filter."""
 
     def __init__(self, area):
         self.area, self.calls = area, []
@@ -38,7 +38,7 @@ class Areas(Known):
 
 
 def staircase(cutoff_hz: float | None) -> float:
-    """A hill around 1200 Hz, in steps of a 50th of its height."""
+    """Return the height of a hill around 1200 Hz, in steps of a 50th of its height."""
     return 50 * math.exp(-(math.log(cutoff_hz / 1200) ** 2)) // 1 if cutoff_hz else 7.0
 
 
@@ -87,7 +87,7 @@ def test_every_scene_is_swept_at_once_and_has_its_own():
 @pytest.mark.parametrize(
     ("areas", "low", "high"),
     [
-        # A tenth of the way down, in the logarithm, to half of the best.
+        # The limits are a tenth of the way, in the logarithm, to half of the best area.
         ({100.0: 50, 200.0: 100, 400.0: 50}, 200 / 2**0.1, 200 * 2**0.1),
         ({100.0: 96, 200.0: 100, 400.0: 0}, 100.0, 200 * 2**0.05),
         ({100.0: 97, 150.0: 20, 200.0: 97, 300.0: 100, 400.0: 99}, 200 * 0.75 ** (2 / 77), 400.0),
@@ -100,7 +100,7 @@ def test_as_good_is_what_is_within_a_twentieth(areas, low, high):
 
 
 def verdict(changes: dict, stiffness: float, damping: float, **_) -> dict:
-    """Stable up to a stiffness that rises with the cutoff to 450 Hz, and falls beyond."""
+    """Return a verdict that is stable up to a stiffness, which rises with the cutoff to 450 Hz and falls above."""
     gains = changes.get("controller.gains.butterworth", {"cutoff_hz": 4e3})
     stable = stiffness < 100 * min(gains["cutoff_hz"], 900 - gains["cutoff_hz"])
     return {"stable": stable, "in_place": stable, "rms_mm": 0.0, "seconds": 0.0}
@@ -115,7 +115,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     (device,) = report["devices"]
     areas = {each["cutoff_hz"]: each["area_n2_s_per_m2"] for each in device["maps"]}
     assert device["best_cutoff_hz"] in areas
-    # All of B, from 6 to 894 N s/m, times one of the steps of 2 kN/m under 45 kN/m; 38 is that of 400 and 500 Hz.
+    # The area is all of B, 6 to 894 N s/m, times a step of 2 kN/m under 45 kN/m; 400 and 500 Hz have 38.
     assert device["best_area_n2_s_per_m2"] == max(areas.values())
     assert max(areas.values()) in [888 * stiffness for stiffness in (40e3, 42e3, 44e3)]
     assert (device["best_leaves_the_map"], device["unfiltered"]["area_n2_s_per_m2"]) == (True, 0)
@@ -156,7 +156,7 @@ def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, mes
 
 
 def test_two_files_of_one_name_are_two_devices(tmp_path):
-    """And their maps are told apart by what was asked, not by what they are called."""
+    """Their maps are told apart by their cases, not by their names."""
     paths = [tmp_path / folder / "device.toml" for folder in "ab"]
     for path, mass in zip(paths, ("0.35", "0.7"), strict=True):
         path.parent.mkdir()

@@ -1,4 +1,4 @@
-"""Why a region ends in a drop: what is measured on walls whose answer is known, a hit each way, what is printed."""
+"""The drop at the end of a region: measurements on walls with known answers, real hits, and the printed tables."""
 
 import json
 import math
@@ -21,9 +21,9 @@ NOTHING = Effort("fixed", 0, 0.0)
 
 
 def strike(scene: str, text: str, changes: dict, damping: float, start: int, backend: str) -> dict:
-    """Three of four hits rest up to B = 1000 times the friction, all up to half of it; but none under 10 N s/m.
+    """Return a hit by a rule: three of four hits rest up to B = 1000 times the friction, and all up to half of that B.
 
-    All are stable up to a B that grows with K.
+    No hit rests under 10 N s/m. All hits are stable up to a B that grows with K.
     """
     friction = changes.get("handle.coulomb_n", 0.1)
     rests = 10 < damping < (1000 if start % 4 else 500) * friction
@@ -32,13 +32,13 @@ def strike(scene: str, text: str, changes: dict, damping: float, start: int, bac
 
 
 def verdict(changes: dict, stiffness: float, damping: float, **_) -> dict:
-    """Stable up to 40 kN/m and to B = 100 N s/m, for Kalman 200."""
+    """Return a verdict that is stable up to 40 kN/m and up to B = 100 N s/m, for Kalman up to 200."""
     stable = stiffness <= 40e3 and damping <= (200 if changes["controller.estimator"] == "kalman" else 100)
     return {"stable": stable, "rms_mm": 0.0, "in_place": stable, "seconds": 0.0}
 
 
 def at_rest(scene, backend: str) -> Chatter:
-    """Levant's u swings by 2 mm/s, nothing else does."""
+    """Return the chatter: Levant's u swings by 2 mm/s, and all other estimates stand still."""
     swing = np.full(8, 2e-3 if (scene.controller.estimator, scene.estimator_output) == ("levant", "u") else 0.0)
     return Chatter(-swing / 2, swing / 2)
 
@@ -52,7 +52,7 @@ def test_the_chatter_shakes_the_handle_where_the_force_sees_both_sides_of_it():
     assert not seen["rests"]
     assert seen["rms_m"] > 1e-6
     assert drop.strike("seed-2011", text, wall | ODD, 10.0, 0, "fixed")["rests"]
-    # Shaken by less than the threshold, it is stable and not at rest.
+    # A handle that is shaken by less than the threshold is stable but not at rest.
     proposed = methods()["proposed"].changes | {"wall.stiffness_n_per_m": 30e3}
     shaken = drop.strike("seed-2011", text, proposed, 90.0, 0, "fixed")
     assert (shaken["rests"], shaken["stable"]) == (False, True)
@@ -70,7 +70,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     assert code == 0
     report = json.loads(out)
     measured = {(each["method"], each["factor"], each["value"]): each["measured_n_s_per_m"] for each in report["laws"]}
-    # By five halvings of the logarithm of 3 to 400.
+    # The search halves the logarithm of the range from 3 to 400 five times.
     step = (400 / 3) ** (1 / 32)
     for friction, value in ((0.03, "x 0.3"), (0.05, "x 0.5"), (0.2, "x 2"), (0.3, "x 3")):
         found = measured["proposed", "Coulomb friction", value]
@@ -88,7 +88,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         assert each["rests_n_s_per_m"] == tried[tried < 100].max()
         assert each["stable_n_s_per_m"] == tried[tried < stiffness / 100].max()
     kalman, adjusted = report["methods"]["kalman"], report["methods"]["adjusted"]
-    # Steps of 24 N s/m from 6 on: the last stable ones are 198 and 78, and then a step down to none.
+    # In steps of 24 N s/m from 6 on, the last stable B are 198 and 78; the next step has no stable wall.
     assert adjusted["area_n2_s_per_m2"] == pytest.approx((78 - 6) * 40e3 + 24 * 20e3)
     assert kalman["of_papers_best"] == pytest.approx((198 - 6 + 12) / (78 - 6 + 12))
     assert kalman["before_the_end"] == 1.0

@@ -1,4 +1,4 @@
-"""The fit: a device that is known is found again, what is far off is not mapped, and what stood in the way is said."""
+"""The fit: a known device is found again, trials far off are not mapped, and the facts that fail are named."""
 
 import json
 import math
@@ -22,10 +22,10 @@ NAMES = {curve.label: name for name, curve in methods.methods().items()}
 
 
 def largest_n_per_m(method: str, changes: dict, damping: float) -> float:
-    """The paper's figure, stretched over B as the mass is off; and as the delay is off, 1000 Hz is stiffer."""
+    """Return K of the paper's figure, stretched over B by the error of the mass; an error of delay stiffens 1000 Hz."""
     stretch = 0.3 * changes.get("handle.mass_kg", 0.35) / MASS_KG
     points = [10.0 * (n + 1) * stretch for n in range(len(PAPER[method]))]
-    # Between the figure's own points K does not change, so a drop stays one.
+    # K is constant between the figure's points, so a drop remains a drop.
     place = int(np.searchsorted(points, damping + 1e-9)) - 1
     inside = 0 <= place < len(points)
     stiffer = 1 + 1e3 * abs(changes.get("amplifier.delay_s", 1e-3) - DELAY_S) * (method == "fdm-1000")
@@ -33,7 +33,7 @@ def largest_n_per_m(method: str, changes: dict, damping: float) -> float:
 
 
 class Device(Known):
-    """Maps of a device that is known."""
+    """Maps of a known device."""
 
     def __init__(self):
         self.cases = []
@@ -65,12 +65,12 @@ def test_a_known_device_is_found_again():
     assert best.score == pytest.approx(best.off_b, abs=1e-9)
     assert best.off_b < 0.05
     assert best.values["handle.mass_kg"] == pytest.approx(MASS_KG, rel=0.2)
-    # 10 % of the area of 1000 Hz: what counts as about equal.
+    # The tolerance is 10 % of the area of 1000 Hz, which counts as about equal.
     assert best.values["amplifier.delay_s"] == pytest.approx(DELAY_S, abs=0.12e-3)
     assert [each.score for each in result.finalists] == sorted(each.score for each in result.finalists)
     # The scene's own values are among the first.
     assert any(trial.values["handle.mass_kg"] == 0.35 for trial in result.trials[:24])
-    # Each is what was mapped: of the trials that were far off, one map.
+    # The cases are the maps made; a trial that is far off has only one map.
     coarse = sum(6 if trial.facts else bool(trial.maps) for trial in result.trials)
     again = sum(bool(trial.facts) for trial in result.trials)
     assert len(known.cases) == 6 + coarse + again + 6 * len(result.finalists)

@@ -1,4 +1,4 @@
-"""The search of Levant's gains: on areas that are known, and what is printed and drawn of areas that are measured."""
+"""The search of Levant's gains: the result on known areas, and the table and picture of measured areas."""
 
 import json
 import math
@@ -27,7 +27,7 @@ SET = [word for key, value in BRIEF.items() for word in ("--set", f"{key}={value
 
 
 class Areas(Known):
-    """Maps of areas that are a function of output and gains, with walls in place if alpha is less than 20."""
+    """Maps whose areas are a function of output and gains, with walls in place if alpha is less than 20."""
 
     def __init__(self, area):
         self.area, self.calls = area, []
@@ -43,7 +43,7 @@ class Areas(Known):
 
 
 def hill(output: str, lam: float, alpha: float) -> float:
-    """Highest at lambda 5, alpha 200; twice as high for u."""
+    """Return the height of a hill with its top at lambda 5, alpha 200; it is twice as high for u."""
     return (2 if output == "u" else 1) * 1e4 / (1 + math.log(lam / 5) ** 2 + math.log(alpha / 200) ** 2)
 
 
@@ -63,7 +63,7 @@ def test_the_best_of_a_known_hill_are_found(searched):
         picks = {name: pick.gains for name, pick in search.picks[output].items()}
         top = nearest(search.lambdas, 5)
         assert picks["best"] == Gains(top, nearest(search.alphas, 200))
-        # The next above 2 sqrt(C), from where on the condition can be met, and so high an alpha that it is.
+        # The next lambda above 2 sqrt(C), where the condition can be met, and an alpha high enough to meet it.
         assert picks["best within the condition"].lambda_sqrt_m_per_s == search.lambdas[search.lambdas > 48**0.5][0]
         assert picks["best in place"] == Gains(top, float(search.alphas[search.alphas < 20][-1]))
         papers = [(each.lambda_sqrt_m_per_s, each.alpha_m_per_s2) for each in (picks["proposed"], picks["adjusted"])]
@@ -117,11 +117,11 @@ def test_gains_without_words_are_left_out(monkeypatch):
 @pytest.mark.parametrize(
     ("lam", "alpha", "meets"),
     [
-        # The paper's figures: 500 mm^(1/2)/s needs 17.7e3 mm/s^2, its proposed gains do not.
+        # By the paper's figures 500 mm^(1/2)/s needs 17.7e3 mm/s^2; its proposed gains do not.
         (250**0.5, 17.8, True),
         (250**0.5, 17.6, False),
         (12**0.5, 13.2, False),
-        # Not at 2 sqrt(C), whatever alpha.
+        # At 2 sqrt(C) no alpha meets the condition.
         (48**0.5, 1e9, False),
         (49**0.5, 1e9, True),
     ],

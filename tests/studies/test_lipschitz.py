@@ -1,4 +1,4 @@
-"""The bound on the acceleration from a hit: what is reported, its gains, its picture, and what is refused."""
+"""The bound on the acceleration from a hit: its report, its gains, its picture, and refused input."""
 
 import json
 import math
@@ -32,7 +32,7 @@ def test_report_and_picture(monkeypatch, capsys, tmp_path):
 
 
 def test_a_longer_record_gives_a_smaller_bound(monkeypatch, capsys):
-    """The same seven sines have more to share: the finding that the module states."""
+    """The same seven sines must cover a longer motion: this is the finding that the module states."""
     bounds = []
     for before, after in ((0.05, 0.2), (0.1, 0.4), (0.3, 0.7)):
         _, out, _ = call(monkeypatch, capsys, "lipschitz", "--json", "--before", before, "--after", after)
@@ -41,7 +41,7 @@ def test_a_longer_record_gives_a_smaller_bound(monkeypatch, capsys):
 
 
 def test_the_least_alpha_satisfies_the_condition_just():
-    """The paper's: lambda 500 mm^(1/2)/s with C = 12 m/s^2 needs an alpha of 17.7 m/s^2 or more."""
+    """In the paper, lambda 500 mm^(1/2)/s with C = 12 m/s^2 needs an alpha of 17.7 m/s^2 or more."""
     square = 250.0
     alpha = least_alpha_m_per_s2(math.sqrt(square), 12.0)
     assert alpha == pytest.approx(17.7, abs=0.05)

@@ -1,4 +1,4 @@
-"""What rate buys: the cases, what is made of their maps, the linear limits, and the command."""
+"""The gain from the sample rate: the cases, the ratios of their maps, the linear limits, and the command."""
 
 import json
 
@@ -23,7 +23,7 @@ FEW = {
 
 
 class OneWall(Known):
-    """Maps of one wall each, of these stiffnesses; it keeps the cases."""
+    """Maps of one wall, whose stiffnesses are given in turn; the cases are kept."""
 
     def __init__(self, stiffness):
         self.seen, self._values = [], iter(stiffness)

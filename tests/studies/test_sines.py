@@ -1,4 +1,4 @@
-"""Fits of sines: what is known is found, and differentiated exactly."""
+"""Fits of sines: known sines are found, and differentiated exactly."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ TIMES = np.linspace(0, 1, 401)
 
 
 def known(*terms: tuple[float, float, float]) -> Sines:
-    """Return a sum of (rad/s, sine, cosine)."""
+    """Return a sum of the terms (rad/s, sine, cosine)."""
     return Sines(*np.array(terms).T)
 
 

@@ -1,4 +1,4 @@
-"""Speed against accuracy: which points are best, what is compared with what, and the command."""
+"""Speed against accuracy: the best points, the comparison with the reference, and the command."""
 
 import json
 from types import SimpleNamespace
@@ -20,7 +20,7 @@ EDGE = 22e3
 
 
 class Invented:
-    """Runs of a world with one rule: a wall is stable up to 22 kN/m, to other stiffnesses with some shortcuts."""
+    """Runs of a world with one rule: walls are stable up to 22 kN/m, with some shortcuts up to another stiffness."""
 
     def stable(self, stiffness, damping, changes, backend):
         times = 1.5 if "solver.step_s" in changes else 1.1 if backend == "float" else 1.0
@@ -73,7 +73,7 @@ def test_a_shortcut_is_held_against_the_reference(found):
     assert reference.map_s == pytest.approx(0.2 * reference.hits)
     stepped = points["steps of 100 us"]
     assert stepped.errors == {name: [pytest.approx(0.5)] * 5 for name in METHODS}
-    # Of 16, 19, 21, 24, 26 and 32 kN/m the last three are stable to 33.
+    # With 33 kN/m as the limit, the last three of 16, 19, 21, 24, 26 and 32 kN/m become stable.
     assert stepped.differ == dict.fromkeys(METHODS, 0.5)
     assert stepped.hit_s == pytest.approx(0.1)
     assert points["float"].errors["adjusted"] == [pytest.approx(2 / 22)] * 5
@@ -188,7 +188,7 @@ SMALL = {
 
 
 def test_the_command_prints_and_draws_real_hits(monkeypatch, capsys, tmp_path):
-    """Of one estimator and few shortcuts; then again, from what is known."""
+    """The command runs with one estimator and few shortcuts, then again from the stored results."""
     few = (REFERENCE.label, "steps of 100 us", "K by 2", "scatter")
     every = shortcuts(load("seed-2011", GRID | SMALL), lambda _: True)
     kept = [each for each in every if each.label.startswith(few) and "+" not in each.label]

@@ -1,4 +1,4 @@
-"""Tracing of a stable region: on regions that are known, what is asked and what is found."""
+"""Tracing of a stable region: the walls hit and the edges found, on known regions."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ GRID = Grid(10.0, 100.0, 1.0, 6.0, 0.5)
 
 
 def traced(stable, grid: Grid = GRID) -> tuple[list[Edge], list[tuple[float, float]]]:
-    """Return the edges, and the walls that were hit, of a region given by a function of K and B."""
+    """Return the edges, and the walls that were hit, for a region given by a function of K and B."""
     steps, asked = trace(grid), []
     try:
         wall = next(steps)
@@ -22,7 +22,7 @@ def traced(stable, grid: Grid = GRID) -> tuple[list[Edge], list[tuple[float, flo
 
 
 def limit(damping: float) -> float:
-    """Rises, falls, and ends."""
+    """Return the largest stable K, which rises over B, falls, and ends."""
     return 5 + 30 * damping - 5.5 * damping**2
 
 
@@ -38,7 +38,7 @@ def test_the_edge_is_found_on_the_grid_and_no_wall_is_hit_twice():
 
 
 def test_the_walls_are_hit_in_the_order_of_the_paper():
-    """Up from the softest; then a step of B, and from the marginal K up or down."""
+    """The search goes up from the softest wall; after every step of B it goes up or down from the marginal K."""
     _, asked = traced(lambda stiffness, damping: stiffness <= (30 if damping < 2 else 10))
     assert asked[:4] == [(10, 1), (20, 1), (30, 1), (40, 1)]
     assert asked[4:8] == [(40, 1.5), (30, 1.5), (40, 2), (30, 2)]
@@ -65,7 +65,7 @@ def test_a_region_that_begins_at_a_stiffer_wall_of_a_larger_damping_is_found():
 
 
 def test_walls_below_the_edge_are_hit_last_and_counted():
-    """Of four a fifth apart, those under 30 are not stable."""
+    """Four walls, a fifth of K apart, are hit below the edge; the walls under 30 are not stable."""
     edges, asked = traced(lambda stiffness, _: 30 <= stiffness <= 70, replace(GRID, walls_below=4))
     assert {edge.held for edge in edges} == {0.75}
     assert asked[-4:] == [(10, 6), (30, 6), (40, 6), (60, 6)]

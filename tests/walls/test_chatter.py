@@ -19,8 +19,9 @@ def scene(method: str, changes: dict | None = None):
 def two_cycle_m_per_s(loaded) -> float:
     """Return u in Levant's cycle of two samples.
 
-    From u1 = 0 on, u1 is a multiple of alpha: it is 0 and alpha in turn, and u = -S and S. With e1 and e2 to either
-    side, e1 + e2 = S, l sqrt(e1) = S + a and l sqrt(e2) = S, so 2 S^2 - (l^2 - 2 a) S + a^2 = 0; the larger is stable.
+    From u1 = 0 on, u1 is a multiple of alpha: it is 0 and alpha in turn, and u is -S and S. With errors e1 and e2 to
+    either side, e1 + e2 = S, l sqrt(e1) = S + a and l sqrt(e2) = S, so 2 S^2 - (l^2 - 2 a) S + a^2 = 0; the larger root
+    is stable.
     """
     gains, tau, q = loaded.controller.gains.levant, 1 / loaded.controller.sample_hz, loaded.encoder.count_m
     lam, alpha = gains.lambda_sqrt_m_per_s * tau / math.sqrt(q), gains.alpha_m_per_s2 * tau**2 / q
@@ -34,7 +35,7 @@ def test_a_cycle_of_two_samples_is_seen_from_one_side_where_the_force_takes_ever
     ends = two_cycle_m_per_s(loaded)
     assert ends == pytest.approx(5e-3)
     assert np.abs(chatter.mean_m_per_s) == pytest.approx(ends)
-    # From either side, as the motion before it came to rest.
+    # The side depends on how the motion before came to rest.
     assert 0.2 < (chatter.mean_m_per_s > 0).mean() < 0.8
 
 
@@ -46,7 +47,7 @@ def test_it_is_seen_from_both_sides_where_the_force_takes_every_eleventh():
 
 
 def test_words_move_the_chatter_by_no_more_than_a_few_of_the_root_s_last_bits():
-    """The root's last bit moves u by lambda times it: 2^-6 counts^(1/2) here."""
+    """The root's last bit, here 2^-6 counts^(1/2), moves u by lambda times that bit."""
     loaded = scene("adjusted")
     bit = loaded.controller.gains.levant.lambda_sqrt_m_per_s * math.sqrt(1e-6) * loaded.spec.design.estimator.root.lsb
     fixed = at_rest(loaded, "fixed")
@@ -55,7 +56,7 @@ def test_words_move_the_chatter_by_no_more_than_a_few_of_the_root_s_last_bits():
 
 
 def test_what_the_force_takes_is_what_the_drive_shows():
-    """In a wall that is nothing but a damper, and everywhere: the drive over B, to half its resolution."""
+    """In a wall that is only a damper and fills all space, it is the drive over B, to half the drive's resolution."""
     loaded = scene("proposed")
     damper = {"wall_stiffness": 0.0, "wall_damping": 400.0, "wall_position": -1e-3}
     drive = Axis(loaded.spec, **loaded.parameters | damper).run(motions(loaded)).drive_n[:, 3000:]
@@ -79,7 +80,7 @@ def test_the_law_is_that_a_place_of_rest_exists():
         limits = Chatter(*ends).rests_up_to(coulomb, push)
         for times, wanted in ((0.999, True), (1.001, False)):
             damping, stiffness = limits * times, 10 ** dice.uniform(2, 5, 500)
-            # Where each of the two velocities alone would let it rest.
+            # Either of the two velocities alone would let the handle rest.
             low, high = ((push + side * coulomb - damping * ends) / stiffness for side in (-1, 1))
             exists = np.minimum(*high) >= np.maximum(np.maximum(*low), 1e-15)
             assert (exists == wanted).all()

@@ -49,7 +49,7 @@ def test_all_are_held_on_the_paper_s_figure():
 )
 def test_each_is_lost_where_it_is_not_so(others, without):
     assert lost(others) == without
-    # What is held lacks nothing.
+    # A fact that holds has no shortfall.
     assert not any(fact.held and fact.shortfall for fact in facts(maps(others)))
 
 
@@ -62,9 +62,9 @@ def test_each_is_lost_where_it_is_not_so(others, without):
         (2, {"adjusted": [7, *PAPER["adjusted"][1:]]}, (10 - 7) / sum(PAPER["fdm-1000"][:10])),
         (3, {"proposed": [12, 18, 24, 28, 30, 30, 29, 27, 25, 98, 0]}, 50 / (sum(PAPER["proposed"]) + 98)),
         (4, {"proposed": [12, 18, 17, 28, 30, 30, 29, 27, 25, 0]}, 2 / (10 + 14 + 19 + 22 + 25)),
-        # At 0.6 of the range, for 0.9; and a step before the end 12 of 30.
+        # The largest K is at 0.6 of the range instead of 0.9, and one step before the end K is 12 of 30.
         (5, {"proposed": [12, 18, 24, 30, 12, 4, 0]}, 0.2 + (0.5 - 0.4)),
-        # At the map's end it still has all of its largest K.
+        # At the map's end K still has its largest value.
         (5, {"adjusted": PAPER["adjusted"][:-1] + [48] * 4}, 1.0),
         (6, {"fdm-500": [10, 14, 19, 22, 25, 27, 28, 0]}, 0.3),
         (6, {"fdm-500": [10, 14, 19, 22, 25, 27, 28, 30, 32, 40, 60, 15, 8, 0]}, 60 / 48 - 1),

@@ -1,4 +1,4 @@
-"""The grids of maps: one that a region ends on, on a controller made for it."""
+"""The grids of maps: large enough for a region to end on, with a controller made for them."""
 
 import pytest
 

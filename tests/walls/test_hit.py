@@ -1,4 +1,4 @@
-"""The protocol of a hit: what is reported of it, against plain numpy on every sample of the run."""
+"""The protocol of a hit: its report against plain NumPy on every sample of the run."""
 
 import hashlib
 from dataclasses import replace
@@ -10,7 +10,7 @@ from hardwall.sim.scene.load import load
 from hardwall.sim.walls import hit
 from stimuli.scenes import CABLE, HAND, PULSES
 
-# An unstable wall, so that means and distances are large; and times that are no whole number of chunks or actuations.
+# The wall is unstable, so that means and distances are large; no time is a whole number of chunks or actuations.
 SCENE = {
     "protocol.settle_s": 0.8503,
     "protocol.mean_s": 0.1207,
@@ -21,7 +21,7 @@ SCENE = {
 
 @pytest.fixture(scope="module")
 def run():
-    """Return a run and all of its samples: an overview of every one."""
+    """Return a run with an overview that holds every sample."""
     scene = load("seed-2011", SCENE)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(hit, "OVERVIEW_POINTS", scene.samples)
@@ -47,7 +47,7 @@ def test_the_verdict_is_the_thresholds(run):
 
 @pytest.mark.parametrize("side", [-1, 1])
 def test_in_place_is_within_friction_a_count_and_the_rms(run, side):
-    """60 kN/m, a push of 0.3572 N, 0.1 N of friction, counts of 1 um, and an RMS of 2 um."""
+    """The case has 60 kN/m, a push of 0.3572 N, 0.1 N of friction, counts of 1 um, and an RMS of 2 um."""
     farthest_n = 0.1 + 60e3 * 3e-6
     for factor, in_place in ((0.999, True), (1.001, False)):
         mean_m = (0.3572 + side * factor * farthest_n) / 60e3
@@ -71,7 +71,7 @@ FIRM = HAND | {"hand.stiffness_n_per_m": 40e3, "hand.rest_m": 1e-4}
     ids=["pulses", "converter", "cable", "encoder at the motor", "hand"],
 )
 def test_in_place_allows_what_a_part_hides(run, side, parts, carried_n, farthest_n, spring_n_per_m):
-    """And counts of 1 um, and an RMS of 2 um. What a hand carries shrinks as it follows."""
+    """The cases have counts of 1 um and an RMS of 2 um. The force that a hand carries shrinks as the hand follows."""
     scene = load("seed-2011", SCENE | parts)
     for factor, in_place in ((0.999, True), (1.001, False)):
         off_n = side * factor * (farthest_n + 60e3 * 3e-6)

@@ -1,4 +1,4 @@
-"""Theory of stiff walls: the closed forms, and the linear loop against the simulation that it leaves nothing out of."""
+"""Theory of stiff walls: the closed forms, and the linear loop against a simulation reduced to what the loop models."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from hardwall.sim.scene.load import load
 from hardwall.sim.walls import hit, theory
 from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND
 
-# No friction that sticks, fine counts, a threshold of fifty; slow enough for the decoder; long enough for what grows.
+# No dry friction, fine counts, a threshold of fifty counts; slow enough for the decoder, long enough for growth.
 LINEAR = {
     "handle.coulomb_n": None,
     "encoder.count_m": 1e-7,
@@ -20,7 +20,7 @@ LINEAR = {
     "protocol.threshold_mm": 5e-3,
     "controller.output": "u",
 }
-# What grows here bounces off a stiffer wall, and no higher.
+# A growing oscillation here bounces off a stiffer wall, and no higher.
 PROMPT = {
     "amplifier": None, "controller.actuation_hz": 10_000, "controller.stiffness_max_n_per_m": 1e6,
     "encoder.count_m": 1e-8, "protocol.threshold_mm": 5e-4,
@@ -62,7 +62,7 @@ def test_a_loop_without_damping_anywhere_is_unstable_at_every_stiffness():
 
 
 def test_a_fast_undelayed_loop_has_the_limit_of_gil_and_hulin():
-    """K < (b + B) / (T / 2 + delay), linear stability's first order in T; the estimator's half sample is beyond it."""
+    """K < (b + B) / (T / 2 + delay) is linear stability's first order in T, without the estimator's half sample."""
     changes = {"controller.estimator": "fdm", "handle.viscous_n_s_per_m": 5.0}
     scene = load("mhz", changes)
     delay_s = (scene.spec.design.latency_to_drive + latency(scene.controller.glitch_clocks)) / scene.spec.clock_hz
@@ -79,7 +79,7 @@ def test_passivity():
     prompt = {"amplifier": None, "controller.clock_hz": 1_000_000_000, "handle.viscous_n_s_per_m": 3.0}
     scene = load("seed-2011", prompt)
     assert 0 < theory.delay_s(scene) < 1e-7
-    # As good as prompt: b > K T / 2 + |B|.
+    # A nearly prompt wall has the condition b > K T / 2 + |B|.
     for damping in (1.0, -1.0):
         assert theory.colgate_schenkel_n_per_m(scene, damping) == pytest.approx((3 - 1) / 0.5e-3, rel=1e-3)
     assert theory.colgate_schenkel_n_per_m(scene, 4.0) == 0
@@ -90,7 +90,7 @@ def test_passivity():
 
 @pytest.mark.parametrize("damping", [0.0, 1.0, 3.0])
 def test_a_late_wall_is_passive_as_colgate_and_schenkel_s_own_condition_has_it(damping):
-    """b > T/2 sup Re((1 - z^-1) H(z)) / (1 - cos), H the wall itself a period late; by numbers."""
+    """b > T/2 sup Re((1 - z^-1) H(z)) / (1 - cos), evaluated numerically with the wall a period late as H."""
     scene = load("seed-2011", {"controller.clock_hz": 1_000_000_000, "handle.viscous_n_s_per_m": 8.0})
     period_s, z = 1e-3, np.exp(1j * np.linspace(1e-3, np.pi, 100_001))
 

@@ -54,13 +54,13 @@ def test_an_early_end_changes_no_verdict(backend, estimator):
             ended += early.samples < whole.samples
             if whole.stable:
                 assert (early.samples, early.force_sha256) == (whole.samples, whole.force_sha256)
-                # Sums in other pieces round otherwise.
+                # Sums over other pieces round differently.
                 assert early.rms_m == pytest.approx(whole.rms_m, rel=1e-9, abs=1e-15)
     assert ended >= 3
 
 
 def test_a_wall_that_settles_late_is_not_ended_early():
-    """The force is at its limit for a sample now and then, and the handle rests in the end all the same."""
+    """The force is at its limit for a sample now and then, but the handle still comes to rest."""
     changes = {"controller.estimator": "fdm", "protocol.push_n": 0.138, "wall.stiffness_n_per_m": 10e3}
     result = hit.run(load("mhz", changes | {"wall.damping_n_s_per_m": 40.0}), "float", until_sure=True)
     assert result.stable
@@ -79,7 +79,7 @@ def test_two_workers_give_the_map_of_one(map_of_one_process):
 
 
 def test_a_map_goes_on_from_what_is_known(map_of_one_process, monkeypatch):
-    """Ended after five hits, then gone on: none of the five is hit again, and the map is the same."""
+    """A map that is ended after five hits and resumed hits none of the five again, and is the same."""
     real, hits = zwidth.verdict, []
 
     def counted(**job):
@@ -111,7 +111,7 @@ def test_the_rtl_gives_the_map_of_fixed(monkeypatch, capsys):
 
 
 def test_walls_below_the_edge_are_hit_where_the_scene_asks():
-    """At 90 N s/m and more, Levant's chatter shakes soft walls, not stiff ones."""
+    """At 90 N s/m and more, Levant's chatter shakes soft walls but not stiff walls."""
     changes = {**METHODS[1].changes, "zwidth.walls_below": 8, "zwidth.stiffness_step_n_per_m": 4e3}
     changes |= {"zwidth.damping_from_n_s_per_m": 90.0, "zwidth.damping_to_n_s_per_m": 100.0}
     changes |= {"zwidth.damping_step_n_s_per_m": 10.0}
@@ -126,7 +126,7 @@ def test_walls_out_of_place_are_left_out_of_the_area_in_place():
     edges = [Edge(10.0 * n, 20e3, 21e3) for n in range(5)]
     found = zwidth.Map(CASES[0], edges, 5, [True, True, False, True, True])
     assert found.area == 40 * 20e3
-    # Two of four trapezoids lose half.
+    # Two of the four trapezoids lose half of their area.
     assert found.area_in_place == 30 * 20e3
 
 

@@ -1,4 +1,4 @@
-"""Steps and pulses of the command."""
+"""The steps and pulses into which a converter turns the command."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def test_a_pulse_is_as_wide_as_the_command():
 
 @pytest.mark.parametrize("period", [40, 64])
 def test_pulses_move_the_device_as_the_forces_that_they_are(period):
-    """Interval by interval, of a length that the period does not divide; the command changes in mid-pulse."""
+    """Intervals have a length that the period does not divide, and the command changes in mid-pulse."""
     encoder, rng = COARSE._replace(clock_hz=1e6), np.random.default_rng(5)
     pulse = Pulse(10.0, period, 4)
     device = Device(0.3, 2.0, bandwidth_hz=2e3, pulse=pulse)

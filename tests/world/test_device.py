@@ -33,7 +33,7 @@ def test_a_held_motor_s_voltage_drive_rises_with_l_over_r():
 
 
 def test_a_voltage_drive_is_damped_by_its_motor():
-    """The force that is asked for is reached at standstill, and the no-load speed is the voltage's over kf."""
+    """The commanded force is reached at standstill, and the no-load speed is the voltage over kf."""
     end = moved(Device(0.01, motor=MOTOR), REST, 1e6, 0.5)  # far beyond the voltage's limit
     assert end.velocity_m_per_s == pytest.approx(24.0 / 4.0, rel=1e-9)
     assert end.others[0] == pytest.approx(0.0, abs=1e-9)
@@ -42,11 +42,11 @@ def test_a_voltage_drive_is_damped_by_its_motor():
 
 
 def test_a_current_loop_gets_no_more_than_its_voltage():
-    """Held, at the limit: the force rises towards the stall force, not at the loop's rate."""
+    """For a held motor at its voltage limit, the force rises towards the stall force, not at the loop's rate."""
     device = Device(1e9, bandwidth_hz=5000.0, motor=MOTOR)
     end = moved(device, REST, 40.0, 2e-4)
     assert end.others[0] == pytest.approx(48.0 * (1 - math.exp(-2000 * 2e-4)), rel=1e-9)
-    # Near the command the loop takes over: where w (u - f) L/R + f = 48 N, and from there at the loop's rate.
+    # Near the command, where w (u - f) L/R + f = 48 N, the loop takes over, and the force rises at the loop's rate.
     w = 2 * math.pi * 5000
     over = (w * 40.0 / 2000 - 48.0) / (w / 2000 - 1)
     since = 1e-3 + math.log(1 - over / 48.0) / 2000
@@ -71,7 +71,7 @@ def test_a_hand_is_a_mass_on_a_damped_spring():
 
 
 def test_a_cable_stretches_by_the_force_it_carries():
-    """A steady push against friction that holds: the motor's side gives way by u / k, and damping settles it there."""
+    """Under a steady push against holding friction, the motor's side moves by u / k, and damping settles it there."""
     device = Device(0.3, 1.0, 1.0, transmission=Transmission(2e4, 20.0, 0.05, 0.0))
     end = moved(device, REST, 0.5, 0.2)
     assert end[:2] == (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""The encoder: stamps and pins against the geometry at every clock, computed without its code, and known passages."""
+"""The encoder: stamps and pins against an independent computation of the geometry, and passages known by hand."""
 
 import os
 import subprocess
@@ -21,9 +21,9 @@ UNIT = Handle(mass_kg=1.0, viscous_n_s_per_m=0.0)
 
 
 def true_path(handle, friction, motion, force, seconds):
-    """Return (position(times), time of the turn or None, whether it ends stuck) of one interval, in extended precision.
+    """Return (position(times), time of the turn or None, whether the handle ends stuck) of one interval.
 
-    The turn is found by bisection.
+    It computes in extended precision, and finds the turn by bisection.
     """
     m, b = map(np.longdouble, handle)
     x, v = map(np.longdouble, motion)
@@ -49,7 +49,7 @@ def true_path(handle, friction, motion, force, seconds):
 
 
 class Scale:
-    """The geometry by counting the edges at or below a position."""
+    """The geometry of the scale, by counting the edges at or below a position."""
 
     def __init__(self, encoder, low, high):
         self.first = int(np.floor(low / encoder.count_m)) - 5
@@ -68,7 +68,7 @@ def buffers(size: int) -> Edges:
 
 
 def steps(levels) -> np.ndarray:
-    """Return +1 or -1 for each change of the pins; fail if one is neither a step up nor down."""
+    """Return +1 or -1 for every change of the pins; fail if a change is neither a step up nor a step down."""
     phases = np.array([UPWARDS.index(word) for word in levels])
     change = np.diff(phases) % 4
     assert set(change.tolist()) <= {1, 3}
@@ -123,7 +123,7 @@ def test_pins_show_the_geometry_at_every_clock(dry):
             numbers = moment.cell.number + np.concatenate([[0], np.cumsum(step)])
             assert numbers[-1] == cell.number
 
-            # The last edge up to each clock gives the cell there. Within the error of a position, either cell will do.
+            # The last edge up to a clock gives the cell there. Within the error of a position, either cell is right.
             times = np.arange(clocks + 1) / CLOCK_HZ
             positions = position(times)
             seen = numbers[np.searchsorted(new, clock + np.arange(clocks + 1), side="right")]
@@ -132,7 +132,7 @@ def test_pins_show_the_geometry_at_every_clock(dry):
             compared += certain.sum()
             assert (~certain).sum() <= 2
 
-            # Not one edge more than the way to the turn and back has.
+            # There are no more edges than on the way to the turn and back.
             ends = position(np.array([0, turn_s or 0, seconds]))
             assert len(new) == np.abs(np.diff(scale.cells(ends))).sum()
             turns += turn_s is not None
@@ -150,7 +150,7 @@ def test_levels_are_quadrature():
 
 
 def test_edges_stand_where_the_errors_put_them():
-    # B late by 0.1, both high for 2.2 counts.
+    # B is late by 0.1 counts, and both pins are high for 2.2 counts.
     encoder = Encoder(2.0, CLOCK_HZ, offsets(0.1, 0.2))
     expected = np.array([-0.1, 1.0, 2.1, 3.2]) * 2
     assert [edge(encoder, n) for n in range(4)] == pytest.approx(expected)
@@ -184,19 +184,19 @@ def passages(encoder, motion, force, clocks, clock=1000, coulomb=None, handle=UN
 
 
 def test_known_passages():
-    # Dyadic numbers, so that every passage is exact: counts of 1 m, 4 clocks a second, m = 1, b = 0.
+    # All numbers are dyadic, so that every passage is exact: counts of 1 m, 4 clocks a second, m = 1, b = 0.
     encoder = Encoder(1.0, 4.0)
-    # 1 m/s from 0.25 to 1.25: passes 1 m after exactly 3 clocks, and holds the new pins at that very clock.
+    # 1 m/s from 0.25 to 1.25: it passes 1 m after exactly 3 clocks, and the pins are new at that very clock.
     assert passages(encoder, Motion(0.25, 1.0), 0.0, 4) == ((1.25, 1.0), (1, 1, 2), [(1003, 0b11)])
-    # Exactly at the end: still of this interval.
+    # A passage exactly at the end belongs to this interval.
     assert passages(encoder, Motion(0.25, 1.0), 0.0, 3) == ((1.0, 1.0), (1, 1, 2), [(1003, 0b11)])
-    # Downwards to exactly the edge: not past it.
+    # A motion downwards exactly to the edge does not pass it.
     assert passages(encoder, Motion(1.75, -1.0), 0.0, 3) == ((1.0, -1.0), (1, 1, 2), [])
-    # Downwards past it: at clock 3 it is on the edge, still the upper cell, and the next clock sees the lower one.
+    # A motion downwards past the edge: at clock 3 it is on the edge, in the upper cell; the next clock sees the lower.
     assert passages(encoder, Motion(1.75, -1.0), 0.0, 4) == ((0.75, -1.0), (0, 0, 1), [(1004, 0b01)])
-    # From the edge downwards at once.
+    # A motion from the edge downwards passes it at once.
     assert passages(encoder, Motion(1.0, -1.0), 0.0, 1) == ((0.75, -1.0), (0, 0, 1), [(1001, 0b01)])
-    # 16 m/s: four edges in each clock, in order; half a metre lies before the first.
+    # 16 m/s: four edges in every clock, in order; the first comes after half a metre.
     _, cell, edges = passages(encoder, Motion(0.5, 16.0), 0.0, 2)
     assert cell.number == 8
     assert edges == [(1001, word) for word in (0b11, 0b10, 0b00, 0b01)] + [(1002, w) for w in (0b11, 0b10, 0b00, 0b01)]
@@ -219,7 +219,7 @@ def test_a_turn_between_two_clocks_shows_both_edges():
 
 @pytest.mark.parametrize("clock_hz", [100.0, 48e6, 1e8])
 def test_rounding_puts_no_edge_outside_its_interval(clock_hz):
-    # Passages at exactly the end, where n / clock_hz * clock_hz may exceed n; and one at exactly the start.
+    # Passages exactly at the end, where n / clock_hz * clock_hz may exceed n, and a passage exactly at the start.
     encoder = Encoder(8.0, clock_hz)
     exceeding = 0
     for clocks in range(1, 400):
@@ -247,7 +247,7 @@ def test_an_interval_without_edges_or_turns_is_quiet():
     assert quietly(None, Motion(0.5, -0.5), 0.0) == ((0.0, -0.5), True)
     assert not quietly(None, Motion(0.5, 0.5), 0.0)[1]
     assert quietly(Coulomb(0.5), Motion(0.5, 0.0), -0.5) == ((0.5, 0.0), True)
-    # A turn: without friction it may lie where no edge can be; with friction it is an event.
+    # Without friction, a turn may lie where no edge can be; with friction, a turn is an event.
     assert quietly(None, Motion(0.5, 0.25), -0.5) == ((0.5, -0.25), True)
     assert not quietly(None, Motion(0.5, 0.5), -0.5)[1]
     assert not quietly(Coulomb(0.0), Motion(0.5, 0.25), -0.5)[1]
@@ -267,7 +267,7 @@ def test_full_arrays_are_reported_and_never_overrun(coulomb):
         assert n_edges == (16 if room == 16 else -1)
         assert (stamps[:room] > 0).all()
         assert (words[:room] < 4).all()
-        if room < 16:  # and stays so
+        if room < 16:  # the array stays full
             lost = Moment(Motion(0.5, 8.0), cell, -1)
             assert advance(plant, encoder, lost, -4.0, interval, edges).n_edges == -1
         assert (stamps[room:] == -7).all()

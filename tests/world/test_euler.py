@@ -1,4 +1,4 @@
-"""The fixed-step solver: against the exact one, step by step finer; its friction, its edges, and where it diverges."""
+"""The fixed-step solver: against the exact one with finer and finer steps; its friction, edges and divergence."""
 
 import math
 
@@ -23,7 +23,7 @@ from stimuli.scenes import PULSES
 REST = State(0.0, 0.0, (0.0, 0.0, 0.0), 0)
 SECONDS = 2e-2
 SCALES = np.array([0.01, 0.1, 1e-3, 0.1, 1.0])
-"""Of x, v, s, w, f in these tests; without a cable f is the third."""
+"""Scales of x, v, s, w, f in these tests; without a cable f is the third."""
 
 
 def system(device, step_s, seconds=SECONDS):
@@ -36,7 +36,7 @@ def moved_in_steps(device, state, command, step_s, seconds=SECONDS):
 
 
 def random_case(rng, number, events):
-    """Return a device, a state and a command; with `events` it has friction that sticks and often a voltage's limit."""
+    """Return a device, a state and a command; with `events` the device has dry friction and often a voltage limit."""
     parts = {"bandwidth_hz": between(rng, 20, 500)}
     if number % 2:
         parts["transmission"] = random_cable(rng, (1e2, 3e4), (0.02, 0.5), 20.0)
@@ -52,7 +52,7 @@ def random_case(rng, number, events):
 
 
 def errors(device, state, command, steps_s):
-    """Return how far the steps' ends are from the exact one, in the states' scales."""
+    """Return the distances of the steps' end states from the exact one, in the states' scales."""
     scales = SCALES if device.transmission else SCALES[[0, 1, 4, 4, 4]]
     exact, *found = (
         np.array([each.position_m, each.velocity_m_per_s, *each.others])
@@ -65,7 +65,7 @@ def errors(device, state, command, steps_s):
 
 
 def test_without_events_the_error_is_of_the_first_order_in_the_step():
-    """At 1 us all that is of higher order is under a per cent: the fastest rate here is some thousands a second."""
+    """At 1 us all higher orders are under a per cent, because the fastest rate here is some thousands a second."""
     rng = np.random.default_rng(1)
     for number in range(40):
         coarse, fine = errors(*random_case(rng, number, events=False), (2e-6, 1e-6))
@@ -73,7 +73,7 @@ def test_without_events_the_error_is_of_the_first_order_in_the_step():
 
 
 def test_with_friction_that_sticks_and_limits_it_falls_with_the_step():
-    """An event is late by up to a step, and by how much changes from step to step: the order is one on average."""
+    """An event is late by up to a step, and the delay varies with the step, so the order is one on average."""
     rng = np.random.default_rng(2)
     orders = []
     for number in range(60):
@@ -105,7 +105,7 @@ def test_a_handle_that_is_stopped_leaves_its_motor_moving():
 
 @pytest.mark.parametrize("at_motor", [False, True])
 def test_edges_are_where_the_line_from_step_to_step_passes_them(at_motor):
-    """One step of 1 ms, through many edges: the pins at every clock, against a line between the step's ends."""
+    """In one step of 1 ms through many edges, the pins at every clock follow a line between the step's ends."""
     rng = np.random.default_rng(3)
     encoder, clocks, edges = Encoder(1e-4, 1e5, offsets(0.2, 0.1)), 100, 0
     for _ in range(40):
@@ -143,7 +143,7 @@ def test_full_arrays_are_reported():
 
 
 def test_a_step_never_spans_a_change_of_the_command():
-    """A pulse of 0.3 of the period at a step of the whole period: without a part that resists, the mean is exact."""
+    """A pulse lasts 0.3 of the period, and a step the whole period: without a part that resists, the mean is exact."""
     device = Device(0.5, pulse=Pulse(2.0, 1000, 100))
     encoder = COARSE._replace(clock_hz=1e6)
     end = after(system(device, 1e-3, 1e-3), REST, -0.8, 1e-3, 0, 1000, encoder)
@@ -163,7 +163,7 @@ def test_the_longest_step_is_the_known_one():
 
 @pytest.mark.parametrize("spring", ["cable", "hand"])
 def test_a_spring_keeps_its_energy_to_within_a_step(spring):
-    """Symplectic Euler conserves the energy but for a term of h w / 2 of it, for ever."""
+    """Symplectic Euler conserves the energy for ever, except for a term of h w / 2 of it."""
     mass, stiffness = 0.2, 1e3
     if spring == "cable":
         device, start = Device(mass, transmission=Transmission(stiffness, 0.0, mass, 0.0)), (0.0, (1e-3, 0.0, 0.0))
@@ -185,7 +185,7 @@ def test_a_spring_keeps_its_energy_to_within_a_step(spring):
 
 
 def test_a_hit_rests_where_the_wall_carries_the_push():
-    """But for the friction that sticks, a count, and half a step of the converter."""
+    """The tolerance is the dry friction, a count, and half a step of the converter."""
     short = {"protocol.settle_s": 3.0, "protocol.measure_s": 0.2, "controller.estimator": "butterworth"}
     scene = load("drive-2011", short | {"solver.step_s": 1e-4})
     assert isinstance(world_of(scene).plant, Stepped)

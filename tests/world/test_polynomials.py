@@ -1,4 +1,4 @@
-"""Polynomials of a leg: what is said to be sure is so, and a passage is where NumPy has it."""
+"""Polynomials of a leg: sure statements are true, and a passage is where NumPy finds it."""
 
 import numpy as np
 import pytest
@@ -71,7 +71,7 @@ def test_what_is_sure_is_so_and_the_rest_is_found():
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_a_start_that_a_rounding_put_outside_does_not_hide_the_way_through(side):
-    """A range that is crossed from side to side is left at the far one; what turns back at once is left at once."""
+    """A range that is crossed is left at its far side; a motion that turns back at once leaves at once."""
     outside = -np.nextafter(1.0, 2.0)
     for slope, left in ((4.0, 0.5), (-1.0, 0.0)):
         series = series_of(side * np.array([outside, slope, 0.0]))

@@ -48,8 +48,8 @@ def exact_span(handle: Handle, seconds: float) -> list[Decimal]:
 
 
 def test_span_is_accurate_for_every_friction():
-    # In units of U: z carries 2, and no coefficient amplifies that; its series adds 2 and the products that follow at
-    # most 6. Without the series (from z = -1/4 on) phi2 takes the error of phi1, 4, times |phi1 / (z phi2)| <= 7.7.
+    # Errors in units of U: z has 2, and no coefficient amplifies it; its series adds 2, and the later products at most
+    # 6. Without the series (from z = -1/4 on) phi2 has the error of phi1, 4, times |phi1 / (z phi2)| <= 7.7.
     rng = np.random.default_rng(1)
     arguments = [0.0, 1e-300, 1e-17, 9.99e-4, 1.001e-3, 0.2499, 0.25, 0.2501, 1.0, 36.0, 40.0, 700.0, 1e4]
     arguments += (10.0 ** rng.uniform(-9, 3, 300)).tolist() + rng.uniform(0.1, 0.4, 200).tolist()
@@ -69,7 +69,7 @@ def test_motion_without_dry_friction_is_the_matrix_exponential():
         m, b = handle
         system = np.array([[0, 1, 0], [0, -b / m, 1 / m], [0, 0, 0]])
         expected = expm(system * seconds) @ [*motion, force]
-        # expm itself is good to about the norm of its argument, below 1000, in units of U.
+        # The error of expm itself is about the norm of its argument, below 1000, in units of U.
         scale = abs(motion.position_m) + (abs(motion.velocity_m_per_s) + abs(force) * seconds / m) * (1 + seconds)
         assert after(Rigid(handle, None), motion, force, span(handle, seconds)) == pytest.approx(
             expected[:2], rel=0, abs=2000 * U * scale
@@ -77,7 +77,7 @@ def test_motion_without_dry_friction_is_the_matrix_exponential():
 
 
 def integrated(handle: Handle, level: float, motion: Motion, force: float, seconds: float) -> tuple[np.ndarray, str]:
-    """Return the state after one interval by numerical integration with events, and what happened in it."""
+    """Return the state after one interval by numerical integration with events, and the events in it."""
 
     def slip(state, direction, time):
         if time == 0:
@@ -130,8 +130,8 @@ def test_stick_and_slip_agree_with_numerical_integration():
 
 @pytest.mark.parametrize("level", [None, 0.0, 0.4])
 def test_a_split_interval_gives_the_same_motion(level):
-    # Each coefficient is off by at most 40 U of itself, and so are a time of turning and what is added after it: the
-    # velocity then differs by its error at the turn, since friction makes the force before it the larger one.
+    # Every coefficient is off by at most 40 U of itself, and so are the time of a turn and the terms after it. The
+    # velocity then differs by its error at the turn, because friction makes the force before the turn the larger one.
     rng = np.random.default_rng(4)
     coulomb = None if level is None else Coulomb(level)
     for _ in range(3000):
@@ -170,10 +170,10 @@ def test_the_level_itself_holds_and_the_next_force_moves():
     [
         (1.0, 1.0, 0.0, 1.0, (0.5, 0.0)),  # stops exactly at the end
         (1.0, -1.0, 0.0, 1.0, (-0.5, 0.0)),
-        (1.0, 1.0, 0.0, 8.0, (0.5, 0.0)),  # stops within
-        (1.0, 1.0, 0.0, 0.5, (0.375, 0.5)),  # not yet
-        (0.5, 1.0, -0.5, 4.0, (0.5, 0.0)),  # pushed back by exactly the level: stays
-        (0.5, 1.0, 0.5, 4.0, (4.0, 1.0)),  # pushed on by exactly the level: goes on for ever
+        (1.0, 1.0, 0.0, 8.0, (0.5, 0.0)),  # stops within the interval
+        (1.0, 1.0, 0.0, 0.5, (0.375, 0.5)),  # does not stop yet
+        (0.5, 1.0, -0.5, 4.0, (0.5, 0.0)),  # pushed back by exactly the level of friction: stays
+        (0.5, 1.0, 0.5, 4.0, (4.0, 1.0)),  # pushed on by exactly the level of friction: goes on for ever
         (0.5, 1.0, -1.5, 1.5, (-0.25, -1.0)),  # stops after 0.5 s at 0.25 m, then slips back with -1 N for 1 s
         (0.5, -1.0, 1.5, 1.5, (0.25, 1.0)),
         (0.0, 1.0, -1.0, 2.0, (0.0, -1.0)),  # no friction: up and back
@@ -216,7 +216,7 @@ def test_a_turn_lies_in_its_interval():
 
 
 def test_friction_takes_the_kinetic_energy():
-    # b = 0: m v^2 / 2 = Fc times the way to the stop. With b as well, m v = Fc t + b x for the momentum.
+    # With b = 0, m v^2 / 2 = Fc times the way to the stop; with b > 0, m v = Fc t + b x for the momentum.
     rng = np.random.default_rng(6)
     for _ in range(200):
         handle, velocity, level = random_handle(rng), float(rng.normal()), float(rng.uniform(0.1, 2))
@@ -241,8 +241,8 @@ def test_heavy_friction_reaches_the_terminal_velocity():
 
 
 def test_many_equal_intervals_do_not_drift():
-    # The factor of one interval, rounded, would be off by up to U in the same direction a million times over.
-    # Rounding the sums instead is a random walk of steps up to U.
+    # The rounded factor of one interval would be off by up to U in the same direction a million times.
+    # Rounding the sums instead gives a random walk of steps up to U.
     @compiled
     def run(plant, moment, interval, steps):
         for _ in range(steps):
@@ -273,5 +273,5 @@ def test_reach_inverts_the_travel_of_one_direction():
         assert 0 <= at <= seconds
         assert glide(start, force, span(handle, at)).position_m == pytest.approx(travel, rel=2e-14, abs=0)
     assert turns > 300
-    # A travel whose square underflows.
+    # The square of this travel underflows.
     assert reach(UNIT, Motion(0.0, 0.0), 1e-200, 1.0, 5e-201) == 1.0

@@ -1,4 +1,4 @@
-"""Devices of more than a handle: against 60-digit exponentials, integrators with events, and the geometry."""
+"""Devices with more parts than a handle: against 60-digit exponentials, integrators with events, and the geometry."""
 
 from dataclasses import replace
 
@@ -52,8 +52,11 @@ CORNERS = [
 
 
 def test_motion_without_events_is_the_exponential_from_extreme_to_extreme():
-    """Each leg adds roundings of the balanced state's size: of its series, of n + 2 = 7 products a term, less than
-    (7 + 2) e; of its tables' entries, a few each, no more again; in all under 64 halves of a unit."""
+    """Every leg adds roundings of the balanced state's size, in all under 64 halves of a unit.
+
+    The series, with n + 2 = 7 products a term, adds less than (7 + 2) e; the entries of the tables, with a few
+    roundings each, add no more than that again.
+    """
     rng = np.random.default_rng(1)
     worst, compared = 0.0, 0
     cases = [(device, step) for device in CORNERS for step in (1e-7, 1e-5)]
@@ -116,8 +119,11 @@ def test_sticking_and_limits_agree_with_numerical_integration():
 
 
 def test_sticking_and_limits_agree_with_numerical_integration_from_extreme_to_extreme():
-    """Forces of some newtons on whatever stiffness, mass and damping. The integrator errs by 1e-11 a step, in at most
-    some thousand steps, and by as little at each event: a millionth of the change is far more."""
+    """Forces of some newtons act on any stiffness, mass and damping.
+
+    The integrator errs by 1e-11 a step, in at most some thousand steps, and by as little at every event: the tolerance,
+    a millionth of the change, is far larger.
+    """
     rng = np.random.default_rng(7)
     seen = dict.fromkeys(("rests", "breaks", "limits", "recovers"), 0)
     for case in range(1500):
@@ -149,7 +155,7 @@ def test_sticking_and_limits_agree_with_numerical_integration_from_extreme_to_ex
 
 
 def test_a_voltage_that_crosses_all_of_its_range_in_a_leg_is_followed():
-    """Narrow limits, fast devices: whole legs against legs of another length, and one case against SciPy."""
+    """With narrow limits and fast devices, whole legs agree with legs of another length, and one case with SciPy."""
     motor = Motor(
         1.8173661069341358, 2.3265107419110975e-4, 0.4116723507997901, 0.5511340164319264, 0.010239159076919186
     )
@@ -199,7 +205,7 @@ def test_a_handle_alone_moves_as_the_closed_form_has_it(coulomb):
 @pytest.mark.parametrize("stiffness", [1.0, 1e8])
 @pytest.mark.parametrize("mass", [1e-3, 100.0])
 def test_two_masses_on_an_undamped_cable_keep_their_energy(stiffness, mass):
-    """A hundred thousand intervals of a tenth of the fastest time: energy walks by roundings, it does not drift."""
+    """Over a hundred thousand intervals of a tenth of the fastest time, energy walks by roundings without a drift."""
     device = Device(mass, transmission=Transmission(stiffness, 0.0, mass, 0.0))
     seconds = 0.1 / fastest_per_s(device)
     system, steps = train(device, seconds), 100_000
@@ -223,7 +229,7 @@ def test_two_masses_on_an_undamped_cable_keep_their_energy(stiffness, mass):
 
 @pytest.mark.parametrize("at_motor", [False, True])
 def test_pins_show_the_geometry_at_every_clock(at_motor):
-    """The stamps of whole intervals, against where the encoder is clock by clock."""
+    """The stamps of whole intervals agree with the encoder's position clock by clock."""
     rng = np.random.default_rng(4 + at_motor)
     encoder = Encoder(1e-4, 1e4, offsets(0.2, 0.1))
     edges = near = 0
