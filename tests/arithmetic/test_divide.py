@@ -18,13 +18,13 @@ def exact(dividend: int, divisor: int, quotient_width: int) -> int:
 
 
 def ends(width: int) -> list[int]:
-    """Return the words at which something carries or is at its end."""
+    """Return the words at which a carry occurs, and the ends of the range."""
     top = (1 << width) - 1
     return sorted({v for k in range(width) for v in ((1 << k) - 1, 1 << k, (1 << k) + 1) if v <= top} | {0, top})
 
 
 def stimulus(dividend_width: int, divisor_width: int, quotient_width: int, samples: int):
-    """Yield (dividend, divisor): all ends, both sides of whole quotients and of the largest one, random magnitudes."""
+    """Yield (dividend, divisor): all ends, both sides of whole and largest quotients, random magnitudes."""
     random = rng()
     largest = (1 << dividend_width) - 1
     for divisor in ends(divisor_width):

@@ -1,4 +1,4 @@
-"""Formats and narrowing: the model's against exact arithmetic, and the hardware's shapes against the model's."""
+"""Formats and narrowing: the model against exact arithmetic, and the hardware's shapes against the model's formats."""
 
 import math
 from fractions import Fraction
@@ -70,7 +70,7 @@ def test_saturate_holds_within(value, one, other):
 
 
 def evaluate(expression: Value) -> int:
-    """Return what a constant Amaranth expression is worth."""
+    """Return the value of a constant Amaranth expression."""
     m, result = Module(), Signal(expression.shape())
     m.d.comb += result.eq(expression)
     seen = []

@@ -15,7 +15,7 @@ def make(**sizes: int) -> SignedDivide:
 
 
 def pairs(component: SignedDivide, samples: int):
-    """Yield dividends and divisors whose quotient fits: the ends of it, then anything."""
+    """Yield dividends and divisors whose quotient fits: the ends of its range, then random pairs."""
     random, members = rng(), component.signature.members
     top = (1 << (members["dividend"].shape.width - 1)) - 1
     most = (1 << members["divisor"].shape) - 1
@@ -57,7 +57,7 @@ async def a_start_while_busy_abandons_the_quotient_in_hand(dut):
     "sizes",
     [
         {"dividend_width": 20, "divisor_width": 11, "fraction": 18, "quotient_bits": 21},
-        # As many steps as need a bit more to be counted with those besides.
+        # The counter of steps needs one more bit when the additional steps are counted too.
         {"dividend_width": 5, "divisor_width": 9, "fraction": 11, "quotient_bits": 14},
     ],
     ids=["wide", "small dividend"],

@@ -13,7 +13,7 @@ from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, s
 
 
 def around_squares(width: int) -> list[int]:
-    """Return the radicands at which a root changes, and its neighbours, over all magnitudes; and the extremes."""
+    """Return radicands around those at which the root changes, over all magnitudes, and the extremes."""
     top = (1 << width) - 1
     roots = {r for k in range((width + 1) // 2 + 1) for r in (1 << k, (1 << k) - 1, math.isqrt(top >> k))}
     return sorted({0, 1, top} | {v for r in roots for v in (r * r - 1, r * r, r * r + 1) if 0 <= v <= top})
@@ -35,7 +35,7 @@ async def follows_model(dut):
     component = Sqrt(width)
     bench = Bench(dut, component)
     await bench.reset()
-    # Exhaustive where that is less than the random campaign.
+    # The campaign is exhaustive where that takes fewer samples than the random one.
     radicands = range(1 << width) if 1 << width <= SAMPLES else rng().integers(0, 1 << width, SAMPLES).tolist()
     rows = [(radicand,) for radicand in [*around_squares(width), *radicands]]
     starts, roots = await bench.campaign("start", "done", ("radicand",), ("root",), rows)

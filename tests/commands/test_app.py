@@ -29,7 +29,7 @@ main()
 
 
 def without(absent: set[str], *arguments: str) -> subprocess.CompletedProcess:
-    """Run the command line where some packages are not installed."""
+    """Run the command line as if some packages were not installed."""
     program = WITHOUT.format(absent=absent, arguments=arguments)
     return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
 

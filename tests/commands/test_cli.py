@@ -1,4 +1,4 @@
-"""The command line: what it prints, and that every bad input is one line that says what, where and what is accepted."""
+"""The command line: its output, and one line for every bad input with the fault, its place and the accepted values."""
 
 import json
 import subprocess

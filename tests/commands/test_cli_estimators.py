@@ -1,4 +1,4 @@
-"""The commands that compare estimators: what they print, what they refuse, and that nothing computed is lost."""
+"""The commands that compare estimators: their output, the input that they refuse, and interrupted runs."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Accuracy of estimators: the founding paper's figures, every backend, and what is refused."""
+"""Accuracy of estimators: the founding paper's figures, every backend, and refused input."""
 
 import math
 
@@ -26,7 +26,7 @@ def test_the_papers_second_figure_at_its_crossing(label, backend):
 
 
 def test_the_papers_second_figure_rises_and_falls_as_published():
-    """Levant falls steeply to where it meets the filter, then hardly rises; the plain difference only rises."""
+    """Levant's error falls steeply until it meets the filter's, then hardly rises; the plain difference only rises."""
     rms = {
         (name, rate): measure(name, "u", "paper", rate)["rms_mm_s"]
         for name in ("fdm", "levant")
@@ -39,15 +39,15 @@ def test_the_papers_second_figure_rises_and_falls_as_published():
     assert rms["fdm", 2_000] < rms["fdm", 5_000] < rms["fdm", 10_000] < rms["fdm", 20_000]
 
 
-# Its levels change at times that a rounding moves, so that two runs part: what words cost it is a matter of many runs,
-# which its own test makes.
+# Its levels change at times that a rounding moves, so two runs differ: only many runs, as in its own test, show the
+# cost of words.
 REPEATABLE = [pair for pair in EVERY_OUTPUT if pair[0] != "levant-adaptive"]
 
 
 @pytest.mark.parametrize("sample_hz", [1_000, 10_000, 100_000, 1_000_000])
 @pytest.mark.parametrize(("estimator", "output"), REPEATABLE)
 def test_words_cost_no_estimator_more_than_a_hundredth_of_its_error(estimator, output, sample_hz):
-    """What is reported of `fixed` is what is reported of `float`; each estimator's own test holds the samples too."""
+    """The figures of `fixed` are those of `float`; every estimator's own test also compares the samples."""
     floating, fixed = (measure(estimator, output, "paper", sample_hz, backend) for backend in ("float", "fixed"))
     assert fixed["rms_mm_s"] == pytest.approx(floating["rms_mm_s"], rel=0.01)
     assert fixed["flags"] == []
@@ -99,11 +99,11 @@ def test_outputs_of_names():
 
 
 def test_the_window_floor_is_that_of_a_window():
-    """Its formula against a run of the difference over that window."""
+    """The formula agrees with a run of the difference over that window."""
     signal = signals.load("paper")
     window_s = 2 * math.sqrt(figures.COUNT_M / 2 / signal.acceleration_max_m_per_s2)
     row = measure("window", "u", "paper", 100_000, gains={"window_s": round(window_s * 1e5) / 1e5})
-    # The formula's roundings are independent; those of a motion slower than a count a window are not, and larger.
+    # The formula's roundings are independent; they are dependent and larger in a motion slower than a count a window.
     slow = sum(abs(v) * window_s < figures.COUNT_M for v in exact_velocity(signal.motion, np.arange(1, 5, 1e-3))) / 4000
     floor = 1e3 * figures.window_floor_m_per_s(signal, 100_000)
     assert floor * (1 - slow) <= row["rms_mm_s"] <= floor * (1 + slow)

@@ -1,4 +1,4 @@
-"""The figures of an estimate against those that were put into it."""
+"""The figures of an estimate against the errors that were put into it."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ def test_a_delay_is_found(delay):
 
     times = np.arange(200_000) / RATE
     judge = judged(exact(times - delay) + 0.01 * rng().standard_normal(len(times)), exact(times))
-    # The noise moves the peak by about its RMS over the slope's, over the root of the number of samples.
+    # The noise moves the peak by about its RMS over the RMS of the slope and over the root of the number of samples.
     slope = np.sqrt(np.mean(np.gradient(exact(times), times) ** 2))
     assert judge.delay_s(exact, 0.1) == pytest.approx(delay, abs=5 * 0.01 / slope / np.sqrt(len(times)))
 

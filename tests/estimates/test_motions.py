@@ -43,7 +43,7 @@ def test_a_track_is_exact_for_a_cubic():
     times = np.linspace(0, 0.02, 97)
     assert np.abs(positions(path, times) - cubic(times)[0]).max() < 1e-15
     assert np.abs(np.array([motions.velocity(path, t) for t in times]) - cubic(times)[1]).max() < 1e-12
-    # Beyond its ends it goes on as it was.
+    # The track continues beyond its ends.
     assert motions.position(path, -0.1) == pytest.approx(-1e-4, rel=1e-12)
     assert motions.velocity(path, 0.1) == pytest.approx(cubic(0.02)[1], rel=1e-12)
 

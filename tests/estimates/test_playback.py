@@ -1,4 +1,4 @@
-"""A known motion through an axis: the count at each strobe is the place at its time, on every backend."""
+"""A known motion through an axis: the count at every strobe is the position at its time, on every backend."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Recordings: what is read, at which rate, and that each thing wrong is one line that says where and what is right."""
+"""Recordings: their counts and rates, and one line for every fault that says where it is and what is accepted."""
 
 import re
 
@@ -26,7 +26,7 @@ def read(tmp_path):
 
 @pytest.fixture
 def refused(read):
-    """Return a function that gives the message with which a file is refused; always one line that names the file."""
+    """Return a function that gives the message for a refused file, which is always one line that names the file."""
 
     def message(*args, **kwargs):
         with pytest.raises(RecordingError) as caught:
@@ -183,7 +183,7 @@ def stamped(times, form="{:.3f}"):
     ],
 )
 def test_the_rate_is_found_from_uniform_times(read, times, form, rate):
-    """Within what the stamps tell: the first and the last are half a unit off at most."""
+    """The rate is as exact as the stamps: the first and the last are off by at most half a unit."""
     lines = stamped(map(float, times), form)
     decimals = 6 if "e" in form else max(len(line.split(",")[0].partition(".")[2]) for line in lines)
     whole = times[-1] - times[0]
@@ -225,7 +225,7 @@ def test_a_rate_that_contradicts_the_times_is_refused(refused, read):
     lines = stamped(np.arange(2000) / 1000)
     assert "line 3, column time_s: times must agree with the rate 500 Hz within 0.001 s" in refused(lines, rate_hz=500)
     assert "(over all: 1000 Hz)" in refused(lines, rate_hz=1001)
-    # Within what stamps of a millisecond tell over two seconds.
+    # The rate is as exact as stamps of a millisecond allow over two seconds.
     assert read(lines, rate_hz=1000.4).rate_hz == 1000.4
 
 

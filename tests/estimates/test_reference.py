@@ -1,4 +1,4 @@
-"""The reference of a replay: no delay, judged after the first second, and the bound that is taken from it."""
+"""The reference of a replay: no delay, errors only after the first second, and the bound that it gives."""
 
 import math
 
@@ -10,7 +10,7 @@ from stimuli.replays import COARSEN, recording, reference_of, swing
 
 
 def test_the_reference_has_no_delay():
-    """The derivative of a sine, less what a difference over two samples takes off, within the rounding of counts."""
+    """It is the derivative of a sine, reduced as by a difference over two samples, within the rounding of counts."""
     amplitude, hertz, t = 1e9, 2.0, np.arange(4000) / 1000
     made = recording(np.round(amplitude * np.sin(2 * np.pi * hertz * t)))
     reference = replay(made, "fdm", "u", "float").reference_counts_per_s

@@ -1,4 +1,4 @@
-"""Replays: recordings on every backend, the paper's equations, units, what is refused and what is written."""
+"""Replays: recordings on every backend, the paper's equations, units, refused input and written files."""
 
 import csv
 import json
@@ -49,9 +49,9 @@ def test_recordings_on_every_backend(recordings, name, estimator, output):
 def check_equations(recorded: Recording, bound: float) -> None:
     """Assert that u and u1 of every sample are those of the paper's equations, written in SI and absolute position.
 
-    Position is summed in extended precision, so what is left is the rounding of the kernel's own sum, half an ulp a
-    sample of what is a few counts at most. An error of d in e is one of at most lambda sqrt(d) in u, and can turn the
-    sign of an e within d.
+    Position is summed in extended precision, so only the rounding of the kernel's own sum remains: half an ulp a
+    sample of a few counts at most. An error of d in e causes at most lambda sqrt(d) in u, and can turn the sign of an
+    e that is within d of 0.
     """
     rate, tau = recorded.rate_hz, 1 / recorded.rate_hz
     u, u1 = (
@@ -90,7 +90,7 @@ def test_float_finite_difference_is_the_difference():
 @EVERY
 @pytest.mark.parametrize("backend", ["float", "fixed"])
 def test_coarse_counts_are_judged_in_recorded_counts(estimator, output, backend):
-    """What lies between coarse counts is not seen: the same velocity, to the word, in units of the recorded counts."""
+    """Motion between coarse counts is not seen: the velocity is the same to the word, in units of recorded counts."""
     fine, random = swing(), rng()
     coarse = recording(fine.counts // COARSEN)
     other = recording(fine.counts // COARSEN * COARSEN + random.integers(0, COARSEN, len(fine.counts)))
@@ -128,7 +128,7 @@ def test_the_shortest_and_the_stillest(estimator, output, counts):
 
 @EVERY
 def test_the_widest(estimator, output):
-    """All of 32 bits: the count wraps, and no word is too narrow to be made."""
+    """The counts use all of 32 bits: the count wraps, and every word can be made."""
     slope = 2**32 // 4000
     counts = -(2**31) + slope * np.arange(4000)
     if ESTIMATORS[estimator].uses_stamps():  # no clock counts so many edges
@@ -138,14 +138,14 @@ def test_the_widest(estimator, output):
     result = replay(recording(counts), estimator, output, "fixed", acceleration_max_counts_per_s2=slope * 1e5)
     assert result.spec.count_width == 32
     assert np.median(result.velocity_counts_per_s[2000:]) == pytest.approx(slope * 1000.0, rel=0.1)
-    # From no acceleration at all, too.
+    # Gains also follow from zero acceleration.
     assert replay(recording(counts), estimator, output, "fixed").acceleration_max_counts_per_s2 > 0
     jump = np.zeros(1000, np.int64)
     jump[500:] = 2**31 - 1
     assert np.isfinite(replay(recording(jump), estimator, output, "fixed").velocity_counts_per_s).all()
 
 
-# ---- what is refused ------------------------------------------------------------------------------------------------
+# ---- refused input --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -191,7 +191,7 @@ def test_a_change_too_fast_for_any_clock_is_refused_on_rtl_alone():
     assert replay(recording(counts), "fdm", backend="fixed").velocity_counts_per_s.max() == 100_001_000.0
 
 
-# ---- what is written ------------------------------------------------------------------------------------------------
+# ---- written files --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("coarsen", [None, COARSEN])
@@ -226,7 +226,7 @@ def test_samples_are_saved(tmp_path, coarsen):
     if coarsen:
         saved = [float(row["reference_counts_per_s"]) for row in rows]
         assert saved == pytest.approx(result.reference_counts_per_s.tolist(), rel=1e-11)
-    # What was saved can be replayed.
+    # The saved file can be replayed.
     again = replay(load(path, "count"), coarsen=coarsen)
     assert again.velocity_sha256 == result.velocity_sha256
     assert [each.name for each in tmp_path.iterdir()] == ["out.csv"]

@@ -1,4 +1,4 @@
-"""The signals by name: what each is, and what is no signal."""
+"""The signals by name: their properties, and refused names."""
 
 import math
 

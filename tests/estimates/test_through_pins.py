@@ -23,7 +23,7 @@ def axis_of(estimator: str):
 
 
 def extremes(spec, samples=20_000) -> np.ndarray:
-    """Return counts as fast as the pins allow, that turn at every sample, rest, wrap the axis's count, and wander."""
+    """Return counts that move as fast as the pins allow, turn at every sample, rest, wrap the axis's count, wander."""
     random, most = rng(), spec.clocks_per_sample
     parts = [
         np.full(20, most),
@@ -55,7 +55,7 @@ def test_rtl_gives_the_words_of_fixed_at_the_extremes(estimator, output):
 
 @EVERY
 def test_a_replay_is_the_same_on_rtl_and_fixed(estimator, output):
-    """From the recording on, at another rate and not coarser: per count and sample it is the same axis."""
+    """The recording has another rate and is not coarsened; per count and sample, the axis is the same."""
     made = recording(swing().counts // COARSEN, rate_hz=500)
     given = {"acceleration_max_counts_per_s2": BOUND / COARSEN / 4}
     fixed, rtl = (replay(made, estimator, output, backend, **given) for backend in ("fixed", "rtl"))

@@ -1,4 +1,4 @@
-"""Results that took time: kept as they come, found again, and given up when the sources change."""
+"""The store of results that take time: kept as they come, found again, and discarded when the sources change."""
 
 import multiprocessing
 

@@ -1,4 +1,4 @@
-"""The closed loop: the RTL, through its pins, gives the model's force words, every one of them."""
+"""The closed loop: the RTL, through its pins, gives all force words of the model."""
 
 import json
 import math
@@ -17,12 +17,12 @@ UNSTABLE = {"wall.stiffness_n_per_m": 100e3, "wall.damping_n_s_per_m": 20.0}
 ESTIMATORS = {
     f"{name} {output}": {"controller.estimator": name, "controller.output": output} for name, output in EVERY_OUTPUT
 }
-# Run whole in every wall; the others in one, and for a second in the other.
+# These run whole in both walls; the others run whole in one wall and for a second in the other.
 CORE = ("levant u", "levant u1", "fdm u")
 
 
 def same_words(scene: str, changes: dict) -> hit.Hit:
-    """Run `fixed` and `rtl`, hold one against the other, and return the former."""
+    """Run `fixed` and `rtl`, compare them, and return the hit of `fixed`."""
     loaded = load(scene, changes)
     fixed, rtl = hit.run(loaded, "fixed"), hit.run(loaded, "rtl")
     assert fixed.force_sha256 == rtl.force_sha256
@@ -55,7 +55,7 @@ def test_rtl_gives_the_models_force_words_with_an_imperfect_encoder(estimator):
 
 @pytest.mark.parametrize("output", ["dac", "pwm"])
 def test_rtl_gives_the_models_force_words_on_a_device_of_every_part(output):
-    """The plant advances between the same instants, whatever it is made of."""
+    """The plant advances between the same instants, whatever its parts."""
     parts = AMPLIFIER | CABLE | HAND | DRIVE | {"amplifier.current_limit_a": 10.0, "output.full_scale_n": 40.0}
     parts |= {"output.dac_bits": 12} if output == "dac" else {"output.pwm_carrier_hz": 20_000, "output.pwm_steps": 600}
     parts |= {"protocol.push_n": 2.0}  # pulses meet the voltage's limit, and push the less
@@ -71,7 +71,7 @@ def test_rtl_gives_the_models_force_words_when_samples_leave_no_slack(estimator)
 
 
 def test_rtl_gives_the_models_force_words_and_flags_when_the_encoder_is_too_fast():
-    # The motor makes it faster than promised: on a slow clock, no level lasts as long as the longest filter.
+    # The motor turns the encoder faster than promised: on a slow clock, no level lasts as long as the longest filter.
     changes = {"protocol.push_n": 20.0, "encoder.phase_error_counts": 0.1, "controller.glitch_clocks": 15}
     changes |= {"controller.clock_hz": 2_000_000, "controller.speed_max_m_per_s": 0.2}
     result = same_words("seed-2011", changes | ONE_SECOND)
@@ -112,14 +112,14 @@ def test_the_first_moments_are_those_of_the_undisturbed_handle():
 
 
 def test_a_late_amplifier_is_late_by_exactly_its_delay():
-    """With the delay the handle feels the wall so much later: its path leaves the prompt one's only then."""
+    """With a delay the handle feels the wall later by the delay, and leaves the path of the prompt handle only then."""
     late = load("seed-2011", ONE_SECOND | {"amplifier.delay_s": 5e-3})
     prompt = load("seed-2011", ONE_SECOND | {"amplifier.delay_s": 0.0})
     paths = [hit.run(scene, "fixed", traces=True).detail for scene in (late, prompt)]
     apart = int(np.argmax(paths[0].position_m != paths[1].position_m))
     first_force = int(np.argmax(paths[1].force_n != 0))
     assert apart == first_force + 1
-    # The motor pushes the late one on until the first force, 50 samples late, acts; and not a sample longer.
+    # The motor pushes the late handle until the first force acts, exactly 50 samples late.
     speed = np.diff(paths[0].velocity_m_per_s[first_force : first_force + 53])
     assert (speed[:50] > 0).all()
     assert (speed[51:] < 0).all()

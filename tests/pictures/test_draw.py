@@ -1,4 +1,4 @@
-"""Every picture: what is on its axes, that all of its words are within it, and that its file is always the same."""
+"""Every picture: its axes have names and units, all words are within it, and its file is always the same."""
 
 import re
 from dataclasses import replace
@@ -62,7 +62,7 @@ def picture(request) -> Figure:
 
 
 def words(figure: Figure) -> list[Text]:
-    """Return the texts of a figure that are seen, but for the ticks', once it is laid out."""
+    """Return the visible texts of a figure after its layout, except for those of the ticks."""
     figure.draw_without_rendering()
     ticks = {text for tick in figure.findobj(Tick) for text in tick.findobj(Text)}
     texts = figure.findobj(Text, include_self=False)
@@ -130,7 +130,7 @@ def test_an_error_stands_under_the_estimate(name):
     top = others[0].get_position()
     figure.draw_without_rendering()
     assert error.get_position().y1 <= top.y0
-    # What the panel has is the estimate less the truth, of the panel above.
+    # This panel shows the estimate minus the truth of the panel above.
     if name == "hit":
         true, estimate = (line.get_ydata() for line in others[0].lines[:2])
         assert error.lines[0].get_ydata() == pytest.approx((estimate - true) * 1e3)

@@ -1,4 +1,4 @@
-"""What all pictures share: colours, lengths as text, places of labels, and files."""
+"""The style that all pictures share: colours, lengths as text, places of labels, and files."""
 
 import numpy as np
 import pytest

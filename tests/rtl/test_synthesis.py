@@ -1,4 +1,4 @@
-"""Synthesis: what it reports, and what it says when it cannot. Full runs on both devices are `make synth`."""
+"""Synthesis: its report, and its messages on failure. Full runs on both devices are `make synth`."""
 
 import importlib.util
 import json
@@ -20,7 +20,7 @@ KEYS = {
     "dsp", "bram", "available", "clocks_per_sample", "max_sample_hz", "latency_clocks", "critical_path", "folder",
 }  # fmt: skip
 
-# A stand-in for either tool. Speed and size follow from the seed, so that every number of the report can be told.
+# A stand-in for either tool. Speed and size follow from the seed, so that every number of the report is known.
 TOOL = """#!{python}
 import json, pathlib, sys
 seed = int(sys.argv[sys.argv.index("--seed") + 1]) if "--seed" in sys.argv else 0
@@ -55,7 +55,10 @@ def placed(scene, *order) -> dict:
 
 @pytest.fixture
 def tools(tmp_path, monkeypatch) -> Path:
-    """Stand-ins for Yosys and nextpnr, an empty build folder; the file that lists the calls' seeds, Yosys being 0."""
+    """Set up stand-ins for Yosys and nextpnr and an empty build folder; return the file that lists the calls' seeds.
+
+    A call of Yosys is listed as 0.
+    """
     calls, programs = tmp_path / "calls", tmp_path / "bin"
     programs.mkdir()
     for name in (synthesis.YOSYS, *(device.nextpnr[0] for device in DEVICES.values())):
@@ -89,7 +92,7 @@ def test_report_of_a_device_that_nextpnr_knows(tools):
 
 
 def test_multipliers_without_registers_are_part_of_a_path(tools):
-    # 5 ns to the multiplier, its 9 ns, and 6 ns on: 50 MHz, whatever nextpnr says of the rest.
+    # 5 ns to the multiplier, 9 ns in it, and 6 ns after it: 50 MHz, whatever nextpnr reports for the rest.
     report = placed(load("mhz"), "ice40-up5k", (4, 6, 7))
     assert report["fmax_mhz_seeds"] == [40.0, 50.0, 50.0]
     assert (report["fmax_mhz"], report["slack_ns"], report["ok"]) == (50.0, 0.0, True)
@@ -123,7 +126,7 @@ def test_what_was_done_is_not_done_again(tools):
     assert sorted(tools.read_text().split()) == ["0", "5", "6"]
     placed(load("mhz"), "ecp5-25k", (6, 7))
     assert sorted(tools.read_text().split()) == ["0", "5", "6", "7"]
-    # Another clock is another constraint.
+    # A different clock is a different constraint, so it is run again.
     placed(load("mhz", {"controller.clock_hz": 100_000_000}), "ecp5-25k", (5,))
     assert len(tools.read_text().split()) == 6
 
@@ -138,7 +141,7 @@ def test_a_design_that_does_not_fit_is_one_line_with_the_log(tools):
         f"place and route for ice40-up5k with seed 13 failed: Unable to place cell 'x', no BELs remaining; see {log}"
     )
     assert "Info: as if" in log.read_text()
-    # Nothing half done is left to be taken for a result.
+    # No unfinished file is left that could be taken for a result.
     assert [path.name for path in (tools.parent / "build" / "synth").glob("building-*")] == []
     assert not list((tools.parent / "build" / "synth").glob("*/seed-13*"))
 
@@ -165,7 +168,7 @@ def test_what_cannot_be_is_refused(device, seeds, message):
 
 
 def test_absent_constraints_are_one_line(tools, monkeypatch, tmp_path):
-    """Without pins a tool would place as it likes, and say nothing."""
+    """Without pin constraints a tool would place the ports anywhere without a message."""
     monkeypatch.setattr(synthesis, "files", lambda package: tmp_path)
     with pytest.raises(SynthesisError, match=r"^constraints/ulx3s-25f\.lpf is not installed: [^\n]*$"):
         placed(load("mhz"), "ecp5-25k")
@@ -184,7 +187,7 @@ def test_constraints_place_every_port_once(device):
     ports, pins = zip(*placed, strict=True)
     assert sorted(ports) == sorted(Board(spec("mhz")).signature.members)
     assert len(set(pins)) == len(pins)
-    # What is left for a run is all but the frequency, which is the scene's.
+    # A run uses all constraints of the file except the frequency, which comes from the scene.
     assert device.frequency in path.read_text()
     assert device.frequency not in synthesis._constraints(device)
 

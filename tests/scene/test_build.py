@@ -1,4 +1,4 @@
-"""Scenes of more than a handle: what is accepted, what becomes of it, and what is refused."""
+"""Scenes with more parts than a handle: accepted keys, the devices that they make, and refused values."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def test_pulses_begin_with_the_push():
 
 
 def test_coarse_steps_of_the_output_are_felt():
-    """A push that a coarse converter rounds off moves nothing; fine steps move the handle as none do."""
+    """A push that a coarse converter rounds off moves nothing; fine steps move the handle as without a converter."""
 
     def start(changes):
         trace = hit.run(load("seed-2011", ONE_SECOND | changes), "float", traces=True).overview
@@ -75,7 +75,7 @@ def test_coarse_steps_of_the_output_are_felt():
 
 
 def test_pulses_push_as_their_mean_does():
-    """A push of one step: at any time the velocity is within half a pulse's of what the push alone gives."""
+    """Under a push of one step, the velocity is always within half a pulse's effect of that under the push alone."""
     push = {"handle.coulomb_n": None, "protocol.push_n": 100.0 / 300}
     exact, pulsed = (
         hit.run(load("seed-2011", ONE_SECOND | push | changes), "float", traces=True).overview
@@ -88,7 +88,7 @@ def test_pulses_push_as_their_mean_does():
 
 
 def test_a_handle_that_never_comes_to_the_wall_proves_no_wall_stable():
-    """A push that the converter rounds to nothing."""
+    """The converter rounds the push to nothing."""
     changes = ONE_SECOND | {"output.full_scale_n": 40.0, "output.dac_bits": 4}
     result = hit.run(load("seed-2011", changes), "fixed")
     assert result.rms_m < 1e-15
@@ -106,7 +106,7 @@ def test_a_handle_that_never_comes_to_the_wall_proves_no_wall_stable():
 
 
 def test_a_chunk_shrinks_by_the_work_of_a_sample():
-    """12 MHz, 10 kHz samples, a carrier of 20 kHz: its two periods a sample begin and end a pulse each."""
+    """At 12 MHz, with 10 kHz samples and a 20 kHz carrier, both periods in a sample begin and end a pulse."""
     assert work_of(world_of(load("seed-2011", {}))) == 1
     legs = work_of(world_of(load("seed-2011", CABLE)))
     leg_s = train(device_of(load("seed-2011", CABLE)), 1e-4).leg_s

@@ -1,4 +1,4 @@
-"""A scene as a value: made once, hit many times, and left out where it cannot be."""
+"""A scene as a value: made once, hit many times, and left out where it is impossible."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Campaigns: the pace of their strobes, and what they say of an answer that is late, lost or too many."""
+"""Campaigns: the pace of their strobes, and their messages on late, lost and extra answers."""
 
 import cocotb
 import numpy as np
@@ -13,7 +13,7 @@ LONGEST = 7
 
 
 class Echo(wiring.Component):
-    """Gives back `value` after `delay` clocks; unless `lost`, and with `extra` in between."""
+    """A component that returns `value` after `delay` clocks, unless `lost`, with an additional answer for `extra`."""
 
     strobe: In(1)
     value: In(8)
@@ -44,7 +44,7 @@ async def echo(dut, delay: int) -> Bench:
 
 
 def rows(samples: int, **at: int) -> list[tuple[int, int, int]]:
-    """Return values, and whether their answers are lost or followed by an extra one: at the samples named."""
+    """Return rows (value, lost, extra); answers are lost or followed by an extra answer at the given samples."""
     return [(k % 256, int(k == at.get("lost")), int(k == at.get("extra"))) for k in range(samples)]
 
 
@@ -60,7 +60,7 @@ async def every_latency_and_pace_is_kept(dut):
             taken, given = await campaign(bench, rows(100), latency=latency, every=every)
             assert taken.column("value").tolist() == list(range(100))
             check(taken, given, {"echo": np.arange(100)}, latency)
-            # The next strobe is as soon as it may be or a clock later; from batch to batch it takes longer.
+            # The next strobe comes as early as allowed or a clock later; between batches it takes longer.
             apart = np.delete(np.diff(taken.clocks), np.arange(15, 99, 16))
             assert set(apart.tolist()) == {every, every + 1}
 

@@ -1,4 +1,4 @@
-"""The bench outside the checkout: a block of one's own passes, and a wrong one says where to look."""
+"""The bench outside the checkout: a custom block passes, and a wrong block leaves its seed and waveform."""
 
 import os
 import re
@@ -17,14 +17,14 @@ pytestmark = pytest.mark.rtl
 
 @pytest.fixture
 def outside(tmp_path: Path) -> Path:
-    """A folder with the example's two files and nothing else."""
+    """Return a folder with the example's two files and nothing else."""
     for path in EXAMPLES.glob("*moving_average.py"):
         shutil.copy(path, tmp_path)
     return tmp_path
 
 
 def run(folder: Path, command: list[str], **environ: str) -> subprocess.CompletedProcess:
-    """Run a command in a folder, without what the checkout's own tests are given."""
+    """Run a command in a folder, without the environment of the checkout's own tests."""
     kept = {name: value for name, value in os.environ.items() if not name.startswith(("HARDWALL_", "PY", "COCOTB"))}
     return subprocess.run(command, cwd=folder, env=kept | environ, capture_output=True, text=True, check=False)
 
@@ -62,7 +62,7 @@ def test_a_wrong_block_leaves_its_seed_and_its_waveform(outside):
     )
     waveform = outside / found[1]
     assert any(name.endswith("mean") for name in signals(waveform))
-    # As a command of the shell, and with the samples that were asked for.
+    # The message gives a shell command with the number of samples of this run.
     assert found[2].startswith("HARDWALL_SEED=7 HARDWALL_SAMPLES=2000 ")
     again = run(outside, ["env", *shlex.split(found[2])])
     assert found[0] in again.stdout
