@@ -1,41 +1,44 @@
 """Levant's differentiator with gains that adapt to the signal, in fixed point.
 
-The algorithm is `levant_semi_implicit` with gains that belong to a level j of 0 to `levels`: with L_max = alpha / 1.1,
+The algorithm is `levant_semi_implicit` with gains that depend on a level j of 0 to `levels`: with L_max = alpha / 1.1,
 
     L = L_max 2**-j,     alpha_j = alpha 2**-j,     lambda_j = lambda 2**(-j/2)
 
-Level 0 is the fixed-gain estimator for the axis's bound C; every level down makes the noise of a count, about
-sqrt(L q), smaller by sqrt(2), and the estimator slower. All times below are in samples, all lengths in counts:
+Level 0 is the fixed-gain estimator for the axis's bound C; every further level reduces the noise of a count, about
+sqrt(L q), by sqrt(2), and makes the estimator slower. All times below are in samples, all lengths in counts:
 
 1. *Time on one side*: t counts the samples since b last changed its sign (`elapsed`), and `reached` is the last level
    whose L explains an excursion of LOST counts in t: L >= EXCESS LOST / t^2. It starts again at 0 with every change.
-2. *Lost*: |b| >= LOST, more than quantisation of one count can do. Then j falls at once to `reached`, if it is above.
-   If |b| goes on to twice as much, and again each time it has doubled, j falls to `reached` or by two, whichever is
-   lower: L by 4, lambda by 2.
-3. *Calm*: if |b| < LOST for HOLD windows of 2 / sqrt(L), L of the level in hand, j rises by one: from level 0 to the
-   last in less than 3.5 times the hold of the last.
+2. *Lost*: |b| >= LOST, more than quantisation of one count can cause. Then j falls at once to `reached`, if j is above.
+   If |b| grows to twice as much, and every time it has doubled again, j falls to `reached` or by two, whichever is
+   lower: two levels multiply L by 4 and lambda by 2.
+3. *Calm*: if |b| < LOST for HOLD windows of 2 / sqrt(L), with L of the present level, j rises by one: from level 0 to
+   the last level in less than 3.5 times the hold of the last.
 
-No divider, no table: levels are a factor of 2 apart, so alpha_j is a shift, and lambda_j a shift and, for odd j, the
-root of half the radicand. Thresholds of time are two constants, shifted, with TIME_BITS fraction bits.
+The law needs no divider and no table: levels are a factor of 2 apart, so alpha_j is a shift, and lambda_j is a shift
+and, for odd j, the root of half the radicand. The time thresholds are two constants, shifted, with TIME_BITS fraction
+bits.
 
-*What is promised.* Let a signal with |f''| <= A leave a state of no error. Until it is lost, the error of u grows by
-at most A tau a sample, for both corrections pull back, and its sum, the position error, is at most LOST + 1 counts. So
+*Guarantee.* Let a signal with |f''| <= A leave a state of no error. Until b is lost, the error of u grows by at most
+A tau a sample, since both corrections pull back, and its sum, the position error, is at most LOST + 1 counts. So
 *the error of u is at most sqrt(2 (LOST + 1) A q) = 2.45 sqrt(A q) until the loss, and an acceleration A out of rest is
-seen within sqrt(2 (LOST + 1) q / A) = 2.45 sqrt(q / A)*, both a sample longer, however low L had sunk. Fixed gains for
-just that A give errors up to 1.7 sqrt(A q). If the sign changed when the acceleration began, the L asked for is
-EXCESS LOST / (2 (LOST + 1)) A = 2.7 A or more: enough. At the loss u steps by lambda_j sqrt(beyond), so that its error
-may go to lambda_j sqrt(LOST + 1) on the other side: at most what level 0, the fixed gains, may always do.
+seen within sqrt(2 (LOST + 1) q / A) = 2.45 sqrt(q / A)*, both a sample longer, however small L was. Fixed gains for
+exactly that A give errors up to 1.7 sqrt(A q). If the sign changed when the acceleration began, the required L is
+EXCESS LOST / (2 (LOST + 1)) A = 2.7 A or more, which is enough. At the loss u steps by lambda_j sqrt(beyond), so that
+its error may become lambda_j sqrt(LOST + 1) on the other side: at most the error that the fixed gains of level 0 can
+always make.
 
-*When it fails.* (a) The transient above, up to sqrt(2) times that of fixed gains, is the price. (b) Out of rest the
-sign often changes with the first count, not with the acceleration; then t is too short, L too large, and u overshoots
-as said: 6.6 sqrt(A q) at A = 1 m/s^2 with C = 12 (measured, largest of 24 steps out of rest and slow motion, 100 kHz;
-fixed gains: 4.0). (c) If b was on the side of the acceleration long before, t is too long, and only the doublings raise
-L. (d) A signal that is calm and lost by turns, such as a sine whose |f''| passes 0, keeps L in motion, and u1, which
-pays for the excursions, may be worse than with fixed gains (table): so u is the default. (e) |f''| > L_max is not
+*Limitations.* (a) The transient above, up to sqrt(2) times that of fixed gains, is the price. (b) Out of rest the sign
+often changes with the first count, not with the acceleration; then t is too short, L too large, and u overshoots:
+6.6 sqrt(A q) at A = 1 m/s^2 with C = 12 (measured, largest of 24 steps out of rest and slow motion, 100 kHz; fixed
+gains: 4.0). (c) If b was on the side of the acceleration long before, t is too long, and only the doublings raise L.
+(d) A signal that is calm and lost in turn, such as a sine whose |f''| passes 0, keeps changing L, and u1, which
+carries the excursions, may be worse than with fixed gains (table): so u is the default. (e) |f''| > L_max is not
 followed, as with fixed gains. (f) Below about sqrt(L_max / q) samples a second, an acceleration moves b by more than
-LOST counts in a sample: the sample more in the bounds is then most of them. (g) Noise of LOST counts holds L up.
+LOST counts in a sample: the additional sample is then the main part of the bounds. (g) Noise of LOST counts keeps L
+large.
 
-What laws gave: RMS (largest) error of u, mm/s, at 100 kHz in float64, q = 1 um. Paper's signal over 1 to 3 s; a hit at
+Laws compared: RMS (largest) error of u, mm/s, at 100 kHz in float64, q = 1 um. Paper's signal over 1 to 3 s; a hit at
 0.3 m/s on 10 kN/m with 0.35 kg, deceleration up to 51 m/s^2, C = 55; a step of 10 m/s^2 after 0.5 s of rest, C = 12:
 
     law                                      paper, C 1.68  C 12      hit        step       0.1, 1, 10 mm/s, C 12
@@ -47,25 +50,25 @@ What laws gave: RMS (largest) error of u, mm/s, at 100 kHz in float64, q = 1 um.
       explicit sign                          0.30 (2)       0.31 (2)  0.84 (11)  1.30 (7)   0.03 0.03 0.03
     the same, implicit sign: as above        0.30 (2)       0.32 (2)  0.80 (10)  1.29 (7)   0.03 0.03 0.03
 
-u1 of the last: 0.41, 0.39, 1.47, 2.82; of `levant`: 0.15, 0.36, 1.39, 1.62. With the explicit sign the law locks up at
-1 kHz, where the chatter alone is LOST counts: 1.97 and 13.98 on the paper's signal, against 0.41 and 0.39.
+u1 of the last law: 0.41, 0.39, 1.47, 2.82; of `levant`: 0.15, 0.36, 1.39, 1.62. With the explicit sign the law locks up
+at 1 kHz, where the chatter alone is LOST counts: 1.97 and 13.98 on the paper's signal, against 0.41 and 0.39.
 
-Source: the paper leaves adaptation open. That a differentiator of variable gain keeps its accuracy is Levant's and
-Livne's (2012, 2018); the law is ours.
+Source: the paper leaves adaptation open. Levant and Livne (2012, 2018) show that a differentiator of variable gain
+keeps its accuracy; the law is this project's.
 
-Formats are those of `levant_semi_implicit`, and differ thus:
+Formats are as in `levant_semi_implicit`, except:
 
 - `levels`: the number of halvings of L, at most LEVELS (noise over a range of 64); not beyond the L whose window is
-  the time to the largest speed, 2 sqrt(q / L) = speed_max / C, for a slower estimate averages whole strokes; and not
-  more than int64 has fraction bits for.
-- f, the fraction bits of b, u and u1: alpha at the last level has at least LEAST_ALPHA_BITS below its top one, so that
-  its shift, which rounds down, changes it by at most 2**-LEAST_ALPHA_BITS; and the budget of position holds for lambda
-  at the last level. The product of lambda and root is shifted by the level without loss, and then rounded. At odd
-  levels the root is that of half the radicand, so delta = lambda_j sqrt(2) 2**-(root.f+1) + 2**-(f+1) there.
-- `elapsed` and `calm` stop where they have no more to decide, so they cannot overflow. The thresholds follow the gains
-  that were designed, not those set at run time; at the first sample j is 0.
-- A loss is a matter of one rounding, so fixed and real trajectories part. Below 1 MHz the RMS of a single 0.5 s run
-  differs by 2 to 8 %, either way and whatever the word length; over many runs by less than 1 %.
+  the time to the largest speed, 2 sqrt(q / L) = speed_max / C, since a slower estimate averages whole strokes; and not
+  more than the fraction bits of int64 allow.
+- f, the fraction bits of b, u and u1: alpha at the last level has at least LEAST_ALPHA_BITS below its top bit, so that
+  its shift, which rounds down, changes it by at most 2**-LEAST_ALPHA_BITS; and the position budget holds for lambda at
+  the last level. The product of lambda and root is shifted by the level without loss, and then rounded. At odd levels
+  the root is that of half the radicand, so delta = lambda_j sqrt(2) 2**-(root.f+1) + 2**-(f+1) there.
+- `elapsed` and `calm` stop once they can change no decision, so they cannot overflow. The thresholds follow the
+  designed gains, not those set at run time; at the first sample j is 0.
+- A single rounding may decide a loss, so fixed-point and real trajectories diverge. Below 1 MHz the RMS of a single
+  0.5 s run differs by 2 to 8 %, in either direction and whatever the word length; over many runs by less than 1 %.
 """
 
 import math
@@ -86,23 +89,23 @@ if TYPE_CHECKING:
 STEPS = 17
 """Clocks of the sequence besides the root: see `hardwall.hdl.estimators.levant_adaptive`."""
 LEVELS = 12
-"""L is halved at most so often: noise, which goes with sqrt(L), then spans a factor of 64."""
+"""Largest number of halvings of L: noise, which is proportional to sqrt(L), then spans a factor of 64."""
 LOST = 2
-"""Counts of |b| at which sliding is lost: quantisation explains one, and as much again is left to the tracking."""
+"""Counts of |b| at which sliding is lost: quantisation explains one count, and tracking may use one more."""
 EXCESS = 8
-"""A loss asks for L >= EXCESS LOST / t^2. To go LOST counts in t takes 2 LOST / t^2, or 3 with a count of rounding."""
+"""A loss requires L >= EXCESS LOST / t^2. LOST counts in t take 2 LOST / t^2, or 3 with a count of rounding."""
 HOLD = 4
 """Windows of calm before L is halved."""
 RATIO = 1.1
-"""alpha / L, of the paper's proposed gains."""
+"""The ratio alpha / L of the gains that the paper proposes."""
 TIME_BITS = 4
-"""Fraction bits of the thresholds of time, samples."""
+"""Fraction bits of the time thresholds, which are in samples."""
 LEAST_ALPHA_BITS = 5
-"""alpha at the last level has at least this many bits below its top one: rounding it down costs 3 % at most."""
+"""alpha at the last level has at least this many bits below its top bit: rounding it down costs 3 % at most."""
 
 
 class Law(NamedTuple):
-    """Parameters of the adaptation, as `Design` has them; thresholds of time for even and for odd levels."""
+    """Parameters of the adaptation: the last level, and the time thresholds of `Design` for even and for odd levels."""
 
     levels: int
     reach_even: int
@@ -112,7 +115,7 @@ class Law(NamedTuple):
 
 
 class Params(NamedTuple):
-    """The family's; the adaptation's; and the bits that the largest shift of lambda takes from the product."""
+    """Parameters of `levant`, those of the adaptation, and the bits that the product loses by the largest shift."""
 
     levant: levant.Params
     law: Law
@@ -120,14 +123,14 @@ class Params(NamedTuple):
 
 
 class FloatParams(NamedTuple):
-    """The family's and the adaptation's."""
+    """Parameters of `levant` and of the adaptation."""
 
     levant: levant.FloatParams
     law: Law
 
 
 class State(NamedTuple):
-    """`lead`, `u1`, `count` as `levant.State`; the rest is the adaptation's."""
+    """The state: `lead`, `u1` and `count` as in `levant.State`; the other fields are the adaptation's."""
 
     running: int
     count: int  # type: ignore[assignment]  # a tuple has a method of this name
@@ -135,10 +138,10 @@ class State(NamedTuple):
     u1: float
     level: int
     side: int  # the last sign of b that was not 0
-    elapsed: int  # samples since it changed, until `reached` is at its end
+    elapsed: int  # samples since that sign changed; stops when `reached` is the last level
     reached: int
     limit: int  # counts of |b| at which the level falls next
-    calm: int  # samples
+    calm: int  # samples of calm
 
 
 START = State(0, 0, 0, 0, 0, 0, 0, 0, LOST, 0)
@@ -146,11 +149,11 @@ FLOAT_START = State(0, 0, 0.0, 0.0, 0, 0, 0, 0, LOST, 0)
 
 
 class Design(levant_semi_implicit.Design):
-    """Formats, run-time words and latency for an axis, as `levant.Design`: the module says what differs.
+    """Formats, run-time words and latency for an axis, as in `levant.Design` except where the module says otherwise.
 
     Attributes:
         levels: the last level.
-        reach, hold: first thresholds of the time on one side, and of calm, for even and for odd levels, samples.
+        reach, hold: first thresholds of the time on one side, and of calm, for even and for odd levels, in samples.
     """
 
     name = "levant-adaptive"
@@ -163,7 +166,7 @@ class Design(levant_semi_implicit.Design):
         self.hold = _times(HOLD * 2 / math.sqrt(most))
 
     def _least(self, f_max: int) -> tuple[float, float]:
-        # Those of level 0: if there is room for no more, it is the only one.
+        # The least gains of level 0: if there is room for no further level, it is the only level.
         return super()._least(f_max)[0], 2.0 ** (LEAST_ALPHA_BITS - f_max)
 
     def _fraction(self, axis, lam: float, alpha: float, f_max: int) -> int:
@@ -179,20 +182,20 @@ class Design(levant_semi_implicit.Design):
 
     @property
     def spare(self) -> int:
-        """Bits that the largest shift of lambda takes from the product."""
+        """Bits that the product loses by the largest shift of lambda."""
         return self.levels // 2
 
     def reach_samples(self, level: int) -> int:
-        """Return how many samples on one side reach `level`, 1 or more."""
+        """Return the number of samples on one side, 1 or more, that reach `level`."""
         return -(-_threshold(*self.reach, level) >> TIME_BITS)
 
     def hold_samples(self, level: int) -> int:
-        """Return how many samples of calm leave `level`."""
+        """Return the number of samples of calm after which j leaves `level`."""
         return -(-_threshold(*self.hold, level) >> TIME_BITS)
 
     @property
     def law(self) -> Law:
-        """The adaptation's parameters, of either kernel."""
+        """The adaptation's parameters, the same for either kernel."""
         return Law(self.levels, *self.reach, *self.hold)
 
     def params(self, words: Mapping[str, int]) -> tuple:
@@ -265,7 +268,7 @@ def step(params, state, seen, restart):
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
-    """The same in float64, unsaturated."""
+    """Take one sample in float64, unsaturated: the same algorithm."""
     family = params.levant
     moved, lead, u1 = arrive(family, state, seen, restart)
     error = lead - moved

@@ -99,8 +99,8 @@ REST_BITS = 3
 LEFT_MAX = 46
 """Largest left shift of a gain word, beyond which every result saturates anyway: 16 + 46 bits fit int64."""
 ANCHOR, FIRST, TIMED, CARRIED, LOOSE = range(5)
-"""The last edge is: the anchor itself; the first known edge; an edge to correct by; an edge too close to the anchor that
-has long stayed the last and becomes the anchor; an edge that is still too close."""
+"""The last edge is: the anchor itself; the first known edge; an edge to correct by; an edge too close to the anchor,
+which has long stayed the last and becomes the anchor; an edge that is still too close."""
 
 
 @compiled

@@ -1,7 +1,7 @@
-"""Levant's differentiator by implicit Euler, sign and square root both, in fixed point.
+"""Levant's differentiator by implicit Euler, for both the sign and the square root, in fixed point.
 
-As `levant_semi_implicit`, but with the root, too, that of the error after the step. Per sample, with f the count, x its
-tracked value, u1 the integral state, in counts and sample periods, and a plus for after the sample:
+The algorithm is `levant_semi_implicit`, but the root, too, is of the error after the step. Per sample, with f the
+count, x its tracked value, u1 the integral state, in counts and sample periods, and a plus for after the sample:
 
     e+  =  x + u1 - f  -  lambda sqrt(|e+|) sign(e+)  -  alpha S,      S in SGN(e+)
     u1+ =  u1 - alpha S
@@ -14,26 +14,27 @@ b, and z = sqrt(|e+|) is the positive root of z^2 + lambda z = |b| - alpha. Toge
     near = min(|b|, alpha),  beyond = |b| - near,      g = lambda z = lambda (sqrt(beyond + lambda^2/4) - lambda/2)
     u1+ = u1 - sign(b) near,   u = u1+ - sign(b) g,    e+ = sign(b) (beyond - g)
 
-a continuous map of b, whose g never exceeds beyond. The outputs are u, the corrected velocity, and u1, the integral
-state. What is said there of standstill, constant speed, low and high rates holds here word for word: in the band both
-outputs are exactly the finite difference; beyond it g is smaller, so it is the smoother of the two between 1 and
-100 kHz. (It keeps an e+ of its own where the other has none, so a count that stands takes some samples more.)
+a continuous map of b, in which g never exceeds beyond. The outputs are u, the corrected velocity, and u1, the integral
+state. The statements of `levant_semi_implicit` on standstill, constant speed, low and high rates hold here too: in the
+band both outputs are exactly the finite difference; outside it g is smaller, so this estimator is the smoother of the
+two between 1 and 100 kHz. (Here e+ is not 0 in some cases where it is 0 there, so a constant count takes some samples
+more.)
 
 Source: implicit Euler for the super-twisting algorithm, Acary, Brogliato 2010 and 2012; Brogliato, Polyakov, Efimov,
 IEEE Trans. Automatic Control 2020; closed form for the differentiator, Mojallizadeh, Brogliato, Acary, Int. J. Robust
-and Nonlinear Control 2021; Koch, Reichhartinger 2018 for the class that it belongs to.
+and Nonlinear Control 2021; Koch, Reichhartinger 2018 for the class to which it belongs.
 
-Formats are those of `levant_semi_implicit`, and differ thus:
+Formats are as in `levant_semi_implicit`, except:
 
-- g = lambda root - lambda^2/2, root = sqrt(beyond + lambda^2/4): lambda^2, once for all, is a product of the same
-  multiplier as lambda times the root. `radicand` has room for lambda^2/4 at the largest word. There lambda^2/4 is
-  rounded down to the radicand's LSB, a position of 2**-(2 root.f); in g, lambda^2/2 is rounded to f bits.
-- With the root's half LSB as in `levant`, g is off by at most delta = lambda 2**-(root.f+1) + 2 * 2**-(f+1), and the
-  same u follows exactly from a beyond displaced by at most
+- g = lambda root - lambda^2/2, root = sqrt(beyond + lambda^2/4): the same multiplier makes lambda^2, used twice, and
+  lambda times the root. `radicand` has room for lambda^2/4 at the largest word. In the radicand, lambda^2/4 is rounded
+  down to the LSB, a position of 2**-(2 root.f); in g, lambda^2/2 is rounded to f bits.
+- With the root's half LSB as in `levant`, the error of g is at most delta = lambda 2**-(root.f+1) + 2 * 2**-(f+1), and
+  the same u follows exactly from a beyond displaced by at most
   eta = 2 sqrt(beyond + lambda^2/4) delta / lambda + (delta / lambda)^2 + 2**-(2 root.f).
-  At beyond = 1 count the slope is sqrt(4 + lambda^2): each of the two parts of delta is held to POSITION_BUDGET / 2
-  there, which at low rates takes a root of more bits than the explicit one. (Where lambda is thousands, the radicand
-  would exceed int64: the root then has the bits that are left, and delta grows.) g is held within 0 to beyond.
+  At beyond = 1 count the slope is sqrt(4 + lambda^2): either part of delta is held to POSITION_BUDGET / 2 there, which
+  at low rates takes a root of more bits than in the explicit estimator. (If lambda is in the thousands, the radicand
+  would exceed int64: the root then has the remaining bits, and delta grows.) g is held within 0 to beyond.
 """
 
 import math
@@ -50,7 +51,7 @@ from .levant_semi_implicit import band, float_settle, settle
 
 
 class Params(NamedTuple):
-    """The family's; and by how much lambda^2 is shifted to the radicand's and to the velocity's fraction bits."""
+    """Parameters of `levant`, and the shifts of lambda^2 to the radicand's and to the velocity's fraction bits."""
 
     levant: levant.Params
     quarter_shift: int
@@ -58,16 +59,16 @@ class Params(NamedTuple):
 
 
 class FloatParams(NamedTuple):
-    """The family's, in a class of its own by which the kernel is found."""
+    """Parameters of `levant`, in a separate class that selects this kernel."""
 
     levant: levant.FloatParams
 
 
 class Design(levant_semi_implicit.Design):
-    """Formats, run-time words and latency for an axis, as `levant.Design`: the module says what differs.
+    """Formats, run-time words and latency for an axis, as in `levant.Design` except where the module says otherwise.
 
     Attributes:
-        quarter_shift, half_shift: bits that lambda^2 / 4 has more than the radicand, and lambda^2 / 2 than u.
+        quarter_shift, half_shift: fraction bits of lambda^2 / 4 beyond the radicand's, of lambda^2 / 2 beyond u's.
     """
 
     name = "levant-implicit"
@@ -113,12 +114,12 @@ def step(params, state, seen, restart):
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
-    """The same in float64, unsaturated."""
+    """Take one sample in float64, unsaturated: the same algorithm."""
     family = params.levant
     moved, lead, u1 = arrive(family, state, seen, restart)
     sign, near, beyond = band(lead - moved, family.alpha)
     half = family.lambda_ / 2
-    # The difference of the two roots, without their cancellation.
+    # This form of the difference of the two roots has no cancellation.
     correction = family.lambda_ * beyond / (math.sqrt(beyond + half * half) + half)
     lead, u1, velocity = float_settle(family, u1, sign, near, beyond, correction)
     return State(1, seen.count, lead, u1), velocity, 0

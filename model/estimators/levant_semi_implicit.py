@@ -9,43 +9,46 @@ value, u1 the integral state, in counts and sample periods, and a plus for after
     u1+ =  u1 - alpha S
     u   =  u1+ - g sign(e+),      x+ = x + u = f + e+
 
-What is known before the step is b = x + u1 - f, and e+ has the sign of b or is 0. So the generalised equation is solved
-by a projection: alpha S takes of b what it can, near = min(|b|, alpha), and the root term takes of the rest,
+Before the step b = x + u1 - f is known, and e+ has the sign of b or is 0. So the generalised equation is solved by a
+projection: alpha S takes as much of b as it can, near = min(|b|, alpha), and the root term acts on the rest,
 beyond = |b| - near,
 
     u1+ = u1 - sign(b) near          g = min(lambda sqrt(beyond), beyond)
     u   = u1+ - sign(b) g            e+ = sign(b) (beyond - g)
 
-with the root explicit, of what alpha has left of b; the projection keeps it, too, from crossing. For the fully implicit
-root see `levant_implicit`. u, the corrected velocity, moves the tracked x; u1, the integral state, is the quieter one.
+with an explicit root, of the part of b that alpha leaves; the projection keeps the root term, too, from crossing. For
+the fully implicit root see `levant_implicit`. u, the corrected velocity, moves the tracked x; u1, the integral state,
+is the quieter output.
 
 - *Standstill and constant speed.* In the band |b| <= alpha, e+ = 0 and u1+ = (f - last f) - (last e): from the second
-  sample in a row within it, both outputs are exactly the finite difference, without memory or rounding. In the band,
-  then, fixed point and real numbers agree word for word. A count that stands leads into the band from any state, at
-  every rate, and from there gives exactly 0: measured with C = 1.6785 m/s^2 from 30 mm/s after 32 ms, from 0.3 m/s
+  successive sample within the band, both outputs are exactly the finite difference, without memory or rounding. In the
+  band, therefore, fixed point and real numbers agree word for word. A constant count leads into the band from any
+  state, at every rate, and there gives exactly 0: measured with C = 1.6785 m/s^2 from 30 mm/s after 32 ms, from 0.3 m/s
   after 0.22 s (about 2 u / alpha; `levant` never).
-- *Low rates.* Where alpha is a count or more, the estimator is the finite difference, limited in acceleration:
-  0.42 mm/s RMS on the paper's signal at 1 kHz, where the explicit one has 1.95. That it does not chatter does not make
-  it better than the finite difference there; and a larger C only makes it more alike.
+- *Low rates.* If alpha is a count or more, the estimator is the finite difference, limited in acceleration: 0.42 mm/s
+  RMS on the paper's signal at 1 kHz, where the explicit estimator has 1.95. There the lack of chatter does not make it
+  better than the finite difference; and a larger C only makes it more similar.
 - *High rates.* With alpha and lambda^2 much less than a count, every count is an excursion beyond both projections, and
-  it is the explicit one: the noise of the count remains (at 1 MHz 0.649 against 0.647). Between, at 5 to 100 kHz, u is
-  worse by up to a fifth (0.740 against 0.626 at 10 kHz), u1 better or equal (0.280 against 0.290).
+  the estimator equals the explicit one: the noise of the count remains (at 1 MHz 0.649 against 0.647). In between, at 5
+  to 100 kHz, u is worse by up to a fifth (0.740 against 0.626 at 10 kHz), u1 better or equal (0.280 against 0.290).
 
 Source: the implicit sign of Acary, Brogliato, Orlov, IEEE Trans. Automatic Control 2012; semi-implicit differentiators,
-whose projectors split S otherwise, Michel, Ghanes, Plestan, Aoustin, Barbot, CDC 2021, and as compared by Mojallizadeh,
-Brogliato, Acary, Int. J. Robust and Nonlinear Control 2021. The split above, alpha first, is ours: it needs no divider.
+whose projectors split S differently, Michel, Ghanes, Plestan, Aoustin, Barbot, CDC 2021, and as compared by
+Mojallizadeh, Brogliato, Acary, Int. J. Robust and Nonlinear Control 2021. The split above, alpha first, is this
+project's: it needs no divider.
 
-Formats are those of `levant`, with beyond for |e|, and differ thus:
+Formats are as in `levant`, with beyond instead of |e|, except:
 
 - b is held as `lead - moved`, lead = e+ + u1+ of the last sample; it saturates at the `error` format (flag
   `error_saturated`). To let the root step across the whole speed range, lambda sqrt(beyond) and beyond must both reach
   it: the range holds (2 speed / lambda)^2 + 2 speed.
-- b, alpha, u1 and e+ have the same fraction bits: all of the projection is exact, and only g rounds. It is off by at
-  most delta = lambda 2**-(root.f+1) + 2**-(f+1), without a bias and never beyond its limit, so that e+ keeps its sign.
-  As g grows with beyond, at lambda / (2 sqrt(beyond)) or by 1, the same u follows exactly from a beyond that is
+- b, alpha, u1 and e+ have the same fraction bits: the whole projection is exact, and only g is rounded. Its error is at
+  most delta = lambda 2**-(root.f+1) + 2**-(f+1), without a bias, and g never exceeds its limit, so that e+ keeps its
+  sign. As g grows with beyond, at the rate lambda / (2 sqrt(beyond)) or 1, the same u follows exactly from a beyond
+  that is
   displaced by at most eta = 2 sqrt(beyond) delta / lambda + (delta / lambda)^2 (or delta, where that is more).
-- u saturates where it is put out, u1 in the state (flag `velocity_saturated`); e+ needs neither, so a saturated u does
-  not drag x.
+- u saturates at the output, u1 in the state (flag `velocity_saturated`); e+ depends on neither limit, so a saturated u
+  does not drag x.
 """
 
 import math
@@ -64,19 +67,19 @@ STEPS = 12
 
 
 class Params(NamedTuple):
-    """Parameters of the integer kernel: the family's, in a class of its own by which its kernel is found."""
+    """Parameters of the integer kernel: those of `levant`, in a separate class that selects this kernel."""
 
     levant: levant.Params
 
 
 class FloatParams(NamedTuple):
-    """Parameters of the float64 kernel, likewise."""
+    """Parameters of the float64 kernel: those of `levant`, in a separate class that selects this kernel."""
 
     levant: levant.FloatParams
 
 
 class Design(levant.Design):
-    """Formats, run-time words and latency for an axis, as `levant.Design`: the module says what differs."""
+    """Formats, run-time words and latency for an axis, as in `levant.Design` except where the module says otherwise."""
 
     name = "levant-semi-implicit"
     steps = STEPS
@@ -93,14 +96,14 @@ class Design(levant.Design):
 
 @compiled
 def band(error, alpha):
-    """Return (sign, near, beyond): what alpha takes of an error, and what it leaves; of either kernel."""
+    """Return (sign, near, beyond): the sign of an error, the part that alpha takes, and the rest; for either kernel."""
     near = min(abs(error), alpha)
     return sign_of(error), near, abs(error) - near
 
 
 @compiled
 def settle(params, u1, sign, near, beyond, correction):
-    """Return (lead, u1, velocity, flag) after a sample, held within their formats; the flag if that changed one."""
+    """Return (lead, u1, velocity, flag) after a sample, held within their formats; the flag says if one was limited."""
     far_u1 = u1 - sign * near
     u1 = saturate(far_u1, -params.velocity_max, params.velocity_max)
     far_u = u1 - sign * correction
@@ -133,7 +136,7 @@ def step(params, state, seen, restart):
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
-    """The same in float64, unsaturated."""
+    """Take one sample in float64, unsaturated: the same algorithm."""
     family = params.levant
     moved, lead, u1 = arrive(family, state, seen, restart)
     sign, near, beyond = band(lead - moved, family.alpha)
