@@ -4,7 +4,7 @@ Per sample, with d the difference of the last two counts, in counts and sample p
 
     x  = (d + 2 d' + d'') / 4            the last three differences: the double zero at half the sampling rate
     w <- w + gamma (x - y) - beta w
-    y <- y + gamma w                     the velocity, output `u`; with the w just made
+    y <- y + gamma w                     the velocity, output `u`; with the new w
 
 With g = tan(pi f_c / f_s) and D = 1 + sqrt(2) g + g^2, gamma = 2 g / sqrt(D) and beta = 2 sqrt(2) g / D make this the
 bilinear transform, prewarped, of 1 / (s^2 + sqrt(2) s + 1): eliminate w, and y[k] - (2 - beta - gamma^2) y[k-1] +
@@ -12,37 +12,38 @@ bilinear transform, prewarped, of 1 / (s^2 + sqrt(2) s + 1): eliminate w, and y[
 
 Source: Chawda, Celik, O'Malley, World Haptics 2011, "FDM" with a Butterworth filter; Butterworth 1930.
 
-Structure. A direct form rounds y among values whose differences carry the signal: at gamma = 2e-4 an LSB there comes
-out 1/gamma^2 times. The delta form, which has w in units of gamma, still has 1/gamma^2. Here the two states are of
-one size, both coefficients of one order, and
-- *operands*: the multiplications see w and x - y without their last bits (floor). That is a change of w and of y
+Structure. A direct form rounds y, while the signal is in the differences between values of y: at gamma = 2e-4 an LSB
+there appears at the output 1/gamma^2 times. The delta form, which has w in units of gamma, still has 1/gamma^2. Here
+the two states are of the same size, both coefficients are of the same order, and
+- *operands*: the multiplications take w and x - y without their last bits (floor). This is a change of w and of y
   before the filter, which returns it with a gain of order 1 whatever gamma: OPERAND_NORM LSB at most.
-- *accumulators* keep what an operand drops, the products are floored to their LSB. Such an error comes out of order
-  1/gamma times: PRODUCT_NORM max(1/gamma, 2) LSB at most, and only adders pay for the bits.
+- *accumulators* keep the bits that an operand drops, and the products are floored to the accumulators' LSB. Such an
+  error appears at the output of order 1/gamma times: PRODUCT_NORM max(1/gamma, 2) LSB at most, and only adders need
+  the additional bits.
 
-The norms are sums of the absolute impulse responses from each place to y, the largest of all cutoffs up to CUTOFF_MAX;
-so is STATE_NORM, to w and y from x: no input makes more of them.
+The norms are sums of the absolute impulse responses from each place to y, the largest over all cutoffs up to
+CUTOFF_MAX; STATE_NORM is the same from x to w and y: no input makes them larger.
 
 Formats, derived. C' = C tau^2 / q is the bound on the acceleration in counts a sample^2.
 
-- d is held within `step_max`: what twice the largest speed moves in a sample, begun within a count, and one count for
-  an edge out of its place. Beyond, it saturates (flag `velocity_saturated`), and what it loses is lost.
+- d is held within `step_max`: the counts that twice the largest speed moves in a sample, begun within a count, and one
+  count for an edge out of place. A larger d saturates (flag `velocity_saturated`), and the excess is lost.
 - f, fraction bits of the velocity: an LSB is at most sqrt(C') 2**-RESOLUTION_BITS. sqrt(C') is half of the minimax
   bound 2 sqrt(C eps), eps one count.
 - operands have GUARD_BITS more, which makes OPERAND_NORM of their LSB 0.38 of an LSB of the velocity.
-- accumulators have `reach` bits more again, 1/gamma at the least cutoff as a power of two, no less than 2: their
-  errors come to 0.1. Together less than a half: *under a constant difference n, y settles within half an LSB of n and
-  the velocity, rounded half up, is n exactly*; 0 at standstill. No cycle is left in the velocity, and its gain at DC
-  is exactly 1.
-- i holds STATE_NORM times `step_max`, and one more. With coefficients of any one cutoff nothing else saturates; while
-  the host changes them, or with coefficients of no cutoff, w or y may (flag `state_saturated`).
+- accumulators have another `reach` bits, 1/gamma at the least cutoff as a power of two, no less than 2: their errors
+  add up to 0.1. The total is less than a half: *under a constant difference n, y settles within half an LSB of n and
+  the velocity, rounded half up, is n exactly*; 0 at standstill. The velocity has no limit cycle, and its gain at DC is
+  exactly 1.
+- i holds STATE_NORM times `step_max`, plus one. With the coefficients of any single cutoff nothing else saturates;
+  while the host changes them, or with coefficients that belong to no cutoff, w or y may (flag `state_saturated`).
 - `frequency` and `damping`, run-time words, are gamma and beta with a common exponent, value = word 16**-exponent,
   UQ(1, GAIN_BITS - 1): they keep 12 bits at any cutoff. The three belong together: `Design.words_for` makes them.
 - They hold any cutoff from the default one / 2**RANGE_BITS, or the designed one if that is lower, to CUTOFF_MAX.
-- int64 ends at 62 bits: where these do not fit, first the range of cutoffs gives way, then f.
+- int64 holds 62 bits: if the formats do not fit, first the range of cutoffs is reduced, then f.
 
-Restart and the first sample: d = 0 and all states 0; the count may wrap. From rest that is no transient; out of a
-motion it is the filter's step response, as for any step of velocity: 4.3 % over, and settled in about 1 / cutoff.
+Restart and the first sample: d = 0 and all states 0; the count may wrap. A start from rest has no transient; a start in
+motion has the filter's step response, as for any step of velocity: 4.3 % overshoot, settled in about 1 / cutoff.
 """
 
 import math
@@ -60,19 +61,19 @@ if TYPE_CHECKING:
     from ..spec import AxisSpec
 
 CUTOFF_MAX = 0.4
-"""Highest cutoff, of the sampling rate."""
+"""Highest cutoff, as a fraction of the sampling rate."""
 RESOLUTION_BITS = 10
-"""The output LSB is no larger than sqrt(C') over two to this."""
+"""The output LSB is at most sqrt(C') 2**-RESOLUTION_BITS."""
 RANGE_BITS = 6
-"""The host may lower the cutoff to the default one over two to this, if not more: from 780 to 12 Hz."""
+"""The host may lower the cutoff at least to the default one 2**-RANGE_BITS: from 780 to 12 Hz."""
 GUARD_BITS = 6
 """Bits of an operand below the output LSB."""
 EXPONENT_STEP = 4
-"""Bits that the common exponent of the coefficients moves them by: few places to choose from, for little precision."""
+"""Bits by which one step of the common exponent shifts the coefficients: few exponents, at little loss of precision."""
 STATE_NORM = 1.75
 OPERAND_NORM = 24.0
 PRODUCT_NORM = 6.3
-"""Largest norms at y: see above."""
+"""Largest norms at y: see the module's docstring."""
 STEPS = 15
 """Clocks of the sequence: see `hardwall.hdl.estimators.butterworth`."""
 
@@ -85,7 +86,7 @@ class Gains(EstimatorGains):
 
     @classmethod
     def default(cls, axis: "AxisSpec") -> "Gains":
-        """Return the cutoff with half of the minimax window for delay, sqrt(2) / (2 pi f_c) = sqrt(q / C)."""
+        """Return the cutoff whose delay is half of the minimax window, sqrt(2) / (2 pi f_c) = sqrt(q / C)."""
         return cls(min(_default_hz(axis), CUTOFF_MAX * axis.sample_hz))
 
 
@@ -94,7 +95,7 @@ def _default_hz(axis) -> float:
 
 
 def coefficients(ratio: float) -> tuple[float, float]:
-    """Return gamma and beta for a cutoff of `ratio` of the sampling rate."""
+    """Return gamma and beta for a cutoff of `ratio` times the sampling rate."""
     g = math.tan(math.pi * ratio)
     d = 1 + math.sqrt(2) * g + g * g
     return 2 * g / math.sqrt(d), 2 * math.sqrt(2) * g / d
@@ -115,7 +116,7 @@ class Params(NamedTuple):
 
 
 class State(NamedTuple):
-    """`w` and `y` have the fraction bits of the accumulators (float: counts a sample); `d1`, `d2` are differences."""
+    """The state: `w` and `y` have the accumulators' fraction bits (float: counts a sample), `d1`, `d2` the last d."""
 
     running: int
     count: int  # type: ignore[assignment]  # a tuple has a method of this name
@@ -136,18 +137,18 @@ FLOAT_START = State(0, 0, 0, 0, 0.0, 0.0)
 
 
 class Design(EstimatorDesign):
-    """Formats, run-time words and latency of the filter for an axis: the module says how they follow.
+    """Formats, run-time words and latency of the filter for an axis, derived as the module says.
 
     Attributes:
         step_max: largest difference of counts.
         velocity, operand, state: formats of the output, of the operands x - y and w, and of w and y.
         coefficient: format of the two coefficient words.
-        exponent_max: a larger exponent word acts as this one.
-        cutoff_min_hz, cutoff_max_hz: what the words hold.
+        exponent_max: largest exponent; a larger word acts as this one.
+        cutoff_min_hz, cutoff_max_hz: range of cutoffs that the words hold.
         words: `butterworth_frequency`, `butterworth_damping`, `butterworth_exponent`.
 
     Raises:
-        ValueError: if the cutoff is above CUTOFF_MAX of the rate, or below what int64 can hold; with the range.
+        ValueError: if the cutoff is above CUTOFF_MAX of the rate, or too low for int64, with the accepted range.
     """
 
     name = "butterworth"
@@ -158,14 +159,14 @@ class Design(EstimatorDesign):
     def __init__(self, axis: "AxisSpec", gains: Gains):
         super().__init__(axis, gains)
         self._sample_hz = axis.sample_hz
-        # No two counts are farther apart than half of their range.
+        # Two counts differ by at most half of their range.
         self.step_max = min(math.floor(2 * axis.speed_max_counts_per_sample) + 2, 1 << (axis.count_width - 1))
         self.coefficient = UQ(1, GAIN_BITS - 1)
         self.cutoff_max_hz = CUTOFF_MAX * axis.sample_hz
         i = 1 + bits_for(STATE_NORM * self.step_max + 1)
         root = math.sqrt(axis.acceleration_max_m_per_s2 / axis.count_m) / axis.sample_hz
 
-        # The widest sums have three bits above a state: 63 with the sign.
+        # The widest sums have three bits more than a state: 63 with the sign.
         room = 60 - i - GUARD_BITS
         least = 2.0**-room * axis.sample_hz / (2 * math.pi)
         self.cutoff_min_hz = least
@@ -202,7 +203,7 @@ class Design(EstimatorDesign):
         return max(bits_for(1 / coefficients(min(cutoff_hz / self._sample_hz, CUTOFF_MAX))[0]), 1)
 
     def _exponent(self, *pair: float) -> int:
-        # Not quite twice the format's end, so that rounding cannot pass it.
+        # The limit is the largest word, just under a power of two, so that rounding cannot exceed it.
         largest = self.coefficient.to_real(self.coefficient.max)
         return max(math.floor(math.log2(largest / max(pair)) / EXPONENT_STEP), 0)
 
@@ -215,7 +216,7 @@ class Design(EstimatorDesign):
         """Return the three words, by name, as numbers for `Axis`; the fixed-point axis rounds them.
 
         Raises:
-            ValueError: for a cutoff outside `cutoff_min_hz` to `cutoff_max_hz`.
+            ValueError: if the cutoff is outside `cutoff_min_hz` to `cutoff_max_hz`.
         """
         self._check(cutoff_hz)
         pair = coefficients(cutoff_hz / self._sample_hz)
@@ -228,7 +229,7 @@ class Design(EstimatorDesign):
         }
 
     def product_shift(self, exponent: int) -> int:
-        """Return how far a product with coefficients of this exponent is shifted to the LSB of the states."""
+        """Return the right shift of a product, with coefficients of this exponent, to the LSB of the states."""
         shift = self.operand.f + self.coefficient.f - self.state.f
         return shift + EXPONENT_STEP * min(exponent, self.exponent_max)
 
@@ -246,7 +247,7 @@ class Design(EstimatorDesign):
         )
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
-        """Return the float64 kernel's parameters: coefficients from `si` where given, else those of `gains`."""
+        """Return the float64 kernel's parameters: coefficients from `si` where given, else from `gains`."""
         value = {**self.words_for(gains.cutoff_hz), **si}
         scale = 2.0 ** -(EXPONENT_STEP * min(value["butterworth_exponent"], self.exponent_max))
         return FloatParams(
@@ -283,7 +284,7 @@ def step(params, state, seen, restart):
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
-    """The same filter in float64, unsaturated: the reference for what fixed point costs."""
+    """Take one sample in float64, unsaturated: the same filter, as a reference for the cost of fixed point."""
     fresh = restart or not state.running
     d = 0 if fresh else wrap(seen.count - state.count, params.count_width)
     d1 = 0 if fresh else state.d1

@@ -2,54 +2,55 @@
 
 Position, velocity and acceleration, x, v and a, in counts and sample periods; per sample, with f the count:
 
-    v <- v + a,  x <- x + v - a / 2          predict; with the v just made
+    v <- v + a,  x <- x + v - a / 2          predict; with the new v
     r  = f - x                               innovation
     x <- x + K_x r,  v <- v + K_v r,  a <- a + K_a r
 
-x is held as its distance to the last count, `lead` = x - f, so that the count may wrap. The output `u` is v. It is the
-filter of a velocity driven by white jerk. With K_a = 0, a is held at 0 and it is that of white acceleration, with two
-integrators: `Design.words_for(..., integrators=2)`. On the paper's signal two integrators lag by sqrt(2)/omega whatever
-the motion, three only by what the acceleration changes meanwhile: 0.16 against 0.09 mm/s at 1 MHz with the gains below,
-and at the best bandwidth of each 0.16 and 0.02. So three are the default.
+x is held as its distance from the last count, `lead` = x - f, so that the count may wrap. The output `u` is v. This is
+the filter of a motion driven by white jerk. With K_a = 0, a is held at 0 and it is the filter of white acceleration,
+with two integrators: `Design.words_for(..., integrators=2)`. On the paper's signal two integrators lag by
+sqrt(2)/omega whatever the motion, three only by the change of the acceleration in that time: 0.16 against 0.09 mm/s at
+1 MHz with the gains below, and 0.16 against 0.02 at the best bandwidth of each. So three are the default.
 
 Source: Belanger, Dobrovolny, Helmy, Zhang, International Journal of Robotics Research 17 (1998), 1225.
 
-Noise model. Count and acceleration are two stationary signals that forget exponentially: the error of quantisation, RMS
-q / sqrt(12), and the acceleration, uniform within the axis's C, RMS C / sqrt(3). How long each lasts (`noise_time_s`,
-`acceleration_time_s`) is by default 2 sqrt(q/C), the minimax window: in less, neither a change of acceleration shows in
-the counts nor does an axis that starts to move get to the next count. A white signal of the same power below those
-rates stands for each:
+Noise model. The quantisation error and the acceleration are two stationary signals with exponential correlation: the
+error has RMS q / sqrt(12), and the acceleration, uniform within the axis's C, has RMS C / sqrt(3). The correlation
+times (`noise_time_s`, `acceleration_time_s`) are by default 2 sqrt(q/C), the minimax window: in a shorter time, neither
+does a change of acceleration show in the counts nor does an axis that starts to move reach the next count. Either
+signal is modelled as a white one with the same power below those rates:
 
-    R = rms^2 coth(tau / (2 time))        counts^2: as the mean of many samples has it
+    R = rms^2 coth(tau / (2 time))        counts^2: gives the variance of the mean of many samples
     Q = 2 rms^2 (1 - exp(-tau / time))    mean square change of the acceleration in a sample
     h = (Q / R)^(1/6)                     filter's bandwidth times the sample period; two integrators:
                                           (rms^2 coth(tau / (2 time)) / R)^(1/4), with the acceleration's
 
 For tau -> 0 and the default gains h = tau sqrt(C/q): a bandwidth of 3464 rad/s for C = 12 m/s^2 on 1 um at any rate.
-Were quantisation taken for white at the sampling rate, the bandwidth would grow with the rate although no count comes
-sooner. The gains follow from h alone: `riccati.steady_state`. For small h, K = (2 h, 2 h^2, h^3).
+If quantisation were modelled as white at the sampling rate, the bandwidth would grow with the rate although no count
+comes sooner. The gains follow from h alone: `riccati.steady_state`. For small h, K = (2 h, 2 h^2, h^3).
 
-Formats, derived. C' = C tau^2 / q; 2**reach is no less than 1/h nor than 1.
+Formats, derived. C' = C tau^2 / q; 2**reach is at least 1/h and at least 1.
 
-- The difference of counts is held within `step_max`: what twice the largest speed moves in a sample, begun within a
-  count, and one count for an edge out of its place. Beyond, it saturates (flag `velocity_saturated`): what it loses is
-  a displacement of the scale, and of no consequence later.
-- Then the states are bounded: by the norms (sums of absolute impulse responses) from the difference of counts to v, a
-  and lead, `norms`, times `step_max`. Their formats hold that and one more of their unit; with the gains of a noise
-  model nothing else saturates. With other gains `lead` may (flag `innovation_saturated`; it drags x along),
+- The difference of counts is held within `step_max`: the counts that twice the largest speed moves in a sample, begun
+  within a count, and one count for an edge out of place. A larger difference saturates (flag `velocity_saturated`): the
+  excess is a displacement of the scale, without later effect.
+- The states are then bounded by the norms (sums of absolute impulse responses) from the difference of counts to v, a
+  and lead, `norms`, times `step_max`. Their formats hold that bound plus one of their unit; with the gains of a noise
+  model nothing else saturates. With other gains `lead` may saturate (flag `innovation_saturated`; it drags x along),
   or v or a (flag `state_saturated`).
 - f, fraction bits of the velocity: an LSB is at most sqrt(C') 2**-RESOLUTION_BITS.
-- lead, v and a have GUARD_BITS more, v `reach` more and a twice `reach` more again, for a state's rounding error comes
-  out 1, 1/h and 1/h^2 times. An error of r comes out h times, so the operand r has reach - 1 bits less than lead. All
-  products, the sums' narrower parts and r are floored. At their worst all floors come to ERROR_NORM 2**-GUARD_BITS
-  of an LSB of the velocity, which is less than a half: *at constant n counts a sample the velocity, rounded half up,
-  settles to n exactly*, to 0 at standstill. Beneath, a cycle of the states may go on that no output shows.
-- The gain words are GAIN_BITS wide, with HEADROOM_BITS above the designed gain; K_x stays below 2. The promise holds
-  for gains of the designed h or a larger one that the words hold; with a smaller one the last bits may move.
-- int64 ends at 62 bits: f gives way.
+- lead, v and a have GUARD_BITS more than f, v another `reach` and a another twice `reach`, since a state's rounding
+  error appears in the velocity 1, 1/h and 1/h^2 times. An error of r appears h times, so the operand r has reach - 1
+  bits less than lead. All products, the sums' narrower parts and r are floored. In the worst case all floors add up to
+  ERROR_NORM 2**-GUARD_BITS of an LSB of the velocity, which is less than a half: *at constant n counts a sample the
+  velocity, rounded half up, settles to n exactly*, to 0 at standstill. A limit cycle of the states may remain that no
+  output shows.
+- The gain words are GAIN_BITS wide, with HEADROOM_BITS above the designed gain; K_x stays below 2. The exact settling
+  holds for gains of the designed h, or of any larger h that the words hold; with a smaller h the last bits may move.
+- int64 holds 62 bits: if the formats do not fit, f is reduced.
 
-Restart and the first sample: all states 0; the count may wrap. From rest that is no transient; out of a motion it is
-the step response, as for any step of velocity: about 41 % over, and settled in a few times sqrt(q / C).
+Restart and the first sample: all states 0; the count may wrap. A start from rest has no transient; a start in motion
+has the step response, as for any step of velocity: about 41 % overshoot, settled in a few times sqrt(q / C).
 """
 
 import math
@@ -68,11 +69,11 @@ if TYPE_CHECKING:
     from ..spec import AxisSpec
 
 RESOLUTION_BITS = 11
-"""The output LSB is no larger than sqrt(C') over two to this."""
+"""The output LSB is at most sqrt(C') 2**-RESOLUTION_BITS."""
 GUARD_BITS = 6
 """Bits of `lead` below the output LSB."""
 ERROR_NORM = 18.0
-"""Largest sum of all rounding errors at v, in units of a guard bit: see above."""
+"""Largest sum of all rounding errors at v, in units of a guard bit: see the module's docstring."""
 HEADROOM_BITS = 2
 """A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
 STEPS = 12
@@ -84,8 +85,8 @@ class Gains(EstimatorGains):
     """The noise model, SI units.
 
     Attributes:
-        acceleration_rms_m_per_s2, acceleration_time_s: acceleration of the axis, and for how long it lasts.
-        noise_rms_m, noise_time_s: error of the position measured, and for how long it lasts.
+        acceleration_rms_m_per_s2, acceleration_time_s: the axis's acceleration, and its correlation time.
+        noise_rms_m, noise_time_s: the error of the measured position, and its correlation time.
     """
 
     acceleration_rms_m_per_s2: float
@@ -95,7 +96,7 @@ class Gains(EstimatorGains):
 
     @classmethod
     def default(cls, axis: "AxisSpec") -> "Gains":
-        """Return the module's model: uniform acceleration within C, uniform quantisation, the minimax window."""
+        """Return the default noise model: uniform acceleration within C, uniform quantisation, the minimax window."""
         bound, q = axis.acceleration_max_m_per_s2, axis.count_m
         window = 2 * math.sqrt(q / bound)
         return cls(bound / math.sqrt(3), window, q / math.sqrt(12), window)
@@ -111,8 +112,10 @@ class Gains(EstimatorGains):
 
 
 def norms(index: float) -> tuple[float, float, float]:
-    """Return bounds of the norms from the difference of counts to v, a and lead; with h at most 1 for the last two,
-    in units of h and 1/h."""
+    """Return bounds of the norms from the difference of counts to v, a and lead.
+
+    The bounds for a and lead are in units of h and 1/h, with h held to at most 1.
+    """
     return (2.1, 1.0, 1.1 + 2.2 * index) if index <= 1 else (3.7, 5.5, 7.4)
 
 
@@ -138,7 +141,7 @@ class Params(NamedTuple):
 
 
 class State(NamedTuple):
-    """Words of the formats of `Design` (float: counts and sample periods); `count` is the last one."""
+    """The state, in the formats of `Design` (float: counts and sample periods); `count` is the last count."""
 
     running: int
     count: int  # type: ignore[assignment]  # a tuple has a method of this name
@@ -159,16 +162,16 @@ FLOAT_START = State(0, 0, 0.0, 0.0, 0.0)
 
 
 class Design(EstimatorDesign):
-    """Formats, run-time words and latency of the filter for an axis: the module says how they follow.
+    """Formats, run-time words and latency of the filter for an axis, derived as the module says.
 
     Attributes:
         step_max: largest difference of counts.
         velocity, lead, v, a, operand: formats of the output, the three states, and r as the multiplier takes it.
-        shifts: how far the products with the three gains are shifted to the LSB of their states.
+        shifts: right shifts of the products with the three gains to the LSB of their states.
         words: `kalman_position`, `kalman_velocity`, `kalman_acceleration`.
 
     Raises:
-        ValueError: if the noise model has a bandwidth too small for int64, with the least acceleration.
+        ValueError: if the noise model has a bandwidth too small for int64, with the least accepted acceleration.
     """
 
     name = "kalman"
@@ -179,7 +182,7 @@ class Design(EstimatorDesign):
     def __init__(self, axis: "AxisSpec", gains: Gains):
         super().__init__(axis, gains)
         self._axis = axis
-        # No two counts are farther apart than half of their range.
+        # Two counts differ by at most half of their range.
         self.step_max = most = min(math.floor(2 * axis.speed_max_counts_per_sample) + 2, 1 << (axis.count_width - 1))
         index = gains.index(axis)
         h = min(index, 1.0)
@@ -189,7 +192,7 @@ class Design(EstimatorDesign):
         i_lead = 1 + bits_for(norm_lead * most / h + 1)
         reach = max(bits_for(1 / h), 0)
         less = max(reach - 1, 0)
-        # States leave three bits for their sums, the product one.
+        # The sums need three bits more than the states, the product one more.
         room = min(
             60 - GUARD_BITS - reach - i,
             60 - GUARD_BITS - 2 * reach - i_a,
@@ -252,7 +255,7 @@ class Design(EstimatorDesign):
         )
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
-        """Return the float64 kernel's parameters: gains from `si` where given, else those of the noise model."""
+        """Return the float64 kernel's parameters: gains from `si` where given, else from the noise model."""
         value = {**self.words_for(gains), **si}
         k_x, k_v, k_a = (value[word.name] / word.si_per_unit for word in self.words)
         return FloatParams(k_x, k_v, k_a, self.count_width)
@@ -289,7 +292,7 @@ def step(params, state, seen, restart):
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
-    """The same filter in float64, unsaturated: the reference for what fixed point costs."""
+    """Take one sample in float64, unsaturated: the same filter, as a reference for the cost of fixed point."""
     fresh = restart or not state.running
     d = 0 if fresh else wrap(seen.count - state.count, params.count_width)
     lead = 0.0 if fresh else state.lead
