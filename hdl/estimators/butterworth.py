@@ -19,11 +19,12 @@ class Estimator(EstimatorBlock):
 
     The velocity is y. Start: at the first sample, and with `restart`, d and all states are 0.
 
-    Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier serves
+    Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
     the three products.
 
-    Rounding and overflow: operands and products round down, the velocity half up; d, w and y saturate, with flags;
-    w and y only under coefficients that are not, or have just ceased to be, of one cutoff. The count may wrap.
+    Rounding and overflow: operands and products round down, the velocity half up; d, w and y saturate, with flags; w
+    and y saturate only while the coefficients belong to no single cutoff, or just after a change of cutoff. The count
+    may wrap.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ class Estimator(EstimatorBlock):
         limited = saturate(moved, -design.step_max, design.step_max)
 
         m.d.sync += [self.valid.eq(0), product.eq(operand * coefficient), term.eq(scaled)]
-        # One clock each. A product takes a clock, its shift another, while the next one follows behind.
+        # Every state takes one clock. A product takes a clock and its shift another, while the next product follows.
         sequence = {
             "DIFFERENCE": [d.eq(limited), self.saturated[0].eq(limited != moved)],
             "INPUT": [four_x.eq(d + (d1 << 1) + d2), d1.eq(d), d2.eq(d1)],

@@ -12,9 +12,9 @@ from ..quadrature import Seen
 
 
 class CycleTimes(wiring.Component):
-    """What the stamps of a sample say: times of cycles and gaps between edges, and ages.
+    """Times of cycles and of gaps between edges, and ages of edges, from the stamps of a sample.
 
-    Equation: differences of stamps, modulo their width; `hardwall.model.estimators.cycle_times` says which, and when.
+    Equation: differences of stamps, modulo their width; `hardwall.model.estimators.cycle_times` defines them.
 
     Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with it.
 
@@ -27,24 +27,24 @@ class CycleTimes(wiring.Component):
     stamp_width : int
         Bits of the clock stamps, 3 to 62.
     cycles_max : int
-        Most cycles that are told, 1 or more.
+        Largest number of cycles that `cycles` can show, 1 or more.
 
     Members
     -------
     strobe : In(1)
-        Takes what the decoder has seen.
+        Pulse: take the decoder's outputs.
     restart : In(1)
         With `strobe`: this sample counts as the first.
     seen : In(Seen)
-        What the decoder shows.
+        The decoder's outputs.
     news : Out(1)
         Whether there is a new edge.
     cycles : Out
-        Whole cycles of one direction that ended with the last edge, in `cycle`; 0: none.
+        Number of whole cycles in one direction, in the time `cycle`, that ended with the last edge; 0: none.
     cycle, gap : Out(stamp_width)
-        Clocks: of those cycles, and between the last two edges (0: not known).
+        Clocks of those cycles, and clocks between the last two edges (0: not known).
     age, cycle_age : Out(stamp_width)
-        Clocks since the last edge and since the one three before it; 0: not known, or too long.
+        Clocks since the last edge and since the edge three before it; 0: not known, or too long.
     valid : Out(1)
         High for one clock; the others are valid from then until the next `strobe`.
 
@@ -53,7 +53,7 @@ class CycleTimes(wiring.Component):
     TypeError
         If a parameter is not an int.
     ValueError
-        If it is out of its range.
+        If a parameter is out of range.
 
     Source: Brown, Schneider, Mulligan 1992: fixed position, by full cycles.
     """
@@ -110,7 +110,7 @@ class CycleTimes(wiring.Component):
         running, first = Signal(), Signal()
         fresh = Signal(4)
 
-        # The four kinds one after the other, from that of the last edge on: a clock to subtract, a clock to judge.
+        # The four kinds follow each other, beginning with the last edge's: one clock to subtract, one clock to judge.
         kind, judged = Signal(2), Signal(2)
         age, change = Signal(width), Signal(width)
         known = Signal()
@@ -164,7 +164,7 @@ class CycleTimes(wiring.Component):
                 ]
                 m.next = "LEFT"
             with m.State("LEFT"):
-                # The edge of this kind that the last sample knew stands so many counts before the last that it saw.
+                # The edge of this kind that the last sample knew is so many counts before the last edge of that sample.
                 behind = (-forward)[:2]
                 held = Mux(cycles > self._cycles_max, self._cycles_max, cycles)
                 m.d.sync += [
@@ -177,7 +177,7 @@ class CycleTimes(wiring.Component):
                 ]
                 m.next = "OPPOSITE"
             with m.State("OPPOSITE"):
-                # A neighbour of the last edge's kind is the edge before it, or the one three before; ages tell.
+                # The two neighbouring kinds are those of the edge before and of the edge three before; ages tell which.
                 both = known & right_known & last_known & (run == RUN_MAX)
                 either = (known | right_known) & last_known & (run >= 2)
                 m.d.sync += [

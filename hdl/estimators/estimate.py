@@ -1,4 +1,4 @@
-"""What every velocity estimator is in hardware: its members, and the bus by which it sees the decoder."""
+"""The members that every velocity estimator has in hardware, with the bus from the decoder."""
 
 from amaranth.lib.wiring import In, Member, Out
 
@@ -10,34 +10,34 @@ from ..quadrature import Seen
 
 
 class EstimatorBlock(Block):
-    """A velocity estimator: the members that all of them have; a subclass adds what happens between them.
+    """A velocity estimator with the members that all estimators have; a subclass adds the logic.
 
     Parameters
     ----------
     design : hardwall.model.estimators.estimate.EstimatorDesign
-        That of the estimator, of its `design_class`.
+        The estimator's design, of its `design_class`.
 
     Members
     -------
     strobe : In(1)
-        Takes a sample.
+        Pulse: take a sample.
     restart : In(1)
         With `strobe`: this sample counts as the first.
     seen : In(Seen)
-        What the decoder shows, valid with `strobe`; an estimator uses `design.inputs` of it.
+        The decoder's outputs, valid with `strobe`; an estimator uses the fields `design.inputs`.
     one input for each of `design.words` : In
         Run-time parameters; constant from a `strobe` to its `valid`.
     velocity : Out(SQ)
-        Counts a sample, `design.velocity`; valid from `valid` until the next.
+        Velocity, counts a sample, in the format `design.velocity`; constant from one `valid` to the next.
     saturated : Out
-        With `valid`: bits as `design.flags`.
+        With `valid`: bits as in `design.flags`.
     valid : Out(1)
         High for one clock. The next `strobe` may come with it.
 
     Raises
     ------
     TypeError
-        If `design` is not of that class.
+        If `design` is of another class.
     """
 
     @staticmethod

@@ -10,23 +10,23 @@ from .estimate import EstimatorBlock
 from .history import History
 
 FIRST = HISTORY_LATENCY + 1
-"""Clock at which the change of the first tap is there."""
+"""Clock at which the change of the first tap is ready."""
 
 
 class Estimator(EstimatorBlock):
     """The slope over the longest window in which the counts are a line.
 
     Equation, with D_i the change over i taps of T samples, d the band, and n the largest number of taps, at most
-    `foaw_window`, up to which every one passes
+    `foaw_window`, up to which every tap passes
 
         (D_i - d) / i <= D_n / n <= (D_i + d) / i                        for i < n
 
         velocity = D_n / (n T), or the slope of the least-squares line over the same taps
 
-    In the first samples the axis counts as having stood at the first one before, so velocity is 0 at the first.
+    Before the first sample the axis counts as having stood at its position, so velocity is 0 at the first sample.
 
-    Latency: `latency` clocks from `strobe` to `valid`: one a tap, and the division's; the next `strobe` may come with
-    `valid`.
+    Latency: `latency` clocks from `strobe` to `valid`: one a tap, and those of the division; the next `strobe` may come
+    with `valid`.
 
     Rounding and overflow: the search is exact; the velocity rounds toward zero. The change of a sample is limited to
     the velocity format, with a flag; the velocity then always fits. The count may wrap.
@@ -70,7 +70,7 @@ class Estimator(EstimatorBlock):
         m.d.sync += [division.start.eq(0), self.valid.eq(division.done)]
         with m.If(clock != 0):
             m.d.sync += clock.eq(clock + 1)
-        # The next tap is asked for every clock, from when the newest position is there for the first one's change.
+        # Every clock reads the next tap, from the clock at which the newest position is ready for the first change.
         with m.If(clock >= FIRST - 2):
             m.d.sync += age.eq(age + spacing)
         with m.Switch(clock):
@@ -93,11 +93,12 @@ class Estimator(EstimatorBlock):
         return m
 
     def _search(self, m: Module, clock: Signal, change: Value) -> tuple[Signal, Signal, Signal, Signal]:
-        """Add the search, in which tap i's change is there at clock FIRST + i - 1, and decided on two clocks later.
+        """Add the search: the change over i taps is ready at clock FIRST + i - 1, and is judged two clocks later.
 
-        Return, of the window found: its change, the sum of its taps', the sum of the sums before the last, its taps.
+        Return, for the longest fitting window: its change, the sum of its taps' changes, the sum of the earlier sums,
+        and its number of taps.
         """
-        # No change of a tap is larger than this, so none of i taps than i times it; all widths follow.
+        # The change over one tap is at most this, and over i taps at most i times this; all widths follow.
         tap = self._design.history.change.max * self._design.spacing * self._design.history.every
         triangle = TAPS * (TAPS + 1) // 2
         slopes = _holding((tap << BAND.f) * UNIT + BAND.max * UNIT)
@@ -142,5 +143,5 @@ class Estimator(EstimatorBlock):
 
 
 def _holding(largest: int) -> Shape:
-    """Return the signed shape of what is `largest` in magnitude at most."""
+    """Return the signed shape that holds magnitudes up to `largest`."""
     return signed(largest.bit_length() + 1)

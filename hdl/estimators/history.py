@@ -1,4 +1,4 @@
-"""The positions of the past, in block RAM."""
+"""The past positions of an axis, in block RAM."""
 
 from amaranth.hdl import Module, Mux, Signal, signed, unsigned
 from amaranth.lib.memory import Memory
@@ -11,15 +11,16 @@ from ..block import Block
 
 
 class History(Block):
-    """Sums the changes of the count, stores every so many samples' sum, and differences the newest with an older one.
+    """The sum of the count's changes, stored every `design.every` samples, and its change since an older stored sum.
 
     Equation: position <- position + limit(count - last count), modulo 2**width; 0 at the first sample, and with
-    `restart`. change = position - (the one `age` stored positions before it, 0 if that was before the first).
+    `restart`. change = position - (the position stored `age` stored positions before, 0 if that was before the first).
 
-    Latency: `latency` clocks from `strobe` to `valid`. `change` is there 2 clocks after its `age`, and from 1 after
-    `valid` on; an age may come every clock. The next `strobe` may come 1 clock after `valid`.
+    Latency: `latency` clocks from `strobe` to `valid`. `change` is ready 2 clocks after its `age`, and not before 1
+    clock after `valid`; an age may come every clock. The next `strobe` may come 1 clock after `valid`.
 
-    Rounding and overflow: the change of a sample is limited, with `limited`; all else is exact. The count may wrap.
+    Rounding and overflow: the change of a sample is limited, with `limited`; everything else is exact. The count may
+    wrap.
 
     Parameters
     ----------
@@ -29,7 +30,7 @@ class History(Block):
     Members
     -------
     strobe : In(1)
-        Takes `count`.
+        Pulse: take `count`.
     restart : In(1)
         With `strobe`: this sample counts as the first.
     count : In(signed)
@@ -43,12 +44,12 @@ class History(Block):
     age : In
         Stored positions to go back, 1 or more.
     change : Out(signed)
-        Counts; from a stored position.
+        Change of the position, counts, if the newest position is stored.
 
     Raises
     ------
     TypeError
-        If `design` is not of that class.
+        If `design` is of another class.
     """
 
     design_class = Design

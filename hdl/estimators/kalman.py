@@ -19,11 +19,12 @@ class Estimator(EstimatorBlock):
 
     The velocity is v. Start: at the first sample, and with `restart`, x = count, v = 0 and a = 0.
 
-    Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier serves
+    Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
     the three products.
 
     Rounding and overflow: r, the products and narrowed sums round down, the velocity half up; the difference of counts,
-    x - count, v and a saturate, with flags; the last three only under gains of no noise model. The count may wrap.
+    x - count, v and a saturate, with flags; x - count, v and a saturate only with gains that belong to no noise model.
+    The count may wrap.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ class Estimator(EstimatorBlock):
         last = Signal.like(self.seen.count)
         moved = Signal.like(self.seen.count)
         d = Signal(range(-design.step_max, design.step_max + 1))
-        # With a gain just below 2, lead may turn to its own opposite and a little beyond.
+        # With a gain just below 2, lead may change to its own negative and slightly beyond.
         lead = Signal(signed(design.lead.width + 1))
         v, a = Signal(shape(design.v)), Signal(shape(design.a))
         predicted = Signal(signed(max(len(v), len(a) - design.a.f + design.v.f) + 1))
@@ -68,7 +69,7 @@ class Estimator(EstimatorBlock):
         for_x, for_v, for_a = design.shifts
 
         m.d.sync += [self.valid.eq(0), product.eq(operand * gain)]
-        # One clock each. A product takes a clock, its shift another, while the next one follows behind.
+        # Every state takes one clock. A product takes a clock and its shift another, while the next product follows.
         sequence = {
             "DIFFERENCE": [
                 d.eq(limited),

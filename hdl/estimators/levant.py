@@ -19,9 +19,9 @@ class Estimator(EstimatorBlock):
         x  <- x + u
         u1 <- u1 - alpha sign(e)
 
-    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: from rest, no false transient.
+    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: a start from rest has no transient.
 
-    Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
+    Latency: `latency` clocks from `strobe` to `valid`, most of them for the root; the next `strobe` may come with
     `valid`.
 
     Rounding and overflow: the root rounds down and half of its LSB is added back; u rounds half up; e, u and u1
@@ -45,7 +45,7 @@ class Estimator(EstimatorBlock):
         lead = Signal(signed(max(error.width, velocity.width) + 1))
         u1 = Signal(shape(velocity))
 
-        # One clock a step; the root takes its own time between ROOT and PRODUCT.
+        # A step takes one clock; state PRODUCT waits for the root.
         e = Signal(shape(error))
         product = Signal(design.lambda_.width + design.root.width + 1)
         correction = Signal(max(design.lambda_.width + design.root.width + 2 - (design.product - velocity.f), 1))
@@ -86,9 +86,9 @@ class Estimator(EstimatorBlock):
 
 
 def arrive(m, block, lead, u1, e, then):
-    """Add the states from the strobe to the error e, those that all of the family begin with; state `then` follows.
+    """Add the states from the strobe to the error e, with which the whole family begins; state `then` follows.
 
-    At the first sample `lead` and `u1` are cleared; the signal returned says, after the strobe, that it is one.
+    The first sample clears `lead` and `u1`; the returned signal says, after the strobe, whether it is the first sample.
     """
     velocity, error = block.design.velocity, block.design.error
     running = Signal()
@@ -118,9 +118,9 @@ def arrive(m, block, lead, u1, e, then):
 
 
 def _moved(value, step, up, down, most):
-    """Return `value` plus or less `step`, or as it is, held within +-`most`; and whether it was held.
+    """Return `value` plus or minus `step`, or unchanged, held within +-`most`; and whether it was limited.
 
-    Sum and difference side by side, for each needs a limit on one side only: `value` itself is within.
+    Sum and difference are computed in parallel; either needs a limit on one side only, since `value` is within both.
     """
     above, below = value + step > most, value - step < -most
     higher, lower = Mux(above, most, value + step), Mux(below, -most, value - step)

@@ -9,7 +9,7 @@ from . import levant_semi_implicit
 
 
 class Estimator(levant_semi_implicit.Estimator):
-    """Levant's differentiator without numerical chatter, its gains between 1 and 2**-levels of the axis's.
+    """Levant's differentiator without numerical chatter, with gains adapted between 1 and 2**-levels of the axis's.
 
     Equation, per sample, in counts and sample periods, at level j:
 
@@ -18,24 +18,25 @@ class Estimator(levant_semi_implicit.Estimator):
         u  = u1 - sign(b) g,        g = min(lambda 2**(-j/2) sqrt(beyond), beyond),    beyond = |b| - near
         x  <- x + u
 
-    j falls as soon as |b| is more than quantisation explains, to what the time since b changed its sign asks for; it
-    rises by one after a time of calm. The module of the design has the law.
+    As soon as |b| is more than quantisation explains, j falls to the level that the time since the last change of b's
+    sign requires; it rises by one after a time of calm. The design's module has the law.
 
-    Start: at the first sample, and with `restart`, x = count, u1 = 0 and j = 0, so u = 0: from rest, no false
+    Start: at the first sample, and with `restart`, x = count, u1 = 0 and j = 0, so u = 0: a start from rest has no
     transient.
 
-    Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
+    Latency: `latency` clocks from `strobe` to `valid`, most of them for the root; the next `strobe` may come with
     `valid`.
 
     Rounding and overflow: alpha 2**-j rounds down; the root rounds down and half of its LSB is added back; g rounds
-    half up, and the rest is exact; b, u and u1 saturate, with flags. The count may wrap; no counter of the law can.
+    half up, and everything else is exact; b, u and u1 saturate, with flags. The count may wrap; no counter of the law
+    can.
 
     Parameters
     ----------
     design : hardwall.model.estimators.levant_adaptive.Design
         Formats and thresholds; its module derives them.
 
-    Source: ours, on Levant 1998 and the projection of `levant_semi_implicit`.
+    Source: this project, based on Levant 1998 and the projection of `levant_semi_implicit`.
     """
 
     design_class = Design
@@ -49,7 +50,7 @@ class Estimator(levant_semi_implicit.Estimator):
         return self._slowed
 
     def _radicand(self, beyond):
-        # For odd levels, 1 / sqrt(2) of the root.
+        # At odd levels the radicand is halved, which divides the root by sqrt(2).
         shift = self.design.velocity.f - self.design.radicand.f
         return Mux(self._level[0], shift_floor(beyond, shift + 1), shift_floor(beyond, shift))
 
@@ -60,7 +61,7 @@ class Estimator(levant_semi_implicit.Estimator):
     def _adapt(self, m, first, e, size):
         design, level = self.design, self._level
         whole = size[design.velocity.f :]
-        # Thresholds of time, whole samples: to reach the level after a level, and to leave a level.
+        # Time thresholds in whole samples, by level: to reach the next level, and to leave the level.
         reach = [design.reach_samples(n + 1) for n in range(design.levels)]
         hold = [design.hold_samples(n) for n in range(design.levels)]
         side = Signal(signed(2))
@@ -100,7 +101,7 @@ class Estimator(levant_semi_implicit.Estimator):
 
 
 def _choose(m, index, values) -> Value:
-    """Return the value of that index."""
+    """Return the value at `index`."""
     chosen = Signal(range(max(values, default=0) + 1))
     with m.Switch(index):
         for n, value in enumerate(values):

@@ -15,25 +15,27 @@ from .levant_edge_signals import Signals
 
 
 class Estimator(EstimatorBlock):
-    """Levant's idea on edges: the error is that of the place predicted for an edge at the moment it came.
+    """Levant's differentiator on edges: the error is that of the place predicted for an edge when it comes.
 
-    Equation, at an edge T clocks and n edges after the last one used, 2**(L-1) <= T < 2**L, in counts, samples, clocks:
+    Equation, at an edge T clocks and n edges after the last edge in use, with 2**(L-1) <= T < 2**L, in counts, samples
+    and clocks:
 
         E = (v + a T/2) T - (n + the difference of the two edges' places) D
         v <- v + a T - min(|E| / T, lambda sqrt(|E| 2**L)) sign(E)
         a <- a - min(|E| / T / 2**L, alpha 2**L) sign(E)
 
-    and at every sample, s clocks after it, velocity = v + a s, held to what no further edge allows; 0 at rest. The
-    places of the four edges of a cycle are learnt from E. `hardwall.model.estimators.levant_edge` says all of it.
+    and at every sample, s clocks after that edge, velocity = v + a s, held within the bound for no further edge; 0 at
+    rest. The places of the four edges of a cycle are learnt from E. `hardwall.model.estimators.levant_edge` has the
+    whole law.
 
-    Start: at the first sample, and with `restart`, v = a = 0 and no edge is known; the first to come is an anchor, the
-    second gives a velocity.
+    Start: at the first sample, and with `restart`, v = a = 0 and no edge is known; the first edge to come is the
+    anchor, the second gives a velocity.
 
-    Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
+    Latency: `latency` clocks from `strobe` to `valid`, most of them for the root; the next `strobe` may come with
     `valid`.
 
     Rounding and overflow: as the model says; times of more than `mantissa` bits are cut to that many. Velocity and
-    error saturate, with flags; acceleration and places saturate without: that is part of the algorithm. The count may
+    error saturate, with flags; acceleration and places saturate without a flag, as part of the algorithm. The count may
     wrap.
 
     Parameters
@@ -61,19 +63,19 @@ class Estimator(EstimatorBlock):
         return m
 
     def _measure(self, m, s):
-        """A time as it multiplies: its top bits. The multiplier, and what it makes of an acceleration."""
+        """Add the multiplier, the top bits of a time for it, and the change of velocity from an acceleration."""
         d, p = self._design, s.params
         m.d.sync += [s.size.eq(length_of(s.measure)), s.product.eq(s.left * s.right)]
         m.d.comb += [
             s.cut.eq(Mux(s.size > d.mantissa, s.size - d.mantissa, 0)),
             s.time.eq(s.measure >> s.cut),
-            # A time with its top bit set is cut by one bit more; but then the acceleration is 0.
+            # A time with its top bit set is cut by one more bit, but then the acceleration is 0.
             s.kept.eq(d.turn_span - s.cut),
             s.turned.eq(fitted(shift_floor(s.product, p.turn_shift) >> s.drop, len(s.turned))),
         ]
 
     def _solve(self, m, s):
-        """Root and quotient of the error, and the limits of what they change, ready well before they are asked for."""
+        """Add the root and the quotient of the error, and the limits of the changes, ready well before their use."""
         d, p = self._design, s.params
         error, velocity = d.error, d.velocity
         m.submodules.root = root = Sqrt(d.radicand.width + 1)
@@ -94,7 +96,7 @@ class Estimator(EstimatorBlock):
         ]
         first = d.shortest + 1
         most, steepest = len(s.slope), len(s.bent)
-        # Bits of the interval beyond the fewest; `few` where it is not cut.
+        # The interval's bits beyond the shortest one's; `few` is the same number if the interval is not cut.
         more = Signal(range(max(d.stamp_width - first, 2)))
         few = Signal(range(max(d.mantissa - first, 0) + 1))
         halves = Signal(range(max((d.mantissa >> 1) - (first >> 1), 0) + 1))
@@ -110,7 +112,7 @@ class Estimator(EstimatorBlock):
         ]
 
     def _learn(self, m, s):
-        """The places learn while the root is drawn."""
+        """Add the learning of the places, which goes on while the root is computed."""
         p, place = s.params, self._design.place
         residual = Signal(signed(p.learn_max.bit_length() + 1))
         learnt = Signal(signed(max(len(residual) - p.learn_shift, 1) + 1))
@@ -123,7 +125,7 @@ class Estimator(EstimatorBlock):
         ]
 
     def _states_of_the_sample(self, m, s):
-        """What the sample is: which edge came last, and what is to be done with it."""
+        """Add the states that take the sample's last edge and decide how to use it."""
         d, seen = self._design, self.seen
         with m.State("SAMPLE"), m.If(self.strobe):
             stamps = Array([seen.stamp_a_rise, seen.stamp_b_rise, seen.stamp_a_fall, seen.stamp_b_fall])
@@ -168,7 +170,7 @@ class Estimator(EstimatorBlock):
             m.next = "TIME"
 
     def _states_of_the_error(self, m, s):
-        """The velocity predicted for the edge, and the error of the place predicted for it, over its interval."""
+        """Add the states that predict the velocity at the edge and compute the error of its place over the interval."""
         d, p = self._design, s.params
         with m.State("TIME"):
             m.d.sync += [
@@ -210,7 +212,7 @@ class Estimator(EstimatorBlock):
             m.next = "START"
 
     def _states_of_the_correction(self, m, s):
-        """Root and quotient; the changes that they make, limited; the new anchor."""
+        """Add the states for root and quotient, for the limited changes that they make, and for the new anchor."""
         d = self._design
         with m.State("START"):
             m.d.comb += s.start.eq(1)
@@ -253,7 +255,7 @@ class Estimator(EstimatorBlock):
             m.next = "LINE PRODUCT"
 
     def _states_of_the_line(self, m, s):
-        """The velocity now, on a line from the anchor, held to what no further edge allows."""
+        """Add the states that extrapolate the velocity from the anchor and hold it within the bound for no edge."""
         d = self._design
         with m.State("LINE PRODUCT"):
             room = Mux(s.v < 0, s.bound + s.v, s.bound - s.v)
@@ -268,7 +270,7 @@ class Estimator(EstimatorBlock):
             m.d.sync += [s.line.eq(line), s.flags[1].eq(s.flags[1] | (line != straight))]
             m.next = "END"
         with m.State("END"):
-            # Only the end on the line's own side of 0 can hold it.
+            # Only the bound on the line's own side of 0 can limit it.
             m.d.sync += s.end.eq(Mux((s.line < 0) == (s.v < 0), _signed(s.onward, s.v < 0), -s.v))
             m.next = "OUTPUT"
         with m.State("OUTPUT"):
@@ -282,7 +284,7 @@ class Estimator(EstimatorBlock):
 
 
 def _shifted(value, right: int, left):
-    """Return floor(value * 2**(left - right)), `left` a signal."""
+    """Return floor(value * 2**(left - right)), where `left` is a signal."""
     return (value << left) >> right if right > 0 else value << -right << left
 
 

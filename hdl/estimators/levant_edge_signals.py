@@ -14,21 +14,21 @@ class Signals:
         self.params = d.params({word.name: word.reset for word in d.words})
         count, clocks, velocity = signed(d.count_width), unsigned(d.stamp_width), shape(d.velocity)
 
-        # Held from sample to sample: the anchor, the motion there, the places of the four edges.
+        # The state from sample to sample: the anchor, the motion there, and the places of the four kinds of edges.
         self.running, self.known = Signal(), Signal()
         self.number, self.stamp, self.kind = Signal(count), Signal(clocks), Signal(2)
         self.length = Signal(range(d.stamp_width + 1))
         self.v, self.a = Signal(velocity), Signal(shape(d.acceleration))
         self.places = Array(Signal(shape(d.place), name=f"place_{n}") for n in range(4))
 
-        # Of the sample. `anchor`: its edge is the new anchor; `loose`: it is not yet.
+        # The sample. `anchor`: its edge is the new anchor; `loose`: its edge is not an anchor yet.
         self.fresh, self.full_run, self.rest, self.beyond = Signal(), Signal(), Signal(), Signal()
         self.correct, self.carry, self.anchor, self.loose = Signal(), Signal(), Signal(), Signal()
         self.now, self.at, self.waited = Signal(clocks), Signal(clocks), Signal()
         self.to, self.to_kind, self.passed = Signal(count), Signal(2), Signal(count)
         self.flags = Signal(2)
 
-        # A time and its length, as it multiplies, and what it makes of an acceleration.
+        # A time and its length, its bits for the multiplier, and the change of velocity by an acceleration in it.
         self.measure, self.size = Signal(clocks), Signal(range(d.stamp_width + 1))
         self.cut, self.kept = Signal(range(d.turn_span + 2)), Signal(range(d.turn_span + 1))
         self.time, self.age_time = Signal(d.mantissa), Signal(d.mantissa)
@@ -38,7 +38,7 @@ class Signals:
         self.turned, self.turn = (Signal(signed(d.velocity.width + 1)) for _ in range(2))
         self.ahead = Signal(signed(d.velocity.width + 2))
 
-        # The error of place, and what it changes.
+        # The error of the place, and the changes that it makes.
         self.distance, self.apart = Signal(shape(d.distance)), Signal(signed(d.place.width + 1))
         bits = max(d.distance.width + d.clocks.bit_length() + d.place.f, d.place.width + 1) + 1
         self.way, self.moved = Signal(signed(bits)), Signal(shape(d.error))
@@ -51,6 +51,6 @@ class Signals:
         self.here, self.there = Signal(shape(d.place)), Signal(shape(d.place))
         self.next_here, self.next_there = Signal(shape(d.place)), Signal(shape(d.place))
 
-        # What no further edge allows.
+        # The bound of the line without a further edge.
         self.bound, self.onward = Signal(d.velocity.width - 1), Signal(d.velocity.width - 1)
         self.line, self.end = Signal(velocity), Signal(signed(d.velocity.width + 1))

@@ -9,7 +9,7 @@ from . import levant_semi_implicit
 
 
 class Estimator(levant_semi_implicit.Estimator):
-    """Levant's differentiator, sign and root implicit, one sample at a time.
+    """Levant's differentiator with implicit sign and root, one sample at a time.
 
     Equation, per sample, in counts and sample periods:
 
@@ -18,14 +18,14 @@ class Estimator(levant_semi_implicit.Estimator):
         u  = u1 - sign(b) g,        g = lambda sqrt(beyond + lambda^2 / 4) - lambda^2 / 2,    beyond = |b| - near
         x  <- x + u
 
-    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: from rest, no false transient.
+    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: a start from rest has no transient.
 
-    Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
-    `valid`. One multiplier, for lambda^2 before the root and for lambda times the root after it.
+    Latency: `latency` clocks from `strobe` to `valid`, most of them for the root; the next `strobe` may come with
+    `valid`. One multiplier makes lambda^2 before the root, and lambda times the root after it.
 
     Rounding and overflow: the root rounds down and half of its LSB is added back; lambda^2 / 4 rounds down to the
-    root's radicand; g, of two parts that round half up, is held within 0 to beyond; b, u and u1 saturate, with flags.
-    The count may wrap.
+    root's radicand; g, the difference of two parts that round half up, is held within 0 to beyond; b, u and u1
+    saturate, with flags. The count may wrap.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Estimator(levant_semi_implicit.Estimator):
         return super().elaborate(platform)
 
     def _factor(self, root):
-        # The root is done, for one clock, when the second product is taken.
+        # `done` is high for the one clock in which the second product is taken.
         return Mux(root.done, super()._factor(root), self._word(0))
 
     def _square(self, m, product):

@@ -20,32 +20,32 @@ class Estimator(EstimatorBlock):
         u  = u1 - sign(b) g,        g = min(lambda sqrt(beyond), beyond),    beyond = |b| - near
         x  <- x + u
 
-    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: from rest, no false transient.
+    Start: at the first sample, and with `restart`, x = count and u1 = 0, so u = 0: a start from rest has no transient.
 
-    Latency: `latency` clocks from `strobe` to `valid`, most of them the root's; the next `strobe` may come with
+    Latency: `latency` clocks from `strobe` to `valid`, most of them for the root; the next `strobe` may come with
     `valid`.
 
-    Rounding and overflow: the root rounds down and half of its LSB is added back; g rounds half up, and the rest is
-    exact; b, u and u1 saturate, with flags. The count may wrap.
+    Rounding and overflow: the root rounds down and half of its LSB is added back; g rounds half up, and everything else
+    is exact; b, u and u1 saturate, with flags. The count may wrap.
 
     Parameters
     ----------
     design : hardwall.model.estimators.levant_semi_implicit.Design
         Formats; its module derives them.
 
-    Source: Acary, Brogliato, Orlov 2012; Michel et al. 2021; the module of the design says what is our own.
+    Source: Acary, Brogliato, Orlov 2012; Michel et al. 2021; the design's module says what is this project's own.
     """
 
     design_class = Design
 
-    # What those of the family that project do in their own way.
+    # Subclasses, which share the projection, override these methods.
 
     def _word(self, number: int) -> Value:
         """Return a run-time word: 0 for lambda, 1 for alpha, 2 for the output."""
         return getattr(self, self.design.words[number].name)
 
     def _alpha(self) -> Value:
-        """Return alpha, as from state BAND on."""
+        """Return alpha, valid from state BAND on."""
         return self._word(1)
 
     def _adapt(self, m, fresh, e, size) -> str:
@@ -53,14 +53,14 @@ class Estimator(EstimatorBlock):
         return "BAND"
 
     def _factor(self, root) -> Value:
-        """Return what lambda is multiplied by, in states MAGNITUDE and PRODUCT."""
+        """Return the factor of lambda in states MAGNITUDE and PRODUCT."""
         return Cat(Const(1, 1), root.root)
 
     def _square(self, m, product) -> None:
         """Use the product of state MAGNITUDE, in state BAND."""
 
     def _radicand(self, beyond) -> Value:
-        """Return what the root is taken of, in state ROOT."""
+        """Return the radicand of the root, in state ROOT."""
         return shift_floor(beyond, self.design.velocity.f - self.design.radicand.f)
 
     def _correction(self, product) -> Value:
@@ -75,14 +75,14 @@ class Estimator(EstimatorBlock):
         lead = Signal(signed(max(error.width, velocity.width) + 1))
         u1 = Signal(shape(velocity))
 
-        # One clock a step, one carry chain a clock.
+        # A step takes one clock, and a clock has one carry chain.
         e = Signal(shape(error))
         negative = Signal()
         size, near, beyond, rest = (Signal(error.width - 1) for _ in range(4))
         difference = Signal(signed(max(len(size), self.design.alpha.width) + 1))
         far_u1, far_u = (Signal(signed(max(len(size), len(u1)) + 2)) for _ in range(2))
         next_u1 = Signal.like(u1)
-        # `near` is there long before u1 is wanted.
+        # `near` is ready long before u1 is used.
         m.d.sync += [far_u1.eq(Mux(negative, u1 + near, u1 - near)), next_u1.eq(saturate(far_u1, -most, most))]
 
         m.submodules.root = root = Sqrt(self.design.radicand.width)
@@ -122,7 +122,7 @@ class Estimator(EstimatorBlock):
         return m
 
     def _correct(self, m, root, factor, product, beyond) -> Value:
-        """Add the states from ROOT to OUTPUT, not included; return g. The root takes its own time before PRODUCT."""
+        """Add the states from ROOT up to OUTPUT (not included) and return g; state PRODUCT waits for the root."""
         full, correction = Signal.like(self._correction(product)), Signal.like(beyond)
         below, above = Signal(), Signal()
         m.d.comb += root.radicand.eq(self._radicand(beyond))

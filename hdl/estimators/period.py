@@ -20,8 +20,8 @@ class Estimator(EstimatorBlock):
 
     Start: 0 at the first sample and with `restart`, and until there are two edges in one direction.
 
-    Latency: `latency` clocks from `strobe` to `valid`, most of them the divisions', which go side by side; the next
-    `strobe` may come with `valid`.
+    Latency: `latency` clocks from `strobe` to `valid`, most of them for the two divisions, which run in parallel; the
+    next `strobe` may come with `valid`.
 
     Rounding and overflow: rounds half up in magnitude; saturates at the velocity format, with a flag. Count and stamps
     may wrap.
@@ -46,7 +46,7 @@ class Estimator(EstimatorBlock):
         m.d.comb += [times.strobe.eq(self.strobe), times.restart.eq(self.restart)]
         connect(m, flipped(self.seen), times.seen)
 
-        # The speed's quotient is held until there is another edge.
+        # The quotient of the speed is held until there is a new edge.
         scaled = Signal(range(4 * clocks * design.cycles_max + 1))
         whole = times.cycles != 0
         m.submodules.speed = speed = Divide(len(scaled) + fraction, width, quotient_width)

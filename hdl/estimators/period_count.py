@@ -1,4 +1,4 @@
-"""Velocity by the time of one encoder cycle when slow, by the counts of a window when fast."""
+"""Velocity by the time of one encoder cycle at low speed, and by the counts of a window at high speed."""
 
 from amaranth.hdl import Module, Mux, Signal, signed
 from amaranth.lib.wiring import connect, flipped
@@ -12,7 +12,7 @@ from .estimate import EstimatorBlock
 
 
 class Estimator(EstimatorBlock):
-    """A cycle timed or a window counted, by how many counts the last window had.
+    """The time of a cycle or the counts of a window, chosen by the number of counts in the last window.
 
     Equation, per sample, in counts and clocks, with c clocks a sample and windows of w samples:
 
@@ -22,10 +22,10 @@ class Estimator(EstimatorBlock):
 
     Start: 0 at the first sample and with `restart`, and until there is a cycle in one direction or a fast window.
 
-    Latency: `latency` clocks from `strobe` to `valid`, most of them the division's; the next `strobe` may come with
+    Latency: `latency` clocks from `strobe` to `valid`, most of them for the division; the next `strobe` may come with
     `valid`.
 
-    Rounding and overflow: a cycle's speed rounds half up in magnitude, a window's is exact; both saturate at the
+    Rounding and overflow: a cycle's speed rounds half up in magnitude, a window's speed is exact; both saturate at the
     velocity format, with a flag. Count and stamps may wrap.
 
     Parameters
@@ -82,7 +82,7 @@ class Estimator(EstimatorBlock):
                 with m.If(times.age == 0):
                     m.d.sync += cycle.eq(0)
                 with m.Elif(times.news & (times.cycles <= 1)):
-                    # More than one cycle in a sample: the last one timed stands, until it is counted.
+                    # With more than one cycle in a sample the last timed cycle stays, until counting begins.
                     m.d.sync += cycle.eq(Mux(times.cycles == 1, times.cycle, 0))
                 m.next = "DIVIDE"
             with m.State("DIVIDE"):

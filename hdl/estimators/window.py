@@ -12,11 +12,11 @@ from .history import History
 class Estimator(EstimatorBlock):
     """The mean velocity over the last `window_length` stored positions.
 
-    Equation: velocity = (count - count n samples ago) / n; in the first n samples the axis counts as having stood at
-    the first one before, so velocity is 0 at the first. Where the history stores every M-th sample only, n is a
-    multiple of M, and the velocity is held between.
+    Equation: velocity = (count - count n samples ago) / n; before the first sample the axis counts as having stood at
+    its position, so velocity is 0 at the first sample. If the history stores only every M-th sample, n is a multiple of
+    M, and the velocity is held between.
 
-    Latency: `latency` clocks from `strobe` to `valid`, most of them the division's; the next `strobe` may come with
+    Latency: `latency` clocks from `strobe` to `valid`, most of them for the division; the next `strobe` may come with
     `valid`.
 
     Rounding and overflow: rounds toward zero. The change of a sample is limited to the velocity format, with a flag;
@@ -40,7 +40,7 @@ class Estimator(EstimatorBlock):
         m.submodules.division = division = SignedDivide(
             design.history.width, len(length), design.fraction, design.velocity.width - 1
         )
-        # No window is shorter than a sample.
+        # A window has at least one sample.
         m.d.sync += length.eq(Mux(self.window_length == 0, 1, self.window_length))
         m.d.comb += [
             history.strobe.eq(self.strobe),
