@@ -174,6 +174,15 @@ def _check_speed(recording: Recording, counts: np.ndarray, count: int) -> None:
         )
 
 
+def _output_of(estimator: str, output: str | None) -> str:
+    """Return the output of an estimator that was asked for, or its first; raise ReplayError for one that is not."""
+    _one_of("estimator", estimator, tuple(registry.ESTIMATORS))
+    outputs = registry.design_of(estimator).outputs
+    if output is not None:
+        _one_of(f"output of {estimator}", output, outputs)
+    return outputs[0] if output is None else output
+
+
 def _check_numbers(recording: Recording, coarsen: object, bound: float | None, cutoff: float) -> None:
     """Raise ReplayError if a recording cannot be replayed with these numbers."""
     rate, samples = recording.rate_hz, len(recording.counts)
@@ -227,10 +236,7 @@ def replay(
         ReplayError: in one line, what cannot be and what is accepted.
         RuntimeError: if the RTL could not be built.
     """
-    _one_of("estimator", estimator, tuple(registry.ESTIMATORS))
-    outputs = registry.design_of(estimator).outputs
-    output = outputs[0] if output is None else output
-    _one_of(f"output of {estimator}", output, outputs)
+    output = _output_of(estimator, output)
     _one_of("backend", backend, BACKENDS)
     rate, bound = recording.rate_hz, acceleration_max_counts_per_s2
     cutoff = min(REFERENCE_HZ, rate / 4) if reference_hz is None else reference_hz
@@ -246,8 +252,7 @@ def replay(
     spec = _axis_for(counts, count, bound, rate, estimator)
     velocity, flags, seconds = run(spec, counts, backend, output, progress)
 
-    exact = is_exact(backend)
-    lsb = spec.design.estimator.velocity.lsb if exact else 1.0
+    lsb = spec.design.estimator.velocity.lsb if is_exact(backend) else 1.0
     return Replay(
         recording=recording,
         coarsen=coarsen,
@@ -262,7 +267,7 @@ def replay(
         difference_counts_per_s=np.diff(counts, prepend=counts[0]) * (count * rate),
         reference_counts_per_s=reference,
         flags=spec.design.flag_names(flags),
-        velocity_sha256=hashlib.sha256(velocity.astype("<i8").tobytes()).hexdigest() if exact else None,
+        velocity_sha256=hashlib.sha256(velocity.astype("<i8").tobytes()).hexdigest() if is_exact(backend) else None,
         seconds=seconds,
     )
 
