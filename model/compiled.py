@@ -67,17 +67,32 @@ def _jit(function: Kernel, folder: str, **options: bool) -> Any:
         settings.CACHE_DIR = saved
 
 
-def compiled(function: Kernel) -> Kernel:
-    """Compile `function` with Numba, cached on disk by the content of the project's sources.
+def _kernel(function: Kernel, into_caller: bool) -> Kernel:
+    """Return `function` as Python calls it, and as compiled code does.
 
     What takes and gives Python's objects is a third of the compiler's work, and a call from compiled code needs none of
-    it: for such calls there is a second compilation, without.
+    it: for such calls there is a second compilation, without. Whether that is put into its caller is always said, for
+    what is not said is taken from the caller that happens to be compiled first.
     """
-    kernel = _jit(function, "called")
+    kernel = _jit(function, "called", forceinline=False)
     if not config.DISABLE_JIT:
-        inner = _jit(function, "inlined", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+        folder = "into_caller" if into_caller else "apart"
+        inner = _jit(function, folder, forceinline=into_caller, no_cpython_wrapper=True, no_cfunc_wrapper=True)
         kernel.get_call_template, kernel.get_overload = inner.get_call_template, inner.get_overload
     return cast(Kernel, kernel)
+
+
+def compiled(function: Kernel) -> Kernel:
+    """Compile `function` with Numba, cached on disk by the content of the project's sources."""
+    return _kernel(function, into_caller=False)
+
+
+def inlined(function: Kernel) -> Kernel:
+    """Compile `function` as `compiled` does, and put it into its callers: for what nearly every sample of a loop runs.
+
+    A state of many fields is copied at each call; within one function it stays in registers.
+    """
+    return _kernel(function, into_caller=True)
 
 
 def by_type(declaration: Callable) -> ByType:
@@ -98,7 +113,7 @@ def by_type(declaration: Callable) -> ByType:
             raise TypeError(f"{declaration.__name__} has no variant for {type(first).__name__}")
         return variant(first, *rest)
 
-    @overload(call)
+    @overload(call, jit_options={"forceinline": True})
     def choose(first, *rest):
         variant = variants.get(getattr(first, "instance_class", None))
         if variant is None:
