@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from . import checks, output, quadrature, wall
 from .arithmetic.fixed import UQ
-from .compiled import compiled
+from .compiled import compiled, inlined
 from .estimators import registry
 from .estimators.estimate import estimate
 from .words import Word
@@ -146,7 +146,7 @@ class Design:
         return [name for bit, name in enumerate(self.flags) if flags >> bit & 1]
 
 
-@compiled
+@inlined
 def step(
     params: Params, state: State, seen: quadrature.Seen, restart: int, fault: int, enable: int
 ) -> tuple[State, float, float]:

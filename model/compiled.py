@@ -56,7 +56,7 @@ def source_digest() -> str:
     return digest.hexdigest()[:16]
 
 
-def _jit(function: Kernel, folder: str, **options: bool) -> Any:
+def _jit(function: Kernel, folder: str, **options: Any) -> Any:
     """Return `function` compiled with Numba, cached on disk in a folder of the content of the project's sources."""
     settings: Any = config
     saved = settings.CACHE_DIR
@@ -67,17 +67,32 @@ def _jit(function: Kernel, folder: str, **options: bool) -> Any:
         settings.CACHE_DIR = saved
 
 
-def compiled(function: Kernel) -> Kernel:
-    """Compile `function` with Numba, cached on disk by the content of the project's sources.
+def _kernel(function: Kernel, into_caller: bool) -> Kernel:
+    """Return `function` as Python calls it, and as compiled code does.
 
     The wrapper that converts Python objects is a third of the compiler's work, and a call from compiled code does not
-    need it: a second compilation, without the wrapper, serves such calls.
+    need it: a second compilation, without the wrapper, serves such calls. Whether that one is inlined is always stated,
+    because Numba otherwise takes it from the caller that happens to be compiled first.
     """
-    kernel = _jit(function, "called")
+    kernel = _jit(function, "called", forceinline=False)
     if not config.DISABLE_JIT:
-        inner = _jit(function, "inlined", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+        folder = "into_caller" if into_caller else "apart"
+        inner = _jit(function, folder, forceinline=into_caller, no_cpython_wrapper=True, no_cfunc_wrapper=True)
         kernel.get_call_template, kernel.get_overload = inner.get_call_template, inner.get_overload
     return cast(Kernel, kernel)
+
+
+def compiled(function: Kernel) -> Kernel:
+    """Compile `function` with Numba, cached on disk by the content of the project's sources."""
+    return _kernel(function, into_caller=False)
+
+
+def inlined(function: Kernel) -> Kernel:
+    """Compile `function` as `compiled` does, and put it into its callers: for what nearly every sample of a loop runs.
+
+    A state of many fields is copied at each call; within one function it stays in registers.
+    """
+    return _kernel(function, into_caller=True)
 
 
 def by_type(declaration: Callable) -> ByType:
@@ -98,7 +113,7 @@ def by_type(declaration: Callable) -> ByType:
             raise TypeError(f"{declaration.__name__} has no variant for {type(first).__name__}")
         return variant(first, *rest)
 
-    @overload(call)
+    @overload(call, jit_options={"forceinline": True})
     def choose(first, *rest):
         variant = variants.get(getattr(first, "instance_class", None))
         if variant is None:

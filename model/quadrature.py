@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .arithmetic.fixed import wrap
-from .compiled import compiled
+from .compiled import compiled, inlined
 
 
 class Params(NamedTuple):
@@ -272,7 +272,7 @@ def _settle(params, state, inputs, pins, clocks):
     return _rest(params, state, pins, clocks) if clocks > 0 else state
 
 
-@compiled
+@inlined
 def advance(params, state, inputs, clocks):
     """Return the state after `clocks` steps with constant `Inputs` and no strobes; 0 <= clocks < 2**62.
 

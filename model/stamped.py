@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import axis, checks, quadrature
-from .compiled import compiled
+from .compiled import compiled, inlined
 
 
 class Edges(NamedTuple):
@@ -58,13 +58,13 @@ def controller(of: axis.Axis, level: int) -> tuple[Controller, State]:
     return params, State(start.output.drive, zero, zero, 0, quadrature.START, start, 0, level)
 
 
-@compiled
+@inlined
 def _decode(controller, decoder, level, clocks):
     inputs = quadrature.Inputs(level & 1, level >> 1, 0, controller.glitch_clocks, controller.invert)
     return quadrature.advance(controller.decoder, decoder, inputs, clocks)
 
 
-@compiled
+@inlined
 def sample_quietly(controller, state, strobe):
     """Take the sample at clock `strobe`, with no edge between the last sample and this one: return the state."""
     decoder = _decode(controller, state.decoder, state.level, strobe - state.clock)

@@ -46,6 +46,7 @@ COVERED = {
     "trade_runs": "studies/test_trade",
     "zwidth": "walls/test_zwidth",
 }
+MOST_ARGUMENTS, MOST_LINES = 9, 60
 CONFIG = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 EXTRAS = CONFIG["project"]["optional-dependencies"]
 PROVIDERS = importlib.metadata.packages_distributions()
@@ -163,6 +164,29 @@ def test_a_study_has_its_test():
     }
     assert without == set(COVERED)
     assert [name for name in COVERED.values() if not (ROOT / f"tests/{name}.py").exists()] == []
+
+
+def size(function: ast.FunctionDef | ast.AsyncFunctionDef) -> tuple[int, int]:
+    """Return how many arguments a function has, and how many lines from its `def` on."""
+    given = function.args
+    named = [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]
+    return sum(each is not None for each in named), (function.end_lineno or 0) - function.lineno + 1
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=identity)
+def test_functions_are_short_and_take_few_arguments(path):
+    """A command of the command line has as many options as it offers; hardware is described in one piece."""
+    a_command = path.is_relative_to(ROOT / "sim/commands")
+    long = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            arguments, lines = size(node)
+            of_the_command_line = a_command and bool(node.decorator_list)
+            if (arguments > MOST_ARGUMENTS and not of_the_command_line) or (
+                lines > MOST_LINES and node.name != "elaborate"
+            ):
+                long.append(f"{node.name}: {arguments} arguments, {lines} lines")
+    assert long == []
 
 
 def test_the_model_needs_only_numpy_and_numba():

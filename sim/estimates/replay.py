@@ -258,8 +258,7 @@ def replay(
     spec = _axis_for(counts, count, bound, rate, estimator)
     velocity, flags, seconds = run(spec, counts, backend, output, progress)
 
-    exact = is_exact(backend)
-    lsb = spec.design.estimator.velocity.lsb if exact else 1.0
+    lsb = spec.design.estimator.velocity.lsb if is_exact(backend) else 1.0
     return Replay(
         recording=recording,
         coarsen=coarsen,
@@ -274,7 +273,7 @@ def replay(
         difference_counts_per_s=np.diff(counts, prepend=counts[0]) * (count * rate),
         reference_counts_per_s=reference,
         flags=spec.design.flag_names(flags),
-        velocity_sha256=hashlib.sha256(velocity.astype("<i8").tobytes()).hexdigest() if exact else None,
+        velocity_sha256=hashlib.sha256(velocity.astype("<i8").tobytes()).hexdigest() if is_exact(backend) else None,
         seconds=seconds,
     )
 

@@ -12,7 +12,7 @@ from ..studies.accuracy import Accuracy
 from ..walls.methods import Curve
 from ..world.encoder import offsets
 from .labels import label_right
-from .style import LABEL_PT, MARK, THEORY, TRUTH, looks, name_above, new_figure, page
+from .style import LABEL_PT, MARK, THEORY, TRUTH, ink, looks, name_above, new_figure, page
 
 PIECES = {"from the start": (0.0, 0.06), "where it turns": (1.2, 1.28)}
 """The pieces of Figure 1 that are enlarged, s."""
@@ -94,12 +94,12 @@ def _against_rate(rows: list[dict], labels: list[str]) -> Figure:
     first = rows[0]
     phase = first["encoder_phase_error_counts"]
     encoder = f", encoder out of phase by {phase:g} counts" if phase else ""
-    title = f"RMS error on the signal {first['signal']}, counts of 1 µm, {first['backend']}{encoder}"
+    title = f'RMS error on the signal "{first["signal"]}", counts of 1 µm, {first["backend"]}{encoder}'
     picture = new_figure(6.0, title)
     axes = picture.subplots()
     curves = {label: (row["estimator"], row["output"]) for row, label in zip(rows, labels, strict=True)}
     ends = []
-    for (name, _), style in zip(curves.items(), looks(list(curves.values())), strict=True):
+    for (name, (estimator, _)), style in zip(curves.items(), looks(list(curves.values())), strict=True):
         points = [
             (row["sample_hz"], max(row["rms_mm_s"], LEAST_MM_S))
             for row, label in zip(rows, labels, strict=True)
@@ -107,7 +107,7 @@ def _against_rate(rows: list[dict], labels: list[str]) -> Figure:
         ]
         points.sort()
         axes.plot(*zip(*points, strict=True), **style)
-        ends.append((name, points[-1][1], style["color"]))
+        ends.append((name, points[-1][1], ink(estimator)))
     axes.set_xscale("log")
     axes.set_yscale("log")
     ends += _bounds(axes, rows)

@@ -31,7 +31,9 @@ def draw(rates: Rates) -> Figure:
     ):
         largest = [k / 1e3 for k in gain.largest_n_per_m]
         axes.plot(rates_khz, largest, **style)
-        axes.plot(OWN * rates_khz[0], gain.own.largest_n_per_m / 1e3, **style | {"ls": "", "mfc": "white"})
+        from_own = [OWN * rates_khz[0], rates_khz[0]], [gain.own.largest_n_per_m / 1e3, largest[0]]
+        axes.plot(*from_own, **style | {"ls": ":", "lw": 0.8, "marker": ""})
+        axes.plot(from_own[0][0], from_own[1][0], **style | {"ls": "", "mfc": "white"})
         ends.append((gain.label, largest[-1], ink(own.controller.estimator)))
     axes.set_xscale("log")
     axes.set_yscale("log")

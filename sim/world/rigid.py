@@ -20,7 +20,7 @@ and a handle that sticks keeps its `Motion` bit for bit.
 import math
 from typing import NamedTuple
 
-from ...model.compiled import compiled
+from ...model.compiled import compiled, inlined
 from .advance import Moment, advance, advance_quietly
 from .encoder import level, next_cell, stamp
 
@@ -179,7 +179,7 @@ def resume(handle, coulomb, rest, force_n, seconds):
 
 
 @advance_quietly.register(Rigid)
-@compiled
+@inlined
 def _advance_quietly(plant, moment, force_n, interval):
     coulomb, (motion, cell, n_edges) = plant.coulomb, moment
     if sticks(coulomb, motion, force_n):

@@ -13,6 +13,7 @@ from hardwall.hdl.estimators.kalman import Estimator
 from hardwall.model.axis import Axis
 from hardwall.model.estimators import kalman
 from hardwall.model.estimators.kalman import FLOAT_START, START, Design, Gains, State, steady_state
+from hardwall.model.estimators.riccati import INDEX_MAX
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import BOUND, RATES, axis_at, swing
@@ -152,7 +153,7 @@ def test_gains_at_the_least_and_the_largest_index():
     h = 2.0**-24
     assert steady_state(h) == pytest.approx((2 * h, 2 * h**2, h**3), rel=2 * h)
     assert steady_state(h, 2)[:2] == pytest.approx((math.sqrt(2) * h, h**2), rel=2 * h)
-    assert steady_state(1e9) == steady_state(kalman.INDEX_MAX)
+    assert steady_state(1e9) == steady_state(INDEX_MAX)
 
 
 def test_default_bandwidth_is_that_of_the_bound_at_any_rate():

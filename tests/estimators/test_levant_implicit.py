@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hardwall.hdl.estimators.levant_implicit import Estimator
-from hardwall.model.estimators import levant_implicit
+from hardwall.model.estimators import levant, levant_implicit
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.levant import FLOAT_START, POSITION_BUDGET, START
 from hardwall.model.quadrature import seen_count
@@ -62,7 +62,7 @@ def test_the_closed_form_solves_the_generalised_equation():
         z = float(random.integers(0, 200)) / 16
         size = alpha * float(random.integers(0, 17)) / 16 if z == 0 else alpha + lam * z + z**2
         b = float(random.choice([-1, 1])) * size
-        params = levant_implicit.FloatParams(lam, alpha, 0, 40)
+        params = levant_implicit.FloatParams(levant.FloatParams(lam, alpha, 0, 40))
         # The start is e+ + u1 = b with the count at rest and u1 = 0.
         state, u, _ = estimate(params, FLOAT_START._replace(running=1, lead=b), seen_count(0), 0)
         after, selection, g = state.lead - state.u1, -state.u1 / alpha, state.u1 - u
