@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import RendererBase
 from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
 
@@ -118,12 +119,9 @@ def label_points(
     taken: list[np.ndarray] = []
     texts = []
     for number, (text, _, colour) in enumerate(labels):
-        measured = axes.text(0, 0, text, fontsize=LABEL_PT)
-        extent = measured.get_window_extent(renderer)
-        measured.remove()
         foreign = np.concatenate([*named[:number], *named[number + 1 :], *others])
         panel = _Panel(frame, taken, named[number], foreign)
-        anchor, box = _place(np.array([extent.width, extent.height]), height, panel)
+        anchor, box = _place(_extent(axes, text, renderer), height, panel)
         taken.append(box)
         others.append(_leader(box, anchor))
         near = _gap(box, anchor[None]) < 1.2 * height and panel.nearest(box)
@@ -146,6 +144,14 @@ def label_points(
         written.set_in_layout(False)
         texts.append(written)
     return texts
+
+
+def _extent(axes: Axes, text: str, renderer: RendererBase) -> np.ndarray:
+    """Return the width and the height of a label, in pixels."""
+    measured = axes.text(0, 0, text, fontsize=LABEL_PT)
+    extent = measured.get_window_extent(renderer)
+    measured.remove()
+    return np.array([extent.width, extent.height])
 
 
 class _Panel(NamedTuple):
