@@ -45,6 +45,8 @@ VERILOG = INNER + TOP
 @pytest.mark.parametrize("name", [name for name, case in CASES.items() if EVERY or case.short])
 def test_it_computes_what_was_recorded(name):
     recorded = {entry: value for entry, value in RECORDED["entries"].items() if digest_driver.belongs(entry, name)}
+    if not recorded and not CASES[name].short:
+        pytest.skip(f"not recorded yet: make digests ONLY={name}")
     assert recorded, "nothing was recorded: make digests"
     found = CASES[name].run()
     lines = []
