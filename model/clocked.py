@@ -32,7 +32,7 @@ class Outputs(NamedTuple):
     wall_force: np.ndarray
     flags: np.ndarray
     actuated: np.ndarray
-    count: np.ndarray
+    count: np.ndarray  # type: ignore[assignment]  # a tuple has a method of this name
     illegal_count: np.ndarray
     index_count: np.ndarray
     index_latched: np.ndarray

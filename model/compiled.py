@@ -75,7 +75,7 @@ def _kernel(function: Kernel, into_caller: bool) -> Kernel:
     because Numba otherwise takes it from the caller that happens to be compiled first.
     """
     kernel = _jit(function, "called", forceinline=False)
-    if not config.DISABLE_JIT:
+    if not cast(Any, config).DISABLE_JIT:
         folder = "into_caller" if into_caller else "apart"
         inner = _jit(function, folder, forceinline=into_caller, no_cpython_wrapper=True, no_cfunc_wrapper=True)
         kernel.get_call_template, kernel.get_overload = inner.get_call_template, inner.get_overload

@@ -5,7 +5,7 @@ registers just after it. Words of one bit per channel hold A in bit 0, B in bit 
 `quadrature_speed` says how fast the encoder may turn.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -305,10 +305,11 @@ def run(params: Params, inputs: Inputs, strobes: Strobes = NO_STROBES, start: St
     Every field of `inputs` and `strobes` is a scalar or an array; together they broadcast to (clocks,) or
     (lanes, clocks), the shape of the returned arrays. Every lane begins in `start`.
     """
-    columns = np.broadcast_arrays(*(np.asarray(column, np.int64) for column in (*inputs, *strobes)))
-    shape = columns[0].shape
+    broadcast = np.broadcast_arrays(*(np.asarray(column, np.int64) for column in (*inputs, *strobes)))
+    shape = broadcast[0].shape
     lanes = (1, *shape) if len(shape) == 1 else shape
-    columns = [np.ascontiguousarray(column).reshape(lanes) for column in columns]
+    # The fields of `Inputs` and `Strobes` are numbers of one clock elsewhere, and arrays here.
+    columns: list[Any] = [np.ascontiguousarray(column).reshape(lanes) for column in broadcast]
     record = np.empty((len(State._fields), *lanes), np.int64)
     _run(params, start, Inputs(*columns[: len(inputs)]), Strobes(*columns[len(inputs) :]), record)
     return State(*record.reshape(len(record), *shape))
