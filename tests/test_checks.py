@@ -26,11 +26,11 @@ HALF = 1 << (AXIS.design.spec.count_width - 1)
         ([1, None], TypeError, "counts must be integers, not object"),
         ([[1], [1, 2]], TypeError, "counts must be an array of integers, not [[1], [1, 2]]"),
         (3, ValueError, "counts must have 1 or 2 dimensions, not 0"),
-        ([0, 1 << 62], ValueError, f"counts must be -{2**62 - 1} to {2**62 - 1}, not {2**62} at element 1"),
+        ([0, 1 << 62], ValueError, f"counts must be -{2**62} to {2**62 - 1}, not {2**62} at element 1"),
         (
             np.array([2**64 - 1], np.uint64),
             ValueError,
-            f"counts must be -{2**62 - 1} to {2**62 - 1}, not {2**64 - 1} at element 0",
+            f"counts must be -{2**62} to {2**62 - 1}, not {2**64 - 1} at element 0",
         ),
         (
             [0, 3, HALF + 60],

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hardwall.sim.estimates import signals
+from hardwall.sim.estimates import motions, signals
 from hardwall.sim.estimates.accuracy import exact_velocity
 
 
@@ -53,6 +53,6 @@ def test_what_is_no_signal_is_refused(name):
 def test_the_flicker_crosses_an_edge_and_stays_within_a_count():
     signal = signals.load("flicker")
     times = np.linspace(0, 0.1, 1001)
-    positions = np.array([signals.motion.position(signal.motion, t) for t in times])
+    positions = np.array([motions.position(signal.motion, t) for t in times])
     assert positions.min() < 0 < positions.max() < 1e-6
     assert math.isclose(positions.max(), 0.3e-6, rel_tol=1e-3)

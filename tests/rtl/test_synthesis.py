@@ -170,7 +170,7 @@ def test_what_cannot_be_is_refused(device, seeds, message):
 def test_absent_constraints_are_one_line(tools, monkeypatch, tmp_path):
     """Without pin constraints a tool would place the ports anywhere without a message."""
     monkeypatch.setattr(synthesis, "files", lambda package: tmp_path)
-    with pytest.raises(SynthesisError, match=r"^constraints/ulx3s-25f\.lpf is not installed: [^\n]*$"):
+    with pytest.raises(SynthesisError, match=r"^constraints/ulx3s-25f\.lpf is not installed, and [^\n]*$"):
         placed(load("mhz"), "ecp5-25k")
     assert not tools.exists(), "no tool was called"
 
