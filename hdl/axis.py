@@ -4,7 +4,7 @@ from amaranth.hdl import Cat, Module, Mux, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from hardwall.model.axis import GLITCH_WIDTH, ILLEGAL_WIDTH
+from hardwall.model.design import GLITCH_WIDTH, ILLEGAL_WIDTH
 from hardwall.model.spec import AxisSpec
 
 from .arithmetic.fixed import shape

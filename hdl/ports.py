@@ -7,7 +7,7 @@ from amaranth.hdl import Shape
 from amaranth.lib import wiring
 
 from hardwall.model.arithmetic.fixed import SQ, UQ, Format
-from hardwall.model.axis import ILLEGAL_WIDTH
+from hardwall.model.design import ILLEGAL_WIDTH
 from hardwall.model.spec import AxisSpec
 
 from .axis import Axis

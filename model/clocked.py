@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import axis, output, quadrature
+from . import axis, design, output, quadrature
 from .compiled import compiled
 
 
@@ -47,7 +47,7 @@ class State(NamedTuple):
     """The states of decoder and axis; `restart` is 1 from a preload until the next sample."""
 
     decoder: quadrature.State
-    axis: axis.State
+    axis: design.State
     restart: int
 
 
@@ -92,9 +92,9 @@ def run(controller, timing, state, pins, outputs, first, until):
         elif (n + 1 - latency) % per_sample == 0 and n >= latency:
             _show(outputs, (n + 1 - latency) // per_sample - 1, decoder)
         if pins.clear_flags[n]:
-            now = axis.State(now.estimator, now.output, 0)
+            now = design.State(now.estimator, now.output, 0)
         if not pins.drive_enable[n]:
-            now = axis.State(now.estimator, output.State(now.output.phase, 0), now.flags)
+            now = design.State(now.estimator, output.State(now.output.phase, 0), now.flags)
         inputs = quadrature.Inputs(
             pins.encoder_a[n], pins.encoder_b[n], pins.encoder_z[n], controller.glitch_clocks, controller.invert
         )

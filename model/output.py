@@ -8,14 +8,12 @@ Between actuations the drive holds. Without `enable`, or with a fault, the drive
 then starts again from zero. The force limit is applied last.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from .arithmetic.fixed import UQ, saturate
 from .compiled import compiled
+from .requirements import AxisRequirements
 from .words import Word
-
-if TYPE_CHECKING:
-    from .spec import AxisSpec
 
 FLAGS = ("slew_limited", "force_limited")
 LATENCY = 3
@@ -51,7 +49,7 @@ class Design:
     latency = LATENCY
     flags = FLAGS
 
-    def __init__(self, axis: "AxisSpec"):
+    def __init__(self, axis: AxisRequirements):
         self.decimation = axis.samples_per_actuation
         self.force = axis.force
         self.force_limit = axis.force_limit_word

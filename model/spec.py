@@ -1,88 +1,30 @@
-"""One axis in SI units, and every format and gain word that follows from it. No width is picked by hand.
+"""One axis, specified: its requirements, the estimator that it has, and the design that follows from both."""
 
-Units inside the axis are counts and sample periods, so with q the count size and tau the sample period
-
-    velocity    1 count a sample             = q / tau          m/s
-    stiffness   1 force LSB per count        = r / q            N/m      (r: the force LSB)
-    damping     1 force LSB per count/sample = r tau / q        N s/m
-
-Counts. Positions and the wall may lie anywhere in the travel whatever the origin (twice the travel), and an overshoot
-as large again must not alias: the count covers plus and minus four times the travel, halved on each side, which is
-`1 + ceil(log2(4 travel / q))` bits with the sign. The count wraps, and all differences are taken modulo its width.
-
-Force. The force LSB is `force_resolution_n`; `force` is the format between wall and output stage, with one bit more
-than the largest drive needs, so that a saturated wall force is always beyond the limit that the output stage applies.
-
-Gain words are unsigned and `words.GAIN_BITS` wide; a gain's format has the fewest integer bits that hold its largest
-value, so that it resolves largest / 2**GAIN_BITS or better.
-"""
-
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from .arithmetic.fixed import SQ, bits_for
-from .axis import Design
 from .checks import FieldError
+from .design import Design
 from .estimators.estimate import EstimatorGains
+from .requirements import AxisRequirements
 
 
 @dataclass(frozen=True, kw_only=True)
-class AxisSpec:
-    """The requirements of one axis, in SI units; the RTL, the model and the host's conversions are all built from it.
+class AxisSpec(AxisRequirements):
+    """The requirements of one axis and its estimator; the RTL, the model and the host's conversions are built from it.
 
     Attributes:
-        clock_hz: FPGA clock, Hz.
-        sample_hz: estimator and wall rate, Hz; divides the clock.
-        actuation_hz: rate at which the drive changes, Hz; divides the sample rate.
-        count_m: size of one x4 count, m.
-        travel_m: length of the workspace, m.
-        speed_max_m_per_s: largest speed to estimate, m/s.
-        acceleration_max_m_per_s2: bound C on the acceleration, m/s^2; sets default estimator gains.
-        force_max_n: largest drive, N.
-        force_resolution_n: force LSB, N.
-        stiffness_max_n_per_m: largest wall stiffness, N/m.
-        damping_max_n_s_per_m: largest wall damping, N s/m.
         estimator: name of the velocity estimator.
         gains: that estimator's `Gains`, or None for its default ones.
-        estimator_bits_dropped: number of fraction bits removed from the derived widths of the estimator's words, to
-            study what a bit is worth.
 
-    Raises:
-        TypeError: if a field is of the wrong type.
-        ValueError: if a value is impossible; the message names the field and the accepted range.
+    The other attributes, and the errors, are those of `requirements.AxisRequirements`.
     """
 
-    clock_hz: int
-    sample_hz: int
-    actuation_hz: int
-    count_m: float
-    travel_m: float
-    speed_max_m_per_s: float
-    acceleration_max_m_per_s2: float
-    force_max_n: float
-    force_resolution_n: float
-    stiffness_max_n_per_m: float
-    damping_max_n_s_per_m: float
     estimator: str = "levant"
     gains: EstimatorGains | None = None
-    estimator_bits_dropped: int = 0
 
-    def __post_init__(self):
-        for name, kind in self.__annotations__.items():
-            value = getattr(self, name)
-            if kind is int and (isinstance(value, bool) or not isinstance(value, int)):
-                raise TypeError(f"{name} must be an int, not {value!r}")
-            if kind is str and not isinstance(value, str):
-                raise TypeError(f"{name} must be a str, not {value!r}")
-            if kind is float and (isinstance(value, bool) or not isinstance(value, int | float)):
-                raise TypeError(f"{name} must be a number, not {value!r}")
-            if kind in (int, float) and name != "estimator_bits_dropped" and not (math.isfinite(value) and value > 0):
-                raise FieldError(name, f"must be finite and more than 0, not {value!r}")
-        if not 0 <= self.estimator_bits_dropped <= 32:
-            raise FieldError("estimator_bits_dropped", f"must be 0 to 32, not {self.estimator_bits_dropped!r}")
-        self._check_rates()
-        self._check_widths()
+    def __post_init__(self) -> None:
+        super().__post_init__()
         if self.design.latency_to_drive > self.clocks_per_sample:
             fastest = self.clock_hz // self.design.latency_to_drive
             raise FieldError(
@@ -91,80 +33,7 @@ class AxisSpec:
                 f"at clock_hz {self.clock_hz}, not {self.sample_hz!r}",
             )
 
-    def _check_rates(self):
-        if self.clock_hz % self.sample_hz:
-            raise FieldError("sample_hz", f"must divide clock_hz {self.clock_hz}, not {self.sample_hz!r}")
-        if self.sample_hz % self.actuation_hz:
-            raise FieldError("actuation_hz", f"must divide sample_hz {self.sample_hz}, not {self.actuation_hz!r}")
-
-    def _check_widths(self):
-        if self.travel_m < self.count_m:
-            raise FieldError("travel_m", f"must be at least one count of {self.count_m:g} m, not {self.travel_m!r}")
-        if self.count_width > 32:
-            raise FieldError(
-                "travel_m",
-                f"must be at most {2**29 * self.count_m:g} for a 32-bit count of {self.count_m:g} m, "
-                f"not {self.travel_m!r}",
-            )
-        if not 1 <= self.force_max_n / self.force_resolution_n < 2**24:
-            raise FieldError(
-                "force_resolution_n",
-                f"must be {self.force_max_n / 2**24:g} to {self.force_max_n:g} for force_max_n "
-                f"{self.force_max_n:g}, not {self.force_resolution_n!r}",
-            )
-
-    def shrunk(self, derived: int) -> int:
-        """Return the fraction bits of an estimator's word: `derived` less `estimator_bits_dropped`.
-
-        Raises:
-            ValueError: if the word has fewer fraction bits than are to be dropped.
-        """
-        left = derived - self.estimator_bits_dropped
-        if self.estimator_bits_dropped and left < 0:
-            raise FieldError(
-                "estimator_bits_dropped",
-                f"must be 0 to {max(derived, 0)} with this estimator, not {self.estimator_bits_dropped!r}",
-            )
-        return left
-
-    @property
-    def clocks_per_sample(self) -> int:
-        return self.clock_hz // self.sample_hz
-
-    @property
-    def samples_per_actuation(self) -> int:
-        return self.sample_hz // self.actuation_hz
-
-    @property
-    def count_width(self) -> int:
-        """Bits of the position count."""
-        return 1 + bits_for(4 * self.travel_m / self.count_m)
-
-    @property
-    def stamp_width(self) -> int:
-        """Bits of a clock stamp, which wraps after a second or more: edges below about 2 Hz read as standstill."""
-        return bits_for(self.clock_hz)
-
-    @property
-    def velocity_unit_m_per_s(self) -> float:
-        """Speed of one count a sample, m/s."""
-        return self.count_m * self.sample_hz
-
-    @property
-    def speed_max_counts_per_sample(self) -> float:
-        return self.speed_max_m_per_s / self.velocity_unit_m_per_s
-
-    @property
-    def force_limit_word(self) -> int:
-        """The largest drive word: `force_max_n`, rounded down to the LSB."""
-        return math.floor(self.force_max_n / self.force_resolution_n * (1 + 1e-12))
-
-    @property
-    def force(self) -> SQ:
-        """Format of the wall force and of the drive, in force LSB."""
-        return SQ(self.force_limit_word.bit_length() + 2, 0)
-
     @cached_property
     def design(self) -> Design:
         """Every derived format, word and latency."""
-        return Design(self)
+        return Design(self, self.estimator, self.gains)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import axis, checks, quadrature
+from . import axis, checks, design, quadrature
 from .compiled import compiled, inlined
 
 
@@ -29,7 +29,7 @@ class Controller(NamedTuple):
     decoder: quadrature.Params
     glitch_clocks: int
     invert: int
-    axis: axis.Params
+    axis: design.Params
 
 
 class State(NamedTuple):
@@ -40,7 +40,7 @@ class State(NamedTuple):
     force: float  # force LSB, before the output stage
     flags: int
     decoder: quadrature.State
-    axis: axis.State
+    axis: design.State
     clock: int  # the clock to which the decoder has been advanced
     level: int  # level of the pins, a | b << 1
 
@@ -52,9 +52,9 @@ def room_for(edges: int) -> Edges:
 
 def controller(of: axis.Axis, level: int) -> tuple[Controller, State]:
     """Return the parameters of an axis, and its state after reset with the pins at `level`, a | b << 1."""
-    design, words, zero = of.design, of.words, 0.0 if of.floating else 0
-    start = design.start(of.floating)
-    params = Controller(design.decoder, words["encoder_glitch_clocks"], words["encoder_invert"], of.params)
+    words, zero = of.words, 0.0 if of.floating else 0
+    start = of.design.start(of.floating)
+    params = Controller(of.design.decoder, words["encoder_glitch_clocks"], words["encoder_invert"], of.params)
     return params, State(start.output.drive, zero, zero, 0, quadrature.START, start, 0, level)
 
 
@@ -100,7 +100,7 @@ def _run(controller, state, timing, edges, record):
     first = 0
     for k in range(len(velocity)):
         rest = Edges(edges.clocks[first:], edges.levels[first:])
-        state, taken = sample(controller, state, rest, len(rest.clocks), axis.strobe_of(timing, k))
+        state, taken = sample(controller, state, rest, len(rest.clocks), design.strobe_of(timing, k))
         first += taken
         velocity[k], force[k], drive[k], flags[k] = state.velocity, state.force, state.drive, state.flags
 

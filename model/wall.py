@@ -17,15 +17,13 @@ Formats, derived, with the force LSB r, the count q and the sample period tau:
 In total, fixed point differs from the exact equation on the same words by at most one force LSB.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from .arithmetic.fixed import SQ, UQ, saturate, shift_floor, shift_round_half_up, wrap
 from .checks import FieldError
 from .compiled import by_type, compiled
+from .requirements import AxisRequirements
 from .words import Word, gain_format
-
-if TYPE_CHECKING:
-    from .spec import AxisSpec
 
 LATENCY = 6
 """Clocks from the strobe to `valid`: see `hardwall.hdl.wall`."""
@@ -73,7 +71,7 @@ class Design:
 
     latency = LATENCY
 
-    def __init__(self, axis: "AxisSpec", velocity: SQ):
+    def __init__(self, axis: AxisRequirements, velocity: SQ):
         q, r, tau = axis.count_m, axis.force_resolution_n, 1 / axis.sample_hz
         self.count_width = axis.count_width
         self.force = axis.force

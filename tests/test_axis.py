@@ -6,7 +6,8 @@ import pytest
 from cocotb.triggers import RisingEdge, Timer, ValueChange
 
 from hardwall.hdl.axis import Axis
-from hardwall.model import axis, clocked, quadrature, stamped
+from hardwall.model import clocked, quadrature, stamped
+from hardwall.model.design import Design
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from stimuli.specs import ADJUSTED, MHZ, spec
@@ -28,7 +29,7 @@ def make(estimator: str) -> Axis:
     return Axis(busy(estimator))
 
 
-def random_words(design: axis.Design, random: np.random.Generator) -> dict[str, int]:
+def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
     """Return words for a wall that is often hit, with gains from zero to the largest."""
     words = {word.name: word.reset for word in design.words}
     for name in ("wall_stiffness", "wall_damping", "output_force_limit", "output_slew_limit"):

@@ -13,7 +13,7 @@ from hardwall.model.spec import AxisSpec
 from stimuli.specs import PAPER, spec
 
 AXIS = Axis(spec("mhz", "fdm"))
-HALF = 1 << (AXIS.design.spec.count_width - 1)
+HALF = 1 << (AXIS.spec.count_width - 1)
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_records_of_edges(arguments, error, message):
 @pytest.mark.parametrize("floating", [False, True])
 def test_parameters_of_an_axis(arguments, error, message, floating):
     with pytest.raises(error, match=message):
-        Axis(**({"spec": AXIS.design.spec, "floating": floating} | arguments))
+        Axis(**({"spec": AXIS.spec, "floating": floating} | arguments))
 
 
 @pytest.mark.parametrize(

@@ -72,15 +72,8 @@ def plain(name: str) -> str:
 
 
 def imports(path: Path) -> Iterator[str]:
-    """Yield the absolute name of every module that a source imports, at any depth, and of names imported from modules.
-
-    Imports for type checkers only are left out.
-    """
-    waiting: list[ast.AST] = [ast.parse(path.read_text(encoding="utf-8"))]
-    while waiting:
-        node = waiting.pop()
-        if not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
-            waiting += ast.iter_child_nodes(node)
+    """Yield the absolute name of every module that a source imports, at any depth, and of every name that it takes."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

@@ -48,7 +48,7 @@ reveal_type(SQ(3, 2).max)
 SHOWN = [
     r"numpy\.ndarray\[.*\]",
     r"numpy\.ndarray\[.*\]",
-    r"tuple\[.*fallback=hardwall\.model\.axis\.State\]",
+    r"tuple\[.*fallback=hardwall\.model\.design\.State\]",
     r"float",
     r"hardwall\.model\.estimators\.estimate\.EstimatorDesign",
     r"int",

@@ -49,16 +49,14 @@ motion has the filter's step response, as for any step of velocity: 4.3 % oversh
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..arithmetic.fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from ..checks import FieldError
 from ..compiled import compiled
+from ..requirements import AxisRequirements
 from ..words import GAIN_BITS, Word
 from .estimate import EstimatorDesign, EstimatorGains, estimate
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
 
 CUTOFF_MAX = 0.4
 """Highest cutoff, as a fraction of the sampling rate."""
@@ -85,7 +83,7 @@ class Gains(EstimatorGains):
     cutoff_hz: float
 
     @classmethod
-    def default(cls, axis: "AxisSpec") -> "Gains":
+    def default(cls, axis: AxisRequirements) -> "Gains":
         """Return the cutoff whose delay is half of the minimax window, sqrt(2) / (2 pi f_c) = sqrt(q / C)."""
         return cls(min(_default_hz(axis), CUTOFF_MAX * axis.sample_hz))
 
@@ -156,7 +154,7 @@ class Design(EstimatorDesign):
     flags = ("velocity_saturated", "state_saturated")
     latency = STEPS
 
-    def __init__(self, axis: "AxisSpec", gains: Gains):
+    def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         self._sample_hz = axis.sample_hz
         # Two counts differ by at most half of their range.

@@ -9,15 +9,13 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from ..arithmetic.fixed import SQ
 from ..checks import FieldError
 from ..compiled import by_type
+from ..requirements import AxisRequirements
 from ..words import Word
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
 
 
 @dataclass(frozen=True)
@@ -35,7 +33,7 @@ class EstimatorGains(ABC):
 
     @classmethod
     @abstractmethod
-    def default(cls, axis: "AxisSpec") -> Self:
+    def default(cls, axis: AxisRequirements) -> Self:
         """Return the default gains for an axis, from its rates, ranges and count size alone."""
 
 
@@ -67,7 +65,7 @@ class EstimatorDesign(ABC):
     velocity: SQ
     words: tuple[Word, ...] = ()
 
-    def __init__(self, axis: "AxisSpec", gains: Any):
+    def __init__(self, axis: AxisRequirements, gains: Any):
         self.count_width, self.stamp_width = axis.count_width, axis.stamp_width
 
     @property

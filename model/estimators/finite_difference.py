@@ -7,14 +7,12 @@ after a reset in motion the velocity is right from the second sample on.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
 from ..compiled import compiled
+from ..requirements import AxisRequirements
 from .estimate import EstimatorDesign, EstimatorGains, estimate
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
 
 
 @dataclass(frozen=True)
@@ -22,7 +20,7 @@ class Gains(EstimatorGains):
     """A finite difference has no gains."""
 
     @classmethod
-    def default(cls, axis: "AxisSpec") -> "Gains":
+    def default(cls, axis: AxisRequirements) -> "Gains":
         return cls()
 
 
@@ -54,7 +52,7 @@ class Design(EstimatorDesign):
     gains_class = Gains
     latency = 2
 
-    def __init__(self, axis: "AxisSpec", gains: Gains):
+    def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         self.velocity = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), axis.shrunk(0))
 

@@ -46,7 +46,7 @@ Control Systems Technology 2000.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,13 +55,11 @@ from ..arithmetic.signed_divide import divide
 from ..arithmetic.signed_divide import latency as divide_latency
 from ..checks import FieldError
 from ..compiled import compiled
+from ..requirements import AxisRequirements
 from ..words import Word
 from . import history
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 from .history import change_over, take
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
 
 TAPS = 12
 """Largest number of steps back that are searched, one a clock."""
@@ -97,7 +95,7 @@ class Gains(EstimatorGains):
             raise FieldError("window_s", f"must be finite and more than 0, not {window!r}")
 
     @classmethod
-    def default(cls, axis: "AxisSpec") -> "Gains":
+    def default(cls, axis: AxisRequirements) -> "Gains":
         """Return a band of one count, and the window in which the largest acceleration takes half of that band."""
         return cls(BAND_COUNTS, 2 * math.sqrt(BAND_COUNTS * axis.count_m / axis.acceleration_max_m_per_s2))
 
@@ -149,7 +147,7 @@ class Design(EstimatorDesign):
     gains_class = Gains
     outputs = ("end-fit", "best-fit")
 
-    def __init__(self, axis: "AxisSpec", gains: Gains):
+    def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         self.history = history.Design(axis, gains.window_s, TAPS)
         self.spacing = self.history.longest // TAPS

@@ -24,16 +24,14 @@ Formats, derived:
   difference over it exact. The hold adds at most every - 1 samples to the age of a window of thousands of samples.
 """
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
 from ..checks import FieldError
 from ..compiled import compiled
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
+from ..requirements import AxisRequirements
 
 MEMORY_BITS = 1 << 16
 """Largest memory: 16 of the 30 blocks of 4 kbit in an iCE40UP5K, 4 of the 56 of 18 kbit in an ECP5-25F."""
@@ -71,7 +69,7 @@ class Design:
     """Formats of the history for an axis and a window.
 
     Args:
-        axis: the `spec.AxisSpec`.
+        axis: the `requirements.AxisRequirements`.
         window_s: longest time to look back, s.
         steps: the window is a multiple of this number of samples.
 
@@ -85,7 +83,7 @@ class Design:
 
     latency = LATENCY
 
-    def __init__(self, axis: "AxisSpec", window_s: float, steps: int = 1):
+    def __init__(self, axis: AxisRequirements, window_s: float, steps: int = 1):
         self.count_width = axis.count_width
         self.change = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), 0)
         # Rounding to whole steps may lengthen a window by half, or to the least length of one step.

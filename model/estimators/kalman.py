@@ -56,17 +56,15 @@ has the step response, as for any step of velocity: about 41 % overshoot, settle
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..arithmetic.fixed import SQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from ..checks import FieldError
 from ..compiled import compiled
+from ..requirements import AxisRequirements
 from ..words import GAIN_BITS, Word, gain_format
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 from .riccati import steady_state
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
 
 RESOLUTION_BITS = 11
 """The output LSB is at most sqrt(C') 2**-RESOLUTION_BITS."""
@@ -95,7 +93,7 @@ class Gains(EstimatorGains):
     noise_time_s: float
 
     @classmethod
-    def default(cls, axis: "AxisSpec") -> "Gains":
+    def default(cls, axis: AxisRequirements) -> "Gains":
         """Return the default noise model: uniform acceleration within C, uniform quantisation, the minimax window."""
         bound, q = axis.acceleration_max_m_per_s2, axis.count_m
         window = 2 * math.sqrt(q / bound)
@@ -179,7 +177,7 @@ class Design(EstimatorDesign):
     flags = ("velocity_saturated", "innovation_saturated", "state_saturated")
     latency = STEPS
 
-    def __init__(self, axis: "AxisSpec", gains: Gains):
+    def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         self._axis = axis
         # Two counts differ by at most half of their range.

@@ -43,18 +43,16 @@ lambda sqrt(alpha tau^2) and alpha tau; `levant_semi_implicit` comes to rest.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..arithmetic.fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from ..arithmetic.sqrt import isqrt
 from ..arithmetic.sqrt import latency as sqrt_latency
 from ..checks import FieldError
 from ..compiled import compiled
+from ..requirements import AxisRequirements
 from ..words import GAIN_BITS, Word
 from .estimate import EstimatorDesign, EstimatorGains, estimate
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
 
 ALPHA_BITS = 9
 """The designed alpha's word has at least this many bits below its top bit: its error is at most 0.1 %."""
@@ -74,7 +72,7 @@ class Gains(EstimatorGains):
     alpha_m_per_s2: float
 
     @classmethod
-    def default(cls, axis: "AxisSpec") -> "Gains":
+    def default(cls, axis: AxisRequirements) -> "Gains":
         """Return the gains proposed by the paper for |f''| <= C, the axis's bound: lambda = sqrt(C), alpha = 1.1 C."""
         bound = axis.acceleration_max_m_per_s2
         return cls(math.sqrt(bound), 1.1 * bound)
@@ -138,7 +136,7 @@ class Design(EstimatorDesign):
     steps = STEPS
     roundings = 1
 
-    def __init__(self, axis: "AxisSpec", gains: Gains):
+    def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         tau, q = 1 / axis.sample_hz, axis.count_m
         lam = gains.lambda_sqrt_m_per_s * tau / math.sqrt(q)

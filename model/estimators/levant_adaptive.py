@@ -73,18 +73,16 @@ Formats are as in `levant_semi_implicit`, except:
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..arithmetic.fixed import bits_for, saturate, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import isqrt
 from ..compiled import compiled
+from ..requirements import AxisRequirements
 from . import levant, levant_semi_implicit
 from .estimate import estimate
 from .levant import POSITION_BUDGET, Gains, arrive, sign_of
 from .levant_semi_implicit import band, float_settle, settle
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
 
 STEPS = 17
 """Clocks of the sequence besides the root: see `hardwall.hdl.estimators.levant_adaptive`."""
@@ -159,7 +157,7 @@ class Design(levant_semi_implicit.Design):
     name = "levant-adaptive"
     steps = STEPS
 
-    def __init__(self, axis: "AxisSpec", gains: Gains):
+    def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         most = gains.alpha_m_per_s2 / RATIO / axis.sample_hz**2 / axis.count_m
         self.reach = _times(math.sqrt(EXCESS * LOST / most))

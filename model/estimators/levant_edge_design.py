@@ -21,18 +21,16 @@ The symbols v, a, E, T, L, D and C are those of `levant_edge`; q is a count, u t
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..arithmetic.divide import latency as divide_latency
 from ..arithmetic.fixed import SQ, UQ, bits_for, shift_floor
 from ..arithmetic.sqrt import latency as sqrt_latency
 from ..checks import FieldError
 from ..quadrature import Seen
+from ..requirements import AxisRequirements
 from ..words import GAIN_BITS, Word
 from .estimate import EstimatorDesign, EstimatorGains
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
 
 HEADROOM_BITS = 2
 """A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
@@ -62,7 +60,7 @@ class Gains(EstimatorGains):
     alpha_m_per_s3: float
 
     @classmethod
-    def default(cls, axis: "AxisSpec") -> "Gains":
+    def default(cls, axis: AxisRequirements) -> "Gains":
         """Return alpha = 2 C / sqrt(q / C) and Levant's lambda = 1.5 sqrt(alpha), with C and q of the axis."""
         bound = axis.acceleration_max_m_per_s2
         alpha = 2 * bound * math.sqrt(bound / axis.count_m)
@@ -154,7 +152,7 @@ class Design(EstimatorDesign):
     inputs = Seen._fields
     flags = ("error_saturated", "velocity_saturated")
 
-    def __init__(self, axis: "AxisSpec", gains: Gains):
+    def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         self.clocks = axis.clocks_per_sample
         if 4 * self.clocks > 1 << axis.stamp_width:
@@ -164,7 +162,7 @@ class Design(EstimatorDesign):
         self._derive_places(axis)
         self._derive_gains(axis, gains)
 
-    def _derive_times(self, axis: "AxisSpec") -> None:
+    def _derive_times(self, axis: AxisRequirements) -> None:
         """Derive the width of a time, in clocks, when it multiplies and divides."""
         clock, bound, q = axis.clock_hz, axis.acceleration_max_m_per_s2, axis.count_m
         window = clock * min(math.sqrt(axis.speed_max_m_per_s / (clock * bound)), math.sqrt(q / bound) / 4)
@@ -174,7 +172,7 @@ class Design(EstimatorDesign):
         self.mantissa = min(max(exact, bits_for(4 * max(self.clocks, 1 << self.shortest))), axis.stamp_width - 1)
         self.turn_span = max(axis.stamp_width - 1 - self.mantissa, 0)
 
-    def _derive_motion(self, axis: "AxisSpec") -> None:
+    def _derive_motion(self, axis: AxisRequirements) -> None:
         """Derive the formats of velocity and acceleration."""
         tau, q, bound = 1 / axis.sample_hz, axis.count_m, axis.acceleration_max_m_per_s2
         i = 1 + bits_for(max(2 * axis.speed_max_counts_per_sample, 2.0))
@@ -186,7 +184,7 @@ class Design(EstimatorDesign):
         i = 1 + ACCELERATION_BITS + bits_for(bound * tau / q / axis.clock_hz)
         self.acceleration = SQ(i, self.velocity.width - i)
 
-    def _derive_places(self, axis: "AxisSpec") -> None:
+    def _derive_places(self, axis: AxisRequirements) -> None:
         """Derive the formats of errors and places, in counts times D, and of the number of edges passed."""
         f = self.velocity.f
         self.error = SQ(self.velocity.i + self.mantissa + 2, f - min(max(self.shortest - 1, 0), f))
@@ -195,7 +193,7 @@ class Design(EstimatorDesign):
         passed = 2 * axis.speed_max_counts_per_sample * (2 + (2 << self.shortest) / self.clocks) + 1
         self.distance = SQ(min(1 + bits_for(passed), axis.count_width), 0)
 
-    def _derive_gains(self, axis: "AxisSpec", gains: Gains) -> None:
+    def _derive_gains(self, axis: AxisRequirements, gains: Gains) -> None:
         """Derive the formats of the gains and of the root, and the run-time words."""
         tau, q, clock = 1 / axis.sample_hz, axis.count_m, axis.clock_hz
         alpha = gains.alpha_m_per_s3 * tau / q / clock**2

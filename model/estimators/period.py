@@ -44,7 +44,7 @@ stamps may wrap. The first sample, and a sample with a restart, forget the past:
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..arithmetic.divide import divide
 from ..arithmetic.divide import latency as divide_latency
@@ -52,12 +52,10 @@ from ..arithmetic.fixed import SQ, bits_for
 from ..checks import FieldError
 from ..compiled import compiled
 from ..quadrature import Seen
+from ..requirements import AxisRequirements
 from . import cycle_times
 from .cycle_times import AGE_LIMIT, NOTHING, Memory, observe
 from .estimate import EstimatorDesign, EstimatorGains, estimate
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
 
 ERROR_SHARE = 0.01
 """Rounding error, as a part of the stamp's error."""
@@ -73,7 +71,7 @@ class Gains(EstimatorGains):
     """The gains of `period`: none."""
 
     @classmethod
-    def default(cls, axis: "AxisSpec") -> "Gains":
+    def default(cls, axis: AxisRequirements) -> "Gains":
         return cls()
 
 
@@ -145,7 +143,7 @@ class Design(EstimatorDesign):
     gains_class = Gains
     inputs = Seen._fields
 
-    def __init__(self, axis: "AxisSpec", gains: Gains):
+    def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         check_stamps(axis)
         self.clocks = axis.clocks_per_sample

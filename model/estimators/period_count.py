@@ -38,7 +38,7 @@ sample or a restart, v = 0 until there are five edges in one direction, or a fas
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..arithmetic.divide import divide
 from ..arithmetic.divide import latency as divide_latency
@@ -46,14 +46,12 @@ from ..arithmetic.fixed import UQ, bits_for, saturate, wrap
 from ..checks import FieldError
 from ..compiled import compiled
 from ..quadrature import Seen
+from ..requirements import AxisRequirements
 from ..words import Word
 from . import cycle_times
 from .cycle_times import NOTHING, Memory, observe
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 from .period import check_stamps, velocity_format
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
 
 CYCLE_SPEED = 3.0
 """Highest switching speed, counts a sample: even with a misplaced edge a sample has at most the four of a cycle."""
@@ -71,7 +69,7 @@ class Gains(EstimatorGains):
     switch_m_per_s: float
 
     @classmethod
-    def default(cls, axis: "AxisSpec") -> "Gains":
+    def default(cls, axis: AxisRequirements) -> "Gains":
         """Return the best window for the axis's bound on the acceleration, and the speed at which it beats a cycle."""
         acceleration = axis.acceleration_max_m_per_s2 / (axis.count_m * axis.sample_hz**2)
         window = 1 << min(max(round(math.log2(2 / (3 * acceleration)) / 2), 0), _window_bits_max(axis))
@@ -136,7 +134,7 @@ class Design(EstimatorDesign):
     cycles_max = 2
     """More than one cycle in a sample is not timed, so only 0, 1 and more must be distinguished."""
 
-    def __init__(self, axis: "AxisSpec", gains: Gains):
+    def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         check_stamps(axis)
         tau, most = 1 / axis.sample_hz, _window_bits_max(axis)

@@ -36,19 +36,17 @@ Source: elementary; the bound follows from Taylor's formula and the triangle ine
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..arithmetic.fixed import SQ, UQ
 from ..arithmetic.signed_divide import divide
 from ..arithmetic.signed_divide import latency as divide_latency
 from ..compiled import compiled
+from ..requirements import AxisRequirements
 from ..words import Word
 from . import history
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 from .history import change_over, take
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
 
 EPS_COUNTS = 0.5
 """Largest distance, counts, between the position and the count plus half a count."""
@@ -65,7 +63,7 @@ class Gains(EstimatorGains):
     window_s: float
 
     @classmethod
-    def default(cls, axis: "AxisSpec") -> "Gains":
+    def default(cls, axis: AxisRequirements) -> "Gains":
         """Return the minimax window for |f''| <= C, the axis's bound: 2 sqrt(eps / C)."""
         return cls(2 * math.sqrt(EPS_COUNTS * axis.count_m / axis.acceleration_max_m_per_s2))
 
@@ -107,7 +105,7 @@ class Design(EstimatorDesign):
     name = "window"
     gains_class = Gains
 
-    def __init__(self, axis: "AxisSpec", gains: Gains):
+    def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         self.history = history.Design(axis, gains.window_s)
         self.velocity = SQ(self.history.change.i, axis.shrunk(self.history.fraction + ROUNDING_BITS))

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...model import quadrature
-from ...model.axis import strobe_of
 from ...model.compiled import compiled
+from ...model.design import strobe_of
 from ...model.spec import AxisSpec
 from ...model.stamped import Edges
 from ..loop.backends import is_exact, number_of, opened

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ...model import quadrature
-from ...model.axis import Timing, strobe_of
 from ...model.compiled import compiled
+from ...model.design import Timing, strobe_of
 from ...model.stamped import room_for
 from ..loop.controllers import sample, sample_quietly, taken_off
 from ..world.encoder import level
@@ -42,7 +42,7 @@ def through_pins(controller, state, timing, counts, velocity, edges, n_edges, fi
 
     Args:
         controller, state: the controller and its state (`sim.loop.controllers`).
-        timing: an `axis.Timing` whose sample has clocks enough for the largest change and for both latencies together.
+        timing: a `design.Timing` whose sample has clocks enough for the largest change and for both latencies together.
         counts: int64 array; the pins begin at the level of count 0, so the first count must be 0.
         velocity: array that receives the velocity of every sample.
         edges: `Edges` that the controller has not taken yet, with room for twice the largest change.

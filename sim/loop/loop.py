@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...model.axis import Timing, strobe_of
 from ...model.compiled import compiled
+from ...model.design import Timing, strobe_of
 from ...model.stamped import Edges
 from ..world.advance import Interval, Moment, advance, advance_quietly
 from ..world.converter import Converter, converted

@@ -3,6 +3,7 @@
 Units are in the keys. Every error is one line that names the file, the key and what is accepted.
 """
 
+import dataclasses
 from functools import cached_property
 from typing import Annotated, Literal
 
@@ -180,9 +181,8 @@ class Scene(Section):
     @cached_property
     def spec(self) -> AxisSpec:
         """The axis."""
-        fields = self.controller.model_dump(
-            include=set(AxisSpec.__annotations__) - {"count_m", "gains"}, exclude_unset=False
-        )
+        of_the_spec = {field.name for field in dataclasses.fields(AxisSpec)} - {"count_m", "gains"}
+        fields = self.controller.model_dump(include=of_the_spec, exclude_unset=False)
         gains = getattr(self.controller.gains, self.controller.estimator)
         if gains is not None:
             gains = registry.design_of(self.controller.estimator).gains_class(**gains.model_dump())

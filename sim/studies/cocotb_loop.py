@@ -16,7 +16,7 @@ import numpy as np
 from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, ReadOnly, Timer
 
-from ...model.axis import strobe_of
+from ...model.design import strobe_of
 from ...model.stamped import room_for
 from ..loop import loop
 from ..loop.controllers import taken_off

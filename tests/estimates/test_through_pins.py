@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hardwall.model import quadrature, stamped
-from hardwall.model.axis import Timing
+from hardwall.model.design import Timing
 from hardwall.sim.estimates.replay import replay
 from hardwall.sim.estimates.replay_axis import run
 from hardwall.sim.estimates.through_pins import through_pins

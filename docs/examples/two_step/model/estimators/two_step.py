@@ -14,14 +14,12 @@ Source: elementary.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
 from ..compiled import compiled
+from ..requirements import AxisRequirements
 from .estimate import EstimatorDesign, EstimatorGains, estimate
-
-if TYPE_CHECKING:
-    from ..spec import AxisSpec
 
 
 @dataclass(frozen=True)
@@ -29,7 +27,7 @@ class Gains(EstimatorGains):
     """A mean of two differences has no gains."""
 
     @classmethod
-    def default(cls, axis: "AxisSpec") -> "Gains":
+    def default(cls, axis: AxisRequirements) -> "Gains":
         return cls()
 
 
@@ -64,7 +62,7 @@ class Design(EstimatorDesign):
     gains_class = Gains
     latency = 2
 
-    def __init__(self, axis: "AxisSpec", gains: Gains):
+    def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         self.velocity = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), axis.shrunk(1))
 

@@ -1,0 +1,136 @@
+"""The design of one axis: every format, run-time word, flag and latency, and its kernels' parameters and states."""
+
+from typing import NamedTuple
+
+from . import output, quadrature, wall
+from .arithmetic.fixed import UQ
+from .compiled import compiled
+from .estimators import registry
+from .estimators.estimate import EstimatorGains
+from .requirements import AxisRequirements
+from .words import Word
+
+GLITCH_WIDTH = 4
+"""Bits of the glitch filter's length, which is up to 15 clocks."""
+ILLEGAL_WIDTH = 8
+"""Bits of the count of illegal transitions, which saturates: a count of one is a fault, a full count a broken cable."""
+ENCODER_FLAGS = ("encoder_illegal", "encoder_overspeed")
+
+
+class Params(NamedTuple):
+    """Parameters of the three blocks, all integer words or all float64, and the lowest bits of their flags."""
+
+    estimator: tuple
+    wall: wall.Params | wall.FloatParams
+    output: output.Params
+    estimator_bit: int
+    output_bit: int
+
+
+class State(NamedTuple):
+    """The states of the blocks, and the sticky flags (bits as in `Design.flags`, after the encoder's flags)."""
+
+    estimator: tuple
+    output: output.State
+    flags: int
+
+
+class Timing(NamedTuple):
+    """The clocks at which an axis samples and changes its drive; clock 0 is the first one after reset."""
+
+    clocks_per_sample: int
+    latency: int  # clocks from a strobe to the changed drive
+
+
+@compiled
+def strobe_of(timing, k):
+    """Return the number of the clock at which sample k is taken."""
+    return (k + 1) * timing.clocks_per_sample - 1
+
+
+class Design:
+    """Formats, run-time words and latencies of an axis, derived from its requirements and the choice of an estimator.
+
+    Args:
+        requirements: the axis's `AxisRequirements`.
+        estimator: name of the velocity estimator.
+        gains: that estimator's `Gains`, or None for its default ones.
+
+    Attributes:
+        decoder: the decoder's `quadrature.Params`.
+        estimator, wall, output: the designs of the other blocks.
+        words: every run-time word, in the order of the hardware's ports.
+        flags: names of the sticky flags, bit 0 first.
+        latency_to_drive: clocks from the sample strobe to the changed drive.
+        timing: the clocks per sample, and `latency_to_drive`.
+    """
+
+    words: tuple[Word, ...]
+    flags: tuple[str, ...]
+
+    def __init__(self, requirements: AxisRequirements, estimator: str, gains: EstimatorGains | None = None):
+        chosen = registry.design_of(estimator)
+        gains = chosen.gains_class.default(requirements) if gains is None else gains
+        if not isinstance(gains, chosen.gains_class):
+            kind = f"{chosen.gains_class.__module__.rpartition('.')[2]}.Gains"
+            raise TypeError(f"gains of {estimator} must be {kind} or None, not {gains!r}")
+        self.requirements = requirements
+        self.gains = gains
+        self.decoder = quadrature.Params(requirements.count_width, requirements.stamp_width, ILLEGAL_WIDTH)
+        self.estimator = chosen(requirements, gains)
+        self.wall = wall.Design(requirements, self.estimator.velocity)
+        self.output = output.Design(requirements)
+        self.words = (
+            Word(
+                "encoder_glitch_clocks",
+                UQ(GLITCH_WIDTH, 0),
+                1.0,
+                "",
+                0,
+                "longest pulse that the glitch filter rejects, clocks",
+            ),
+            Word("encoder_invert", UQ(1, 0), 1.0, "", 0, "1: count the other way"),
+            *self.estimator.words,
+            *self.wall.words,
+            *self.output.words,
+        )
+        self.flags = (*ENCODER_FLAGS, *self.estimator.flags, *self.output.flags)
+        self._flag_bits = len(ENCODER_FLAGS), len(ENCODER_FLAGS) + len(self.estimator.flags)
+        self.latency_to_drive = self.estimator.latency + self.wall.latency + self.output.latency
+        self.timing = Timing(requirements.clocks_per_sample, self.latency_to_drive)
+
+    def encode(self, **si: float) -> dict[str, int]:
+        """Return every run-time word by name: converted from the SI value where one is given, else its reset word.
+
+        Raises:
+            TypeError: if a value is not a number.
+            ValueError: if a name is not a word, or a value does not fit; the message says what is accepted.
+        """
+        known = {word.name: word for word in self.words}
+        for name in si:
+            if name not in known:
+                raise ValueError(f"parameter must be one of {', '.join(known)}, not {name!r}")
+        return {name: word.from_si(si[name]) if name in si else word.reset for name, word in known.items()}
+
+    def params(self, words: dict[str, int]) -> Params:
+        """Return the integer kernel's parameters."""
+        blocks = self.estimator.params(words), self.wall.params(words), self.output.params(words)
+        return Params(*blocks, *self._flag_bits)
+
+    def float_params(self, words: dict[str, int], si: dict[str, float]) -> Params:
+        """Return the float64 kernel's parameters: gains unrounded, as given in `si` by the name of their word."""
+        selected = self.estimator.outputs[words.get(self.estimator.output_word(), 0)]
+        return Params(
+            self.estimator.float_params(self.gains, selected, si),
+            self.wall.float_params(si.get("wall_stiffness", 0.0), si.get("wall_damping", 0.0), words),
+            self.output.float_params(words),
+            *self._flag_bits,
+        )
+
+    def start(self, floating: bool = False) -> State:
+        """Return the state before the first sample, for one run only: the run may write to arrays in it."""
+        return State(self.estimator.start(floating), output.FLOAT_START if floating else output.START, 0)
+
+    def flag_names(self, flags: int) -> list[str]:
+        """Return the names of the flags that are raised in `flags`."""
+        return [name for bit, name in enumerate(self.flags) if flags >> bit & 1]
