@@ -8,8 +8,6 @@ warning, and so fails the build.
 """
 
 import re
-import types
-import typing
 
 import typer.main
 from docutils import nodes
@@ -19,6 +17,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from hardwall.sim.commands.group import app
 from hardwall.sim.scene.schema import Scene
+from hardwall.sim.scene.sentences import accepted, sections_of
 
 log = logging.getLogger(__name__)
 
@@ -45,7 +44,6 @@ UNITS = {
     "_a": "A",
     "_v": "V",
 }
-RELATIONS = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
 
 
 def cell(text: object) -> str:
@@ -117,56 +115,20 @@ class SceneSection(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         name = self.arguments[0]
-        fields = _sections(Scene)[name].model_fields
+        fields = sections_of(Scene)[name].model_fields
         meanings = dict(re.fullmatch(r"(\w+): (.*)", line).groups() for line in self.content if line.strip())
         if meanings.keys() != fields.keys():
             wrong = sorted(meanings.keys() ^ fields.keys())
             log.warning("section %s of a scene: %s", name, ", ".join(wrong), location=self.get_location())
-        rows = [
-            [f"`{key}`", _unit(key), cell(_range(field)), cell(_default(field)), cell(meanings.get(key, ""))]
-            for key, field in fields.items()
-        ]
+        rows = []
+        for key, field in fields.items():
+            taken = accepted(field.annotation, tuple(field.metadata))
+            rows.append([f"`{key}`", _unit(key), cell(taken), cell(_default(field)), cell(meanings.get(key, ""))])
         return self.parse_text_to_nodes("\n".join(table(["key", "unit", "range", "default", "meaning"], rows)))
-
-
-def _sections(model: type) -> dict[str, type]:
-    """Return the sections of a scene by name."""
-    kinds = {name: (field.annotation, *typing.get_args(field.annotation)) for name, field in model.model_fields.items()}
-    return {name: kind for name, several in kinds.items() for kind in several if hasattr(kind, "model_fields")}
 
 
 def _unit(key: str) -> str:
     return next((unit for end, unit in UNITS.items() if key.endswith(end)), "")
-
-
-def _range(field) -> str:
-    """Return what a field accepts, in words."""
-    return _accepted(field.annotation, field.metadata)
-
-
-def _accepted(kind, metadata=()) -> str:
-    """Return what a type accepts, with the limits that are annotated."""
-    origin, inner = typing.get_origin(kind), typing.get_args(kind)
-    if origin is typing.Annotated:
-        words = _accepted(inner[0], kind.__metadata__)
-    elif origin in (typing.Union, types.UnionType):
-        words = " or ".join(_accepted(one, metadata) for one in inner if one is not type(None))
-    elif origin is typing.Literal:
-        words = ", ".join(code(str(one)) for one in inner)
-    elif kind in (int, float):
-        words = f"{'a whole number' if kind is int else 'a number'} {_limits(metadata)}".strip()
-    elif hasattr(kind, "model_fields"):
-        words = "a section"
-    else:
-        words = {bool: "true or false", str: "a name"}.get(kind, "a list of numbers")
-    return words
-
-
-def _limits(metadata) -> str:
-    """Return the limits among what a field is annotated with, in words."""
-    marks = [mark for data in metadata for mark in (getattr(data, "metadata", None) or [data])]
-    found = [(words, getattr(mark, sign)) for mark in marks for sign, words in RELATIONS.items() if hasattr(mark, sign)]
-    return " and ".join(f"{words} {limit:g}" for words, limit in found)
 
 
 def _default(field) -> str:

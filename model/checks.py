@@ -7,6 +7,11 @@ from numpy.typing import ArrayLike
 
 LARGEST = (1 << 62) - 1
 """The largest count or clock; the least is -LARGEST - 1. Sums and differences of two such values fit int64."""
+NUMBERS = 1e-30, 1e30
+"""The least and the largest number of a specification, in units that the user may choose: far beyond any use, and such
+that no power or ratio of the numbers leaves the range of float64."""
+SHOWN_MAX = 60
+"""The most characters of a value in a message."""
 
 
 class FieldError(ValueError):
@@ -18,6 +23,21 @@ class FieldError(ValueError):
 
     def __str__(self) -> str:
         return f"{self.field} {self.message}"
+
+
+def shown(value: object) -> str:
+    """Return a value as messages show it: on one line, printable and shortened."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # more digits, or a deeper nesting, than Python writes
+        text = f"a very long {type(value).__name__}"
+    return text if len(text) <= SHOWN_MAX else text[: SHOWN_MAX - 3] + "..."
+
+
+def check_range(name: str, value: float, least: float, most: float) -> None:
+    """Raise FieldError unless a number is `least` to `most`; NaN never is."""
+    if not least <= value <= most:
+        raise FieldError(name, f"must be {least:g} to {most:g}, not {shown(value)}")
 
 
 def check_int(name: str, value: int, least: int, most: int | None = None) -> None:

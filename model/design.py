@@ -7,11 +7,12 @@ from .arithmetic.fixed import UQ
 from .compiled import compiled
 from .estimators import registry
 from .estimators.estimate import EstimatorGains
+from .quadrature_speed import GLITCH_CLOCKS_MAX, glitch_clocks_for
 from .requirements import AxisRequirements
 from .words import Word
 
-GLITCH_WIDTH = 4
-"""Bits of the glitch filter's length, which is up to 15 clocks."""
+GLITCH_WIDTH = GLITCH_CLOCKS_MAX.bit_length()
+"""Bits of the glitch filter's length."""
 ILLEGAL_WIDTH = 8
 """Bits of the count of illegal transitions, which saturates: a count of one is a fault, a full count a broken cable."""
 ENCODER_FLAGS = ("encoder_illegal", "encoder_overspeed")
@@ -86,8 +87,9 @@ class Design:
                 UQ(GLITCH_WIDTH, 0),
                 1.0,
                 "",
-                0,
-                "longest pulse that the glitch filter rejects, clocks",
+                glitch_clocks_for(requirements.edges_per_clock_max),
+                "longest pulse that the glitch filter rejects, clocks; 0: no filter, so that every pulse that a clock "
+                "sees is counted forth and back, and falsifies the stamps of edges without a flag",
             ),
             Word("encoder_invert", UQ(1, 0), 1.0, "", 0, "1: count the other way"),
             *self.estimator.words,

@@ -21,6 +21,12 @@ quadrature a flag is up within `clocks_to_fault`.
 
 import math
 
+GLITCH_CLOCKS_MAX = 15
+"""The longest glitch filter: its word has four bits."""
+SPEED_MARGIN = 2.0
+"""How many times the largest speed `glitch_clocks_for` leaves room for: formats hold twice that speed, too, and an
+encoder whose errors nobody stated may have levels that are shorter than ideal ones."""
+
 
 def max_edge_rate(clock_hz: float, glitch_clocks: int, edge_error: float = 0.0) -> float:
     """Return the highest steady rate of edges, in Hz, at which the count is exact and no flag rises.
@@ -36,6 +42,25 @@ def max_edge_rate(clock_hz: float, glitch_clocks: int, edge_error: float = 0.0) 
     apart = 1 / (1 - 2 * edge_error)
     long = (glitch_clocks + 1) / (2 - 2 * edge_error)
     return clock_hz / max(apart, long)
+
+
+def glitch_clocks_for(edges_per_clock: float, edge_error: float = 0.0) -> int:
+    """Return the glitch filter for a largest rate of edges: the longest that counts exactly at `SPEED_MARGIN` times it.
+
+    The shortest level at that rate r lasts (2 - 2 `edge_error`) / r clocks and must be at least glitch_clocks + 1
+    clocks long: see `max_edge_rate`. The result is 0 where not even one clock can be filtered, and otherwise at most
+    `GLITCH_CLOCKS_MAX`. Pulses up to that length then change nothing, whereas without a filter every pulse that a
+    clock sees is counted forth and back, with stamps of an encoder that seems to move at two edges in its length.
+
+    Raises:
+        ValueError: if `edge_error` is not from 0 to less than 0.5.
+    """
+    passing = [
+        glitch_clocks
+        for glitch_clocks in range(GLITCH_CLOCKS_MAX + 1)
+        if max_edge_rate(1.0, glitch_clocks, edge_error) >= SPEED_MARGIN * edges_per_clock
+    ]
+    return max(passing, default=0)
 
 
 def clocks_to_fault(edges_per_clock: float, glitch_clocks: int) -> float:

@@ -22,7 +22,10 @@ import math
 from dataclasses import dataclass
 
 from .arithmetic.fixed import SQ, bits_for
-from .checks import FieldError
+from .checks import NUMBERS, FieldError, check_range, shown
+
+RATES_HZ = 1, 10**9
+"""The least and the largest rate of an axis in true seconds, of a recording too."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,15 +69,14 @@ class AxisRequirements:
         for field in dataclasses.fields(self):
             name, kind, value = field.name, field.type, getattr(self, field.name)
             if kind is int and (isinstance(value, bool) or not isinstance(value, int)):
-                raise TypeError(f"{name} must be an int, not {value!r}")
+                raise TypeError(f"{name} must be an int, not {shown(value)}")
             if kind is str and not isinstance(value, str):
-                raise TypeError(f"{name} must be a str, not {value!r}")
+                raise TypeError(f"{name} must be a str, not {shown(value)}")
             if kind is float and (isinstance(value, bool) or not isinstance(value, int | float)):
-                raise TypeError(f"{name} must be a number, not {value!r}")
-            if kind in (int, float) and name != "estimator_bits_dropped" and not (math.isfinite(value) and value > 0):
-                raise FieldError(name, f"must be finite and more than 0, not {value!r}")
-        if not 0 <= self.estimator_bits_dropped <= 32:
-            raise FieldError("estimator_bits_dropped", f"must be 0 to 32, not {self.estimator_bits_dropped!r}")
+                raise TypeError(f"{name} must be a number, not {shown(value)}")
+            if kind in (int, float) and name != "estimator_bits_dropped":
+                check_range(name, value, 1 if kind is int else NUMBERS[0], NUMBERS[1])
+        check_range("estimator_bits_dropped", self.estimator_bits_dropped, 0, 32)
         self._check_rates()
         self._check_widths()
 
@@ -140,6 +142,11 @@ class AxisRequirements:
     @property
     def speed_max_counts_per_sample(self) -> float:
         return self.speed_max_m_per_s / self.velocity_unit_m_per_s
+
+    @property
+    def edges_per_clock_max(self) -> float:
+        """Rate of the encoder's edges at the largest speed."""
+        return self.speed_max_m_per_s / (self.count_m * self.clock_hz)
 
     @property
     def force_limit_word(self) -> int:

@@ -5,14 +5,13 @@ two variants, one for the integer words of the hardware and one for the same alg
 see `registry`.
 """
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from ..arithmetic.fixed import SQ
-from ..checks import FieldError
+from ..checks import NUMBERS, FieldError, check_range, shown
 from ..compiled import by_type
 from ..requirements import AxisRequirements
 from ..words import Word
@@ -23,13 +22,14 @@ class EstimatorGains(ABC):
     """The gains of an estimator in SI units; the name of every field ends in its unit.
 
     Raises:
-        ValueError: if a field is not finite and more than 0.
+        ValueError: if a field is not within `checks.NUMBERS`.
     """
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-                raise FieldError(name, f"must be finite and more than 0, not {value!r}")
+            if not isinstance(value, int | float):
+                raise FieldError(name, f"must be a number, not {shown(value)}")
+            check_range(name, value, *NUMBERS)
 
     @classmethod
     @abstractmethod

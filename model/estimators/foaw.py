@@ -53,7 +53,7 @@ import numpy as np
 from ..arithmetic.fixed import SQ, UQ
 from ..arithmetic.signed_divide import divide
 from ..arithmetic.signed_divide import latency as divide_latency
-from ..checks import FieldError
+from ..checks import NUMBERS, FieldError, check_number, check_range, shown
 from ..compiled import compiled
 from ..requirements import AxisRequirements
 from ..words import Word
@@ -80,7 +80,7 @@ class Gains(EstimatorGains):
     """The band, counts, and the longest window, s.
 
     Raises:
-        ValueError: if the band does not fit its word, or the window is not finite and more than 0.
+        ValueError: if the band does not fit its word, or the window is not within `checks.NUMBERS`.
     """
 
     band_counts: float
@@ -90,9 +90,9 @@ class Gains(EstimatorGains):
         band, window = self.band_counts, self.window_s
         most = BAND.to_real(BAND.max)
         if not (isinstance(band, int | float) and 0 <= band <= most):
-            raise FieldError("band_counts", f"must be 0 to {most:g}, not {band!r}")
-        if not (isinstance(window, int | float) and math.isfinite(window) and window > 0):
-            raise FieldError("window_s", f"must be finite and more than 0, not {window!r}")
+            raise FieldError("band_counts", f"must be 0 to {most:g}, not {shown(band)}")
+        check_number("window_s", window)
+        check_range("window_s", window, *NUMBERS)
 
     @classmethod
     def default(cls, axis: AxisRequirements) -> "Gains":

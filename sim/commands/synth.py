@@ -18,5 +18,5 @@ def command(
 ) -> None:
     of = Case.of(scene, options.changes(controller__estimator=estimator)).scene
     with log.status(f"{device}: Yosys, then nextpnr with {seeds} seeds"):
-        report = synthesise(of.spec, device, range(1, seeds + 1), of.controller.glitch_clocks)
+        report = synthesise(of.spec, device, range(1, seeds + 1), of.glitch_clocks)
     options.finish(Values({"scene": of.name} | report))

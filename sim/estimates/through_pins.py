@@ -17,6 +17,7 @@ from ..loop.controllers import sample, sample_quietly, taken_off
 from ..world.encoder import level
 
 GLITCH_CLOCKS = 0
+"""The glitch filter: edges that are computed have no glitches, and are never too fast for the decoder alone."""
 DECODER_CLOCKS = quadrature.latency(GLITCH_CLOCKS)
 """The latency of the decoder: an edge this many clocks before a strobe is the last that is counted at it."""
 CHUNK_CLOCKS = 1 << 20

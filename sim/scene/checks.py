@@ -1,12 +1,8 @@
 """Checks of a scene; every error is a sentence that begins with the key and says what is accepted."""
 
-import difflib
 import math
-from typing import Any
 
-from pydantic import BaseModel
-
-from ...model.checks import FieldError
+from ...model.checks import FieldError, shown
 from ...model.quadrature_speed import max_edge_rate
 from ..world import device
 from ..world.euler import longest_s
@@ -17,6 +13,10 @@ SAMPLES_MAX = 10**9
 """The most samples in a run's settling or measuring: a minute or two with the model, hours with the RTL."""
 STEPS_MAX = 10_000
 """The most steps of a map in either direction, and the most steps of a fixed-step solver in a sample."""
+ERROR_MAX_COUNTS = 0.5
+"""The distance of an edge from its ideal place from which the decoder promises nothing."""
+DELAY_SAMPLES_MAX = 10**6
+"""The most drives that a late amplifier holds."""
 
 # The scene keys of the model's words and fields, where the names differ.
 KEYS = {
@@ -38,6 +38,7 @@ def _key_of(field: str, scene: Scene) -> str:
 
 def check(scene: Scene) -> None:
     """Raise ValueError for errors that the sections of a `Scene` cannot see alone; the message begins with the key."""
+    _check_encoder(scene)
     _check_axis(scene)
     _check_protocol(scene)
     _check_wall(scene)
@@ -50,27 +51,45 @@ def check(scene: Scene) -> None:
         _check_map(scene)
 
 
+def _check_encoder(scene: Scene) -> None:
+    try:
+        error_counts = scene.encoder.error_counts
+    except ValueError as error:
+        raise ValueError(f"encoder.{error}") from None
+    if not error_counts < ERROR_MAX_COUNTS:
+        raise ValueError(
+            f"encoder.phase_error_counts and duty_error_counts must move each edge by less than {ERROR_MAX_COUNTS:g} "
+            f"counts, not {error_counts:g}"
+        )
+
+
 def _check_axis(scene: Scene) -> None:
     try:
         spec, outputs = scene.spec, scene.spec.design.estimator.outputs
         if scene.estimator_output not in outputs:
             raise FieldError("output", f"must be one of {', '.join(outputs)}, not {scene.estimator_output!r}")
         _check_start(scene)
-        _ = scene.words
+        _check_words(scene)
     except FieldError as error:
         raise ValueError(f"{_key_of(error.field, scene)} {error.message}") from None
-    try:
-        _ = scene.encoder.offsets
-    except ValueError as error:
-        raise ValueError(f"encoder.{error}") from None
-
-    error_counts = max(map(abs, scene.encoder.offsets))
-    fastest = spec.count_m * max_edge_rate(spec.clock_hz, scene.controller.glitch_clocks, error_counts)
+    fastest = spec.count_m * max_edge_rate(spec.clock_hz, scene.glitch_clocks, scene.encoder.error_counts)
     if spec.speed_max_m_per_s > fastest:
         raise ValueError(
             f"controller.speed_max_m_per_s must be at most {fastest:g}, the decoder's limit at this clock, count size, "
             f"glitch_clocks and edge error, not {spec.speed_max_m_per_s!r}"
         )
+
+
+def _check_words(scene: Scene) -> None:
+    """Raise FieldError if a wall or a limit does not fit its word, or is so small that its word would be 0."""
+    si, words = scene.parameters, scene.words
+    for word in scene.spec.design.words:
+        if word.name in KEYS and si.get(word.name) and not words[word.name]:
+            raise FieldError(
+                word.name,
+                f"must be at least {word.to_si(1) / 2:g}, half of its word's LSB in this controller, "
+                f"not {si[word.name]!r}",
+            )
 
 
 def check_hit(scene: Scene) -> None:
@@ -81,22 +100,25 @@ def check_hit(scene: Scene) -> None:
 
 def _check_start(scene: Scene) -> None:
     start_m, travel_m = scene.protocol.start_m, scene.spec.travel_m
-    if -start_m > travel_m:
-        raise ValueError(f"protocol.start_m must be {-travel_m:g} to 0, within travel_m, not {start_m!r}")
+    if not -travel_m <= start_m < 0:
+        raise ValueError(
+            f"protocol.start_m must be less than 0 and at least {-travel_m:g}, for controller.travel_m, not {start_m!r}"
+        )
 
 
 def _check_protocol(scene: Scene) -> None:
     protocol, rate = scene.protocol, scene.spec.sample_hz
-    longest = SAMPLES_MAX / rate
-    for key in ("settle_s", "measure_s"):
-        if not 0.5 < getattr(protocol, key) * rate <= SAMPLES_MAX:
+    for key in ("settle_s", "mean_s", "measure_s"):
+        value = getattr(protocol, key)
+        if not value * rate > 0.5:
+            raise ValueError(f"protocol.{key} must be at least one sample of {1 / rate:g} s, not {value!r}")
+        if not value * rate <= SAMPLES_MAX:
             raise ValueError(
-                f"protocol.{key} must be a sample of {1 / rate:g} s to {longest:g}, not {getattr(protocol, key)!r}"
+                f"protocol.{key} must be at most {SAMPLES_MAX / rate:g}, {SAMPLES_MAX:g} samples, not {value!r}"
             )
-    if not 0.5 < protocol.mean_s * rate <= round(protocol.settle_s * rate):
+    if not protocol.mean_s * rate <= round(protocol.settle_s * rate):
         raise ValueError(
-            f"protocol.mean_s must be a sample of {1 / rate:g} s to settle_s {protocol.settle_s:g}, "
-            f"not {protocol.mean_s!r}"
+            f"protocol.mean_s must be at most protocol.settle_s, {protocol.settle_s:g}, not {protocol.mean_s!r}"
         )
 
 
@@ -107,7 +129,7 @@ def _check_wall(scene: Scene) -> None:
     ):
         if not 0 <= getattr(scene.wall, name) <= most:
             raise ValueError(
-                f"wall.{name} must be 0 to {most:g}, what the controller is for, not {getattr(scene.wall, name)!r}"
+                f"wall.{name} must be 0 to {most:g}, what the controller is for, not {shown(getattr(scene.wall, name))}"
             )
 
 
@@ -116,7 +138,12 @@ def _check_amplifier(scene: Scene) -> None:
         raise ValueError("amplifier.current_limit_a needs amplifier.bandwidth_hz and a section motor: a current loop")
     delay_s, settle_s, rate = scene.amplifier.delay_s, scene.protocol.settle_s, scene.spec.sample_hz
     if delay_s > settle_s:
-        raise ValueError(f"amplifier.delay_s must be 0 to settle_s {settle_s:g}, not {delay_s!r}")
+        raise ValueError(f"amplifier.delay_s must be at most protocol.settle_s, {settle_s:g}, not {delay_s!r}")
+    if scene.delay_samples > DELAY_SAMPLES_MAX:
+        raise ValueError(
+            f"amplifier.delay_s must be at most {DELAY_SAMPLES_MAX / rate:g}, {DELAY_SAMPLES_MAX} samples, "
+            f"not {delay_s!r}"
+        )
     if not math.isclose(delay_s * rate, scene.delay_samples, abs_tol=1e-6):
         raise ValueError(f"amplifier.delay_s must be a whole number of samples of {1 / rate:g} s, not {delay_s!r}")
 
@@ -132,6 +159,12 @@ def _check_output(scene: Scene) -> None:
     if rest or period < 2:
         raise ValueError(
             f"output.pwm_carrier_hz must be controller.clock_hz {clock_hz} divided by a whole number from 2, "
+            f"not {output.pwm_carrier_hz!r}"
+        )
+    most_hz = device.LEGS_MAX // 2 * scene.spec.sample_hz
+    if output.pwm_carrier_hz > most_hz:
+        raise ValueError(
+            f"output.pwm_carrier_hz must be at most {most_hz}, {device.LEGS_MAX // 2} pulses a sample, "
             f"not {output.pwm_carrier_hz!r}"
         )
     parts = device_of(scene)
@@ -168,6 +201,11 @@ def _check_solver(scene: Scene, parts: device.Device) -> None:
             f"solver.step_s must be {least:g} to {sample_s:g}, from {STEPS_MAX} steps a sample to one, not {step_s!r}"
         )
     stable_s = longest_s(parts, step_s)
+    if stable_s < least:
+        raise ValueError(
+            f"solver must be left out: this device diverges of itself in steps longer than {stable_s:.4g} s, "
+            f"more than {STEPS_MAX} a sample"
+        )
     if stable_s < step_s:
         raise ValueError(
             f"solver.step_s must be at most {stable_s:.4g}, in longer steps this device diverges of itself, "
@@ -177,12 +215,15 @@ def _check_solver(scene: Scene, parts: device.Device) -> None:
 
 def _check_map(scene: Scene) -> None:
     steps, spec = scene.zwidth, scene.spec
-    for key, least, most in (
-        ("stiffness_to_n_per_m", steps.stiffness_step_n_per_m, spec.stiffness_max_n_per_m),
-        ("damping_to_n_s_per_m", steps.damping_from_n_s_per_m, spec.damping_max_n_s_per_m),
+    for key, least_key, most_key in (
+        ("stiffness_to_n_per_m", "stiffness_step_n_per_m", "stiffness_max_n_per_m"),
+        ("damping_to_n_s_per_m", "damping_from_n_s_per_m", "damping_max_n_s_per_m"),
     ):
-        if not least <= getattr(steps, key) <= most:
-            raise ValueError(f"zwidth.{key} must be {least:g} to {most:g}, not {getattr(steps, key)!r}")
+        value, least, most = getattr(steps, key), getattr(steps, least_key), getattr(spec, most_key)
+        if value < least:
+            raise ValueError(f"zwidth.{key} must be at least zwidth.{least_key}, {least:g}, not {value!r}")
+        if value > most:
+            raise ValueError(f"zwidth.{key} must be at most controller.{most_key}, {most:g}, not {value!r}")
     for key, span in (
         ("stiffness_step_n_per_m", steps.stiffness_to_n_per_m),
         ("damping_step_n_s_per_m", steps.damping_to_n_s_per_m - steps.damping_from_n_s_per_m),
@@ -191,40 +232,3 @@ def _check_map(scene: Scene) -> None:
             raise ValueError(
                 f"zwidth.{key} must be at least {span / STEPS_MAX:g}, {STEPS_MAX} steps, not {getattr(steps, key)!r}"
             )
-
-
-def sentence(error: dict[str, Any], scene: type[BaseModel]) -> str:
-    """Return one pydantic error as 'key must ..., not value'."""
-    key = ".".join(
-        str(part) for part in error["loc"] if not str(part).startswith(("function-", "constrained", "list[", "float"))
-    )
-    limits = error.get("ctx", {})
-    if error["type"] == "missing":
-        return f"{key} is missing"
-    if error["type"] == "extra_forbidden":
-        return f"{key} is not a key of a scene{_suggestion(error['loc'], scene)}"
-    if error["type"] in ("model_type", "dict_type"):
-        return f"{key} must be a section, not {error['input']!r}"
-    if key == "encoder.phase_error_counts":
-        return f"{key} must be a finite number, or a list of four, not {error['input']!r}"
-    relations = {"gt": "more than", "ge": "at least", "lt": "less than", "le": "at most"}
-    accepted = " and ".join(f"{words} {limits[short]:g}" for short, words in relations.items() if short in limits)
-    if not accepted:
-        accepted = (
-            error["msg"]
-            .removeprefix("Input should be ")
-            .replace("a valid ", "a ")
-            .replace("a integer", "a whole number")
-        )
-    return f"{key} must be {accepted}, not {error['input']!r}"
-
-
-def _suggestion(location: tuple, scene: type[BaseModel]) -> str:
-    """Return a suggestion for a misspelt key: the nearest key of its section, or all keys of the section."""
-    section: Any = scene
-    for part in location[:-1]:
-        kinds = [section.model_fields[part].annotation, *getattr(section.model_fields[part].annotation, "__args__", ())]
-        section = next(kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel))
-    keys = [key for key in section.model_fields if key != "name"]
-    near = difflib.get_close_matches(str(location[-1]), keys, 1)
-    return f"; did you mean {near[0]}?" if near else f"; its section has {', '.join(keys) or 'no keys'}"

@@ -9,11 +9,16 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from .checks import check, sentence
+from ...model.checks import shown
+from ..jobs.regular_file import content_of
+from .checks import check
 from .errors import SceneError
 from .schema import Scene
+from .sentences import sentence, stranger
 
 FOLDER = Path(__file__).with_name("builtin")
+BYTES_MAX = 10**6
+"""The largest file of a scene."""
 
 
 def names() -> list[str]:
@@ -41,11 +46,15 @@ def read(scene: str) -> str:
         SceneError: if there is no such scene.
     """
     try:
-        return _path(scene).read_text(encoding="utf-8")
+        if not scene.endswith(".toml") and scene not in names():
+            raise FileNotFoundError
+        return content_of(_path(scene), BYTES_MAX).decode("utf-8")
     except FileNotFoundError:
-        raise SceneError(f"scene must be one of {', '.join(names())}, or a .toml file, not {scene!r}") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise SceneError(f"{scene}: not a readable TOML file: {str(error).splitlines()[0]}") from None
+        raise SceneError(f"scene must be one of {', '.join(names())}, or a .toml file, not {shown(scene)}") from None
+    except UnicodeDecodeError:
+        raise SceneError(f"scene must be a .toml file of UTF-8 text, not {shown(scene)}") from None
+    except OSError as error:
+        raise SceneError(f"scene must be a readable .toml file, not {shown(scene)}: {error.strerror}") from None
 
 
 def _path(scene: str) -> Path:
@@ -59,26 +68,50 @@ def parse(scene: str, text: str, changes: dict[str, Any] | None = None) -> Scene
         SceneError: as in `load`.
     """
     try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(f"{scene}: not a readable TOML file: {str(error).splitlines()[0]}") from None
+        content = toml_of(text)
+    except ValueError as error:
+        raise SceneError(f"{scene}: must be a readable TOML file: {error}") from None
+    if "name" in content:
+        raise SceneError(f"{scene}: name is not a key of a scene: its file has its name")
     for key, value in (changes or {}).items():
-        *sections, last = key.split(".")
-        place = content
-        for section in sections:
-            place = place.setdefault(section, {})
-            if not isinstance(place, dict):
-                raise SceneError(f"{scene}: {key} is not a key of a scene")
-        place.pop(last, None)
-        if value is not None:
-            place[last] = value
+        _change(content, scene, key, value)
     try:
-        result = Scene(name=_path(scene).stem, **{key: value for key, value in content.items() if key != "name"})
+        result = Scene(name=_path(scene).stem, **content)
         check(result)
     except ValidationError as error:
         # A misspelt key also makes a key missing; the message about the misspelling says more.
         worst = min(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
-        raise SceneError(f"{scene}: {sentence(worst, Scene)}") from None
+        raise SceneError(f"{scene}: {sentence(worst)}") from None
     except ValueError as error:
         raise SceneError(f"{scene}: {error}") from None
     return result
+
+
+def _change(content: dict[str, Any], scene: str, key: str, value: Any) -> None:
+    """Change a dotted key of a scene's content; a value of None takes it out."""
+    *sections, last = key.split(".")
+    wrong = stranger((*sections, last))
+    if wrong:
+        raise SceneError(f"{scene}: {wrong}")
+    place = content
+    for section in sections:
+        place = place.setdefault(section, {})
+        if not isinstance(place, dict):
+            raise SceneError(f"{scene}: {section} must be a section, not {shown(place)}")
+    place.pop(last, None)
+    if value is not None:
+        place[last] = value
+
+
+def toml_of(text: str) -> dict[str, Any]:
+    """Return the content of TOML text.
+
+    Raises:
+        ValueError: if it is not TOML, or has longer integers or a deeper nesting than Python reads; in one line.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+    except ValueError as error:
+        raise ValueError(str(error).splitlines()[0]) from None

@@ -10,13 +10,34 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from ...model.estimators import registry
+from ...model.quadrature_speed import GLITCH_CLOCKS_MAX, glitch_clocks_for
 from ...model.spec import AxisSpec
 from ..world.encoder import offsets
-
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Rate = Annotated[int, Field(gt=0, le=10**9)]
+from .quantities import (
+    Acceleration,
+    Bandwidth,
+    Current,
+    Damping,
+    EdgeError,
+    Force,
+    Gain,
+    Inductance,
+    Length,
+    Mass,
+    Place,
+    Radius,
+    Rate,
+    Resistance,
+    SlewRate,
+    Speed,
+    Step,
+    Stiffness,
+    Threshold,
+    Time,
+    TorqueConstant,
+    Voltage,
+    or_none,
+)
 
 
 class Section(BaseModel):
@@ -26,27 +47,32 @@ class Section(BaseModel):
 class HandleSection(Section):
     """The moving mass; without `coulomb_n` it has no dry friction."""
 
-    mass_kg: Positive
-    viscous_n_s_per_m: NotNegative = 0.0
-    coulomb_n: NotNegative | None = None
+    mass_kg: Mass
+    viscous_n_s_per_m: or_none(Damping) = 0.0
+    coulomb_n: or_none(Force) | None = None
 
 
 class EncoderSection(Section):
     """The scale; without errors its edges are where they should be."""
 
-    count_m: Positive
-    phase_error_counts: Finite | Annotated[list[Finite], Field(min_length=4, max_length=4)] = 0.0
-    duty_error_counts: Finite = 0.0
+    count_m: Length
+    phase_error_counts: EdgeError | Annotated[list[EdgeError], Field(min_length=4, max_length=4)] = 0.0
+    duty_error_counts: EdgeError = 0.0
 
     @cached_property
     def offsets(self) -> tuple[float, float, float, float]:
         """The distances of the four kinds of edges from their ideal positions, counts."""
         return offsets(self.phase_error_counts, self.duty_error_counts)
 
+    @property
+    def error_counts(self) -> float:
+        """The largest of these distances, either way."""
+        return max(map(abs, self.offsets))
+
 
 def _gains_section(name: str) -> type[Section]:
     """Return a section with the fields of an estimator's gains."""
-    fields = dict.fromkeys(registry.design_of(name).gains_class.__annotations__, (Positive, ...))
+    fields = dict.fromkeys(registry.design_of(name).gains_class.__annotations__, (Gain, ...))
     return create_model(f"{name.title()}Section", __base__=Section, **fields)
 
 
@@ -58,106 +84,107 @@ GainsSection = create_model(
 
 
 class ControllerSection(Section):
-    """The axis: see `hardwall.model.spec.AxisSpec`. Gains are given by estimator, as in `[controller.gains.levant]`."""
+    """The axis: see `hardwall.model.spec.AxisSpec`. Gains are given by estimator, as in `[controller.gains.levant]`.
+    Without `glitch_clocks` the glitch filter is the longest for the largest speed: see `Scene.glitch_clocks`."""
 
     clock_hz: Rate
     sample_hz: Rate
     actuation_hz: Rate
-    travel_m: Positive
-    speed_max_m_per_s: Positive
-    acceleration_max_m_per_s2: Positive
-    force_max_n: Positive
-    force_resolution_n: Positive
-    stiffness_max_n_per_m: Positive
-    damping_max_n_s_per_m: Positive
+    travel_m: Length
+    speed_max_m_per_s: Speed
+    acceleration_max_m_per_s2: Acceleration
+    force_max_n: Force
+    force_resolution_n: Force
+    stiffness_max_n_per_m: Stiffness
+    damping_max_n_s_per_m: Damping
     estimator: Literal[tuple(registry.ESTIMATORS)] = "levant"
     output: str | None = None
-    glitch_clocks: Annotated[int, Field(ge=0, le=15)] = 0
-    slew_limit_n_per_s: Positive | None = None
+    glitch_clocks: Annotated[int, Field(ge=0, le=GLITCH_CLOCKS_MAX)] | None = None
+    slew_limit_n_per_s: SlewRate | None = None
     gains: GainsSection = GainsSection()
 
 
 class WallSection(Section):
     """The wall, its surface at position 0; without `forbid_pull` its damper may hold the leaving handle back."""
 
-    stiffness_n_per_m: NotNegative
-    damping_n_s_per_m: NotNegative
+    stiffness_n_per_m: or_none(Stiffness)
+    damping_n_s_per_m: or_none(Damping)
     forbid_pull: bool = False
 
 
 class AmplifierSection(Section):
     """The amplifier; a key that is absent means no delay, lag or limit. A current limit needs motor and bandwidth."""
 
-    delay_s: NotNegative = 0.0
-    bandwidth_hz: Positive | None = None
-    current_limit_a: Positive | None = None
+    delay_s: or_none(Time) = 0.0
+    bandwidth_hz: Bandwidth | None = None
+    current_limit_a: Current | None = None
 
 
 class MotorSection(Section):
     """A brushed DC motor. With an amplifier's bandwidth its current follows the force; else its voltage does."""
 
-    resistance_ohm: Positive
-    inductance_h: Positive
-    torque_constant_n_m_per_a: Positive
-    voltage_limit_v: Positive
-    pulley_radius_m: Positive
+    resistance_ohm: Resistance
+    inductance_h: Inductance
+    torque_constant_n_m_per_a: TorqueConstant
+    voltage_limit_v: Voltage
+    pulley_radius_m: Radius
 
 
 class TransmissionSection(Section):
     """A cable between motor and handle; the motor's mass is rotor and pulley as felt at the handle."""
 
-    stiffness_n_per_m: Positive
-    damping_n_s_per_m: NotNegative = 0.0
-    motor_mass_kg: Positive
-    motor_viscous_n_s_per_m: NotNegative = 0.0
+    stiffness_n_per_m: Stiffness
+    damping_n_s_per_m: or_none(Damping) = 0.0
+    motor_mass_kg: Mass
+    motor_viscous_n_s_per_m: or_none(Damping) = 0.0
     encoder_at: Literal["handle", "motor"] = "handle"
 
 
 class HandSection(Section):
     """A hand that moves with the handle and holds it, by a spring to `rest_m` and a damper."""
 
-    mass_kg: NotNegative
-    damping_n_s_per_m: NotNegative
-    stiffness_n_per_m: NotNegative
-    rest_m: Finite = 0.0
+    mass_kg: or_none(Mass)
+    damping_n_s_per_m: or_none(Damping)
+    stiffness_n_per_m: or_none(Stiffness)
+    rest_m: Place = 0.0
 
 
 class OutputSection(Section):
     """Steps of a converter (`dac_bits`), or pulses (`pwm_carrier_hz`, `pwm_steps` a period), up to +- full scale."""
 
-    full_scale_n: Positive
+    full_scale_n: Force
     dac_bits: Annotated[int, Field(ge=2, le=32)] | None = None
     pwm_carrier_hz: Rate | None = None
-    pwm_steps: Annotated[int, Field(ge=2)] | None = None
+    pwm_steps: Annotated[int, Field(ge=2, le=10**9)] | None = None
 
 
 class SolverSection(Section):
     """Steps of semi-implicit Euler, no longer than `step_s`, as in most simulations; without this section the device is
     advanced exactly from event to event."""
 
-    step_s: Positive
+    step_s: Step
 
 
 class ProtocolSection(Section):
     """A hit from rest at `start_m`, pushed towards the wall. A wall is stable if the RMS distance over `measure_s`
     after `settle_s`, from the mean over `mean_s` before it, is under the threshold."""
 
-    start_m: Annotated[float, Field(lt=0, allow_inf_nan=False)]
-    push_n: Positive
-    settle_s: Positive
-    mean_s: Positive
-    measure_s: Positive
-    threshold_mm: Annotated[float, Field(gt=0, le=1e3, allow_inf_nan=False)]
+    start_m: Annotated[Place, Field(le=-1e-12)]
+    push_n: Force
+    settle_s: Time
+    mean_s: Time
+    measure_s: Time
+    threshold_mm: Threshold
 
 
 class ZWidthSection(Section):
     """Steps of a map of stable walls, and the number of walls hit below its edge: see `hardwall.sim.walls.boundary`."""
 
-    stiffness_step_n_per_m: Positive
-    stiffness_to_n_per_m: Positive
-    damping_from_n_s_per_m: NotNegative
-    damping_to_n_s_per_m: NotNegative
-    damping_step_n_s_per_m: Positive
+    stiffness_step_n_per_m: Stiffness
+    stiffness_to_n_per_m: Stiffness
+    damping_from_n_s_per_m: or_none(Damping)
+    damping_to_n_s_per_m: or_none(Damping)
+    damping_step_n_s_per_m: Damping
     walls_below: Annotated[int, Field(ge=0, le=1000)] = 0
 
 
@@ -189,15 +216,24 @@ class Scene(Section):
         return AxisSpec(count_m=self.encoder.count_m, gains=gains, **fields)
 
     @property
+    def glitch_clocks(self) -> int:
+        """The glitch filter: the scene's own, or the longest that its speed and the errors of its encoder leave."""
+        given = self.controller.glitch_clocks
+        if given is not None:
+            return given
+        return glitch_clocks_for(self.spec.edges_per_clock_max, self.encoder.error_counts)
+
+    @property
     def estimator_output(self) -> str:
         """The estimator's output that the wall uses."""
-        return self.controller.output or self.spec.design.estimator.outputs[0]
+        outputs = self.spec.design.estimator.outputs
+        return outputs[0] if self.controller.output is None else self.controller.output
 
     @property
     def parameters(self) -> dict[str, float]:
         """Run-time parameters in SI units, by word; the count is 0 at the start, so the wall is at -`start_m`."""
         si = {
-            "encoder_glitch_clocks": self.controller.glitch_clocks,
+            "encoder_glitch_clocks": self.glitch_clocks,
             "wall_stiffness": self.wall.stiffness_n_per_m,
             "wall_damping": self.wall.damping_n_s_per_m,
             "wall_position": -self.protocol.start_m,

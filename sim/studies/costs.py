@@ -81,5 +81,5 @@ def cost(estimator: str, device: str, seeds: Iterable[int]) -> dict:
         "sample_hz": scene.spec.sample_hz,
         **estimator_cells(scene.spec, device),
         "latency_clocks": scene.spec.design.estimator.latency,
-        "board": {"scene": scene.name} | synthesise(scene.spec, device, list(seeds), scene.controller.glitch_clocks),
+        "board": {"scene": scene.name} | synthesise(scene.spec, device, list(seeds), scene.glitch_clocks),
     }

@@ -32,7 +32,7 @@ SEARCH = 100
 
 def delay_s(scene: Scene) -> float:
     """Return the time (s) from a position to the force that follows from it, by decoder, force path and amplifier."""
-    clocks = latency(scene.controller.glitch_clocks) + scene.spec.design.latency_to_drive
+    clocks = latency(scene.glitch_clocks) + scene.spec.design.latency_to_drive
     return clocks / scene.spec.clock_hz + scene.delay_samples / scene.spec.sample_hz
 
 
@@ -96,7 +96,7 @@ class Loop:
         # Constant forces move the equilibrium, and do not affect its stability.
         rates = np.zeros((n + 1, n + 1))
         rates[:n] = np.delete(device.rates, n, axis=1)
-        seen_s = latency(scene.controller.glitch_clocks) / spec.clock_hz
+        seen_s = latency(scene.glitch_clocks) / spec.clock_hz
         until_drive_s = spec.design.latency_to_drive / spec.clock_hz
         early, late, applied = (np.eye(self._n_state) for _ in range(3))
         early[: n + 1, : n + 1] = expm(rates * (seen_s + until_drive_s))

@@ -331,14 +331,14 @@ def test_start_and_restart_make_no_transient():
 @pytest.mark.parametrize("value", [-1.0, 0.0, math.nan, math.inf, "1"])
 def test_an_impossible_noise_model_is_refused(name, value):
     fields = dict(vars(Gains.default(spec("paper", "kalman")))) | {name: value}
-    with pytest.raises(ValueError, match=f"^{name} must be finite and more than 0, not "):
+    with pytest.raises(ValueError, match=f"^{name} must be "):
         Gains(**fields)
 
 
 def test_a_bandwidth_too_small_is_refused_with_the_least_acceleration():
     axis = spec("paper", "kalman")
-    gains = Gains(1e-40, 1.0, 1.0, 1.0)
-    with pytest.raises(ValueError, match=r"^acceleration_rms_m_per_s2 must be at least .* at these rates, not 1e-40"):
+    gains = Gains(1e-28, 1.0, 1.0, 1.0)
+    with pytest.raises(ValueError, match=r"^acceleration_rms_m_per_s2 must be at least .* at these rates, not 1e-28"):
         Design(axis, gains)
 
 

@@ -50,7 +50,7 @@ else:
 
 def placed(scene, *order) -> dict:
     """Return the report on a scene's axis."""
-    return synthesise(scene.spec, *order, glitch_clocks=scene.controller.glitch_clocks)
+    return synthesise(scene.spec, *order, glitch_clocks=scene.glitch_clocks)
 
 
 @pytest.fixture

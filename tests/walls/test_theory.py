@@ -65,7 +65,7 @@ def test_a_fast_undelayed_loop_has_the_limit_of_gil_and_hulin():
     """K < (b + B) / (T / 2 + delay) is linear stability's first order in T, without the estimator's half sample."""
     changes = {"controller.estimator": "fdm", "handle.viscous_n_s_per_m": 5.0}
     scene = load("mhz", changes)
-    delay_s = (scene.spec.design.latency_to_drive + latency(scene.controller.glitch_clocks)) / scene.spec.clock_hz
+    delay_s = (scene.spec.design.latency_to_drive + latency(scene.glitch_clocks)) / scene.spec.clock_hz
     expected = 5.0 / (0.5e-6 + delay_s)
     assert theory.linear_limit_n_per_m(theory.Loop(scene), 0.0) == pytest.approx(expected, rel=0.01)
 

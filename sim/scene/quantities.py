@@ -1,0 +1,46 @@
+"""The quantities of a scene, each a type with the range that is accepted.
+
+`tests/scene/test_quantities.py` runs the loop at both ends of every range. The ranges are wide enough for any device
+that a hand touches, and narrow enough that no sum or product of such numbers leaves the range of float64.
+"""
+
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from ...model.requirements import RATES_HZ
+
+
+def number(least: float, most: float) -> Any:
+    """Return the type of a number from `least` to `most`."""
+    return Annotated[float, Field(ge=least, le=most, allow_inf_nan=False)]
+
+
+def or_none(quantity: Any) -> Any:
+    """Return the type of a number that may also be 0, which stands for a part or an effect that is absent."""
+    (limits,) = quantity.__metadata__
+    return number(0.0, next(mark.le for mark in limits.metadata if hasattr(mark, "le")))
+
+
+Mass = number(1e-6, 1e3)  # the needle of an instrument, to a vehicle
+Length = number(1e-12, 1e3)  # a count of an interferometer, to a hall
+Place = number(-1e3, 1e3)
+Speed = number(1e-9, 1e5)  # a nanometre in a second, to what no encoder follows
+Acceleration = number(1e-9, 1e9)  # what shows after minutes, to the largest force on a gram
+Force = number(1e-12, 1e6)  # one step of the smallest force, to a press
+Stiffness = number(1e-6, 1e10)  # a hair, to a block of steel
+Damping = number(1e-9, 1e7)  # air on a needle, to many dampers of a vehicle
+Time = number(1e-9, 1e6)  # one clock of the fastest FPGA, to eleven days
+Step = number(1e-13, 1.0)  # the most steps of the slowest and of the fastest sample
+Threshold = number(1e-9, 1e3)  # mm: a picometre, to a metre
+Bandwidth = number(1e-3, 1e9)  # of a loop that takes minutes, to the clock of the fastest FPGA
+SlewRate = number(1e-9, 1e15)  # from none to the largest force in a nanosecond
+Current = number(1e-6, 1e6)
+Voltage = number(1e-3, 1e5)
+Resistance = number(1e-3, 1e6)
+Inductance = number(1e-9, 1e3)
+TorqueConstant = number(1e-6, 1e3)
+Radius = number(1e-4, 1e1)
+EdgeError = number(-1.0, 1.0)  # counts: a whole one puts an edge upon its neighbour
+Gain = number(1e-15, 1e15)  # in various units; the words of each estimator hold less, and say so
+Rate = Annotated[int, Field(ge=RATES_HZ[0], le=RATES_HZ[1])]

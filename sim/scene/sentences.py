@@ -1,0 +1,81 @@
+"""What a key of a scene accepts, and what is wrong with a scene, in words."""
+
+import difflib
+import types
+import typing
+from typing import Any
+
+from pydantic import BaseModel
+
+from ...model.checks import shown
+from .schema import Scene
+
+
+def accepted(kind: Any, marks: tuple = ()) -> str:
+    """Return what a key of a type accepts, with the limits that are annotated."""
+    origin, inner = typing.get_origin(kind), typing.get_args(kind)
+    if origin is typing.Annotated:
+        return accepted(inner[0], kind.__metadata__ + tuple(marks))
+    if origin in (typing.Union, types.UnionType):
+        return ", or ".join(accepted(one, marks) for one in inner if one is not types.NoneType)
+    if origin is typing.Literal:
+        return f"one of {', '.join(map(str, inner))}"
+    if origin is list:
+        return f"a list of {_limits(marks)['min_length']}, each {accepted(inner[0])}"
+    if kind in (int, float):
+        limits = _limits(marks)
+        return f"{'a whole number' if kind is int else 'a number'} of {limits['ge']:g} to {limits['le']:g}"
+    return {bool: "true or false", str: "a name"}.get(kind, "a section")
+
+
+def _limits(marks: tuple) -> dict[str, Any]:
+    """Return the limits among what a type is annotated with, the last and narrowest of each kind."""
+    several = [mark for data in marks for mark in (getattr(data, "metadata", None) or [data])]
+    names = ("ge", "le", "min_length")
+    return {name: getattr(mark, name) for mark in several for name in names if hasattr(mark, name)}
+
+
+def sections_of(model: type[BaseModel]) -> dict[str, type[BaseModel]]:
+    """Return the sections of a scene, or of a section, by name."""
+    kinds = {name: (field.annotation, *typing.get_args(field.annotation)) for name, field in model.model_fields.items()}
+    return {
+        name: kind
+        for name, several in kinds.items()
+        for kind in several
+        if isinstance(kind, type) and issubclass(kind, BaseModel)
+    }
+
+
+def stranger(key: tuple[str, ...]) -> str | None:
+    """Return the sentence that says that a key, by its parts, is none of a scene; None if it is one."""
+    section: type[BaseModel] = Scene
+    for depth, part in enumerate(key):
+        known = {name: field for name, field in section.model_fields.items() if (depth, name) != (0, "name")}
+        if part not in known:
+            near = difflib.get_close_matches(part, known, 1)
+            other = f"; did you mean {near[0]}?" if near else f"; its section has {', '.join(known) or 'no keys'}"
+            return f"{'.'.join(key[: depth + 1])} is not a key of a scene{other}"
+        if depth + 1 < len(key):
+            inner = sections_of(section)
+            if part not in inner:
+                return f"{'.'.join(key)} is not a key of a scene: {'.'.join(key[: depth + 1])} is no section"
+            section = inner[part]
+    return None
+
+
+def sentence(error: dict[str, Any]) -> str:
+    """Return one pydantic error as 'KEY must be ..., not VALUE'."""
+    if error["type"] == "extra_forbidden":
+        return stranger(tuple(map(str, error["loc"]))) or f"{'.'.join(map(str, error['loc']))} is not a key of a scene"
+    section, parts, kind, marks = Scene, [], None, ()
+    for part in error["loc"]:
+        if part not in section.model_fields:
+            break  # what follows is inside of a value
+        parts.append(part)
+        field, inner = section.model_fields[part], sections_of(section)
+        kind, marks = field.annotation, tuple(field.metadata)
+        section = inner.get(part, BaseModel)
+    key = ".".join(parts)
+    if error["type"] == "missing":
+        return f"{key} is missing"
+    return f"{key} must be {accepted(kind, marks)}, not {shown(error['input'])}"

@@ -1,0 +1,134 @@
+"""Files and changes of scenes that are refused: in a line, and at once."""
+
+import os
+
+import pytest
+
+from hardwall.model.quadrature_speed import max_edge_rate
+from hardwall.sim.scene.errors import SceneError
+from hardwall.sim.scene.load import BYTES_MAX, load, names, parse, read
+from hardwall.sim.scene.schema import Scene
+from hardwall.sim.scene.sentences import sections_of
+
+SEED = read("seed-2011")
+
+
+@pytest.mark.parametrize(
+    ("key", "said"),
+    [
+        ("handle.coulmb_n", "handle.coulmb_n is not a key of a scene; did you mean coulomb_n?"),
+        ("handel.coulomb_n", "handel is not a key of a scene; did you mean handle?"),
+        ("name", "name is not a key of a scene; its section has handle, "),
+        ("handle.mass_kg.x", "handle.mass_kg.x is not a key of a scene: handle.mass_kg is no section"),
+        ("handle.", "handle. is not a key of a scene; its section has mass_kg"),
+        (".", " is not a key of a scene; its section has handle"),
+    ],
+)
+@pytest.mark.parametrize("value", [None, 1.0])
+def test_a_key_that_is_none_is_refused_whatever_its_value(key, value, said):
+    with pytest.raises(SceneError) as refusal:
+        load("seed-2011", {key: value})
+    assert str(refusal.value).startswith(f"seed-2011: {said}")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("name = 'mine'\n" + SEED, "name is not a key of a scene: its file has its name"),
+        (SEED.replace("mass_kg = 0.35", f"mass_kg = {'9' * 5000}"), "must be a readable TOML file: Exceeds the limit"),
+        (SEED.replace("mass_kg = 0.35", f"mass_kg = {'9' * 4000}"), "handle.mass_kg must be a number of 1e-06 to 1000"),
+        (SEED.replace("1.0 ", "[" * 5000 + "1" + "]" * 5000), "must be a readable TOML file: it is nested too deeply"),
+        ("handle = 3", "handle must be a section, not 3"),
+        ("handle = [[1]]", "handle must be a section, not [[1]]"),
+        (
+            SEED.replace("travel_m = 0.15", "travel_m = 'a\\nb'"),
+            "controller.travel_m must be a number of 1e-12 to 1000",
+        ),
+    ],
+)
+def test_text_that_is_no_scene_is_refused_in_a_short_line(text, said):
+    with pytest.raises(SceneError) as refusal:
+        parse("seed-2011", text)
+    assert str(refusal.value).startswith(f"seed-2011: {said}")
+    assert "\n" not in str(refusal.value)
+    assert len(str(refusal.value)) < 300
+
+
+def test_a_file_that_is_no_regular_one_or_too_large_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe.toml")
+    (tmp_path / "folder.toml").mkdir()
+    (tmp_path / "large.toml").write_text("#" * (BYTES_MAX + 1))
+    for name, said in (("pipe", "not a regular file"), ("folder", "not a regular file"), ("large", "more than 1 MB")):
+        with pytest.raises(
+            SceneError, match=rf"^scene must be a readable \.toml file, not '{name}\.toml': it .*{said}$"
+        ):
+            load(f"{name}.toml")
+    with pytest.raises(SceneError, match=f"^scene must be one of .* not '{'x' * 50}"):
+        load("x" * 5000)
+    with pytest.raises(SceneError, match=r"x\.\.\.: File name too long$"):
+        load("x" * 5000 + ".toml")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (
+            {"zwidth.damping_from_n_s_per_m": 1e6},
+            "zwidth.damping_to_n_s_per_m must be at least zwidth.damping_from_n_s_per_m, 1e+06, not 300.0",
+        ),
+        (
+            {"zwidth.damping_to_n_s_per_m": 500.0},
+            "zwidth.damping_to_n_s_per_m must be at most controller.damping_max_n_s_per_m, 400, not 500.0",
+        ),
+        (
+            {"encoder.phase_error_counts": 0.7},
+            "encoder.phase_error_counts and duty_error_counts must move each edge by less than 0.5 counts, not 0.7",
+        ),
+        ({"controller.slew_limit_n_per_s": 1e-9}, "controller.slew_limit_n_per_s must be at least 0.5, half of its"),
+        ({"wall.stiffness_n_per_m": 1.0}, "wall.stiffness_n_per_m must be at least 1.95313, half of its word's LSB"),
+        (
+            {"protocol.settle_s": 100.0, "amplifier.delay_s": 101.0},
+            "amplifier.delay_s must be at most protocol.settle_s, 100, not 101.0",
+        ),
+        (
+            {"protocol.settle_s": 1e4, "amplifier.delay_s": 1e3},
+            "amplifier.delay_s must be at most 100, 1000000 samples, not 1000.0",
+        ),
+        ({"controller.output": ""}, "controller.output must be one of u, u1, not ''"),
+    ],
+)
+def test_keys_that_contradict_each_other_are_both_named(changes, said):
+    with pytest.raises(SceneError) as refusal:
+        load("seed-2011", changes)
+    assert str(refusal.value).startswith(f"seed-2011: {said}")
+
+
+def test_every_number_has_a_range():
+    def ends(schema: dict) -> list[dict]:
+        inner = schema.get("anyOf", []) + ([schema["items"]] if "items" in schema else [])
+        return [schema, *(each for part in inner for each in ends(part))]
+
+    sections, found = list(sections_of(Scene).values()), 0
+    while sections:
+        section = sections.pop()
+        sections += sections_of(section).values()
+        for key, schema in section.model_json_schema()["properties"].items():
+            for part in ends(schema):
+                if part.get("type") in ("number", "integer"):
+                    assert {"minimum", "maximum"} <= part.keys(), f"{section.__name__}.{key}"
+                    found += 1
+    assert found > 60
+
+
+@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("errors", [0.0, 0.3])
+def test_without_a_glitch_filter_given_it_is_the_longest_that_leaves_twice_the_speed(name, errors):
+    scene = load(name, {"controller.glitch_clocks": None, "encoder.phase_error_counts": errors})
+    glitch, rate = scene.glitch_clocks, scene.spec.edges_per_clock_max
+    assert scene.words["encoder_glitch_clocks"] == glitch > 0
+    assert max_edge_rate(1.0, glitch, errors) >= 2 * rate
+    assert glitch == 15 or max_edge_rate(1.0, glitch + 1, errors) < 2 * rate
+    reset = next(word.reset for word in scene.spec.design.words if word.name == "encoder_glitch_clocks")
+    assert reset == load(name, {"controller.glitch_clocks": None}).glitch_clocks
+    assert load(name).glitch_clocks == 2

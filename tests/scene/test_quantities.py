@@ -1,0 +1,80 @@
+"""Scenes at the ends of their ranges: refused in a line, or run to finite numbers on both models."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hardwall.sim.scene.errors import SceneError
+from hardwall.sim.scene.load import load
+from hardwall.sim.scene.schema import Scene
+from hardwall.sim.scene.sentences import sections_of
+from hardwall.sim.walls import hit
+
+# Thirty samples beside the wall, so that the stiffest devices do not take long either.
+BRIEF = {"protocol.start_m": -2e-6, "protocol.settle_s": 2e-3, "protocol.mean_s": 1e-3, "protocol.measure_s": 1e-3}
+# With 0 a part is left out, and the loop is compiled without it.
+LEFT_OUT = {("handle.coulomb_n", 0.0), ("amplifier.delay_s", 0.0)}
+HELD = {"handle.coulomb_n", "protocol.push_n"}
+"""Keys of the handle's friction, and of what overcomes it."""
+
+
+def ends_of(base: str) -> list[tuple[str, float]]:
+    """Return every number of a scene's sections with the least and the largest value that it accepts."""
+    scene, found = load(base), []
+    for name, section in sections_of(Scene).items():
+        if getattr(scene, name) is None:
+            continue
+        for key, schema in section.model_json_schema()["properties"].items():
+            for part in [schema, *schema.get("anyOf", [])]:
+                if part.get("type") in ("number", "integer"):
+                    number = int if part["type"] == "integer" else float
+                    found += [(f"{name}.{key}", number(part[end])) for end in ("minimum", "maximum")]
+    return [end for end in dict.fromkeys(found) if end not in LEFT_OUT]
+
+
+def run(base: str, changes: dict[str, float]) -> list[hit.Hit]:
+    """Return the hits of a scene with changes on both models; none if the scene or the run is refused."""
+    try:
+        scene = load(base, BRIEF | changes)
+        found = [hit.run(scene, backend) for backend in ("float", "fixed")]
+    except (SceneError, RuntimeError) as refusal:
+        told, found = str(refusal), []
+    if not found:
+        assert "\n" not in told
+        assert len(told) < 400
+        assert told.startswith((f"{base}: ", "the handle passed more than"))
+    for result in found:
+        assert all(map(math.isfinite, (result.mean_m, result.rms_m, result.max_force_n)))
+        assert result.samples == scene.samples
+        assert 0 <= result.max_force_n <= scene.spec.force_max_n * (1 + 1e-9)
+    return found
+
+
+@pytest.mark.parametrize("base", ["seed-2011", "drive-2011"])
+@settings(derandomize=True, deadline=None, max_examples=60)
+@given(data=st.data())
+def test_the_ends_of_all_ranges_are_refused_or_give_finite_numbers(base, data):
+    ends = st.sampled_from(ends_of(base))
+    changes = dict(data.draw(st.lists(ends, min_size=1, max_size=3, unique_by=lambda end: end[0])))
+    found = run(base, changes)
+    if found and base == "seed-2011" and not HELD & changes.keys():
+        start_m = changes.get("protocol.start_m", BRIEF["protocol.start_m"])
+        assert all(result.mean_m != start_m for result in found), "the handle never moved"
+
+
+@pytest.mark.parametrize("mass_kg", [1e-6, 1e3])
+def test_the_lightest_and_the_heaviest_handle_fall_as_they_should(mass_kg):
+    """Under 0.2572 N, what friction leaves of the push, on the way to a far wall."""
+    changes = {"protocol.start_m": -0.14, "handle.mass_kg": mass_kg, "handle.viscous_n_s_per_m": 0.0}
+    scene = load("seed-2011", BRIEF | changes | {"protocol.mean_s": 1e-4})
+    result = hit.run(scene, "fixed")
+    # The mean is that of the last sample before the end of settling; the first one was taken at rest.
+    assert result.mean_m + 0.14 == pytest.approx(0.2572 / mass_kg * 1.9e-3**2 / 2, rel=1e-9 if mass_kg < 1 else 1e-3)
+
+
+@pytest.mark.parametrize("mass_kg", [0.0, 1e-320, 9.99e-7, 1001.0, math.inf, math.nan, 10**400])
+def test_a_number_outside_its_range_is_refused_with_the_range(mass_kg):
+    with pytest.raises(SceneError, match=r"^seed-2011: handle\.mass_kg must be a number of 1e-06 to 1000, not "):
+        load("seed-2011", {"handle.mass_kg": mass_kg})
