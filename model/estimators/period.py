@@ -28,9 +28,8 @@ the M/T method; the bound by the time since the last edge is classical.
 
 Formats, derived.
 
-- `velocity` SQ(i, f): i holds twice the largest speed. The rounding, half an LSB, is at most ERROR_SHARE of the stamp's
-  error v^2 / 4 c at the design speed (or at the largest speed, if that is less), but need not be finer than ERROR_SHARE
-  of the slowest readable speed, one cycle in the age limit.
+- `velocity` SQ(i, f): i holds twice the largest speed. The rounding, half an LSB, is at most ERROR_SHARE of the slowest
+  speed that can be read, one cycle in the age limit, and so of every speed: f follows from clock and rate alone.
 - The quotient is unsigned and has one bit more for rounding half up, so it is as wide as `velocity`.
 - Cycles: the decoder counts at most one edge a clock, so a sample has at most ceil(c / 4) cycles; more are limited.
 
@@ -58,7 +57,7 @@ from .cycle_times import AGE_LIMIT, NOTHING, Memory, observe
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 
 ERROR_SHARE = 0.01
-"""Rounding error, as a part of the stamp's error."""
+"""The largest rounding error, as a part of any speed that can be read."""
 DIVIDEND_BITS = 56
 """Most bits of stamp and sample together: a dividend, at most c 4 ceil(c / 4) 2**(f + 1) < 2**(stamp_width + 6) c, is
 then an int64."""
@@ -121,11 +120,8 @@ def velocity_format(axis, least_fraction: int = 0) -> SQ:
         ValueError: if int64 cannot hold a word of that format.
     """
     clocks, speed = axis.clocks_per_sample, axis.speed_max_counts_per_sample
-    acceleration = axis.acceleration_max_m_per_s2 / (axis.count_m * axis.sample_hz**2)
-    design_speed = min((4 * clocks * acceleration) ** (1 / 3), speed)
     slowest = 4 * clocks / (AGE_LIMIT * 2.0**axis.stamp_width)
-    half_lsb = ERROR_SHARE * max(design_speed**2 / (4 * clocks), slowest)
-    i, f = 1 + max(1, bits_for(2 * speed)), max(bits_for(0.5 / half_lsb), least_fraction)
+    i, f = 1 + max(1, bits_for(2 * speed)), max(bits_for(0.5 / (ERROR_SHARE * slowest)), least_fraction)
     if i + f > 62:
         most = 2.0 ** (60 - f) * axis.velocity_unit_m_per_s
         raise FieldError("speed_max_m_per_s", f"must be at most {most:g}, not {axis.speed_max_m_per_s!r}")

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from hardwall.hdl.estimators.period import Estimator
+from hardwall.model import stamped
+from hardwall.model.axis import Axis
 from hardwall.model.estimators import period
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.period import FLOAT_START, START
@@ -211,3 +213,38 @@ def test_latency_leaves_the_force_path_its_clocks(bound):
 def test_wrong_design_is_refused():
     with pytest.raises(TypeError, match=r"not 3$"):
         Estimator(3)
+
+
+@pytest.mark.parametrize("name", ["mhz", "paper", "narrow", "wide"])
+def test_rounding_is_at_most_a_hundredth_of_every_speed_that_can_be_read(name):
+    d = design(name)
+    slowest = 4 * d.clocks / (period.AGE_LIMIT * 2.0**d.stamp_width)  # counts a sample: a cycle in the age limit
+    assert d.velocity.lsb / 2 <= period.ERROR_SHARE * slowest
+
+
+@pytest.mark.parametrize("rate", [10_000, 1_000_000])
+def test_a_hundredth_of_a_millimetre_a_second_is_read(rate):
+    """A step of 1 um lasts 0.1 s; stamps are exact to 0.2 ppm of it, so what is off is the rounding."""
+    row = accuracy.measure(NAME, "u", "steady:0.01", rate, "fixed")
+    assert 0 < row["max_mm_s"] < 0.01 * 0.01
+
+
+def test_a_filter_by_default_keeps_short_pulses_from_the_estimate():
+    """Ten pulses a second of two clocks, at 10 mm/s; without a filter they are edges of a fast motion, unflagged."""
+    axis = spec("mhz", NAME)
+    apart = round(1e-6 / 10e-3 * axis.clock_hz)  # clocks from one edge to the next
+    number = np.arange(1, 3_001)
+    pulses = apart * (number[100::1000] + 1) - 50  # on B, a little before the next edge
+    level = ((number + 1) & 3) ^ (((number + 1) & 3) >> 1)
+    within = level[pulses // apart - 1]
+    clocks = np.concatenate([apart * number, pulses, pulses + 2])
+    levels = np.concatenate([level, within ^ 2, within])
+    order = np.argsort(clocks, kind="stable")
+    worst = {}
+    for glitch in ({}, {"encoder_glitch_clocks": 0}):
+        of = Axis(axis, **glitch)
+        seen = stamped.run(of, clocks[order], levels[order], 3_000 * apart // axis.clocks_per_sample, int(level[-1]))
+        assert of.design.flag_names(int(seen.flags[-1])) == []
+        worst[of.words["encoder_glitch_clocks"]] = np.abs(seen.velocity_m_per_s[1_000:] - 10e-3).max()
+    assert worst[15] < 10e-6
+    assert worst[0] > 1.0
