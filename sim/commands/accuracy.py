@@ -13,9 +13,11 @@ from ..jobs.store import Store
 from ..studies import accuracy
 from ..world.encoder import offsets
 from .errors import BadInput
-from .options import BackendOption, EstimatorsOption, curves_of, rates_of
+from .options import BackendOption, EstimatorsOption, curves_of, rates_of, within
 from .study import StudyOptions, study
 
+ACCELERATIONS_M_PER_S2 = 1e-9, 1e6
+"""The least and the largest bound C: one that shows after minutes, and one beyond any motor."""
 DRAWN_HZ_MAX = 100_000
 """The highest rate at which Figure 1 is drawn, sample by sample."""
 
@@ -48,8 +50,8 @@ def command(
         raise BadInput(
             "--rates, --encoder-phase-error and --acceleration-max are for known motions: a recording has its own"
         )
-    if acceleration_max is not None and not 0 < acceleration_max < 1e6:
-        raise BadInput(f"--acceleration-max must be more than 0 and less than 1e6 m/s^2, not {acceleration_max!r}")
+    if acceleration_max is not None:
+        within(acceleration_max, "--acceleration-max", *ACCELERATIONS_M_PER_S2, "m/s^2")
     at = figures.RATES_HZ[figure or 2] if rates is None else rates_of(rates, "--rates")
     if options.plot and (recorded or len(known) > 1):
         raise BadInput("--plot draws error against rate for one signal that is no recording: give one --signal")

@@ -12,7 +12,7 @@ import sys
 from importlib import import_module
 
 from ..scene.errors import SceneError
-from .errors import BadInput
+from .errors import BadInput, one_line
 
 
 def main() -> None:
@@ -32,7 +32,7 @@ def main() -> None:
     else:
         return
     if message:
-        print(f"hardwall: error: {message}", file=sys.stderr)
+        print(f"hardwall: error: {one_line(message)}", file=sys.stderr)
     sys.exit(code)
 
 

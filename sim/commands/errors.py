@@ -1,4 +1,9 @@
-"""The error for invalid input."""
+"""The error for invalid input, and the one line that is printed of any error."""
+
+
+def one_line(message: str) -> str:
+    """Return a message with its line breaks and other characters that do not print escaped, as in a name of a file."""
+    return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in message)
 
 
 class BadInput(Exception):

@@ -23,8 +23,8 @@ def command(
         Literal["3-30", "30-300"] | None,
         typer.Option("--axis", metavar="B", help="of the paper's B axis, N s/m: 3-30 or 30-300", show_default="both"),
     ] = None,
-    evaluations: Annotated[int, typer.Option(min=1, help="of a search, about so many")] = 576,
-    seed: Annotated[int, typer.Option(min=0, help="of a search")] = 1,
+    evaluations: Annotated[int, typer.Option(min=1, max=10**9, help="of a search, about so many")] = 576,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="of a search")] = 1,
     backend: ModelOption = "fixed",
 ) -> None:
     changes, fits = options.changes(), []

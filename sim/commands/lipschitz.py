@@ -6,18 +6,23 @@ import typer
 
 from ..scene.case import Case
 from ..studies import lipschitz
-from .options import GAINS, SceneArgument, refuse
+from .options import GAINS, SceneArgument, refuse, within
 from .study import StudyOptions, study
+
+RECORD_MAX_S = 1e6
+"""The longest record on either side of the contact: that of the longest protocol."""
 
 
 @study("set_", "plot")
 def command(
     options: StudyOptions,
     scene: SceneArgument = "seed-2011",
-    before: Annotated[float, typer.Option(min=0.0, metavar="S", help="of the record, before the contact")] = 0.1,
-    after: Annotated[float, typer.Option(min=1e-3, metavar="S", help="and after it")] = 0.4,
+    before: Annotated[float, typer.Option(metavar="S", help="of the record, before the contact")] = 0.1,
+    after: Annotated[float, typer.Option(metavar="S", help="and after it")] = 0.4,
     sines: Annotated[int, typer.Option(min=1, max=20, help="how many are fitted")] = 7,
 ) -> None:
+    within(before, "--before", 0.0, RECORD_MAX_S, "s")
+    within(after, "--after", 1e-3, RECORD_MAX_S, "s")
     case = Case.of(scene, options.changes())
     refuse(case.changes, GAINS, "it takes the paper's filter")
     options.finish(lipschitz.study(case, before, after, sines))

@@ -1,14 +1,16 @@
 """The options of the commands, and the checks of their values."""
 
-import tomllib
+import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
 
+from ...model.checks import shown
 from ...model.estimators import registry
 from ..estimates.accuracy import RATES_HZ, outputs
-from ..scene.load import names
+from ..scene.load import names, toml_of
 from ..walls.methods import Curve, label
 from .errors import BadInput
 
@@ -28,7 +30,7 @@ DeviceOption = Annotated[Device, typer.Option(help="the part to place and route 
 SeedsOption = Annotated[int, typer.Option(min=1, max=99, help="how many placements; fmax is their median")]
 RateOption = Annotated[float, typer.Option(metavar="HZ", help="sample rate")]
 
-WorkersOption = Annotated[int | None, typer.Option(min=1, help="processes", show_default="one a core")]
+WorkersOption = Annotated[int | None, typer.Option(min=1, max=1024, help="processes", show_default="one a core")]
 SchedulerOption = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="of a Dask cluster that runs, in place of workers of its own")
 ]
@@ -43,17 +45,39 @@ JsonOption = Annotated[bool, typer.Option("--json", help="print JSON on stdout, 
 
 def changes_of(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
     """Return scene changes from `--set` and from options for single keys (None: not given)."""
-    changes = {}
+    changes: dict[str, Any] = {}
     for assignment in assignments or []:
         key, equals, text = assignment.partition("=")
         if not equals or not key:
-            raise BadInput(f"--set must be KEY=VALUE, not {assignment!r}")
-        try:
-            changes[key] = tomllib.loads(f"value = {text}")["value"] if text else None
-        except tomllib.TOMLDecodeError:
-            changes[key] = text
-    named = {key.replace("__", "."): value for key, value in options.items() if value is not None}
-    return changes | named
+            raise BadInput(f"--set must be KEY=VALUE, not {shown(assignment)}")
+        _change(changes, "--set", key, value_of(key, text) if text else None)
+    for name, value in options.items():
+        if value is not None:
+            key = name.replace("__", ".")
+            _change(changes, f"--{key.rpartition('.')[2].partition('_')[0]}", key, value)
+    return changes
+
+
+def _change(changes: dict[str, Any], option: str, key: str, value: Any) -> None:
+    """Add the change of a key by an option; a key may be changed once, and not after keys inside of it."""
+    for earlier in changes:
+        if f"{earlier}.".startswith(f"{key}."):
+            raise BadInput(f"{option} must change each key once, not {shown(key)} after {shown(earlier)}")
+    changes[key] = value
+
+
+def value_of(key: str, text: str) -> Any:
+    """Return the value of a key on the command line: one TOML value; what is no TOML is a text of its own."""
+    if not text.isprintable():
+        raise BadInput(f"--set {shown(key)} must be one value on one line, not {shown(text)}")
+    try:
+        # Nothing can follow a value in an inline table but another key.
+        found = toml_of(f"table = {{ value = {text} }}")
+    except ValueError:
+        return text
+    if found.keys() != {"table"} or found["table"].keys() != {"value"}:
+        raise BadInput(f"--set {shown(key)} must be one value, not {shown(text)}")
+    return found["table"]["value"]
 
 
 GAINS = ("controller.estimator", "controller.output", "controller.gains")
@@ -64,7 +88,7 @@ def refuse(changes: dict[str, Any], keys: tuple[str, ...], instead: str) -> None
     """Refuse changes of scene keys that the command sets itself; `instead` is the reason."""
     for key in changes:
         if key.startswith(keys):
-            raise BadInput(f"--set {key} is what this command sets itself: {instead}")
+            raise BadInput(f"--set {shown(key)} is what this command sets itself: {instead}")
 
 
 def refuse_for_maps(changes: dict[str, Any], estimators: str) -> None:
@@ -103,23 +127,47 @@ def rates_of(text: str, option: str) -> list[int]:
         except ValueError:
             rate = 0.0
         if not (RATES_HZ[0] <= rate <= RATES_HZ[1] and rate == int(rate)):
-            raise BadInput(f"{option} must be whole numbers of {RATES_HZ[0]:g} to {RATES_HZ[1]:g} Hz, not {word!r}")
+            raise BadInput(
+                f"{option} must be whole numbers of {RATES_HZ[0]:g} to {RATES_HZ[1]:g} Hz, not {shown(word)}"
+            )
         rates.append(int(rate))
     return list(dict.fromkeys(rates))
 
 
-def output_file(path: Path | None, option: str, suffixes: tuple[str, ...]) -> Path | None:
-    """Make the folder of an output file and return its path; raise BadInput if the file could not be written."""
+def within(value: float, option: str, least: float, most: float, unit: str) -> float:
+    """Return the number that was given with an option; raise BadInput if it is not `least` to `most`."""
+    if not least <= value <= most:
+        raise BadInput(f"{option} must be {least:g} to {most:g} {unit}, not {value!r}")
+    return value
+
+
+def output_file(
+    path: Path | None, option: str, suffixes: tuple[str, ...], other_than: Path | None = None
+) -> Path | None:
+    """Make the folder of an output file and return its path; raise BadInput if the file could not be written.
+
+    Args:
+        path: the file; None for none.
+        option: the option that gave it.
+        suffixes: the accepted ends of its name.
+        other_than: a file that is read, and must not be overwritten.
+    """
     if path is None:
         return None
     if path.suffix not in suffixes:
-        raise BadInput(f"{option} must end in {' or '.join(suffixes)}, not {str(path)!r}")
+        raise BadInput(f"{option} must end in {' or '.join(suffixes)}, not {shown(str(path))}")
+    with suppress(OSError):
+        if other_than is not None and path.samefile(other_than):
+            raise BadInput(f"{option} must be another file than the recording, not {shown(str(path))}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        is_new = not os.path.lexists(path)
+        if path.exists() and not path.is_file():
+            raise BadInput(f"{option} must be a regular file, not {shown(str(path))}")
         with path.open("ab"):
             pass
+        if is_new:
+            path.unlink()
     except OSError as error:
-        raise BadInput(f"{option} {str(path)!r} cannot be written: {error.strerror}") from None
-    if path.stat().st_size == 0:
-        path.unlink()
+        raise BadInput(f"{option} {shown(str(path))} cannot be written: {error.strerror}") from None
     return path

@@ -30,9 +30,7 @@ def command(
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="write the velocities")] = None,
 ) -> None:
-    if out and out.exists() and file.exists() and out.samefile(file):
-        raise BadInput(f"--out must be another file than the recording, not {str(out)!r}")
-    out = output_file(out, "--out", (".csv",))
+    out = output_file(out, "--out", (".csv",), other_than=file)
     try:
         recorded = recording.load(file, column, rate)
         with progress(f"{file.name} {estimator} {backend}", len(recorded.counts)) as advance:

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from ...model.checks import shown
 from ..rtl.sources import write_verilog
 from ..scene.case import Case
 from .errors import BadInput
@@ -23,4 +24,4 @@ def command(
         for path in write_verilog(spec, folder):
             print(path)
     except OSError as error:
-        raise BadInput(f"-o {str(folder)!r} cannot be written: {error.strerror}") from None
+        raise BadInput(f"-o {shown(str(folder))} cannot be written: {error.strerror}") from None

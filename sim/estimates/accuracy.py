@@ -37,11 +37,11 @@ def outputs(text: str) -> list[tuple[str, str]]:
     Raises:
         ValueError: if there is no such estimator or output.
     """
-    name, _, output = text.partition(":")
+    name, colon, output = text.partition(":")
     design = registry.design_of(name)
-    if output:
+    if colon:
         design.choose(output)
-    return [(name, chosen) for chosen in ([output] if output else design.outputs)]
+    return [(name, chosen) for chosen in ([output] if colon else design.outputs)]
 
 
 def axis_spec(

@@ -1,0 +1,150 @@
+"""Options whose values are refused: before any work, in one short line, whatever their length."""
+
+import json
+import os
+
+import pytest
+
+from hardwall.sim.commands import options
+from hardwall.sim.commands.errors import BadInput, one_line
+from stimuli.command_line import call
+
+LONG = "x" * 5000
+DIGITS = "9" * 5000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["hit", "--set", "handle.coulmb_n="], "seed-2011: handle.coulmb_n is not a key of a scene; did you mean coul"),
+        (["hit", "--set", "name=anything"], "seed-2011: name is not a key of a scene; its section has handle"),
+        (
+            ["hit", "--set", "handle.mass_kg=1.0\nhandle.coulomb_n=2.0"],
+            "--set 'handle.mass_kg' must be one value on one line, not '1.0\\nhandle.coulomb_n=2.0'",
+        ),
+        (
+            ["hit", "--set", "handle.mass_kg=1.0, other = 2"],
+            "--set 'handle.mass_kg' must be one value, not '1.0, other = 2'",
+        ),
+        (["hit", "--set", "handle.mass_kg=1.0 # heavy"], "seed-2011: handle.mass_kg must be a number of 1e-06 to 1000"),
+        (["hit", "--set", "handle.mass_kg=1 2"], "seed-2011: handle.mass_kg must be a number of 1e-06 to 1000, not '1"),
+        (["hit", "--set", f"handle.mass_kg={DIGITS}"], "seed-2011: handle.mass_kg must be a number of 1e-06 to 1000"),
+        (["hit", "--set", f"handle.mass_kg={'[' * 5000}"], "seed-2011: handle.mass_kg must be a number of 1e-06 to"),
+        (
+            ["hit", "--set", "handle.mass_kg=1.0", "--set", "handle.mass_kg=2.0"],
+            "--set must change each key once, not 'handle.mass_kg' after 'handle.mass_kg'",
+        ),
+        (
+            ["hit", "--set", "amplifier.delay_s=0.0", "--set", "amplifier="],
+            "--set must change each key once, not 'amplifier' after 'amplifier.delay_s'",
+        ),
+        (
+            ["hit", "--set", "wall.stiffness_n_per_m=1e3", "--stiffness", "2e3"],
+            "--stiffness must change each key once, not 'wall.stiffness_n_per_m' after 'wall.stiffness_n_per_m'",
+        ),
+        (["hit", "--output", ""], "seed-2011: controller.output must be one of u, u1, not ''"),
+        (["hit", "--plot", "pipe.png"], "--plot must be a regular file, not 'pipe.png'"),
+        (["hit", "--trace", "pipe.npz"], "--trace must be a regular file, not 'pipe.npz'"),
+        (["hit", "--plot", f"{LONG}.png"], "--plot 'xxxx"),
+        (["hit", "a\nb"], "scene must be one of desktop-arm, "),
+        (["hit", LONG], "scene must be one of desktop-arm, "),
+        (
+            ["hit", "drive-2011", "--set", "motor.torque_constant_n_m_per_a=1e300"],
+            "drive-2011: motor.torque_constant_n_m_per_a must be",
+        ),
+        (["rates", "--rates", ""], "--rates must be whole numbers of 1000 to 1e+07 Hz, not ''"),
+        (["rates", "--estimators", ""], "--estimators: estimator must be one of fdm, "),
+        (["rates", "--estimators", "abc"], "--estimators: estimator must be one of fdm, "),
+        (["accuracy", "--estimators", "levant:"], "--estimators: output of levant must be one of u, u1, not ''"),
+        (["accuracy", "--signal", ""], "--signal: signal must be one of paper, "),
+        (["accuracy", "--acceleration-max", "1e-300"], "--acceleration-max must be 1e-09 to 1e+06 m/s^2, not 1e-300"),
+        (["accuracy", "--rates", LONG], "--rates must be whole numbers of 1000 to 1e+07 Hz, not 'xxxx"),
+        (["accuracy", "--workers", "100000"], "Invalid value for '--workers': "),
+        (["lipschitz", "--after", "inf"], "--after must be 0.001 to 1e+06 s, not inf"),
+        (["lipschitz", "--before", "1e400"], "--before must be 0 to 1e+06 s, not inf"),
+        (["lipschitz", "--before", "nan"], "--before must be 0 to 1e+06 s, not nan"),
+        (["replay", "r.csv", "--column", "c", "--out", f"{LONG}.csv"], "--out 'xxxx"),
+        (["replay", "r.csv", "--column", "c", "--out", "r.csv"], "--out must be another file than the recording"),
+        (["replay", LONG, "--column", "c"], "'xxxx"),
+        (["replay", "pipe.png", "--column", "c"], "pipe.png: cannot be read (it is not a regular file); must be a CSV"),
+        (["replay", "r.csv", "--column", "c"], "r.csv: is empty; must be a CSV file"),
+        (["table", "/dev/zero"], "'/dev/zero' must be a JSON report of `hardwall hit --json`, and is none: it is not"),
+        (["verilog", "-o", f"{LONG}"], "-o 'xxxx"),
+    ],
+)
+def test_it_is_refused_in_a_short_line_before_any_work(monkeypatch, capsys, tmp_path, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    for name in ("pipe.png", "pipe.npz"):
+        os.mkfifo(name)
+    (tmp_path / "r.csv").touch()
+    code, out, err = call(monkeypatch, capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith(f"hardwall: error: {message}")
+    assert err.count("\n") == 1
+    assert len(err) < 500
+    assert {path.name for path in tmp_path.iterdir()} == {"pipe.png", "pipe.npz", "r.csv"}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("1", 1), ("[1, 2]", [1, 2]), ("{ a = 1 }", {"a": 1}), ("levant", "levant"), ("'u1'", "u1"), ("1, a = 2", None)],
+)
+def test_a_value_is_one_toml_value_or_a_text(text, value):
+    if value is not None:
+        assert options.value_of("key", text) == value
+    else:
+        with pytest.raises(BadInput, match=r"^--set 'key' must be one value, not '1, a = 2'$"):
+            options.value_of("key", text)
+
+
+def test_what_does_not_print_is_escaped():
+    assert one_line("a\nb\x1b[31m\udcffé") == "a\\nb\\x1b[31m\\udcffé"
+
+
+REPORT = {
+    "estimator": "fdm",
+    "output": "u",
+    "backend": "fixed",
+    "scene": "seed-2011",
+    "stiffness_n_per_m": 1e3,
+    "damping_n_s_per_m": 2.0,
+    "stable": True,
+    "rms_mm": 0.1,
+    "max_force_n": 3.0,
+    "estimate_rms_mm_per_s": None,
+    "force_sha256": None,
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"stiffness_n_per_m": "stiff"}, "stiffness_n_per_m: "),
+        ({"stable": "no"}, "stable: "),
+        ({"rms_mm": float("inf")}, "rms_mm: "),
+        ({"force_sha256": 5}, "force_sha256: "),
+        ({"scene": "x" * 10**5}, "scene: "),
+        ({"max_force_n": 10**400}, "max_force_n: "),
+    ],
+)
+def test_a_report_of_wrong_types_is_refused(monkeypatch, capsys, tmp_path, change, said):
+    file = tmp_path / "r.json"
+    monkeypatch.chdir(tmp_path)
+    file.write_text(json.dumps(REPORT))
+    assert call(monkeypatch, capsys, "table", "r.json")[0] == 0
+    file.write_text(json.dumps(REPORT | change))
+    code, out, err = call(monkeypatch, capsys, "table", "r.json")
+    assert (code, out) == (2, "")
+    assert err.startswith(
+        f"hardwall: error: 'r.json' must be a JSON report of `hardwall hit --json`, and is none: {said}"
+    )
+    assert err.count("\n") == 1
+    assert len(err) < 300
+
+
+@pytest.mark.parametrize("text", ["", "5", "[" * 10**5, '{"rms_mm": ' + DIGITS + "}", "\xff", "null"])
+def test_what_is_no_report_is_refused(monkeypatch, capsys, tmp_path, text):
+    (tmp_path / "r.json").write_text(text, encoding="latin-1")
+    code, _, err = call(monkeypatch, capsys, "table", tmp_path / "r.json")
+    assert (code, err.count("\n")) == (2, 1)
+    assert len(err) < 400
