@@ -11,7 +11,6 @@ distinguish from no acceleration, or the least C that the words can hold with it
 """
 
 import hashlib
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...model.checks import NUMBERS, shown
 from ...model.estimators import registry
 from ...model.quadrature_speed import max_edge_rate
 from ...model.spec import AxisSpec
@@ -32,6 +32,8 @@ from .through_pins import GLITCH_CLOCKS
 
 CLOCK_MAX_HZ = 100e6
 """The fastest clock of a replay; counts that change too fast for it are a fault of the recording, not a motion."""
+EDGES_MAX = 1 << 24
+"""The most edges in a sample that go through the pins: all of them are in memory."""
 
 
 class ReplayError(ValueError):
@@ -157,19 +159,19 @@ class Replay(Summary):
 
 def _one_of(name: str, value: object, accepted: tuple[str, ...]) -> None:
     if value not in accepted:
-        raise ReplayError(f"{name} must be one of {', '.join(accepted)}, not {value!r}")
+        raise ReplayError(f"{name} must be one of {', '.join(accepted)}, not {shown(value)}")
 
 
 def _check_speed(recording: Recording, counts: np.ndarray, count: int) -> None:
     """Raise ReplayError, naming the sample, if a change is too fast for the pins."""
     steps = np.abs(np.diff(counts))
-    most = max_edge_rate(CLOCK_MAX_HZ, GLITCH_CLOCKS) / recording.rate_hz
+    most = min(max_edge_rate(CLOCK_MAX_HZ, GLITCH_CLOCKS) / recording.rate_hz, EDGES_MAX)
     if steps.max() > most:
         k = int(np.argmax(steps > most)) + 1
         coarse = "" if count == 1 else f" of {count}"
         raise ReplayError(
             f"{recording.file}, column {recording.column}: on rtl the count must change by at most {int(most)}{coarse} "
-            f"in a sample at {recording.rate_hz:g} Hz (a clock of {CLOCK_MAX_HZ / 1e6:g} MHz), "
+            f"in a sample at {recording.rate_hz:g} Hz (a clock of {CLOCK_MAX_HZ / 1e6:g} MHz, and {EDGES_MAX} edges), "
             f"not by {steps[k - 1]} at sample {k}, {recording.time_s[k]:g} s"
         )
 
@@ -196,8 +198,9 @@ def _check_numbers(recording: Recording, coarsen: object, bound: float | None, c
         )
     if not 0 < cutoff < rate / 2:
         raise ReplayError(f"reference_hz must be more than 0 and less than {rate / 2:g}, half the rate, not {cutoff!r}")
-    if bound is not None and not (math.isfinite(bound) and bound > 0):
-        raise ReplayError(f"acceleration_max_counts_per_s2 must be finite and more than 0, not {bound!r}")
+    least, most = (number * (rate / SECOND) ** 2 for number in NUMBERS)
+    if bound is not None and not least <= bound <= most:
+        raise ReplayError(f"acceleration_max_counts_per_s2 must be {least:g} to {most:g} at {rate:g} Hz, not {bound!r}")
 
 
 def _counts_for(recording: Recording, count: int, pins: bool) -> np.ndarray:
