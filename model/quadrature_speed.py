@@ -45,22 +45,16 @@ def max_edge_rate(clock_hz: float, glitch_clocks: int, edge_error: float = 0.0) 
 
 
 def glitch_clocks_for(edges_per_clock: float, edge_error: float = 0.0) -> int:
-    """Return the glitch filter for a largest rate of edges: the longest that counts exactly at `SPEED_MARGIN` times it.
+    """Return the glitch filter for a largest rate of edges: the longest that leaves `SPEED_MARGIN` times it.
 
     The shortest level at that rate r lasts (2 - 2 `edge_error`) / r clocks and must be at least glitch_clocks + 1
     clocks long: see `max_edge_rate`. The result is 0 where not even one clock can be filtered, and otherwise at most
     `GLITCH_CLOCKS_MAX`. Pulses up to that length then change nothing, whereas without a filter every pulse that a
     clock sees is counted forth and back, with stamps of an encoder that seems to move at two edges in its length.
-
-    Raises:
-        ValueError: if `edge_error` is not from 0 to less than 0.5.
     """
-    passing = [
-        glitch_clocks
-        for glitch_clocks in range(GLITCH_CLOCKS_MAX + 1)
-        if max_edge_rate(1.0, glitch_clocks, edge_error) >= SPEED_MARGIN * edges_per_clock
-    ]
-    return max(passing, default=0)
+    level_clocks = (2 - 2 * edge_error) / (SPEED_MARGIN * edges_per_clock)
+    # A level of a whole number of clocks may be computed a rounding short.
+    return min(max(math.floor(level_clocks * (1 + 1e-12)) - 1, 0), GLITCH_CLOCKS_MAX)
 
 
 def clocks_to_fault(edges_per_clock: float, glitch_clocks: int) -> float:

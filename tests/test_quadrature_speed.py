@@ -8,7 +8,7 @@ import pytest
 from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.compiled import compiled
 from hardwall.model.quadrature import NO_STROBES, START, Inputs, Params, advance, step
-from hardwall.model.quadrature_speed import clocks_to_fault, max_edge_rate
+from hardwall.model.quadrature_speed import clocks_to_fault, glitch_clocks_for, max_edge_rate
 from hardwall.testing import rng
 
 
@@ -150,3 +150,19 @@ def test_no_record_of_the_pins_loses_a_count_without_a_flag(shortest, longest, m
     met, wrong, late = explore(shortest, longest, memory)
     assert (wrong, late) == (0, 0)
     assert met > at_least
+
+
+@pytest.mark.parametrize(
+    ("edges_per_clock", "edge_error", "expected"),
+    [
+        (1.0, 0.0, 0),
+        (0.5, 0.0, 1),
+        (1 / 6, 0.0, 5),
+        (1 / 6, 0.25, 3),
+        (1 / 16, 0.0, 15),
+        (1e-9, 0.49, 15),
+        (0.2, 0.4, 2),
+    ],
+)
+def test_the_default_filter_is_the_longest_for_twice_the_speed(edges_per_clock, edge_error, expected):
+    assert glitch_clocks_for(edges_per_clock, edge_error) == expected
