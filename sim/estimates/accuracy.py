@@ -20,7 +20,7 @@ from . import recording, signals
 from .errors import Judge
 from .motions import velocity
 from .playback import velocities
-from .replay import replay
+from .replay import check_length, replay
 
 RATES_HZ = (1_000, 10_000_000)
 """The slowest and the fastest rate that is measured."""
@@ -190,7 +190,9 @@ def measure_recording(
         RecordingError, ReplayError: in one line, what is refused and what is accepted.
         RuntimeError: if the RTL could not be built.
     """
-    result = replay(recording.load(file, column), estimator, output, backend, coarsen=COARSEN)
+    recorded = recording.load(file, column)
+    check_length(recorded)
+    result = replay(recorded, estimator, output, backend, coarsen=COARSEN)
     rate, begin = result.recording.rate_hz, result.judged_from
     estimate, exact = result.velocity_counts_per_s[begin:], result.reference_counts_per_s[begin:]
     judge = Judge(len(estimate), rate)
