@@ -17,7 +17,7 @@ from ...model.spec import AxisSpec
 from ..scene.case import Case
 from ..world.encoder import offsets
 from . import recording, signals
-from .errors import Judge
+from .judge import Judge
 from .motions import velocity
 from .playback import velocities
 from .replay import check_length, replay
@@ -107,7 +107,7 @@ def measure(
     gains: dict[str, float] | None = None,
     bits_dropped: int = 0,
 ) -> dict:
-    """Return one row of measurements, units in the keys; `errors` defines the figures.
+    """Return one row of measurements, units in the keys; `judge` defines the figures.
 
     Args:
         estimator, output: names of the estimator and of its output.
