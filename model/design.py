@@ -7,7 +7,7 @@ from .arithmetic.fixed import UQ
 from .compiled import compiled
 from .estimators import registry
 from .estimators.estimate import EstimatorGains
-from .quadrature_speed import GLITCH_CLOCKS_MAX, glitch_clocks_for
+from .quadrature_speed import GLITCH_CLOCKS_MAX
 from .requirements import AxisRequirements
 from .words import Word
 
@@ -87,7 +87,7 @@ class Design:
                 UQ(GLITCH_WIDTH, 0),
                 1.0,
                 "",
-                glitch_clocks_for(requirements.edges_per_clock_max),
+                requirements.glitch_clocks_at_reset,
                 "longest pulse that the glitch filter rejects, clocks; 0: no filter, so that every pulse that a clock "
                 "sees is counted forth and back, and falsifies the stamps of edges without a flag",
             ),

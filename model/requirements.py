@@ -22,7 +22,8 @@ import math
 from dataclasses import dataclass
 
 from .arithmetic.fixed import SQ, bits_for
-from .checks import NUMBERS, FieldError, check_range, shown
+from .checks import NUMBERS, FieldError, check_int, check_range, shown
+from .quadrature_speed import GLITCH_CLOCKS_MAX, glitch_clocks_for
 
 RATES_HZ = 1, 10**9
 """The least and the largest rate of an axis in true seconds, of a recording too."""
@@ -44,6 +45,8 @@ class AxisRequirements:
         force_resolution_n: force LSB, N.
         stiffness_max_n_per_m: largest wall stiffness, N/m.
         damping_max_n_s_per_m: largest wall damping, N s/m.
+        glitch_clocks: the encoder's glitch filter after reset, clocks; None for the longest that its speed leaves
+            (`quadrature_speed.glitch_clocks_for`).
         estimator_bits_dropped: number of fraction bits removed from the derived widths of the estimator's words, to
             study what a bit is worth.
 
@@ -63,6 +66,7 @@ class AxisRequirements:
     force_resolution_n: float
     stiffness_max_n_per_m: float
     damping_max_n_s_per_m: float
+    glitch_clocks: int | None = None
     estimator_bits_dropped: int = 0
 
     def __post_init__(self):
@@ -77,6 +81,8 @@ class AxisRequirements:
             if kind in (int, float) and name != "estimator_bits_dropped":
                 check_range(name, value, 1 if kind is int else NUMBERS[0], NUMBERS[1])
         check_range("estimator_bits_dropped", self.estimator_bits_dropped, 0, 32)
+        if self.glitch_clocks is not None:
+            check_int("glitch_clocks", self.glitch_clocks, 0, GLITCH_CLOCKS_MAX)
         self._check_rates()
         self._check_widths()
 
@@ -142,6 +148,13 @@ class AxisRequirements:
     @property
     def speed_max_counts_per_sample(self) -> float:
         return self.speed_max_m_per_s / self.velocity_unit_m_per_s
+
+    @property
+    def glitch_clocks_at_reset(self) -> int:
+        """The glitch filter after reset, clocks."""
+        if self.glitch_clocks is not None:
+            return self.glitch_clocks
+        return glitch_clocks_for(self.edges_per_clock_max)
 
     @property
     def edges_per_clock_max(self) -> float:

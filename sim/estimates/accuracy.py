@@ -21,6 +21,7 @@ from .judge import Judge
 from .motions import velocity
 from .playback import velocities
 from .replay import check_length, replay
+from .through_pins import GLITCH_CLOCKS
 
 RATES_HZ = (1_000, 10_000_000)
 """The slowest and the fastest rate that is measured."""
@@ -51,7 +52,7 @@ def axis_spec(
     gains: dict[str, float] | None = None,
     bits_dropped: int = 0,
 ) -> AxisSpec:
-    """Return the specification of the axis: the device of the scene `mhz` at another rate.
+    """Return the specification of the axis: the device of the scene `mhz` at another rate, unfiltered.
 
     Raises:
         ValueError: if there is no such axis; the message names the field.
@@ -61,6 +62,7 @@ def axis_spec(
         clock_hz=sample_hz * max(-(-CLOCK_HZ // sample_hz), CLOCKS),
         sample_hz=sample_hz,
         actuation_hz=sample_hz,
+        glitch_clocks=GLITCH_CLOCKS,
         acceleration_max_m_per_s2=acceleration_max_m_per_s2,
         estimator=estimator,
         gains=gains and registry.design_of(estimator).gains_class(**gains),

@@ -2,7 +2,7 @@
 
 The edges are placed so that the count at the strobe of sample k is exactly that of the position at time k / sample_hz.
 The decoder's latency is left out, because it is the same for every estimator. A stamp is the clock in which its edge
-was decoded. Its pins have no glitches, so there is no glitch filter.
+was decoded. Its pins have no glitches, and `accuracy.axis_spec` has no filter.
 """
 
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ from ..loop.controllers import sample, sample_quietly
 from ..world.encoder import Encoder
 from .motions import Encoded, encoded
 from .signals import Signal
-from .through_pins import DECODER_CLOCKS, GLITCH_CLOCKS
+from .through_pins import DECODER_CLOCKS
 
 CHUNK = 1 << 18
 
@@ -61,8 +61,7 @@ def velocities(
     Raises:
         RuntimeError: if the RTL could not be built.
     """
-    passed = encoded_signal(signal, spec, offsets)
-    parameters = spec.design.estimator.choose(output) | {"encoder_glitch_clocks": GLITCH_CLOCKS}
+    passed, parameters = encoded_signal(signal, spec, offsets), spec.design.estimator.choose(output)
     unit = spec.velocity_unit_m_per_s * (spec.design.estimator.velocity.lsb if is_exact(backend) else 1.0)
     samples, taken = int(signal.seconds * spec.sample_hz), 0
     with opened(spec, backend, parameters, passed.start_level) as axis:

@@ -79,6 +79,7 @@ def axis_spec(counts: np.ndarray, count: int, acceleration_max: float, estimator
         force_resolution_n=1.0,
         stiffness_max_n_per_m=1.0 / count,
         damping_max_n_s_per_m=1.0 / count / SECOND,
+        glitch_clocks=GLITCH_CLOCKS,
         estimator=estimator,
     )
     # The edges of an interval begin before its strobe, and must not overlap the force path of the previous interval.
@@ -113,7 +114,6 @@ def run(
     """
     choice = spec.design.estimator.choose(output)
     if needs_pins(spec.estimator, backend):
-        choice["encoder_glitch_clocks"] = GLITCH_CLOCKS
         with opened(spec, backend, choice, int(level(0)), short=True) as (controller, state, _):
             return run_pins(controller, state, spec.design.timing, counts, progress)
     axis = Axis(spec, not is_exact(backend), **choice)

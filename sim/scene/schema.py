@@ -210,6 +210,7 @@ class Scene(Section):
         """The axis."""
         of_the_spec = {field.name for field in dataclasses.fields(AxisSpec)} - {"count_m", "gains"}
         fields = self.controller.model_dump(include=of_the_spec, exclude_unset=False)
+        fields["glitch_clocks"] = self.glitch_clocks
         gains = getattr(self.controller.gains, self.controller.estimator)
         if gains is not None:
             gains = registry.design_of(self.controller.estimator).gains_class(**gains.model_dump())
@@ -221,7 +222,8 @@ class Scene(Section):
         given = self.controller.glitch_clocks
         if given is not None:
             return given
-        return glitch_clocks_for(self.spec.edges_per_clock_max, self.encoder.error_counts)
+        edges_hz = self.controller.speed_max_m_per_s / self.encoder.count_m
+        return glitch_clocks_for(edges_hz / self.controller.clock_hz, self.encoder.error_counts)
 
     @property
     def estimator_output(self) -> str:
