@@ -49,7 +49,7 @@ def draw(found: ZWidth) -> Figure:
     border = _border(axes, grid)
     notes = ["dotted: limit of the linear loop without friction, in the colour of its method"] if any(limits) else []
     if any(each.leaves for each in maps):
-        notes.append("a region whose line meets the right or the upper border of the map goes on beyond it")
+        notes.append("a region whose line meets the right or the upper border of the map (grey) goes on beyond it")
     notes += _passive(axes, scene, grid.dampings)
     picture.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)
     if len(maps) > ROOM:

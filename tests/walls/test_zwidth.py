@@ -17,6 +17,7 @@ from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.walls import hit, methods, zwidth
 from hardwall.sim.walls.boundary import Edge
+from stimuli import results
 from stimuli.command_line import call
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -240,3 +241,13 @@ def test_an_interrupted_map_says_how_to_go_on(tmp_path):
     assert (process.returncode, out) == (1, "")
     assert err.splitlines()[-1] == "hardwall: error: interrupted; --resume goes on from here"
     assert len(kept()) > 0
+
+
+def test_the_columns_of_the_table_that_need_it_are_explained():
+    result = results.maps()
+    headings = list(result.tables()[0].columns)
+    said = [note.partition(":")[0] for note in result.notes()]
+    assert said[:3] == ["area", "in place", "to B"]
+    assert all(any(heading.startswith(word) for heading in headings) for word in said[:3])
+    held = replace(result.maps[0], edges=[replace(edge, held=0.5) for edge in result.maps[0].edges])
+    assert "held" in [note.partition(":")[0] for note in results.zwidth([held]).notes()]
