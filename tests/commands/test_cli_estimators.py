@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from hardwall.model.compiled import build_dir
+from hardwall.model.build_folder import build_dir
 from stimuli.command_line import call
 
 KEYS = {
