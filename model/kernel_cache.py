@@ -67,7 +67,7 @@ class KernelCache(_Cache):  # type: ignore[misc]
         payload = shelf.get(self._key(sig, target_context.codegen()))
         return None if payload is None else CompileResult._rebuild(target_context, *payload)
 
-    def save_overload(self, sig: Any, data: CompileResult) -> None:
+    def save_overload(self, sig: Any, data: Any) -> None:
         """Keep the variant of a signature, unless its code holds addresses of this process."""
         shelf = self._shelf(sig)
         if shelf is None or data.library.has_dynamic_globals or not all(part.can_cache for part in data.lifted):
