@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from hardwall.model.compiled import build_dir
+from hardwall.model.build_folder import build_dir
 from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.sim.pictures.style import DPI, PAGE_IN
 from stimuli.command_line import call

@@ -20,9 +20,9 @@ from cocotb_tools.runner import get_runner
 
 from ...hdl.axis import Axis
 from ...hdl.export import to_verilog
-from ...model.compiled import build_dir
+from ...model.build_folder import build_dir
 from ...model.spec import AxisSpec
-from .verilator import LINT_OPTIONS, environment
+from .verilator import LINT_OPTIONS, check_paths, environment
 from .waveform import vcd_to_fst
 
 TOOLS = version("cocotb") + version("verilator")
@@ -184,6 +184,7 @@ def _run(component: wiring.Component, name: str, job: Job, trace_to: Path | None
 
 def _built(build: Path, sources: dict[str, str], name: str, traced: bool):
     """Return a runner of the model built in the folder `build` from sources by file name."""
+    check_paths(build)
     os.environ.update(environment())
     runner = get_runner("verilator")
     # Two processes may need the same model: one builds it, and the other finds it built.

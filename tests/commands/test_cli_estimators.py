@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from hardwall.model.compiled import build_dir
+from hardwall.model.build_folder import build_dir
 from stimuli.command_line import call
 
 KEYS = {
@@ -110,4 +110,4 @@ def test_an_interrupted_run_loses_nothing_and_ends_its_workers(tmp_path):
     assert (run.returncode, out) == (1, "")
     assert err.splitlines()[-1] == "hardwall: error: interrupted"
     (kept,) = results.iterdir()
-    assert all(len(json.loads(line)) == 2 for line in kept.read_text().split("\n") if line)
+    assert all(len(json.loads(line)) == 3 for line in kept.read_text().split("\n") if line)
