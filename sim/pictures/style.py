@@ -17,7 +17,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from ..jobs.whole_file import whole_file
+from ...model.whole_file import whole_file
 
 SUFFIXES = (".pdf", ".png", ".svg")
 PAGE_IN = 7.0

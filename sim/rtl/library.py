@@ -4,8 +4,6 @@ import ctypes
 import hashlib
 import os
 import shutil
-import subprocess
-import tempfile
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -18,6 +16,8 @@ from ...hdl.axis import Axis
 from ...hdl.export import to_verilog
 from ...model.compiled import build_dir
 from ...model.spec import AxisSpec
+from ..jobs import children
+from ..jobs.scratch import scratch
 from ..jobs.stages import stage
 from .verilated import Rtl, RtlState
 from .verilator import LINT_OPTIONS, environment
@@ -109,16 +109,14 @@ def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
     library = folder / "libaxis.so"
     if library.exists():
         return library
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as scratch:
-        work = Path(scratch)
+    with scratch(folder.parent) as work:
         for name, text in files.items():
             (work / name).write_text(text)
         command = ["verilator", "--cc", "--build", "-j", str(os.cpu_count() or 1), *options]
         command += ["-CFLAGS", f"-fPIC -I{work}", "--lib-create", "axis", "--Mdir", str(work / "obj")]
         command += [name for name in files if not name.endswith(".h")]
         with stage("building the hardware with Verilator, once"):
-            done = subprocess.run(command, cwd=work, env=environment(), capture_output=True, text=True, check=False)
+            done = children.run(command, cwd=work, env=environment(), capture_output=True, text=True)
         if done.returncode:
             log = folder.parent / "failed.log"
             log.write_text(" ".join(command) + "\n" + done.stdout + done.stderr)

@@ -15,7 +15,6 @@ import shutil
 import statistics
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -29,6 +28,8 @@ from ...hdl.export import to_verilog
 from ...model import quadrature
 from ...model.compiled import build_dir
 from ...model.spec import AxisSpec
+from ..jobs import children
+from ..jobs.scratch import scratch
 
 # The folder of the tools' console scripts.
 TOOLS = Path(sys.executable).parent
@@ -101,14 +102,7 @@ def _run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
     if tool is None:
         raise SynthesisError(f"{command[0]} is not installed: {HOW_TO_INSTALL}")
     with log.open("w", encoding="utf-8") as file:
-        done = subprocess.run(
-            [tool, *command[1:]],
-            cwd=work,
-            stdin=subprocess.DEVNULL,
-            stdout=file,
-            stderr=subprocess.STDOUT,
-            check=False,
-        )
+        done = children.run([tool, *command[1:]], cwd=work, stdout=file, stderr=subprocess.STDOUT)
     if done.returncode:
         lines = [line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines()]
         why = next((line for line in lines if line.startswith("ERROR: ")), f"exit code {done.returncode}")
@@ -143,9 +137,8 @@ def _netlist(name: str, device: Device, verilog: str, constraints: str, clock_hz
     folder = build_dir() / "synth" / f"{name}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
     if folder.exists():
         return folder
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as temporary:
-        work = Path(temporary) / "netlist"
+    with scratch(folder.parent) as temporary:
+        work = temporary / "netlist"
         work.mkdir()
         (work / "board.v").write_text(verilog, encoding="utf-8")
         (work / device.constraints[0]).write_text(constraints, encoding="utf-8")
@@ -164,8 +157,7 @@ def _place_and_route(name: str, device: Device, folder: Path, clock_hz: int, see
     """Return nextpnr's report on the netlist in `folder` for a seed; run nextpnr first if the report is missing."""
     report = folder / f"seed-{seed}.json"
     if not report.exists():
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as temporary:
-            work = Path(temporary)
+        with scratch(folder.parent) as work:
             for file in ("board.json", device.constraints[0]):
                 shutil.copyfile(folder / file, work / file)
             command = [*device.nextpnr, "--json", "board.json", "--seed", str(seed), "--freq", f"{clock_hz / 1e6:g}"]

@@ -2,7 +2,6 @@
 
 import json
 import math
-import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -12,9 +11,11 @@ from pathlib import Path
 import numpy as np
 
 from ...model import stamped
+from ...model.compiled import build_dir
+from ...model.whole_file import whole_file
 from ..jobs.result import Summary
+from ..jobs.scratch import scratch
 from ..jobs.stages import stage
-from ..jobs.whole_file import whole_file
 from ..loop import loop, record
 from ..loop.backends import Opened, is_exact, number_of, opened
 from ..scene.build import output_step_n, start_of, work_of, world_of
@@ -265,8 +266,8 @@ def _vcd(waveform: Path | None) -> Iterator[Path | None]:
         return
     from ..rtl.waveform import vcd_to_fst  # noqa: PLC0415  (only waveforms need its library)
 
-    with tempfile.TemporaryDirectory() as folder:
-        vcd = Path(folder) / "axis.vcd"
+    with scratch(build_dir() / "rtl") as folder:
+        vcd = folder / "axis.vcd"
         yield vcd
         vcd_to_fst(vcd, waveform)
 

@@ -9,7 +9,7 @@ WIDTH = 80
 def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
     """Return exit code, stdout and stderr of `hardwall ARGUMENTS`."""
     monkeypatch.setattr("sys.argv", ["hardwall", *map(str, arguments)])
-    monkeypatch.setattr("signal.signal", lambda *_: None)  # the signals are pytest's
+    monkeypatch.setattr("hardwall.sim.jobs.ending.hear_signals", lambda: None)  # the signals are pytest's
     try:
         app.main()
         code = 0
