@@ -15,6 +15,7 @@ import signal
 import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from multiprocessing import resource_tracker
 from typing import Any
 
 from .ending import undone
@@ -65,6 +66,8 @@ def deaf_children() -> Iterator[None]:
 
     A terminal sends SIGINT to children that have not joined their group yet, too; only this process answers it.
     """
+    # At its start, the tracker of shared semaphores lets the thread hear again.
+    resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
