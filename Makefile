@@ -21,7 +21,7 @@ HARDWALL := $(VENV)/bin/hardwall
 SOURCES := $(wildcard $(addsuffix .py,hdl/* hdl/*/* model/* model/*/* sim/* sim/*/*) sim/rtl/*.cpp sim/scene/builtin/*.toml)
 
 # The main job: the paper's device with the generated hardware in the loop, and for comparison the same axis at 1 MHz on
-# the bit-accurate model, which gives the hardware's words in a twentieth of the time.
+# the bit-accurate model, which gives the hardware's words in a hundredth of the time.
 SCENE := seed-2011
 ESTIMATORS := levant fdm
 REPORTS := $(ESTIMATORS:%=build/hit-%.json) $(ESTIMATORS:%=build/mhz-%.json)
