@@ -18,7 +18,8 @@ PATIENCE_S = 120.0
 def started(*command: object, **environ: str) -> Iterator[subprocess.Popen]:
     """Start a command in a session of its own, all of which is killed at the end of the context."""
     tests = Path(__file__).absolute().parents[1]
-    settings = os.environ | {"PYTHONPATH": str(tests)} | environ
+    # What is printed is buffered, as it is for users.
+    settings = os.environ | {"PYTHONPATH": str(tests), "PYTHONUNBUFFERED": ""} | environ
     out, words = subprocess.PIPE, list(map(str, command))
     with subprocess.Popen(words, env=settings, stdout=out, stderr=out, text=True, start_new_session=True) as process:
         try:
