@@ -38,7 +38,7 @@ GATES = {
     "layered": ["tests/test_layout.py", "tests/test_typing.py"],
 }
 """The quick ones of the tests that a page names for an example, besides the example's own."""
-QUICK = "(two or layered or registry or style or layout or itself) and not narrow"
+QUICK = "(two or layered or registry or style or itself or path_of_its) and not narrow"
 
 
 def _is_wired(example: str) -> bool:

@@ -14,9 +14,9 @@ import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from ...model.build_folder import not_kept
+from .scratch import scratch
 
 LIST = "SHA256SUMS"
 
@@ -40,12 +40,12 @@ def whole_folder(folder: Path, make: Callable[[Path], None]) -> Path:
             return known
     with ExitStack() as stack:
         try:
-            scratch = stack.enter_context(_scratch(folder.parent))
+            work = stack.enter_context(scratch(folder.parent))
         except OSError as error:
             not_kept(folder.parent, error)
             folder = own
-            scratch = stack.enter_context(_scratch(folder.parent))
-        made = scratch / folder.name
+            work = stack.enter_context(scratch(folder.parent))
+        made = work / folder.name
         made.mkdir()
         make(made)
         _seal(made)
@@ -53,7 +53,7 @@ def whole_folder(folder: Path, make: Callable[[Path], None]) -> Path:
             # Another process may have been first, and may use what it made.
             if not _is_whole(folder):
                 if folder.exists():
-                    folder.rename(scratch / "not whole")
+                    folder.rename(work / "not whole")
                 made.rename(folder)
     return folder
 
@@ -75,14 +75,6 @@ def _own_folder() -> Path:
     path = Path(tempfile.gettempdir()) / f"hardwall-{os.getpid()}-{os.urandom(8).hex()}"
     atexit.register(shutil.rmtree, path, ignore_errors=True)
     return path
-
-
-@contextmanager
-def _scratch(parent: Path) -> Iterator[Path]:
-    """Provide a temporary folder in `parent`, which is made if it is missing."""
-    parent.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory(dir=parent, prefix="building-") as scratch:
-        yield Path(scratch)
 
 
 def _seal(folder: Path) -> None:

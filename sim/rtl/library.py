@@ -4,7 +4,6 @@ import ctypes
 import hashlib
 import os
 import shutil
-import subprocess
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -18,6 +17,7 @@ from ...hdl.axis import Axis
 from ...hdl.export import to_verilog
 from ...model.build_folder import build_dir, shown
 from ...model.spec import AxisSpec
+from ..jobs import children
 from ..jobs.stages import stage
 from ..jobs.whole_folder import keep_log, whole_folder
 from .verilated import Rtl, RtlState
@@ -119,7 +119,7 @@ def _verilate(files: dict[str, str], options: list[str], work: Path) -> None:
     command += ["-CFLAGS", "-fPIC -I..", "--lib-create", "axis", "--Mdir", "obj"]
     command += [name for name in files if not name.endswith(".h")]
     with stage("building the hardware with Verilator, once"):
-        done = subprocess.run(command, cwd=work, env=environment(), capture_output=True, text=True, check=False)
+        done = children.run(command, cwd=work, env=environment(), capture_output=True, text=True)
     if done.returncode:
         text = " ".join(command) + "\n" + done.stdout + done.stderr
         log = keep_log(build_dir() / "rtl" / "failed.log", text)

@@ -28,6 +28,7 @@ from ...hdl.export import to_verilog
 from ...model import quadrature
 from ...model.build_folder import build_dir, shown
 from ...model.spec import AxisSpec
+from ..jobs import children
 from ..jobs.whole_folder import keep_log, whole_folder
 
 # The folder of the tools' console scripts.
@@ -101,14 +102,7 @@ def _run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
     if tool is None:
         raise SynthesisError(f"{command[0]} is not installed: {HOW_TO_INSTALL}")
     with log.open("w", encoding="utf-8") as file:
-        done = subprocess.run(
-            [tool, *command[1:]],
-            cwd=work,
-            stdin=subprocess.DEVNULL,
-            stdout=file,
-            stderr=subprocess.STDOUT,
-            check=False,
-        )
+        done = children.run([tool, *command[1:]], cwd=work, stdout=file, stderr=subprocess.STDOUT)
     if done.returncode:
         lines = [line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines()]
         why = next((line for line in lines if line.startswith("ERROR: ")), f"exit code {done.returncode}")

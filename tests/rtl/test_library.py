@@ -1,12 +1,15 @@
-"""The cache of built axes: checked before use, built again when damaged; and one line where make cannot build."""
+"""The cache of built axes: checked before use, and built again when damaged; builds that cannot be, and early ends."""
 
+import signal
 import subprocess
 from pathlib import Path
 
 import pytest
 
+from hardwall.model.build_folder import build_dir
 from hardwall.sim.rtl import library
 from hardwall.sim.rtl.verilator import BuildError
+from stimuli.processes import HARDWALL, ended, session, started, wait_until
 from stimuli.specs import spec
 
 CODE = b"machine code" * 1000
@@ -54,3 +57,23 @@ def test_a_path_with_a_space_is_one_line_before_anything_runs(tmp_path, monkeypa
             "the path of the build folder ($HARDWALL_BUILD) must be without a space for make to build there, not "
         )
         assert message.isprintable()
+
+
+def building(build: Path) -> list[Path]:
+    """Return the folders of unfinished builds in which Verilator has begun."""
+    return [path.parent for path in build.glob("rtl/building-*/*/obj")]
+
+
+@pytest.mark.parametrize("number", ["SIGINT", "SIGKILL"])
+def test_a_build_that_is_ended_leaves_no_process_behind(tmp_path, number):
+    (tmp_path / "numba").symlink_to(build_dir() / "numba")
+    with started(HARDWALL, "hit", "--backend", "rtl", "--json", HARDWALL_BUILD=str(tmp_path)) as process:
+        wait_until(lambda: building(tmp_path))
+        process.send_signal(signal.Signals[number])
+        wait_until(lambda: session(process) == [])
+        code, out, err = ended(process)
+    if number == "SIGINT":
+        assert (code, out, err.splitlines()[-1]) == (130, "", "hardwall: error: interrupted")
+        assert building(tmp_path) == []
+    else:
+        assert (code, out) == (-signal.SIGKILL, "")
