@@ -30,6 +30,7 @@ BROAD = {
     "test_digests": "whatever the program computes",
     "test_docs": "the pages",
     "test_endurance": "every estimator",
+    "test_fuzz": "the command line",
     "test_layout": "the tree",
     "test_makefile": "the tasks",
     "test_readme": "the README",
