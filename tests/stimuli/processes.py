@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 HARDWALL = Path(sys.executable).with_name("hardwall")
-PATIENCE_S = 120.0
+PATIENCE_S = 300.0
 """The limit of every wait: only a test that fails takes so long."""
 
 
