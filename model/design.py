@@ -22,7 +22,7 @@ class Params(NamedTuple):
     """Parameters of the three blocks, all integer words or all float64, and the lowest bits of their flags."""
 
     estimator: tuple
-    wall: wall.Params | wall.FloatParams
+    wall: tuple
     output: output.Params
     estimator_bit: int
     output_bit: int

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..studies.drop import PAPERS, STARTS, STIFFNESSES_N_PER_M
+from ..studies.drop import ENOUGH, PAPERS, STARTS, STIFFNESSES_N_PER_M
 from ..studies.drop_result import STIFFNESS_N_PER_M, Drop, Law
 from ..walls.grid import grid_of
 from .labels import label_points
@@ -154,7 +154,7 @@ def _spot(law: Law) -> tuple[float, float]:
 def _ends(drop: Drop) -> Figure:
     """Return the picture of the ends of rest and of stability, from soft walls to stiff walls."""
     title = (
-        f"Up to which B three of four of {STARTS} hits come to rest, and are stable, at K of "
+        f"Up to which B at least {math.ceil(ENOUGH * STARTS)} of {STARTS} hits come to rest, and are stable, at K of "
         f"{', '.join(f'{k / 1e3:g}' for k in STIFFNESSES_N_PER_M)} kN/m\n{_setting(drop)}"
     )
     picture = new_figure(4.9, title)

@@ -4,17 +4,24 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..loop.record import Trace
+from ..loop.record import Overview, Trace
 from ..walls.hit import Hit
 from .style import FORCE, LABEL_PT, MARK, THEORY, TRUTH, WALL, length_text, looks, name_above, new_figure, page
 
 OFFSET = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "fontsize": LABEL_PT}
+TRUTH_SHARE = 0.025
+"""The width of the line of the truth as a share of a panel's height; an estimate that scatters more hides that line."""
+OVER = {"color": "black", "lw": 0.8, "zorder": 3}
+"""The style of the truth over an estimate that would hide it."""
 UNITS = ("position (mm)", "velocity (m/s)", "error (mm/s)", "force (N)")
 
 
 @page
 def draw(hit: Hit) -> Figure:
     """Return the picture of a hit with traces: the whole run on the left, its first contact on the right.
+
+    The whole run has more samples than the picture has points. So its estimate and its force are drawn as the range
+    from each kept sample up to the next.
 
     Below the estimate is its error, together with the error of the finite difference of counts without encoder errors:
     the baseline that an estimator should beat.
@@ -34,7 +41,7 @@ def draw(hit: Hit) -> Figure:
         panel.set_ylabel(unit)
     figure.align_ylabels(axes[:, 0])
     if len(hit.detail.time_s):
-        contact = _first_contact(hit.detail)
+        contact = _first_contact(hit)
         _column(axes[:, 1], contact, (contact.time_s - hit.contact_s) * 1e3, hit, zoomed=True)
         axes[0, 1].set_title(f"first contact, at {hit.contact_s:.4f} s")
         axes[-1, 1].set_xlabel("time after contact (ms)")
@@ -45,15 +52,13 @@ def draw(hit: Hit) -> Figure:
     return figure
 
 
-def _first_contact(trace: Trace) -> Trace:
+def _first_contact(hit: Hit) -> Trace:
     """Return the trace until the handle has left the wall for a quarter of the contact's length."""
-    inside = trace.position_m > 0
-    entered = int(np.argmax(inside))
-    exited = entered + int(np.argmin(inside[entered:]))
-    if exited == entered:
-        return trace
-    last = exited + (exited - entered) // 4
-    return Trace(**{key: array[:last] for key, array in vars(trace).items()})
+    if hit.contact is None:
+        return hit.detail
+    begin, end = hit.contact.start, hit.contact.stop
+    last = end + (end - begin) // 4
+    return Trace(**{key: array[:last] for key, array in vars(hit.detail).items()})
 
 
 def _title(hit: Hit) -> str:
@@ -81,30 +86,53 @@ def _column(axes: np.ndarray, trace: Trace, time: np.ndarray, hit: Hit, zoomed: 
 
     name = hit.scene.controller.estimator
     (style,) = looks([(name, "u")])
-    estimate, true = trace.estimate_m_per_s, trace.velocity_m_per_s
-    velocity.plot(time, true, **TRUTH, label="true")
-    velocity.plot(time, estimate, color=style["color"], lw=0.9, label=f"estimate ({name} {hit.scene.estimator_output})")
-    _frame(velocity, true, estimate)
+    line = {"color": style["color"], "lw": 0.9, "zorder": 2.2}
+    true, least, largest = trace.velocity_m_per_s, *_error(trace)
+    _frame(velocity, true, true + least, true + largest)
+    hidden = np.quantile(largest, 0.9) - np.quantile(least, 0.1) > TRUTH_SHARE * np.ptp(velocity.get_ylim())
+    velocity.plot(time, true, label="true", **(OVER if hidden else TRUTH))
+    label = f"estimate ({name} {hit.scene.estimator_output})"
+    _draw(velocity, time, true + least, true + largest, label=label, **line)
 
-    wrong = (estimate - true) * 1e3
     if zoomed and name != "fdm":
         q, rate = hit.scene.spec.count_m, hit.scene.spec.sample_hz
-        baseline = (np.diff(np.floor(trace.position_m / q)) * (q * rate) - true[1:]) * 1e3
+        baseline = np.diff(np.floor(trace.position_m / q)) * (q * rate) - true[1:]
         # The smaller of the two errors lies on top.
-        below = np.std(baseline) > np.std(wrong)
-        line = {"color": "0.6", "lw": 0.7, "zorder": 2.1 if below else 2.3}
-        error.plot(time[1:], baseline, label="plain difference", **line)
+        below = np.std(baseline) > np.std(least)
+        error.plot(
+            time[1:], baseline * 1e3, label="plain difference", color="0.6", lw=0.7, zorder=2.1 if below else 2.3
+        )
     rms = hit.estimate_rms_m_per_s
-    label = "estimate" if rms is None else f"estimate: RMS {rms * 1e3:.3g} mm/s"
-    error.plot(time, wrong, color=style["color"], lw=0.9, label=label, zorder=2.2)
+    label = "estimate" if rms is None else f"RMS in the wall {rms * 1e3:.3g} mm/s"
+    _draw(error, time, least * 1e3, largest * 1e3, label=label, **line)
     error.axhline(0, color="black", lw=0.6)
-    _frame(error, wrong)
+    _frame(error, least * 1e3, largest * 1e3)
 
-    force.plot(time, trace.force_n, color=FORCE, lw=0.9, drawstyle="steps-post", label=_drive_label(hit))
+    _draw(force, time, *_force(trace), step=True, color=FORCE, lw=0.9, label=_drive_label(hit))
     force.axhline(-hit.scene.protocol.push_n, color=THEORY, lw=0.9, ls=":", label="balance of the push")
     if zoomed:
         for panel in (velocity, error, force):
             name_above(panel)
+
+
+def _error(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the largest error of the estimate from each sample of a trace up to the next."""
+    if isinstance(trace, Overview):
+        return trace.error_least_m_per_s, trace.error_largest_m_per_s
+    return (trace.estimate_m_per_s - trace.velocity_m_per_s,) * 2
+
+
+def _force(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the largest force from each sample of a trace up to the next."""
+    return (trace.force_least_n, trace.force_largest_n) if isinstance(trace, Overview) else (trace.force_n,) * 2
+
+
+def _draw(axes: Axes, time: np.ndarray, least: np.ndarray, largest: np.ndarray, step: bool = False, **style) -> None:
+    """Draw the range of a quantity over time; where it has no width, as a line."""
+    if least is largest or np.array_equal(least, largest):
+        axes.plot(time, least, drawstyle="steps-post" if step else "default", **style)
+    else:
+        axes.fill_between(time, least, largest, step="post" if step else None, **style)
 
 
 def _drive_label(hit: Hit) -> str:

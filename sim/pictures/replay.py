@@ -69,7 +69,7 @@ def _lines(result: Replay) -> list[tuple[str, np.ndarray, dict]]:
     """Return label, velocities and style of the finite difference and of the estimate, which lies on top."""
 
     def rms(value: float | None) -> str:
-        return "" if value is None else f", RMS error {value:.3g} counts/s"
+        return "" if value is None else f", RMS error {float(f'{value:.3g}'):g} counts/s"
 
     (own,) = looks([(result.estimator, "u")])
     difference = {"color": "0.55", "lw": 0.7}

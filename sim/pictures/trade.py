@@ -18,7 +18,7 @@ NOTES = (
 )
 QUESTIONS = {
     HIT: ("time of a hit (ms)", "verdicts that differ (%)", "is a wall stable? {walls} walls around the edge"),
-    MAP: ("time of the maps of all estimators, in one process (s)", "largest error of K (%)", "where is the edge?"),
+    MAP: ("time of both maps, in one process (s)", "largest error of K (%)", "where is the edge?"),
 }
 
 

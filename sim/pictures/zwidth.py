@@ -9,11 +9,14 @@ from matplotlib.figure import Figure
 from ..scene.schema import Scene
 from ..studies.zwidth import ZWidth
 from ..walls import theory
+from ..walls.boundary import Grid
 from ..walls.grid import grid_of
 from ..walls.zwidth import Map
 from .labels import label_points
 from .style import LABEL_PT, THEORY, ink, looks, new_figure, page
 
+BORDER = "0.6"
+"""The colour of the map's border."""
 ROOM = 8
 """The largest number of maps labelled at their lines; more are labelled beside the panel, in order of their areas."""
 SEEN = 0.02
@@ -43,9 +46,10 @@ def draw(found: ZWidth) -> Figure:
     axes.set_ylabel("largest stable stiffness K (kN/m)")
     axes.set_xlim(0, None)
     axes.set_ylim(0, 1.08 * axes.get_ylim()[1])
+    border = _border(axes, grid)
     notes = ["dotted: limit of the linear loop without friction, in the colour of its method"] if any(limits) else []
     if any(each.leaves for each in maps):
-        notes.append("a region whose line meets the right or the upper border of the map goes on beyond it")
+        notes.append("a region whose line meets the right or the upper border of the map (grey) goes on beyond it")
     notes += _passive(axes, scene, grid.dampings)
     picture.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)
     if len(maps) > ROOM:
@@ -54,8 +58,16 @@ def draw(found: ZWidth) -> Figure:
         inks = [ink(own.controller.estimator) for own in scenes]
         labels = [(each.case.label, *where) for each, *where in zip(maps, edges, inks, strict=True)]
         dotted = [list(zip(grid.dampings, np.array(limit) / 1e3, strict=True)) for limit in limits if limit]
-        label_points(axes, labels, lines=dotted)
+        label_points(axes, labels, lines=[*dotted, border])
     return picture
+
+
+def _border(axes: Axes, grid: Grid) -> list[tuple[float, float]]:
+    """Draw the upper and the right border of the map, as far as the panel shows them; return their corners."""
+    first, last, top = grid.dampings[0], grid.dampings[-1], grid.rows * grid.stiffness_step_n_per_m / 1e3
+    corners = [(first, top), (last, top), (last, 0.0)]
+    axes.plot(*zip(*corners, strict=True), color=BORDER, lw=0.8, zorder=1.5)
+    return corners
 
 
 def _linear(scene: Scene, dampings: list[float]) -> list[float] | None:

@@ -106,7 +106,7 @@ def _rates(scene: Scene) -> list[Shortcut]:
 
 def _steps(scene: Scene) -> list[Shortcut]:
     lengths_s = [1 / (steps * scene.controller.sample_hz) for steps in STEPS]
-    return [Shortcut("step", f"steps of {step_s * 1e6:g} us", {"solver.step_s": step_s}) for step_s in lengths_s]
+    return [Shortcut("step", f"steps of {step_s * 1e6:g} µs", {"solver.step_s": step_s}) for step_s in lengths_s]
 
 
 def _grids(scene: Scene) -> list[Shortcut]:

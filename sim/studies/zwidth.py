@@ -56,8 +56,16 @@ class ZWidth:
         return tables
 
     def notes(self) -> list[str]:
-        """Return the meaning of a +."""
-        return plus_of_areas(self.maps)
+        """Return the meaning of the columns."""
+        held = ["held: that area, times the share of the walls hit below the edge that are stable too"]
+        return [
+            "area: under the largest stable K at every B",
+            *(held if any(each.area_held is not None for each in self.maps) else []),
+            "in place: that area without each B whose largest stable wall holds the handle elsewhere than its spring "
+            "alone would",
+            "to B: the largest B with a stable wall",
+            *plus_of_areas(self.maps),
+        ]
 
 
 def study(case: Case, curves: list[Curve] | None, mapping: Mapping) -> ZWidth:

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from ...model import stamped
+from ...model.whole_file import whole_file
+from ..jobs.ending import undone
 from ..jobs.result import Summary
 from ..jobs.stages import stage
-from ..jobs.whole_file import whole_file
 from ..loop import loop, record
 from ..loop.backends import Opened, is_exact, number_of, opened
 from ..scene.build import output_step_n, start_of, work_of, world_of
@@ -48,7 +49,8 @@ class Hit(Summary):
         rms_m: RMS distance from that mean after the mark, m.
         touched: whether the handle ever was within the wall, or felt it.
         force_sha256: digest of the drive words of every actuation, little-endian int32; None for `float`.
-        overview, detail: if asked for, samples of the whole run, and every sample of the contact.
+        overview, detail: if asked for, samples of the whole run, and every sample from shortly before the first
+            contact, `DETAIL_S` long.
     """
 
     scene: Scene
@@ -61,7 +63,7 @@ class Hit(Summary):
     max_force_n: float
     flags: list[str]
     force_sha256: str | None
-    overview: record.Trace | None = None
+    overview: record.Overview | None = None
     detail: record.Trace | None = None
 
     @property
@@ -89,17 +91,34 @@ class Hit(Summary):
         return abs(stiffness * self.mean_m - carried_n) <= slack_n
 
     @property
+    def contact(self) -> slice | None:
+        """The samples of `detail` in the first contact: from the first one inside the wall until the handle leaves it.
+
+        A contact that lasts longer than `detail` ends with it. None without traces or a contact.
+        """
+        if self.detail is None:
+            return None
+        inside = self.detail.position_m > 0
+        if not inside.any():
+            return None
+        entered = int(np.argmax(inside))
+        outside = np.flatnonzero(~inside[entered:])
+        return slice(entered, entered + int(outside[0]) if len(outside) else len(inside))
+
+    @property
     def contact_s(self) -> float:
         """Time of the first sample in `detail` inside the wall; if there is none, time of the run's end."""
-        inside = np.flatnonzero(self.detail.position_m > 0)
-        return float(self.detail.time_s[inside[0]]) if len(inside) else self.samples / self.scene.spec.sample_hz
+        contact = self.contact
+        return float(self.detail.time_s[contact.start]) if contact else self.samples / self.scene.spec.sample_hz
 
     @property
     def estimate_rms_m_per_s(self) -> float | None:
-        """RMS error of the velocity estimate over `detail`, the first contact; None without traces or a contact."""
-        if self.detail is None or not len(self.detail.time_s):
+        """RMS error of the velocity estimate over the first contact; None without traces or a contact."""
+        contact = self.contact
+        if contact is None:
             return None
-        return float(np.sqrt(np.mean((self.detail.estimate_m_per_s - self.detail.velocity_m_per_s) ** 2)))
+        error = self.detail.estimate_m_per_s[contact] - self.detail.velocity_m_per_s[contact]
+        return float(np.sqrt(np.mean(error**2)))
 
     def save(self, path: Path) -> None:
         """Write the traces as an .npz: `overview_time_s`, `detail_force_n` and so on, and the report as JSON text.
@@ -111,6 +130,10 @@ class Hit(Summary):
         arrays = {f"{name}_{key}": array for name, trace in kept.items() for key, array in vars(trace).items()}
         with whole_file(path) as part, part.open("wb") as file:
             np.savez_compressed(file, report=json.dumps(self.report()), **arrays)
+
+    def notes(self) -> list[str]:
+        """Return what keeps the velocity's error from being known."""
+        return [] if self.detail else ["estimate_rms_mm_per_s: known with --plot or --trace, which keep every sample"]
 
     def report(self) -> dict:
         """Return the summary that the command line prints, with units in the keys."""
@@ -150,9 +173,8 @@ class _Loop:
         self.chunk = max(1, min(chunk, CHUNK // work_of(self.world)))
         overview = detail = None
         if traces:
-            stride = max(1, scene.samples // OVERVIEW_POINTS)
-            overview = record.new(spec, number, -np.inf, stride, scene.samples // stride + 1)
-            detail = record.new(spec, number, DETAIL_FROM_M, 1, round(DETAIL_S * spec.sample_hz))
+            overview = record.overview(spec, number, scene.samples, OVERVIEW_POINTS)
+            detail = record.detail(spec, number, DETAIL_FROM_M, round(DETAIL_S * spec.sample_hz))
         self.memory = loop.Memory(
             edges=stamped.room_for(loop.EDGE_CAPACITY),
             delay=np.zeros(scene.delay_samples, number) if scene.delay_samples else None,
@@ -265,8 +287,9 @@ def _vcd(waveform: Path | None) -> Iterator[Path | None]:
         return
     from ..rtl.waveform import vcd_to_fst  # noqa: PLC0415  (only waveforms need its library)
 
-    with tempfile.TemporaryDirectory() as folder:
-        vcd = Path(folder) / "axis.vcd"
+    folder = tempfile.TemporaryDirectory()
+    with undone(folder.cleanup):
+        vcd = Path(folder.name) / "axis.vcd"
         yield vcd
         vcd_to_fst(vcd, waveform)
 

@@ -130,13 +130,45 @@ def test_an_error_stands_under_the_estimate(name):
     top = others[0].get_position()
     figure.draw_without_rendering()
     assert error.get_position().y1 <= top.y0
-    # This panel shows the estimate minus the truth of the panel above.
-    if name == "hit":
-        true, estimate = (line.get_ydata() for line in others[0].lines[:2])
-        assert error.lines[0].get_ydata() == pytest.approx((estimate - true) * 1e3)
 
 
-@pytest.mark.parametrize("name", ["hit", "replay", "figure 1"])
+def columns(figure: Figure) -> tuple[list, list]:
+    """Return the panels of the whole run and of the contact, from top to bottom."""
+    return figure.axes[::2], figure.axes[1::2]
+
+
+def test_the_error_of_a_hit_is_the_estimate_minus_the_truth():
+    _, (_, velocity, error, _) = columns(hit.draw(results.hit()))
+    true, estimate = (line.get_ydata() for line in velocity.lines[:2])
+    (own,) = [line for line in error.lines if "RMS" in line.get_label()]
+    assert own.get_ydata() == pytest.approx((estimate - true) * 1e3)
+
+
+def test_the_whole_run_shows_what_happens_between_its_points():
+    run = results.hit()
+    (_, velocity, error, force), _ = columns(hit.draw(run))
+    (drawn,) = error.collections
+    rows = drawn.get_paths()[0].vertices
+    assert rows[:, 1].min() == pytest.approx(run.overview.error_least_m_per_s.min() * 1e3)
+    assert rows[:, 1].max() == pytest.approx(run.overview.error_largest_m_per_s.max() * 1e3)
+    assert len(velocity.collections) == 1
+    # A force that is the same between two points is a line.
+    assert force.lines[0].get_ydata() == pytest.approx(run.overview.force_n)
+
+
+def test_a_truth_that_a_noisy_estimate_would_hide_is_drawn_over_it():
+    noisy = results.hit()
+    for share, over in ((3.0, True), (0.01, False)):
+        detail = noisy.detail
+        estimate = detail.velocity_m_per_s + share * (detail.estimate_m_per_s - detail.velocity_m_per_s)
+        _, (_, velocity, *_) = columns(hit.draw(replace(noisy, detail=replace(detail, estimate_m_per_s=estimate))))
+        true, drawn = velocity.lines[:2]
+        assert (true.get_label(), drawn.get_label()) == ("true", "estimate (levant u)")
+        assert (true.get_zorder() > drawn.get_zorder()) is over
+        assert true.get_linewidth() > 2 * drawn.get_linewidth() or over
+
+
+@pytest.mark.parametrize("name", ["replay", "figure 1"])
 def test_the_estimate_lies_over_a_truth_that_is_broader(name):
     for axes in PICTURES[name]().axes:
         if axes.get_ylabel().startswith("velocity"):
@@ -174,6 +206,12 @@ def test_the_passivity_limit_is_seen_or_said_to_be_absent():
     seen = zwidth.draw(results.zwidth([viscous]))
     assert "below the dash-dotted line" in " ".join(text.get_text() for text in words(seen))
     assert "-." in [line.get_linestyle() for line in seen.axes[0].lines]
+
+
+def test_the_border_of_a_map_is_drawn_where_the_map_ends():
+    axes = zwidth.draw(results.maps()).axes[0]
+    (border,) = [line for line in axes.lines if line.get_color() == zwidth.BORDER]
+    assert list(zip(*border.get_data(), strict=True)) == [(6, 100), (300, 100), (300, 0)]
 
 
 def test_gains_with_several_names_are_named_once():

@@ -19,7 +19,8 @@ PAGES = sorted(
 class Block(NamedTuple):
     """A block of a page: its language, its text, whether a mark keeps it from being run, and its expected output.
 
-    The marks are `long`, for blocks that take minutes, and `setup`, for blocks that change the reader's machine.
+    The marks are `long`, for blocks that take minutes, and `setup`, for blocks that change the reader's machine. On a
+    page of the site they are attributes, `{.long}`; elsewhere, where these would be seen, comments, `<!-- long -->`.
     """
 
     language: str
@@ -36,8 +37,9 @@ def text_of(name: str) -> str:
 
 def blocks(name: str) -> list[Block]:
     """Return the blocks of commands (`sh`) and of Python of a page, in order."""
-    pattern = r"^(\{\.(?:long|setup)\}\n)?```(sh|python)\n(.*?)^```$(?:\n\nprints\n\n```text\n(.*?)^```$)?"
-    found = re.findall(pattern, text_of(name), re.MULTILINE | re.DOTALL)
+    mark = r"^((?:\{\.(?:long|setup)\}|<!-- (?:long|setup) -->)\n)?"
+    pattern = r"```(sh|python)\n(.*?)^```$(?:\n\nprints\n\n```text\n(.*?)^```$)?"
+    found = re.findall(mark + pattern, text_of(name), re.MULTILINE | re.DOTALL)
     return [Block(language, text, bool(mark), printed or None) for mark, language, text, printed in found]
 
 

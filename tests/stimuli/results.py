@@ -4,7 +4,7 @@ import numpy as np
 
 from hardwall.model.estimators.levant import Gains
 from hardwall.sim.estimates import figures
-from hardwall.sim.loop.record import Trace
+from hardwall.sim.loop.record import Overview, Trace
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.studies import bits, cutoff, drop, gains, lipschitz, rates, shortcuts, sines, trade
@@ -21,7 +21,7 @@ NOTHING = Effort("fixed", 0, 0.0)
 
 
 def hit(rms_m: float = 0.0, reached: bool = True) -> Hit:
-    """Return a hit with 20 ms of contact and a noisy estimate."""
+    """Return a hit with 20 ms of contact and a noisy estimate, which is off by 20 mm/s between the kept samples."""
 
     def trace(times: np.ndarray) -> Trace:
         position, velocity = 1e-3 * np.sin(150 * times), 0.15 * np.cos(150 * times)
@@ -30,7 +30,10 @@ def hit(rms_m: float = 0.0, reached: bool = True) -> Hit:
 
     contact = trace(np.arange(-10, 300) * 1e-4 if reached else np.zeros(0))
     run = {"samples": 60_000, "seconds": 1.0, "mean_m": 3e-5, "touched": reached, "max_force_n": 10.0}
-    kept = {"overview": trace(np.linspace(-0.5, 5.5, 500)), "detail": contact}
+    whole = trace(np.linspace(-0.5, 5.5, 500))
+    wrong = whole.estimate_m_per_s - whole.velocity_m_per_s
+    overview = Overview(*vars(whole).values(), wrong - 0.02, wrong + 0.02, whole.force_n, whole.force_n)
+    kept = {"overview": overview, "detail": contact}
     return Hit(load("seed-2011"), "fixed", rms_m=rms_m, flags=[], force_sha256="0" * 64, **run, **kept)
 
 

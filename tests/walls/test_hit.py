@@ -102,10 +102,47 @@ def test_the_digest_is_of_the_drive_of_every_actuation(run):
     assert run.max_force_n == pytest.approx(np.abs(run.overview.force_n).max())
 
 
-def test_the_estimates_error_is_that_of_the_contact(run):
-    error = run.detail.estimate_m_per_s - run.detail.velocity_m_per_s
-    assert run.estimate_rms_m_per_s == pytest.approx(error.std(), rel=0.1)
-    assert hit.run(run.scene, "fixed").estimate_rms_m_per_s is None
+def test_the_estimates_error_is_that_of_the_contact_alone(run):
+    inside = run.detail.position_m > 0
+    first = int(np.argmax(inside))
+    last = first + int(np.argmin(inside[first:]))
+    assert 0 < first < last < len(inside)
+    assert not inside[last]
+    assert run.contact == slice(first, last)
+    assert run.contact_s == run.detail.time_s[first]
+    error = (run.detail.estimate_m_per_s - run.detail.velocity_m_per_s)[first:last]
+    assert run.estimate_rms_m_per_s == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
+
+
+def test_a_contact_lasts_at_most_as_long_as_its_trace(run):
+    def traced(position_m):
+        return replace(run, detail=replace(run.detail, position_m=position_m))
+
+    inside = run.detail.position_m > 0
+    stays = traced(np.where(np.arange(len(inside)) < 100, -1e-6, 1e-6))
+    assert stays.contact == slice(100, len(inside))
+    away = traced(-np.ones(len(inside)))
+    assert away.contact is None
+    assert away.contact_s == run.samples / 10_000
+    assert away.estimate_rms_m_per_s is None
+    plain = replace(run, overview=None, detail=None)
+    assert plain.estimate_rms_m_per_s is None
+    assert "--plot" in " ".join(plain.notes())
+    assert run.notes() == []
+
+
+def test_the_overview_has_the_extremes_between_its_samples(run, monkeypatch):
+    """The estimate chatters, and every tenth sample alone would hide how far."""
+    monkeypatch.setattr(hit, "OVERVIEW_POINTS", run.samples // 10)
+    coarse, every = hit.run(run.scene, "fixed", traces=True).overview, run.overview
+    starts = np.arange(0, run.samples, 10)
+    assert coarse.position_m.tolist() == every.position_m[starts].tolist()
+    error = every.estimate_m_per_s - every.velocity_m_per_s
+    assert coarse.error_least_m_per_s == pytest.approx(np.minimum.reduceat(error, starts), abs=1e-15)
+    assert coarse.error_largest_m_per_s == pytest.approx(np.maximum.reduceat(error, starts), abs=1e-15)
+    assert coarse.force_least_n.tolist() == np.minimum.reduceat(every.force_n, starts).tolist()
+    assert coarse.force_largest_n.tolist() == np.maximum.reduceat(every.force_n, starts).tolist()
+    assert np.abs(error[starts] - coarse.error_least_m_per_s).max() > 0.01
 
 
 def test_scene_keys_reach_the_hardwares_words():

@@ -11,7 +11,6 @@ point differs from the exact equation on the same words by at most two force LSB
 than half of the count's range away from the core, and a core never pushes in free space.
 """
 
-from collections.abc import Mapping
 from typing import NamedTuple
 
 from . import wall
@@ -59,17 +58,17 @@ class Design:
             Word("core_depth", UQ(bits_for(axis.travel_m / q), 0), q, "m", 0, "depth at which the core begins"),
         )
 
-    def _core(self, words: Mapping[str, int]) -> dict[str, int]:
+    def _core(self, words: dict[str, int]) -> dict[str, int]:
         """Return the core's run-time words by the names that a wall's words have."""
         inwards = -words["core_depth"] if words["wall_left"] else words["core_depth"]
         position = wrap(words["wall_position"] + inwards, self.count_width)
         return {**words, "wall_stiffness": words["core_stiffness"], "wall_damping": 0, "wall_position": position}
 
-    def params(self, words: Mapping[str, int]) -> Params:
+    def params(self, words: dict[str, int]) -> Params:
         """Return the kernel's parameters for the given run-time words."""
         return Params(self.layer.params(words), self.layer.params(self._core(words)), self.force.max)
 
-    def float_params(self, stiffness_n_per_m: float, damping_n_s_per_m: float, words: Mapping[str, int]) -> FloatParams:
+    def float_params(self, stiffness_n_per_m: float, damping_n_s_per_m: float, words: dict[str, int]) -> FloatParams:
         """Return the float64 wall's parameters; the core's stiffness is taken from its word."""
         core_stiffness = next(word for word in self.words if word.name == "core_stiffness")
         core_n_per_m = core_stiffness.to_si(words["core_stiffness"])
