@@ -154,8 +154,11 @@ def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys
     [
         (["mhz"], "mhz: amplifier.delay_s is missing: the search begins from it"),
         (["--axis", "1-10"], "'1-10' is not one of '3-30', '30-300'"),
-        (["--set", "controller.output=u1"], "--set controller.output is what this command sets itself"),
-        (["--set", "zwidth.stiffness_step_n_per_m=123.0"], "--set zwidth.stiffness_step_n_per_m is what this command"),
+        (["--set", "controller.output=u1"], "--set 'controller.output' is what this command sets itself"),
+        (
+            ["--set", "zwidth.stiffness_step_n_per_m=123.0"],
+            "--set 'zwidth.stiffness_step_n_per_m' is what this command",
+        ),
         (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "give it or --workers, not both"),
     ],
 )

@@ -167,8 +167,8 @@ def test_a_scene_that_lacks_a_part_has_no_shortcut_without_it(hardware):
     ("arguments", "message"),
     [
         (["mhz"], "mhz: zwidth.stiffness_step_n_per_m is missing"),
-        (["--set", "solver.step_s=1e-5"], "--set solver.step_s is what this command sets itself: it is one of the"),
-        (["--set", "controller.output=u1"], "--set controller.output is what this command sets itself: it takes two"),
+        (["--set", "solver.step_s=1e-5"], "--set 'solver.step_s' is what this command sets itself: it is one of the"),
+        (["--set", "controller.output=u1"], "--set 'controller.output' is what this command sets itself: it takes two"),
         (["--plot", "trade.gif"], "--plot must end in .pdf or .png or .svg"),
     ],
 )
