@@ -8,7 +8,12 @@ from amaranth.hdl import Shape
 
 
 class Packing:
-    """The layout of signals side by side in one word, the first in its lowest bits; `shapes` has the shapes by name."""
+    """The layout of signals side by side in one word, the first in its lowest bits.
+
+    Attributes:
+        shapes: the shapes by name.
+        width: bits of the word.
+    """
 
     def __init__(self, shapes: dict[str, Shape]):
         self.shapes = shapes
