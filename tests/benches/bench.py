@@ -152,21 +152,14 @@ class Bench:
             latency = getattr(self._component, "latency", None)
         taken, given = (Record(names, self.packing, [], []) for names in (inputs, outputs))
         campaign = Campaign(strobe, done, taken, given, latency, max(latency or 1, 1) if every is None else every)
-        held, last = self.inputs.pack({**self._held, **dict.fromkeys((strobe, *inputs), 0)}), None
-
-        def words() -> Iterable[int]:
-            nonlocal last
-            for last in rows:
-                yield held | self.inputs.pack(dict(zip(inputs, last, strict=True)))
-
+        held = self.inputs.pack({**self._held, **dict.fromkeys((strobe, *inputs), 0)})
         self.in_campaign = True
         try:
-            await campaign.run(self, words())
+            last = await campaign.run(self, held, rows)
         finally:
             self.in_campaign = False
             self.dut.bench_campaign.value = 0
-        if last is not None:
-            self.drive(**dict(zip(inputs, last, strict=True)))
+        self.drive(**last)
         await self.rest()
         return taken, given
 

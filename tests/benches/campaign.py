@@ -39,9 +39,10 @@ class Campaign:
         self.strobe, self.done, self.taken, self.given = strobe, done, taken, given
         self.latency, self.every = latency, every
         self._waiting: deque[int] = deque()
+        self._coin = rng()
 
-    async def run(self, bench, words: Iterable[int]) -> None:
-        """Put words of inputs through, one word a strobe, and fill the records.
+    async def run(self, bench, held: int, rows: Iterable[tuple[int, ...]]) -> dict[str, int]:
+        """Put rows of inputs through, beside the word `held` of the others; fill the records and return the last row.
 
         Raises:
             AssertionError: if an answer is missing or late, or comes without a strobe.
@@ -53,27 +54,30 @@ class Campaign:
         dut.bench_strobe.value = inputs.bit(self.strobe)
         dut.bench_watched.value = sum(map(seen.bit, watched))
         dut.bench_campaign.value = 1
-        go = int(dut.bench_go.value)
-        for rows in self._batches(inputs, words):
-            (scratch / "rows").write_text(rows, encoding="ascii")
+        go, rows, last = int(dut.bench_go.value), islice(rows, TRACED_SAMPLES), {}
+        while batch := list(islice(rows, BATCH)):
+            last = dict(zip(self.taken.names, batch[-1], strict=True))
+            words = inputs.pack_rows(self.taken.names, batch)
+            text = "".join(
+                f"{above | held | word:x}\n" for above, word in zip(self._spacings(inputs, len(batch)), words)
+            )
+            (scratch / "rows").write_text(text, encoding="ascii")
             go ^= 1
             dut.bench_go.value, start = go, bench.clock_number() + 1
             await ValueChange(dut.bench_done)
             bench.ran(start + int(dut.bench_clocks.value) - 1)
             numbers = [int(word, 16) for word in (scratch / "events").read_text(encoding="ascii").split()]
             self._sort(seen, start, zip(numbers[::2], numbers[1::2], strict=True), bench.monitors)
+        return last
 
-    def _batches(self, inputs: Packing, words: Iterable[int]) -> Iterator[str]:
-        """Yield batches of rows as text: a strobe comes with the promised answer or a clock later, at random.
+    def _spacings(self, inputs: Packing, rows: int) -> Iterator[int]:
+        """Yield what is above the inputs of a batch's rows: a strobe comes with the promised answer or a clock later.
 
         The last row of a batch waits until its answer is overdue.
         """
-        coin, words = rng(), islice(words, TRACED_SAMPLES)
-        while batch := list(islice(words, BATCH)):
-            spacings = (self.every - 1 + (coin.random(len(batch)) < 0.5)).tolist()
-            spacings[-1] = max(spacings[-1], self.latency + 1)
-            above = inputs.width
-            yield "".join(f"{spacing << above | word:x}\n" for spacing, word in zip(spacings, batch, strict=True))
+        spacings = (self.every - 1 + (self._coin.random(rows) < 0.5)).tolist()
+        spacings[-1] = max(spacings[-1], self.latency + 1)
+        return (spacing << inputs.width for spacing in spacings)
 
     def _sort(self, seen: Packing, start: int, events: Iterable[tuple[int, int]], monitors: list) -> None:
         """Sort the events of a batch into the records of inputs taken, of outputs given, and of monitors."""

@@ -29,6 +29,14 @@ class Packing:
             word |= (int(value) & self._masks[name]) << self._offsets[name]
         return word
 
+    def pack_rows(self, names: Iterable[str], rows: list[tuple[int, ...]]) -> list[int]:
+        """Return the words for rows of the values of `names`; everything else is 0."""
+        shifted = []
+        for name, column in zip(names, zip(*rows, strict=True), strict=True):
+            mask, offset = self._masks[name], self._offsets[name]
+            shifted.append([(int(value) & mask) << offset for value in column])
+        return list(map(sum, zip(*shifted, strict=True)))
+
     def bit(self, name: str) -> int:
         """Return the word in which a signal of one bit is 1 and all else is 0."""
         return 1 << self._offsets[name]
