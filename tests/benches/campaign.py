@@ -1,7 +1,7 @@
 """Campaigns: many rows put through a component, in batches that the harness's sequencer runs, and their answers."""
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path
 
@@ -59,7 +59,8 @@ class Campaign:
             last = dict(zip(self.taken.names, batch[-1], strict=True))
             words = inputs.pack_rows(self.taken.names, batch)
             text = "".join(
-                f"{above | held | word:x}\n" for above, word in zip(self._spacings(inputs, len(batch)), words)
+                f"{spacing << inputs.width | held | word:x}\n"
+                for spacing, word in zip(self._spacings(len(batch)), words, strict=True)
             )
             (scratch / "rows").write_text(text, encoding="ascii")
             go ^= 1
@@ -70,14 +71,14 @@ class Campaign:
             self._sort(seen, start, zip(numbers[::2], numbers[1::2], strict=True), bench.monitors)
         return last
 
-    def _spacings(self, inputs: Packing, rows: int) -> Iterator[int]:
-        """Yield what is above the inputs of a batch's rows: a strobe comes with the promised answer or a clock later.
+    def _spacings(self, rows: int) -> list[int]:
+        """Return the extra clocks after each row of a batch, so that a strobe comes with the answer or a clock later.
 
-        The last row of a batch waits until its answer is overdue.
+        The last row waits until its answer is overdue.
         """
         spacings = (self.every - 1 + (self._coin.random(rows) < 0.5)).tolist()
         spacings[-1] = max(spacings[-1], self.latency + 1)
-        return (spacing << inputs.width for spacing in spacings)
+        return spacings
 
     def _sort(self, seen: Packing, start: int, events: Iterable[tuple[int, int]], monitors: list) -> None:
         """Sort the events of a batch into the records of inputs taken, of outputs given, and of monitors."""
