@@ -121,7 +121,10 @@ class Axis:
                 stamps of edges, which `hardwall.model.stamped.run` has.
         """
         if self.design.estimator.uses_stamps():
-            raise ValueError(f"estimator must be one that needs only counts, not {self.spec.estimator!r}")
+            raise ValueError(
+                f"estimator must be one that needs only counts, not {self.spec.estimator!r}; "
+                f"hardwall.model.stamped.run takes the edges that it needs"
+            )
         spec = self.spec
         checked = checks.lanes_of_counts(counts, spec.count_width, spec.clocks_per_sample)
         lanes = np.atleast_2d(checked)

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import axis, checks, design, quadrature
+from . import checks, design, quadrature
+from .axis import Axis, Record, step
 from .compiled import compiled, inlined
 
 
@@ -50,11 +51,11 @@ def room_for(edges: int) -> Edges:
     return Edges(np.zeros(edges, np.int64), np.zeros(edges, np.int64))
 
 
-def controller(of: axis.Axis, level: int) -> tuple[Controller, State]:
+def controller(axis: Axis, level: int) -> tuple[Controller, State]:
     """Return the parameters of an axis, and its state after reset with the pins at `level`, a | b << 1."""
-    words, zero = of.words, 0.0 if of.floating else 0
-    start = of.design.start(of.floating)
-    params = Controller(of.design.decoder, words["encoder_glitch_clocks"], words["encoder_invert"], of.params)
+    words, zero = axis.words, 0.0 if axis.floating else 0
+    start = axis.design.start(axis.floating)
+    params = Controller(axis.design.decoder, words["encoder_glitch_clocks"], words["encoder_invert"], axis.params)
     return params, State(start.output.drive, zero, zero, 0, quadrature.START, start, 0, level)
 
 
@@ -69,7 +70,7 @@ def sample_quietly(controller, state, strobe):
     """Take the sample at clock `strobe`, with no edge between the last sample and this one: return the state."""
     decoder = _decode(controller, state.decoder, state.level, strobe - state.clock)
     fault = decoder.illegal | decoder.overspeed << 1
-    after, velocity, force = axis.step(controller.axis, state.axis, quadrature.seen(decoder), 0, fault, 1)
+    after, velocity, force = step(controller.axis, state.axis, quadrature.seen(decoder), 0, fault, 1)
     return State(after.output.drive, velocity, force, after.flags, decoder, after, strobe, state.level)
 
 
@@ -105,11 +106,11 @@ def _run(controller, state, timing, edges, record):
         velocity[k], force[k], drive[k], flags[k] = state.velocity, state.force, state.drive, state.flags
 
 
-def run(of: axis.Axis, edge_clocks: ArrayLike, edge_levels: ArrayLike, samples: int, level: int = 0) -> axis.Record:
+def run(axis: Axis, edge_clocks: ArrayLike, edge_levels: ArrayLike, samples: int, level: int = 0) -> Record:
     """Run a record of edges from reset.
 
     Args:
-        of: the axis.
+        axis: the axis.
         edge_clocks: integers, shape (edges,): numbers of the clocks, never decreasing and not negative, at which a
             register at the pins first holds the new level.
         edge_levels: integers of the same shape: the pins from then on, a | b << 1.
@@ -120,18 +121,18 @@ def run(of: axis.Axis, edge_clocks: ArrayLike, edge_levels: ArrayLike, samples: 
         The record, with arrays of shape (samples,).
 
     Raises:
-        TypeError: if `of` is not an Axis, or another argument is not an integer or integers.
+        TypeError: if `axis` is not an Axis, or another argument is not an integer or integers.
         ValueError: if the shapes differ, the clocks decrease or are negative, a level is not 0 to 3, or `samples` is
             less than 1.
     """
-    if not isinstance(of, axis.Axis):
-        raise TypeError(f"of must be an Axis, not {of!r}")
+    if not isinstance(axis, Axis):
+        raise TypeError(f"axis must be an Axis, not a value of type {type(axis).__name__}")
     edges = Edges(*checks.edges(edge_clocks, edge_levels))
     checks.check_int("samples", samples, 1)
     checks.check_int("level", level, 0, 3)
-    number = np.float64 if of.floating else np.int64
+    number = np.float64 if axis.floating else np.int64
     velocity, force, drive = (np.zeros(samples, number) for _ in range(3))
     flags = np.zeros(samples, np.int64)
-    start = controller(of, level)
-    _run(*start, of.design.timing, edges, (velocity, force, drive, flags))
-    return axis.Record(of.design, velocity, force, drive, flags)
+    start = controller(axis, level)
+    _run(*start, axis.design.timing, edges, (velocity, force, drive, flags))
+    return Record(axis.design, velocity, force, drive, flags)

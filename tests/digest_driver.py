@@ -141,7 +141,7 @@ def _parts(report: dict, name: str) -> dict[str, Any]:
 
 def rows(text: str) -> dict[str, Any]:
     """Return every row of `accuracy` as an entry."""
-    return {f"{row['output']}/{row['signal']}/{row['sample_hz']:g}": row for row in timeless(json.loads(text))}
+    return {f"{row['output']}/{row['signal']}/{row['sample_hz']:g}": row for row in timeless(json.loads(text)["rows"])}
 
 
 def digest_of(array: np.ndarray) -> dict[str, Any]:

@@ -62,7 +62,7 @@ def test_counts_that_are_counts():
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ({"of": 3}, TypeError, "of must be an Axis, not 3"),
+        ({"axis": 3}, TypeError, "axis must be an Axis, not a value of type int"),
         ({"edge_clocks": [1.5, 2.0]}, TypeError, "edge_clocks must be integers, not float64"),
         ({"edge_clocks": [1, math.nan]}, TypeError, "edge_clocks must be integers, not float64"),
         ({"edge_levels": ["a", "b"]}, TypeError, "edge_levels must be integers, not <U1"),
@@ -81,7 +81,7 @@ def test_counts_that_are_counts():
     ],
 )
 def test_records_of_edges(arguments, error, message):
-    good = {"of": AXIS, "edge_clocks": [1, 2], "edge_levels": [1, 3], "samples": 5}
+    good = {"axis": AXIS, "edge_clocks": [1, 2], "edge_levels": [1, 3], "samples": 5}
     with pytest.raises(error) as refused:
         stamped.run(**(good | arguments))
     assert str(refused.value) == message

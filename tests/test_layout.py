@@ -31,6 +31,7 @@ NOT_TWINNED = {
 BROAD = {
     "commands/test_cli": "every command, as it is called",
     "commands/test_cli_estimators": "the commands on estimators, as they are called",
+    "commands/test_reports": "every report in JSON",
     "estimators/test_levants": "what several of Levant's differentiators promise alike",
     "pictures/test_draw": "every picture",
     "test_digests": "whatever the program computes",

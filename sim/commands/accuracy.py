@@ -8,7 +8,7 @@ import typer
 
 from ..estimates import figures, recording, signals
 from ..estimates.accuracy import measure, measure_recording, spec_of
-from ..estimates.replay import ReplayError
+from ..estimates.replay import ReplayError, check_length
 from ..jobs.store import Store
 from ..studies import accuracy
 from ..world.encoder import offsets
@@ -93,11 +93,11 @@ def _recording_jobs(curves: list, recorded: list[tuple[str, str]]) -> list[dict]
     """Return the arguments of `measure_recording` without the backend, for every estimator and recording.
 
     Raises:
-        RecordingError: if a recording is not valid.
+        RecordingError, ReplayError: if a recording is not valid, or too short to be judged.
     """
     jobs = []
     for file, column in recorded:
-        recording.load(file, column)
+        check_length(recording.load(file, column))
         content = hashlib.sha256(Path(file).read_bytes()).hexdigest()
         keys = {"file": file, "column": column, "content": content}
         jobs += [{"estimator": curve.estimator, "output": curve.output} | keys for curve in curves]

@@ -20,7 +20,7 @@ def command(
     rate: Annotated[
         float | None, typer.Option(metavar="HZ", help="sample rate", show_default="from column time_s")
     ] = None,
-    coarsen: Annotated[int | None, typer.Option(help="divide the counts, and judge against the full ones")] = None,
+    coarsen: Annotated[int, typer.Option(help="divide the counts, and judge against the full ones")] = 1,
     estimator: Annotated[Estimator, typer.Option(help="velocity estimator")] = "levant",
     output: OutputOption = None,
     backend: BackendOption = "fixed",

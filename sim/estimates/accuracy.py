@@ -17,10 +17,10 @@ from ...model.spec import AxisSpec
 from ..scene.case import Case
 from ..world.encoder import offsets
 from . import recording, signals
-from .errors import Judge
+from .judge import Judge
 from .motions import velocity
 from .playback import velocities
-from .replay import replay
+from .replay import check_length, replay
 
 RATES_HZ = (1_000, 10_000_000)
 """The slowest and the fastest rate that is measured."""
@@ -107,7 +107,7 @@ def measure(
     gains: dict[str, float] | None = None,
     bits_dropped: int = 0,
 ) -> dict:
-    """Return one row of measurements, units in the keys; `errors` defines the figures.
+    """Return one row of measurements, units in the keys; `judge` defines the figures.
 
     Args:
         estimator, output: names of the estimator and of its output.
@@ -190,7 +190,9 @@ def measure_recording(
         RecordingError, ReplayError: in one line, what is refused and what is accepted.
         RuntimeError: if the RTL could not be built.
     """
-    result = replay(recording.load(file, column), estimator, output, backend, coarsen=COARSEN)
+    recorded = recording.load(file, column)
+    check_length(recorded)
+    result = replay(recorded, estimator, output, backend, coarsen=COARSEN)
     rate, begin = result.recording.rate_hz, result.judged_from
     estimate, exact = result.velocity_counts_per_s[begin:], result.reference_counts_per_s[begin:]
     judge = Judge(len(estimate), rate)

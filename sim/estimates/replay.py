@@ -43,7 +43,7 @@ class Replay(Summary):
     """The result of a replay; arrays have the recording's length, and are in recorded counts and seconds.
 
     Attributes:
-        coarsen: divisor of the counts that the estimator saw (floor division); None: no divisor, and no judgement.
+        coarsen: divisor of the counts that the estimator saw (floor division).
         acceleration_max_counts_per_s2: the bound C that set the gains.
         gains: the gains by name, with their units.
         clock_hz: clock of the axis: that of its pins on `rtl`, without meaning on the other backends.
@@ -56,7 +56,7 @@ class Replay(Summary):
     """
 
     recording: Recording
-    coarsen: int | None
+    coarsen: int
     estimator: str
     output: str
     backend: str
@@ -85,27 +85,17 @@ class Replay(Summary):
         return float(np.sqrt(np.mean(error**2))) if len(error) else None
 
     @cached_property
-    def error_rms_counts_per_s(self) -> float | None:
+    def rms_counts_per_s(self) -> float | None:
         """The RMS error of the estimate against the reference, after the first second; None for a shorter recording.
 
-        Without `coarsen` the reference comes from the same counts that the estimator saw.
+        With a `coarsen` of 1 the reference comes from the same counts that the estimator saw.
         """
         return self._rms(self.velocity_counts_per_s)
 
     @cached_property
-    def error_rms_fdm_counts_per_s(self) -> float | None:
+    def rms_fdm_counts_per_s(self) -> float | None:
         """The RMS error of the finite difference against the reference, likewise."""
         return self._rms(self.difference_counts_per_s)
-
-    @property
-    def rms_counts_per_s(self) -> float | None:
-        """The RMS error of the estimate if it is judged; None without `coarsen`."""
-        return None if self.coarsen is None else self.error_rms_counts_per_s
-
-    @property
-    def rms_fdm_counts_per_s(self) -> float | None:
-        """The RMS error of the finite difference if it is judged; None without `coarsen`."""
-        return None if self.coarsen is None else self.error_rms_fdm_counts_per_s
 
     def report(self) -> dict:
         """Return the summary that the command line prints, units in the keys; all counts are recorded counts."""
@@ -125,8 +115,6 @@ class Replay(Summary):
             "reference_hz": self.reference_hz,
             "rms_counts_per_s": self.rms_counts_per_s,
             "rms_fdm_counts_per_s": self.rms_fdm_counts_per_s,
-            "error_rms_counts_per_s": self.error_rms_counts_per_s,
-            "error_rms_fdm_counts_per_s": self.error_rms_fdm_counts_per_s,
             "max_abs_counts_per_s": float(np.abs(self.velocity_counts_per_s).max()),
             "flags": self.flags,
             "velocity_sha256": self.velocity_sha256,
@@ -135,7 +123,7 @@ class Replay(Summary):
         }
 
     def save(self, path: str | Path) -> None:
-        """Write time, recorded count and velocity of every sample as CSV; with `coarsen`, the reference too.
+        """Write time, recorded count, velocity and reference of every sample as CSV.
 
         Raises:
             OSError: if the file cannot be written.
@@ -144,9 +132,8 @@ class Replay(Summary):
             "time_s": (self.recording.time_s, "%.9f"),
             "count": (self.recording.counts, "%d"),
             "velocity_counts_per_s": (self.velocity_counts_per_s, "%.12g"),
+            "reference_counts_per_s": (self.reference_counts_per_s, "%.12g"),
         }
-        if self.coarsen is not None:
-            columns["reference_counts_per_s"] = self.reference_counts_per_s, "%.12g"
         line = ",".join(form for _, form in columns.values()) + "\n"
         with whole_file(path) as part, part.open("w", encoding="utf-8", newline="") as file:
             file.write(",".join(columns) + "\n")
@@ -184,16 +171,20 @@ def _check_names(estimator: str, output: str | None, backend: str) -> str:
     return output
 
 
+def check_length(recording: Recording) -> None:
+    """Raise ReplayError if no sample of a recording is judged."""
+    if len(recording.counts) <= judged_from(recording.rate_hz):
+        raise ReplayError(
+            f"{recording.file}: must be longer than {SETTLE_S:g} s, after which the estimate is judged, "
+            f"not {len(recording.counts)} samples at {recording.rate_hz:g} Hz"
+        )
+
+
 def _check_numbers(recording: Recording, coarsen: object, bound: float | None, cutoff: float) -> None:
     """Raise ReplayError if a recording cannot be replayed with these numbers."""
-    rate, samples = recording.rate_hz, len(recording.counts)
-    if coarsen is not None and not (isinstance(coarsen, int) and 1 <= coarsen < 2**31):
+    rate = recording.rate_hz
+    if isinstance(coarsen, bool) or not (isinstance(coarsen, int) and 1 <= coarsen < 2**31):
         raise ReplayError(f"coarsen must be a whole number of 1 to 2**31 - 1, not {coarsen!r}")
-    if coarsen is not None and samples <= judged_from(rate):
-        raise ReplayError(
-            f"{recording.file}: with coarsen a recording must be longer than {SETTLE_S:g} s, after which the estimate "
-            f"is judged, not {samples} samples at {rate:g} Hz"
-        )
     if not 0 < cutoff < rate / 2:
         raise ReplayError(f"reference_hz must be more than 0 and less than {rate / 2:g}, half the rate, not {cutoff!r}")
     if bound is not None and not (math.isfinite(bound) and bound > 0):
@@ -224,7 +215,7 @@ def replay(
     estimator: str = "levant",
     output: str | None = None,
     backend: str = "fixed",
-    coarsen: int | None = None,
+    coarsen: int = 1,
     acceleration_max_counts_per_s2: float | None = None,
     reference_hz: float | None = None,
     progress: Callable[[int], None] | None = None,
@@ -236,7 +227,7 @@ def replay(
         estimator: name of the estimator.
         output: name of its output; None for its first.
         backend: one of `backends.BACKENDS`.
-        coarsen: divide the counts by this (floor division), and judge the estimate; 1 judges without coarser counts.
+        coarsen: divide the counts by this (floor division).
         acceleration_max_counts_per_s2: the bound C that sets the gains; None to derive it from the recording.
         reference_hz: cutoff of the reference; None for the usual cutoff.
         progress: function called with the number of samples done.
@@ -250,12 +241,11 @@ def replay(
     cutoff = min(REFERENCE_HZ, rate / 4) if reference_hz is None else reference_hz
     _check_numbers(recording, coarsen, bound, cutoff)
 
-    count = coarsen or 1
-    counts = _counts_for(recording, count, pins=needs_pins(estimator, backend))
+    counts = _counts_for(recording, coarsen, pins=needs_pins(estimator, backend))
     reference = zero_phase_velocity(recording.counts, rate, cutoff)
     if bound is None:
-        bound = max(acceleration_bound(reference, rate), least_bound(counts) * count * rate**2)
-    spec = _axis_for(counts, count, bound, rate, estimator)
+        bound = max(acceleration_bound(reference, rate), least_bound(counts) * coarsen * rate**2)
+    spec = _axis_for(counts, coarsen, bound, rate, estimator)
     velocity, flags, seconds = run(spec, counts, backend, output, progress)
 
     lsb = spec.design.estimator.velocity.lsb if is_exact(backend) else 1.0
@@ -269,8 +259,8 @@ def replay(
         acceleration_max_counts_per_s2=float(bound),
         gains=_gains(spec, rate),
         reference_hz=float(cutoff),
-        velocity_counts_per_s=velocity * (lsb * count * rate),
-        difference_counts_per_s=np.diff(counts, prepend=counts[0]) * (count * rate),
+        velocity_counts_per_s=velocity * (lsb * coarsen * rate),
+        difference_counts_per_s=np.diff(counts, prepend=counts[0]) * (coarsen * rate),
         reference_counts_per_s=reference,
         flags=spec.design.flag_names(flags),
         velocity_sha256=hashlib.sha256(velocity.astype("<i8").tobytes()).hexdigest() if is_exact(backend) else None,

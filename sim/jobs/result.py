@@ -17,8 +17,8 @@ class Table(NamedTuple):
 class Result(Protocol):
     """The interface of every study's result."""
 
-    def report(self) -> Any:
-        """Return the values that are printed as JSON, with units in the keys."""
+    def report(self) -> dict[str, Any]:
+        """Return the values that are printed as one JSON object, with units in the keys; a list is under `rows`."""
 
     def tables(self) -> list[Table]:
         """Return the tables that are printed for people."""

@@ -49,7 +49,7 @@ def draw(result: Replay) -> Figure:
 
 
 def _title(result: Replay) -> str:
-    recording, count = result.recording, result.coarsen or 1
+    recording, count = result.recording, result.coarsen
     seen = "" if count == 1 else f", seen {count} times coarser"
     return (
         f"{Path(recording.file).name}: {recording.column} at {recording.rate_hz:g} Hz{seen}\n"

@@ -23,9 +23,9 @@ class Accuracy:
     rows: list[dict[str, Any]]
     labels: list[str]
 
-    def report(self) -> list[dict[str, Any]]:
+    def report(self) -> dict[str, Any]:
         """Return the rows, units in the keys."""
-        return self.rows
+        return {"rows": self.rows}
 
     def tables(self) -> list[Table]:
         """Return a table of the known motions, and a table of the recordings, which have another unit."""

@@ -20,9 +20,9 @@ class Bits:
 
     rows: list[dict[str, Any]]
 
-    def report(self) -> list[dict[str, Any]]:
+    def report(self) -> dict[str, Any]:
         """Return the rows, units in the keys."""
-        return self.rows
+        return {"rows": self.rows}
 
     def tables(self) -> list[Table]:
         """Return a table of the rows."""

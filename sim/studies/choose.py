@@ -30,9 +30,9 @@ class Choice:
 
     rows: list[dict[str, Any]]
 
-    def report(self) -> list[dict[str, Any]]:
+    def report(self) -> dict[str, Any]:
         """Return the rows, units in the keys."""
-        return self.rows
+        return {"rows": self.rows}
 
     def tables(self) -> list[Table]:
         """Return the table of errors and the table of costs."""

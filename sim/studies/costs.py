@@ -25,9 +25,9 @@ class Costs:
 
     rows: list[dict[str, Any]]
 
-    def report(self) -> list[dict[str, Any]]:
+    def report(self) -> dict[str, Any]:
         """Return the rows."""
-        return self.rows
+        return {"rows": self.rows}
 
     def tables(self) -> list[Table]:
         """Return two tables for every device: the estimators alone, and the board with each estimator."""

@@ -53,6 +53,11 @@ class Law:
     measured_n_s_per_m: float
 
 
+def _finite(of: End | Law) -> dict[str, Any]:
+    """Return the values by name, with None for infinity, which JSON does not have."""
+    return {key: None if value == math.inf else value for key, value in vars(of).items()}
+
+
 @dataclass(frozen=True)
 class Drop:
     """The result of the study.
@@ -113,11 +118,9 @@ class Drop:
                 for name, chatter in self.chatters.items()
             },
             "shaken": [vars(each) for each in self.shaken],
-            "ends": [vars(each) for each in self.ends],
+            "ends": [_finite(each) for each in self.ends],
             "measured_over_predicted": self.agreement(),
-            "laws": [
-                {key: None if value == math.inf else value for key, value in vars(each).items()} for each in self.laws
-            ],
+            "laws": [_finite(each) for each in self.laws],
         }
 
     def tables(self) -> list[Table]:

@@ -23,7 +23,7 @@ def test_rows_as_json_and_as_a_table(monkeypatch, capsys):
     arguments = ["accuracy", *SHORT, "--workers", 1, "--signal", "hit", "--signal", "steady:10"]
     code, out, err = call(monkeypatch, capsys, *arguments, "--json")
     assert (code, err) == (0, "")
-    rows = json.loads(out)
+    rows = json.loads(out)["rows"]
     assert len(rows) == 8
     assert all(set(row) >= KEYS for row in rows)
     assert {(row["estimator"], row["output"]) for row in rows} == {("fdm", "u"), ("levant", "u1")}
@@ -37,7 +37,7 @@ def test_rows_as_json_and_as_a_table(monkeypatch, capsys):
 def test_fixed_is_rtl(monkeypatch, capsys):
     arguments = ["accuracy", "--estimators", "fdm", "--rates", "1e4", "--signal", "hit", "--workers", 1, "--json"]
     fixed, rtl = (
-        json.loads(call(monkeypatch, capsys, *arguments, "--backend", each)[1])[0] for each in ("fixed", "rtl")
+        json.loads(call(monkeypatch, capsys, *arguments, "--backend", each)[1])["rows"][0] for each in ("fixed", "rtl")
     )
     assert {**fixed, "backend": "rtl"} == rtl
 
@@ -49,7 +49,7 @@ def test_figures_are_drawn(monkeypatch, capsys, tmp_path, figure):
     arguments = ["accuracy", "--figure", figure, *few, "--plot", picture, "--workers", 1, "--json"]
     code, out, _ = call(monkeypatch, capsys, *arguments)
     assert code == 0
-    rows, text = json.loads(out), picture.read_text()
+    rows, text = json.loads(out)["rows"], picture.read_text()
     if figure == 1:
         assert {row["sample_hz"] for row in rows} == {10_000}
         wanted = ("velocity (mm/s)", "time (s)", "exact derivative", "Levant u, adjusted gains")

@@ -11,7 +11,7 @@ import pytest
 
 from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.sim.estimates.recording import Recording, load
-from hardwall.sim.estimates.replay import ReplayError, replay
+from hardwall.sim.estimates.replay import ReplayError, check_length, replay
 from hardwall.sim.pictures.replay import draw
 from hardwall.sim.pictures.style import SUFFIXES, save
 from hardwall.testing import rng
@@ -97,7 +97,7 @@ def test_coarse_counts_are_judged_in_recorded_counts(estimator, output, backend)
     assert (coarse.counts < 0).any()
     seen = replay(fine, estimator, output, backend, COARSEN, BOUND)
     same = replay(other, estimator, output, backend, COARSEN, BOUND)
-    small = replay(coarse, estimator, output, backend, None, BOUND / COARSEN)
+    small = replay(coarse, estimator, output, backend, 1, BOUND / COARSEN)
     assert (seen.velocity_counts_per_s == same.velocity_counts_per_s).all()
     assert np.allclose(seen.velocity_counts_per_s, COARSEN * small.velocity_counts_per_s, rtol=1e-12, atol=1e-9)
     assert seen.velocity_sha256 == same.velocity_sha256 == small.velocity_sha256
@@ -177,8 +177,10 @@ def test_what_cannot_be_is_refused(arguments, message):
 
 
 def test_a_recording_too_short_to_be_judged_is_refused():
-    with pytest.raises(ReplayError, match=r"^made.csv: with coarsen a recording must be longer than 1 s, .* not 1000 "):
-        replay(swing(1000), coarsen=COARSEN)
+    with pytest.raises(ReplayError, match=r"^made.csv: must be longer than 1 s, .* not 1000 samples at 1000 Hz$"):
+        check_length(swing(1000))
+    check_length(swing(1001))
+    assert replay(swing(1000), coarsen=COARSEN).rms_counts_per_s is None
     assert replay(swing(1001), coarsen=COARSEN).rms_counts_per_s > 0
 
 
@@ -194,20 +196,20 @@ def test_a_change_too_fast_for_any_clock_is_refused_on_rtl_alone():
 # ---- written files --------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("coarsen", [None, COARSEN])
+@pytest.mark.parametrize("coarsen", [1, COARSEN])
 def test_the_report_is_json_with_units(coarsen):
     report = json.loads(json.dumps(replay(swing(), coarsen=coarsen).report(), allow_nan=False))
     assert report["samples"] == 3000
     assert (report["estimator"], report["output"], report["backend"]) == ("levant", "u", "fixed")
     assert (report["coarsen"], report["rate_hz"], report["clock_hz"]) == (coarsen, 1000.0, None)
     assert (report["file"], report["column"], report["flags"]) == ("made.csv", "counts", [])
-    assert (report["rms_counts_per_s"] is None) == (report["rms_fdm_counts_per_s"] is None) == (coarsen is None)
+    assert 0 < report["rms_counts_per_s"] < report["rms_fdm_counts_per_s"]
     assert re.fullmatch("[0-9a-f]{64}", report["velocity_sha256"])
     assert report["samples_per_s"] == pytest.approx(3000 / report["seconds"])
     assert 0 < report["max_abs_counts_per_s"] < 1e6
 
 
-@pytest.mark.parametrize("coarsen", [None, COARSEN])
+@pytest.mark.parametrize("coarsen", [1, COARSEN])
 def test_samples_are_saved(tmp_path, coarsen):
     made = recording(swing().counts, start_s=0.25)
     result = replay(made, coarsen=coarsen)
@@ -216,16 +218,14 @@ def test_samples_are_saved(tmp_path, coarsen):
     result.save(path)
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    names = ["time_s", "count", "velocity_counts_per_s", *(["reference_counts_per_s"] if coarsen else [])]
-    assert list(rows[0]) == names
+    assert list(rows[0]) == ["time_s", "count", "velocity_counts_per_s", "reference_counts_per_s"]
     assert [int(row["count"]) for row in rows] == made.counts.tolist()
     assert [float(row["time_s"]) for row in rows] == pytest.approx(made.time_s.tolist(), abs=1e-9)
     assert [float(row["velocity_counts_per_s"]) for row in rows] == pytest.approx(
         result.velocity_counts_per_s.tolist(), rel=1e-11
     )
-    if coarsen:
-        saved = [float(row["reference_counts_per_s"]) for row in rows]
-        assert saved == pytest.approx(result.reference_counts_per_s.tolist(), rel=1e-11)
+    saved = [float(row["reference_counts_per_s"]) for row in rows]
+    assert saved == pytest.approx(result.reference_counts_per_s.tolist(), rel=1e-11)
     # The saved file can be replayed.
     again = replay(load(path, "count"), coarsen=coarsen)
     assert again.velocity_sha256 == result.velocity_sha256

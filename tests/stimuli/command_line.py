@@ -2,12 +2,14 @@
 
 from hardwall.sim.commands import app
 
+from .reports import check_text
+
 WIDTH = 80
 """The width of output in columns where there is no terminal."""
 
 
 def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
-    """Return exit code, stdout and stderr of `hardwall ARGUMENTS`."""
+    """Return exit code, stdout and stderr of `hardwall ARGUMENTS`; a report on stdout is held to its schema."""
     monkeypatch.setattr("sys.argv", ["hardwall", *map(str, arguments)])
     monkeypatch.setattr("signal.signal", lambda *_: None)  # the signals are pytest's
     try:
@@ -16,6 +18,8 @@ def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
     except SystemExit as exit_:
         code = exit_.code
     out, err = capsys.readouterr()
-    if "--json" not in arguments:
+    if "--json" in arguments and not code:
+        check_text(str(arguments[0]), out)
+    else:
         assert [line for line in out.splitlines() if len(line) > WIDTH] == [], "a table does not fit"
     return code, out, err

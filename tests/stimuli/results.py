@@ -31,7 +31,7 @@ def hit(rms_m: float = 0.0, reached: bool = True) -> Hit:
     contact = trace(np.arange(-10, 300) * 1e-4 if reached else np.zeros(0))
     run = {"samples": 60_000, "seconds": 1.0, "mean_m": 3e-5, "touched": reached, "max_force_n": 10.0}
     kept = {"overview": trace(np.linspace(-0.5, 5.5, 500)), "detail": contact}
-    return Hit(load("seed-2011"), "fixed", rms_m=rms_m, flags=[], force_sha256="", **run, **kept)
+    return Hit(load("seed-2011"), "fixed", rms_m=rms_m, flags=[], force_sha256="0" * 64, **run, **kept)
 
 
 def map_of(method: str, stiffest_n_per_m: float, last_n_s_per_m: float, case: Case | None = None) -> Map:

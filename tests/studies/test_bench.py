@@ -1,12 +1,12 @@
 """The benchmark: it runs on any scene, its cocotb loop gives the model's words, and its report is as promised."""
 
-import json
 import shutil
 
 import pytest
 
 from hardwall.sim.scene.load import FOLDER
 from hardwall.sim.studies import bench
+from stimuli.reports import check
 
 
 @pytest.mark.rtl
@@ -25,5 +25,5 @@ def test_the_benchmark_runs_on_a_scene_of_ones_own(tmp_path, monkeypatch):
     }  # fmt: skip
     assert all(value > 0 for value in report["samples_per_s"].values())
     assert report["rtl_over_cocotb"] == report["samples_per_s"]["rtl"] / report["samples_per_s"]["cocotb"]
-    assert json.dumps(report)
+    check("bench", report)
     assert len(said) == 1 + 4 + 7

@@ -1,6 +1,7 @@
 """The table for the choice of an estimator, from made-up results."""
 
 from hardwall.sim.studies import choose
+from stimuli.reports import check
 
 COST = {"device": "some", "lut4": 10, "ff": 20, "dsp": 1, "bram": 0, "latency_clocks": 7, "board": {"max_sample_hz": 5}}
 
@@ -12,6 +13,7 @@ def test_every_error_is_in_its_own_place():
     assert len({job["acceleration_max_m_per_s2"] for job in jobs}) == 1
     measured = [{"rms_mm_s": number, "delay_s": -number} for number, _ in enumerate(jobs)]
     rows = choose.table(pairs, measured, [COST | {"estimator": name} for name in ("fdm", "levant")])
+    check("choose", choose.Choice(rows).report())
     for row, (estimator, output) in zip(rows, pairs, strict=True):
         assert (row["estimator"], row["output"]) == (estimator, output if estimator == "levant" else "")
         assert (row["lut4"], row["max_sample_hz"]) == (10, 5)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hardwall.sim.estimates.errors import CHATTER_S, Judge
+from hardwall.sim.estimates.judge import CHATTER_S, Judge
 from hardwall.testing import rng
 
 RATE = 10_000.0

@@ -1,0 +1,53 @@
+"""The schema of the JSON reports: it is a schema, has every command that prints JSON, and fits every study's result."""
+
+import inspect
+from importlib import import_module
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from hardwall.sim.commands.group import COMMANDS
+from hardwall.sim.estimates.replay import replay
+from stimuli import results
+from stimuli.replays import COARSEN, swing
+from stimuli.reports import SCHEMA, check, check_text
+
+PARTS = {"board", "fact", "map", "trial"}
+"""Definitions of the schema that are no command's, but parts of several."""
+RESULTS = {
+    "cutoff": results.devices,
+    "drop": results.dropped,
+    "gains": results.search,
+    "hit": results.hit,
+    "lipschitz": results.fit,
+    "rates": results.rate_gains,
+    "replay": lambda: replay(swing(), coarsen=COARSEN),
+    "trade": results.traded,
+    "zwidth": results.maps,
+}
+
+
+def prints_json(name: str) -> bool:
+    command = import_module(f"hardwall.sim.commands.{name}").command
+    return "as_json" in inspect.signature(command).parameters
+
+
+def test_every_command_that_prints_json_has_its_definition():
+    Draft202012Validator.check_schema(SCHEMA)
+    assert set(SCHEMA["$defs"]) - PARTS == {name for name in COMMANDS if prints_json(name)}
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_result_is_as_its_schema_says(name):
+    check(name, RESULTS[name]().report())
+
+
+def test_what_is_not_as_the_schema_says_is_found():
+    report = results.hit().report()
+    for wrong in (report | {"rms_mm": -1.0}, report | {"more": 1}, {**report, "flags": "none"}, [report]):
+        with pytest.raises(AssertionError, match=r"^hit: "):
+            check("hit", wrong)
+    with pytest.raises(AssertionError, match=r"^hit: NaN is not JSON"):
+        check_text("hit", '{"rms_mm": NaN}')
+    with pytest.raises(ValueError, match="Out of range float"):
+        check("hit", report | {"rms_mm": float("inf")})
