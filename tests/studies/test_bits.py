@@ -58,7 +58,7 @@ def test_words_with_too_few_bits_to_drop_are_none(synthesised):
 def test_a_table_has_a_line_a_row():
     row = {"estimator": "levant", "output": "u1", "sample_hz": RATE, "bits_dropped": 2, "velocity_bits": 18}
     result = bits.Bits([row | {"rms_mm_s": 0.25} | CELLS])
-    assert result.report() == [row | {"rms_mm_s": 0.25} | CELLS]
+    assert result.report() == {"rows": [row | {"rms_mm_s": 0.25} | CELLS]}
     (table,) = result.tables()
     assert table.rows == [["levant u1", "2", "18", "0.25", "500", "300", "4"]]
     assert list(table.columns) == ["estimator", "bits dropped", "velocity bits", "RMS (mm/s)", "LUT4", "FF", "DSP"]
