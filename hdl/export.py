@@ -11,6 +11,7 @@ from amaranth.back import verilog
 from amaranth.lib import wiring
 
 from hardwall.model.spec import AxisSpec
+from hardwall.model.whole_file import whole_file
 
 from .axis import Axis
 from .board import Board
@@ -67,5 +68,6 @@ def write(spec: AxisSpec, folder: Path) -> tuple[Path, ...]:
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():
-        (folder / name).write_text(text, encoding="utf-8", newline="\n")
+        with whole_file(folder / name) as part:
+            part.write_text(text, encoding="utf-8", newline="\n")
     return tuple(folder / name for name in files)

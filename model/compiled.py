@@ -1,24 +1,23 @@
 """How kernels are compiled: one plain Python source for a single step, a long record, many lanes and the closed loop.
 
-`compiled` is `numba.njit` with a disk cache that follows the *content* of the whole project. Numba's own cache looks
-only at the file of the function it is about to load, so editing a callee in another file would silently leave the
-old arithmetic in place; here every edit gets a fresh cache folder. With `NUMBA_DISABLE_JIT=1` the same functions
-run as ordinary Python.
+`compiled` is `numba.njit` with a disk cache that follows the *content* of the whole project, so that no edit of a
+callee in another file leaves the old arithmetic in place: see `kernel_cache`. With `NUMBA_DISABLE_JIT=1` the same
+functions run as ordinary Python.
 
 `by_type` is the one place where a kernel picks its variant: a function with several bodies, chosen by the type of its
 first argument, at compile time inside compiled code. A variant that a run does not use is not in its machine code.
 """
 
 import functools
-import hashlib
-import os
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, Protocol, TypeVar, cast
 
 import numba
 from numba.core import config
 from numba.extending import overload
+
+from . import provenance
+from .kernel_cache import KernelCache
 
 Kernel = TypeVar("Kernel", bound=Callable)
 
@@ -32,39 +31,12 @@ class ByType(Protocol):
         """Return a decorator that makes a function the body for `kind`."""
 
 
-def build_dir() -> Path:
-    """Return where generated files go: `$HARDWALL_BUILD`, else `build/` of the source tree, else a folder of the user.
-
-    The user's folder serves an installed copy, whose own folder may not be writable.
-    """
-    if chosen := os.environ.get("HARDWALL_BUILD"):
-        return Path(chosen).absolute()
-    root = Path(__file__).absolute().parent.parent
-    if (root / "pyproject.toml").exists():
-        return root / "build"
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "hardwall"
-
-
-@functools.cache
-def source_digest() -> str:
-    """Return a hex digest of every Python source that kernels may come from."""
-    digest = hashlib.sha256()
-    here = Path(__file__).absolute().parent
-    for room in ("model", "sim"):
-        for path in sorted((here.parent / room).rglob("*.py")):
-            digest.update(str(path.relative_to(here.parent)).encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
 def _jit(function: Kernel, folder: str, **options: Any) -> Any:
-    """Return `function` compiled with Numba, cached on disk in a folder of the content of the project's sources."""
-    settings: Any = config
-    saved = settings.CACHE_DIR
-    settings.CACHE_DIR = str(build_dir() / "numba" / source_digest() / folder)
-    try:
-        return numba.njit(cache=True, error_model="numpy", **options)(function)
-    finally:
-        settings.CACHE_DIR = saved
+    """Return `function` compiled with Numba, kept on disk: see `kernel_cache`."""
+    kernel = numba.njit(error_model="numpy", **options)(function)
+    if not cast(Any, config).DISABLE_JIT:
+        kernel._cache = KernelCache(function, folder)
+    return kernel
 
 
 def _kernel(function: Kernel, into_caller: bool) -> Kernel:
@@ -130,6 +102,7 @@ def by_type(declaration: Callable) -> ByType:
         kind.__name__ = f"{kind.__module__}.{kind.__qualname__}"
 
         def add(variant: Callable) -> Callable:
+            provenance.chooses(kind, variant)
             variants[kind] = variant
             return variant
 

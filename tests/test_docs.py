@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from hardwall.model.compiled import build_dir
+from hardwall.model.build_folder import build_dir
 from hardwall.model.estimators.registry import ESTIMATORS
 from stimuli.command_line import call
 from stimuli.pages import PAGES, ROOT, blocks, command_line, commands, text_of

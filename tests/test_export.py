@@ -91,6 +91,20 @@ def written(tmp_path_factory) -> Path:
     return folder
 
 
+def test_a_disk_that_is_full_truncates_no_file(written, tmp_path):
+    """A limit on the size of files stands for the full disk."""
+    program = (
+        "import resource, sys; from stimuli.specs import spec; from hardwall.hdl import export; "
+        "export.to_verilog = lambda component, name: 'x' * 5000; "
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)); export.write(spec('mhz'), sys.argv[1])"
+    )
+    (tmp_path / "axis.v").write_text("an older axis")
+    command = [sys.executable, "-c", program, str(tmp_path)]
+    done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
+    assert done.stderr.splitlines()[-1] == f"OSError: {tmp_path / 'axis.v'}: cannot be written (File too large)"
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("axis.v", "an older axis")]
+
+
 @pytest.mark.parametrize("top", TOPS)
 def test_written_verilog_passes_the_lint(written, top):
     command = ["verilator", "--lint-only", *LINT_OPTIONS, "--top-module", top, str(written / f"{top}.v")]

@@ -37,6 +37,8 @@ BROAD = {
     "test_digests": "whatever the program computes",
     "test_docs": "the pages",
     "test_endurance": "every estimator",
+    "test_fuzz": "every command, called as no one would",
+    "test_killed": "every command that stores results",
     "test_layout": "the tree",
     "test_makefile": "the tasks",
     "test_readme": "the README",

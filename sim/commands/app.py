@@ -1,47 +1,55 @@
 """The command line. Results go to stdout, everything else to stderr.
 
-The exit codes are 0, 1 for a failed run, and 2 for bad input. This module imports nothing that comes with an extra, so
-that it can name an extra that is not installed.
+The exit codes are 0, 1 for a failed run, 2 for bad input, 130 after SIGINT, 143 after SIGTERM, and 141 if stdout was
+closed early. This module imports nothing that comes with an extra, so that it can name an extra that is not installed.
 """
 
 import importlib.metadata
-import os
 import re
-import signal
 import sys
 from importlib import import_module
 
+from ..jobs import ending
 from ..scene.errors import SceneError
+from . import streams
 from .errors import BadInput
 
 
 def main() -> None:
     """Run the command line; report every failure as one line on stderr and an exit code."""
-    signal.signal(signal.SIGINT, _interrupted)
+    streams.prepare()
+    ending.begin()
+    ending.hear_signals()
+    code, message = _run()
+    try:
+        sys.stdout.flush()
+    except streams.StdoutError as error:
+        if not message:
+            code, message = error.code, str(error)
+    if message:
+        print(f"hardwall: error: {' '.join(message.split())}", file=sys.stderr)
+    if code:
+        sys.exit(code)
+
+
+def _run() -> tuple[int, str]:
+    """Run the command that is called; return the exit code and the message of its failure."""
     try:
         import_module(".group", __package__).run()
     except (BadInput, SceneError) as error:
-        code, message = 2, str(error)
+        return 2, str(error)
     except ModuleNotFoundError as error:
         extra = _extra_of(error.name)
         if extra is None:
             raise
-        code, message = 1, f"{error.name} is not installed: it comes with pip install 'hardwall[{extra}]'"
+        return 1, f"{error.name} is not installed: it comes with pip install 'hardwall[{extra}]'"
+    except streams.StdoutError as error:
+        return error.code, str(error)
     except (RuntimeError, OSError) as error:
-        code, message = 1, str(error)
-    else:
-        return
-    if message:
-        print(f"hardwall: error: {message}", file=sys.stderr)
-    sys.exit(code)
-
-
-def _interrupted(*_: object) -> None:
-    """Stop at once: a KeyboardInterrupt raised in compiled code, or in its compiler, crashes the process."""
-    # A progress bar may have hidden the cursor.
-    shown = "\x1b[?25h" if sys.stderr.isatty() else ""
-    print(f"{shown}hardwall: error: interrupted", file=sys.stderr, flush=True)
-    os._exit(1)
+        return 1, f"{error}{ending.remark()}"
+    except SystemExit as exit_:
+        return exit_.code or 0, ""
+    return 0, ""
 
 
 def _extra_of(module: str | None) -> str | None:

@@ -47,10 +47,10 @@ class LazyGroup(TyperGroup):
     def resolve_command(self, context: Any, words: list[str]) -> tuple[str | None, Any, list[str]]:
         """Return the name of the command that is called, the command with its options, and the remaining words."""
         name, stub, rest = super().resolve_command(context, words)
-        return name, stub and _loaded(name), rest
+        return name, stub and loaded(name), rest
 
 
-def _loaded(name: str) -> Any:
+def loaded(name: str) -> Any:
     """Import the module of a command; return the command with its options."""
     alone = typer.Typer(add_completion=False)
     alone.command(name, help=COMMANDS[name])(import_module(f".{name}", __package__).command)

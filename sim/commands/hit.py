@@ -10,7 +10,7 @@ from ..walls import hit
 from .errors import BadInput
 from .options import BackendOption, EstimatorOption, OutputOption, SceneArgument, output_file
 from .study import StudyOptions, study
-from .terminal import log, progress
+from .terminal import progress
 
 
 @study("set_", "plot")
@@ -39,8 +39,10 @@ def command(
         raise BadInput(f"--trace {waveform.name} needs --backend rtl: only hardware has waveforms")
     with progress(f"{of.name} {of.controller.estimator} {backend}", of.samples) as advance:
         result = hit.run(of, backend, bool(options.plot or trace), advance, waveform)
-    options.finish(result)
-    if trace and not waveform:
-        result.save(trace)
-    if trace:
-        log.print(f"trace: {trace}")
+
+    def save() -> list[Path]:
+        if not waveform:
+            result.save(trace)
+        return [trace]
+
+    options.finish(result, {"trace": save} if trace else {})

@@ -16,10 +16,21 @@ from .study import StudyOptions
 from .terminal import progress
 
 
+def check_cluster(options: StudyOptions) -> None:
+    """Raise BadInput if no cluster can be what the options `--workers` and `--scheduler` ask for."""
+    if options.scheduler is None:
+        return
+    try:
+        cluster.check_address(options.scheduler)
+    except cluster.AddressError as error:
+        raise BadInput(f"--scheduler {error}") from None
+    if options.workers:
+        raise BadInput(f"--scheduler {options.scheduler} has workers of its own: give it or --workers, not both")
+
+
 def cluster_for(options: StudyOptions, jobs: int) -> AbstractContextManager[Client | None]:
     """Return `cluster.client` for the options `--workers` and `--scheduler`."""
-    if options.workers and options.scheduler is not None:
-        raise BadInput(f"--scheduler {options.scheduler} has workers of its own: give it or --workers, not both")
+    check_cluster(options)
     return cluster.client(jobs, options.workers, options.scheduler)
 
 
@@ -27,6 +38,7 @@ class Maps:
     """A `zwidth.Mapping` that makes maps as the options say, and records their effort."""
 
     def __init__(self, options: StudyOptions, backend: str):
+        check_cluster(options)
         self._options, self._backend = options, backend
         self._hits, self._began = 0, time.perf_counter()
 

@@ -9,7 +9,7 @@ from ..estimates import recording, replay
 from .errors import BadInput
 from .options import BackendOption, Estimator, OutputOption, output_file
 from .study import StudyOptions, study
-from .terminal import log, progress
+from .terminal import progress
 
 
 @study("plot")
@@ -39,7 +39,9 @@ def command(
             result = replay.replay(recorded, estimator, output, backend, coarsen, acceleration_max, progress=advance)
     except (recording.RecordingError, replay.ReplayError) as error:
         raise BadInput(str(error)) from None
-    options.finish(result)
-    if out:
+
+    def save() -> list[Path]:
         result.save(out)
-        log.print(f"velocities: {out}")
+        return [out]
+
+    options.finish(result, {"velocities": save} if out else {})

@@ -3,12 +3,15 @@
 import functools
 import inspect
 import json
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
+from functools import partial
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
-from ..jobs import parallel
+from ..jobs import ending, parallel
 from ..jobs.result import Result
 from ..jobs.store import Store
 from .options import (
@@ -59,8 +62,23 @@ class StudyOptions:
         with progress(title, len(jobs)) as advance:
             return parallel.run(function, jobs, store, self.workers, advance)
 
-    def finish(self, result: Result) -> None:
-        """Print a result, then draw it: the result is printed even if drawing fails."""
+    def finish(self, result: Result, files: dict[str, Callable[[], Iterable[Path]]] | None = None) -> None:
+        """Print a result, write files of it, and draw it; whichever of these fails, the others are done.
+
+        Args:
+            result: the result.
+            files: functions that write files and return their paths, by what the files are.
+
+        Raises:
+            Exception: what failed; see `_do_all`.
+        """
+        files = dict(files or {})
+        if self.plot:
+            # The picture is the last, because it takes longest.
+            files["picture"] = lambda: _picture("style").save_all(_picture(self.study).draw(result), self.plot)
+        _do_all([partial(self._print, result), *(partial(_write, what, write) for what, write in files.items())])
+
+    def _print(self, result: Result) -> None:
         if self.as_json:
             print(json.dumps(result.report()))
         else:
@@ -68,9 +86,33 @@ class StudyOptions:
                 show(table)
             for note in result.notes():
                 log.print(note)
-        if self.plot:
-            for written in _picture("style").save_all(_picture(self.study).draw(result), self.plot):
-                log.print(f"picture: {written}")
+        # Whatever happens to the files, the result is out.
+        sys.stdout.flush()
+
+
+def _write(what: str, write: Callable[[], Iterable[Path]]) -> None:
+    for path in write():
+        log.print(f"{what}: {path}")
+
+
+def _do_all(steps: Iterable[Callable[[], None]]) -> None:
+    """Do every step, whichever of them fails.
+
+    Raises:
+        Exception: the one that failed, or the first that must not fail.
+        RuntimeError: if several failed; the message names them all.
+    """
+    failures = []
+    for step in steps:
+        try:
+            step()
+        except Exception as error:
+            failures.append(error)
+    faults = [failure for failure in failures if not isinstance(failure, OSError | RuntimeError)]
+    if faults or len(failures) == 1:
+        raise (faults or failures)[0]
+    if failures:
+        raise RuntimeError("; ".join(filter(None, map(str, failures))))
 
 
 def _picture(name: str) -> Any:
@@ -94,6 +136,8 @@ def study(*shared: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
 
         @functools.wraps(function)
         def command(**given: Any) -> None:
+            if "resume" in shared:
+                ending.go_on_by("--resume goes on from there")
             options = StudyOptions(study=name, **{field.name: given.pop(field.name) for field in known})
             function(options, **given)
 

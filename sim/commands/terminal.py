@@ -95,10 +95,11 @@ def _widths(columns: list[_Column], width: int) -> list[tuple[_Column, int]]:
 
 
 class _Stages(logging.Handler):
-    """A log handler that prints the stages of the program."""
+    """A log handler that prints the stages of the program, and its warnings, each on one line."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        log.print(record.getMessage(), style="dim")
+        prefix = "hardwall: warning: " if record.levelno >= logging.WARNING else ""
+        log.print(f"{prefix}{record.getMessage()}", style="dim", soft_wrap=True)
 
 
 def hear_stages() -> None:

@@ -20,7 +20,7 @@ def command(
     spec = Case.of(scene, changes_of(set_, controller__estimator=estimator)).scene.spec
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for path in write_verilog(spec, folder):
-            print(path)
     except OSError as error:
-        raise BadInput(f"-o {str(folder)!r} cannot be written: {error.strerror}") from None
+        raise BadInput(f"-o {str(folder)!r} cannot be made: {error.strerror}") from None
+    for path in write_verilog(spec, folder):
+        print(path)

@@ -22,8 +22,8 @@ import numpy as np
 from ...model.estimators import registry
 from ...model.quadrature_speed import max_edge_rate
 from ...model.spec import AxisSpec
+from ...model.whole_file import whole_file
 from ..jobs.result import Summary
-from ..jobs.whole_file import whole_file
 from ..loop.backends import BACKENDS, is_exact
 from .recording import Recording
 from .reference import REFERENCE_HZ, SETTLE_S, acceleration_bound, judged_from, zero_phase_velocity

@@ -1,23 +1,56 @@
-"""Workers for many independent runs: a Dask cluster of this machine's cores, or a cluster that already runs."""
+"""Workers for many independent runs: a Dask cluster of this machine's cores, or a cluster that already runs.
 
+Whatever becomes of a cluster is a RuntimeError of one line: the logs of Dask are silenced.
+"""
+
+import asyncio
 import logging
 import os
-import signal
+import threading
+import time
 from collections.abc import Iterator
+from concurrent.futures import CancelledError, ThreadPoolExecutor
+from concurrent.futures import Future as Answer
 from contextlib import contextmanager
 
 from distributed import Client, Future, LocalCluster, Worker
-from distributed.client import FutureCancelledError
+from distributed.comm.addressing import parse_address, parse_host_port
+from distributed.core import rpc
 from distributed.scheduler import KilledWorker
+from distributed.security import Security
 
-from .parallel import Interrupted
+from . import children
 
-TIMEOUT_S = 10
+TIMEOUT_S = 8.0
+"""The time for a scheduler to answer, and the time for it to have a worker then."""
+PATIENCE_S = 30.0
+"""The time that a cluster may be without a worker in the middle of the work."""
+POLL_S = 1.0
+SCHEMES = ("tcp", "tls")
+GROUP = "HARDWALL_GROUP"
+"""The variable that tells the workers of a local cluster the number of their process group."""
+SILENT = ("asyncio", "distributed", "tornado")
+"""The loggers of Dask and of what it is made of."""
 
 
-def dask_setup(worker: Worker) -> None:
-    """Leave interrupts to the waiting process; Dask calls this function in every worker of a local cluster."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+class AddressError(ValueError):
+    """A text that cannot be the address of a scheduler; the message says what can."""
+
+
+def check_address(text: str) -> None:
+    """Raise AddressError if a text cannot be the address of a Dask scheduler."""
+    try:
+        scheme, place = parse_address(text)
+        host, port = parse_host_port(place)
+    except ValueError:
+        scheme, host, port = "", "", 0
+    if scheme not in SCHEMES or not host or not 0 < port < 1 << 16:
+        raise AddressError(f"must be an address such as tcp://10.0.0.7:8786, not {text!r}")
+
+
+def dask_setup(_: Worker) -> None:
+    """Tie a worker of a local cluster to the process that waits for it; Dask calls this function in every worker."""
+    children.join(int(os.environ[GROUP]))
 
 
 def result_of(future: Future) -> dict:
@@ -29,7 +62,9 @@ def result_of(future: Future) -> dict:
     """
     try:
         return future.result()
-    except (KilledWorker, FutureCancelledError, ModuleNotFoundError) as error:
+    except (KilledWorker, CancelledError, ModuleNotFoundError) as error:
+        if getattr(error, "reason", None) == "scheduler-connection-lost":
+            raise RuntimeError("the connection to the Dask scheduler is lost") from None
         reason = " ".join(str(error).split()) or type(error).__name__
         raise RuntimeError(f"the Dask cluster could not run a hit: {reason}") from None
 
@@ -44,36 +79,126 @@ def client(jobs: int, workers: int | None = None, scheduler: str | None = None) 
         scheduler: address of a cluster to use instead, e.g. tcp://10.0.0.7:8786. Its workers need this project.
 
     Raises:
+        AddressError: if the address cannot be one.
         RuntimeError: if no cluster answers at that address, or it has no workers.
-        Interrupted: if the user interrupts; the workers are ended.
     """
-    # This process only waits, so an interrupt may be raised in it; compiled code would not survive one.
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        if scheduler is not None:
-            try:
-                connected = Client(scheduler, timeout=TIMEOUT_S)
-            except (OSError, ValueError) as error:
-                raise RuntimeError(f"no Dask scheduler answers at {scheduler}: {error or 'timed out'}") from None
-            with connected:
-                try:
-                    connected.wait_for_workers(1, TIMEOUT_S)
-                except TimeoutError:
-                    raise RuntimeError(f"the Dask scheduler at {scheduler} has no workers") from None
-                yield connected
-            return
-        workers = min(workers or os.cpu_count() or 1, jobs)
-        if workers == 1:
-            # Compiled code runs in this process: an interrupt ends it, and the store has the results so far.
-            signal.signal(signal.SIGINT, before)
-            yield None
-            return
-        options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
-        # No memory limit: a hit needs little, but on many cores a worker's share is less than Python itself needs.
-        options |= {"preload": [__name__], "memory_limit": 0}
-        with LocalCluster(n_workers=workers, **options) as local, Client(local) as connected:
+    for name in logging.root.manager.loggerDict:
+        if name.partition(".")[0] in SILENT:
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    if scheduler is not None:
+        with _connected(scheduler) as connected:
             yield connected
-    except KeyboardInterrupt:
-        raise Interrupted("interrupted; --resume goes on from here") from None
+        return
+    workers = min(workers or os.cpu_count() or 1, jobs)
+    if workers == 1:
+        yield None
+        return
+    with _local(workers) as connected:
+        yield connected
+
+
+@contextmanager
+def _local(workers: int) -> Iterator[Client]:
+    """Provide a client of a cluster on this machine, whose workers end with this process."""
+    options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
+    # No memory limit: a hit needs little, but on many cores a worker's share is less than Python itself needs.
+    options |= {"preload": [__name__], "memory_limit": 0}
+    with children.Group() as group:
+        options["env"] = {GROUP: str(group.number)}
+        # Dask's threads start its processes: they come from a thread of its own, so that this one still hears SIGINT.
+        with ThreadPoolExecutor(1) as starter:
+            local = starter.submit(_deaf_cluster, n_workers=workers, **options).result()
+        with local, Client(local) as connected:
+            yield connected
+
+
+def _deaf_cluster(**options) -> LocalCluster:
+    with children.deaf_children():
+        return LocalCluster(**options)
+
+
+@contextmanager
+def _connected(scheduler: str) -> Iterator[Client]:
+    """Provide a client of a cluster that runs already.
+
+    Raises:
+        AddressError, RuntimeError: see `client`.
+    """
+    check_address(scheduler)
+    _check_scheduler(scheduler)
+    try:
+        connected = Client(scheduler, timeout=TIMEOUT_S)
+    except (OSError, ValueError) as error:
+        raise RuntimeError(f"no Dask scheduler answers at {scheduler}: {error or 'timed out'}") from None
+    with connected:
+        try:
+            connected.wait_for_workers(1, TIMEOUT_S)
+        except TimeoutError:
+            raise RuntimeError(f"the Dask scheduler at {scheduler} has no workers") from None
+        with _watched(connected, scheduler):
+            yield connected
+
+
+@contextmanager
+def _watched(connected: Client, scheduler: str) -> Iterator[None]:
+    """Cancel all jobs when a cluster has had no worker for `PATIENCE_S`: Dask itself waits for ever.
+
+    Raises:
+        RuntimeError: if that happens.
+    """
+    over, deserted = threading.Event(), threading.Event()
+
+    def watch() -> None:
+        peopled = time.monotonic()
+        while not over.wait(POLL_S):
+            now = time.monotonic()
+            if connected.scheduler_info()["workers"]:
+                peopled = now
+            elif now - peopled > PATIENCE_S:
+                deserted.set()
+                connected.cancel([Future(key, connected) for key in list(connected.futures)])
+                return
+
+    watcher = threading.Thread(target=watch, daemon=True)
+    watcher.start()
+    try:
+        yield
+    except RuntimeError:
+        if deserted.is_set():
+            message = f"the Dask cluster at {scheduler} has had no worker for {PATIENCE_S:g} s"
+            raise RuntimeError(message) from None
+        raise
     finally:
-        signal.signal(signal.SIGINT, before)
+        over.set()
+        watcher.join(POLL_S)
+
+
+def _check_scheduler(address: str) -> None:
+    """Raise RuntimeError if no Dask scheduler answers at an address within `TIMEOUT_S`.
+
+    A Dask client waits for ever on a peer that accepts the connection and says nothing, and what a peer of another kind
+    says may break it in any way. So the question is put by a thread that is left to itself when its time is over.
+    """
+    answer: Answer = Answer()
+
+    def ask() -> None:
+        try:
+            answer.set_result(asyncio.run(_kind_of(address)))
+        except BaseException as error:
+            answer.set_exception(error)
+
+    threading.Thread(target=ask, daemon=True).start()
+    try:
+        kind = answer.result(TIMEOUT_S)
+    except Exception as error:
+        reason = "timed out" if isinstance(error, TimeoutError) else " ".join(str(error).split())
+        raise RuntimeError(f"no Dask scheduler answers at {address}: {reason or type(error).__name__}") from None
+    if kind != "Scheduler":
+        raise RuntimeError(f"no Dask scheduler answers at {address}: what answers is no scheduler")
+
+
+async def _kind_of(address: str) -> str | None:
+    """Return the kind that a Dask server says it is."""
+    secrets = Security().get_connection_args("client")
+    async with rpc(address, timeout=TIMEOUT_S, connection_args=secrets) as server:
+        return (await server.identity()).get("type")

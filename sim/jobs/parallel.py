@@ -2,30 +2,14 @@
 
 import multiprocessing
 import os
-import signal
 from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import suppress
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
+from . import children
+from .ending import count_kept
 from .store import Store
-
-
-class Interrupted(RuntimeError):
-    """The user interrupted the run; the results so far are kept."""
-
-
-def _alone() -> None:
-    """Make a worker the leader of its own process group, which the parent ends as a whole, and ignore interrupts."""
-    os.setpgrp()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _end(worker: multiprocessing.Process) -> None:
-    """End a worker and all processes that it has started."""
-    with suppress(ProcessLookupError):
-        os.killpg(worker.pid, signal.SIGKILL)
-    worker.kill()
 
 
 def run(
@@ -45,8 +29,9 @@ def run(
         progress: called with the number of jobs done.
 
     Raises:
-        Exception: the exception of the first job that fails; the results of the others so far are kept.
-        Interrupted: if the user interrupts; the workers are ended.
+        Exception: the exception of the first job that fails; the results of the others so far are kept, and the
+            workers are ended.
+        RuntimeError: if a worker is killed.
     """
     jobs = list(jobs)
     missing = [job for index, job in enumerate(jobs) if job not in store and job not in jobs[:index]]
@@ -55,6 +40,7 @@ def run(
     def keep(job: dict, result: Any) -> None:
         nonlocal done
         store.put(job, result)
+        count_kept()
         done += 1
         if progress:
             progress(done)
@@ -64,23 +50,26 @@ def run(
         for job in missing:
             keep(job, function(**job))
     else:
-        # The workers are spawned, because a fork would copy a process that has threads.
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers, mp_context=context, initializer=_alone) as pool:
-            futures = {pool.submit(function, **job): job for job in missing}
-            # This process only waits, so an interrupt may be raised in it; compiled code would not survive one.
-            before = signal.signal(signal.SIGINT, signal.default_int_handler)
-            try:
-                for future in as_completed(futures):
-                    keep(futures[future], future.result())
-            except BaseException as error:
-                alive = multiprocessing.active_children()
-                pool.shutdown(wait=False, cancel_futures=True)
-                for worker in alive:
-                    _end(worker)
-                if isinstance(error, KeyboardInterrupt):
-                    raise Interrupted("interrupted") from None
-                raise
-            finally:
-                signal.signal(signal.SIGINT, before)
+        _on_processes(function, missing, workers, keep)
     return [store.get(job) for job in jobs]
+
+
+def _on_processes(
+    function: Callable[..., Any], jobs: list[dict], workers: int, keep: Callable[[dict, Any], None]
+) -> None:
+    """Call `keep(job, function(**job))` for every job, as the results of the workers arrive."""
+    # The workers are spawned, because a fork would copy a process that has threads.
+    settings = {"mp_context": multiprocessing.get_context("spawn"), "initializer": children.join}
+    with children.Group() as group, ProcessPoolExecutor(workers, initargs=(group.number,), **settings) as pool:
+        try:
+            with children.deaf_children():
+                futures: dict[Future, dict] = {pool.submit(function, **job): job for job in jobs}
+            for future in as_completed(futures):
+                keep(futures[future], future.result())
+        except BaseException as error:
+            # The pool waits for its workers, who may be in the middle of long jobs.
+            pool.shutdown(wait=False, cancel_futures=True)
+            group.kill()
+            if isinstance(error, BrokenProcessPool):
+                raise RuntimeError("a worker process was killed, perhaps for lack of memory") from None
+            raise

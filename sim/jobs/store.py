@@ -1,19 +1,24 @@
 """Expensive results, kept on disk as they come: an interrupted run loses none, and a repetition computes none again.
 
-A store is a file of one JSON line for each result, found by the digest of its job. It belongs to the exact sources of
-this project and the versions of its tools: any change begins a new store. The line break comes before the text of a
-line, so that a part of a line, left by a process that was killed while it wrote, spoils no other line.
+A store is a file of one JSON line for each result: a digest of the rest of the line, a digest of the job, by which the
+result is found, and the result. It belongs to the exact sources of this project and the versions of its tools: any
+change begins a new store. The line break comes before the text of a line, so that a part of a line, left by a process
+that was killed while it wrote, spoils no other line. A line that does not fit its digest is skipped, and its result
+computed again.
 """
 
+import errno
 import hashlib
 import json
+import os
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from ...model.compiled import build_dir
+from ...model.build_folder import build_dir, not_kept, shown
+from .stages import logger
 
 ROOMS = ("model", "hdl", "sim", "constraints")
 SUFFIXES = (".py", ".cpp", ".toml", ".lpf", ".pcf")
@@ -47,18 +52,35 @@ class Store:
     def __init__(self, kind: str, known: bool = True):
         self.path = build_dir() / "results" / f"{kind}-{sources()}.jsonl"
         self._known: dict[str, Any] = {}
-        text = self.path.read_text(encoding="utf-8") if known and self.path.exists() else ""
-        for line in text.splitlines():
+        # A file that cannot be read cannot be written either, and the first result says so.
+        with suppress(OSError):
+            self._read(self.path.read_bytes() if known else b"")
+
+    def _read(self, content: bytes) -> None:
+        """Take the results of a store's content; skip and count lines that are none."""
+        skipped = 0
+        for line in filter(None, content.split(b"\n")):
             try:
-                key, result = json.loads(line)
-            except ValueError:
-                continue
-            self._known[key] = result
+                check, key, result = json.loads(line)
+            except (ValueError, TypeError, RecursionError):
+                check = None
+            if check is not None and check == self._check(key, result):
+                self._known[key] = result
+            else:
+                skipped += 1
+        if skipped:
+            lines = "1 line that is no result was" if skipped == 1 else f"{skipped} lines that are no results were"
+            logger.warning(f"{shown(self.path)}: {lines} skipped")
 
     @staticmethod
     def _key(job: dict) -> str:
         """Return the digest of a job, because a job may hold a whole scene, and a study many thousands of jobs."""
-        return hashlib.sha256(json.dumps(job, sort_keys=True).encode()).hexdigest()[:32]
+        return _digest(json.dumps(job, sort_keys=True))
+
+    @staticmethod
+    def _check(key: str, result: Any) -> str:
+        """Return the digest of a result and of the key of its job."""
+        return _digest(json.dumps([key, result]))
 
     def __contains__(self, job: dict) -> bool:
         """Return whether there is a result of a job."""
@@ -69,8 +91,19 @@ class Store:
         return self._known.get(self._key(job))
 
     def put(self, job: dict, result: Any) -> None:
-        """Keep the result of a job."""
-        self._known[self._key(job)] = result
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        with self.path.open("a", encoding="utf-8") as file:
-            file.write("\n" + json.dumps([self._key(job), result]))
+        """Keep the result of a job: on disk too, unless that cannot be written."""
+        key = self._key(job)
+        self._known[key] = result
+        line = "\n" + json.dumps([self._check(key, result), key, result])
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            # Without a buffer a line is one call of the system: two processes that append do not mix their lines.
+            with self.path.open("ab", buffering=0) as file:
+                if file.write(line.encode()) != len(line):
+                    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError as error:
+            not_kept(self.path, error)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:32]

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from ..jobs.whole_file import whole_file
+from ...model.whole_file import whole_file
 
 SUFFIXES = (".pdf", ".png", ".svg")
 PAGE_IN = 7.0

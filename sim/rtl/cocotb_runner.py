@@ -8,22 +8,26 @@ import fcntl
 import hashlib
 import os
 import re
+import subprocess
 import sys
 import tempfile
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
+from typing import TextIO
 from xml.etree import ElementTree
 
 from amaranth.lib import wiring
-from cocotb_tools.runner import get_runner
+from cocotb_tools.runner import Verilator
 
 from ...hdl.axis import Axis
 from ...hdl.export import to_verilog
-from ...model.compiled import build_dir
+from ...model.build_folder import build_dir
 from ...model.spec import AxisSpec
-from .verilator import LINT_OPTIONS, environment
+from ..jobs import children
+from .verilator import LINT_OPTIONS, check_paths, environment
 from .waveform import vcd_to_fst
 
 TOOLS = version("cocotb") + version("verilator")
@@ -188,10 +192,22 @@ def _run(component: wiring.Component, name: str, job: Job, trace_to: Path | None
             raise CocotbFailedError(job.module, failed, sample)
 
 
-def _built(build: Path, sources: dict[str, str], name: str, traced: bool):
+class _Runner(Verilator):
+    """Cocotb's runner for Verilator, whose processes end with this process."""
+
+    def _execute_cmds(self, commands: Sequence[Sequence[str]], folder: Path, stdout: TextIO | None = None) -> None:
+        stderr = None if stdout is None else subprocess.STDOUT
+        for command in commands:
+            ended = children.run(command, cwd=folder, env=self.env, stdout=stdout, stderr=stderr).returncode
+            if ended:
+                raise RuntimeError(f"{command[0]} ended with exit code {ended}")
+
+
+def _built(build: Path, sources: dict[str, str], name: str, traced: bool) -> _Runner:
     """Return a runner of the model built in the folder `build` from sources by file name."""
+    check_paths(build)
     os.environ.update(environment())
-    runner = get_runner("verilator")
+    runner = _Runner()
     # Two processes may need the same model: one builds it, and the other finds it built.
     with (build / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)

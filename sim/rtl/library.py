@@ -4,9 +4,8 @@ import ctypes
 import hashlib
 import os
 import shutil
-import subprocess
-import tempfile
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
@@ -16,12 +15,15 @@ from amaranth.lib.wiring import In
 
 from ...hdl.axis import Axis
 from ...hdl.export import to_verilog
-from ...model.compiled import build_dir
+from ...model.build_folder import build_dir, shown
 from ...model.spec import AxisSpec
+from ..jobs import children
 from ..jobs.stages import stage
+from ..jobs.whole_folder import keep_log, whole_folder
 from .verilated import Rtl, RtlState
-from .verilator import LINT_OPTIONS, environment
+from .verilator import LINT_OPTIONS, BuildError, check_paths, environment
 
+LIBRARY = "libaxis.so"
 SHIM = Path(__file__).with_name("library.cpp")
 OPTIONS = [
     *LINT_OPTIONS,
@@ -34,10 +36,6 @@ OPTIONS = [
 # A closed loop runs long enough to be worth the best optimisation; the playback of a recording does not.
 FAST_TO_RUN = ["-CFLAGS", "-O3", "-MAKEFLAGS", "OPT_FAST=-O3"]
 FAST_TO_BUILD = ["-CFLAGS", "-O1", "-MAKEFLAGS", "OPT_FAST=-O1"]
-
-
-class BuildError(RuntimeError):
-    """Verilator or the C++ compiler failed; the message names the log."""
 
 
 def _ports(spec: AxisSpec) -> str:
@@ -85,8 +83,7 @@ endmodule
 def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
     """Return the shared library of the axis; build it first if it is missing.
 
-    It is found by the content of the Verilog, the shim and the tools' versions. It is built in a temporary folder and
-    moved into place when whole, so that an interrupted build, or two at once, leave nothing broken behind.
+    It is found by the content of the Verilog, the shim and the tools' versions, and checked before it is used.
 
     Args:
         spec: the axis.
@@ -106,35 +103,29 @@ def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
     options = [*OPTIONS, *(FAST_TO_BUILD if short else FAST_TO_RUN), *options]
     content = "\0".join([*files.values(), version("verilator"), *options])
     folder = build_dir() / "rtl" / hashlib.sha256(content.encode()).hexdigest()[:16]
-    library = folder / "libaxis.so"
-    if library.exists():
-        return library
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as scratch:
-        work = Path(scratch)
-        for name, text in files.items():
-            (work / name).write_text(text)
-        command = ["verilator", "--cc", "--build", "-j", str(os.cpu_count() or 1), *options]
-        command += ["-CFLAGS", f"-fPIC -I{work}", "--lib-create", "axis", "--Mdir", str(work / "obj")]
-        command += [name for name in files if not name.endswith(".h")]
-        with stage("building the hardware with Verilator, once"):
-            done = subprocess.run(command, cwd=work, env=environment(), capture_output=True, text=True, check=False)
-        if done.returncode:
-            log = folder.parent / "failed.log"
-            log.write_text(" ".join(command) + "\n" + done.stdout + done.stderr)
-            raise BuildError(f"the Verilated library could not be built: see {log}")
-        ready = work / "ready"
-        ready.mkdir()
-        for name in files:
-            shutil.move(work / name, ready / name)
-        shutil.move(work / "obj" / "libaxis.so", ready / library.name)
-        try:
-            ready.rename(folder)
-        except OSError:
-            # Another process was first and made the same content.
-            if not library.exists():
-                raise
-    return library
+    return whole_folder(folder, partial(_verilate, files, options)) / LIBRARY
+
+
+def _verilate(files: dict[str, str], options: list[str], work: Path) -> None:
+    """Write sources, by file name, into the folder `work`, and build the library beside them.
+
+    Raises:
+        BuildError: if the build fails.
+    """
+    check_paths(build_dir())
+    for name, text in files.items():
+        (work / name).write_text(text)
+    command = ["verilator", "--cc", "--build", "-j", str(os.cpu_count() or 1), *options]
+    command += ["-CFLAGS", "-fPIC -I..", "--lib-create", "axis", "--Mdir", "obj"]
+    command += [name for name in files if not name.endswith(".h")]
+    with stage("building the hardware with Verilator, once"):
+        done = children.run(command, cwd=work, env=environment(), capture_output=True, text=True)
+    if done.returncode:
+        text = " ".join(command) + "\n" + done.stdout + done.stderr
+        log = keep_log(build_dir() / "rtl" / "failed.log", text)
+        raise BuildError(f"the Verilated library could not be built: see {shown(log)}")
+    shutil.move(work / "obj" / LIBRARY, work / LIBRARY)
+    shutil.rmtree(work / "obj")
 
 
 @dataclass

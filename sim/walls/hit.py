@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from ...model import stamped
+from ...model.whole_file import whole_file
+from ..jobs.ending import undone
 from ..jobs.result import Summary
 from ..jobs.stages import stage
-from ..jobs.whole_file import whole_file
 from ..loop import loop, record
 from ..loop.backends import Opened, is_exact, number_of, opened
 from ..scene.build import output_step_n, start_of, work_of, world_of
@@ -265,8 +266,9 @@ def _vcd(waveform: Path | None) -> Iterator[Path | None]:
         return
     from ..rtl.waveform import vcd_to_fst  # noqa: PLC0415  (only waveforms need its library)
 
-    with tempfile.TemporaryDirectory() as folder:
-        vcd = Path(folder) / "axis.vcd"
+    folder = tempfile.TemporaryDirectory()
+    with undone(folder.cleanup):
+        vcd = Path(folder.name) / "axis.vcd"
         yield vcd
         vcd_to_fst(vcd, waveform)
 

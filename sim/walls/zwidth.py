@@ -14,6 +14,7 @@ from distributed import Client, as_completed
 
 from ..jobs import store
 from ..jobs.cluster import result_of
+from ..jobs.ending import count_kept
 from ..scene.case import Case
 from . import hit
 from .boundary import Edge, area, trace
@@ -204,6 +205,7 @@ def run(
     Raises:
         SceneError: if a case is not valid, or its scene has no section `zwidth`.
         NeverReached: if the handle does not reach the wall in a case.
+        RuntimeError: if the cluster fails; see `jobs.cluster`.
     """
     traces = [_Tracing(case, backend) for case in cases]
 
@@ -218,6 +220,7 @@ def run(
     def keep(tracing: _Tracing, result: dict) -> dict | None:
         """Keep a verdict; return the next hit to run, or None at the end of the trace."""
         known.put(tracing.wanted, result)
+        count_kept()
         return forward(tracing)
 
     if client is None:

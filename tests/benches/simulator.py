@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hardwall.model.compiled import build_dir
+from hardwall.model.build_folder import build_dir
 from hardwall.sim.rtl import cocotb_runner
 
 from .harness import SEQUENCER, Harness

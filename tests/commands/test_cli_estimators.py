@@ -1,17 +1,13 @@
 """The commands that compare estimators: their output, the input that they refuse, and interrupted runs."""
 
 import json
-import os
 import signal
-import subprocess
-import sys
-import time
-from pathlib import Path
 
 import pytest
 
-from hardwall.model.compiled import build_dir
+from hardwall.model.build_folder import build_dir
 from stimuli.command_line import call
+from stimuli.processes import HARDWALL, ended, session, started, wait_until
 
 KEYS = {
     "estimator", "output", "backend", "sample_hz", "signal", "rms_mm_s", "max_mm_s", "delay_s", "chatter_mm_s",
@@ -94,20 +90,16 @@ def test_bad_input_is_one_line(monkeypatch, capsys, tmp_path, arguments, message
 
 
 def test_an_interrupted_run_loses_nothing_and_ends_its_workers(tmp_path):
-    program = Path(sys.executable).with_name("hardwall")
-    command = [program, "accuracy", "--estimators", "fdm,levant", "--rates", "1e3,1e4,1e5,1e6,1e7", "--workers", "2"]
-    environment = os.environ | {"HARDWALL_BUILD": str(tmp_path)}
+    command = [HARDWALL, "accuracy", "--estimators", "fdm,levant", "--rates", "1e3,1e4,1e5,1e6,1e7", "--workers", "2"]
     (tmp_path / "numba").symlink_to(build_dir() / "numba")
-    run = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     results = tmp_path / "results"
-    deadline = time.monotonic() + 300
-    while not (results.exists() and any(path.stat().st_size for path in results.iterdir())):
-        assert time.monotonic() < deadline
-        assert run.poll() is None
-        time.sleep(0.05)
-    run.send_signal(signal.SIGINT)
-    out, err = run.communicate(timeout=60)
-    assert (run.returncode, out) == (1, "")
-    assert err.splitlines()[-1] == "hardwall: error: interrupted"
+    with started(*command, HARDWALL_BUILD=str(tmp_path)) as run:
+        wait_until(lambda: results.exists() and any(path.stat().st_size for path in results.iterdir()))
+        run.send_signal(signal.SIGTERM)
+        code, out, err = ended(run)
+        assert session(run) == []
+    assert (code, out) == (143, "")
+    assert err.splitlines()[-1].startswith("hardwall: error: terminated; ")
+    assert err.endswith(" kept, and the same command goes on from there\n")
     (kept,) = results.iterdir()
-    assert all(len(json.loads(line)) == 2 for line in kept.read_text().split("\n") if line)
+    assert all(len(json.loads(line)) == 3 for line in kept.read_text().split("\n") if line)

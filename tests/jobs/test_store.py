@@ -1,9 +1,11 @@
 """The store of results that take time: kept as they come, found again, and discarded when the sources change."""
 
 import multiprocessing
+import os
 
 import pytest
 
+from hardwall.model import build_folder
 from hardwall.sim.jobs import parallel, store
 from hardwall.sim.jobs.store import Store
 
@@ -40,6 +42,91 @@ def test_a_line_that_was_cut_off_is_no_result_and_spoils_none():
     assert (again.get({"a": 1}), {"a": 2} in again) == (1, False)
     again.put({"a": 2}, 2)
     assert Store("some").get({"a": 2}) == 2
+
+
+NO_RESULTS = {
+    "a number": b"5", "a list": b"[1]", "nothing": b"null", "a text": b'"abc"',
+    "an object": b'{"a": 1, "b": 2, "c": 3}',
+    "old form": b'["0123456789abcdef0123456789abcdef", 5]', "a key of a wrong kind": b'["a", ["b"], 5]',
+    "not UTF-8": b"\xff\xfe\x80", "NUL": b"\0", "blanks": b"  ", "deep": b"[" * 100_000, "long": b"[1" + b"0" * 9999,
+    "a line of another system": b'["a", "b", 5]\r',
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("line", NO_RESULTS.values(), ids=NO_RESULTS)
+def test_a_line_that_is_no_result_is_skipped_and_one_line_says_so(line, caplog):
+    kept = Store("some")
+    kept.put({"a": 1}, 1)
+    with kept.path.open("ab") as file:
+        file.write(b"\n" + line)
+    kept.put({"a": 2}, 2)
+    again = Store("some")
+    assert (again.get({"a": 1}), again.get({"a": 2})) == (1, 2)
+    assert caplog.messages == [f"{kept.path}: 1 line that is no result was skipped"]
+
+
+def test_all_that_is_skipped_is_counted(caplog):
+    kept = Store("some")
+    kept.put({"a": 1}, 1)
+    with kept.path.open("ab") as file:
+        file.writelines(b"\n" + line for line in NO_RESULTS.values())
+    assert Store("some").get({"a": 1}) == 1
+    assert caplog.messages == [f"{kept.path}: {len(NO_RESULTS)} lines that are no results were skipped"]
+
+
+@pytest.mark.parametrize("result", [{"rms": 1.5, "ok": True}, [float("nan"), -0.0, 1e-320], {"1": None}, "ünï\n\u2028"])
+def test_a_result_comes_back_as_it_was(result, caplog):
+    Store("some").put({"a": 1}, result)
+    assert repr(Store("some").get({"a": 1})) == repr(result)
+    assert caplog.messages == []
+
+
+def test_a_result_that_was_edited_is_computed_again():
+    kept = Store("squares")
+    kept.put({"number": 7}, {"square": 49})
+    kept.path.write_text(kept.path.read_text().replace('{"square": 49}', "5"))
+    assert parallel.run(square, [{"number": 7}], Store("squares")) == [{"square": 49}]
+    assert Store("squares").get({"number": 7}) == {"square": 49}
+
+
+@pytest.fixture
+def unsaid(monkeypatch):
+    """Forget what this process has warned of."""
+    monkeypatch.setattr(build_folder, "_said", set())
+
+
+def test_without_a_place_to_keep_them_results_are_used_and_one_line_says_so(tmp_path, monkeypatch, caplog, unsaid):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path / "file"))
+    kept = Store("squares")
+    jobs = [{"number": number} for number in (1, 2, 3)]
+    assert parallel.run(square, jobs, kept, 1) == [{"square": 1}, {"square": 4}, {"square": 9}]
+    assert caplog.messages == [f"{kept.path} cannot be written (Not a directory): what this run makes is not kept"]
+
+
+@pytest.mark.skipif(not os.access("/dev/full", os.W_OK), reason="this system has no /dev/full")
+def test_on_a_full_disk_results_are_used_and_one_line_says_so(caplog, unsaid):
+    kept = Store("squares")
+    kept.path.parent.mkdir(parents=True)
+    kept.path.symlink_to("/dev/full")
+    kept.put({"number": 1}, {"square": 1})
+    assert kept.get({"number": 1}) == {"square": 1}
+    reason = "No space left on device"
+    assert caplog.messages == [f"{kept.path} cannot be written ({reason}): what this run makes is not kept"]
+
+
+def put_many(first: int) -> None:
+    kept = Store("many")
+    for number in range(first, first + 50):
+        kept.put({"number": number}, "x" * 20_000)
+
+
+def test_processes_that_put_at_once_lose_nothing(caplog):
+    with multiprocessing.get_context("fork").Pool(4) as pool:
+        pool.map(put_many, range(0, 400, 50))
+    kept = Store("many")
+    assert sum({"number": number} in kept for number in range(400)) == 400
+    assert caplog.messages == []
 
 
 def test_nothing_is_a_result_too():

@@ -9,6 +9,7 @@ import pytest
 
 from hardwall.hdl.board import Board
 from hardwall.model import quadrature
+from hardwall.sim.jobs.whole_folder import LIST
 from hardwall.sim.rtl import synthesis
 from hardwall.sim.rtl.synthesis import DEVICES, SynthesisError, synthesise
 from hardwall.sim.scene.load import load
@@ -81,10 +82,13 @@ def test_report_of_a_device_that_nextpnr_knows(tools):
     assert (report["clocks_per_sample"], report["max_sample_hz"]) == (latency, round(60e6 / latency))
     assert report["latency_clocks"] == quadrature.latency(2) + latency
     assert report["critical_path"] == "axis.from to axis.to, 20.0 ns"
-    assert sorted(path.name for path in Path(report["folder"]).iterdir()) == [
-        "board.json", "board.v", "seed-5.json", "seed-5.log", "seed-6.json", "seed-6.log", "seed-9.json", "seed-9.log",
-        "ulx3s-25f.lpf", "yosys.log",
+    folder = Path(report["folder"])
+    seeds = ["seed-5", "seed-6", "seed-9"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        LIST, "board.json", "board.v", *seeds, "ulx3s-25f.lpf", "yosys.log"
     ]  # fmt: skip
+    for seed in seeds:
+        assert sorted(path.name for path in (folder / seed).iterdir()) == [LIST, "nextpnr.log", "report.json"]
 
 
 def test_multipliers_without_registers_are_part_of_a_path(tools):
@@ -125,6 +129,15 @@ def test_what_was_done_is_not_done_again(tools):
     # A different clock is a different constraint, so it is run again.
     placed(load("mhz", {"controller.clock_hz": 100_000_000}), "ecp5-25k", (5,))
     assert len(tools.read_text().split()) == 6
+
+
+@pytest.mark.parametrize(("damaged", "again"), [("board.json", ["0", "5"]), ("seed-5/report.json", ["5"])])
+def test_what_was_damaged_is_made_again(tools, damaged, again):
+    first = placed(load("mhz"), "ecp5-25k", (5,))
+    path = Path(first["folder"]) / damaged
+    path.write_bytes(path.read_bytes()[:-9])
+    assert placed(load("mhz"), "ecp5-25k", (5,)) == first
+    assert tools.read_text().split() == ["0", "5", *again]
 
 
 def test_a_design_that_does_not_fit_is_one_line_with_the_log(tools):

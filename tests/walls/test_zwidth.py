@@ -2,22 +2,22 @@
 
 import json
 import os
+import re
 import signal
-import subprocess
-import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from distributed import Client, LocalCluster
 
+from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs.store import Store
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.walls import hit, methods, zwidth
 from hardwall.sim.walls.boundary import Edge
 from stimuli.command_line import call
+from stimuli.processes import HARDWALL, ended, session, started, wait_until
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
@@ -205,38 +205,23 @@ def test_a_scene_of_a_file_need_not_be_there_any_more(tmp_path, map_of_one_proce
     assert [each.edges for each in maps] == [each.edges for each in map_of_one_process]
 
 
-def test_a_scheduler_without_workers_is_a_failure(monkeypatch, capsys):
-    monkeypatch.setattr("hardwall.sim.jobs.cluster.TIMEOUT_S", 0.5)
-    with LocalCluster(n_workers=0, dashboard_address=":0") as cluster:
-        address = cluster.scheduler_address
-        code, out, err = call(monkeypatch, capsys, "zwidth", *SET, "--scheduler", address)
-    assert (code, out) == (1, "")
-    assert f"the Dask scheduler at {address} has no workers" in err
+@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_an_interrupted_map_says_how_to_go_on(tmp_path, workers, number):
+    (tmp_path / "numba").symlink_to(build_dir() / "numba")
+    with started(HARDWALL, "zwidth", "--workers", workers, "--json", HARDWALL_BUILD=str(tmp_path)) as process:
+        wait_until(lambda: kept(tmp_path))
+        # An interrupt of the terminal goes to all processes of its group.
+        os.killpg(process.pid, signal.Signals[number])
+        code, out, err = ended(process)
+        assert session(process) == []
+    assert (code, out) == ({"SIGINT": 130, "SIGTERM": 143}[number], "")
+    word = {"SIGINT": "interrupted", "SIGTERM": "terminated"}[number]
+    remark = r"(1 new result is|\d+ new results are) kept, and --resume goes on from there"
+    assert re.fullmatch(rf"hardwall: error: {word}; {remark}", err.splitlines()[-1])
+    assert len(kept(tmp_path)) > 0
 
 
-def test_a_scheduler_that_is_not_there_is_a_failure(monkeypatch, capsys):
-    monkeypatch.setattr("hardwall.sim.jobs.cluster.TIMEOUT_S", 0.5)
-    code, out, err = call(monkeypatch, capsys, "zwidth", *SET, "--scheduler", "tcp://127.0.0.1:1")
-    assert (code, out) == (1, "")
-    assert "no Dask scheduler answers at tcp://127.0.0.1:1" in err
-
-
-def test_an_interrupted_map_says_how_to_go_on(tmp_path):
-    command = [Path(sys.executable).with_name("hardwall"), "zwidth", "--workers", "2", "--json"]
-    build = tmp_path / "results"
-    process = subprocess.Popen(
-        command, env={**os.environ, "HARDWALL_BUILD": str(build)}, stderr=subprocess.PIPE, stdout=subprocess.PIPE,
-        text=True, start_new_session=True,
-    )  # fmt: skip
-
-    def kept() -> list[str]:
-        return [line for path in build.glob("results/zwidth-*.jsonl") for line in path.read_text().split()]
-
-    deadline = time.monotonic() + 120
-    while time.monotonic() < deadline and not kept():
-        time.sleep(0.2)
-    os.killpg(process.pid, signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (1, "")
-    assert err.splitlines()[-1] == "hardwall: error: interrupted; --resume goes on from here"
-    assert len(kept()) > 0
+def kept(build: Path) -> list[str]:
+    """Return the verdicts in a folder for generated files, as lines of JSON."""
+    return [line for path in build.glob("results/zwidth-*.jsonl") for line in path.read_text().split("\n") if line]

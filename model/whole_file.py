@@ -1,9 +1,15 @@
 """Files that are written completely or not at all."""
 
+import itertools
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+unfinished: set[Path] = set()
+"""The temporary files that are being written, for a process that ends in the middle of its work to remove."""
+
+_numbers = itertools.count()
 
 
 @contextmanager
@@ -11,9 +17,10 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     """Provide a temporary file beside `path` to write to; rename it to `path` once it is complete.
 
     Raises:
-        OSError: if the file cannot be written; the message is one line.
+        OSError: if the file cannot be written; the message is one line and names the file.
     """
-    part = Path(path).with_name(f".{Path(path).stem}-{os.getpid()}{Path(path).suffix}")
+    part = Path(path).with_name(f".part-{os.getpid()}-{next(_numbers)}{Path(path).suffix}")
+    unfinished.add(part)
     try:
         yield part
         part.replace(path)
@@ -22,3 +29,4 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
+        unfinished.discard(part)

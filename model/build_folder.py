@@ -1,0 +1,51 @@
+"""The folder of what the program makes for itself: compiled kernels, built hardware, stored results.
+
+All of it can be made again. What is found there is checked before it is used, and a run does without what cannot be
+written there.
+"""
+
+import logging
+import multiprocessing
+import os
+from pathlib import Path
+
+LOGGER = logging.getLogger("hardwall")
+SHOWN_MAX = 200
+"""The most characters of a path in a message."""
+_said: set[str] = set()
+
+
+def build_dir() -> Path:
+    """Return where generated files go: `$HARDWALL_BUILD`, else `build/` of the source tree, else a folder of the user.
+
+    The user's folder serves an installed copy, whose own folder may not be writable.
+    """
+    if chosen := os.environ.get("HARDWALL_BUILD"):
+        return Path(chosen).absolute()
+    root = Path(__file__).absolute().parent.parent
+    if (root / "pyproject.toml").exists():
+        return root / "build"
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "hardwall"
+
+
+def warn_once(kind: str, message: str) -> None:
+    """Log a warning, unless this process has logged one of its kind; a worker leaves that to the process it works for.
+
+    Where the project's logger has no handler, Python itself prints warnings on stderr.
+    """
+    if kind not in _said and multiprocessing.parent_process() is None:
+        _said.add(kind)
+        LOGGER.warning(message)
+
+
+def not_kept(path: Path, error: OSError) -> None:
+    """Warn that a file or folder cannot be written; the run goes on, and the next one makes its content again."""
+    reason = error.strerror or error
+    warn_once("not kept", f"{shown(path)} cannot be written ({reason}): what this run makes is not kept")
+
+
+def shown(path: Path) -> str:
+    """Return a path for a message: printable, on one line, and the middle of a very long one left out."""
+    text = str(path) if str(path).isprintable() else repr(str(path))
+    half = SHOWN_MAX // 2
+    return text if len(text) <= SHOWN_MAX else f"{text[:half]}...{text[-half:]}"

@@ -1,0 +1,119 @@
+"""The end of the program by a signal: at once, with one line on stderr, and with nothing left behind.
+
+An exception that a signal raises in compiled code, or in its compiler, crashes the process. A signal therefore ends
+the process where it is. What has to be undone before is registered with `undone`; results are kept as they come.
+"""
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+
+from ...model.whole_file import unfinished
+
+CODES = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
+"""The exit code after every signal that is handled, and the word for it."""
+GRACE_S = 1.0
+"""The time for what is printed already to go out."""
+TO_THE_START_OF_THE_LINE, SHOW_THE_CURSOR = "\r\x1b[K", "\x1b[?25h"
+
+
+@dataclass
+class _Kept:
+    """The results that outlive this process, and the way to go on from them."""
+
+    results: int = 0
+    way: str = "the same command goes on from there"
+
+
+_kept = _Kept()
+_undoing: dict[object, Callable[[], object]] = {}
+_ending = threading.Lock()
+
+
+@contextmanager
+def undone(undo: Callable[[], object]) -> Iterator[None]:
+    """Call `undo` at the end of the context, and before a signal ends the process within the context."""
+    key = object()
+    _undoing[key] = undo
+    try:
+        yield
+    finally:
+        undo()
+        _undoing.pop(key, None)
+
+
+def count_kept() -> None:
+    """Count a result that outlives this process."""
+    _kept.results += 1
+
+
+def go_on_by(way: str) -> None:
+    """Say how the user goes on from the results that are kept: the end of `remark`."""
+    _kept.way = way
+
+
+def remark() -> str:
+    """Return the end of a message that says what is kept of an unfinished run, and how to go on; often empty."""
+    if not _kept.results:
+        return ""
+    results = "1 new result is" if _kept.results == 1 else f"{_kept.results} new results are"
+    return f"; {results} kept, and {_kept.way}"
+
+
+def begin() -> None:
+    """Begin a run: nothing is kept yet."""
+    global _kept  # noqa: PLW0603
+    _kept = _Kept()
+
+
+def hear_signals() -> None:
+    """End this process when a signal of `CODES` arrives.
+
+    A signal that arrives just before the main thread waits for a lock is not noticed there until the wait is over. So a
+    thread hears it, too, and whichever is first ends the process.
+    """
+    heard, told = os.pipe()
+    os.set_blocking(told, False)
+    signal.set_wakeup_fd(told, warn_on_full_buffer=False)
+    # Python's tracker of shared semaphores removes what an early end leaves of them; it need not complain about it.
+    sys.warnoptions.append("ignore:resource_tracker")
+    for number in CODES:
+        signal.signal(number, lambda number, _: _end(number))
+    threading.Thread(target=_hear, args=[heard], daemon=True).start()
+
+
+def _hear(heard: int) -> None:
+    while number := os.read(heard, 1):
+        if number[0] in CODES:
+            _end(number[0])
+
+
+def _flush() -> None:
+    with suppress(Exception):
+        sys.stdout.flush()
+
+
+def _end(number: int) -> None:
+    if not _ending.acquire(blocking=False):
+        # The other thread ends this process.
+        threading.Event().wait()
+    code, word = CODES[signal.Signals(number)]
+    # A print that was interrupted holds stdout for good.
+    flushing = threading.Thread(target=_flush, daemon=True)
+    flushing.start()
+    flushing.join(GRACE_S)
+    # A progress bar may have hidden the cursor.
+    begin = TO_THE_START_OF_THE_LINE + SHOW_THE_CURSOR if os.isatty(2) else ""
+    with suppress(OSError):
+        os.write(2, f"{begin}hardwall: error: {word}{remark()}\n".encode())
+    for undo in reversed(list(_undoing.values())):
+        with suppress(Exception):
+            undo()
+    for part in list(unfinished):
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+    os._exit(code)

@@ -1,0 +1,170 @@
+"""Clusters that do not answer, that are no clusters, that lose their workers or their scheduler; local ones end."""
+
+import os
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import contextmanager
+
+import pytest
+from distributed import LocalCluster
+
+from hardwall.sim.jobs import cluster
+from stimuli.command_line import call
+from stimuli.processes import ended, session, started, wait_until
+
+LOCAL = {"threads_per_worker": 1, "dashboard_address": ":0"}
+
+
+@contextmanager
+def listening(answer):
+    """Provide the address of a listener, and hand it connections in a thread."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+
+        def serve():
+            while True:
+                try:
+                    connection, _ = listener.accept()
+                    kept.append(connection)
+                    answer(connection)
+                except OSError:
+                    return
+
+        kept: list[socket.socket] = []
+        threading.Thread(target=serve, daemon=True).start()
+        yield f"tcp://127.0.0.1:{listener.getsockname()[1]}"
+        listener.shutdown(socket.SHUT_RDWR)
+        for connection in kept:
+            connection.close()
+
+
+ANSWERS = {
+    "nothing": lambda connection: None,
+    "the end": lambda connection: connection.close(),
+    "another protocol": lambda connection: connection.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n" * 9),
+    "garbage": lambda connection: connection.sendall(bytes(range(256)) * 9),
+    "a short frame": lambda connection: connection.sendall(b"\1" + bytes(7) + b"\5" + bytes(7) + b"hello"),
+    "an echo": lambda connection: connection.sendall(connection.recv(1 << 16)),
+}
+
+
+@pytest.mark.parametrize("answer", ANSWERS)
+def test_who_does_not_answer_as_a_scheduler_is_none(monkeypatch, capsys, answer):
+    monkeypatch.setattr(cluster, "TIMEOUT_S", 1.0)
+    with listening(ANSWERS[answer]) as address:
+        code, out, err = call(monkeypatch, capsys, "zwidth", "--scheduler", address)
+    assert (code, out) == (1, "")
+    assert err.startswith(f"hardwall: error: no Dask scheduler answers at {address}: ")
+    assert err.count("\n") == 1
+
+
+def test_a_scheduler_that_wants_certificates_needs_some(monkeypatch, capsys):
+    monkeypatch.setattr(cluster, "TIMEOUT_S", 1.0)
+    code, out, err = call(monkeypatch, capsys, "zwidth", "--scheduler", "tls://127.0.0.1:8786")
+    assert (code, out) == (1, "")
+    assert err.startswith("hardwall: error: no Dask scheduler answers at tls://127.0.0.1:8786: TLS ")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("address", ["abc", "", "tcp://", "tcp://a", "ftp://a:1", "a:0", "a:65536", ":8786", "::1:9"])
+@pytest.mark.parametrize("command", ["zwidth", "fit", "rates"])
+def test_what_is_no_address_is_refused_before_any_work(monkeypatch, capsys, address, command):
+    monkeypatch.setattr(cluster, "client", lambda *_: pytest.fail("it connects"))
+    expected = f"hardwall: error: --scheduler must be an address such as tcp://10.0.0.7:8786, not {address!r}\n"
+    assert call(monkeypatch, capsys, command, "--scheduler", address) == (2, "", expected)
+
+
+@pytest.mark.parametrize("address", ["tcp://10.0.0.7:8786", "node-7:8786", "tls://[::1]:8786"])
+def test_what_is_an_address_is_accepted(address):
+    cluster.check_address(address)
+
+
+def test_a_scheduler_without_workers_is_a_failure(monkeypatch, capsys):
+    monkeypatch.setattr(cluster, "TIMEOUT_S", 1.0)
+    with LocalCluster(n_workers=0, **LOCAL) as local:
+        address = local.scheduler_address
+        code, out, err = call(monkeypatch, capsys, "zwidth", "--scheduler", address)
+    assert (code, out) == (1, "")
+    assert err == f"hardwall: error: the Dask scheduler at {address} has no workers\n"
+
+
+def test_a_scheduler_that_is_not_there_is_a_failure(monkeypatch, capsys):
+    monkeypatch.setattr(cluster, "TIMEOUT_S", 1.0)
+    code, out, err = call(monkeypatch, capsys, "zwidth", "--scheduler", "tcp://127.0.0.1:1")
+    assert (code, out) == (1, "")
+    assert err.startswith("hardwall: error: no Dask scheduler answers at tcp://127.0.0.1:1: ")
+
+
+def wait_for_nobody(address: str, happens: Callable[[], object]) -> None:
+    """Wait for a job that no worker takes, while something happens to the cluster."""
+    with cluster.client(9, None, address) as client:
+        assert cluster.result_of(client.submit(abs, -7)) == 7
+        waiting = client.submit(abs, -8, workers=["nowhere"])
+        happens()
+        cluster.result_of(waiting)
+
+
+def test_a_cluster_that_loses_its_workers_is_left(monkeypatch):
+    monkeypatch.setattr(cluster, "TIMEOUT_S", 30.0)
+    monkeypatch.setattr(cluster, "PATIENCE_S", 1.0)
+    monkeypatch.setattr(cluster, "POLL_S", 0.1)
+    with LocalCluster(n_workers=1, processes=False, protocol="tcp", **LOCAL) as local:
+        message = f"^the Dask cluster at {local.scheduler_address} has had no worker for 1 s$"
+        with pytest.raises(RuntimeError, match=message):
+            wait_for_nobody(local.scheduler_address, lambda: local.scale(0))
+
+
+SCHEDULER = """
+from distributed import LocalCluster
+import sys, time
+with LocalCluster(n_workers=1, processes=False, protocol="tcp", dashboard_address=None) as local:
+    print(local.scheduler_address, flush=True)
+    time.sleep(600)
+"""
+
+
+def test_a_scheduler_that_is_killed_is_a_failure_in_a_line(monkeypatch, capfd):
+    monkeypatch.setattr(cluster, "TIMEOUT_S", 30.0)
+    with started(sys.executable, "-c", SCHEDULER) as scheduler:
+        address = scheduler.stdout.readline().strip()
+        with pytest.raises(RuntimeError, match=r"^the connection to the Dask scheduler is lost$"):
+            wait_for_nobody(address, scheduler.kill)
+    assert capfd.readouterr() == ("", "")
+
+
+LOCAL_PROGRAM = """
+import sys, time
+from hardwall.sim.jobs import cluster, ending
+ending.hear_signals()
+if __name__ == "__main__":
+    print("begun", flush=True)
+    with cluster.client(2, 2) as client:
+        print("ready", flush=True)
+        client.submit(time.sleep, 600).result()
+"""
+
+
+@pytest.mark.parametrize("moment", ["begun", "ready"])
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGKILL"])
+def test_a_local_cluster_ends_with_its_client(tmp_path, moment, number):
+    """An interrupt goes to all processes of the terminal, at the start of the cluster, too."""
+    program = tmp_path / "program.py"
+    program.write_text(LOCAL_PROGRAM)
+    with started(sys.executable, program) as process:
+        while process.stdout.readline().strip() != moment:
+            pass
+        if moment == "begun":
+            wait_until(lambda: len(session(process)) >= 5)
+        if number == "SIGINT":
+            os.killpg(process.pid, signal.SIGINT)
+        else:
+            process.send_signal(signal.Signals[number])
+        wait_until(lambda: session(process) == [])
+        code, _, err = ended(process)
+    if number == "SIGKILL":
+        assert code == -signal.SIGKILL
+    else:
+        words = {"SIGINT": (130, "interrupted"), "SIGTERM": (143, "terminated")}[number]
+        assert (code, err) == (words[0], f"hardwall: error: {words[1]}\n")

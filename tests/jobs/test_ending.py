@@ -1,0 +1,58 @@
+"""Ends by a signal: the exit code, one line, and what is undone before."""
+
+import signal
+import sys
+
+import pytest
+
+from hardwall.sim.jobs import ending
+from stimuli.processes import ended, started, wait_until
+
+PROGRAM = """
+import sys, time
+from pathlib import Path
+from hardwall.model.whole_file import whole_file
+from hardwall.sim.jobs import ending
+ending.hear_signals()
+ending.go_on_by("--resume goes on from there")
+for _ in range({kept}):
+    ending.count_kept()
+with ending.undone(Path("outer").touch), ending.undone(lambda: Path("inner").touch(Path("outer").exists())):
+    with whole_file("file.txt") as part:
+        part.touch()
+        print("finished", end="")  # stays in the buffer
+        Path("ready").touch()
+        time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("kept", [0, 1, 2])
+@pytest.mark.parametrize(("number", "code", "word"), [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")])
+def test_a_signal_ends_the_program_in_a_line(tmp_path, monkeypatch, kept, number, code, word):
+    monkeypatch.chdir(tmp_path)
+    with started(sys.executable, "-c", PROGRAM.format(kept=kept)) as process:
+        wait_until((tmp_path / "ready").exists)
+        process.send_signal(signal.Signals[number])
+        assert ended(process) == (code, "finished", f"hardwall: error: {word}{REMARKS[kept]}\n")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["inner", "outer", "ready"]
+
+
+REMARKS = {
+    0: "",
+    1: "; 1 new result is kept, and --resume goes on from there",
+    2: "; 2 new results are kept, and --resume goes on from there",
+}
+
+
+def test_what_ends_without_a_signal_is_undone_once():
+    calls = []
+    with ending.undone(lambda: calls.append("undone")):
+        assert calls == []
+    assert calls == ["undone"]
+
+
+def test_a_run_begins_with_nothing_kept():
+    ending.count_kept()
+    assert "kept" in ending.remark()
+    ending.begin()
+    assert ending.remark() == ""

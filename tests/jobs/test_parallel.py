@@ -1,0 +1,42 @@
+"""Jobs on worker processes, and the end of the workers; `test_store` has what is kept of them."""
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from hardwall.sim.jobs import parallel
+from hardwall.sim.jobs.store import Store
+from stimuli import jobs
+from stimuli.processes import ended, session, started, wait_until
+
+
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGKILL"])
+def test_no_worker_and_no_tool_of_a_worker_is_left(tmp_path, monkeypatch, number):
+    monkeypatch.chdir(tmp_path)
+    with started(sys.executable, "-m", "stimuli.jobs", HARDWALL_BUILD=str(tmp_path)) as process:
+        wait_until(lambda: all(Path(f"begun-{job}").exists() for job in (1, 2)))
+        wait_until(lambda: len(session(process)) >= 10)
+        process.send_signal(signal.Signals[number])
+        wait_until(lambda: session(process) == [])
+        code, _, err = ended(process)
+    if number == "SIGKILL":
+        assert code == -signal.SIGKILL
+    else:
+        assert code == {"SIGINT": 130, "SIGTERM": 143}[number]
+        assert err.endswith("; 1 new result is kept, and the same command goes on from there\n")
+        assert err.count("\n") == 1
+
+
+def test_a_job_that_fails_ends_the_others(tmp_path, monkeypatch, fresh):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ValueError, match=r"^this job fails$"):
+        parallel.run(jobs.fail_beside_a_long_job, [{"number": 0}, {"number": 1}], Store("failures"), 2)
+    assert Path("begun-1").exists()
+
+
+def test_a_worker_that_is_killed_is_a_failure_in_a_line(fresh):
+    with pytest.raises(RuntimeError, match=r"^a worker process was killed, perhaps for lack of memory$"):
+        parallel.run(os._exit, [{"status": 1}, {"status": 2}], Store("exits"), 2)

@@ -1,0 +1,79 @@
+"""The cache of built axes: checked before use, and built again when damaged; builds that cannot be, and early ends."""
+
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from hardwall.model.build_folder import build_dir
+from hardwall.sim.rtl import library
+from hardwall.sim.rtl.verilator import BuildError
+from stimuli.processes import HARDWALL, ended, session, started, wait_until
+from stimuli.specs import spec
+
+CODE = b"machine code" * 1000
+
+
+@pytest.fixture
+def builds(tmp_path, monkeypatch) -> list[Path]:
+    """Set up a stand-in for Verilator and an empty build folder; return the list of its calls."""
+    calls = []
+
+    def verilate(files: dict[str, str], options: list[str], work: Path) -> None:
+        calls.append(work)
+        for name, text in files.items():
+            (work / name).write_text(text)
+        (work / library.LIBRARY).write_bytes(CODE)
+
+    monkeypatch.setattr(library, "_verilate", verilate)
+    monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path / "build"))
+    return calls
+
+
+def test_an_axis_is_built_once_for_every_way_to_build_it(builds):
+    ways = [{}, {"short": True}, {"traced": True}]
+    paths = {library.build(spec("mhz"), **way) for way in ways for _ in range(2)}
+    assert len(paths) == len(builds) == len(ways)
+
+
+@pytest.mark.parametrize("content", [CODE[: len(CODE) // 2], b"", b"garbage"], ids=["half", "empty", "garbage"])
+def test_a_damaged_library_is_built_again(builds, content):
+    path = library.build(spec("mhz"))
+    path.write_bytes(content)
+    assert library.build(spec("mhz")) == path
+    assert path.read_bytes() == CODE
+    assert len(builds) == 2
+
+
+def test_a_path_with_a_space_is_one_line_before_anything_runs(tmp_path, monkeypatch):
+    monkeypatch.setattr(subprocess, "run", None)
+    for name in ("a b", "a\nb"):
+        monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path / name))
+        with pytest.raises(BuildError) as caught:
+            library.build(spec("mhz"))
+        message = str(caught.value)
+        assert message.startswith(
+            "the path of the build folder ($HARDWALL_BUILD) must be without a space for make to build there, not "
+        )
+        assert message.isprintable()
+
+
+def building(build: Path) -> list[Path]:
+    """Return the folders of unfinished builds in which Verilator has begun."""
+    return [path.parent for path in build.glob("rtl/building-*/*/obj")]
+
+
+@pytest.mark.parametrize("number", ["SIGINT", "SIGKILL"])
+def test_a_build_that_is_ended_leaves_no_process_behind(tmp_path, number):
+    (tmp_path / "numba").symlink_to(build_dir() / "numba")
+    with started(HARDWALL, "hit", "--backend", "rtl", "--json", HARDWALL_BUILD=str(tmp_path)) as process:
+        wait_until(lambda: building(tmp_path))
+        process.send_signal(signal.Signals[number])
+        wait_until(lambda: session(process) == [])
+        code, out, err = ended(process)
+    if number == "SIGINT":
+        assert (code, out, err.splitlines()[-1]) == (130, "", "hardwall: error: interrupted")
+        assert building(tmp_path) == []
+    else:
+        assert (code, out) == (-signal.SIGKILL, "")

@@ -1,0 +1,113 @@
+"""The command line in a forked child: the real `main`, with nothing to import or compile anew.
+
+A call that is accepted may be a day's work, so the child ends, with exit code 0, where the work of a study, a build or
+a synthesis would begin; runs of a hit, a replay and of accuracy at low rates are real, and kept short by a lower limit
+on the samples of a scene.
+"""
+
+import faulthandler
+import os
+import resource
+import signal
+import sys
+import traceback
+from collections.abc import Callable
+from contextlib import nullcontext
+from pathlib import Path
+from typing import Any, NamedTuple, NoReturn
+
+from hardwall.sim.commands import app
+from hardwall.sim.estimates.accuracy import measure
+from hardwall.sim.jobs import cluster, parallel, store
+from hardwall.sim.rtl import library, synthesis
+from hardwall.sim.scene import checks
+from hardwall.sim.walls import zwidth
+
+LIMIT_S = 60
+"""The time after which a child counts as hung; it prints where it hangs. A loaded machine needs most of it."""
+SAMPLES_MAX = 50_000
+STEPS_MAX = 100
+RATE_MAX_HZ = 20_000
+FILE_BYTES_MAX = 100 << 20
+CRASHED, HUNG = 70, 71
+
+
+class Ended(NamedTuple):
+    """How a child ended: its exit code, negative for a signal, and what it printed."""
+
+    code: int
+    out: str
+    err: str
+
+
+class _Began(BaseException):
+    """The work of an accepted call would begin here."""
+
+
+def _begin(*_: Any, **__: Any) -> NoReturn:
+    raise _Began
+
+
+def _short(run: Callable) -> Callable:
+    """Return `parallel.run` that does the work only if it is short."""
+
+    def short(function: Callable, jobs: list[dict], *rest: Any, **more: Any) -> list[Any]:
+        if jobs and (function is not measure or max(job["sample_hz"] for job in jobs) > RATE_MAX_HZ or len(jobs) > 4):
+            raise _Began
+        return run(function, jobs, *rest, **more)
+
+    return short
+
+
+def _shorten(folder: Path) -> None:
+    """End this process where long work begins, and keep results in `folder`."""
+    checks.SAMPLES_MAX, checks.STEPS_MAX = SAMPLES_MAX, STEPS_MAX
+    parallel.run = _short(parallel.run)
+    zwidth.run = library.build = synthesis.synthesise = synthesis.estimator_cells = _begin
+    store.build_dir = lambda: folder / "build"
+    connected = cluster.client
+    cluster.client = lambda jobs, workers=None, scheduler=None: (
+        nullcontext() if scheduler is None else connected(jobs, workers, scheduler)
+    )
+
+
+def _child(arguments: tuple[str, ...], folder: Path) -> int:
+    """Run the command line in this process; return its exit code."""
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        os.dup2(os.open(folder / name, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600), number)
+    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    sys.stdout, sys.stderr = (open(number, "w", encoding="utf-8", closefd=False) for number in (1, 2))  # noqa: SIM115
+    faulthandler.dump_traceback_later(LIMIT_S, exit=True, file=2)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (FILE_BYTES_MAX, FILE_BYTES_MAX))
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # a file that is too large is then an error of writing
+    work = folder / "work"
+    os.chdir(work)
+    _shorten(folder)
+    sys.argv = ["hardwall", *arguments]
+    try:
+        app.main()
+    except _Began:
+        return 0
+    except SystemExit as exit_:
+        return exit_.code if isinstance(exit_.code, int) else int(exit_.code is not None)
+    except BaseException:
+        traceback.print_exc()
+        return CRASHED
+    return 0
+
+
+def run(arguments: tuple[str, ...], folder: Path) -> Ended:
+    """Return how `hardwall ARGUMENTS` ends in the folder `work` of an otherwise empty `folder`."""
+    child = os.fork()
+    if not child:
+        code = CRASHED
+        try:
+            code = _child(arguments, folder)
+            sys.stdout.flush()
+            sys.stderr.flush()
+        finally:
+            os._exit(code)
+    _, status = os.waitpid(child, 0)
+    out, err = ((folder / name).read_text(encoding="utf-8", errors="replace") for name in ("stdout", "stderr"))
+    code = os.waitstatus_to_exitcode(status)
+    return Ended(HUNG if err.startswith("Timeout (") or "\nTimeout (" in err else code, out, err)

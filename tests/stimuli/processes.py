@@ -1,0 +1,61 @@
+"""The command line as a process of its own, with all that it starts, for signals to end."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+HARDWALL = Path(sys.executable).with_name("hardwall")
+PATIENCE_S = 300.0
+"""The limit of every wait: only a test that fails takes so long."""
+
+
+@contextmanager
+def started(*command: object, **environ: str) -> Iterator[subprocess.Popen]:
+    """Start a command in a session of its own, all of which is killed at the end of the context."""
+    tests = Path(__file__).absolute().parents[1]
+    # What is printed is buffered, as it is for users.
+    settings = os.environ | {"PYTHONPATH": str(tests), "PYTHONUNBUFFERED": ""} | environ
+    out, words = subprocess.PIPE, list(map(str, command))
+    with subprocess.Popen(words, env=settings, stdout=out, stderr=out, text=True, start_new_session=True) as process:
+        try:
+            yield process
+        finally:
+            for member in session(process):
+                os.kill(member, signal.SIGKILL)
+
+
+def ended(process: subprocess.Popen) -> tuple[int, str, str]:
+    """Wait for the end of a process; return its exit code, stdout and stderr."""
+    out, err = process.communicate(timeout=PATIENCE_S)
+    return process.returncode, out, err
+
+
+def session(process: subprocess.Popen) -> list[int]:
+    """Return the processes that live in the session of a process, itself included."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            state = (folder / "stat").read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()[0]
+            if os.getsid(int(folder.name)) == process.pid and state not in "ZX":
+                found.append(int(folder.name))
+        except (OSError, IndexError):
+            continue  # it has ended meanwhile
+    return found
+
+
+def wait_until(happens: Callable[[], object]) -> None:
+    """Wait until a function returns something true."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not happens():
+        assert time.monotonic() < deadline, "it did not happen"
+        time.sleep(0.02)
+
+
+def line(process: subprocess.Popen) -> str:
+    """Return the next line that a process writes on stdout."""
+    return process.stdout.readline().rstrip("\n")

@@ -1,0 +1,82 @@
+"""Calls as no one would make them: an answer in time, one line for bad input, and a report as its schema says.
+
+`HARDWALL_FUZZ` is the number of calls of all commands together; `make fuzz` makes 20 000. A call that fails is printed
+with the files that it had, and comes again with the same seed.
+"""
+
+import os
+import re
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from hardwall.sim.commands.group import COMMANDS
+from stimuli.forked import Ended, run
+from stimuli.hostile import Call, calls
+from stimuli.reports import check_text
+
+CALLS = int(os.environ.get("HARDWALL_FUZZ", "180"))
+LINE_MAX = 1500
+"""The most characters of an error message: what is shown of a value is shortened."""
+BAD, ERROR = 2, re.compile(r"hardwall: error: [^\n]+\n")
+
+
+def faults(call: Call, ended: Ended) -> list[str]:
+    """Return what is wrong with how a call ended."""
+    found = []
+    if ended.code not in (0, 1, BAD):
+        found.append(f"exit code {ended.code}")
+    if "Traceback" in ended.err or "Warning" in ended.err or "Exception ignored" in ended.err:
+        found.append("a traceback or a warning of Python")
+    if ended.code == BAD and not (ERROR.fullmatch(ended.err) and not ended.out):
+        found.append("bad input is not one line on stderr")
+    if ended.code == 1 and not ERROR.search(ended.err):
+        found.append("a failure without a message")
+    if len(max(ended.err.split("\n"), key=len)) > LINE_MAX:
+        found.append("a message that is too long")
+    if ended.code == 0 and "--json" in call.arguments and ended.out:
+        try:
+            check_text(call.arguments[0], ended.out)
+        except (AssertionError, ValueError) as error:
+            found.append(f"the report: {error}")
+    return found
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_hostile_calls(command):
+    @settings(
+        max_examples=max(CALLS // len(COMMANDS), 1),
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(st.data())
+    def attack(data):
+        call = data.draw(calls(command))
+        with tempfile.TemporaryDirectory() as folder:
+            work = Path(folder) / "work"
+            work.mkdir()
+            call.put(work)
+            ended = run(call.arguments, Path(folder))
+            wrong = faults(call, ended)
+        assert not wrong, f"{'; '.join(wrong)}\n{call}\n{ended.out[-2000:]}\n{ended.err[-4000:]}"
+
+    attack()
+
+
+def test_the_fuzzer_sees_what_is_wrong():
+    call = Call(("hit", "--json"))
+    line = "hardwall: error: what\n"
+    assert faults(call, Ended(2, "", line)) == faults(call, Ended(1, "", f"working\n{line}")) == []
+    for ended in (
+        Ended(2, "", line + line),
+        Ended(2, "out", line),
+        Ended(1, "", "no message"),
+        Ended(-11, "", ""),
+        Ended(70, "", "Traceback (most recent call last):"),
+        Ended(0, '{"rms_mm": NaN}', ""),
+        Ended(0, "", "RuntimeWarning: overflow"),
+        Ended(2, "", "hardwall: error: " + "x" * 2000 + "\n"),
+    ):
+        assert faults(call, ended)

@@ -1,0 +1,109 @@
+"""Commands that store results, ended at any time: no process is left, nothing is lost, and the next run goes on.
+
+`HARDWALL_KILLS` is the number of runs that are ended, of all commands together; `make fuzz` ends 200. Every run is
+ended by the next of three signals at a random part of the time that a whole run takes, with the suite's seed.
+"""
+
+import json
+import os
+import signal
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hardwall.model.build_folder import build_dir
+from hardwall.testing import rng
+from stimuli.processes import HARDWALL, ended, session, started, wait_until
+
+KILLS = int(os.environ.get("HARDWALL_KILLS", "0"))
+"""The number of runs that are ended; 0 for one run of every quick command."""
+CODES = {signal.SIGKILL: -9, signal.SIGINT: 130, signal.SIGTERM: 143}
+SHORT = {
+    "protocol.start_m": -0.001, "protocol.settle_s": 0.3, "protocol.mean_s": 0.05, "protocol.measure_s": 0.1,
+    "zwidth.stiffness_step_n_per_m": 5e3, "zwidth.stiffness_to_n_per_m": 60e3,
+    "zwidth.damping_from_n_s_per_m": 20.0, "zwidth.damping_to_n_s_per_m": 140.0, "zwidth.damping_step_n_s_per_m": 40.0,
+}  # fmt: skip
+SET = [f"--set={key}={value}" for key, value in SHORT.items()]
+RUNS: dict[str, tuple[str, ...]] = {
+    "zwidth": ("zwidth", "seed-2011", "--estimators", "adjusted,fdm-500", "--workers", "2", "--resume", *SET),
+    "accuracy": ("accuracy", "--estimators", "levant,fdm,kalman", "--rates", "1e3,2e3,5e3", "--workers", "2"),
+    "zwidth alone": ("zwidth", "seed-2011", "--estimators", "adjusted", "--workers", "1", "--resume", *SET),
+    "cutoff": ("cutoff", "seed-2011", "--workers", "2", "--resume", *SET),
+    "rates": ("rates", "seed-2011", "--estimators", "fdm", "--rates", "1e3,1e4", "--workers", "2", "--resume", *SET),
+    "gains": ("gains", "seed-2011", "--workers", "2", "--resume", *SET),
+    "drop": ("drop", "seed-2011", "--workers", "2", "--resume", *SET),
+    "trade": ("trade", "seed-2011", "--workers", "2", "--resume", *SET),
+}
+QUICK = ("zwidth", "accuracy")
+TIMES = {"seconds", "samples_per_s", "hit_s", "map_s", "best_for_hits", "best_for_maps"}
+"""Keys of reports that depend on times."""
+
+
+def timeless(value: Any) -> Any:
+    """Return a report without what depends on times."""
+    if isinstance(value, dict):
+        return {key: timeless(member) for key, member in value.items() if key not in TIMES}
+    return [timeless(member) for member in value] if isinstance(value, list) else value
+
+
+def environment(folder: Path) -> dict[str, str]:
+    """Return an environment with results of its own, and with the compiled files that are there already."""
+    build = folder / "build"
+    build.mkdir()
+    for name in ("numba", "rtl"):
+        (build_dir() / name).mkdir(parents=True, exist_ok=True)
+        (build / name).symlink_to(build_dir() / name)
+    return {"HARDWALL_BUILD": str(build)}
+
+
+def stored(folder: Path) -> list[str]:
+    """Return the stored results, line by line."""
+    return [
+        line for file in (folder / "build").glob("results/*.jsonl") for line in file.read_text().split("\n") if line
+    ]
+
+
+def report_of(command: tuple[str, ...], environ: dict[str, str]) -> dict[str, Any]:
+    """Run a command to its end; return its report without times."""
+    with started(HARDWALL, *command, "--json", **environ) as process:
+        code, out, err = ended(process)
+    assert code == 0, err
+    return timeless(json.loads(out))
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> dict[str, tuple[float, dict]]:
+    """Return the time and the report of whole runs; the first of two runs also compiles."""
+    found = {}
+    for name in RUNS if KILLS else QUICK:
+        for _ in range(2):
+            began, folder = time.monotonic(), tmp_path_factory.mktemp("whole")
+            report = report_of(RUNS[name], environment(folder))
+        found[name] = time.monotonic() - began, report
+    return found
+
+
+@pytest.mark.parametrize("name", RUNS if KILLS else QUICK)
+def test_what_is_ended_goes_on(whole, tmp_path_factory, name):
+    seconds, report = whole[name]
+    chance = rng()
+    for number in range(max(KILLS // len(RUNS), 1)):
+        folder = tmp_path_factory.mktemp("killed")
+        environ, (way, code) = environment(folder), list(CODES.items())[number % len(CODES)]
+        with started(HARDWALL, *RUNS[name], "--json", **environ) as process:
+            time.sleep(seconds * chance.random())
+            process.send_signal(way)
+            found, out, err = ended(process)
+            wait_until(lambda process=process: not session(process))
+        assert "Traceback" not in err
+        if found == 0:
+            assert timeless(json.loads(out)) == report  # the signal came too late
+        else:
+            assert found in (code, -way), err  # before the first lines of Python ran, the signal ends the process
+            assert err.count("error") <= 1
+        kept = stored(folder)
+        assert report_of(RUNS[name], environ) == report
+        assert set(kept) <= set(stored(folder)), "nothing is lost"
+        assert len(set(stored(folder))) == len(stored(folder)), "nothing is computed again"
