@@ -10,7 +10,6 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -27,6 +26,7 @@ from ...hdl.export import to_verilog
 from ...model.build_folder import build_dir
 from ...model.spec import AxisSpec
 from ..jobs import children
+from ..jobs.scratch import scratch
 from .verilator import LINT_OPTIONS, check_paths, environment
 from .waveform import vcd_to_fst
 
@@ -159,8 +159,8 @@ def _run(component: wiring.Component, name: str, job: Job, trace_to: Path | None
     sources = {f"{name}.vlt": f"`verilator_config\n{visible}", f"{name}.v": _verilog(component, name, job)}
     runner = _built(build, sources, name, traced=trace_to is not None)
     results = build / f"results-{_digest(repr((job.module, job.checks, sorted(job.environ.items()))))}.xml"
-    with tempfile.TemporaryDirectory() as scratch:
-        wrong_sample = Path(scratch) / "wrong-sample"
+    with scratch(build) as own:
+        wrong_sample = own / "wrong-sample"
         try:
             runner.test(
                 test_module=job.module,
@@ -174,7 +174,7 @@ def _run(component: wiring.Component, name: str, job: Job, trace_to: Path | None
                 waves=trace_to is not None,
                 test_args=["--trace-file", str(trace_to)] if trace_to else [],
                 # A folder of this run's own, for the Verilog and for Python.
-                plusargs=[f"+scratch={scratch}"],
+                plusargs=[f"+scratch={own}"],
                 extra_env={
                     **job.environ,
                     "HARDWALL_WRONG_SAMPLE": str(wrong_sample),

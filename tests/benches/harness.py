@@ -78,15 +78,19 @@ class Harness(wiring.Component):
 
     def elaborate(self, platform):
         m = Module()
-        clocked = m.domains.component = ClockDomain("component")
-        m.d.comb += clocked.rst.eq(ResetSignal())
-        m.submodules.component = DomainRenamer("component")(self.component)
         ports = {name: port for name, (_, port) in ports_of(self.component).items()}
         by_hand, by_sequencer = Cat(getattr(self, name) for name in self.inputs.shapes), Signal(self.inputs.width)
         inputs = Cat(ports[name] for name in self.inputs.shapes)
         m.d.comb += inputs.eq(Mux(self.bench_campaign, by_sequencer, by_hand))
         m.d.comb += [getattr(self, name).eq(port) for name, port in ports.items() if name not in self.inputs.shapes]
         m.d.comb += self.bench_seen.eq(Cat(ports.values()))
+        if "clk" in ports:
+            # It clocks itself by a pin, and has no campaigns.
+            m.submodules.component = self.component
+            return m
+        clocked = m.domains.component = ClockDomain("component")
+        m.d.comb += clocked.rst.eq(ResetSignal())
+        m.submodules.component = DomainRenamer("component")(self.component)
         m.submodules.sequencer = Instance(
             "bench_sequencer",
             p_INPUTS=self.inputs.width,
