@@ -60,9 +60,10 @@ lint: $(VENV)/.test | tools ## style and common mistakes
 bench: $(VENV)/.test | tools ## how fast the loop runs, beside cocotb
 	@$(HARDWALL) bench
 
-synth: $(VENV)/.synth | tools ## size and fmax on both devices, median of several place-and-route seeds
+synth: $(VENV)/.synth $(VENV)/.test | tools ## size and fmax on both devices, median of several place-and-route seeds
 	@$(HARDWALL) synth mhz $(ON_ECP5) --seeds 3
 	@$(HARDWALL) synth mhz $(ON_ICE40) --seeds 3
+	@$(RUN) pytest -q -n 0 tests/rtl/test_synthesis.py
 
 choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy, and cost on both devices (half an hour)
 	@$(HARDWALL) costs

@@ -79,7 +79,6 @@ class State(NamedTuple):
 A_RISE, B_RISE, A_FALL, B_FALL = range(4)
 RUN_MAX = 4
 """Edges in a full cycle of the encoder: after this many in one direction, all four stamps are of the last cycle."""
-N_OUTPUTS = State._fields.index("first")
 
 
 class Seen(NamedTuple):

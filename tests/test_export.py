@@ -10,7 +10,7 @@ import pytest
 from hardwall.hdl.axis import Axis
 from hardwall.hdl.board import Board
 from hardwall.hdl.export import to_verilog, write
-from hardwall.hdl.ports import COLUMNS, port_table
+from hardwall.hdl.ports import COLUMNS, frame_table, port_table
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from stimuli.specs import spec
 
@@ -124,13 +124,16 @@ def test_written_verilog_says_what_it_is_of(written, top):
 
 def test_written_tables_are_all_there(written):
     text = (written / "ports.md").read_text()
-    axis = spec("mhz")
-    assert port_table(Axis(axis)) in text
-    assert port_table(Board(axis)) in text
-    board = Board(axis)
-    for fields in (board.commands, board.telemetry):
-        listed = [rf"\| [\d:]+ \| `{name}` \| (un)?signed \|\n" for name, *_ in fields]
-        assert re.search("".join(listed), text)
+    axis, board = Axis(spec("mhz")), Board(spec("mhz"))
+    for table in (port_table(axis), port_table(board), frame_table(board.commands), frame_table(board.telemetry)):
+        assert f"\n\n{table}" in text
+    assert f"\nA sample every 50 clocks; the drive changes {axis.latency} clocks after it is taken. " in text
+    bits = board.frame_bits
+    assert f"\nAn SPI device, mode 0: {bits} bits each way, the first of them number {bits - 1}.\n" in text
+    assert list(map(text.index, ("To the axis:", "From the axis:"))) == sorted(
+        text.index(frame_table(frame)) - len(head) - 2
+        for frame, head in ((board.commands, "To the axis:"), (board.telemetry, "From the axis:"))
+    )
 
 
 def test_text_is_the_same_in_another_process(written, tmp_path):

@@ -20,10 +20,13 @@ from hardwall.model import quadrature as model
 from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.compiled import compiled
 from hardwall.model.quadrature import NO_STROBES, START, Inputs, Params, State, Strobes, advance, run, step
-from hardwall.testing import SAMPLES, SEED, Bench, Packing, Record, check, parameters, ports_of, rng, simulate
+from hardwall.testing import SAMPLES, SEED, Bench, check, parameters, rng, simulate
+from hardwall.testing.harness import ports_of
+from hardwall.testing.packing import Packing, Record
 
 INPUTS = (*Inputs._fields, *Strobes._fields)
-OUTPUTS = (*State._fields[: model.N_OUTPUTS], "fault")
+N_OUTPUTS = State._fields.index("first")
+OUTPUTS = (*State._fields[:N_OUTPUTS], "fault")
 WIDE = {"count_width": 32, "stamp_width": 24}
 NARROW = {"count_width": 4, "stamp_width": 5, "glitch_width": 4, "fault_width": 2}
 PARAMS = Quadrature(**NARROW).params
@@ -126,11 +129,11 @@ def random_stimulus(generator: np.random.Generator, clocks: int, width: int) -> 
 def expected(params: Params, inputs: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return the outputs after every clock; a reset, which must come first, leaves the outputs of START."""
     resets = np.flatnonzero(inputs["reset"])
-    record = np.empty((model.N_OUTPUTS, len(inputs["reset"])), np.int64)
+    record = np.empty((N_OUTPUTS, len(inputs["reset"])), np.int64)
     for begin, end in zip(resets, [*resets[1:], record.shape[1]], strict=True):
-        record[:, begin] = START[: model.N_OUTPUTS]
+        record[:, begin] = START[:N_OUTPUTS]
         after = run_all(params, {name: inputs[name][begin + 1 : end] for name in INPUTS})
-        record[:, begin + 1 : end] = after[: model.N_OUTPUTS]
+        record[:, begin + 1 : end] = after[:N_OUTPUTS]
     outputs = dict(zip(OUTPUTS, record, strict=False))
     return {**outputs, "fault": outputs["illegal"] | outputs["overspeed"]}
 

@@ -26,6 +26,7 @@ from ...hdl.export import to_verilog
 from ...model.build_folder import build_dir
 from ...model.spec import AxisSpec
 from ..jobs import children
+from ..jobs.scratch import scratch
 from .verilator import LINT_OPTIONS, check_paths, environment
 from .waveform import vcd_to_fst
 
@@ -42,6 +43,9 @@ BUILD_OPTIONS = [
     "0",
     "-CFLAGS",
     "-O1",
+    # A component may make its own clocks: these are iterations of a single evaluation.
+    "--converge-limit",
+    str(1 << 30),
     "--no-public-flat-rw",
 ]
 TRACED_LINES = 50_000_000
@@ -102,7 +106,7 @@ def trace(component: wiring.Component, name: str, job: Job, failed: CocotbFailed
     None means that the tests passed this time.
     """
     names = "|".join(re.escape(test) for test in failed.failed)
-    environ = dict(job.environ)
+    environ = {**job.environ, "HARDWALL_TRACED": "1"}
     if failed.wrong_sample is not None:
         # A few samples after the wrong one show the response to it.
         environ["HARDWALL_TRACED_SAMPLES"] = str(failed.wrong_sample + 3)
@@ -154,36 +158,38 @@ def _run(component: wiring.Component, name: str, job: Job, trace_to: Path | None
     visible = "".join(f'public_flat_rw -module "{name}" -var "{port}"\n' for port in ports)
     sources = {f"{name}.vlt": f"`verilator_config\n{visible}", f"{name}.v": _verilog(component, name, job)}
     runner = _built(build, sources, name, traced=trace_to is not None)
-    run = _digest(repr((job.module, job.checks, sorted(job.environ.items()))))
-    results, wrong_sample = build / f"results-{run}.xml", build / f"wrong-sample-{run}"
-    wrong_sample.unlink(missing_ok=True)
-    ended = 0
-    try:
-        runner.test(
-            test_module=job.module,
-            hdl_toplevel=name,
-            build_dir=build,
-            test_dir=job.folder,
-            results_xml=str(results),
-            test_filter=job.checks,
-            seed=job.seed,
-            log_file=job.log,
-            waves=trace_to is not None,
-            test_args=["--trace-file", str(trace_to)] if trace_to else [],
-            extra_env={
-                **job.environ,
-                "HARDWALL_WRONG_SAMPLE": str(wrong_sample),
-                "PYTHONPATH": os.pathsep.join([str(job.folder), *filter(None, sys.path)]),
-                # By default every module that a test imports, even NumPy and Numba, is parsed again at every start.
-                "COCOTB_REWRITE_ASSERTION_FILES": f"{job.module}.py",
-            },
-        )
-    except SystemExit as exit_:
-        ended = exit_.code
-    failed = _failed(results, job, ended)
-    if failed:
-        sample = int(wrong_sample.read_text(encoding="ascii")) if wrong_sample.exists() else None
-        raise CocotbFailedError(job.module, failed, sample)
+    results = build / f"results-{_digest(repr((job.module, job.checks, sorted(job.environ.items()))))}.xml"
+    with scratch(build) as own:
+        wrong_sample = own / "wrong-sample"
+        try:
+            runner.test(
+                test_module=job.module,
+                hdl_toplevel=name,
+                build_dir=build,
+                test_dir=job.folder,
+                results_xml=str(results),
+                test_filter=job.checks,
+                seed=job.seed,
+                log_file=job.log,
+                waves=trace_to is not None,
+                test_args=["--trace-file", str(trace_to)] if trace_to else [],
+                # A folder of this run's own, for the Verilog and for Python.
+                plusargs=[f"+scratch={own}"],
+                extra_env={
+                    **job.environ,
+                    "HARDWALL_WRONG_SAMPLE": str(wrong_sample),
+                    "PYTHONPATH": os.pathsep.join([str(job.folder), *filter(None, sys.path)]),
+                    # By default every module that a test imports, even NumPy and Numba, is parsed at every start.
+                    "COCOTB_REWRITE_ASSERTION_FILES": f"{job.module}.py",
+                },
+            )
+            ended = 0
+        except SystemExit as exit_:
+            ended = exit_.code
+        failed = _failed(results, job, ended)
+        if failed:
+            sample = int(wrong_sample.read_text(encoding="ascii")) if wrong_sample.exists() else None
+            raise CocotbFailedError(job.module, failed, sample)
 
 
 class _Runner(Verilator):

@@ -8,26 +8,8 @@ of inputs through it, and `check` compares the outputs with the model's by `==`.
 random campaigns.
 """
 
-from .bench import Bench, Monitor
-from .harness import Harness, packing_of, ports_of
-from .packing import Packing, Record
+from .bench import Bench
 from .simulator import CAMPAIGN, SAMPLES, SEED, parameters, rng, simulate
-from .verdict import Wrong, check
+from .verdict import check
 
-__all__ = [
-    "CAMPAIGN",
-    "SAMPLES",
-    "SEED",
-    "Bench",
-    "Harness",
-    "Monitor",
-    "Packing",
-    "Record",
-    "Wrong",
-    "check",
-    "packing_of",
-    "parameters",
-    "ports_of",
-    "rng",
-    "simulate",
-]
+__all__ = ["CAMPAIGN", "SAMPLES", "SEED", "Bench", "check", "parameters", "rng", "simulate"]

@@ -1,15 +1,20 @@
 """Campaigns: many rows put through a component, in batches that the harness's sequencer runs, and their answers."""
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from itertools import islice
+from pathlib import Path
 
-from cocotb.triggers import FallingEdge, RisingEdge
+import cocotb
+from cocotb.triggers import FallingEdge, RisingEdge, ValueChange
 
-from .harness import BATCH, SPACING_BITS, event_of, row_of
+from .harness import SPACING_BITS
 from .packing import Packing, Record
-from .simulator import TRACED_SAMPLES, rng
+from .simulator import TRACED, TRACED_SAMPLES, rng
 from .verdict import Wrong
+
+BATCH = 4096
+"""The most rows of a batch: few files of rows, and a fault is found soon."""
 
 
 class Campaign:
@@ -34,59 +39,67 @@ class Campaign:
         self.strobe, self.done, self.taken, self.given = strobe, done, taken, given
         self.latency, self.every = latency, every
         self._waiting: deque[int] = deque()
+        self._coin = rng()
 
-    async def run(self, dut, inputs: Packing, seen: Packing, words: Iterable[int], clock_number) -> None:
-        """Put words of inputs through, one word a strobe, and fill the records.
+    async def run(self, bench, held: int, rows: Iterable[tuple[int, ...]]) -> dict[str, int]:
+        """Put rows of inputs through, beside the word `held` of the others; fill the records and return the last row.
 
         Raises:
             AssertionError: if an answer is missing or late, or comes without a strobe.
         """
+        dut, inputs, seen, scratch = bench.dut, bench.inputs, bench.packing, Path(cocotb.plusargs["scratch"])
+        watched = {self.strobe, self.done, *(monitor.strobe for monitor in bench.monitors)}
+        # See sequencer.v: only the clocks of the bench take time, which a waveform needs.
+        await (RisingEdge if TRACED else FallingEdge)(dut.clk)
         dut.bench_strobe.value = inputs.bit(self.strobe)
-        dut.bench_watched.value = seen.bit(self.strobe) | seen.bit(self.done)
+        dut.bench_watched.value = sum(map(seen.bit, watched))
         dut.bench_campaign.value = 1
-        ended, batch = FallingEdge(dut.bench_busy), int(dut.bench_go.value)
-        await RisingEdge(dut.clk)
-        for rows, length in self._batches(inputs, words):
-            batch ^= 1
-            dut.bench_rows.value, dut.bench_length.value, dut.bench_go.value = rows, length, batch
-            # The next edge takes the batch; the events' clocks are counted from the one after it.
-            start = clock_number() + 2
-            await ended
-            self._sort(seen, start, int(dut.bench_events.value), int(dut.bench_records.value))
+        go, rows, last = int(dut.bench_go.value), islice(rows, TRACED_SAMPLES), {}
+        while batch := list(islice(rows, BATCH)):
+            last = dict(zip(self.taken.names, batch[-1], strict=True))
+            words = inputs.pack_rows(self.taken.names, batch)
+            text = "".join(
+                f"{spacing << inputs.width | held | word:x}\n"
+                for spacing, word in zip(self._spacings(len(batch)), words, strict=True)
+            )
+            (scratch / "rows").write_text(text, encoding="ascii")
+            go ^= 1
+            dut.bench_go.value, start = go, bench.clock_number() + 1
+            await ValueChange(dut.bench_done)
+            bench.ran(start + int(dut.bench_clocks.value) - 1)
+            numbers = [int(word, 16) for word in (scratch / "events").read_text(encoding="ascii").split()]
+            self._sort(seen, start, zip(numbers[::2], numbers[1::2], strict=True), bench.monitors)
+        return last
 
-    def _batches(self, inputs: Packing, words: Iterable[int]) -> Iterator[tuple[int, int]]:
-        """Yield batches of rows and their lengths: a strobe comes with the promised answer or a clock later, at random.
+    def _spacings(self, rows: int) -> list[int]:
+        """Return the extra clocks after each row of a batch, so that a strobe comes with the answer or a clock later.
 
-        The last row of a batch waits until its answer is overdue.
+        The last row waits until its answer is overdue.
         """
-        row, coin, words = row_of(inputs), rng(), islice(words, TRACED_SAMPLES)
-        while batch := list(islice(words, BATCH)):
-            spacings = (self.every - 1 + (coin.random(len(batch)) < 0.5)).tolist()
-            spacings[-1] = max(spacings[-1], self.latency + 1)
-            rows = 0
-            for place, (word, spacing) in enumerate(zip(batch, spacings, strict=True)):
-                rows |= row.pack({"inputs": word, "spacing": spacing}) << place * row.width
-            yield rows, len(batch)
+        spacings = (self.every - 1 + (self._coin.random(rows) < 0.5)).tolist()
+        spacings[-1] = max(spacings[-1], self.latency + 1)
+        return spacings
 
-    def _sort(self, seen: Packing, start: int, events: int, records: int) -> None:
-        """Sort the events of a batch into the records of inputs taken and outputs given."""
-        event, kept = event_of(seen), min(events, 2 * BATCH)
-        is_strobe, is_done, mask = seen.bit(self.strobe), seen.bit(self.done), (1 << event.width) - 1
-        words = [records >> place * event.width & mask for place in range(kept)]
-        for ports, clock in zip(event.column("seen", words), event.column("clock", words), strict=True):
+    def _sort(self, seen: Packing, start: int, events: Iterable[tuple[int, int]], monitors: list) -> None:
+        """Sort the events of a batch into the records of inputs taken, of outputs given, and of monitors."""
+        is_strobe, is_done = seen.bit(self.strobe), seen.bit(self.done)
+        watching = [(seen.bit(monitor.strobe), monitor) for monitor in monitors]
+        for number, ports in events:
+            clock = start + number
             if ports & is_strobe:
-                self.taken.add(start + clock, ports)
-                self._waiting.append(start + clock)
+                self.taken.add(clock, ports)
+                self._waiting.append(clock)
             if ports & is_done:
                 if not self._waiting:
                     sample = len(self.given.clocks)
                     raise Wrong(sample, f"{self.done} without {self.strobe} before sample {sample}")
                 self._waiting.popleft()
-                self.given.add(start + clock, ports)
-            self._check_patience(start + clock)
+                self.given.add(clock, ports)
+            self._check_patience(clock)
+            for bit, monitor in watching:
+                if ports & bit:
+                    monitor.add(clock, ports)
         self._check_patience(None)
-        if events > kept:
-            raise Wrong(len(self.given.clocks), f"{events} clocks with {self.strobe} or {self.done} in {BATCH} samples")
 
     def _check_patience(self, now: int | None) -> None:
         """Fail if the oldest sample's answer is overdue at clock `now`; None is the end of a batch."""

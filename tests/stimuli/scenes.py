@@ -11,4 +11,5 @@ DRIVE = {
 }  # fmt: skip
 PULSES = {"output.full_scale_n": 50.0, "output.pwm_carrier_hz": 20_000, "output.pwm_steps": 300}
 ONE_SECOND = {"protocol.settle_s": 0.7, "protocol.mean_s": 0.1, "protocol.measure_s": 0.3}
+TWO_SECONDS = {"protocol.settle_s": 1.5, "protocol.mean_s": 0.2, "protocol.measure_s": 0.5}
 ODD = {"controller.sample_hz": 11_000, "controller.clock_hz": 9_900_000}
