@@ -1,10 +1,11 @@
 # Every task of the project; `make help` lists them. Paths here are relative, so that `make -C` works from anywhere.
 #
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
-#   ARGS="-k levant"          more options for pytest (test, soak)
+#   ARGS="-k levant"          more options for pytest (test, soak, fuzz)
 #   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests)
 #   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
 #                             the seeds, the samples for every seed, and the samples of endurance (soak)
+#   CALLS=1000 KILLS=16       the hostile calls, and the runs that are ended (fuzz)
 
 SHELL := /bin/bash
 .SHELLFLAGS := -euo pipefail -c
@@ -41,11 +42,13 @@ STUDIES := cutoff gains rates drop trade
 SEEDS ?= $(shell shuf -i 1-999999999 -n 3)
 SAMPLES ?= 1000000
 ENDURANCE ?= 1000000000
+CALLS ?= 20000
+KILLS ?= 200
 PYTEST := $(RUN) pytest -n logical --maxprocesses 8 --dist worksteal
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test lint bench synth choose figures verilog docs digests soak clean distclean help tools FORCE
+.PHONY: all test lint bench synth choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -95,6 +98,9 @@ soak: $(VENV)/.test | tools ## long campaigns: 10^9 samples of every estimator, 
 	  echo "HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES); again: make soak SEEDS=$$seed SAMPLES=$(SAMPLES)"; \
 	  HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES) $(PYTEST) -m rtl $(ARGS); \
 	done
+
+fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200 runs ended at random times (an hour or two)
+	@HARDWALL_FUZZ=$(CALLS) HARDWALL_KILLS=$(KILLS) $(PYTEST) tests/test_fuzz.py tests/test_killed.py $(ARGS)
 
 clean: ## remove what was built and cached
 	rm -rf build .hypothesis .pytest_cache .ruff_cache

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from hardwall.sim.commands.group import COMMANDS
@@ -47,9 +47,11 @@ def faults(call: Call, ended: Ended) -> list[str]:
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_hostile_calls(command):
+    # A call that fails is not made smaller: that takes hundreds of calls, and it is short as it is.
     @settings(
         max_examples=max(CALLS // len(COMMANDS), 1),
         suppress_health_check=list(HealthCheck),
+        phases=[Phase.generate],
     )
     @given(st.data())
     def attack(data):
