@@ -43,16 +43,16 @@ def check_range(name: str, value: float, least: float, most: float) -> None:
 def check_int(name: str, value: int, least: int, most: int | None = None) -> None:
     """Raise TypeError unless `value` is an int, and ValueError unless it is `least` to `most` (None: no limit)."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise TypeError(f"{name} must be an int, not {value!r}")
+        raise TypeError(f"{name} must be an int, not {shown(value)}")
     if value < least or (most is not None and value > most):
         accepted = f"{least} or more" if most is None else f"{least} to {most}"
-        raise ValueError(f"{name} must be {accepted}, not {value!r}")
+        raise FieldError(name, f"must be {accepted}, not {shown(value)}")
 
 
 def check_number(name: str, value: float) -> None:
-    """Raise TypeError unless `value` is a real number."""
-    if not isinstance(value, Real):
-        raise TypeError(f"{name} must be a number, not {value!r}")
+    """Raise TypeError unless `value` is a real number; a bool is none."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise TypeError(f"{name} must be a number, not {shown(value)}")
 
 
 def integers(name: str, values: ArrayLike, least: int = -LARGEST - 1, most: int = LARGEST) -> np.ndarray:
@@ -66,13 +66,16 @@ def integers(name: str, values: ArrayLike, least: int = -LARGEST - 1, most: int 
         array = np.asarray(values)
     except ValueError:
         raise TypeError(f"{name} must be an array of integers, not {values!r}") from None
-    if array.size and not np.issubdtype(array.dtype, np.integer):
+    if array.size and array.dtype.kind not in "iu":
         raise TypeError(f"{name} must be integers, not {array.dtype}")
+    if np.ma.is_masked(values):
+        raise TypeError(f"{name} must be integers, and none of them masked")
     if array.size:
         wrong = np.flatnonzero((array < least) | (array > most))
         if len(wrong):
-            first = int(wrong[0])
-            raise ValueError(f"{name} must be {least} to {most}, not {array.reshape(-1)[first]} at element {first}")
+            place = [int(index) for index in np.unravel_index(wrong[0], array.shape)]
+            where = ", ".join(map(str, place))
+            raise ValueError(f"{name} must be {least} to {most}, not {array[tuple(place)]} at element {where}")
     return array.astype(np.int64)
 
 
@@ -97,10 +100,10 @@ def lanes_of_counts(counts: ArrayLike, width: int, most: int) -> np.ndarray:
         round_it = ((changes + half) & (2 * half - 1)) - half
         wrong = np.argwhere(far & (np.abs(round_it) > most))
         if len(wrong):
-            where = tuple(wrong[0].tolist())
+            *lane, before = wrong[0].tolist()
             raise ValueError(
                 f"counts must change by less than {half}, half of their range, from sample to sample, "
-                f"not by {changes[where]} at sample {where[-1] + 1}"
+                f"not by {changes[*lane, before]} at sample {before + 1}{f' of lane {lane[0]}' if lane else ''}"
             )
     return ((array + half) & (2 * half - 1)) - half
 

@@ -22,9 +22,11 @@ import math
 from dataclasses import dataclass
 
 from .arithmetic.fixed import SQ, bits_for
-from .checks import NUMBERS, FieldError, check_int, check_range, shown
+from .checks import NUMBERS, FieldError, check_int, check_number, check_range, shown
 from .quadrature_speed import GLITCH_CLOCKS_MAX, glitch_clocks_for
 
+CLOCK_HZ_MAX = 1 << 48
+"""The largest clock, far beyond any: stamps, of as many bits, are computed in 64."""
 RATES_HZ = 1, 10**9
 """The least and the largest rate of an axis in true seconds, of a recording too."""
 
@@ -72,15 +74,13 @@ class AxisRequirements:
     def __post_init__(self):
         for field in dataclasses.fields(self):
             name, kind, value = field.name, field.type, getattr(self, field.name)
-            if kind is int and (isinstance(value, bool) or not isinstance(value, int)):
-                raise TypeError(f"{name} must be an int, not {shown(value)}")
+            if kind is int:
+                check_int(name, value, *((0, 32) if name == "estimator_bits_dropped" else (1, CLOCK_HZ_MAX)))
             if kind is str and not isinstance(value, str):
                 raise TypeError(f"{name} must be a str, not {shown(value)}")
-            if kind is float and (isinstance(value, bool) or not isinstance(value, int | float)):
-                raise TypeError(f"{name} must be a number, not {shown(value)}")
-            if kind in (int, float) and name != "estimator_bits_dropped":
-                check_range(name, value, 1 if kind is int else NUMBERS[0], NUMBERS[1])
-        check_range("estimator_bits_dropped", self.estimator_bits_dropped, 0, 32)
+            if kind is float:
+                check_number(name, value)
+                check_range(name, value, *NUMBERS)
         if self.glitch_clocks is not None:
             check_int("glitch_clocks", self.glitch_clocks, 0, GLITCH_CLOCKS_MAX)
         self._check_rates()

@@ -113,7 +113,8 @@ def run(axis: Axis, edge_clocks: ArrayLike, edge_levels: ArrayLike, samples: int
         axis: the axis.
         edge_clocks: integers, shape (edges,): numbers of the clocks, never decreasing and not negative, at which a
             register at the pins first holds the new level.
-        edge_levels: integers of the same shape: the pins from then on, a | b << 1.
+        edge_levels: integers of the same shape: the pins from then on, a | b << 1. Edges after
+            the last sample have no effect.
         samples: number of samples to take, 1 or more.
         level: level of the pins at reset, a | b << 1.
 

@@ -87,7 +87,10 @@ class Design:
             if bits > 61:
                 value = getattr(axis, name)
                 least = value * 2.0 ** (bits - 61)
-                raise FieldError(name, f"must be at least {least:g} beside the other gain's largest, not {value!r}")
+                raise FieldError(
+                    name,
+                    f"must be at least {least:g} beside the other gain's largest and the largest speed, not {value!r}",
+                )
         self.words = (
             Word("wall_stiffness", self.stiffness, r / q, "N/m", 0, "spring of the wall"),
             Word("wall_damping", self.damping, r * tau / q, "N s/m", 0, "damper of the wall"),

@@ -62,7 +62,11 @@ class Word:
             TypeError: if `value` is not a number.
             ValueError: if the value does not fit the word; the message gives the accepted range in SI units.
         """
-        check_number(self.name, value)
+        whole = self.format.f == 0 and self.si_per_unit == 1.0
+        if not (isinstance(value, bool) and whole and self.format.max == 1):
+            check_number(self.name, value)
+        if whole and value % 1:
+            raise FieldError(self.name, f"must be a whole number of {self.si_min:g} to {self.si_max:g}, not {value!r}")
         try:
             return self.format.from_real(value / self.si_per_unit)
         except ValueError:

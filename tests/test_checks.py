@@ -24,6 +24,9 @@ HALF = 1 << (AXIS.spec.count_width - 1)
         (["1", "2"], TypeError, "counts must be integers, not <U1"),
         ([True, False], TypeError, "counts must be integers, not bool"),
         ([1, None], TypeError, "counts must be integers, not object"),
+        (np.array([1, 2], "timedelta64[s]"), TypeError, "counts must be integers, not timedelta64[s]"),
+        (np.ma.array([1, 2], mask=[0, 1]), TypeError, "counts must be integers, and none of them masked"),
+        ([[0], [1 << 62]], ValueError, f"counts must be -{2**62} to {2**62 - 1}, not {2**62} at element 1, 0"),
         ([[1], [1, 2]], TypeError, "counts must be an array of integers, not [[1], [1, 2]]"),
         (3, ValueError, "counts must have 1 or 2 dimensions, not 0"),
         ([0, 1 << 62], ValueError, f"counts must be -{2**62} to {2**62 - 1}, not {2**62} at element 1"),
@@ -42,7 +45,7 @@ HALF = 1 << (AXIS.spec.count_width - 1)
             [[0, 1], [0, -HALF]],
             ValueError,
             f"counts must change by less than {HALF}, half of their range, from sample to sample, "
-            f"not by {-HALF} at sample 1",
+            f"not by {-HALF} at sample 1 of lane 1",
         ),
     ],
 )
@@ -96,6 +99,8 @@ def test_records_of_edges(arguments, error, message):
         ({"wall_stiffness": 1e6}, ValueError, r"^wall_stiffness must be 0 to 255996 N/m, not 1000000.0$"),
         ({"wall_damping": math.nan}, ValueError, r"^wall_damping must be 0 to .* N s/m, not nan$"),
         ({"wall_left": 2}, ValueError, r"^wall_left must be 0 to 1, not 2$"),
+        ({"wall_left": 0.5}, ValueError, r"^wall_left must be a whole number of 0 to 1, not 0.5$"),
+        ({"wall_stiffness": True}, TypeError, r"^wall_stiffness must be a number, not True$"),
     ],
 )
 @pytest.mark.parametrize("floating", [False, True])
@@ -109,6 +114,7 @@ def test_parameters_of_an_axis(arguments, error, message, floating):
     [
         ({"clock_hz": 12e6}, TypeError, r"^clock_hz must be an int, not 12000000.0$"),
         ({"clock_hz": True}, TypeError, r"^clock_hz must be an int, not True$"),
+        ({"clock_hz": 10**30}, ValueError, r"^clock_hz must be 1 to 281474976710656, not 1000"),
         ({"travel_m": "1"}, TypeError, r"^travel_m must be a number, not '1'$"),
         ({"travel_m": math.nan}, ValueError, r"^travel_m must be 1e-30 to 1e\+30, not nan$"),
         ({"estimator": 3}, TypeError, r"^estimator must be a str, not 3$"),

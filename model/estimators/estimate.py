@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 from ..arithmetic.fixed import SQ
-from ..checks import NUMBERS, FieldError, check_range, shown
+from ..checks import NUMBERS, check_number, check_range
 from ..compiled import by_type
 from ..requirements import AxisRequirements
 from ..words import Word
@@ -22,13 +22,13 @@ class EstimatorGains(ABC):
     """The gains of an estimator in SI units; the name of every field ends in its unit.
 
     Raises:
+        TypeError: if a field is not a number.
         ValueError: if a field is not within `checks.NUMBERS`.
     """
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
-            if not isinstance(value, int | float):
-                raise FieldError(name, f"must be a number, not {shown(value)}")
+            check_number(name, value)
             check_range(name, value, *NUMBERS)
 
     @classmethod
