@@ -92,7 +92,7 @@ class StudyOptions:
 
 def _write(what: str, write: Callable[[], Iterable[Path]]) -> None:
     for path in write():
-        log.print(f"{what}: {path}")
+        log.print(f"{what}: {path}", soft_wrap=True)
 
 
 def _do_all(steps: Iterable[Callable[[], None]]) -> None:

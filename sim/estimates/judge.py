@@ -21,6 +21,15 @@ DELAY_POINTS = 1 << 15
 DELAY_STEPS = 400
 
 
+def _inner(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the inner product of two arrays.
+
+    A product by BLAS is spread over threads, which takes ten times as long for arrays of this size, and its last digits
+    are those of the number of cores.
+    """
+    return float(np.sum(one * other))
+
+
 class _Means:
     """Means over blocks of `size` samples, of values that arrive in chunks."""
 
@@ -58,7 +67,7 @@ class Judge:
     def add(self, first: int, estimate: np.ndarray, exact: np.ndarray) -> None:
         """Add the samples of a chunk, the first of which has the number `first`."""
         error = estimate - exact
-        self._squares += float(error @ error)
+        self._squares += _inner(error, error)
         self.largest = max(self.largest, float(np.abs(error).max(initial=0.0)))
         self._slow.add(first, error)
         self._shape.add(first, estimate)
@@ -85,7 +94,7 @@ class Judge:
 
         def mismatch(delay_s: float) -> float:
             exact = exact_at(times - delay_s)
-            return -float(estimate @ exact) / math.sqrt(float(exact @ exact))
+            return -_inner(estimate, exact) / math.sqrt(_inner(exact, exact))
 
         tried = np.linspace(-within_s, within_s, DELAY_STEPS + 1)
         number = int(np.argmin([mismatch(delay_s) for delay_s in tried]))

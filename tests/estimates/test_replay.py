@@ -279,7 +279,11 @@ def test_a_picture_is_drawn(tmp_path, suffix):
     if suffix == ".svg":
         text = content.decode()
         shown = ("counts (counts)", "velocity (counts/s)", "time (s)", "finite difference", "zero-phase reference")
-        for label in (*shown, f"RMS error {result.rms_counts_per_s:.3g} counts/s", "levant, output u"):
+        for label in (
+            *shown,
+            f"RMS error {float(format(result.rms_counts_per_s, '.3g')):g} counts/s",
+            "levant, output u",
+        ):
             assert label in text
     save(draw(result), path)
     assert path.read_bytes() == content

@@ -71,7 +71,7 @@ def test_a_shortcut_is_held_against_the_reference(found):
     assert (reference.differ, reference.errors) == (dict.fromkeys(METHODS, 0.0), {name: [0.0] * 5 for name in METHODS})
     assert reference.hit_s == pytest.approx(0.2)
     assert reference.map_s == pytest.approx(0.2 * reference.hits)
-    stepped = points["steps of 100 us"]
+    stepped = points["steps of 100 µs"]
     assert stepped.errors == {name: [pytest.approx(0.5)] * 5 for name in METHODS}
     # With 33 kN/m as the limit, the last three of 16, 19, 21, 24, 26 and 32 kN/m become stable.
     assert stepped.differ == dict.fromkeys(METHODS, 0.5)
@@ -148,7 +148,7 @@ def test_every_shortcut_is_a_scene_of_its_own():
     assert (rigid.transmission, rigid.motor, rigid.output) == (None, None, None)
     assert rigid.amplifier.bandwidth_hz is None
     assert rigid.amplifier.delay_s == 1e-3
-    both = scenes["rigid handle only + steps of 100 us"]
+    both = scenes["rigid handle only + steps of 100 µs"]
     assert both == rigid.model_copy(update={"solver": both.solver})
     assert scenes["samples at 2 kHz"].controller.actuation_hz == 1000
     fast = load("drive-2011", {"controller.actuation_hz": 10_000, "amplifier.delay_s": 0.0})
@@ -159,8 +159,8 @@ def test_every_shortcut_is_a_scene_of_its_own():
 def test_a_scene_that_lacks_a_part_has_no_shortcut_without_it(hardware):
     labels = [each.shortcut.label for each in study(Case.of("seed-2011"), Invented()).points]
     assert [label for label in labels if "no " in label or "rigid" in label] == []
-    assert "steps of 10 us" in labels
-    assert "samples at 5 kHz + steps of 100 us" in labels
+    assert "steps of 10 µs" in labels
+    assert "samples at 5 kHz + steps of 100 µs" in labels
 
 
 @pytest.mark.parametrize(
@@ -189,7 +189,7 @@ SMALL = {
 
 def test_the_command_prints_and_draws_real_hits(monkeypatch, capsys, tmp_path):
     """The command runs with one estimator and few shortcuts, then again from the stored results."""
-    few = (REFERENCE.label, "steps of 100 us", "K by 2", "scatter")
+    few = (REFERENCE.label, "steps of 100 µs", "K by 2", "scatter")
     every = shortcuts(load("seed-2011", GRID | SMALL), lambda _: True)
     kept = [each for each in every if each.label.startswith(few) and "+" not in each.label]
     monkeypatch.setattr(trade_runs, "shortcuts", lambda scene, accepted: kept)
@@ -205,8 +205,8 @@ def test_the_command_prints_and_draws_real_hits(monkeypatch, capsys, tmp_path):
     assert all(row["hit_s"] > 0 and row["map_hits"] > 0 for row in report["settings"])
     assert any(row["best_for_maps"] for row in report["settings"])
     wanted = {
-        "hit": ("steps of 100 us", "time of a hit (ms)", "verdicts that differ (%)", "FDM + 500 Hz"),
-        "map": ("steps of 100 us", "in one process (s)", "largest error of K (%)", "FDM + 500 Hz"),
+        "hit": ("steps of 100 µs", "time of a hit (ms)", "verdicts that differ (%)", "FDM + 500 Hz"),
+        "map": ("steps of 100 µs", "in one process (s)", "largest error of K (%)", "FDM + 500 Hz"),
     }
     for name, labels in wanted.items():
         text = (tmp_path / f"trade-{name}.svg").read_text()
@@ -214,4 +214,4 @@ def test_the_command_prints_and_draws_real_hits(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
     code, out, _ = call(monkeypatch, capsys, *order, "--resume")
     assert code == 0
-    assert "steps of 100 us" in out
+    assert "steps of 100 µs" in out

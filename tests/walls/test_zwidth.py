@@ -30,7 +30,13 @@ SMALL = {
     "protocol.settle_s": 2.0,
     "protocol.measure_s": 0.5,
 }
-SET = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
+
+
+def options(changes: dict) -> list[str]:
+    return [word for key, value in changes.items() for word in ("--set", f"{key}={value}")]
+
+
+SET = options(SMALL)
 METHODS = [methods.methods()[name] for name in ("fdm-100", "adjusted")]
 CASES = [Case(each.label, "seed-2011", read("seed-2011"), SMALL | each.changes) for each in METHODS]
 
@@ -101,8 +107,9 @@ def test_a_map_goes_on_from_what_is_known(map_of_one_process, monkeypatch):
 
 @pytest.mark.rtl
 def test_the_rtl_gives_the_map_of_fixed(monkeypatch, capsys):
-    few = [*SET, "--set", "zwidth.stiffness_to_n_per_m=20e3", "--set", "zwidth.damping_to_n_s_per_m=10.0"]
-    few += ["--set", "controller.clock_hz=6000000", "--estimators", "adjusted", "--workers", 1, "--json"]
+    smaller = {"zwidth.stiffness_to_n_per_m": 20e3, "zwidth.damping_to_n_s_per_m": 10.0}
+    few = [*options(SMALL | smaller | {"controller.clock_hz": 6_000_000}), "--estimators", "adjusted"]
+    few += ["--workers", 1, "--json"]
     fixed, rtl = (
         json.loads(call(monkeypatch, capsys, "zwidth", *few, "--backend", each)[1])["maps"] for each in ("fixed", "rtl")
     )
@@ -174,7 +181,7 @@ def test_report_and_picture(monkeypatch, capsys, tmp_path, map_of_one_process):
         ),
         (["--set", "zwidth.walls_below=-1"], "zwidth.walls_below must be a whole number of 0 to 1000, not -1"),
         (["--set", "protocol.threshold_mm=1e300"], "protocol.threshold_mm must be a number of 1e-09 to 1000, not"),
-        (["--workers", "2", "--scheduler", ""], "--scheduler  has workers of its own"),
+        (["--workers", "2", "--scheduler", ""], "--scheduler must be an address such as tcp:"),
         (["--estimators", "nobody"], "--estimators: estimator must be one of fdm, "),
         (
             ["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"],
