@@ -62,7 +62,7 @@ class Word:
             TypeError: if `value` is not a number.
             ValueError: if the value does not fit the word; the message gives the accepted range in SI units.
         """
-        whole = self.format.f == 0 and self.si_per_unit == 1.0
+        whole = self.format.f == 0 and not self.unit
         if not (isinstance(value, bool) and whole and self.format.max == 1):
             check_number(self.name, value)
         if whole and value % 1:
