@@ -41,10 +41,10 @@ def warn_once(kind: str, message: str) -> None:
 def not_kept(path: Path, error: OSError) -> None:
     """Warn that a file or folder cannot be written; the run goes on, and the next one makes its content again."""
     reason = error.strerror or error
-    warn_once("not kept", f"{shown(path)} cannot be written ({reason}): what this run makes is not kept")
+    warn_once("not kept", f"{shown_path(path)} cannot be written ({reason}): what this run makes is not kept")
 
 
-def shown(path: Path) -> str:
+def shown_path(path: Path) -> str:
     """Return a path for a message: printable, on one line, and the middle of a very long one left out."""
     text = str(path) if str(path).isprintable() else repr(str(path))
     half = SHOWN_MAX // 2

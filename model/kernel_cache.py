@@ -7,10 +7,8 @@ compiled afresh. A folder that cannot be written is done without, and one line s
 """
 
 import hashlib
-import os
 import pickle
 import re
-import uuid
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -22,6 +20,7 @@ from numba.core.serialize import dumps
 
 from . import provenance
 from .build_folder import build_dir, not_kept
+from .whole_file import whole_file
 
 DIGEST_BYTES = hashlib.sha256().digest_size
 
@@ -114,9 +113,10 @@ class _Shelf:
         """
         data = dumps(thing)
         self.folder.mkdir(parents=True, exist_ok=True)
-        _write(self.folder / _name(data), data)
         index = dumps(self._entries() | {key: _name(data)})
-        _write(self._index, hashlib.sha256(index).digest() + index)
+        for path, content in ((self.folder / _name(data), data), (self._index, hashlib.sha256(index).digest() + index)):
+            with whole_file(path) as part:
+                part.write_bytes(content)
 
     def _entries(self) -> dict[tuple, str]:
         """Return the names of the files by key: of none, if the index is absent or not whole."""
@@ -138,14 +138,3 @@ def _loaded(data: bytes) -> Any | None:
         return pickle.loads(data)
     except (AttributeError, ImportError, TypeError, ValueError, pickle.UnpicklingError):
         return None
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all."""
-    part = path.with_name(f"{uuid.uuid4().hex[:16]}.tmp")
-    try:
-        part.write_bytes(data)
-        os.replace(part, path)
-    finally:
-        with suppress(OSError):
-            part.unlink(missing_ok=True)

@@ -25,7 +25,7 @@ import numba
 import numpy as np
 from numba import types
 
-from .build_folder import shown, warn_once
+from .build_folder import shown_path, warn_once
 
 TREE = Path(__file__).absolute().parent.parent
 ROOMS = ("model", "sim")
@@ -166,7 +166,9 @@ def key_of(module: str, signature: Iterable[Any]) -> str | None:
         return None
     _changed.update(path for path, content in sources.items() if _seen.setdefault(path, content) != content)
     if _changed:
-        warn_once("changed", f"{shown(min(_changed))} changed while this process ran: its compiled code is not kept")
+        warn_once(
+            "changed", f"{shown_path(min(_changed))} changed while this process ran: its compiled code is not kept"
+        )
     if _changed or not all(_file(sys.modules.get(name)) for name in outside):
         return None
     return _digest(sources, project_key()) if sources else project_key()

@@ -17,7 +17,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     """Provide a temporary file beside `path` to write to; rename it to `path` once it is complete.
 
     Raises:
-        OSError: if the file cannot be written; the message is one line and names the file.
+        OSError: if the file cannot be written; the message is one line and names the file, `strerror` is the reason.
     """
     part = Path(path).with_name(f".part-{os.getpid()}-{next(_numbers)}{Path(path).suffix}")
     unfinished.add(part)
@@ -25,7 +25,10 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         yield part
         part.replace(path)
     except OSError as error:
-        raise OSError(f"{path}: cannot be written ({error.strerror or error})") from None
+        reason = error.strerror or str(error)
+        failure = OSError(f"{path}: cannot be written ({reason})")
+        failure.strerror = reason
+        raise failure from None
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from hardwall.model import build_folder
-from hardwall.model.build_folder import SHOWN_MAX, build_dir, not_kept, shown
+from hardwall.model.build_folder import SHOWN_MAX, build_dir, not_kept, shown_path
 
 PLAIN = Path("/some/where")
 
@@ -51,7 +51,7 @@ def test_a_worker_says_nothing():
 
 @pytest.mark.parametrize("name", ["a\nb", "a\tb", "\udcff", "\x1b[31m", "x" * 5000])
 def test_a_path_is_shown_on_one_short_line(name):
-    text = shown(PLAIN / name)
+    text = shown_path(PLAIN / name)
     assert text.isprintable()
     assert len(text) <= SHOWN_MAX + 3
-    assert shown(PLAIN) == str(PLAIN)
+    assert shown_path(PLAIN) == str(PLAIN)

@@ -21,8 +21,10 @@ def test_a_file_appears_when_it_is_complete(tmp_path):
 def test_a_file_that_fails_leaves_the_old_one(tmp_path):
     path = tmp_path / "file.txt"
     path.write_text("old")
-    with pytest.raises(OSError, match=r"file\.txt: cannot be written \(No space left on device\)$"), whole_file(path):
+    message = r"file\.txt: cannot be written \(No space left on device\)$"
+    with pytest.raises(OSError, match=message) as failure, whole_file(path):
         raise OSError(28, "No space left on device")
+    assert failure.value.strerror == "No space left on device"
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 

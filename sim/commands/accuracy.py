@@ -36,10 +36,11 @@ def command(
     rates: Annotated[str | None, typer.Option(metavar="HZ,...", help="sample rates, e.g. 1e3,10e3,1e6")] = None,
     backend: BackendOption = "float",
     encoder_phase_error: Annotated[
-        float, typer.Option(metavar="COUNTS", help="channel B late by so much, -0.95 to 0.95")
+        float, typer.Option(metavar="COUNTS", help="delay of channel B, -0.95 to 0.95 counts")
     ] = 0.0,
     acceleration_max: Annotated[
-        float | None, typer.Option(metavar="C", help="m/s^2, sets the gains", show_default="the signal's own")
+        float | None,
+        typer.Option(metavar="C", help="acceleration that sets the gains, m/s^2", show_default="the signal's own"),
     ] = None,
 ) -> None:
     if figure and signal:

@@ -1,6 +1,6 @@
 """The command `bench`."""
 
-from ..scene.case import Case
+from ..scene.load import load
 from ..studies import bench
 from .options import SceneArgument
 from .study import StudyOptions, study
@@ -9,5 +9,5 @@ from .terminal import log
 
 @study()
 def command(options: StudyOptions, scene: SceneArgument = "mhz") -> None:
-    Case.of(scene)
+    load(scene)  # a wrong scene is refused before anything long begins
     options.finish(bench.study(scene, log.print))

@@ -18,7 +18,7 @@ def command(
     scenes: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="SCENE...", help=f"of {', '.join(names())}, or .toml files", show_default="three devices"
+            metavar="SCENE...", help=f"some of {', '.join(names())}, or .toml files", show_default="three devices"
         ),
     ] = None,
     backend: ModelOption = "fixed",

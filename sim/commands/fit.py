@@ -4,12 +4,11 @@ from typing import Annotated, Literal
 
 import typer
 
-from ..jobs.store import Store
 from ..scene.case import Case
 from ..studies import fit
 from ..walls.methods import methods
 from .drop import refuse_methods_and_walls
-from .maps import MapsOnOneCluster, cluster_for
+from .maps import MapsOnOneCluster
 from .options import ModelOption, SceneArgument, refuse
 from .study import StudyOptions, study
 from .terminal import progress
@@ -21,18 +20,19 @@ def command(
     scene: SceneArgument = "seed-2011",
     reading: Annotated[
         Literal["3-30", "30-300"] | None,
-        typer.Option("--axis", metavar="B", help="of the paper's B axis, N s/m: 3-30 or 30-300", show_default="both"),
+        typer.Option(
+            "--axis", metavar="B", help="range of the paper's B axis, N s/m: 3-30 or 30-300", show_default="both"
+        ),
     ] = None,
-    evaluations: Annotated[int, typer.Option(min=1, max=10**9, help="of a search, about so many")] = 576,
-    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="of a search")] = 1,
+    evaluations: Annotated[int, typer.Option(min=1, max=10**9, help="approximate number of trials of a search")] = 576,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="seed of the searches")] = 1,
     backend: ModelOption = "fixed",
 ) -> None:
     changes, fits = options.changes(), []
     refuse_methods_and_walls(changes)
     refuse(changes, ("zwidth",), "its maps go a little beyond the paper's axes")
     case = Case.of(scene, changes)
-    with cluster_for(options, len(methods())) as client:
-        maps = MapsOnOneCluster(options, backend, Store("fit", options.resume), client)
+    with MapsOnOneCluster(options, backend, len(methods())) as maps:
         for each in [reading] if reading else fit.READINGS:
             with progress(f"{case.scene.name}, B axis {each}", evaluations) as advance:
                 fits.append(fit.study(case, each, evaluations, seed, maps, advance))

@@ -1,6 +1,7 @@
 """The commands by name. The module of a command is imported only when the command runs, or shows its own help."""
 
 import importlib.metadata
+import sys
 from importlib import import_module
 from typing import Annotated, Any
 
@@ -65,7 +66,6 @@ def _version(wanted: bool) -> None:
 
 app = typer.Typer(
     cls=LazyGroup,
-    no_args_is_help=True,
     pretty_exceptions_enable=False,
     help="A stiff virtual wall in hardware: encoder edges in, force out.",
 )
@@ -81,13 +81,16 @@ def _options(
 
 
 def run() -> None:
-    """Run the command that is called.
+    """Run the command that is called; without any, print the help.
 
     Raises:
-        BadInput: if a command, an option or an argument is not valid; without a message if only help was shown.
+        BadInput: if a command, an option or an argument is not valid.
     """
     hear_stages()
     try:
-        app(prog_name="hardwall", standalone_mode=False)
+        app(sys.argv[1:] or ["--help"], prog_name="hardwall", standalone_mode=False)
+    except typer.BadParameter as error:
+        # Its words come from what a scene is made of, which is imported only now.
+        raise BadInput(import_module(".refusal", __package__).refusal(error)) from None
     except typer.TyperException as error:
         raise BadInput(" ".join(error.format_message().split())) from None

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..scene.case import Case
+from ..scene.load import load
 from ..walls import hit
 from .errors import BadInput
 from .options import BackendOption, EstimatorOption, OutputOption, SceneArgument, output_file
@@ -20,8 +20,8 @@ def command(
     estimator: EstimatorOption = None,
     output: OutputOption = None,
     backend: BackendOption = "fixed",
-    stiffness: Annotated[float | None, typer.Option(help="of the wall, N/m")] = None,
-    damping: Annotated[float | None, typer.Option(help="of the wall, N s/m")] = None,
+    stiffness: Annotated[float | None, typer.Option(help="stiffness of the wall, N/m")] = None,
+    damping: Annotated[float | None, typer.Option(help="damping of the wall, N s/m")] = None,
     trace: Annotated[
         Path | None, typer.Option(metavar="FILE", help=".npz: the samples; .fst: a waveform of the contact (rtl)")
     ] = None,
@@ -32,7 +32,7 @@ def command(
         wall__stiffness_n_per_m=stiffness,
         wall__damping_n_s_per_m=damping,
     )
-    of = Case.of(scene, changes).scene
+    of = load(scene, changes)
     trace = output_file(trace, "--trace", (".fst", ".npz"))
     waveform = trace if trace and trace.suffix == ".fst" else None
     if waveform and backend != "rtl":

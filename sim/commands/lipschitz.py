@@ -17,9 +17,9 @@ RECORD_MAX_S = 1e6
 def command(
     options: StudyOptions,
     scene: SceneArgument = "seed-2011",
-    before: Annotated[float, typer.Option(metavar="S", help="of the record, before the contact")] = 0.1,
-    after: Annotated[float, typer.Option(metavar="S", help="and after it")] = 0.4,
-    sines: Annotated[int, typer.Option(min=1, max=20, help="how many are fitted")] = 7,
+    before: Annotated[float, typer.Option(metavar="S", help="length of the record before the contact")] = 0.1,
+    after: Annotated[float, typer.Option(metavar="S", help="length of the record after the contact")] = 0.4,
+    sines: Annotated[int, typer.Option(min=1, max=20, help="number of sines that are fitted")] = 7,
 ) -> None:
     within(before, "--before", 0.0, RECORD_MAX_S, "s")
     within(after, "--after", 1e-3, RECORD_MAX_S, "s")

@@ -2,6 +2,7 @@
 
 import time
 from contextlib import AbstractContextManager
+from typing import Any, Self
 
 from distributed import Client
 
@@ -28,12 +29,6 @@ def check_cluster(options: StudyOptions) -> None:
         raise BadInput(f"--scheduler {options.scheduler} has workers of its own: give it or --workers, not both")
 
 
-def cluster_for(options: StudyOptions, jobs: int) -> AbstractContextManager[Client | None]:
-    """Return `cluster.client` for the options `--workers` and `--scheduler`."""
-    check_cluster(options)
-    return cluster.client(jobs, options.workers, options.scheduler)
-
-
 class Maps:
     """A `zwidth.Mapping` that makes maps as the options say, and records their effort."""
 
@@ -49,9 +44,13 @@ class Maps:
         self._hits += sum(a_map.hits for a_map in maps)
         return maps
 
+    def _client(self, jobs: int) -> AbstractContextManager[Client | None]:
+        """Return a context with the client of a cluster for so many jobs at a time."""
+        return cluster.client(jobs, self._options.workers, self._options.scheduler)
+
     def _made(self, title: str, cases: list[Case]) -> list[Map]:
         known = Store("zwidth", self._options.resume)
-        with cluster_for(self._options, len(cases)) as client, progress(title, len(cases)) as advance:
+        with self._client(len(cases)) as client, progress(title, len(cases)) as advance:
             return zwidth.run(cases, self._backend, known, client, advance)
 
     def effort(self) -> Effort:
@@ -60,11 +59,21 @@ class Maps:
 
 
 class MapsOnOneCluster(Maps):
-    """Maps on a cluster that runs already, without a progress bar of their own: for very many maps."""
+    """A context in which all maps, of so many cases at a time, are made on one cluster: for very many maps.
 
-    def __init__(self, options: StudyOptions, backend: str, known: Store, client: Client | None):
+    They have no progress bar of their own.
+    """
+
+    def __init__(self, options: StudyOptions, backend: str, cases: int):
         super().__init__(options, backend)
-        self._known, self._client = known, client
+        self._known, self._cluster = Store(options.study, options.resume), self._client(cases)
+
+    def __enter__(self) -> Self:
+        self._connected = self._cluster.__enter__()
+        return self
+
+    def __exit__(self, *exception: Any) -> bool | None:
+        return self._cluster.__exit__(*exception)
 
     def _made(self, title: str, cases: list[Case]) -> list[Map]:
-        return zwidth.run(cases, self._backend, self._known, self._client)
+        return zwidth.run(cases, self._backend, self._known, self._connected)

@@ -20,26 +20,31 @@ Device = Literal["ecp5-25k", "ice40-up5k"]
 
 SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help=f"{', '.join(names())}, or a .toml file")]
 EstimatorOption = Annotated[Estimator | None, typer.Option(help="velocity estimator", show_default="the scene's")]
-OutputOption = Annotated[str | None, typer.Option(help="its output, e.g. u or u1", show_default="its first")]
+OutputOption = Annotated[
+    str | None, typer.Option(help="output of the estimator, e.g. u or u1", show_default="its first")
+]
 EstimatorsOption = Annotated[
-    str | None, typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="which", show_default="all")
+    str | None,
+    typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="estimators, or `all`", show_default="all"),
 ]
 BackendOption = Annotated[Backend, typer.Option(help="float64 algorithm, bit-accurate model, or the Verilated RTL")]
 ModelOption = Annotated[Literal["float", "fixed"], typer.Option(help="float64 algorithm, or bit-accurate model")]
 DeviceOption = Annotated[Device, typer.Option(help="the part to place and route for")]
-SeedsOption = Annotated[int, typer.Option(min=1, max=99, help="how many placements; fmax is their median")]
+SeedsOption = Annotated[int, typer.Option(min=1, max=99, help="number of placements; fmax is their median")]
 RateOption = Annotated[float, typer.Option(metavar="HZ", help="sample rate")]
 
-WorkersOption = Annotated[int | None, typer.Option(min=1, max=1024, help="processes", show_default="one a core")]
-SchedulerOption = Annotated[
-    str | None, typer.Option(metavar="ADDRESS", help="of a Dask cluster that runs, in place of workers of its own")
+WorkersOption = Annotated[
+    int | None, typer.Option(min=1, max=1024, help="number of processes", show_default="one a core")
 ]
-ResumeOption = Annotated[bool, typer.Option("--resume", help="go on where an interrupted run was")]
+SchedulerOption = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="address of a running Dask cluster, in place of workers")
+]
+ResumeOption = Annotated[bool, typer.Option("--resume", help="go on where an interrupted run ended")]
 SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="change a key of the scene; an empty value takes it out"),
 ]
-PlotOption = Annotated[Path | None, typer.Option(metavar="FILE", help="draw it: .png, .svg or .pdf")]
+PlotOption = Annotated[Path | None, typer.Option(metavar="FILE", help="draw the result: .png, .svg or .pdf")]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON on stdout, and nothing else")]
 
 

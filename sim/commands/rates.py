@@ -20,10 +20,15 @@ def command(
     scene: SceneArgument = "drive-2011",
     wanted: Annotated[
         str | None,
-        typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="see zwidth", show_default="six of all"),
+        typer.Option(
+            "--estimators",
+            metavar="NAME[:OUTPUT],...",
+            help="estimators, as zwidth takes them",
+            show_default="six of all",
+        ),
     ] = None,
     tried: Annotated[
-        str | None, typer.Option("--rates", metavar="HZ,...", help="ascending", show_default="1e3 to 1e6")
+        str | None, typer.Option("--rates", metavar="HZ,...", help="sample rates, ascending", show_default="1e3 to 1e6")
     ] = None,
     backend: ModelOption = "fixed",
 ) -> None:

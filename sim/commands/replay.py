@@ -26,9 +26,9 @@ def command(
     backend: BackendOption = "fixed",
     acceleration_max: Annotated[
         float | None,
-        typer.Option(metavar="C", help="counts/s^2, sets the gains", show_default="the recording's"),
+        typer.Option(metavar="C", help="acceleration that sets the gains, counts/s^2", show_default="the recording's"),
     ] = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="write the velocities")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.csv", help="file for the velocities")] = None,
 ) -> None:
     out = output_file(out, "--out", (".csv",), other_than=file)
     try:

@@ -2,7 +2,7 @@
 
 from ..jobs.result import Values
 from ..rtl.synthesis import synthesise
-from ..scene.case import Case
+from ..scene.load import load
 from .options import DeviceOption, EstimatorOption, SceneArgument, SeedsOption
 from .study import StudyOptions, study
 from .terminal import log
@@ -16,7 +16,7 @@ def command(
     seeds: SeedsOption = 3,
     estimator: EstimatorOption = None,
 ) -> None:
-    of = Case.of(scene, options.changes(controller__estimator=estimator)).scene
+    of = load(scene, options.changes(controller__estimator=estimator))
     with log.status(f"{device}: Yosys, then nextpnr with {seeds} seeds"):
         report = synthesise(of.spec, device, range(1, seeds + 1), of.glitch_clocks)
     options.finish(Values({"scene": of.name} | report))

@@ -7,18 +7,20 @@ import typer
 
 from ...model.checks import shown
 from ..rtl.sources import write_verilog
-from ..scene.case import Case
+from ..scene.load import load
 from .errors import BadInput
 from .options import EstimatorOption, SceneArgument, SetOption, changes_of
 
 
 def command(
     scene: SceneArgument = "seed-2011",
-    folder: Annotated[Path, typer.Option("-o", "--output-folder", metavar="DIR", help="made if absent")] = Path("."),
+    folder: Annotated[
+        Path, typer.Option("-o", "--output-folder", metavar="DIR", help="folder for the files, made if absent")
+    ] = Path("."),
     estimator: EstimatorOption = None,
     set_: SetOption = None,
 ) -> None:
-    spec = Case.of(scene, changes_of(set_, controller__estimator=estimator)).scene.spec
+    spec = load(scene, changes_of(set_, controller__estimator=estimator)).spec
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -14,7 +14,7 @@ import numpy as np
 from ...model.compiled import compiled
 from ...model.estimators import registry
 from ...model.spec import AxisSpec
-from ..scene.case import Case
+from ..scene.load import load
 from ..world.encoder import offsets
 from . import recording, signals
 from .judge import Judge
@@ -58,7 +58,7 @@ def axis_spec(
         ValueError: if there is no such axis; the message names the field.
     """
     return replace(
-        Case.of("mhz").scene.spec,
+        load("mhz").spec,
         clock_hz=sample_hz * max(-(-CLOCK_HZ // sample_hz), CLOCKS),
         sample_hz=sample_hz,
         actuation_hz=sample_hz,

@@ -18,7 +18,9 @@ from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
 from typing import Any
 
-from .ending import undone
+import psutil
+
+from .ending import undone, undone_by_signal
 
 GUARD = ("/bin/sh", "-c", "trap '' HUP INT TERM; read line; kill -KILL 0")
 
@@ -61,18 +63,35 @@ def join(number: int) -> None:
 
 
 @contextmanager
-def deaf_children() -> Iterator[None]:
-    """Make processes and threads that are started in the context, by this thread, deaf to SIGINT.
+def quiet_children() -> Iterator[None]:
+    """Make worker processes that this thread starts in the context say nothing when a signal ends this process.
 
-    A terminal sends SIGINT to children that have not joined their group yet, too; only this process answers it.
+    Until they have joined their group, a terminal sends SIGINT to them, too; and a worker that is not told what to do,
+    because this process has ended before, complains. So they are deaf to SIGINT, and are killed before that end.
     """
-    # At its start, the tracker of shared semaphores lets the thread hear again.
+    # At its start, the tracker of shared semaphores lets the thread hear again. It outlives this process.
     resource_tracker.ensure_running()
+    older = set(psutil.Process().children())
+
+    def kill() -> None:
+        while young := [child for child in psutil.Process().children() if child not in older and _lives(child)]:
+            for child in young:
+                with suppress(psutil.NoSuchProcess):
+                    child.kill()
+
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
-        yield
+        with undone_by_signal(kill):
+            yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _lives(child: psutil.Process) -> bool:
+    try:
+        return child.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
 
 
 def run(command: Sequence[str], **options: Any) -> subprocess.CompletedProcess:

@@ -19,6 +19,7 @@ from distributed.core import rpc
 from distributed.scheduler import KilledWorker
 from distributed.security import Security
 
+from ...model.checks import shown
 from . import children
 
 TIMEOUT_S = 8.0
@@ -45,7 +46,7 @@ def check_address(text: str) -> None:
     except ValueError:
         scheme, host, port = "", "", 0
     if scheme not in SCHEMES or not host or not 0 < port < 1 << 16:
-        raise AddressError(f"must be an address such as tcp://10.0.0.7:8786, not {text!r}")
+        raise AddressError(f"must be an address such as tcp://10.0.0.7:8786, not {shown(text)}")
 
 
 def dask_setup(_: Worker) -> None:
@@ -107,13 +108,13 @@ def _local(workers: int) -> Iterator[Client]:
         options["env"] = {GROUP: str(group.number)}
         # Dask's threads start its processes: they come from a thread of its own, so that this one still hears SIGINT.
         with ThreadPoolExecutor(1) as starter:
-            local = starter.submit(_deaf_cluster, n_workers=workers, **options).result()
+            local = starter.submit(_quiet_cluster, n_workers=workers, **options).result()
         with local, Client(local) as connected:
             yield connected
 
 
-def _deaf_cluster(**options) -> LocalCluster:
-    with children.deaf_children():
+def _quiet_cluster(**options) -> LocalCluster:
+    with children.quiet_children():
         return LocalCluster(**options)
 
 

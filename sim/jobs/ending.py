@@ -37,12 +37,21 @@ _ending = threading.Lock()
 @contextmanager
 def undone(undo: Callable[[], object]) -> Iterator[None]:
     """Call `undo` at the end of the context, and before a signal ends the process within the context."""
+    with undone_by_signal(undo):
+        try:
+            yield
+        finally:
+            undo()
+
+
+@contextmanager
+def undone_by_signal(undo: Callable[[], object]) -> Iterator[None]:
+    """Call `undo` before a signal ends the process within the context."""
     key = object()
     _undoing[key] = undo
     try:
         yield
     finally:
-        undo()
         _undoing.pop(key, None)
 
 

@@ -8,7 +8,6 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 from . import children
-from .ending import count_kept
 from .store import Store
 
 
@@ -40,7 +39,6 @@ def run(
     def keep(job: dict, result: Any) -> None:
         nonlocal done
         store.put(job, result)
-        count_kept()
         done += 1
         if progress:
             progress(done)
@@ -62,7 +60,7 @@ def _on_processes(
     settings = {"mp_context": multiprocessing.get_context("spawn"), "initializer": children.join}
     with children.Group() as group, ProcessPoolExecutor(workers, initargs=(group.number,), **settings) as pool:
         try:
-            with children.deaf_children():
+            with children.quiet_children():
                 futures: dict[Future, dict] = {pool.submit(function, **job): job for job in jobs}
             for future in as_completed(futures):
                 keep(futures[future], future.result())

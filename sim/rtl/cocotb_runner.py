@@ -97,7 +97,7 @@ def simulate(component: wiring.Component, name: str, job: Job) -> None:
         CocotbFailedError: if a test fails.
         RuntimeError: if the build fails, the simulator ends without results, or no test ran.
     """
-    _run(component, name, job)
+    _run(_Model.of(component, name, job), job)
 
 
 def trace(component: wiring.Component, name: str, job: Job, failed: CocotbFailedError) -> Path | None:
@@ -111,7 +111,8 @@ def trace(component: wiring.Component, name: str, job: Job, failed: CocotbFailed
         # A few samples after the wrong one show the response to it.
         environ["HARDWALL_TRACED_SAMPLES"] = str(failed.wrong_sample + 3)
     again = replace(job, environ=environ, checks=rf"(^|\.)({names})$")
-    build = _build_folder(component, name, job, traced=True)
+    model = replace(_Model.of(component, name, job), traced=True)
+    build = model.folder(job)
     waveform = build / f"{job.module}-{_digest(repr((job.checks, sorted(job.environ.items()))))}.fst"
     pipe = waveform.with_suffix(f".{os.getpid()}.vcd")
     build.mkdir(parents=True, exist_ok=True)
@@ -120,7 +121,7 @@ def trace(component: wiring.Component, name: str, job: Job, failed: CocotbFailed
     reader = threading.Thread(target=vcd_to_fst, args=(pipe, waveform, TRACED_LINES))
     reader.start()
     try:
-        _run(component, name, again, pipe)
+        _run(model, again, pipe)
     except RuntimeError:
         return waveform
     else:
@@ -141,30 +142,45 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _verilog(component: wiring.Component, name: str, job: Job) -> str:
-    return to_verilog(component, name) + job.more
+@dataclass(frozen=True)
+class _Model:
+    """What is built of a component.
+
+    Attributes:
+        name: name of the top module.
+        verilog: the component as Verilog.
+        visible: configuration of Verilator that shows the ports to cocotb.
+        traced: whether its signals can be traced.
+    """
+
+    name: str
+    verilog: str
+    visible: str
+    traced: bool = False
+
+    @classmethod
+    def of(cls, component: wiring.Component, name: str, job: Job) -> "_Model":
+        ports = ["clk", "rst", *component.signature.members]
+        visible = "".join(f'public_flat_rw -module "{name}" -var "{port}"\n' for port in ports)
+        return cls(name, to_verilog(component, name) + job.more, f"`verilator_config\n{visible}")
+
+    def folder(self, job: Job) -> Path:
+        digest = _digest(self.verilog + self.visible + TOOLS + repr(BUILD_OPTIONS))
+        return (job.build or build_dir()) / "cocotb" / f"{self.name}-{digest}{'-traced' * self.traced}"
 
 
-def _build_folder(component: wiring.Component, name: str, job: Job, traced: bool) -> Path:
-    text = _verilog(component, name, job) + TOOLS + repr(BUILD_OPTIONS)
-    return (job.build or build_dir()) / "cocotb" / f"{name}-{_digest(text)}{'-traced' * traced}"
-
-
-def _run(component: wiring.Component, name: str, job: Job, trace_to: Path | None = None) -> None:
-    """Build the component if necessary, and run the tests; write its signals to the file `trace_to`, if given."""
-    build = _build_folder(component, name, job, traced=trace_to is not None)
+def _run(model: _Model, job: Job, trace_to: Path | None = None) -> None:
+    """Build a model if necessary, and run the tests; write its signals to the file `trace_to`, if given."""
+    build = model.folder(job)
     build.mkdir(parents=True, exist_ok=True)
-    ports = ["clk", "rst", *component.signature.members]
-    visible = "".join(f'public_flat_rw -module "{name}" -var "{port}"\n' for port in ports)
-    sources = {f"{name}.vlt": f"`verilator_config\n{visible}", f"{name}.v": _verilog(component, name, job)}
-    runner = _built(build, sources, name, traced=trace_to is not None)
+    runner = _built(build, model)
     results = build / f"results-{_digest(repr((job.module, job.checks, sorted(job.environ.items()))))}.xml"
     with scratch(build) as own:
         wrong_sample = own / "wrong-sample"
         try:
             runner.test(
                 test_module=job.module,
-                hdl_toplevel=name,
+                hdl_toplevel=model.name,
                 build_dir=build,
                 test_dir=job.folder,
                 results_xml=str(results),
@@ -203,8 +219,9 @@ class _Runner(Verilator):
                 raise RuntimeError(f"{command[0]} ended with exit code {ended}")
 
 
-def _built(build: Path, sources: dict[str, str], name: str, traced: bool) -> _Runner:
-    """Return a runner of the model built in the folder `build` from sources by file name."""
+def _built(build: Path, model: _Model) -> _Runner:
+    """Return a runner of the model built in the folder `build`."""
+    sources = {f"{model.name}.vlt": model.visible, f"{model.name}.v": model.verilog}
     check_paths(build)
     os.environ.update(environment())
     runner = _Runner()
@@ -216,11 +233,11 @@ def _built(build: Path, sources: dict[str, str], name: str, traced: bool) -> _Ru
                 (build / file).write_text(text)
         runner.build(
             sources=[build / file for file in sources],
-            hdl_toplevel=name,
+            hdl_toplevel=model.name,
             build_dir=build,
             build_args=BUILD_OPTIONS,
             timescale=("1ns", "1ns"),
-            waves=traced,
+            waves=model.traced,
             log_file=build / "build.log",
         )
     return runner

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "Vaxis.h"
+#include "Vaxis__ALL.cpp"
 #include "axis_ports.h"
 #include "verilated.h"
 #if VM_TRACE

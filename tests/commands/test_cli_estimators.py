@@ -59,7 +59,7 @@ def test_figures_are_drawn(monkeypatch, capsys, tmp_path, figure):
     ("arguments", "message"),
     [
         (["accuracy", "--signal", "noise"], "--signal: signal must be one of paper, "),
-        (["accuracy", "--figure", "3"], "Invalid value for '--figure': "),
+        (["accuracy", "--figure", "3"], "--figure must be a whole number of 1 to 2, not '3'"),
         (["accuracy", "--figure", "2", "--signal", "hit"], "--figure 2 has a signal of its own"),
         (["accuracy", "--estimators", "nobody"], "--estimators: estimator must be one of fdm, "),
         (["accuracy", "--estimators", "levant:v"], "--estimators: output of levant must be one of u, u1, not 'v'"),
@@ -78,7 +78,7 @@ def test_figures_are_drawn(monkeypatch, capsys, tmp_path, figure):
         (["accuracy", "--plot", "a.gif"], "--plot must end in .pdf or .png or .svg, not 'a.gif'"),
         (["choose", "--rate", "1"], "--rate must be whole numbers of 1000 to 1e+07 Hz, not '1.0'"),
         (["bits", "--estimators", ""], "--estimators: estimator must be one of fdm, "),
-        (["costs", "--device", "z80"], "Invalid value for '--device'"),
+        (["costs", "--device", "z80"], "--device must be one of ecp5-25k, ice40-up5k, not 'z80'"),
     ],
 )
 def test_bad_input_is_one_line(monkeypatch, capsys, tmp_path, arguments, message):

@@ -59,7 +59,7 @@ DIGITS = "9" * 5000
         (["accuracy", "--signal", ""], "--signal: signal must be one of paper, "),
         (["accuracy", "--acceleration-max", "1e-300"], "--acceleration-max must be 1e-09 to 1e+06 m/s^2, not 1e-300"),
         (["accuracy", "--rates", LONG], "--rates must be whole numbers of 1000 to 1e+07 Hz, not 'xxxx"),
-        (["accuracy", "--workers", "100000"], "Invalid value for '--workers': "),
+        (["accuracy", "--workers", "100000"], "--workers must be a whole number of 1 to 1024, not '100000'"),
         (["lipschitz", "--after", "inf"], "--after must be 0.001 to 1e+06 s, not inf"),
         (["lipschitz", "--before", "1e400"], "--before must be 0 to 1e+06 s, not inf"),
         (["lipschitz", "--before", "nan"], "--before must be 0 to 1e+06 s, not nan"),

@@ -6,7 +6,7 @@ import os
 import pytest
 
 from hardwall.model import build_folder
-from hardwall.sim.jobs import parallel, store
+from hardwall.sim.jobs import ending, parallel, store
 from hardwall.sim.jobs.store import Store
 
 
@@ -95,13 +95,22 @@ def unsaid(monkeypatch):
     monkeypatch.setattr(build_folder, "_said", set())
 
 
+def test_results_that_are_kept_are_counted():
+    ending.begin()
+    Store("some").put({"a": 1}, 1)
+    Store("some").put({"a": 2}, 2)
+    assert ending.remark().startswith("; 2 new results are kept")
+
+
 def test_without_a_place_to_keep_them_results_are_used_and_one_line_says_so(tmp_path, monkeypatch, caplog, unsaid):
+    ending.begin()
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path / "file"))
     kept = Store("squares")
     jobs = [{"number": number} for number in (1, 2, 3)]
     assert parallel.run(square, jobs, kept, 1) == [{"square": 1}, {"square": 4}, {"square": 9}]
     assert caplog.messages == [f"{kept.path} cannot be written (Not a directory): what this run makes is not kept"]
+    assert ending.remark() == "", "nothing is kept"
 
 
 @pytest.mark.skipif(not os.access("/dev/full", os.W_OK), reason="this system has no /dev/full")

@@ -20,7 +20,7 @@ def builds(tmp_path, monkeypatch) -> list[Path]:
     """Set up a stand-in for Verilator and an empty build folder; return the list of its calls."""
     calls = []
 
-    def verilate(files: dict[str, str], options: list[str], work: Path) -> None:
+    def verilate(files: dict[str, str], options: list[str], optimisation: str, work: Path) -> None:
         calls.append(work)
         for name, text in files.items():
             (work / name).write_text(text)

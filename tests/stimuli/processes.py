@@ -9,6 +9,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from hardwall.sim.jobs.ending import CODES
+
 HARDWALL = Path(sys.executable).with_name("hardwall")
 PATIENCE_S = 300.0
 """The limit of every wait: only a test that fails takes so long."""
@@ -33,6 +35,24 @@ def ended(process: subprocess.Popen) -> tuple[int, str, str]:
     """Wait for the end of a process; return its exit code, stdout and stderr."""
     out, err = process.communicate(timeout=PATIENCE_S)
     return process.returncode, out, err
+
+
+def ended_by(number: str, process: subprocess.Popen) -> tuple[str, str]:
+    """Wait until a signal, by its name, has ended a process; check its exit code and the last line on its stderr.
+
+    Returns:
+        The lines of stderr before the last, and what the last says is kept; nothing for a signal that is not handled.
+    """
+    code, _, err = ended(process)
+    way = signal.Signals[number]
+    if way not in CODES:
+        assert code == -way, err
+        return "", ""
+    expected, word = CODES[way]
+    *before, last = err.splitlines(keepends=True)
+    assert code == expected, err
+    assert last.startswith(f"hardwall: error: {word}"), err
+    return "".join(before), last.removeprefix(f"hardwall: error: {word}").removesuffix("\n")
 
 
 def session(process: subprocess.Popen) -> list[int]:

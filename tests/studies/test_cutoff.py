@@ -143,7 +143,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         (["--set", "controller.estimator=fdm"], "--set 'controller.estimator' is what this command sets itself"),
         (["--set", "wall.damping_n_s_per_m=1.0"], "--set 'wall.damping_n_s_per_m' is what this command sets itself"),
         (["--set", "handle.mass_kg=0"], "seed-2011: handle.mass_kg must be a number of 1e-06 to 1000, not 0"),
-        (["--backend", "rtl"], "'rtl' is not one of 'float', 'fixed'"),
+        (["--backend", "rtl"], "--backend must be one of float, fixed, not 'rtl'"),
         (["--workers", "2", "--scheduler", "tcp://127.0.0.1:1"], "give it or --workers, not both"),
         (["--plot", "area.gif"], "--plot must end in .pdf or .png or .svg"),
     ],

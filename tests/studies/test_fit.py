@@ -153,7 +153,7 @@ def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys
     ("arguments", "message"),
     [
         (["mhz"], "mhz: amplifier.delay_s is missing: the search begins from it"),
-        (["--axis", "1-10"], "'1-10' is not one of '3-30', '30-300'"),
+        (["--axis", "1-10"], "--axis must be one of 3-30, 30-300, not '1-10'"),
         (["--set", "controller.output=u1"], "--set 'controller.output' is what this command sets itself"),
         (
             ["--set", "zwidth.stiffness_step_n_per_m=123.0"],
