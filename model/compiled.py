@@ -13,8 +13,8 @@ from collections.abc import Callable
 from typing import Any, Protocol, TypeVar, cast
 
 import numba
-from numba.core import config
-from numba.extending import overload
+from numba.core import config, types
+from numba.core.typing.templates import AbstractTemplate, infer_global
 
 from . import provenance
 from .kernel_cache import KernelCache
@@ -85,16 +85,22 @@ def by_type(declaration: Callable) -> ByType:
             raise TypeError(f"{declaration.__name__} has no variant for {type(first).__name__}")
         return variant(first, *rest)
 
-    @overload(call, jit_options={"forceinline": True})
-    def choose(first, *rest):
-        variant = variants.get(getattr(first, "instance_class", None))
-        if variant is None:
-            return None
+    class Choice(AbstractTemplate):
+        """The type of `call` in compiled code: a call is one of its variant, and nothing is between them."""
 
-        def body(first, *rest):
-            return variant(first, *rest)
+        key = call
 
-        return body
+        def generic(self, args: tuple, kws: dict) -> Any:
+            variant = variants.get(getattr(args[0], "instance_class", type(None)))
+            if variant is None:
+                return None
+            self._variant = types.Dispatcher(variant)
+            return self._variant.get_call_type(self.context, args, kws)
+
+        def get_impl_key(self, sig: Any) -> Any:
+            return self._variant.get_impl_key(sig)
+
+    infer_global(call, types.Function(Choice))
 
     def register(kind: type) -> Callable:
         # The names of compiled functions contain the names of their arguments' classes, without the module: two
