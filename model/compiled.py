@@ -94,7 +94,7 @@ def by_type(declaration: Callable) -> ByType:
             variant = variants.get(getattr(args[0], "instance_class", type(None)))
             if variant is None:
                 return None
-            self._variant = types.Dispatcher(variant)
+            self._variant = types.Dispatcher(cast(Any, variant))
             return self._variant.get_call_type(self.context, args, kws)
 
         def get_impl_key(self, sig: Any) -> Any:
