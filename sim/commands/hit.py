@@ -1,10 +1,15 @@
 """The command `hit`."""
 
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from ..jobs.ending import undone
 from ..scene.load import load
 from ..walls import hit
 from .errors import BadInput
@@ -37,12 +42,24 @@ def command(
     waveform = trace if trace and trace.suffix == ".fst" else None
     if waveform and backend != "rtl":
         raise BadInput(f"--trace {waveform.name} needs --backend rtl: only hardware has waveforms")
-    with progress(f"{of.name} {of.controller.estimator} {backend}", of.samples) as advance:
-        result = hit.run(of, backend, bool(options.plot or trace), advance, waveform)
+    with _room_for_vcd() as vcd:
+        with progress(f"{of.name} {of.controller.estimator} {backend}", of.samples) as advance:
+            result = hit.run(of, backend, bool(options.plot or trace), advance, vcd if waveform else None)
 
-    def save() -> list[Path]:
-        if not waveform:
-            result.save(trace)
-        return [trace]
+        def save() -> list[Path]:
+            if waveform:
+                # Only waveforms need the library of their files.
+                import_module("...rtl.waveform", __name__).vcd_to_fst(vcd, waveform)
+            else:
+                result.save(trace)
+            return [trace]
 
-    options.finish(result, {"trace": save} if trace else {})
+        options.finish(result, {"trace": save} if trace else {})
+
+
+@contextmanager
+def _room_for_vcd() -> Iterator[Path]:
+    """Provide the path of a temporary file, which is removed whatever ends the process."""
+    folder = tempfile.TemporaryDirectory()
+    with undone(folder.cleanup):
+        yield Path(folder.name) / "axis.vcd"

@@ -15,15 +15,17 @@ from .options import EstimatorOption, SceneArgument, SetOption, changes_of
 def command(
     scene: SceneArgument = "seed-2011",
     folder: Annotated[
-        Path, typer.Option("-o", "--output-folder", metavar="DIR", help="folder for the files, made if absent")
-    ] = Path("."),
+        str, typer.Option("-o", "--output-folder", metavar="DIR", help="folder for the files, made if absent")
+    ] = ".",
     estimator: EstimatorOption = None,
     set_: SetOption = None,
 ) -> None:
     spec = load(scene, changes_of(set_, controller__estimator=estimator)).spec
+    if not folder:
+        raise BadInput("-o must be a folder, not ''")
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        Path(folder).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BadInput(f"-o {shown(str(folder))} cannot be made: {error.strerror}") from None
-    for path in write_verilog(spec, folder):
+        raise BadInput(f"-o {shown(folder)} cannot be made: {error.strerror}") from None
+    for path in write_verilog(spec, Path(folder)):
         print(path)

@@ -16,6 +16,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from ...model.build_folder import not_kept
+from .ending import undone
 from .scratch import scratch
 
 LIST = "SHA256SUMS"
@@ -73,7 +74,9 @@ def keep_log(path: Path, text: str) -> Path:
 def _own_folder() -> Path:
     """Return a folder that lasts as long as this process; it is not made before something is written there."""
     path = Path(tempfile.gettempdir()) / f"hardwall-{os.getpid()}-{os.urandom(8).hex()}"
-    atexit.register(shutil.rmtree, path, ignore_errors=True)
+    removed = undone(functools.partial(shutil.rmtree, path, ignore_errors=True))
+    removed.__enter__()
+    atexit.register(removed.__exit__, None, None, None)
     return path
 
 

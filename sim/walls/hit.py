@@ -2,10 +2,8 @@
 
 import json
 import math
-import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +11,6 @@ import numpy as np
 
 from ...model import stamped
 from ...model.whole_file import whole_file
-from ..jobs.ending import undone
 from ..jobs.result import Summary
 from ..jobs.stages import stage
 from ..loop import loop, record
@@ -252,7 +249,7 @@ def run(
     backend: str,
     traces: bool = False,
     progress: Callable[[int], None] | None = None,
-    waveform: Path | None = None,
+    vcd: Path | None = None,
     until_sure: bool = False,
 ) -> Hit:
     """Hit the wall of `scene` and return the result.
@@ -262,7 +259,7 @@ def run(
         backend: one of `backends.BACKENDS`.
         traces: keep samples of the whole run and of the contact.
         progress: called with the number of samples done.
-        waveform: for `rtl`, an FST file to write, with every signal around the contact.
+        vcd: for `rtl`, a VCD file to write, with every signal around the contact.
         until_sure: end a run that is certainly unstable, or whose handle outruns the encoder by far; `rms_m` is then
             the RMS up to that point, or infinite.
 
@@ -270,28 +267,12 @@ def run(
         RuntimeError: if the handle outran every decoder's limit by far, or the RTL could not be built.
     """
     closed = _Loop(scene, backend, traces, until_sure)
-    traced = waveform is not None
-    with opened(scene.spec, backend, scene.parameters, closed.start_level, traced) as axis, _vcd(waveform) as vcd:
+    with opened(scene.spec, backend, scene.parameters, closed.start_level, traced=vcd is not None) as axis:
         # The contact is known before the hardware runs, because the bit-accurate model has it at the same sample.
-        result = closed.run(axis, _waveform_marks(scene, axis.hardware, vcd) if traced else (), progress)
-        if traced:
+        result = closed.run(axis, _waveform_marks(scene, axis.hardware, vcd) if vcd else (), progress)
+        if vcd:
             axis.hardware.end_trace()
     return result
-
-
-@contextmanager
-def _vcd(waveform: Path | None) -> Iterator[Path | None]:
-    """Provide a VCD file to write to, and convert it to `waveform` at the end."""
-    if waveform is None:
-        yield None
-        return
-    from ..rtl.waveform import vcd_to_fst  # noqa: PLC0415  (only waveforms need its library)
-
-    folder = tempfile.TemporaryDirectory()
-    with undone(folder.cleanup):
-        vcd = Path(folder.name) / "axis.vcd"
-        yield vcd
-        vcd_to_fst(vcd, waveform)
 
 
 def _waveform_marks(scene: Scene, hardware, vcd: Path) -> Marks:

@@ -70,6 +70,7 @@ DIGITS = "9" * 5000
         (["replay", "r.csv", "--column", "c"], "r.csv: is empty; must be a CSV file"),
         (["table", "/dev/zero"], "'/dev/zero' must be a JSON report of `hardwall hit --json`, and is none: it is not"),
         (["verilog", "-o", f"{LONG}"], "-o 'xxxx"),
+        (["verilog", "-o", ""], "-o must be a folder, not ''"),
     ],
 )
 def test_it_is_refused_in_a_short_line_before_any_work(monkeypatch, capsys, tmp_path, arguments, message):

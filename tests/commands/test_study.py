@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hardwall.sim.commands.study import _do_all
+from stimuli import results
 from stimuli.command_line import call
 from stimuli.processes import ended, started, wait_until
 
@@ -36,6 +37,17 @@ def test_a_picture_that_fails_loses_neither_the_report_nor_the_trace(tmp_path, m
     assert err.endswith("\nhardwall: error: hit.png: cannot be written (No space left on device)\n")
     with np.load("hit.npz") as trace:
         assert json.loads(str(trace["report"])) == json.loads(out)
+
+
+def test_a_waveform_that_fails_does_not_lose_the_report(tmp_path, monkeypatch, capsys):
+    def full(*_):
+        raise OSError("hit.fst: cannot be written")
+
+    monkeypatch.setattr("hardwall.sim.rtl.waveform.vcd_to_fst", full)
+    monkeypatch.setattr("hardwall.sim.walls.hit.run", lambda *_: results.hit())
+    code, out, err = call(monkeypatch, capsys, "hit", "--backend", "rtl", "--json", "--trace", tmp_path / "hit.fst")
+    assert (code, err) == (1, "hardwall: error: hit.fst: cannot be written\n")
+    assert json.loads(out)["rms_mm"] == 0
 
 
 def test_an_interrupt_while_drawing_loses_neither_the_report_nor_the_trace(tmp_path, monkeypatch):

@@ -2,7 +2,9 @@
 
 import multiprocessing
 import shutil
+import signal
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from hardwall.model import build_folder
 from hardwall.sim.jobs import whole_folder as module
 from hardwall.sim.jobs.whole_folder import LIST, keep_log, whole_folder
+from stimuli.processes import line, started
 
 TEXTS = {"library.so": "machine code" * 1000, "axis.v": "module axis; endmodule"}
 
@@ -122,6 +125,27 @@ def test_without_a_place_to_keep_it_there_is_one_for_the_process(tmp_path, monke
         assert (whole_folder(folder, making) / "library.so").read_text() == TEXTS["library.so"]
     assert making.calls == 1
     assert caplog.messages == [f"{folder.parent} cannot be written (Not a directory): what this run makes is not kept"]
+
+
+OWN = """
+import time
+from pathlib import Path
+from hardwall.sim.jobs import ending, whole_folder
+ending.hear_signals()
+print(whole_folder.whole_folder(Path("/dev/null/rtl/0123"), lambda folder: (folder / "file").touch()), flush=True)
+time.sleep({seconds})
+"""
+
+
+@pytest.mark.parametrize("number", [None, "SIGTERM", "SIGINT"])
+def test_the_one_for_the_process_ends_with_it(tmp_path, number):
+    program = OWN.format(seconds=600 if number else 0)
+    with started(sys.executable, "-c", program, TMPDIR=str(tmp_path)) as process:
+        assert Path(line(process)).is_relative_to(tmp_path)
+        if number:
+            process.send_signal(signal.Signals[number])
+        process.wait()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_log_is_kept_wherever_possible(tmp_path, monkeypatch):
