@@ -1,4 +1,4 @@
-"""The words of the edge-driven differentiator: within a derived bound of the algorithm, and accurate on known motions."""
+"""The words of the edge-driven differentiator: a derived bound on their rounding, and accuracy on known motions."""
 
 from dataclasses import replace
 from functools import cache
