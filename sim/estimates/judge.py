@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 CHATTER_S = 0.01
 DELAY_POINTS = 1 << 15
@@ -102,4 +102,5 @@ class Judge:
             return None
         best, step = tried[number], tried[1] - tried[0]
         bounds = best - step, best + step
-        return float(minimize_scalar(mismatch, bounds=bounds, method="bounded", options={"xatol": 1e-9}).x)
+        found = scipy.optimize.minimize_scalar(mismatch, bounds=bounds, method="bounded", options={"xatol": 1e-9})
+        return float(found.x)

@@ -10,7 +10,7 @@ to two digits. A designer would know it of the motion; an estimator could not kn
 import math
 
 import numpy as np
-from scipy import signal
+import scipy
 
 REFERENCE_HZ = 40.0
 REFERENCE_ORDER = 4
@@ -25,11 +25,11 @@ def judged_from(rate_hz: float) -> int:
 
 def zero_phase_velocity(counts: np.ndarray, rate_hz: float, cutoff_hz: float) -> np.ndarray:
     """Return the derivative (counts/s) of the counts, low-pass filtered forward and backward."""
-    sections = signal.butter(REFERENCE_ORDER, cutoff_hz, fs=rate_hz, output="sos")
+    sections = scipy.signal.butter(REFERENCE_ORDER, cutoff_hz, fs=rate_hz, output="sos")
     derivative = np.gradient((counts - counts[0]).astype(np.float64)) * rate_hz
     # The usual extension at the ends is three times the filter's length, if there are enough samples.
     extension = min(3 * (2 * len(sections) + 1), len(counts) - 1)
-    return signal.sosfiltfilt(sections, derivative, padlen=extension)
+    return scipy.signal.sosfiltfilt(sections, derivative, padlen=extension)
 
 
 def acceleration_bound(velocity: np.ndarray, rate_hz: float) -> float:

@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 from ...model.estimators.butterworth import CUTOFF_MAX
 from ..jobs.result import Table, table_of
@@ -198,5 +198,5 @@ def _searched(device: _Cases, sweep: dict[float, Map], unfiltered: Map, mapping:
     bounds = [math.log(cutoffs[min(max(place, 0), len(cutoffs) - 1)]) for place in (top - 1, top + 1)]
     if areas[top] > 0 and bounds[0] < bounds[1]:
         options = {"xatol": math.log1p(TOLERANCE), "maxiter": EVALUATIONS}
-        minimize_scalar(loss, bounds=bounds, method="bounded", options=options)
+        scipy.optimize.minimize_scalar(loss, bounds=bounds, method="bounded", options=options)
     return Device(device.scene, dict(sorted(maps.items())), unfiltered)

@@ -21,7 +21,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import differential_evolution
+import scipy
 
 from ..jobs.result import Table, table_of
 from ..scene.case import Case
@@ -300,7 +300,7 @@ def study(
     generations = max(round(evaluations / (MEMBERS * len(PARAMETERS))) - 1, 0)
     options = {"popsize": MEMBERS, "maxiter": generations, "rng": seed, "tol": 0, "polish": False}
     begin = [PARAMETERS[key].part(value) for key, value in own.items()]
-    differential_evolution(score, [(0.0, 1.0)] * len(PARAMETERS), x0=begin, **options)
+    scipy.optimize.differential_evolution(score, [(0.0, 1.0)] * len(PARAMETERS), x0=begin, **options)
     best = {tuple(trial.values.items()): trial for trial in sorted(trials, key=lambda trial: -trial.score)}
     finalists = [judge.fully(trial.values) for trial in list(best.values())[::-1][:FINALISTS]]
     return Fit(reading, own, before, trials, sorted(finalists, key=lambda trial: trial.score))

@@ -10,7 +10,7 @@ sines is strongest.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 
 @dataclass(frozen=True)
@@ -79,4 +79,4 @@ def _searched(times_s, values, start, slowest, fastest) -> np.ndarray:
 
     scale = np.full(len(start), slowest)
     limits = np.full(len(start), slowest / 4), np.full(len(start), fastest)
-    return least_squares(residual, start, bounds=limits, x_scale=scale, max_nfev=60).x
+    return scipy.optimize.least_squares(residual, start, bounds=limits, x_scale=scale, max_nfev=60).x

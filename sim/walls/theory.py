@@ -14,9 +14,7 @@ boundary without a hand.
 """
 
 import numpy as np
-from scipy import signal
-from scipy.linalg import expm
-from scipy.optimize import brentq
+import scipy
 
 from ...model.quadrature import latency
 from ..scene.build import device_of
@@ -63,9 +61,9 @@ def _estimator(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]
         raise ValueError(f"estimator must be one of {', '.join(LINEAR)} for a linear loop, not {name!r}")
     numerator, denominator = np.array([rate, -rate]), np.array([1.0, 0.0])
     if name == "butterworth":
-        b, a = signal.butter(2, scene.spec.design.gains.cutoff_hz, fs=rate)
+        b, a = scipy.signal.butter(2, scene.spec.design.gains.cutoff_hz, fs=rate)
         numerator, denominator = np.convolve(numerator, b), np.convolve(denominator, a)
-    a, b, c, d = signal.tf2ss(numerator, denominator)
+    a, b, c, d = scipy.signal.tf2ss(numerator, denominator)
     return a, b[:, 0], c[0], float(d[0, 0])
 
 
@@ -99,8 +97,8 @@ class Loop:
         seen_s = latency(scene.glitch_clocks) / spec.clock_hz
         until_drive_s = spec.design.latency_to_drive / spec.clock_hz
         early, late, applied = (np.eye(self._n_state) for _ in range(3))
-        early[: n + 1, : n + 1] = expm(rates * (seen_s + until_drive_s))
-        late[: n + 1, : n + 1] = expm(rates * (1 / spec.sample_hz - seen_s - until_drive_s))
+        early[: n + 1, : n + 1] = scipy.linalg.expm(rates * (seen_s + until_drive_s))
+        late[: n + 1, : n + 1] = scipy.linalg.expm(rates * (1 / spec.sample_hz - seen_s - until_drive_s))
         applied[command] = 0
         if delay:
             # The oldest drive leaves the amplifier, and the new drive enters it.
@@ -147,6 +145,6 @@ def linear_limit_n_per_m(loop: Loop, damping_n_s_per_m: float, least: float = 1.
         if loop.radius(stiffness, damping_n_s_per_m) >= 1:
             if stiffness == least:
                 return 0.0
-            return brentq(lambda k: loop.radius(k, damping_n_s_per_m) - 1, stable, stiffness, rtol=1e-9)
+            return scipy.optimize.brentq(lambda k: loop.radius(k, damping_n_s_per_m) - 1, stable, stiffness, rtol=1e-9)
         stable = stiffness
     return most

@@ -23,7 +23,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import matrix_balance
+import scipy
 
 from .converter import AS_IT_IS, Pulse
 from .linear import GRIP, PHASES, QUANTITIES, SEEN, STATES, VOLTAGE, phase_number
@@ -193,7 +193,7 @@ def fastest_per_s(device: Device) -> float:
                 rates = equations(device, along, limited).rates
             if not (np.abs(rates) < BEYOND).all():
                 return math.inf
-            balanced = matrix_balance(rates[:, : len(rates)], permute=False)[0]
+            balanced = scipy.linalg.matrix_balance(rates[:, : len(rates)], permute=False)[0]
             norms.append(np.abs(balanced).sum(axis=0).max())
     return float(max(norms))
 
