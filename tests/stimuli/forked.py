@@ -16,6 +16,8 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
+import scipy
+
 from hardwall.sim.commands import app
 from hardwall.sim.estimates.accuracy import measure
 from hardwall.sim.jobs import cluster, parallel, store
@@ -23,6 +25,8 @@ from hardwall.sim.rtl import library, synthesis
 from hardwall.sim.scene import checks
 from hardwall.sim.walls import zwidth
 
+LOADED = scipy.linalg, scipy.optimize, scipy.signal
+"""What SciPy loads when it is used: here once, and not in every child."""
 LIMIT_S = 60
 """The time after which a child counts as hung; it prints where it hangs. A loaded machine needs most of it."""
 SAMPLES_MAX = 50_000
