@@ -7,26 +7,34 @@ on the samples of a scene.
 
 import faulthandler
 import os
+import pkgutil
 import resource
 import signal
 import sys
 import traceback
 from collections.abc import Callable
 from contextlib import nullcontext
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
 import scipy
 
+from hardwall.sim import pictures
 from hardwall.sim.commands import app
+from hardwall.sim.commands.group import COMMANDS
 from hardwall.sim.estimates.accuracy import measure
 from hardwall.sim.jobs import cluster, parallel, store
 from hardwall.sim.rtl import library, synthesis
 from hardwall.sim.scene import checks
 from hardwall.sim.walls import zwidth
 
-LOADED = scipy.linalg, scipy.optimize, scipy.signal
-"""What SciPy loads when it is used: here once, and not in every child."""
+LOADED = (
+    *(scipy.linalg, scipy.optimize, scipy.signal),
+    *(import_module(f"hardwall.sim.commands.{name}") for name in COMMANDS),
+    *(import_module(f"hardwall.sim.pictures.{name}") for _, name, _ in pkgutil.iter_modules(pictures.__path__)),
+)
+"""What is otherwise loaded when it is used: here once, and not in every child."""
 LIMIT_S = 60
 """The time after which a child counts as hung; it prints where it hangs. A loaded machine needs most of it."""
 SAMPLES_MAX = 50_000
