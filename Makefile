@@ -44,9 +44,9 @@ SAMPLES ?= 1000000
 ENDURANCE ?= 1000000000
 CALLS ?= 20000
 KILLS ?= 200
-# One process more than there are cores, because some tests wait.
-CORES := $(shell getconf _NPROCESSORS_ONLN)
-PYTEST := $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1)),8) --dist worksteal
+# Up to 8 cores, one process more than there are, because some tests wait.
+CORES = $(shell getconf _NPROCESSORS_ONLN)
+PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1)),8) --dist worksteal
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 

@@ -86,12 +86,13 @@ def by_type(declaration: Callable) -> ByType:
         return variant(first, *rest)
 
     class Choice(AbstractTemplate):
-        """The type of `call` in compiled code: a call is one of its variant, and nothing is between them."""
+        """The type of `call` in compiled code, where a call is directly one of the variant."""
 
         key = call
 
         def generic(self, args: tuple, kws: dict) -> Any:
-            variant = variants.get(getattr(args[0], "instance_class", type(None)))
+            kind = getattr(args[0], "instance_class", None) if args and not kws else None
+            variant = variants.get(kind) if kind else None
             if variant is None:
                 return None
             self._variant = types.Dispatcher(cast(Any, variant))

@@ -113,10 +113,11 @@ class _Shelf:
         """
         data = dumps(thing)
         self.folder.mkdir(parents=True, exist_ok=True)
-        index = dumps(self._entries() | {key: _name(data)})
-        for path, content in ((self.folder / _name(data), data), (self._index, hashlib.sha256(index).digest() + index)):
-            with whole_file(path) as part:
-                part.write_bytes(content)
+        with whole_file(self.folder / _name(data)) as part:
+            part.write_bytes(data)
+        with whole_file(self._index) as part:
+            index = dumps(self._entries() | {key: _name(data)})
+            part.write_bytes(hashlib.sha256(index).digest() + index)
 
     def _entries(self) -> dict[tuple, str]:
         """Return the names of the files by key: of none, if the index is absent or not whole."""

@@ -1,6 +1,5 @@
 """Files that are written completely or not at all."""
 
-import itertools
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -8,8 +7,6 @@ from pathlib import Path
 
 unfinished: set[Path] = set()
 """The temporary files that are being written, for a process that ends in the middle of its work to remove."""
-
-_numbers = itertools.count()
 
 
 @contextmanager
@@ -19,7 +16,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     Raises:
         OSError: if the file cannot be written; the message is one line and names the file, `strerror` is the reason.
     """
-    part = Path(path).with_name(f".part-{os.getpid()}-{next(_numbers)}{Path(path).suffix}")
+    part = Path(path).with_name(f".part-{os.urandom(8).hex()}{Path(path).suffix}")
     unfinished.add(part)
     try:
         yield part

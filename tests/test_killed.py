@@ -79,7 +79,7 @@ def whole(tmp_path_factory) -> dict[str, tuple[float, dict]]:
     """Return the time and the report of whole runs; of two runs, the first also compiles."""
     found = {}
     for name in RUNS if KILLS else QUICK:
-        for _ in range(2 if KILLS else 1):
+        for _ in range(2):
             began, folder = time.monotonic(), tmp_path_factory.mktemp("whole")
             report = report_of(RUNS[name], environment(folder))
         found[name] = time.monotonic() - began, report

@@ -89,8 +89,6 @@ def run() -> None:
     hear_stages()
     try:
         app(sys.argv[1:] or ["--help"], prog_name="hardwall", standalone_mode=False)
-    except typer.BadParameter as error:
-        # Its words come from what a scene is made of, which is imported only now.
-        raise BadInput(import_module(".refusal", __package__).refusal(error)) from None
     except typer.TyperException as error:
-        raise BadInput(" ".join(error.format_message().split())) from None
+        # The words for it come from what a scene is made of, which is imported only now.
+        raise BadInput(import_module(".refusal", __package__).refusal(error)) from None

@@ -2,8 +2,7 @@
 
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
-from importlib import import_module
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Annotated
 
@@ -42,14 +41,15 @@ def command(
     waveform = trace if trace and trace.suffix == ".fst" else None
     if waveform and backend != "rtl":
         raise BadInput(f"--trace {waveform.name} needs --backend rtl: only hardware has waveforms")
-    with _room_for_vcd() as vcd:
+    with _room_for_vcd() if waveform else nullcontext() as vcd:
         with progress(f"{of.name} {of.controller.estimator} {backend}", of.samples) as advance:
-            result = hit.run(of, backend, bool(options.plot or trace), advance, vcd if waveform else None)
+            result = hit.run(of, backend, bool(options.plot or trace), advance, vcd)
 
         def save() -> list[Path]:
             if waveform:
-                # Only waveforms need the library of their files.
-                import_module("...rtl.waveform", __name__).vcd_to_fst(vcd, waveform)
+                from ..rtl.waveform import vcd_to_fst  # noqa: PLC0415  (only waveforms need its library)
+
+                vcd_to_fst(vcd, waveform)
             else:
                 result.save(trace)
             return [trace]
@@ -59,7 +59,7 @@ def command(
 
 @contextmanager
 def _room_for_vcd() -> Iterator[Path]:
-    """Provide the path of a temporary file, which is removed whatever ends the process."""
+    """Provide the path of a temporary file, which is removed at the end, by a signal, too."""
     folder = tempfile.TemporaryDirectory()
     with undone(folder.cleanup):
         yield Path(folder.name) / "axis.vcd"

@@ -37,7 +37,7 @@ WorkersOption = Annotated[
     int | None, typer.Option(min=1, max=1024, help="number of processes", show_default="one a core")
 ]
 SchedulerOption = Annotated[
-    str | None, typer.Option(metavar="ADDRESS", help="address of a running Dask cluster, in place of workers")
+    str | None, typer.Option(metavar="ADDRESS", help="address of a running Dask cluster, whose workers are used")
 ]
 ResumeOption = Annotated[bool, typer.Option("--resume", help="go on where an interrupted run ended")]
 SetOption = Annotated[

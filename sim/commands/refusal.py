@@ -4,15 +4,21 @@ import typer
 from pydantic import Field, ValidationError
 from typer.core import TyperOption
 
-from ...model.checks import shown
+from ...model.checks import SHOWN_MAX, shown
 from ..scene.sentences import accepted
 
 
-def refusal(error: typer.BadParameter) -> str:
-    """Return what is wrong with the value of an option as 'OPTION must be ..., not VALUE'."""
-    option, cause = error.param, error.__cause__
+def _short(error: typer.TyperException) -> str:
+    """Return the message of an error on one line, its very long words shortened."""
+    words = error.format_message().split()
+    return " ".join(word if len(word) <= SHOWN_MAX else f"{word[: SHOWN_MAX - 3]}..." for word in words)
+
+
+def refusal(error: typer.TyperException) -> str:
+    """Return what is wrong with a call; with the value of an option, as 'OPTION must be ..., not VALUE'."""
+    option, cause = getattr(error, "param", None), error.__cause__
     if not isinstance(cause, ValidationError) or not isinstance(option, TyperOption):
-        return " ".join(error.format_message().split())
+        return _short(error)
     limits = Field(ge=option.min, le=option.max).metadata
     value = shown(cause.errors()[0]["input"])
     return f"{option.opts[0]} must be {accepted(option.type_descriptor.annotation, limits)}, not {value}"

@@ -13,6 +13,7 @@ import multiprocessing
 import os
 import signal
 import subprocess
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing import resource_tracker
@@ -22,6 +23,8 @@ import psutil
 
 from .ending import undone, undone_by_signal
 
+KILL_S = 1.0
+"""The most time that children get to end when they are killed."""
 GUARD = ("/bin/sh", "-c", "trap '' HUP INT TERM; read line; kill -KILL 0")
 
 
@@ -64,20 +67,24 @@ def join(number: int) -> None:
 
 @contextmanager
 def quiet_children() -> Iterator[None]:
-    """Make worker processes that this thread starts in the context say nothing when a signal ends this process.
+    """Keep worker processes that start in the context silent when a signal ends this process.
 
-    Until they have joined their group, a terminal sends SIGINT to them, too; and a worker that is not told what to do,
-    because this process has ended before, complains. So they are deaf to SIGINT, and are killed before that end.
+    Until it has joined its group, a worker hears the SIGINT of a terminal, too; and if this process ends before it has
+    told a worker what to do, the worker complains. So workers that this thread starts are deaf to SIGINT, and a signal
+    that ends this process kills those that have started.
     """
     # At its start, the tracker of shared semaphores lets the thread hear again. It outlives this process.
     resource_tracker.ensure_running()
     older = set(psutil.Process().children())
 
     def kill() -> None:
-        while young := [child for child in psutil.Process().children() if child not in older and _lives(child)]:
+        # Another thread may start one more meanwhile.
+        deadline = time.monotonic() + KILL_S
+        while (young := _young(older)) and time.monotonic() < deadline:
             for child in young:
-                with suppress(psutil.NoSuchProcess):
+                with suppress(psutil.Error):
                     child.kill()
+            time.sleep(0.01)
 
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -87,11 +94,14 @@ def quiet_children() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _lives(child: psutil.Process) -> bool:
-    try:
-        return child.status() != psutil.STATUS_ZOMBIE
-    except psutil.NoSuchProcess:
-        return False
+def _young(older: set[psutil.Process]) -> list[psutil.Process]:
+    """Return the children of this process that live, without the older ones."""
+    found = []
+    for child in psutil.Process().children():
+        with suppress(psutil.NoSuchProcess):
+            if child not in older and child.status() != psutil.STATUS_ZOMBIE:
+                found.append(child)
+    return found
 
 
 def run(command: Sequence[str], **options: Any) -> subprocess.CompletedProcess:

@@ -31,7 +31,8 @@ class _Kept:
 
 _kept = _Kept()
 _undoing: dict[object, Callable[[], object]] = {}
-_ending = threading.Lock()
+_ending = threading.RLock()
+_ended = False
 
 
 @contextmanager
@@ -107,9 +108,14 @@ def _flush() -> None:
 
 
 def _end(number: int) -> None:
+    global _ended  # noqa: PLW0603
     if not _ending.acquire(blocking=False):
         # The other thread ends this process.
         threading.Event().wait()
+    if _ended:
+        # This thread does, and was interrupted by one more signal.
+        return
+    _ended = True
     code, word = CODES[signal.Signals(number)]
     # A print that was interrupted holds stdout for good.
     flushing = threading.Thread(target=_flush, daemon=True)

@@ -2,7 +2,7 @@
 # as long to read as the code of an axis, are read once.
 
 include Vaxis.mk
-CXXFLAGS += -fPIC -I..
+CXXFLAGS += -fPIC
 
 libaxis.so: ../library.cpp Vaxis__ALL.cpp $(VK_GLOBAL_OBJS)
-	$(CXX) $(OPTIMISATION) $(CXXFLAGS) $(CPPFLAGS) -shared -o $@ $< $(VK_GLOBAL_OBJS)
+	$(CXX) $(CXXFLAGS) $(CPPFLAGS) $(OPTIMISATION) -shared -o $@ $< $(VK_GLOBAL_OBJS) $(LDFLAGS) $(LDLIBS)

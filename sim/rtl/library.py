@@ -31,6 +31,8 @@ OPTIONS = [
     *("--prefix", "Vaxis", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--noassert"),
     # All clocks of one call are iterations of a single evaluation.
     *("--converge-limit", str(1 << 30)),
+    # However large the axis, it is one piece of C++.
+    *("--output-split", "0"),
 ]
 
 
@@ -133,7 +135,10 @@ def _verilate(files: dict[str, str], options: list[str], optimisation: str, work
     ]
     with stage("building the hardware with Verilator, once"):
         for command in commands:
-            done = children.run(command, cwd=work, env=environment(), capture_output=True, text=True)
+            try:
+                done = children.run(command, cwd=work, env=environment(), capture_output=True, text=True)
+            except OSError as error:
+                raise BuildError(f"{command[0]} cannot be run: {error.strerror or error}") from None
             if done.returncode:
                 text = " ".join(command) + "\n" + done.stdout + done.stderr
                 log = keep_log(build_dir() / "rtl" / "failed.log", text)

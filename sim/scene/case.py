@@ -29,7 +29,7 @@ class Case:
 
     @classmethod
     def of(cls, source: str, changes: dict[str, Any] | None = None, label: str = "") -> "Case":
-        """Return the case of a scene by its name or file; this is the only place that reads the file.
+        """Return the case of a scene by its name or file, which is read once, here.
 
         Raises:
             SceneError: if there is no such scene, or it is not valid.

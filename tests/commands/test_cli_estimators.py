@@ -17,15 +17,15 @@ SHORT = ["--estimators", "fdm,levant:u1", "--rates", "1e3,2000"]
 
 def test_rows_as_json_and_as_a_table(monkeypatch, capsys):
     arguments = ["accuracy", *SHORT, "--workers", 1, "--signal", "hit", "--signal", "steady:10"]
-    code, out, _ = call(monkeypatch, capsys, *arguments, "--json")
-    assert code == 0
+    code, out, err = call(monkeypatch, capsys, *arguments, "--json")
+    assert (code, "error" in err) == (0, False)
     rows = json.loads(out)["rows"]
     assert len(rows) == 8
     assert all(set(row) >= KEYS for row in rows)
     assert {(row["estimator"], row["output"]) for row in rows} == {("fdm", "u"), ("levant", "u1")}
     assert [row["delay_s"] is None for row in rows] == [row["signal"] == "steady:10" for row in rows]
-    code, out, _ = call(monkeypatch, capsys, *arguments)
-    assert code == 0
+    code, out, err = call(monkeypatch, capsys, *arguments)
+    assert (code, "error" in err) == (0, False)
     assert "levant u1" in out
     assert "mm/s" in out
 
@@ -96,8 +96,9 @@ def test_an_interrupted_run_loses_nothing_and_ends_its_workers(tmp_path):
     with started(*command, HARDWALL_BUILD=str(tmp_path)) as run:
         wait_until(lambda: results.exists() and any(path.stat().st_size for path in results.iterdir()))
         run.send_signal(signal.SIGTERM)
-        _, remark = ended_by("SIGTERM", run)
+        out, before, remark = ended_by("SIGTERM", run)
         wait_until(lambda: session(run) == [])
+    assert (out, "Traceback" in before) == ("", False)
     assert remark.endswith(" kept, and the same command goes on from there")
     (kept,) = results.iterdir()
     assert all(len(json.loads(line)) == 3 for line in kept.read_text().split("\n") if line)

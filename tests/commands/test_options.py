@@ -70,6 +70,7 @@ DIGITS = "9" * 5000
         (["replay", "r.csv", "--column", "c"], "r.csv: is empty; must be a CSV file"),
         (["table", "/dev/zero"], "'/dev/zero' must be a JSON report of `hardwall hit --json`, and is none: it is not"),
         (["verilog", "-o", f"{LONG}"], "-o 'xxxx"),
+        (["hit", "mhz", "9" * 5000], "Got unexpected extra argument(s) (9999"),
         (["verilog", "-o", ""], "-o must be a folder, not ''"),
     ],
 )

@@ -59,7 +59,7 @@ def judged(estimator: str, output: str, sample_hz: int, backend: str) -> tuple[f
     signal = signals.load("paper")
     axis = axis_spec(estimator, sample_hz, signal.acceleration_max_m_per_s2)
     _, words, flags = zip(*velocities(signal, axis, output, backend, offsets()), strict=True)
-    begin = int(signal.judged_from_s * sample_hz)
+    begin = math.ceil(signal.judged_from_s * sample_hz)
     error = np.concatenate(words)[begin:] - exact(sample_hz)[begin:]
     return float(np.sqrt(np.mean(error**2))), flags[-1]
 
@@ -67,7 +67,7 @@ def judged(estimator: str, output: str, sample_hz: int, backend: str) -> tuple[f
 @pytest.mark.parametrize("sample_hz", [1_000, 10_000, 100_000, 1_000_000])
 @pytest.mark.parametrize(("estimator", "output"), REPEATABLE)
 def test_words_cost_no_estimator_more_than_a_hundredth_of_its_error(estimator, output, sample_hz):
-    """The figures of `fixed` are those of `float`; every estimator's own test also compares the samples."""
+    """The error of `fixed` is that of `float`; every estimator's own test also compares the samples."""
     (floating, _), (fixed, flags) = (judged(estimator, output, sample_hz, backend) for backend in ("float", "fixed"))
     assert fixed == pytest.approx(floating, rel=0.01)
     assert flags == 0

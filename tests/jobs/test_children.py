@@ -31,7 +31,7 @@ def test_no_child_is_left(number, in_a_thread):
         assert len(session(process)) >= 4
         process.send_signal(signal.Signals[number])
         wait_until(lambda: session(process) == [])
-        assert ended_by(number, process) == ("", "")
+        assert ended_by(number, process) == ("", "", "")
 
 
 def test_a_command_runs_to_its_end():
@@ -77,7 +77,7 @@ def test_a_worker_that_has_just_begun_ends_in_silence(number):
         send = os.killpg if number == "SIGINT" else os.kill
         send(process.pid, signal.Signals[number])
         wait_until(lambda: session(process) == [])
-        assert ended_by(number, process) == ("", "")
+        assert ended_by(number, process) == ("", "", "")
 
 
 def test_children_are_deaf_to_an_interrupt_and_this_process_is_not():

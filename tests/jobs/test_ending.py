@@ -2,11 +2,12 @@
 
 import signal
 import sys
+import time
 
 import pytest
 
 from hardwall.sim.jobs import ending
-from stimuli.processes import ended, started, wait_until
+from stimuli.processes import ended, ended_by, line, started, wait_until
 
 PROGRAM = """
 import sys, time
@@ -42,6 +43,28 @@ REMARKS = {
     1: "; 1 new result is kept, and --resume goes on from there",
     2: "; 2 new results are kept, and --resume goes on from there",
 }
+
+
+SLOWLY = """
+import time
+from hardwall.sim.jobs import ending
+ending.hear_signals()
+with ending.undone(lambda: (print("undoing", flush=True), time.sleep(1))):
+    print("ready", flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_more_signals_do_not_hold_up_the_end(number):
+    with started(sys.executable, "-c", SLOWLY) as process:
+        assert line(process) == "ready"
+        process.send_signal(signal.SIGINT)
+        assert line(process) == "undoing"
+        for _ in range(5):
+            process.send_signal(signal.Signals[number])
+            time.sleep(0.05)
+        assert ended_by("SIGINT", process) == ("", "", "")
 
 
 def test_what_ends_without_a_signal_is_undone_once():

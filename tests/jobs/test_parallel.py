@@ -22,7 +22,7 @@ def test_no_worker_and_no_tool_of_a_worker_is_left(tmp_path, monkeypatch, number
         process.send_signal(signal.Signals[number])
         wait_until(lambda: session(process) == [])
         kept = "; 1 new result is kept, and the same command goes on from there"
-        assert ended_by(number, process) == ("", "" if number == "SIGKILL" else kept)
+        assert ended_by(number, process) == ("", "", "" if number == "SIGKILL" else kept)
 
 
 def test_a_job_that_fails_ends_the_others(tmp_path, monkeypatch, fresh):

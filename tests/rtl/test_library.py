@@ -46,6 +46,23 @@ def test_a_damaged_library_is_built_again(builds, content):
     assert len(builds) == 2
 
 
+def test_the_verilog_of_an_axis_is_made_once(builds, monkeypatch):
+    made = []
+    monkeypatch.setattr(library, "to_verilog", lambda *_: made.append(1) or "module axis; endmodule")
+    axis = spec("mhz", "kalman")
+    for short in (False, True):
+        library.build(axis, short=short)
+    assert (len(made), len(builds)) == (1, 2)
+    library._sources.cache_clear()
+
+
+def test_a_tool_that_is_not_there_is_named(tmp_path, monkeypatch):
+    monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
+    monkeypatch.setattr(library, "environment", lambda: {"PATH": str(tmp_path)})
+    with pytest.raises(BuildError, match=r"^verilator cannot be run: No such file or directory$"):
+        library.build(spec("mhz"))
+
+
 def test_a_path_with_a_space_is_one_line_before_anything_runs(tmp_path, monkeypatch):
     monkeypatch.setattr(subprocess, "run", None)
     for name in ("a b", "a\nb"):

@@ -37,22 +37,23 @@ def ended(process: subprocess.Popen) -> tuple[int, str, str]:
     return process.returncode, out, err
 
 
-def ended_by(number: str, process: subprocess.Popen) -> tuple[str, str]:
+def ended_by(number: str, process: subprocess.Popen) -> tuple[str, str, str]:
     """Wait until a signal, by its name, has ended a process; check its exit code and the last line on its stderr.
 
     Returns:
-        The lines of stderr before the last, and what the last says is kept; nothing for a signal that is not handled.
+        What was left of stdout, the lines of stderr before the last, and what the last says is kept; the latter two are
+        empty for a signal that is not handled.
     """
-    code, _, err = ended(process)
+    code, out, err = ended(process)
     way = signal.Signals[number]
     if way not in CODES:
         assert code == -way, err
-        return "", ""
+        return out, "", ""
     expected, word = CODES[way]
     *before, last = err.splitlines(keepends=True)
     assert code == expected, err
     assert last.startswith(f"hardwall: error: {word}"), err
-    return "".join(before), last.removeprefix(f"hardwall: error: {word}").removesuffix("\n")
+    return out, "".join(before), last.removeprefix(f"hardwall: error: {word}").removesuffix("\n")
 
 
 def session(process: subprocess.Popen) -> list[int]:

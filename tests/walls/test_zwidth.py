@@ -227,8 +227,9 @@ def test_an_interrupted_map_says_how_to_go_on(tmp_path, workers, number):
         wait_until(lambda: kept(tmp_path))
         # An interrupt of the terminal goes to all processes of its group.
         os.killpg(process.pid, signal.Signals[number])
-        _, remark = ended_by(number, process)
+        out, before, remark = ended_by(number, process)
         wait_until(lambda: session(process) == [])
+    assert (out, "Traceback" in before) == ("", False)
     assert re.fullmatch(r"; (1 new result is|\d+ new results are) kept, and --resume goes on from there", remark)
 
 
