@@ -1,9 +1,19 @@
 """The error for invalid input, and the one line that is printed of any error."""
 
+import re
+
+WORD_MAX = 200
+"""The most characters of a word in a message."""
+
 
 def one_line(message: str) -> str:
-    """Return a message with its line breaks and other characters that do not print escaped, as in a name of a file."""
-    return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in message)
+    """Return a message as it is printed: no character of it breaks the line, and no word is longer than `WORD_MAX`.
+
+    Line breaks and other characters that do not print, which may be in the name of a file, are escaped.
+    """
+    text = "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in message)
+    half = WORD_MAX // 2 - 2
+    return re.sub(rf"\S{{{WORD_MAX + 1},}}", lambda word: f"{word[0][:half]}...{word[0][-half:]}", text)
 
 
 class BadInput(Exception):

@@ -4,21 +4,15 @@ import typer
 from pydantic import Field, ValidationError
 from typer.core import TyperOption
 
-from ...model.checks import SHOWN_MAX, shown
+from ...model.checks import shown
 from ..scene.sentences import accepted
-
-
-def _short(error: typer.TyperException) -> str:
-    """Return the message of an error on one line, its very long words shortened."""
-    words = error.format_message().split()
-    return " ".join(word if len(word) <= SHOWN_MAX else f"{word[: SHOWN_MAX - 3]}..." for word in words)
 
 
 def refusal(error: typer.TyperException) -> str:
     """Return what is wrong with a call; with the value of an option, as 'OPTION must be ..., not VALUE'."""
     option, cause = getattr(error, "param", None), error.__cause__
     if not isinstance(cause, ValidationError) or not isinstance(option, TyperOption):
-        return _short(error)
+        return " ".join(error.format_message().split())
     limits = Field(ge=option.min, le=option.max).metadata
     value = shown(cause.errors()[0]["input"])
     return f"{option.opts[0]} must be {accepted(option.type_descriptor.annotation, limits)}, not {value}"

@@ -71,6 +71,7 @@ DIGITS = "9" * 5000
         (["table", "/dev/zero"], "'/dev/zero' must be a JSON report of `hardwall hit --json`, and is none: it is not"),
         (["verilog", "-o", f"{LONG}"], "-o 'xxxx"),
         (["hit", "mhz", "9" * 5000], "Got unexpected extra argument(s) (9999"),
+        (["verilog", "--set", f"{LONG}=1"], "seed-2011: xxxx"),
         (["verilog", "-o", ""], "-o must be a folder, not ''"),
     ],
 )
