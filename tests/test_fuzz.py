@@ -39,7 +39,8 @@ def faults(call: Call, ended: Ended) -> list[str]:
         found.append("a message that is too long")
     if ended.code == 0 and "--json" in call.arguments and ended.out:
         try:
-            check_text(call.arguments[0], ended.out)
+            # Options of the program may stand before the command.
+            check_text(next(word for word in call.arguments if word in COMMANDS), ended.out)
         except (AssertionError, ValueError) as error:
             found.append(f"the report: {error}")
     return found
