@@ -39,6 +39,7 @@ LIMIT_S = 60
 """The time after which a child counts as hung; it prints where it hangs. A loaded machine needs most of it."""
 SAMPLES_MAX = 50_000
 STEPS_MAX = 100
+TIMEOUT_S = 0.5
 RATE_MAX_HZ = 20_000
 FILE_BYTES_MAX = 100 << 20
 CRASHED, HUNG = 70, 71
@@ -73,7 +74,7 @@ def _short(run: Callable) -> Callable:
 
 def _shorten(folder: Path) -> None:
     """End this process where long work begins, and keep results in `folder`."""
-    checks.SAMPLES_MAX, checks.STEPS_MAX = SAMPLES_MAX, STEPS_MAX
+    checks.SAMPLES_MAX, checks.STEPS_MAX, cluster.TIMEOUT_S = SAMPLES_MAX, STEPS_MAX, TIMEOUT_S
     parallel.run = _short(parallel.run)
     zwidth.run = library.build = synthesis.synthesise = synthesis.estimator_cells = _begin
     store.build_dir = lambda: folder / "build"
