@@ -26,18 +26,19 @@ SHORT = {
     "zwidth.stiffness_step_n_per_m": 5e3, "zwidth.stiffness_to_n_per_m": 60e3,
     "zwidth.damping_from_n_s_per_m": 20.0, "zwidth.damping_to_n_s_per_m": 140.0, "zwidth.damping_step_n_s_per_m": 40.0,
 }  # fmt: skip
-SET = [f"--set={key}={value}" for key, value in SHORT.items()]
+FEW_WALLS = {"zwidth.stiffness_step_n_per_m": 30e3, "zwidth.damping_step_n_s_per_m": 120.0}
+SET, FEW = ([f"--set={key}={value}" for key, value in keys.items()] for keys in (SHORT, SHORT | FEW_WALLS))
 RUNS: dict[str, tuple[str, ...]] = {
     "zwidth": ("zwidth", "seed-2011", "--estimators", "adjusted,fdm-500", "--workers", "2", "--resume", *SET),
     "accuracy": ("accuracy", "--estimators", "levant,fdm,kalman", "--rates", "1e3,2e3,5e3", "--workers", "2"),
     "zwidth alone": ("zwidth", "seed-2011", "--estimators", "adjusted", "--workers", "1", "--resume", *SET),
-    "cutoff": ("cutoff", "seed-2011", "--workers", "2", "--resume", *SET),
-    "rates": ("rates", "seed-2011", "--estimators", "fdm", "--rates", "1e3,1e4", "--workers", "2", "--resume", *SET),
-    "gains": ("gains", "seed-2011", "--workers", "2", "--resume", *SET),
-    "drop": ("drop", "seed-2011", "--workers", "2", "--resume", *SET),
-    "trade": ("trade", "seed-2011", "--workers", "2", "--resume", *SET),
+    "cutoff": ("cutoff", "seed-2011", "--workers", "2", "--resume", *FEW),
+    "rates": ("rates", "seed-2011", "--estimators", "fdm", "--rates", "1e3,1e4", "--workers", "2", "--resume", *FEW),
+    "gains": ("gains", "seed-2011", "--workers", "2", "--resume", *FEW),
+    "drop": ("drop", "seed-2011", "--workers", "2", "--resume", *FEW),
+    "trade": ("trade", "seed-2011", "--workers", "2", "--resume", *FEW),
 }
-QUICK = ("zwidth", "accuracy")
+NAMES = list(RUNS) if KILLS else ["zwidth", "accuracy"]
 TIMES = {"seconds", "samples_per_s", "hit_s", "map_s", "best_for_hits", "best_for_maps"}
 """Keys of reports that depend on times."""
 
@@ -75,20 +76,17 @@ def report_of(command: tuple[str, ...], environ: dict[str, str]) -> dict[str, An
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory) -> dict[str, tuple[float, dict]]:
-    """Return the time and the report of whole runs; of two runs, the first also compiles."""
-    found = {}
-    for name in RUNS if KILLS else QUICK:
-        for _ in range(2):
-            began, folder = time.monotonic(), tmp_path_factory.mktemp("whole")
-            report = report_of(RUNS[name], environment(folder))
-        found[name] = time.monotonic() - began, report
-    return found
+def whole(request, tmp_path_factory) -> tuple[float, dict]:
+    """Return the time and the report of a whole run; of two runs, the first also compiles."""
+    for _ in range(2):
+        began, folder = time.monotonic(), tmp_path_factory.mktemp("whole")
+        report = report_of(RUNS[request.param], environment(folder))
+    return time.monotonic() - began, report
 
 
-@pytest.mark.parametrize("name", RUNS if KILLS else QUICK)
+@pytest.mark.parametrize(("name", "whole"), [(name, name) for name in NAMES], ids=NAMES, indirect=["whole"])
 def test_what_is_ended_goes_on(whole, tmp_path_factory, name):
-    seconds, report = whole[name]
+    seconds, report = whole
     chance = rng()
     for number in range(max(KILLS // len(RUNS), 1)):
         folder = tmp_path_factory.mktemp("killed")
