@@ -86,7 +86,7 @@ def by_type(declaration: Callable) -> ByType:
         return variant(first, *rest)
 
     class Choice(AbstractTemplate):
-        """The type of `call` in compiled code, where a call is directly one of the variant."""
+        """The type of `call` in compiled code: a call of it is a direct call of the variant."""
 
         key = call
 

@@ -6,7 +6,6 @@ path. Above 1 MHz the clock is faster than that of a real part, so the stamps ar
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import asdict, replace
 
 import numpy as np
@@ -137,8 +136,7 @@ def measure(
         }
     )
     begin = math.ceil(known.judged_from_s * sample_hz)
-    chunks = velocities(known, spec, output, backend, offsets(phase_error_counts))
-    judge, raised = _judged(known, begin, sample_hz, chunks)
+    judge, raised = judged(known, spec, output, backend, phase_error_counts)
     return {
         "estimator": estimator,
         "output": output,
@@ -160,12 +158,23 @@ def measure(
     }
 
 
-def _judged(
-    known: signals.Signal, begin: int, sample_hz: int, chunks: Iterator[tuple[int, np.ndarray, int]]
+def judged(
+    known: signals.Signal, spec: AxisSpec, output: str, backend: str, phase_error_counts: float = 0.0
 ) -> tuple[Judge, int]:
-    """Return the judge of an estimate from sample `begin` on, and the flags that were raised."""
+    """Return the judge of an estimate of a signal, from the time on that the signal is judged from, and all flags.
+
+    Args:
+        known: the signal.
+        spec: the axis.
+        output, backend, phase_error_counts: as for `measure`.
+
+    Raises:
+        RuntimeError: if the RTL could not be built.
+    """
+    sample_hz = spec.sample_hz
+    begin = math.ceil(known.judged_from_s * sample_hz)
     judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
-    for first, words, flags in chunks:
+    for first, words, flags in velocities(known, spec, output, backend, offsets(phase_error_counts)):
         raised |= flags
         estimate = words[max(begin - first, 0) :]
         since = first + len(words) - len(estimate)

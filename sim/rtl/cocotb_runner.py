@@ -187,7 +187,7 @@ def _run(model: _Model, job: Job, trace_to: Path | None = None) -> None:
                 test_filter=job.checks,
                 seed=job.seed,
                 log_file=job.log,
-                waves=trace_to is not None,
+                waves=model.traced,
                 test_args=["--trace-file", str(trace_to)] if trace_to else [],
                 # A folder of this run's own, for the Verilog and for Python.
                 plusargs=[f"+scratch={own}"],
