@@ -92,6 +92,8 @@ docs: $(VENV)/.docs | tools ## the pages as a site in build/docs, every link ins
 digests: $(VENV)/.test | tools ## record anew what the program computes, and show what changed (after a change on purpose)
 	@$(VENV)/bin/python tests/digests.py $(ONLY)
 
+soak fuzz: PYTEST += -o faulthandler_timeout=0
+
 soak: $(VENV)/.test | tools ## long campaigns: 10^9 samples of every estimator, every digest, RTL against model with new seeds
 	@echo "HARDWALL_ENDURANCE=$(ENDURANCE)"
 	@HARDWALL_ENDURANCE=$(ENDURANCE) $(PYTEST) tests/test_endurance.py

@@ -4,6 +4,7 @@ An exception that a signal raises in compiled code, or in its compiler, crashes 
 the process where it is. What has to be undone before is registered with `undone`; results are kept as they come.
 """
 
+import _thread
 import os
 import signal
 import sys
@@ -17,7 +18,9 @@ from ...model.whole_file import unfinished
 CODES = {signal.SIGINT: (130, "interrupted"), signal.SIGTERM: (143, "terminated")}
 """The exit code after every signal that is handled, and the word for it."""
 GRACE_S = 1.0
-"""The time for what is printed already to go out."""
+"""The time for what is printed to go out."""
+UNDO_S = 10.0
+"""The time for what is undone: one that waits, perhaps for a lock of the thread that was interrupted, is left."""
 TO_THE_START_OF_THE_LINE, SHOW_THE_CURSOR = "\r\x1b[K", "\x1b[?25h"
 
 
@@ -102,9 +105,19 @@ def _hear(heard: int) -> None:
             _end(number[0])
 
 
-def _flush() -> None:
-    with suppress(Exception):
-        sys.stdout.flush()
+def _within(seconds: float, do: Callable[[], object]) -> None:
+    """Call a function in a thread of its own; wait for its end, but not longer than `seconds`."""
+    over = threading.Lock()
+    over.acquire()
+
+    def run() -> None:
+        with suppress(Exception):
+            do()
+        over.release()
+
+    # To start a `threading.Thread` takes locks, which the thread that was interrupted may have.
+    _thread.start_new_thread(run, ())
+    over.acquire(timeout=seconds)
 
 
 def _end(number: int) -> None:
@@ -118,17 +131,19 @@ def _end(number: int) -> None:
     _ended = True
     code, word = CODES[signal.Signals(number)]
     # A print that was interrupted holds stdout for good.
-    flushing = threading.Thread(target=_flush, daemon=True)
-    flushing.start()
-    flushing.join(GRACE_S)
+    _within(GRACE_S, sys.stdout.flush)
     # A progress bar may have hidden the cursor.
     begin = TO_THE_START_OF_THE_LINE + SHOW_THE_CURSOR if os.isatty(2) else ""
-    with suppress(OSError):
-        os.write(2, f"{begin}hardwall: error: {word}{remark()}\n".encode())
+    # A reader that has stopped to read holds stderr.
+    _within(GRACE_S, lambda: os.write(2, f"{begin}hardwall: error: {word}{remark()}\n".encode()))
+    _within(UNDO_S, _undo)
+    os._exit(code)
+
+
+def _undo() -> None:
     for undo in reversed(list(_undoing.values())):
         with suppress(Exception):
             undo()
     for part in list(unfinished):
         with suppress(OSError):
             part.unlink(missing_ok=True)
-    os._exit(code)

@@ -11,9 +11,11 @@ from hardwall.sim.jobs import children
 from stimuli.processes import ended_by, line, session, started, wait_until
 
 # The tool has a child of its own, as a build of make and compilers has.
+# Where this runs under nohup, the programs that it starts would not hear SIGHUP.
 PROGRAM = """
-import sys, threading
+import signal, sys, threading
 from hardwall.sim.jobs import children, ending
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 ending.hear_signals()
 tool = ["sh", "-c", "sleep 600 & echo begun; sleep 600"]
 if {in_a_thread}:

@@ -13,7 +13,7 @@ from distributed import LocalCluster
 
 from hardwall.sim.jobs import cluster
 from stimuli.command_line import call
-from stimuli.processes import ended_by, session, started, wait_until
+from stimuli.processes import ended_by, line, session, started, wait_until
 
 LOCAL = {"threads_per_worker": 1, "dashboard_address": ":0"}
 
@@ -128,7 +128,7 @@ with LocalCluster(n_workers=1, processes=False, protocol="tcp", dashboard_addres
 def test_a_scheduler_that_is_killed_is_a_failure_in_a_line(monkeypatch, capfd):
     monkeypatch.setattr(cluster, "TIMEOUT_S", 30.0)
     with started(sys.executable, "-c", SCHEDULER) as scheduler:
-        address = scheduler.stdout.readline().strip()
+        address = line(scheduler)
         with pytest.raises(RuntimeError, match=r"^the connection to the Dask scheduler is lost$"):
             wait_for_nobody(address, scheduler.kill)
     assert capfd.readouterr() == ("", "")
@@ -153,7 +153,7 @@ def test_a_local_cluster_ends_with_its_client(tmp_path, moment, number):
     program = tmp_path / "program.py"
     program.write_text(LOCAL_PROGRAM)
     with started(sys.executable, program) as process:
-        while process.stdout.readline().strip() != moment:
+        while line(process) != moment:
             pass
         if moment == "begun":
             wait_until(lambda: len(session(process)) >= 5)

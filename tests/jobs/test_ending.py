@@ -7,7 +7,7 @@ import time
 import pytest
 
 from hardwall.sim.jobs import ending
-from stimuli.processes import ended, ended_by, line, started, wait_until
+from stimuli.processes import ended, ended_by, line, session, started, wait_until
 
 PROGRAM = """
 import sys, time
@@ -45,11 +45,12 @@ REMARKS = {
 }
 
 
+# What is undone may not print: the signal may come while this program does.
 SLOWLY = """
-import time
+import os, time
 from hardwall.sim.jobs import ending
 ending.hear_signals()
-with ending.undone(lambda: (print("undoing", flush=True), time.sleep(1))):
+with ending.undone(lambda: (os.write(1, b"undoing\\n"), time.sleep(1))):
     print("ready", flush=True)
     time.sleep(600)
 """
@@ -65,6 +66,57 @@ def test_more_signals_do_not_hold_up_the_end(number):
             process.send_signal(signal.Signals[number])
             time.sleep(0.05)
         assert ended_by("SIGINT", process) == ("", "", "")
+
+
+# The thread that is interrupted has a lock that another thread's undoing waits for; the next part is undone no more.
+HELD = """
+import threading, time
+from hardwall.sim.jobs import ending
+ending.UNDO_S = 0.2
+lock = threading.Lock()
+ending.hear_signals()
+with ending.undone(lock.acquire), lock:
+    print("ready", flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_what_cannot_be_undone_does_not_hold_up_the_end(number):
+    with started(sys.executable, "-c", HELD) as process:
+        assert line(process) == "ready"
+        process.send_signal(signal.Signals[number])
+        assert ended_by(number, process) == ("", "", "")
+
+
+# Nobody reads what a program says, and its pipe is full.
+UNHEARD = """
+import os, time
+from pathlib import Path
+from hardwall.sim.jobs import ending
+ending.GRACE_S = 0.2
+ending.hear_signals()
+os.set_blocking(2, False)
+try:
+    while True:
+        os.write(2, bytes(4096))
+except BlockingIOError:
+    os.set_blocking(2, True)
+with ending.undone(Path("undone").touch):
+    print("ready", flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_a_reader_that_has_stopped_does_not_hold_up_the_end(tmp_path, monkeypatch, number):
+    monkeypatch.chdir(tmp_path)
+    with started(sys.executable, "-c", UNHEARD) as process:
+        assert line(process) == "ready"
+        process.send_signal(signal.Signals[number])
+        wait_until(lambda: session(process) == [])
+        assert process.wait() == ending.CODES[signal.Signals[number]][0]
+    assert (tmp_path / "undone").exists()
 
 
 def test_what_ends_without_a_signal_is_undone_once():

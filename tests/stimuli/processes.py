@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from hardwall.sim.jobs.ending import CODES
@@ -28,7 +28,9 @@ def started(*command: object, **environ: str) -> Iterator[subprocess.Popen]:
             yield process
         finally:
             for member in session(process):
-                os.kill(member, signal.SIGKILL)
+                # One member's end may be that of others.
+                with suppress(ProcessLookupError):
+                    os.kill(member, signal.SIGKILL)
 
 
 def ended(process: subprocess.Popen) -> tuple[int, str, str]:
@@ -78,5 +80,7 @@ def wait_until(happens: Callable[[], object]) -> None:
 
 
 def line(process: subprocess.Popen) -> str:
-    """Return the next line that a process writes on stdout."""
-    return process.stdout.readline().rstrip("\n")
+    """Return the next line that a process writes on stdout; fail if it writes no more."""
+    text = process.stdout.readline()
+    assert text, ended(process)
+    return text.rstrip("\n")
