@@ -56,7 +56,8 @@ def test_an_interrupt_while_drawing_loses_neither_the_report_nor_the_trace(tmp_p
         wait_until((tmp_path / "drawing").exists)
         process.send_signal(signal.SIGINT)
         code, out, err = ended(process)
-    assert (code, err) == (130, "trace: hit.npz\nhardwall: error: interrupted\n")
+    # Before, a slow machine says what it compiles.
+    assert (code, err.splitlines()[-2:]) == (130, ["trace: hit.npz", "hardwall: error: interrupted"])
     assert json.loads(out)["backend"] == "fixed"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["drawing", "hit.npz"]
 
