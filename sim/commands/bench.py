@@ -1,6 +1,6 @@
 """The command `bench`."""
 
-from ..scene.load import load
+from ..scene.case import Case
 from ..studies import bench
 from .options import SceneArgument
 from .study import StudyOptions, study
@@ -9,5 +9,4 @@ from .terminal import log
 
 @study()
 def command(options: StudyOptions, scene: SceneArgument = "mhz") -> None:
-    load(scene)  # a wrong scene is refused before anything long begins
-    options.finish(bench.study(scene, log.print))
+    options.finish(bench.study(Case.of(scene), log.print))

@@ -46,8 +46,15 @@ class LazyGroup(TyperGroup):
         super().__init__(**settings | {"commands": stubs})
 
     def resolve_command(self, context: Any, words: list[str]) -> tuple[str | None, Any, list[str]]:
-        """Return the name of the command that is called, the command with its options, and the remaining words."""
-        name, stub, rest = super().resolve_command(context, words)
+        """Return the name of the command that is called, the command with its options, and the remaining words.
+
+        Raises:
+            BadInput: if there is no such command.
+        """
+        try:
+            name, stub, rest = super().resolve_command(context, words)
+        except typer.TyperException:
+            raise BadInput(f"the command must be one of {', '.join(COMMANDS)}, not {words[0]!r}") from None
         return name, stub and loaded(name), rest
 
 

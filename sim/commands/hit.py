@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from ..jobs.ending import undone
+from ..rtl.waveform import vcd_to_fst
 from ..scene.load import load
 from ..walls import hit
 from .errors import BadInput
@@ -47,8 +48,6 @@ def command(
 
         def save() -> list[Path]:
             if waveform:
-                from ..rtl.waveform import vcd_to_fst  # noqa: PLC0415  (only waveforms need its library)
-
                 vcd_to_fst(vcd, waveform)
             else:
                 result.save(trace)

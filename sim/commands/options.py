@@ -16,10 +16,24 @@ from .errors import BadInput
 
 Estimator = Literal[tuple(registry.ESTIMATORS)]
 Backend = Literal["float", "fixed", "rtl"]
-Device = Literal["ecp5-25k", "ice40-up5k"]
+Part = Literal["ecp5-25k", "ice40-up5k"]
 
-SceneArgument = Annotated[str, typer.Argument(metavar="SCENE", help=f"{', '.join(names())}, or a .toml file")]
-EstimatorOption = Annotated[Estimator | None, typer.Option(help="velocity estimator", show_default="the scene's")]
+
+def _scenes(incomplete: str) -> list[str]:
+    """Return the scenes whose names begin so, for the completion of a shell."""
+    return [name for name in names() if name.startswith(incomplete)]
+
+
+SceneArgument = Annotated[
+    str,
+    typer.Argument(metavar="SCENE", help=f"{', '.join(names())}, or a .toml file", autocompletion=_scenes),
+]
+EstimatorOption = Annotated[
+    Estimator | None,
+    typer.Option(
+        metavar="NAME", help=f"velocity estimator: {', '.join(registry.ESTIMATORS)}", show_default="the scene's"
+    ),
+]
 OutputOption = Annotated[
     str | None, typer.Option(help="output of the estimator, e.g. u or u1", show_default="its first")
 ]
@@ -29,7 +43,7 @@ EstimatorsOption = Annotated[
 ]
 BackendOption = Annotated[Backend, typer.Option(help="float64 algorithm, bit-accurate model, or the Verilated RTL")]
 ModelOption = Annotated[Literal["float", "fixed"], typer.Option(help="float64 algorithm, or bit-accurate model")]
-DeviceOption = Annotated[Device, typer.Option(help="the part to place and route for")]
+DeviceOption = Annotated[Part, typer.Option(help="the part to place and route for")]
 SeedsOption = Annotated[int, typer.Option(min=1, max=99, help="number of placements; fmax is their median")]
 RateOption = Annotated[float, typer.Option(metavar="HZ", help="sample rate")]
 

@@ -7,6 +7,7 @@ path. Above 1 MHz the clock is faster than that of a real part, so the stamps ar
 
 import math
 from dataclasses import asdict, replace
+from functools import cache
 
 import numpy as np
 
@@ -44,6 +45,12 @@ def outputs(text: str) -> list[tuple[str, str]]:
     return [(name, chosen) for chosen in ([output] if colon else design.outputs)]
 
 
+@cache
+def _device() -> AxisSpec:
+    """Return the axis of the scene `mhz`."""
+    return load("mhz").spec
+
+
 def axis_spec(
     estimator: str,
     sample_hz: int,
@@ -57,7 +64,7 @@ def axis_spec(
         ValueError: if there is no such axis; the message names the field.
     """
     return replace(
-        load("mhz").spec,
+        _device(),
         clock_hz=sample_hz * max(-(-CLOCK_HZ // sample_hz), CLOCKS),
         sample_hz=sample_hz,
         actuation_hz=sample_hz,

@@ -22,11 +22,10 @@ from dataclasses import replace
 import numpy as np
 
 from ...model.arithmetic.fixed import bits_for
-from ...model.axis import Axis
 from ...model.estimators import registry
 from ...model.quadrature_speed import max_edge_rate
 from ...model.spec import AxisSpec
-from ..loop.backends import is_exact, opened
+from ..loop.backends import opened, whole
 from ..world.encoder import level
 from .through_pins import DECODER_CLOCKS, GLITCH_CLOCKS, run_pins
 
@@ -116,7 +115,7 @@ def run(
     if needs_pins(spec.estimator, backend):
         with opened(spec, backend, choice, int(level(0)), short=True) as (controller, state, _):
             return run_pins(controller, state, spec.design.timing, counts, progress)
-    axis = Axis(spec, not is_exact(backend), **choice)
+    axis = whole(spec, backend, choice)
     axis.run(counts[:0])  # compiles, outside the measured time
     began = time.perf_counter()
     record = axis.run(counts)

@@ -1,4 +1,4 @@
-"""The backends by name, and the only code that opens them.
+"""The backends by name, and the only code that opens them, sample by sample or for whole records.
 
 `float` and `fixed` are the model of decoder and axis, in float64 or in the hardware's integers; `rtl` is the Verilated
 hardware. Any code that runs samples through an axis opens it here, in the form that `controllers` takes.
@@ -39,6 +39,17 @@ def number_of(backend: str) -> type:
     return np.int64 if is_exact(backend) else np.float64
 
 
+def whole(spec: AxisSpec, backend: str, parameters: dict[str, float]) -> Axis:
+    """Return the model of an axis on `float` or `fixed`, for a whole record of counts at once.
+
+    Args:
+        spec: the axis.
+        backend: `float` or `fixed`.
+        parameters: run-time parameters in SI units, by word: see `Axis`.
+    """
+    return Axis(spec, not is_exact(backend), **parameters)
+
+
 @contextmanager
 def opened(
     spec: AxisSpec,
@@ -60,7 +71,7 @@ def opened(
     Raises:
         RuntimeError: if the RTL could not be built.
     """
-    axis = Axis(spec, not is_exact(backend), **parameters)
+    axis = whole(spec, backend, parameters)
     if backend != "rtl":
         yield Opened(*stamped.controller(axis, level), None)
         return

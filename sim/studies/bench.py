@@ -14,7 +14,7 @@ from ...model.build_folder import build_dir
 from ..jobs.result import Table, text_of
 from ..jobs.rounds import medians
 from ..rtl.cocotb_runner import Job, simulate_axis
-from ..scene.load import load
+from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls import hit
 
@@ -46,10 +46,10 @@ def _parts(sample_s: float) -> dict[str, dict]:
     }
 
 
-def _scene(name: str, changes: dict, seconds: float) -> Scene:
+def _scene(case: Case, changes: dict, seconds: float) -> Scene:
     """Return a scene that lasts `seconds`, half of them for settling and half for measuring."""
     half = {"protocol.settle_s": seconds / 2, "protocol.mean_s": seconds / 4, "protocol.measure_s": seconds / 2}
-    return load(name, changes | half)
+    return case.changed(changes | half).scene
 
 
 def _hits(scene: Scene, backend: str) -> Callable[[], float]:
@@ -63,20 +63,18 @@ def _hits(scene: Scene, backend: str) -> Callable[[], float]:
     return run
 
 
-def _cocotb(name: str) -> Callable[[], float]:
+def _cocotb(case: Case) -> Callable[[], float]:
     """Return the same for the loop under cocotb, which raises RuntimeError if the force words are not the model's."""
-    scene = load(name)
-    words = hit.run(_scene(name, {}, COCOTB_SAMPLES / scene.spec.sample_hz), "fixed").force_sha256
+    spec = case.scene.spec
+    words = hit.run(_scene(case, {}, COCOTB_SAMPLES / spec.sample_hz), "fixed").force_sha256
 
     def run() -> float:
         with tempfile.TemporaryDirectory() as folder:
             report = Path(folder) / "report.json"
-            # The simulator runs in a folder of its own.
-            source = str(Path(name).absolute()) if name.endswith(".toml") else name
-            order = {"scene": source, "samples": COCOTB_SAMPLES, "report": str(report)}
+            order = {"case": case.job(), "samples": COCOTB_SAMPLES, "report": str(report)}
             environ = {"HARDWALL_LOOP": json.dumps(order), "COCOTB_LOG_LEVEL": "WARNING"}
             log = build_dir() / "cocotb" / "bench.log"
-            simulate_axis(scene.spec, Job("hardwall.sim.studies.cocotb_loop", Path(folder), environ, log=log))
+            simulate_axis(spec, Job("hardwall.sim.studies.cocotb_loop", Path(folder), environ, log=log))
             result = json.loads(report.read_text())
         if result["force_sha256"] != words:
             raise RuntimeError(f"the RTL under cocotb and the model differ in their first {COCOTB_SAMPLES} force words")
@@ -121,24 +119,24 @@ class Speeds:
         return []
 
 
-def study(scene: str, progress: Callable[[str], None]) -> Speeds:
+def study(case: Case, progress: Callable[[str], None]) -> Speeds:
     """Return samples a second by backend, and nanoseconds a sample by optional part.
 
     Args:
-        scene: name or file of the scene.
+        case: the scene.
         progress: function called with the name of the next measurement.
 
     Raises:
         RuntimeError: if the force words of the RTL under cocotb differ from the model's.
     """
-    spec = load(scene).spec
+    spec = case.scene.spec
     progress("compiling and building")
-    speeds = {backend: _hits(_scene(scene, {}, seconds), backend) for backend, seconds in SECONDS_OF_SCENE.items()}
-    speeds["cocotb"] = _cocotb(scene)
+    speeds = {backend: _hits(_scene(case, {}, seconds), backend) for backend, seconds in SECONDS_OF_SCENE.items()}
+    speeds["cocotb"] = _cocotb(case)
     parts = {
-        name: _hits(_scene(scene, changes, SECONDS_OF_SCENE["fixed"]), "fixed")
+        name: _hits(_scene(case, changes, SECONDS_OF_SCENE["fixed"]), "fixed")
         for name, changes in _parts(1 / spec.sample_hz).items()
     }
     samples_per_s = medians(speeds, ROUNDS, progress)
     costs = {name: 1e9 / rate for name, rate in medians(parts, ROUNDS, progress).items()}
-    return Speeds(scene, samples_per_s, spec.clocks_per_sample, costs)
+    return Speeds(case.source, samples_per_s, spec.clocks_per_sample, costs)

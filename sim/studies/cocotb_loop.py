@@ -21,7 +21,7 @@ from ...model.stamped import room_for
 from ..loop import loop
 from ..loop.controllers import taken_off
 from ..scene.build import start_of, world_of
-from ..scene.load import load
+from ..scene.case import Case
 from ..world.advance import Interval, advance
 from ..world.converter import converted
 from ..world.encoder import level
@@ -34,7 +34,8 @@ PERIOD_NS = 10
 async def closed_loop(dut):
     """Close the loop for some samples; write the digest of the force words and the wall time."""
     order = json.loads(os.environ["HARDWALL_LOOP"])
-    scene = load(order["scene"])
+    case = order["case"]
+    scene = Case("", case["scene"], case["text"], case["changes"]).scene
     world, edges = world_of(scene), room_for(loop.EDGE_CAPACITY)
     _, moment, force_n = start_of(scene, world)
     await _open(dut, scene, int(level(moment.cell.number)))

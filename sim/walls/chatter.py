@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...model.axis import Axis
+from ..loop.backends import whole
 from ..scene.schema import Scene
 
 LANES = 200
@@ -95,7 +95,7 @@ def at_rest(scene: Scene, backend: str) -> Chatter:
         ValueError: if the estimator needs the stamps of edges.
     """
     spec = scene.spec
-    velocity = Axis(spec, backend == "float", **scene.parameters).run(motions(scene)).velocity_m_per_s
+    velocity = whole(spec, backend, scene.parameters).run(motions(scene)).velocity_m_per_s
     # The force follows the first sample of every actuation period.
     seen = velocity[:, :: spec.samples_per_actuation]
     seen = seen[:, round(SETTLING_S * spec.actuation_hz) :]

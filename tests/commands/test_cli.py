@@ -88,7 +88,7 @@ SEED = (load.FOLDER / "seed-2011.toml").read_text()
             ["table", "no-such.json"],
             "'no-such.json' must be a JSON report of `hardwall hit --json`, and is none: No such file",
         ),
-        (["shoot"], "No such command 'shoot'"),
+        (["shoot"], "the command must be one of hit, replay, "),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(monkeypatch, capsys, tmp_path, arguments, message):

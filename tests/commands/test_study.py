@@ -43,7 +43,7 @@ def test_a_waveform_that_fails_does_not_lose_the_report(tmp_path, monkeypatch, c
     def full(*_):
         raise OSError("hit.fst: cannot be written")
 
-    monkeypatch.setattr("hardwall.sim.rtl.waveform.vcd_to_fst", full)
+    monkeypatch.setattr("hardwall.sim.commands.hit.vcd_to_fst", full)
     monkeypatch.setattr("hardwall.sim.walls.hit.run", lambda *_: results.hit())
     code, out, err = call(monkeypatch, capsys, "hit", "--backend", "rtl", "--json", "--trace", tmp_path / "hit.fst")
     assert (code, err) == (1, "hardwall: error: hit.fst: cannot be written\n")

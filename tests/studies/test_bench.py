@@ -4,6 +4,7 @@ import shutil
 
 import pytest
 
+from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import FOLDER
 from hardwall.sim.studies import bench
 from stimuli.reports import check
@@ -17,7 +18,7 @@ def test_the_benchmark_runs_on_a_scene_of_ones_own(tmp_path, monkeypatch):
     shutil.copy(FOLDER / "seed-2011.toml", tmp_path / "mine.toml")
     monkeypatch.chdir(tmp_path)
     said = []
-    report = bench.study("mine.toml", said.append).report()
+    report = bench.study(Case.of("mine.toml"), said.append).report()
     assert set(report["samples_per_s"]) == {"float", "fixed", "rtl", "cocotb"}
     assert set(report["ns_per_sample_of_parts"]) == {
         "none", "coulomb friction", "amplifier delay", "encoder phase error", "converter", "amplifier lag",
