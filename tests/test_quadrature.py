@@ -22,7 +22,7 @@ from hardwall.model.compiled import compiled
 from hardwall.model.quadrature import NO_STROBES, START, Inputs, Params, State, Strobes, advance, run, step
 from hardwall.testing import SAMPLES, SEED, Bench, check, parameters, rng, simulate
 from hardwall.testing.harness import ports_of
-from hardwall.testing.packing import Packing, Record
+from hardwall.testing.packing import Packing, Rows
 from stimuli.pins import (
     INPUTS,
     directed,
@@ -85,7 +85,7 @@ class Recorded(wiring.Component):
         return m
 
 
-async def play(dut, inputs: dict[str, np.ndarray]) -> tuple[Quadrature, Record, Record]:
+async def play(dut, inputs: dict[str, np.ndarray]) -> tuple[Quadrature, Rows, Rows]:
     """Return the decoder, its inputs at every clock edge, and its outputs after that edge, as the pins carried them."""
     component = Recorded(**parameters())
     await Bench(dut, component).reset()
@@ -98,8 +98,8 @@ async def play(dut, inputs: dict[str, np.ndarray]) -> tuple[Quadrature, Record, 
         # The values before the edge: the inputs that this edge takes, the outputs that the last edge made.
         words.append(int(dut.record.value))
     clocks = list(range(len(words) - 1))
-    taken = Record(("reset", *INPUTS), component.records, words[:-1], clocks)
-    return component.decoder, taken, Record(OUTPUTS, component.records, words[1:], clocks)
+    taken = Rows(("reset", *INPUTS), component.records, words[:-1], clocks)
+    return component.decoder, taken, Rows(OUTPUTS, component.records, words[1:], clocks)
 
 
 @cocotb.test()

@@ -7,7 +7,7 @@ import typer
 
 from ..jobs.store import Store
 from ..studies import costs
-from .options import Device, EstimatorsOption, SeedsOption, curves_of
+from .options import EstimatorsOption, Part, SeedsOption, curves_of
 from .study import StudyOptions, study
 
 
@@ -15,7 +15,7 @@ from .study import StudyOptions, study
 def command(
     options: StudyOptions,
     wanted: EstimatorsOption = None,
-    device: Annotated[Device | None, typer.Option(help="the part to place and route for", show_default="each")] = None,
+    device: Annotated[Part | None, typer.Option(help="the part to place and route for", show_default="each")] = None,
     seeds: SeedsOption = 3,
 ) -> None:
     names = list(dict.fromkeys(curve.estimator for curve in curves_of(wanted)))
@@ -24,6 +24,6 @@ def command(
 
 
 def costs_of(options: StudyOptions, names: list[str], device: str, seeds: int) -> list[dict]:
-    """Return the costs of estimators on a device, one after the other: placement runs in processes of its own."""
+    """Return the costs of estimators on a part, one after the other: placement runs in processes of its own."""
     alone = replace(options, workers=1)
     return alone.results(f"costs on {device}", costs.cost, costs.jobs(names, device, seeds), Store("costs"))

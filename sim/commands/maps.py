@@ -30,7 +30,7 @@ def check_cluster(options: StudyOptions) -> None:
 
 
 class Maps:
-    """A `zwidth.Mapping` that makes maps as the options say, and records their effort."""
+    """A `zwidth.Mapper` that makes maps as the options say, and records their effort."""
 
     def __init__(self, options: StudyOptions, backend: str):
         check_cluster(options)

@@ -4,7 +4,7 @@ Time is the FPGA's clock. Sample k is taken at the strobe, clock (k + 1) D - 1, 
 follows from it changes `latency` clocks later, on every backend. The plant is advanced exactly over the two intervals
 between those instants, under a constant force in each.
 
-A part that a scene lacks (`converter`, `delay`, a record) is None here, and has no machine code.
+A part that a scene lacks (`converter`, `delay`, what is kept) is None here, and has no machine code.
 """
 
 from typing import NamedTuple
@@ -21,7 +21,7 @@ from ..world.euler import Stepped
 from ..world.rigid import Rigid, Span
 from ..world.taylor import Train
 from .controllers import sample, sample_quietly, taken_off
-from .record import Record, keep
+from .record import Kept, keep
 
 EDGE_CAPACITY = 1 << 14
 """The most edges in one sample before the loop gives up, far beyond the limit of any decoder."""
@@ -60,8 +60,8 @@ class Memory(NamedTuple):
 
     edges: Edges  # the edges on their way to the controller
     delay: np.ndarray | None  # the drives that a late amplifier still holds, by sample number
-    overview: Record | None
-    detail: Record | None
+    overview: Kept | None
+    detail: Kept | None
     positions: np.ndarray  # float64: the position (m) at each sample of a call
     drives: np.ndarray  # the drive (force LSB) after each
 

@@ -1,4 +1,4 @@
-"""Records of a run's samples, for pictures and traces."""
+"""What is kept of a run's samples, for pictures and traces."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -21,7 +21,7 @@ class Extremes(NamedTuple):
     force_largest_n: np.ndarray
 
 
-class Record(NamedTuple):
+class Kept(NamedTuple):
     """Arrays that keep every `stride`-th sample, from when the handle first passes `trigger_m` until they are full."""
 
     trigger_m: float
@@ -70,22 +70,22 @@ class Overview(Trace):
     force_largest_n: np.ndarray
 
 
-def overview(spec: AxisSpec, number: type, samples: int, points: int) -> Record:
-    """Return an empty record for about `points` of all samples of a run, with estimates of the type `number`."""
+def overview(spec: AxisSpec, number: type, samples: int, points: int) -> Kept:
+    """Return empty arrays for about `points` of all samples of a run, with estimates of the type `number`."""
     stride = max(1, samples // points)
     room = samples // stride + 1
     return _new(spec, number, -np.inf, stride, room, Extremes(*(np.zeros(room) for _ in Extremes._fields)))
 
 
-def detail(spec: AxisSpec, number: type, trigger_m: float, room: int) -> Record:
-    """Return an empty record for every sample from `trigger_m` on, with estimates of the type `number`."""
+def detail(spec: AxisSpec, number: type, trigger_m: float, room: int) -> Kept:
+    """Return empty arrays for every sample from `trigger_m` on, with estimates of the type `number`."""
     return _new(spec, number, trigger_m, 1, room, None)
 
 
-def _new(spec: AxisSpec, number: type, trigger_m: float, stride: int, room: int, extremes: Extremes | None) -> Record:
-    """Return an empty record for `room` samples."""
+def _new(spec: AxisSpec, number: type, trigger_m: float, stride: int, room: int, extremes: Extremes | None) -> Kept:
+    """Return empty arrays for `room` samples."""
     lsb = 1.0 if number is np.float64 else spec.design.estimator.velocity.lsb
-    return Record(
+    return Kept(
         trigger_m=trigger_m,
         stride=stride,
         velocity_lsb_m_per_s=lsb * spec.velocity_unit_m_per_s,
@@ -100,40 +100,40 @@ def _new(spec: AxisSpec, number: type, trigger_m: float, stride: int, room: int,
     )
 
 
-def trace_of(record: Record, spec: AxisSpec) -> Trace:
-    """Return the samples of a record in SI units; an `Overview` if it has extremes."""
-    kept = slice(0, record.mark[0])
-    extremes = record.extremes._asdict() if record.extremes else {}
+def trace_of(kept: Kept, spec: AxisSpec) -> Trace:
+    """Return the samples that were kept, in SI units; an `Overview` if there are extremes."""
+    filled = slice(0, kept.mark[0])
+    extremes = kept.extremes._asdict() if kept.extremes else {}
     return (Overview if extremes else Trace)(
-        time_s=record.sample[kept] / spec.sample_hz,
-        position_m=record.position_m[kept],
-        velocity_m_per_s=record.velocity_m_per_s[kept],
-        estimate_m_per_s=record.estimate[kept] * record.velocity_lsb_m_per_s,
-        force_n=record.force_n[kept],
-        **{name: values[kept] for name, values in extremes.items()},
+        time_s=kept.sample[filled] / spec.sample_hz,
+        position_m=kept.position_m[filled],
+        velocity_m_per_s=kept.velocity_m_per_s[filled],
+        estimate_m_per_s=kept.estimate[filled] * kept.velocity_lsb_m_per_s,
+        force_n=kept.force_n[filled],
+        **{name: values[filled] for name, values in extremes.items()},
     )
 
 
 @compiled
-def keep(record, k, motion, velocity, drive):
+def keep(kept, k, motion, velocity, drive):
     """Keep sample k if it is due, or else what is extreme in it."""
-    if record is None:
+    if kept is None:
         return
-    if record.mark[1] < 0 and motion.position_m >= record.trigger_m:
-        record.mark[1] = k
-    kept, since = record.mark[0], record.mark[1]
+    if kept.mark[1] < 0 and motion.position_m >= kept.trigger_m:
+        kept.mark[1] = k
+    count, since = kept.mark[0], kept.mark[1]
     if since < 0:
         return
-    due = (k - since) % record.stride == 0 and kept < len(record.sample)
+    due = (k - since) % kept.stride == 0 and count < len(kept.sample)
     if due:
-        record.sample[kept] = k
-        record.position_m[kept] = motion.position_m
-        record.velocity_m_per_s[kept] = motion.velocity_m_per_s
-        record.estimate[kept] = velocity
-        record.force_n[kept] = drive * record.force_lsb_n
-        record.mark[0] = kept + 1
-    error = velocity * record.velocity_lsb_m_per_s - motion.velocity_m_per_s
-    _widen(record.extremes, record.mark[0] - 1, due, error, drive * record.force_lsb_n)
+        kept.sample[count] = k
+        kept.position_m[count] = motion.position_m
+        kept.velocity_m_per_s[count] = motion.velocity_m_per_s
+        kept.estimate[count] = velocity
+        kept.force_n[count] = drive * kept.force_lsb_n
+        kept.mark[0] = count + 1
+    error = velocity * kept.velocity_lsb_m_per_s - motion.velocity_m_per_s
+    _widen(kept.extremes, kept.mark[0] - 1, due, error, drive * kept.force_lsb_n)
 
 
 @compiled

@@ -161,8 +161,8 @@ def _ends(drop: Drop) -> Figure:
     panels = picture.subplots(1, len(PAPERS), sharex=True, sharey=True)
     inks, predicted = _inks(drop), _predicted(drop)
     for axes, name in zip(panels, PAPERS, strict=True):
-        edges = drop.maps[name].edges
-        upper = [(edge.damping_n_s_per_m, edge.stable_n_per_m / 1e3) for edge in edges]
+        boundary = drop.maps[name].boundary
+        upper = [(point.damping_n_s_per_m, point.stable_n_per_m / 1e3) for point in boundary]
         axes.plot(*zip(*upper, strict=True), color=inks[name])
         own = [each for each in drop.ends if each.method == name]
         stable = [(each.stable_n_s_per_m, each.stiffness_n_per_m / 1e3) for each in own if each.stable_n_s_per_m]
@@ -196,16 +196,16 @@ def _maps(drop: Drop) -> Figure:
     rows = math.ceil(len(drop.maps) / COLUMNS)
     panels = picture.subplots(rows, COLUMNS, sharex=True, sharey=True, squeeze=False)
     inks = _inks(drop)
-    edges = {
-        name: [(edge.damping_n_s_per_m, edge.stable_n_per_m / 1e3) for edge in each.edges]
+    boundaries = {
+        name: [(point.damping_n_s_per_m, point.stable_n_per_m / 1e3) for point in each.boundary]
         for name, each in drop.maps.items()
     }
     for axes, (name, each) in zip(panels.flat, drop.maps.items(), strict=False):
-        for other in edges.values():
+        for other in boundaries.values():
             axes.plot(*zip(*other, strict=True), color="0.85", lw=0.9)
         controller = each.case.scene.controller
         (style,) = looks([(controller.estimator, controller.output)])
-        axes.plot(*zip(*edges[name], strict=True), **style | {"lw": 1.6, "ms": 3.5})
+        axes.plot(*zip(*boundaries[name], strict=True), **style | {"lw": 1.6, "ms": 3.5})
         times = drop.of_papers(name)
         label = each.case.label.replace(", ", ",\n")
         axes.set_title(label if times is None else f"{label} ({times:.2f})", color=inks[name], fontsize=LABEL_PT)

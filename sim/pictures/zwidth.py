@@ -36,10 +36,11 @@ def draw(found: ZWidth) -> Figure:
     picture = new_figure(5.2, title)
     axes = picture.subplots()
     styles = looks([(scene.controller.estimator, scene.estimator_output) for scene in scenes])
-    edges = [[(edge.damping_n_s_per_m, edge.stable_n_per_m / 1e3) for edge in each.edges] for each in maps]
+    boundaries = [[(point.damping_n_s_per_m, point.stable_n_per_m / 1e3) for point in each.boundary] for each in maps]
     limits = [_linear(own, grid.dampings) for own in scenes]
-    for each, edge, limit, style in zip(maps, edges, limits, styles, strict=True):
-        axes.plot(*zip(*edge, strict=True), label=f"{each.case.label}: {each.area / 1e3:.0f}", **style | {"ms": 3.5})
+    for each, boundary, limit, style in zip(maps, boundaries, limits, styles, strict=True):
+        label = f"{each.case.label}: {each.area / 1e3:.0f}"
+        axes.plot(*zip(*boundary, strict=True), label=label, **style | {"ms": 3.5})
         if limit:
             axes.plot(grid.dampings, np.array(limit) / 1e3, color=style["color"], ls=":", lw=1.1)
     axes.set_xlabel("damping B of the wall (N s/m)")
@@ -56,7 +57,7 @@ def draw(found: ZWidth) -> Figure:
         _name_beside(axes, maps)
     else:
         inks = [ink(own.controller.estimator) for own in scenes]
-        labels = [(each.case.label, *where) for each, *where in zip(maps, edges, inks, strict=True)]
+        labels = [(each.case.label, *where) for each, *where in zip(maps, boundaries, inks, strict=True)]
         dotted = [list(zip(grid.dampings, np.array(limit) / 1e3, strict=True)) for limit in limits if limit]
         label_points(axes, labels, lines=[*dotted, border])
     return picture

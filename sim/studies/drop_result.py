@@ -92,9 +92,9 @@ class Drop:
 
         Return None where the region leaves the map, or has fewer than two dampings.
         """
-        edges = self.maps[name].edges
-        stable = [edge.stable_n_per_m for edge in edges if edge.stable_n_per_m]
-        return None if edges[-1].stable_n_per_m or len(stable) < 2 else stable[-2] / max(stable)
+        boundary = self.maps[name].boundary
+        stable = [point.stable_n_per_m for point in boundary if point.stable_n_per_m]
+        return None if boundary[-1].stable_n_per_m or len(stable) < 2 else stable[-2] / max(stable)
 
     def of_papers(self, name: str) -> float | None:
         """Return a map's area over that of Levant with adjusted gains, the paper's best; None where that is 0."""

@@ -29,7 +29,7 @@ from ..scene.errors import SceneError
 from ..scene.schema import Scene
 from ..walls.figure_5 import ABOUT, Fact, facts
 from ..walls.methods import Curve, methods
-from ..walls.zwidth import Effort, Map, Mapping, NeverReached
+from ..walls.zwidth import Effort, Map, Mapper, NeverReached
 
 READINGS = {"3-30": (3.0, 30.0), "30-300": (30.0, 300.0)}
 """The readings of the paper's B axis: its first and its last damping, N s/m."""
@@ -216,8 +216,8 @@ class Fits:
 class _Judge:
     """A judge that maps a scene with given values of the parameters, and compares the maps with Figure 5."""
 
-    def __init__(self, case: Case, reading: str, mapping: Mapping):
-        self._case, self._mapping = case, mapping
+    def __init__(self, case: Case, reading: str, mapper: Mapper):
+        self._case, self._mapper = case, mapper
         self._low, self._end = READINGS[reading]
 
     def _grid(self, steps: int) -> dict[str, Any]:
@@ -258,7 +258,7 @@ class _Judge:
 
     def _maps(self, papers: dict[str, Curve], case: Case, names: list[str]) -> dict[str, Map]:
         cases = [case.changed(papers[name].changes, papers[name].label) for name in names]
-        return dict(zip(names, self._mapping("fit", cases), strict=True))
+        return dict(zip(names, self._mapper("fit", cases), strict=True))
 
     def _off(self, adjusted: Map) -> tuple[float, float]:
         """Return the distances of the map of Levant with adjusted gains from the ends of the B axis and the K axis."""
@@ -269,7 +269,7 @@ class _Judge:
 
 
 def study(
-    case: Case, reading: str, evaluations: int, seed: int, mapping: Mapping, progress: Callable[[int], None]
+    case: Case, reading: str, evaluations: int, seed: int, mapper: Mapper, progress: Callable[[int], None]
 ) -> Fit:
     """Return the fit of a scene for one reading of the B axis.
 
@@ -278,14 +278,14 @@ def study(
         reading: name of the reading in `READINGS`.
         evaluations: approximate number of evaluations, rounded to whole generations.
         seed: seed of the search.
-        mapping: function that makes the maps, and keeps them.
+        mapper: function that makes the maps, and keeps them.
         progress: function called after every evaluation with the number of evaluations done.
 
     Raises:
         SceneError: if the scene is not valid, or lacks a key that is searched.
         zwidth.NeverReached: if the handle, with the scene's own values, does not reach the wall.
     """
-    judge, plain = _Judge(case, reading, mapping), case.scene
+    judge, plain = _Judge(case, reading, mapper), case.scene
     own = {key: _value(plain, key) for key in PARAMETERS}
     before = judge.fully({})
     trials: list[Trial] = []

@@ -25,7 +25,7 @@ from ..scene.schema import Scene
 from ..walls.boundary import Grid
 from ..walls.grid import grid_of, wider_grid
 from ..walls.methods import methods
-from ..walls.zwidth import Effort, Map, Mapping
+from ..walls.zwidth import Effort, Map, Mapper
 from .lipschitz import least_alpha_m_per_s2
 from .zwidth import area_text, plus_of_areas
 
@@ -147,12 +147,12 @@ def converges(gains: Gains, bound_m_per_s2: float) -> bool:
     return least is not None and gains.alpha_m_per_s2 >= least
 
 
-def study(case: Case, mapping: Mapping) -> Search:
+def study(case: Case, mapper: Mapper) -> Search:
     """Return the areas of a scene over Levant's gains.
 
     Args:
         case: the scene.
-        mapping: function that makes the maps.
+        mapper: function that makes the maps.
 
     Raises:
         SceneError: if the scene is not valid, or is refused with all of the gains, or has no section `zwidth`.
@@ -172,7 +172,7 @@ def study(case: Case, mapping: Mapping) -> Search:
             label = f"{output}, lambda {gains.lambda_sqrt_m_per_s:.4g}, alpha {gains.alpha_m_per_s2:.4g}"
             cases[output, gains] = case.changed(wider_grid(plain, coarser) | levant, label)
         possible = accepted(cases)
-        return dict(zip(possible, mapping(title, list(possible.values())), strict=True))
+        return dict(zip(possible, mapper(title, list(possible.values())), strict=True))
 
     coarse = maps("search of gains", COARSER, [(output, gains) for output in Design.outputs for gains in tried])
     by_output = {out: {gains: each for (of, gains), each in coarse.items() if of == out} for out in Design.outputs}
@@ -183,7 +183,7 @@ def study(case: Case, mapping: Mapping) -> Search:
         output: {name: Pick(gains, finer[output, gains]) for name, gains in named.items() if (output, gains) in finer}
         for output, named in chosen.items()
     }
-    return Search(next(iter(finer.values())).case.scene, lambdas, alphas, by_output, picks, mapping.effort())
+    return Search(next(iter(finer.values())).case.scene, lambdas, alphas, by_output, picks, mapper.effort())
 
 
 def _area(each: Map, in_place: bool) -> float:

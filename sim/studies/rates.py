@@ -13,7 +13,7 @@ from ..scene.schema import Scene
 from ..walls import theory
 from ..walls.grid import grid_of
 from ..walls.methods import Curve
-from ..walls.zwidth import Effort, Map, Mapping
+from ..walls.zwidth import Effort, Map, Mapper
 
 RATES_HZ = (1_000, 2_500, 10_000, 25_000, 100_000, 250_000, 1_000_000)
 METHODS = ("fdm", "butterworth", "adjusted", "levant:u1", "kalman", "levant-edge")
@@ -135,14 +135,14 @@ class Rates:
         return ["own: at the scene's own rates"] + ["+: K goes on beyond the map"] * clipped
 
 
-def study(case: Case, curves: list[Curve], rates_hz: list[int], mapping: Mapping) -> Rates:
+def study(case: Case, curves: list[Curve], rates_hz: list[int], mapper: Mapper) -> Rates:
     """Return what the rate buys with every method.
 
     Args:
         case: the scene; it need not have a section `zwidth`.
         curves: the methods.
         rates_hz: the rates, ascending.
-        mapping: function that makes the maps.
+        mapper: function that makes the maps.
 
     Raises:
         SceneError: if a case is not valid.
@@ -151,9 +151,9 @@ def study(case: Case, curves: list[Curve], rates_hz: list[int], mapping: Mapping
     step = "zwidth.stiffness_step_n_per_m"
     at = [{step: common.changes[step] / FINER}, *(at_rate(rate_hz) for rate_hz in rates_hz)]
     cases = [common.changed(each | curve.changes, curve.label) for curve in curves for each in at]
-    maps = iter(mapping(f"{case.scene.name}, what rate buys", cases))
+    maps = iter(mapper(f"{case.scene.name}, what rate buys", cases))
     gains = [Gain(curve.label, rates_hz, next(maps), [next(maps) for _ in rates_hz]) for curve in curves]
-    return Rates(case.scene, gains, limits, mapping.effort())
+    return Rates(case.scene, gains, limits, mapper.effort())
 
 
 LAG = {"amplifier.bandwidth_hz": None, "amplifier.current_limit_a": None, "motor": None}

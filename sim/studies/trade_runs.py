@@ -3,8 +3,8 @@
 The reference is the bit-accurate model with every part of the scene, the exact solver, and the scene's own rates and
 steps of K. Three things are compared with it, for two estimators:
 
-- the verdicts on walls around the reference's edge, from 0.7 times as stiff to 1 / 0.7 times;
-- K at the edge of the shortcut's own map, at every B where the reference has an edge;
+- the verdicts on walls around the reference's boundary, from 0.7 times as stiff to 1 / 0.7 times;
+- K at the boundary of the shortcut's own map, at every B where the reference has one;
 - the time of a hit, the mean over a wall of every B, and the time of a map: that of a hit times its number of hits.
 
 The hardware has the verdicts of `fixed`, because it has its force words: every hit of the hardware checks that.
@@ -34,9 +34,9 @@ GRID = {
     "zwidth.damping_to_n_s_per_m": 70.0,
     "zwidth.damping_step_n_s_per_m": 15.0,
 }
-"""A grid with few B, as there are many maps; both estimators have an edge at these on the paper's device and drive."""
+"""A grid with few B, as there are many maps; both estimators have a boundary there on the paper's device and drive."""
 AROUND = 0.7, 0.85, 0.95, 1 / 0.95, 1 / 0.85, 1 / 0.7
-"""The walls whose verdicts are compared, as multiples of the reference's edge."""
+"""The walls whose verdicts are compared, as multiples of the reference's boundary."""
 ROUNDS = 3
 RTL_WALLS = 2
 """The number of walls on which the hardware is timed, once, for every estimator: a hit takes seconds."""
@@ -99,10 +99,10 @@ class _Contest:
             return shortcut
         return next(each for each in self.computed if (each.backend, each.changes) == ("fixed", shortcut.changes))
 
-    def walls_around(self, edge: dict[float, float]) -> list[list[Wall]]:
-        """Return the walls around an edge, in one list for every B."""
+    def walls_around(self, boundary: dict[float, float]) -> list[list[Wall]]:
+        """Return the walls around a boundary, in one list for every B."""
         step, walls = self._grid.stiffness_step_n_per_m, []
-        for damping, stiffness in edge.items():
+        for damping, stiffness in boundary.items():
             rows = (min(max(round(times * (stiffness / step + 0.5)), 1), self._grid.rows) for times in AROUND)
             walls.append([(row * step, damping) for row in dict.fromkeys(rows)])
         return walls
@@ -112,9 +112,9 @@ class _Contest:
         return hit.run(self.case_of(shortcut, curve).hitting(*wall), shortcut.backend, until_sure=True)
 
 
-def _edge(of: Map) -> dict[float, float]:
+def _boundary(of: Map) -> dict[float, float]:
     """Return the largest stable K by B, where a wall is stable."""
-    return {edge.damping_n_s_per_m: edge.stable_n_per_m for edge in of.edges if edge.stable_n_per_m}
+    return {point.damping_n_s_per_m: point.stable_n_per_m for point in of.boundary if point.stable_n_per_m}
 
 
 def _hits_of(shortcut: Shortcut) -> str:
@@ -135,22 +135,22 @@ def study(case: Case, runs: Runs) -> Trade:
     """
     began, contest = time.perf_counter(), _Contest(case)
     maps = _maps(contest, runs)
-    edges = {curve.label: _edge(maps[REFERENCE.label, curve.label]) for curve in contest.curves}
-    for label, edge in edges.items():
-        if not edge:
+    boundaries = {curve.label: _boundary(maps[REFERENCE.label, curve.label]) for curve in contest.curves}
+    for label, boundary in boundaries.items():
+        if not boundary:
             raise RuntimeError(
                 f"{contest.scene.name}: with {label} no wall of the map is stable: nothing to compare at"
             )
-    around = {label: contest.walls_around(edge) for label, edge in edges.items()}
+    around = {label: contest.walls_around(boundary) for label, boundary in boundaries.items()}
     verdicts = _verdicts(contest, around, runs)
-    # The timed walls: one for every B, at varying distances from the edge.
+    # The timed walls: one for every B, at varying distances from the boundary.
     timed = {label: [at[n % len(at)] for n, at in enumerate(walls)] for label, walls in around.items()}
     seconds = _seconds(contest, timed, runs)
     points = []
     for shortcut in contest.shortcuts:
         model, hits = contest.model_of(shortcut), _hits_of(shortcut)
-        own = {label: maps[model.label, label] for label in edges}
-        hit_s = {label: seconds[hits, label] for label in edges}
+        own = {label: maps[model.label, label] for label in boundaries}
+        hit_s = {label: seconds[hits, label] for label in boundaries}
         point = Point(
             shortcut,
             hit_s=statistics.mean(hit_s.values()),
@@ -158,9 +158,9 @@ def study(case: Case, runs: Runs) -> Trade:
             map_s=sum(a_map.hits * hit_s[label] for label, a_map in own.items()),
             differ={
                 label: _share_that_differs(verdicts[_hits_of(model), label], verdicts[_hits_of(REFERENCE), label])
-                for label in edges
+                for label in boundaries
             },
-            errors={label: _errors(_edge(own[label]), edge) for label, edge in edges.items()},
+            errors={label: _errors(_boundary(own[label]), boundary) for label, boundary in boundaries.items()},
         )
         points.append(point)
     checked = len(contest.hardware) * sum(len(walls[:RTL_WALLS]) for walls in timed.values())
@@ -172,9 +172,9 @@ def _share_that_differs(verdicts: list[bool], truth: list[bool]) -> float:
     return statistics.mean(float(here != there) for here, there in zip(verdicts, truth, strict=True))
 
 
-def _errors(edge: dict[float, float], truth: dict[float, float]) -> list[float]:
-    """Return the relative errors of K at every B where the true edge has one; 1 where the region has already ended."""
-    return [abs(edge.get(damping, 0.0) / stiffness - 1) for damping, stiffness in truth.items()]
+def _errors(boundary: dict[float, float], truth: dict[float, float]) -> list[float]:
+    """Return the relative errors of K at every B of the true boundary; 1 where the region has already ended."""
+    return [abs(boundary.get(damping, 0.0) / stiffness - 1) for damping, stiffness in truth.items()]
 
 
 def _maps(contest: _Contest, runs: Runs) -> dict[tuple[str, str], Map]:

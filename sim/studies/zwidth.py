@@ -9,7 +9,7 @@ from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls.figure_5 import Fact, facts
 from ..walls.methods import Curve, methods
-from ..walls.zwidth import Effort, Map, Mapping
+from ..walls.zwidth import Effort, Map, Mapper
 
 
 @dataclass(frozen=True)
@@ -68,13 +68,13 @@ class ZWidth:
         ]
 
 
-def study(case: Case, curves: list[Curve] | None, mapping: Mapping) -> ZWidth:
+def study(case: Case, curves: list[Curve] | None, mapper: Mapper) -> ZWidth:
     """Return the maps of a scene.
 
     Args:
         case: the scene.
         curves: the methods; None for those of the paper's Figure 5.
-        mapping: function that makes the maps.
+        mapper: function that makes the maps.
 
     Raises:
         SceneError: if the scene is not valid with one of the methods, or has no section `zwidth`.
@@ -82,9 +82,9 @@ def study(case: Case, curves: list[Curve] | None, mapping: Mapping) -> ZWidth:
     scene = case.scene
     papers = methods(scene)
     cases = [case.changed(curve.changes, curve.label) for curve in (papers.values() if curves is None else curves)]
-    maps = mapping(f"{scene.name} Z-width", cases)
+    maps = mapper(f"{scene.name} Z-width", cases)
     shown = facts(dict(zip(papers, maps, strict=True))) if curves is None else []
-    return ZWidth(scene, maps, shown, mapping.effort())
+    return ZWidth(scene, maps, shown, mapper.effort())
 
 
 def area_text(each: Map) -> str:

@@ -1,11 +1,11 @@
-"""The trace of the edge of the stable region of walls, by the founding paper's method: the walls to hit, in order.
+"""The trace of the boundary of the stable region of walls, by the founding paper's method: the walls to hit, in order.
 
 Stiffness K and damping B go in steps. From a stable wall, raise K until a wall is unstable; then raise B by a step, and
 from that K go down to the first stable wall if the wall there is unstable, else up to the first unstable wall. At each
 B the lowest unstable K found in this way is the marginal K. The trace ends where no K is stable, or at the last B. It
 starts from the softest wall of the first B; if that wall is unstable, K is doubled, then B raised, until one is stable.
 
-The edge is the upper edge. Walls below it may still be unstable, which a trace does not see: `below` hits some of them.
+The boundary is the upper one. Walls below it may still be unstable, which a trace does not see: `below` hits some.
 
 Nothing here hits a wall: `trace` is a generator that yields walls and is sent verdicts, so the map does not depend on
 the source of the verdicts, or on the order in which several maps get theirs.
@@ -21,7 +21,7 @@ from itertools import pairwise
 class Grid:
     """Steps and ends of a map: B from `damping_from_n_s_per_m` to `damping_to_n_s_per_m`, K from one step to its end.
 
-    At each B, `walls_below` walls below the edge are hit as well.
+    At each B, `walls_below` walls below the boundary are hit as well.
     """
 
     stiffness_step_n_per_m: float
@@ -49,14 +49,14 @@ def _whole(steps: float) -> int:
 
 
 @dataclass(frozen=True)
-class Edge:
-    """The edge of a stable region at one B.
+class BoundaryPoint:
+    """The boundary of a stable region at one B.
 
     Attributes:
         damping_n_s_per_m: B.
         stable_n_per_m: the largest stable K under the marginal K; 0 if no K is stable.
         marginal_n_per_m: the lowest unstable K above it; None where the largest K of the map is still stable.
-        held: the part of the walls hit below the edge that is stable; None if no wall below was hit.
+        held: the part of the walls hit below the boundary that is stable; None if no wall below was hit.
     """
 
     damping_n_s_per_m: float
@@ -65,17 +65,17 @@ class Edge:
     held: float | None = None
 
 
-def trace(grid: Grid) -> Generator[tuple[float, float], bool, list[Edge]]:
-    """Yield walls (K, B) to hit, receive whether each is stable, and return the edge, by B.
+def trace(grid: Grid) -> Generator[tuple[float, float], bool, list[BoundaryPoint]]:
+    """Yield walls (K, B) to hit, receive whether each is stable, and return the boundary, by B.
 
-    The walls below the edge that the grid asks for come last.
+    The walls below the boundary that the grid asks for come last.
     """
-    step, edges, row = grid.stiffness_step_n_per_m, [], 0
+    step, boundary, row = grid.stiffness_step_n_per_m, [], 0
     for damping in grid.dampings:
         if row == 0:
             row = yield from _first(grid, damping)
             if row == 0:
-                edges.append(Edge(damping, 0.0, step))
+                boundary.append(BoundaryPoint(damping, 0.0, step))
                 continue
             starts_stable = True
         else:
@@ -88,11 +88,11 @@ def trace(grid: Grid) -> Generator[tuple[float, float], bool, list[Edge]]:
             stable = row - 1
             while stable > 0 and not (yield stable * step, damping):
                 stable -= 1
-        edges.append(Edge(damping, stable * step, (stable + 1) * step if stable < grid.rows else None))
+        boundary.append(BoundaryPoint(damping, stable * step, (stable + 1) * step if stable < grid.rows else None))
         if stable == 0:
             break
         row = min(stable + 1, grid.rows)
-    return (yield from below(edges, grid)) if grid.walls_below else edges
+    return (yield from below(boundary, grid)) if grid.walls_below else boundary
 
 
 def _first(grid: Grid, damping: float) -> Generator[tuple[float, float], bool, int]:
@@ -105,22 +105,22 @@ def _first(grid: Grid, damping: float) -> Generator[tuple[float, float], bool, i
     return 0
 
 
-def below(edges: list[Edge], grid: Grid) -> Generator[tuple[float, float], bool, list[Edge]]:
-    """Yield as many walls below each edge as the grid asks for, evenly spaced in K; return the edges with `held`."""
+def below(boundary: list[BoundaryPoint], grid: Grid) -> Generator[tuple[float, float], bool, list[BoundaryPoint]]:
+    """Yield as many walls below each point as the grid asks for, evenly spaced in K; return the points with `held`."""
     step, checked = grid.stiffness_step_n_per_m, []
-    for edge in edges:
-        top = round(edge.stable_n_per_m / step)
+    for point in boundary:
+        top = round(point.stable_n_per_m / step)
         rows = sorted({round(top * n / (grid.walls_below + 1)) for n in range(1, grid.walls_below + 1)} - {0, top})
         stable = 0
         for row in rows:
-            stable += yield row * step, edge.damping_n_s_per_m
-        checked.append(replace(edge, held=stable / len(rows)) if rows else edge)
+            stable += yield row * step, point.damping_n_s_per_m
+        checked.append(replace(point, held=stable / len(rows)) if rows else point)
     return checked
 
 
-def area(edges: list[Edge]) -> float:
+def area(boundary: list[BoundaryPoint]) -> float:
     """Return the area under the largest stable K, N^2 s/m^2, by trapezoids between the values of B."""
     return sum(
         (right.damping_n_s_per_m - left.damping_n_s_per_m) * (left.stable_n_per_m + right.stable_n_per_m) / 2
-        for left, right in pairwise(edges)
+        for left, right in pairwise(boundary)
     )

@@ -69,11 +69,11 @@ class _Regions:
     """Stable stiffness (kN/m) by method on the longest map's B (N s/m), 0 where a region has ended."""
 
     def __init__(self, maps: dict[str, Map]):
-        longest = max(maps.values(), key=lambda region: len(region.edges))
-        self.dampings = np.array([edge.damping_n_s_per_m for edge in longest.edges])
+        longest = max(maps.values(), key=lambda region: len(region.boundary))
+        self.dampings = np.array([point.damping_n_s_per_m for point in longest.boundary])
         self.stiffness = {name: np.zeros(len(self.dampings)) for name in maps}
         for name, region in maps.items():
-            self.stiffness[name][: len(region.edges)] = [edge.stable_n_per_m / 1e3 for edge in region.edges]
+            self.stiffness[name][: len(region.boundary)] = [point.stable_n_per_m / 1e3 for point in region.boundary]
         self.ends = {name: region.damping_n_s_per_m for name, region in maps.items()}
         self.end = self.ends["adjusted"]
         self.inside = self.dampings <= self.end

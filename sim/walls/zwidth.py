@@ -1,4 +1,4 @@
-"""Z-width: the edge of the region of stable walls for each case, a scene with its changes.
+"""Z-width: the boundary of the region of stable walls for each case, a scene with its changes.
 
 A map is a trace, and a trace asks for one hit at a time. Hits of different traces run side by side on the workers of a
 Dask cluster; every verdict is kept as it comes. A verdict depends on the scene and the wall alone, so the map is the
@@ -16,70 +16,70 @@ from ..jobs import store
 from ..jobs.cluster import result_of
 from ..scene.case import Case
 from . import hit
-from .boundary import Edge, area, trace
+from .boundary import BoundaryPoint, area, trace
 from .grid import grid_of
 
 
 @dataclass(frozen=True)
 class Map:
-    """The edge of one stable region.
+    """The boundary of one stable region.
 
     Attributes:
         case: the case that was mapped.
-        edges: the edges, by B.
+        boundary: its points, by B.
         hits: number of walls that were hit for it.
-        in_place: for each edge, whether its largest stable wall holds the handle there: see `hit.Hit.in_place`.
+        in_place: for each point, whether its largest stable wall holds the handle there: see `hit.Hit.in_place`.
         seconds: wall time of its hits, wherever and whenever they ran; maps are compared without it.
     """
 
     case: Case
-    edges: list[Edge]
+    boundary: list[BoundaryPoint]
     hits: int
     in_place: list[bool]
     seconds: float = field(default=0.0, compare=False)
 
     @property
     def area(self) -> float:
-        """The area under the edge, N^2 s/m^2, whether or not all walls there are stable."""
-        return area(self.edges)
+        """The area under the boundary, N^2 s/m^2, whether or not all walls there are stable."""
+        return area(self.boundary)
 
     @property
     def area_held(self) -> float | None:
-        """The area under the edge, N^2 s/m^2, times the stable part of the walls hit below it; None if none was hit."""
-        if all(edge.held is None for edge in self.edges):
+        """The area under the boundary, N^2 s/m^2, times the stable part of the walls hit below; None if none was."""
+        if all(point.held is None for point in self.boundary):
             return None
-        parts = [1.0 if edge.held is None else edge.held for edge in self.edges]
-        pairs = zip(self.edges, parts, strict=True)
-        return area([replace(edge, stable_n_per_m=edge.stable_n_per_m * part) for edge, part in pairs])
+        parts = [1.0 if point.held is None else point.held for point in self.boundary]
+        pairs = zip(self.boundary, parts, strict=True)
+        return area([replace(point, stable_n_per_m=point.stable_n_per_m * part) for point, part in pairs])
 
     @property
     def area_in_place(self) -> float:
-        """The area under the edge, N^2 s/m^2, with K = 0 at each B whose largest stable wall is not in place."""
+        """The area under the boundary, N^2 s/m^2, with K = 0 at each B whose largest stable wall is not in place."""
         kept = [
-            edge if in_place else replace(edge, stable_n_per_m=0.0)
-            for edge, in_place in zip(self.edges, self.in_place, strict=True)
+            point if in_place else replace(point, stable_n_per_m=0.0)
+            for point, in_place in zip(self.boundary, self.in_place, strict=True)
         ]
         return area(kept)
 
     @property
     def damping_n_s_per_m(self) -> float:
         """The largest B with a stable K; 0 if no B has one."""
-        return max((edge.damping_n_s_per_m for edge in self.edges if edge.stable_n_per_m), default=0.0)
+        return max((point.damping_n_s_per_m for point in self.boundary if point.stable_n_per_m), default=0.0)
 
     @property
     def leaves(self) -> bool:
         """Whether the region continues beyond the map in K or B."""
-        return self.edges[-1].stable_n_per_m > 0 or self.clipped
+        return self.boundary[-1].stable_n_per_m > 0 or self.clipped
 
     @property
     def clipped(self) -> bool:
         """Whether the region continues beyond the map in K."""
-        return any(edge.marginal_n_per_m is None for edge in self.edges)
+        return any(point.marginal_n_per_m is None for point in self.boundary)
 
     @property
     def largest_n_per_m(self) -> float:
         """The largest stable stiffness on the map; the true one is larger if the map is `clipped`."""
-        return max(edge.stable_n_per_m for edge in self.edges)
+        return max(point.stable_n_per_m for point in self.boundary)
 
     def report(self) -> dict[str, Any]:
         """Return the map as the command line prints it.
@@ -91,8 +91,8 @@ class Map:
             "label": self.case.label,
             "scene": self.case.source,
             "changes": self.case.changes,
-            "boundary": [[edge.damping_n_s_per_m, edge.stable_n_per_m] for edge in self.edges],
-            "leaves_the_map_at": [edge.damping_n_s_per_m for edge in self.edges if edge.marginal_n_per_m is None],
+            "boundary": [[point.damping_n_s_per_m, point.stable_n_per_m] for point in self.boundary],
+            "leaves_the_map_at": [point.damping_n_s_per_m for point in self.boundary if point.marginal_n_per_m is None],
             "area_n2_s_per_m2": self.area,
             "area_held_n2_s_per_m2": self.area_held,
             "area_in_place_n2_s_per_m2": self.area_in_place,
@@ -110,7 +110,7 @@ class Effort(NamedTuple):
     seconds: float
 
 
-class Mapping(Protocol):
+class Mapper(Protocol):
     """The function that makes maps for a study."""
 
     def __call__(self, title: str, cases: list[Case]) -> list[Map]:
@@ -174,7 +174,7 @@ class _Tracing:
             stiffness, damping = self._steps.send(stable)
             self.wanted = self._job | {"stiffness": stiffness, "damping": damping}
         except StopIteration as end:
-            walls = [(edge.stable_n_per_m, edge.damping_n_s_per_m) for edge in end.value]
+            walls = [(point.stable_n_per_m, point.damping_n_s_per_m) for point in end.value]
             in_place = [self._in_place.get(wall, False) for wall in walls]
             self.wanted, self.found = None, Map(self._case, end.value, self._hits, in_place, self._seconds)
 

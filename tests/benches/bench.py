@@ -10,15 +10,15 @@ from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
 
 from .campaign import Campaign
 from .harness import RESERVED, inputs_of, packing_of
-from .packing import Record
+from .packing import Rows
 
 PERIOD_NS = 10
 PATIENCE = 10_000
 """Clocks after which the bench stops waiting for an answer."""
 
 
-class Monitor(Record):
-    """Records of the ports at every clock edge where `strobe` is high, as the component itself sees them there.
+class Monitor(Rows):
+    """The values of the ports at every clock edge where `strobe` is high, as the component itself sees them there.
 
     During a campaign the sequencer sees those edges, and the campaign adds them.
     """
@@ -124,7 +124,7 @@ class Bench:
         rows: Iterable[tuple[int, ...]],
         latency: int | None = None,
         every: int | None = None,
-    ) -> tuple[Record, Record]:
+    ) -> tuple[Rows, Rows]:
         """Put `rows` of `inputs` through; every strobe comes with the previous answer or a clock later, at random.
 
         The other inputs stay as they were driven. This is much quicker than `transact` between two monitors, because
@@ -150,7 +150,7 @@ class Bench:
         """
         if latency is None:
             latency = getattr(self._component, "latency", None)
-        taken, given = (Record(names, self.packing, [], []) for names in (inputs, outputs))
+        taken, given = (Rows(names, self.packing, [], []) for names in (inputs, outputs))
         campaign = Campaign(strobe, done, taken, given, latency, max(latency or 1, 1) if every is None else every)
         held = self.inputs.pack({**self._held, **dict.fromkeys((strobe, *inputs), 0)})
         self.in_campaign = True

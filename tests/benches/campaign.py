@@ -9,7 +9,7 @@ import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge, ValueChange
 
 from .harness import SPACING_BITS
-from .packing import Packing, Record
+from .packing import Packing, Rows
 from .simulator import TRACED, TRACED_SAMPLES, rng
 from .verdict import Wrong
 
@@ -18,7 +18,7 @@ BATCH = 4096
 
 
 class Campaign:
-    """A strobe, its answer and their pace, and the records of the inputs taken and the outputs given so far.
+    """A strobe, its answer and their pace, and the rows of the inputs taken and of the outputs given so far.
 
     Attributes:
         taken: the values of the ports at every strobe.
@@ -29,7 +29,7 @@ class Campaign:
         ValueError: if `latency` or `every` is out of its range.
     """
 
-    def __init__(self, strobe: str, done: str, taken: Record, given: Record, latency: int, every: int):
+    def __init__(self, strobe: str, done: str, taken: Rows, given: Rows, latency: int, every: int):
         most = (1 << SPACING_BITS) - 2
         for name, value, least in (("latency", latency, 0), ("every", every, 1)):
             if isinstance(value, bool) or not isinstance(value, int):
@@ -42,7 +42,7 @@ class Campaign:
         self._coin = rng()
 
     async def run(self, bench, held: int, rows: Iterable[tuple[int, ...]]) -> dict[str, int]:
-        """Put rows of inputs through, beside the word `held` of the others; fill the records and return the last row.
+        """Put rows of inputs through, beside the word `held` of the others; fill `taken`, `given`; return the last row.
 
         Raises:
             AssertionError: if an answer is missing or late, or comes without a strobe.
@@ -81,7 +81,7 @@ class Campaign:
         return spacings
 
     def _sort(self, seen: Packing, start: int, events: Iterable[tuple[int, int]], monitors: list) -> None:
-        """Sort the events of a batch into the records of inputs taken, of outputs given, and of monitors."""
+        """Sort the events of a batch into the rows of inputs taken, of outputs given, and of monitors."""
         is_strobe, is_done = seen.bit(self.strobe), seen.bit(self.done)
         watching = [(seen.bit(monitor.strobe), monitor) for monitor in monitors]
         for number, ports in events:

@@ -48,8 +48,8 @@ class Packing:
         return [((word >> offset & mask) ^ sign) - sign for word in words]
 
 
-class Record:
-    """The values of signals at some clocks.
+class Rows:
+    """The values of signals at some clocks, a row for each.
 
     Attributes:
         names: the signals, in the order of a row.
@@ -67,7 +67,7 @@ class Record:
 
     @property
     def rows(self) -> list[tuple[int, ...]]:
-        """Return the values in the order of `names`, record by record."""
+        """Return the values in the order of `names`, row by row."""
         return list(zip(*(self._packing.column(name, self._words) for name in self.names), strict=True))
 
     def column(self, name: str) -> np.ndarray:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .packing import Record
+from .packing import Rows
 
 
 class Wrong(AssertionError):
@@ -17,7 +17,7 @@ class Wrong(AssertionError):
             Path(left).write_text(str(sample), encoding="ascii")
 
 
-def check(inputs: Record, outputs: Record, expected: dict[str, np.ndarray], latency: int | None = None) -> None:
+def check(inputs: Rows, outputs: Rows, expected: dict[str, np.ndarray], latency: int | None = None) -> None:
     """Compare every recorded output with the model's, exactly; fail on a lost or an extra output, or on none at all.
 
     Args:

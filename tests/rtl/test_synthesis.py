@@ -1,4 +1,4 @@
-"""Synthesis: its report, and its messages on failure. Full runs on both devices are `make synth`."""
+"""Synthesis: its report, and its messages on failure. Full runs on both parts are `make synth`."""
 
 import importlib.util
 import sys
@@ -11,7 +11,7 @@ from hardwall.hdl.board import Board
 from hardwall.model import quadrature
 from hardwall.sim.jobs.whole_folder import LIST
 from hardwall.sim.rtl import synthesis
-from hardwall.sim.rtl.synthesis import DEVICES, SynthesisError, synthesise
+from hardwall.sim.rtl.synthesis import PARTS, SynthesisError, synthesise
 from hardwall.sim.scene.load import load
 from hardwall.sim.studies import costs
 from stimuli.reports import check
@@ -58,7 +58,7 @@ def tools(tmp_path, monkeypatch) -> Path:
     """
     calls, programs = tmp_path / "calls", tmp_path / "bin"
     programs.mkdir()
-    for name in (synthesis.YOSYS, *(device.nextpnr[0] for device in DEVICES.values())):
+    for name in (synthesis.YOSYS, *(part.nextpnr[0] for part in PARTS.values())):
         (programs / name).write_text(TOOL.format(python=sys.executable, calls=str(calls)))
         (programs / name).chmod(0o755)
     monkeypatch.setattr(synthesis, "TOOLS", programs)
@@ -67,7 +67,7 @@ def tools(tmp_path, monkeypatch) -> Path:
     return calls
 
 
-def test_report_of_a_device_that_nextpnr_knows(tools):
+def test_report_of_a_part_that_nextpnr_knows(tools):
     report = placed(load("mhz"), "ecp5-25k", (5, 9, 6))
     axis = load("mhz").spec
     latency = axis.design.latency_to_drive
@@ -184,9 +184,9 @@ def test_absent_constraints_are_one_line(tools, monkeypatch, tmp_path):
     assert not tools.exists(), "no tool was called"
 
 
-@pytest.mark.parametrize("device", DEVICES.values(), ids=DEVICES)
-def test_constraints_place_every_port_once(device):
-    path = files("hardwall.constraints") / device.constraints[0]
+@pytest.mark.parametrize("part", PARTS.values(), ids=PARTS)
+def test_constraints_place_every_port_once(part):
+    path = files("hardwall.constraints") / part.constraints[0]
     words = [line.partition("#")[0].split() for line in path.read_text().splitlines()]
     if path.suffix == ".lpf":
         placed = [(line[2], line[4].rstrip(";")) for line in words if line[:2] == ["LOCATE", "COMP"]]
@@ -197,8 +197,8 @@ def test_constraints_place_every_port_once(device):
     assert sorted(ports) == sorted(Board(spec("mhz")).signature.members)
     assert len(set(pins)) == len(pins)
     # A run uses all constraints of the file except the frequency, which comes from the scene.
-    assert device.frequency in path.read_text()
-    assert device.frequency not in synthesis._constraints(device)
+    assert part.frequency in path.read_text()
+    assert part.frequency not in synthesis._constraints(part)
 
 
 # Place and route takes hundreds of megabytes, which `make test` does not install.

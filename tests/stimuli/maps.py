@@ -4,7 +4,7 @@ from hardwall.sim.walls.zwidth import Effort
 
 
 class Known:
-    """A `zwidth.Mapping` without maps; subclasses add them."""
+    """A `zwidth.Mapper` without maps; subclasses add them."""
 
     def effort(self) -> Effort:
         return Effort("fixed", 0, 0.0)

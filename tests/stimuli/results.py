@@ -11,7 +11,7 @@ from hardwall.sim.studies import bits, cutoff, drop, gains, lipschitz, rates, sh
 from hardwall.sim.studies.accuracy import Accuracy
 from hardwall.sim.studies.drop_result import Drop, End, Law, Shaken
 from hardwall.sim.studies.zwidth import ZWidth
-from hardwall.sim.walls.boundary import Edge
+from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.chatter import Chatter
 from hardwall.sim.walls.hit import Hit
 from hardwall.sim.walls.methods import methods
@@ -44,8 +44,9 @@ def map_of(method: str, stiffest_n_per_m: float, last_n_s_per_m: float, case: Ca
         case = Case(curve.label, "seed-2011", read("seed-2011"), curve.changes)
     dampings = np.linspace(6, 300, 15)
     heights = stiffest_n_per_m * np.sin(np.pi * np.clip(dampings / last_n_s_per_m, 0, 1))
-    edges = [Edge(b, k, k + 1e3) for b, k in zip(dampings.tolist(), heights.round(-3).tolist(), strict=True)]
-    return Map(case, edges, 40, [True] * len(edges))
+    walls = zip(dampings.tolist(), heights.round(-3).tolist(), strict=True)
+    boundary = [BoundaryPoint(b, k, k + 1e3) for b, k in walls]
+    return Map(case, boundary, 40, [True] * len(boundary))
 
 
 def zwidth(maps: list[Map]) -> ZWidth:
@@ -87,7 +88,7 @@ def devices() -> cutoff.Cutoffs:
     found = []
     for best in (500, 4000):
         own = {hz: map_of("fdm-500", 1e5 / (1 + np.log(hz / best) ** 2), 200) for hz in (30.0, 100.0, 500.0, 4000.0)}
-        found.append(cutoff.Device(scene, own, map_of("fdm-500", 4e4, 200)))
+        found.append(cutoff.Optimum(scene, own, map_of("fdm-500", 4e4, 200)))
     return cutoff.Cutoffs(found, NOTHING)
 
 

@@ -8,7 +8,7 @@ import pytest
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, names, read
 from hardwall.sim.studies import cutoff
-from hardwall.sim.walls.boundary import Edge
+from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.zwidth import Map
 from stimuli.command_line import call
 from stimuli.maps import Known
@@ -16,9 +16,8 @@ from stimuli.maps import Known
 
 def map_of(case: Case, area: float, leaves: bool = False) -> Map:
     """Return a map that has the given area."""
-    return Map(
-        case, [Edge(0.0, area, None if leaves else 2 * area), Edge(1.0, area, 1.0), Edge(1.0, 0.0, 1.0)], 1, [None] * 3
-    )
+    first = BoundaryPoint(0.0, area, None if leaves else 2 * area)
+    return Map(case, [first, BoundaryPoint(1.0, area, 1.0), BoundaryPoint(1.0, 0.0, 1.0)], 1, [None] * 3)
 
 
 def cutoff_of(case: Case) -> float | None:
@@ -44,44 +43,44 @@ def staircase(cutoff_hz: float | None) -> float:
 
 def test_the_top_of_a_staircase_is_found_between_the_sweep_s_cutoffs():
     known = Areas(staircase)
-    (device,) = cutoff.study([Case.of("seed-2011")], known).devices
+    (optimum,) = cutoff.study([Case.of("seed-2011")], known).optima
     sweep, *search = known.calls
     assert set(cutoff.PAPERS_HZ) < set(sweep)
     assert (min(sweep[:-1]), max(sweep[:-1]), sweep[-1]) == (30.0, 4000.0, None)
     assert [len(each) for each in search] == [1] * len(search)
     assert 2 < len(search) <= cutoff.EVALUATIONS
-    assert device.best.area == 49 > max(staircase(each) for each in sweep[:-1])
+    assert optimum.best.area == 49 > max(staircase(each) for each in sweep[:-1])
     # 1000 and 1400 Hz are on the same step, and the lower one is taken.
     assert staircase(1000) == staircase(1400) == max(staircase(each) for each in sweep[:-1])
     assert all(700 < each < 1400 for (each,) in search)
-    assert list(device.maps) == sorted({*sweep[:-1], *(each for (each,) in search)})
-    assert (device.at_end, device.unfiltered.area) == (False, 7.0)
+    assert list(optimum.maps) == sorted({*sweep[:-1], *(each for (each,) in search)})
+    assert (optimum.at_end, optimum.unfiltered.area) == (False, 7.0)
 
 
 @pytest.mark.parametrize("top_hz", [1200.0, 433.0, 77.0])
 def test_the_search_closes_in_on_the_top(top_hz):
     known = Areas(lambda cutoff_hz: 1e4 - 1e4 * math.log((cutoff_hz or 1.0) / top_hz) ** 2)
-    (device,) = cutoff.study([Case.of("seed-2011")], known).devices
-    assert device.best_hz == pytest.approx(top_hz, rel=cutoff.TOLERANCE)
+    (optimum,) = cutoff.study([Case.of("seed-2011")], known).optima
+    assert optimum.best_hz == pytest.approx(top_hz, rel=cutoff.TOLERANCE)
 
 
 def test_an_area_that_still_rises_where_the_rate_ends_is_said_to():
-    (device,) = cutoff.study([Case.of("desktop-arm")], Areas(lambda cutoff_hz: cutoff_hz or 1e4)).devices
-    assert (device.best_hz, device.at_end) == (400.0, True)
-    assert device.report()["best_is_at_the_end"] is True
+    (optimum,) = cutoff.study([Case.of("desktop-arm")], Areas(lambda cutoff_hz: cutoff_hz or 1e4)).optima
+    assert (optimum.best_hz, optimum.at_end) == (400.0, True)
+    assert optimum.report()["best_is_at_the_end"] is True
 
 
 def test_nothing_stable_is_not_searched():
     known = Areas(lambda _: 0.0)
-    (device,) = cutoff.study([Case.of("maglev")], known).devices
-    assert (len(known.calls), device.best.area) == (1, 0.0)
+    (optimum,) = cutoff.study([Case.of("maglev")], known).optima
+    assert (len(known.calls), optimum.best.area) == (1, 0.0)
 
 
 def test_every_scene_is_swept_at_once_and_has_its_own():
     known = Areas(staircase)
-    devices = cutoff.study([Case.of(name, {"handle.mass_kg": 0.5}) for name in cutoff.SCENES], known).devices
-    assert [(each.scene.name, each.scene.handle.mass_kg) for each in devices] == [(name, 0.5) for name in cutoff.SCENES]
-    assert len(known.calls[0]) == sum(len(each.maps) + 1 for each in devices) - len(known.calls[1:])
+    optima = cutoff.study([Case.of(name, {"handle.mass_kg": 0.5}) for name in cutoff.SCENES], known).optima
+    assert [(each.scene.name, each.scene.handle.mass_kg) for each in optima] == [(name, 0.5) for name in cutoff.SCENES]
+    assert len(known.calls[0]) == sum(len(each.maps) + 1 for each in optima) - len(known.calls[1:])
 
 
 @pytest.mark.parametrize(
@@ -95,8 +94,8 @@ def test_every_scene_is_swept_at_once_and_has_its_own():
 )
 def test_as_good_is_what_is_within_a_twentieth(areas, low, high):
     maps = {cutoff_hz: map_of(Case("", "seed-2011", "", {}), area) for cutoff_hz, area in areas.items()}
-    device = cutoff.Device(load("seed-2011"), maps, maps[200.0])
-    assert device.level_hz == pytest.approx((low, high), rel=1e-12)
+    optimum = cutoff.Optimum(load("seed-2011"), maps, maps[200.0])
+    assert optimum.level_hz == pytest.approx((low, high), rel=1e-12)
 
 
 def verdict(changes: dict, stiffness: float, damping: float, **_) -> dict:
@@ -166,6 +165,6 @@ def test_two_files_of_one_name_are_two_devices(tmp_path):
         def __call__(self, title: str, cases: list[Case]) -> list[Map]:
             return [map_of(case, 100 * case.scene.handle.mass_kg) for case in cases]
 
-    devices = cutoff.study([Case.of(str(path)) for path in paths], OfMass()).devices
-    assert [round(device.best.area) for device in devices] == [35, 70]
-    assert [round(device.unfiltered.area) for device in devices] == [35, 70]
+    optima = cutoff.study([Case.of(str(path)) for path in paths], OfMass()).optima
+    assert [round(optimum.best.area) for optimum in optima] == [35, 70]
+    assert [round(optimum.unfiltered.area) for optimum in optima] == [35, 70]

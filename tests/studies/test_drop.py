@@ -10,7 +10,7 @@ from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.studies import drop
 from hardwall.sim.studies.drop_result import Drop, Law
-from hardwall.sim.walls.boundary import Edge
+from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.chatter import Chatter
 from hardwall.sim.walls.methods import methods
 from hardwall.sim.walls.zwidth import Effort, Map
@@ -111,7 +111,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("edges", "part"),
+    ("stiffnesses", "part"),
     [
         ([40, 50, 10, 0], 1.0),
         ([50, 30, 20, 10, 0], 0.4),
@@ -120,9 +120,10 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         ([0], None),
     ],
 )
-def test_k_before_the_end_is_that_of_the_last_wall_but_one(edges, part):
+def test_k_before_the_end_is_that_of_the_last_wall_but_one(stiffnesses, part):
     case = Case("", "seed-2011", "", {})
-    found = Map(case, [Edge(10.0 * n, 1e3 * k, None) for n, k in enumerate(edges)], 1, [None] * len(edges))
+    boundary = [BoundaryPoint(10.0 * n, 1e3 * k, None) for n, k in enumerate(stiffnesses)]
+    found = Map(case, boundary, 1, [None] * len(boundary))
     assert Drop(load("seed-2011"), {}, [], [], [], {"adjusted": found}, NOTHING).before_the_end("adjusted") == part
 
 

@@ -9,7 +9,7 @@ import pytest
 from hardwall.sim.scene.case import Case
 from hardwall.sim.studies import fit
 from hardwall.sim.walls import methods
-from hardwall.sim.walls.boundary import Edge
+from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.figure_5 import Fact
 from hardwall.sim.walls.grid import grid_of
 from hardwall.sim.walls.zwidth import Map, NeverReached
@@ -32,7 +32,7 @@ def largest_n_per_m(method: str, changes: dict, damping: float) -> float:
     return 1e3 * PAPER[method][max(place, 0)] * stiffer if inside or place < 0 else 0.0
 
 
-class Device(Known):
+class KnownDevice(Known):
     """Maps of a known device."""
 
     def __init__(self):
@@ -43,21 +43,21 @@ class Device(Known):
         return [self._map(case) for case in cases]
 
     def _map(self, case: Case) -> Map:
-        edges = []
+        boundary = []
         for damping in grid_of(case.scene).dampings:
             stiffness = largest_n_per_m(NAMES[case.label], case.changes, damping)
-            edges.append(Edge(damping, stiffness, stiffness + 1e3))
+            boundary.append(BoundaryPoint(damping, stiffness, stiffness + 1e3))
             if not stiffness:
                 break
-        return Map(case, edges, 1, [True] * len(edges))
+        return Map(case, boundary, 1, [True] * len(boundary))
 
 
-def found(evaluations: int, mapping: Device, seed: int = 1) -> fit.Fit:
-    return fit.study(Case.of("seed-2011"), "3-30", evaluations, seed, mapping, lambda done: None)
+def found(evaluations: int, mapper: KnownDevice, seed: int = 1) -> fit.Fit:
+    return fit.study(Case.of("seed-2011"), "3-30", evaluations, seed, mapper, lambda done: None)
 
 
 def test_a_known_device_is_found_again():
-    known = Device()
+    known = KnownDevice()
     result = found(240, known)
     assert result.before.held < 8
     best = result.finalists[0]
@@ -80,12 +80,12 @@ def test_a_known_device_is_found_again():
 
 
 def test_a_search_is_its_seed_s():
-    first, again, other = (found(24, Device(), seed).trials for seed in (1, 1, 2))
+    first, again, other = (found(24, KnownDevice(), seed).trials for seed in (1, 1, 2))
     assert [each.values for each in first] == [each.values for each in again] != [each.values for each in other]
 
 
 def test_both_the_map_of_a_trial_and_its_judgement_have_the_trial_s_alpha():
-    known = Device()
+    known = KnownDevice()
     result = found(24, known)
     key = "controller.gains.levant"
     for case in known.cases:
@@ -170,9 +170,9 @@ def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, mes
 
 
 def test_nothing_stable_is_far_off():
-    class Nothing(Device):
+    class Nothing(KnownDevice):
         def _map(self, case: Case) -> Map:
-            return Map(case, [Edge(3.0, 0.0, 1e3)], 1, [False])
+            return Map(case, [BoundaryPoint(3.0, 0.0, 1e3)], 1, [False])
 
     result = found(24, Nothing())
     assert all(trial.off_b == fit.HOPELESS for trial in result.trials)
@@ -181,7 +181,7 @@ def test_nothing_stable_is_far_off():
 
 
 def test_a_device_that_does_not_reach_the_wall_ends_no_search():
-    class Rough(Device):
+    class Rough(KnownDevice):
         def _map(self, case: Case) -> Map:
             if case.scene.handle.coulomb_n > 0.1:
                 raise NeverReached("the handle did not reach the wall: nothing is said of K 1000, B 3")

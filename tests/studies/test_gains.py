@@ -9,7 +9,7 @@ import pytest
 from hardwall.model.estimators.levant import Gains
 from hardwall.sim.scene.case import Case
 from hardwall.sim.studies import gains
-from hardwall.sim.walls.boundary import Edge
+from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.zwidth import Map
 from stimuli.command_line import call
 from stimuli.maps import Known
@@ -39,7 +39,7 @@ class Areas(Known):
     def map_of(self, case: Case) -> Map:
         pair = case.changes["controller.gains.levant"]
         area = self.area(case.changes["controller.output"], pair["lambda_sqrt_m_per_s"], pair["alpha_m_per_s2"])
-        return Map(case, [Edge(b, area, 2 * area) for b in (0.0, 1.0)], 1, [pair["alpha_m_per_s2"] < 20] * 2)
+        return Map(case, [BoundaryPoint(b, area, 2 * area) for b in (0.0, 1.0)], 1, [pair["alpha_m_per_s2"] < 20] * 2)
 
 
 def hill(output: str, lam: float, alpha: float) -> float:

@@ -8,7 +8,7 @@ from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load
 from hardwall.sim.studies import rates
 from hardwall.sim.walls import methods, theory
-from hardwall.sim.walls.boundary import Edge
+from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.zwidth import Map
 from stimuli.command_line import call
 from stimuli.maps import Known
@@ -30,7 +30,7 @@ class OneWall(Known):
 
     def __call__(self, title, cases):
         self.seen.extend(cases)
-        return [Map(case, [Edge(10.0, k := next(self._values), k + 1)], 1, [True]) for case in cases]
+        return [Map(case, [BoundaryPoint(10.0, k := next(self._values), k + 1)], 1, [True]) for case in cases]
 
 
 def test_each_method_is_mapped_at_the_scene_s_rates_and_at_each():
@@ -62,9 +62,9 @@ def test_each_part_lowers_the_linear_limit_and_without_any_it_grows_with_the_rat
 
 
 def test_a_map_that_k_leaves_has_no_ratio_and_no_end():
-    edge, clipped = Edge(10.0, 50e3, 60e3), Edge(10.0, 500e3, None)
-    for own, last in ((clipped, edge), (edge, clipped)):
-        maps = [Map(None, [each], 1, [True]) for each in (own, edge, last)]
+    within, clipped = BoundaryPoint(10.0, 50e3, 60e3), BoundaryPoint(10.0, 500e3, None)
+    for own, last in ((clipped, within), (within, clipped)):
+        maps = [Map(None, [each], 1, [True]) for each in (own, within, last)]
         gain = rates.Gain("fdm", [1_000, 10_000], maps[0], maps[1:])
         assert gain.ratio is None
         assert gain.report()["clipped"] == [False, last is clipped]

@@ -1,16 +1,16 @@
-"""Tracing of a stable region: the walls hit and the edges found, on known regions."""
+"""Tracing of a stable region: the walls hit and the boundaries found, on known regions."""
 
 from dataclasses import replace
 
 import pytest
 
-from hardwall.sim.walls.boundary import Edge, Grid, area, trace
+from hardwall.sim.walls.boundary import BoundaryPoint, Grid, area, trace
 
 GRID = Grid(10.0, 100.0, 1.0, 6.0, 0.5)
 
 
-def traced(stable, grid: Grid = GRID) -> tuple[list[Edge], list[tuple[float, float]]]:
-    """Return the edges, and the walls that were hit, for a region given by a function of K and B."""
+def traced(stable, grid: Grid = GRID) -> tuple[list[BoundaryPoint], list[tuple[float, float]]]:
+    """Return the boundary, and the walls that were hit, for a region given by a function of K and B."""
     steps, asked = trace(grid), []
     try:
         wall = next(steps)
@@ -26,15 +26,15 @@ def limit(damping: float) -> float:
     return 5 + 30 * damping - 5.5 * damping**2
 
 
-def test_the_edge_is_found_on_the_grid_and_no_wall_is_hit_twice():
-    edges, asked = traced(lambda stiffness, damping: stiffness <= limit(damping))
+def test_the_boundary_is_found_on_the_grid_and_no_wall_is_hit_twice():
+    boundary, asked = traced(lambda stiffness, damping: stiffness <= limit(damping))
     assert len(asked) == len(set(asked))
-    assert edges[-1].stable_n_per_m == 0
-    assert [edge.damping_n_s_per_m for edge in edges] == GRID.dampings[: len(edges)]
-    for edge in edges:
-        exact = max(limit(edge.damping_n_s_per_m), 0)
-        assert edge.stable_n_per_m == exact // 10 * 10
-        assert edge.marginal_n_per_m == edge.stable_n_per_m + 10
+    assert boundary[-1].stable_n_per_m == 0
+    assert [point.damping_n_s_per_m for point in boundary] == GRID.dampings[: len(boundary)]
+    for point in boundary:
+        exact = max(limit(point.damping_n_s_per_m), 0)
+        assert point.stable_n_per_m == exact // 10 * 10
+        assert point.marginal_n_per_m == point.stable_n_per_m + 10
 
 
 def test_the_walls_are_hit_in_the_order_of_the_paper():
@@ -46,31 +46,31 @@ def test_the_walls_are_hit_in_the_order_of_the_paper():
 
 
 def test_a_region_that_leaves_the_map_has_no_marginal_wall_there():
-    edges, asked = traced(lambda *_: True)
-    assert {edge.stable_n_per_m for edge in edges} == {100.0}
-    assert {edge.marginal_n_per_m for edge in edges} == {None}
+    boundary, asked = traced(lambda *_: True)
+    assert {point.stable_n_per_m for point in boundary} == {100.0}
+    assert {point.marginal_n_per_m for point in boundary} == {None}
     assert len(asked) == 10 + len(GRID.dampings) - 1
 
 
 def test_nothing_stable_is_looked_for_at_every_damping():
-    edges, asked = traced(lambda *_: False)
-    assert edges == [Edge(damping, 0.0, 10.0) for damping in GRID.dampings]
+    boundary, asked = traced(lambda *_: False)
+    assert boundary == [BoundaryPoint(damping, 0.0, 10.0) for damping in GRID.dampings]
     assert asked == [(stiffness, damping) for damping in GRID.dampings for stiffness in (10.0, 20.0, 40.0, 80.0)]
 
 
 def test_a_region_that_begins_at_a_stiffer_wall_of_a_larger_damping_is_found():
-    edges, asked = traced(lambda stiffness, damping: 30 <= stiffness <= 70 and damping >= 2)
-    assert [edge.stable_n_per_m for edge in edges] == [0.0, 0.0, *[70.0] * 9]
+    boundary, asked = traced(lambda stiffness, damping: 30 <= stiffness <= 70 and damping >= 2)
+    assert [point.stable_n_per_m for point in boundary] == [0.0, 0.0, *[70.0] * 9]
     assert asked[8:15] == [(10, 2), (20, 2), (40, 2), (50, 2), (60, 2), (70, 2), (80, 2)]
 
 
-def test_walls_below_the_edge_are_hit_last_and_counted():
-    """Four walls, a fifth of K apart, are hit below the edge; the walls under 30 are not stable."""
-    edges, asked = traced(lambda stiffness, _: 30 <= stiffness <= 70, replace(GRID, walls_below=4))
-    assert {edge.held for edge in edges} == {0.75}
+def test_walls_below_the_boundary_are_hit_last_and_counted():
+    """Four walls, a fifth of K apart, are hit below the boundary; the walls under 30 are not stable."""
+    boundary, asked = traced(lambda stiffness, _: 30 <= stiffness <= 70, replace(GRID, walls_below=4))
+    assert {point.held for point in boundary} == {0.75}
     assert asked[-4:] == [(10, 6), (30, 6), (40, 6), (60, 6)]
     soft, _ = traced(lambda stiffness, _: stiffness <= 10, replace(GRID, walls_below=4))
-    assert {edge.held for edge in soft} == {None}, "there is no wall below the softest"
+    assert {point.held for point in soft} == {None}, "there is no wall below the softest"
 
 
 def test_rows_go_to_the_last_whole_step():
@@ -79,9 +79,9 @@ def test_rows_go_to_the_last_whole_step():
 
 
 def test_area_is_that_of_trapezoids():
-    edges = [Edge(1.0, 10.0, None), Edge(3.0, 30.0, None), Edge(4.0, 0.0, None)]
-    assert area(edges) == 2 * 20 + 15
-    assert area(edges[:1]) == 0
+    boundary = [BoundaryPoint(1.0, 10.0, None), BoundaryPoint(3.0, 30.0, None), BoundaryPoint(4.0, 0.0, None)]
+    assert area(boundary) == 2 * 20 + 15
+    assert area(boundary[:1]) == 0
 
 
 @pytest.mark.parametrize(("last", "count"), [(1.0, 1), (1.2, 1), (1.4999, 1), (1.5, 2), (6.0, 11)])

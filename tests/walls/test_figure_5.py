@@ -7,7 +7,7 @@ import pytest
 
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load
-from hardwall.sim.walls.boundary import Edge
+from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.figure_5 import facts
 from hardwall.sim.walls.methods import methods
 from hardwall.sim.walls.zwidth import Map
@@ -16,10 +16,10 @@ from stimuli.figure_5 import PAPER
 
 # As in the paper's figure: K (kN/m) at B = 10, 20 ... N s/m.
 def maps(others: dict[str, list[int]]) -> dict[str, Map]:
-    def edges(stiffness: list[int]) -> list[Edge]:
-        return [Edge(10.0 * (n + 1), 1e3 * k, 1e3 * (k + 1)) for n, k in enumerate(stiffness)]
+    def boundary(stiffness: list[int]) -> list[BoundaryPoint]:
+        return [BoundaryPoint(10.0 * (n + 1), 1e3 * k, 1e3 * (k + 1)) for n, k in enumerate(stiffness)]
 
-    return {name: Map(Case(name, "", "", {}), edges(k), 10, [True] * len(k)) for name, k in (PAPER | others).items()}
+    return {name: Map(Case(name, "", "", {}), boundary(k), 10, [True] * len(k)) for name, k in (PAPER | others).items()}
 
 
 def lost(others: dict[str, list[int]]) -> set[int]:

@@ -15,7 +15,7 @@ from hardwall.sim.jobs.store import Store
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.walls import hit, methods, zwidth
-from hardwall.sim.walls.boundary import Edge
+from hardwall.sim.walls.boundary import BoundaryPoint
 from stimuli import results
 from stimuli.command_line import call
 from stimuli.processes import HARDWALL, ended_by, session, started, wait_until
@@ -118,21 +118,21 @@ def test_the_rtl_gives_the_map_of_fixed(monkeypatch, capsys):
     assert fixed[0]["hits"] > 2
 
 
-def test_walls_below_the_edge_are_hit_where_the_scene_asks():
+def test_walls_below_the_boundary_are_hit_where_the_scene_asks():
     """At 90 N s/m and more, Levant's chatter shakes soft walls but not stiff walls."""
     changes = {**METHODS[1].changes, "zwidth.walls_below": 8, "zwidth.stiffness_step_n_per_m": 4e3}
     changes |= {"zwidth.damping_from_n_s_per_m": 90.0, "zwidth.damping_to_n_s_per_m": 100.0}
     changes |= {"zwidth.damping_step_n_s_per_m": 10.0}
     (found,) = zwidth.run([replace(CASES[1], changes=changes)], "fixed", Store("zwidth"))
-    left, right = (edge.held * edge.stable_n_per_m for edge in found.edges)
-    assert all(0 < edge.held < 1 for edge in found.edges)
+    left, right = (point.held * point.stable_n_per_m for point in found.boundary)
+    assert all(0 < point.held < 1 for point in found.boundary)
     assert found.report()["area_held_n2_s_per_m2"] == found.area_held == pytest.approx(10 * (left + right) / 2)
-    assert replace(found, edges=[replace(edge, held=None) for edge in found.edges]).area_held is None
+    assert replace(found, boundary=[replace(point, held=None) for point in found.boundary]).area_held is None
 
 
 def test_walls_out_of_place_are_left_out_of_the_area_in_place():
-    edges = [Edge(10.0 * n, 20e3, 21e3) for n in range(5)]
-    found = zwidth.Map(CASES[0], edges, 5, [True, True, False, True, True])
+    boundary = [BoundaryPoint(10.0 * n, 20e3, 21e3) for n in range(5)]
+    found = zwidth.Map(CASES[0], boundary, 5, [True, True, False, True, True])
     assert found.area == 40 * 20e3
     # Two of the four trapezoids lose half of their area.
     assert found.area_in_place == 30 * 20e3
@@ -140,7 +140,7 @@ def test_walls_out_of_place_are_left_out_of_the_area_in_place():
 
 def test_a_map_knows_which_of_its_walls_are_in_place(map_of_one_process):
     filtered = map_of_one_process[0]
-    assert filtered.in_place == [edge.stable_n_per_m > 0 for edge in filtered.edges]
+    assert filtered.in_place == [point.stable_n_per_m > 0 for point in filtered.boundary]
     assert filtered.area_in_place == filtered.area > 0
     large = {"controller.gains.levant": {"lambda_sqrt_m_per_s": 100.0, "alpha_m_per_s2": 560.0}}
     (chatters,) = zwidth.run([replace(CASES[1], changes=CASES[1].changes | large)], "fixed", Store("zwidth"))
@@ -216,7 +216,7 @@ def test_a_scene_of_a_file_need_not_be_there_any_more(tmp_path, map_of_one_proce
     cases = [replace(case, source=str(file), text=read(str(file))) for case in CASES]
     file.unlink()
     maps = zwidth.run(cases, "fixed", Store("zwidth"))
-    assert [each.edges for each in maps] == [each.edges for each in map_of_one_process]
+    assert [each.boundary for each in maps] == [each.boundary for each in map_of_one_process]
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -244,5 +244,5 @@ def test_the_columns_of_the_table_that_need_it_are_explained():
     said = [note.partition(":")[0] for note in result.notes()]
     assert said[:3] == ["area", "in place", "to B"]
     assert all(any(heading.startswith(word) for heading in headings) for word in said[:3])
-    held = replace(result.maps[0], edges=[replace(edge, held=0.5) for edge in result.maps[0].edges])
+    held = replace(result.maps[0], boundary=[replace(point, held=0.5) for point in result.maps[0].boundary])
     assert "held" in [note.partition(":")[0] for note in results.zwidth([held]).notes()]
