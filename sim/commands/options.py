@@ -10,13 +10,14 @@ import typer
 from ...model.checks import shown
 from ...model.estimators import registry
 from ..estimates.accuracy import RATES_HZ, outputs
+from ..rtl.parts import PARTS
 from ..scene.load import names, toml_of
 from ..walls.methods import Curve, label
 from .errors import BadInput
 
 Estimator = Literal[tuple(registry.ESTIMATORS)]
 Backend = Literal["float", "fixed", "rtl"]
-Part = Literal["ecp5-25k", "ice40-up5k"]
+Part = Literal[tuple(PARTS)]
 
 
 def _scenes(incomplete: str) -> list[str]:

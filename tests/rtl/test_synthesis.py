@@ -11,7 +11,8 @@ from hardwall.hdl.board import Board
 from hardwall.model import quadrature
 from hardwall.sim.jobs.whole_folder import LIST
 from hardwall.sim.rtl import synthesis
-from hardwall.sim.rtl.synthesis import PARTS, SynthesisError, synthesise
+from hardwall.sim.rtl.parts import PARTS
+from hardwall.sim.rtl.synthesis import SynthesisError, synthesise
 from hardwall.sim.scene.load import load
 from hardwall.sim.studies import costs
 from stimuli.reports import check
@@ -182,6 +183,10 @@ def test_absent_constraints_are_one_line(tools, monkeypatch, tmp_path):
     with pytest.raises(SynthesisError, match=r"^constraints/ulx3s-25f\.lpf is not installed, and [^\n]*$"):
         placed(load("mhz"), "ecp5-25k")
     assert not tools.exists(), "no tool was called"
+
+
+def test_every_part_has_rates_that_it_is_fast_enough_for():
+    assert list(costs.RATES) == list(PARTS)
 
 
 @pytest.mark.parametrize("part", PARTS.values(), ids=PARTS)
