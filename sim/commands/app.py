@@ -1,11 +1,10 @@
 """The command line. Results go to stdout, everything else to stderr.
 
 The exit codes are 0, 1 for a failed run, 2 for bad input, 130 after SIGINT, 143 after SIGTERM, and 141 if stdout was
-closed early. This module imports nothing that comes with an extra, so that it can name an extra that is not installed.
+closed early. This module imports nothing that comes with an extra, so that it can name an extra that is not installed,
+and nothing that takes long: until `main` hears signals, an interrupt is a traceback of Python.
 """
 
-import importlib.metadata
-import re
 import sys
 from importlib import import_module
 
@@ -17,9 +16,9 @@ from .errors import BadInput, one_line
 
 def main() -> None:
     """Run the command line; report every failure as one line on stderr and an exit code."""
-    streams.prepare()
-    ending.begin()
     ending.hear_signals()
+    ending.begin()
+    streams.prepare()
     code, message = _run()
     try:
         sys.stdout.flush()
@@ -39,7 +38,7 @@ def _run() -> tuple[int, str]:
     except (BadInput, SceneError) as error:
         return 2, str(error)
     except ModuleNotFoundError as error:
-        extra = _extra_of(error.name)
+        extra = import_module(".extras", __package__).extra_of(error.name)
         if extra is None:
             raise
         return 1, f"{error.name} is not installed: it comes with pip install 'hardwall[{extra}]'"
@@ -50,13 +49,3 @@ def _run() -> tuple[int, str]:
     except SystemExit as exit_:
         return exit_.code or 0, ""
     return 0, ""
-
-
-def _extra_of(module: str | None) -> str | None:
-    """Return the extra of this project that installs a module; None if no extra does."""
-    name = (module or "").partition(".")[0].replace("_", "-").lower()
-    for requirement in importlib.metadata.requires("hardwall") or []:
-        match = re.fullmatch(r"([\w-]+)==.*extra == ['\"](\w+)['\"]", requirement)
-        if match and match[1].replace("_", "-").lower() == name:
-            return match[2]
-    return None

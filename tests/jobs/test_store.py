@@ -44,6 +44,17 @@ def test_a_line_that_was_cut_off_is_no_result_and_spoils_none():
     assert Store("some").get({"a": 2}) == 2
 
 
+def test_a_pipe_in_the_place_of_the_store_is_not_waited_for(caplog):
+    path = Store("some").path
+    path.parent.mkdir()
+    os.mkfifo(path)
+    kept = Store("some")
+    kept.put({"a": 1}, 1)
+    assert kept.get({"a": 1}) == 1
+    (said,) = caplog.messages
+    assert said.endswith("cannot be written (No such device or address): what this run makes is not kept")
+
+
 NO_RESULTS = {
     "a number": b"5", "a list": b"[1]", "nothing": b"null", "a text": b'"abc"',
     "an object": b'{"a": 1, "b": 2, "c": 3}',
