@@ -13,14 +13,17 @@ unfinished: set[Path] = set()
 def whole_file(path: str | Path) -> Iterator[Path]:
     """Provide a temporary file beside `path` to write to; rename it to `path` once it is complete.
 
+    A `path` that is a symbolic link stays one: the file that it leads to is written.
+
     Raises:
         OSError: if the file cannot be written; the message is one line and names the file, `strerror` is the reason.
     """
-    part = Path(path).with_name(f".part-{os.urandom(8).hex()}{Path(path).suffix}")
+    whole = Path(os.path.realpath(path))
+    part = whole.with_name(f".part-{os.urandom(8).hex()}{whole.suffix}")
     unfinished.add(part)
     try:
         yield part
-        part.replace(path)
+        part.replace(whole)
     except OSError as error:
         reason = error.strerror or str(error)
         failure = OSError(f"{path}: cannot be written ({reason})")

@@ -18,6 +18,18 @@ def test_a_file_appears_when_it_is_complete(tmp_path):
     assert unfinished == set()
 
 
+def test_a_link_stays_one_and_the_file_that_it_leads_to_is_written(tmp_path):
+    target, link = tmp_path / "folder" / "target.txt", tmp_path / "link.txt"
+    target.parent.mkdir()
+    link.symlink_to("folder/target.txt")
+    for text in ("of a link to nothing", "of a link to a file"):
+        with whole_file(link) as part:
+            part.write_text(text)
+        assert link.is_symlink()
+        assert target.read_text() == text
+    assert list(target.parent.iterdir()) == [target]
+
+
 def test_a_file_that_fails_leaves_the_old_one(tmp_path):
     path = tmp_path / "file.txt"
     path.write_text("old")

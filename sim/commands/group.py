@@ -1,6 +1,7 @@
 """The commands by name. The module of a command is imported only when the command runs, or shows its own help."""
 
 import importlib.metadata
+import os
 import sys
 from importlib import import_module
 from typing import Annotated, Any
@@ -71,6 +72,9 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
+COMPLETING = "_HARDWALL_COMPLETE"
+"""The variable with which a shell asks for completions."""
+
 app = typer.Typer(
     cls=LazyGroup,
     pretty_exceptions_enable=False,
@@ -92,6 +96,7 @@ def run() -> None:
 
     Raises:
         BadInput: if a command, an option or an argument is not valid.
+        OSError: if the current folder is needed, and was removed.
     """
     hear_stages()
     try:
@@ -99,3 +104,22 @@ def run() -> None:
     except typer.TyperException as error:
         # The words for it come from what a scene is made of, which is imported only now.
         raise BadInput(import_module(".refusal", __package__).refusal(error)) from None
+    except (KeyError, ValueError):
+        # A shell that asks without the words so far is told nothing: what is printed stands in its user's line.
+        if COMPLETING not in os.environ:
+            raise
+        sys.exit(1)
+    except FileNotFoundError as error:
+        # Python's own message names no folder.
+        if error.filename is None and not _is_somewhere():
+            raise OSError("the current folder was removed; a run needs one that exists") from None
+        raise
+
+
+def _is_somewhere() -> bool:
+    """Return whether the current folder exists; compilation needs one, even where all other paths are absolute."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return False
+    return True

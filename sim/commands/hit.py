@@ -3,6 +3,7 @@
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -45,15 +46,8 @@ def command(
     with _room_for_vcd() if waveform else nullcontext() as vcd:
         with progress(f"{of.name} {of.controller.estimator} {backend}", of.samples) as advance:
             result = hit.run(of, backend, bool(options.plot or trace), advance, vcd)
-
-        def save() -> list[Path]:
-            if waveform:
-                vcd_to_fst(vcd, waveform)
-            else:
-                result.save(trace)
-            return [trace]
-
-        options.finish(result, {"trace": save} if trace else {})
+        save = partial(vcd_to_fst, vcd) if waveform else result.save
+        options.finish(result, {"trace": (trace, save)} if trace else {})
 
 
 @contextmanager

@@ -1,6 +1,8 @@
 """The options of the commands, and the checks of their values."""
 
 import os
+import stat
+import tempfile
 from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -164,7 +166,9 @@ def within(value: float, option: str, least: float, most: float, unit: str) -> f
 def output_file(
     path: Path | None, option: str, suffixes: tuple[str, ...], other_than: Path | None = None
 ) -> Path | None:
-    """Make the folder of an output file and return its path; raise BadInput if the file could not be written.
+    """Return the path of an output file; raise BadInput if the file could not be written.
+
+    Nothing is left of the trial: the folder of the file is made when the file is written.
 
     Args:
         path: the file; None for none.
@@ -180,14 +184,15 @@ def output_file(
         if other_than is not None and path.samefile(other_than):
             raise BadInput(f"{option} must be another file than the recording, not {shown(str(path))}")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        is_new = not os.path.lexists(path)
-        if path.exists() and not path.is_file():
-            raise BadInput(f"{option} must be a regular file, not {shown(str(path))}")
-        with path.open("ab"):
+        # A link is followed, as it is when the file is written.
+        real = Path(os.path.realpath(path))
+        with suppress(FileNotFoundError, NotADirectoryError):
+            if not stat.S_ISREG(real.lstat().st_mode):
+                raise BadInput(f"{option} must be a regular file, not {shown(str(path))}")
+            with real.open("ab"):
+                pass
+        with tempfile.TemporaryFile(dir=next(folder for folder in real.parents if folder.exists())):
             pass
-        if is_new:
-            path.unlink()
     except OSError as error:
         raise BadInput(f"{option} {shown(str(path))} cannot be written: {error.strerror}") from None
     return path

@@ -37,9 +37,4 @@ def command(
             result = replay.replay(recorded, estimator, output, backend, coarsen, acceleration_max, progress=advance)
     except (recording.RecordingError, replay.ReplayError) as error:
         raise BadInput(str(error)) from None
-
-    def save() -> list[Path]:
-        result.save(out)
-        return [out]
-
-    options.finish(result, {"velocities": save} if out else {})
+    options.finish(result, {"velocities": (out, result.save)} if out else {})

@@ -3,6 +3,8 @@
 import functools
 import inspect
 import json
+import logging
+import os
 import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
@@ -14,6 +16,8 @@ from typing import Any
 from ..jobs import ending, parallel
 from ..jobs.result import Result
 from ..jobs.store import Store
+from ..pictures import SUFFIXES
+from .errors import one_line
 from .options import (
     JsonOption,
     PlotOption,
@@ -51,7 +55,7 @@ class StudyOptions:
     def __post_init__(self):
         # A picture that cannot be written is reported before anything long begins.
         if self.plot:
-            output_file(self.plot, "--plot", _picture("style").SUFFIXES)
+            output_file(self.plot, "--plot", SUFFIXES)
 
     def changes(self, **options: Any) -> dict[str, Any]:
         """Return the changes of a scene, including those of a command's other options: see `changes_of`."""
@@ -62,12 +66,12 @@ class StudyOptions:
         with progress(title, len(jobs)) as advance:
             return parallel.run(function, jobs, store, self.workers, advance)
 
-    def finish(self, result: Result, files: dict[str, Callable[[], Iterable[Path]]] | None = None) -> None:
+    def finish(self, result: Result, files: dict[str, tuple[Path, Callable[[Path], object]]] | None = None) -> None:
         """Print a result, write files of it, and draw it; whichever of these fails, the others are done.
 
         Args:
             result: the result.
-            files: functions that write files and return their paths, by what the files are.
+            files: paths, and functions that write the files there, by what the files are.
 
         Raises:
             Exception: what failed; see `_do_all`.
@@ -75,12 +79,12 @@ class StudyOptions:
         files = dict(files or {})
         if self.plot:
             # The picture is the last, because it takes longest.
-            files["picture"] = lambda: _picture("style").save_all(_picture(self.study).draw(result), self.plot)
-        _do_all([partial(self._print, result), *(partial(_write, what, write) for what, write in files.items())])
+            files["picture"] = self.plot, partial(self._draw, result)
+        _do_all([partial(self._print, result), *(partial(_write, what, *file) for what, file in files.items())])
 
     def _print(self, result: Result) -> None:
         if self.as_json:
-            print(json.dumps(result.report()))
+            print(_json_of(result.report()))
         else:
             for table in result.tables():
                 show(table)
@@ -89,10 +93,31 @@ class StudyOptions:
         # Whatever happens to the files, the result is out.
         sys.stdout.flush()
 
+    def _draw(self, result: Result, path: Path) -> list[Path]:
+        return _picture("style").save_all(_picture(self.study).draw(result), path)
 
-def _write(what: str, write: Callable[[], Iterable[Path]]) -> None:
-    for path in write():
-        log.print(f"{what}: {path}", soft_wrap=True)
+
+def _json_of(report: dict[str, Any]) -> str:
+    """Return a report as JSON.
+
+    Raises:
+        RuntimeError: if a number of it is infinite or NaN, which JSON does not have.
+    """
+    try:
+        return json.dumps(report, allow_nan=False)
+    except ValueError as error:
+        raise RuntimeError(f"the result cannot be printed as JSON: {error}") from None
+
+
+def _write(what: str, path: Path, write: Callable[[Path], object]) -> None:
+    """Write a file, or several with names of their own, whose paths `write` returns; make their folder first."""
+    try:
+        Path(os.path.realpath(path)).parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"{path}: cannot be written ({error.strerror})") from None
+    written = write(path)
+    for each in written if isinstance(written, list) else [path]:
+        log.print(one_line(f"{what}: {each}"), soft_wrap=True)
 
 
 def _do_all(steps: Iterable[Callable[[], None]]) -> None:
@@ -117,6 +142,10 @@ def _do_all(steps: Iterable[Callable[[], None]]) -> None:
 
 def _picture(name: str) -> Any:
     """Return a module of pictures; Matplotlib is loaded only if something is drawn."""
+    # Pictures go to files, whatever draws the user's windows. What Matplotlib says of its own settings and folders is
+    # not about the picture, and would stand between the lines of this program.
+    os.environ["MPLBACKEND"] = "agg"
+    logging.getLogger("matplotlib").setLevel(logging.CRITICAL)
     return import_module(f"...pictures.{name}", __name__)
 
 

@@ -19,8 +19,8 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ...model.whole_file import whole_file
+from . import SUFFIXES
 
-SUFFIXES = (".pdf", ".png", ".svg")
 PAGE_IN = 7.0
 DPI = 150
 TEXT_PT, LABEL_PT = 9.0, 8.0

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pylibfst
 
+from ...model.whole_file import whole_file
+
 _LIB, _FFI = pylibfst.lib, pylibfst.ffi
 _EXPONENTS = {"1s": 0, "1ms": -3, "1us": -6, "1ns": -9, "1ps": -12, "1fs": -15}
 
@@ -19,15 +21,17 @@ def vcd_to_fst(vcd: Path, fst: Path, most: int | None = None) -> int:
     Raises:
         OSError: if `fst` cannot be created.
     """
-    writer = _LIB.fstWriterCreate(str(fst).encode(), 1)
-    if writer == _FFI.NULL:
-        raise OSError(f"{fst}: cannot be written")
-    try:
-        with vcd.open(encoding="ascii") as lines:
-            handles = _declare(writer, lines)
-            return sum(_change(writer, handles, line.rstrip()) for line in islice(lines, most))
-    finally:
-        _LIB.fstWriterClose(writer)
+    # The library would put its file in the place of a link.
+    with whole_file(fst) as part:
+        writer = _LIB.fstWriterCreate(bytes(part), 1)
+        if writer == _FFI.NULL:
+            raise OSError("it cannot be created")
+        try:
+            with vcd.open(encoding="ascii") as lines:
+                handles = _declare(writer, lines)
+                return sum(_change(writer, handles, line.rstrip()) for line in islice(lines, most))
+        finally:
+            _LIB.fstWriterClose(writer)
 
 
 def _declare(writer, lines) -> dict[str, tuple[int, int]]:

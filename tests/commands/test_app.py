@@ -13,6 +13,7 @@ from hardwall.sim.commands.group import COMMANDS
 from hardwall.sim.commands.terminal import show
 from hardwall.sim.jobs.result import Table, Values, table_of
 from stimuli.command_line import call
+from stimuli.processes import HARDWALL
 
 HEAVY = {"numba", "numpy", "scipy", "matplotlib", "distributed", "pydantic", "amaranth"}
 WITHOUT = """
@@ -81,6 +82,24 @@ def test_a_shell_completes_commands_options_and_scenes(words, wanted):
         [sys.executable, "-c", program], env=os.environ | asked, capture_output=True, text=True, check=False
     )
     assert wanted in done.stdout.split()
+
+
+@pytest.mark.parametrize("asked", [{}, {"COMP_WORDS": "hardwall"}, {"COMP_WORDS": "hardwall", "COMP_CWORD": "abc"}])
+def test_a_shell_that_asks_wrongly_is_told_nothing(asked):
+    environ = {name: value for name, value in os.environ.items() if name not in ("COMP_WORDS", "COMP_CWORD")}
+    environ |= {"_HARDWALL_COMPLETE": "complete_bash"} | asked
+    done = subprocess.run([HARDWALL], env=environ, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", "")
+
+
+def test_a_current_folder_that_was_removed_is_said_in_a_line(tmp_path):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    command = ["bash", "-c", 'rmdir "$PWD"; exec "$0" "$@"', HARDWALL, "hit", "mhz"]
+    environ = os.environ | {"HARDWALL_BUILD": "relative"}
+    done = subprocess.run(command, cwd=gone, env=environ, capture_output=True, text=True, check=False)
+    message = "hardwall: error: the current folder was removed; a run needs one that exists\n"
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", message)
 
 
 @pytest.mark.parametrize(

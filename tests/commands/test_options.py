@@ -44,6 +44,11 @@ DIGITS = "9" * 5000
         ),
         (["hit", "--output", ""], "seed-2011: controller.output must be one of u, u1, not ''"),
         (["hit", "--plot", "pipe.png"], "--plot must be a regular file, not 'pipe.png'"),
+        (["hit", "--plot", "new/folder/x.png", "--set", "handle.mass_kg=-1"], "seed-2011: handle.mass_kg must be a"),
+        (["hit", "--plot", "r.csv/x.png"], "--plot 'r.csv/x.png' cannot be written: Not a directory"),
+        (["hit", "--plot", "/proc/none/x.png"], "--plot '/proc/none/x.png' cannot be written: No such file"),
+        (["hit", "--plot", f"{LONG}/x.png"], "--plot 'xxxx"),
+        (["replay", "absent.csv", "--column", "c", "--out", "new/x.csv"], "absent.csv: there is no such file"),
         (["hit", "--trace", "pipe.npz"], "--trace must be a regular file, not 'pipe.npz'"),
         (["hit", "--plot", f"{LONG}.png"], "--plot 'xxxx"),
         (["hit", "a\nb"], "scene must be one of desktop-arm, "),
@@ -86,6 +91,20 @@ def test_it_is_refused_in_a_short_line_before_any_work(monkeypatch, capsys, tmp_
     assert err.count("\n") == 1
     assert len(err) < 500
     assert {path.name for path in tmp_path.iterdir()} == {"pipe.png", "pipe.npz", "r.csv"}
+
+
+def test_a_link_is_followed_and_one_that_leads_nowhere_is_refused(tmp_path):
+    links = {"loop.csv": "loop.csv", "pipe.csv": "pipe", "far.csv": "new/target.csv", "near.csv": "target.csv"}
+    os.mkfifo(tmp_path / "pipe")
+    for name, target in links.items():
+        (tmp_path / name).symlink_to(target)
+    before = sorted(tmp_path.iterdir())
+    for name in ("loop.csv", "pipe.csv"):
+        with pytest.raises(BadInput, match=r"^--out must be a regular file, not "):
+            options.output_file(tmp_path / name, "--out", (".csv",))
+    for name in ("far.csv", "near.csv"):
+        assert options.output_file(tmp_path / name, "--out", (".csv",)) == tmp_path / name
+    assert sorted(tmp_path.iterdir()) == before
 
 
 @pytest.mark.parametrize(

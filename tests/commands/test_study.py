@@ -1,16 +1,24 @@
 """The end of a command: what is printed, saved and drawn, whichever of these fails."""
 
 import json
+import math
+import os
 import signal
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hardwall.sim.commands.study import _do_all
+from hardwall.sim.commands import terminal
+from hardwall.sim.commands.study import StudyOptions, _do_all, _write
+from hardwall.sim.jobs.result import Values
+from hardwall.sim.jobs.stages import logger
+from hardwall.sim.rtl.waveform import vcd_to_fst
 from stimuli import results
 from stimuli.command_line import call
-from stimuli.processes import ended, started, wait_until
+from stimuli.processes import HARDWALL, ended, started, wait_until
 
 DRAWING = """
 import sys, time
@@ -60,6 +68,64 @@ def test_an_interrupt_while_drawing_loses_neither_the_report_nor_the_trace(tmp_p
     assert (code, err.splitlines()[-2:]) == (130, ["trace: hit.npz", "hardwall: error: interrupted"])
     assert json.loads(out)["backend"] == "fixed"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["drawing", "hit.npz"]
+
+
+def test_names_of_files_stay_on_a_line_and_folders_are_made(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("hardwall.sim.walls.hit.run", lambda *_: results.hit())
+    files = "new/a\nb.npz", "other/folder/x\ny.svg"
+    code, _, err = call(monkeypatch, capsys, "hit", "--json", "--trace", files[0], "--plot", files[1])
+    assert (code, err) == (0, "trace: new/a\\nb.npz\npicture: other/folder/x\\ny.svg\n")
+    assert all(Path(file).exists() for file in files)
+
+
+def test_what_a_run_says_of_a_name_stays_on_a_line(monkeypatch, capsys):
+    monkeypatch.setattr(logger, "handlers", [])
+    terminal.hear_stages()
+    logger.info("compiling a\nb ...")
+    monkeypatch.setattr(terminal, "SILENCE_S", 0.0)
+    with terminal.progress("a\nb.csv", 2) as advance:
+        advance(1)
+    assert capsys.readouterr().err == "compiling a\\nb ...\na\\nb.csv: 50%\n"
+
+
+def test_a_folder_that_went_meanwhile_is_an_error_in_a_line(tmp_path):
+    (tmp_path / "file").touch()
+    path = tmp_path / "file" / "x.csv"
+    with pytest.raises(OSError, match=r"/file/x\.csv: cannot be written \(File exists\)$"):
+        _write("velocities", path, Path.touch)
+
+
+def test_a_waveform_goes_where_a_link_leads(tmp_path):
+    vcd, link = tmp_path / "x.vcd", tmp_path / "link.fst"
+    vcd.write_text("$timescale 1ns $end\n$var wire 1 ! a $end\n$enddefinitions $end\n#0\n1!\n#1\n0!\n")
+    link.symlink_to("target.fst")
+    assert vcd_to_fst(vcd, link) == 2
+    assert link.is_symlink()
+    assert (tmp_path / "target.fst").stat().st_size
+
+
+def test_a_number_that_json_lacks_is_an_error_in_a_line(capsys):
+    for number in (math.nan, math.inf):
+        with pytest.raises(RuntimeError, match=r"^the result cannot be printed as JSON: Out of range float values"):
+            StudyOptions(study="hit", as_json=True).finish(Values({"rms_mm": number}))
+    assert capsys.readouterr().out == ""
+
+
+def test_a_refused_call_does_not_load_what_draws(tmp_path):
+    command = [HARDWALL, "hit", "--plot", "x.png", "--set", "handle.mass_kg=-1"]
+    environ = os.environ | {"MPLCONFIGDIR": "/dev/null/none"}
+    done = subprocess.run(command, cwd=tmp_path, env=environ, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+
+
+def test_settings_of_the_user_s_windows_and_folders_are_not_in_the_way_of_a_picture(tmp_path):
+    (tmp_path / "matplotlibrc").write_text("backend: none\nno.key: 1\nlines.linewidth: thick\n")
+    program = "from hardwall.sim.commands.study import _picture; print(_picture('style').mpl.get_backend())"
+    environ = os.environ | {"MPLBACKEND": "none", "MPLCONFIGDIR": "/dev/null/none"}
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, cwd=tmp_path, env=environ, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "agg\n", "")
 
 
 def test_several_failures_are_one_error():
