@@ -7,10 +7,11 @@ from typing import Annotated
 import typer
 
 from ..estimates import figures, recording, signals
-from ..estimates.accuracy import measure, measure_recording, spec_of
-from ..estimates.replay import ReplayError, check_length
+from ..estimates.accuracy import COARSEN, measure, measure_recording, spec_of
+from ..estimates.replay import ReplayError, check_length, plan
 from ..jobs.store import Store
 from ..studies import accuracy
+from ..walls.methods import Curve
 from ..world.encoder import offsets
 from .errors import BadInput
 from .options import BackendOption, EstimatorsOption, curves_of, rates_of, within
@@ -68,7 +69,7 @@ def command(
         # Invalid input is reported before anything long begins.
         for job in jobs:
             spec_of(job)
-        files = [job | {"backend": backend} for job in _recording_jobs(curves, recorded)]
+        files = _recording_jobs(curves, recorded, backend)
         rows = options.results(f"accuracy, {backend}", measure, jobs, Store("accuracy"))
         rows += options.results(f"recordings, {backend}", measure_recording, files, Store("recordings"))
     except (ValueError, recording.RecordingError, ReplayError) as error:
@@ -92,16 +93,20 @@ def _signals(names: list[str]) -> tuple[list[str], list[tuple[str, str]]]:
     return known, recorded
 
 
-def _recording_jobs(curves: list, recorded: list[tuple[str, str]]) -> list[dict]:
-    """Return the arguments of `measure_recording` without the backend, for every estimator and recording.
+def _recording_jobs(curves: list[Curve], recorded: list[tuple[str, str]], backend: str) -> list[dict]:
+    """Return the arguments of `measure_recording` for every estimator and recording.
 
     Raises:
-        RecordingError, ReplayError: if a recording is not valid, or too short to be judged.
+        RecordingError, ReplayError: if a recording is not valid, or too short to be judged, or an estimator cannot take
+            it.
     """
     jobs = []
     for file, column in recorded:
-        check_length(recording.load(file, column))
+        counts = recording.load(file, column)
+        check_length(counts)
+        for estimator in dict.fromkeys(curve.estimator for curve in curves):
+            plan(counts, estimator, backend, COARSEN)
         content = hashlib.sha256(Path(file).read_bytes()).hexdigest()
-        keys = {"file": file, "column": column, "content": content}
+        keys = {"file": file, "column": column, "content": content, "backend": backend}
         jobs += [{"estimator": curve.estimator, "output": curve.output} | keys for curve in curves]
     return jobs

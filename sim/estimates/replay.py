@@ -15,6 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -149,17 +150,17 @@ def _one_of(name: str, value: object, accepted: tuple[str, ...]) -> None:
         raise ReplayError(f"{name} must be one of {', '.join(accepted)}, not {shown(value)}")
 
 
-def _check_speed(recording: Recording, counts: np.ndarray, count: int) -> None:
-    """Raise ReplayError, naming the sample, if a change is too fast for the pins."""
+def _check_speed(recording: Recording, counts: np.ndarray, count: int, taker: str) -> None:
+    """Raise ReplayError, naming the sample and who takes the counts, if a change is too fast for the pins."""
     steps = np.abs(np.diff(counts))
     most = min(max_edge_rate(CLOCK_MAX_HZ, GLITCH_CLOCKS) / recording.rate_hz, EDGES_MAX)
     if steps.max() > most:
         k = int(np.argmax(steps > most)) + 1
         coarse = "" if count == 1 else f" of {count}"
         raise ReplayError(
-            f"{recording.file}, column {recording.column}: on rtl the count must change by at most {int(most)}{coarse} "
-            f"in a sample at {recording.rate_hz:g} Hz (a clock of {CLOCK_MAX_HZ / 1e6:g} MHz, and {EDGES_MAX} edges), "
-            f"not by {steps[k - 1]} at sample {k}, {recording.time_s[k]:g} s"
+            f"{recording.file}, column {recording.column}: {taker} the count must change by at most "
+            f"{int(most)}{coarse} in a sample at {recording.rate_hz:g} Hz (a clock of {CLOCK_MAX_HZ / 1e6:g} MHz, "
+            f"and {EDGES_MAX} edges), not by {steps[k - 1]} at sample {k}, {recording.time_s[k]:g} s"
         )
 
 
@@ -194,23 +195,65 @@ def _check_numbers(recording: Recording, coarsen: object, bound: float | None, c
         raise ReplayError(f"acceleration_max_counts_per_s2 must be {least:g} to {most:g} at {rate:g} Hz, not {bound!r}")
 
 
-def _counts_for(recording: Recording, count: int, pins: bool) -> np.ndarray:
+def _counts_for(recording: Recording, count: int, estimator: str, backend: str) -> np.ndarray:
     """Return the counts that the estimator sees; raise ReplayError if they go through pins and change too fast."""
     counts = recording.counts // count
-    if pins:
-        _check_speed(recording, counts, count)
+    if needs_pins(estimator, backend):
+        _check_speed(recording, counts, count, "on rtl" if backend == "rtl" else f"for {estimator}, which times edges,")
     return counts
 
 
-def _axis_for(counts: np.ndarray, count: int, bound: float, rate_hz: float, estimator: str) -> AxisSpec:
-    """Return the axis for counts of `count` recorded counts each, with a bound C in recorded counts a second^2."""
+class Plan(NamedTuple):
+    """What is derived from a recording before its counts are run.
+
+    Attributes:
+        counts: the counts that the estimator sees.
+        reference_hz, reference_counts_per_s: cutoff of the reference, and the reference.
+        acceleration_max_counts_per_s2: the bound C that sets the gains.
+        spec: the axis.
+    """
+
+    counts: np.ndarray
+    reference_hz: float
+    reference_counts_per_s: np.ndarray
+    acceleration_max_counts_per_s2: float
+    spec: AxisSpec
+
+
+def plan(
+    recording: Recording,
+    estimator: str,
+    backend: str,
+    coarsen: int = 1,
+    acceleration_max_counts_per_s2: float | None = None,
+    reference_hz: float | None = None,
+) -> Plan:
+    """Derive what a replay runs; the arguments are those of `replay`.
+
+    Raises:
+        ReplayError: in one line, what is refused and what is accepted.
+    """
+    rate, given = recording.rate_hz, acceleration_max_counts_per_s2
+    cutoff = min(REFERENCE_HZ, rate / 4) if reference_hz is None else reference_hz
+    _check_numbers(recording, coarsen, given, cutoff)
+    counts = _counts_for(recording, coarsen, estimator, backend)
+    reference = zero_phase_velocity(recording.counts, rate, cutoff)
+    bound = given
+    if bound is None:
+        bound = max(acceleration_bound(reference, rate), least_bound(counts) * coarsen * rate**2)
     try:
-        return axis_spec(counts, count, bound / rate_hz**2, estimator)
+        spec = axis_spec(counts, coarsen, bound / rate**2, estimator)
     except ValueError as error:
+        why = f"as if {SECOND} samples were a second: {error}"
+        if given is None:
+            raise ReplayError(
+                f"{recording.file}, column {recording.column}: {estimator} cannot take this recording, for no gains "
+                f"fit its acceleration of {bound:g} counts/s^2 ({why})"
+            ) from None
         raise ReplayError(
-            f"acceleration_max_counts_per_s2 must give gains that fit this recording (as if {SECOND} samples were a "
-            f"second: {error}), not {bound!r}"
+            f"acceleration_max_counts_per_s2 must give gains that fit this recording ({why}), not {bound!r}"
         ) from None
+    return Plan(counts, cutoff, reference, bound, spec)
 
 
 def replay(
@@ -240,15 +283,10 @@ def replay(
         RuntimeError: if the RTL could not be built.
     """
     output = _check_names(estimator, output, backend)
-    rate, bound = recording.rate_hz, acceleration_max_counts_per_s2
-    cutoff = min(REFERENCE_HZ, rate / 4) if reference_hz is None else reference_hz
-    _check_numbers(recording, coarsen, bound, cutoff)
-
-    counts = _counts_for(recording, coarsen, pins=needs_pins(estimator, backend))
-    reference = zero_phase_velocity(recording.counts, rate, cutoff)
-    if bound is None:
-        bound = max(acceleration_bound(reference, rate), least_bound(counts) * coarsen * rate**2)
-    spec = _axis_for(counts, coarsen, bound, rate, estimator)
+    rate = recording.rate_hz
+    counts, cutoff, reference, bound, spec = plan(
+        recording, estimator, backend, coarsen, acceleration_max_counts_per_s2, reference_hz
+    )
     velocity, flags, seconds = run(spec, counts, backend, output, progress)
 
     lsb = spec.design.estimator.velocity.lsb if is_exact(backend) else 1.0

@@ -94,6 +94,30 @@ def test_bad_input_is_one_line(monkeypatch, capsys, tmp_path, arguments, message
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("high", "estimators", "said"),
+    [
+        (10**9, "fdm,levant-edge", "for levant-edge, which times edges, the count must change by at most 100000 of 16"),
+        (0, "all", "levant-edge cannot take this recording, for no gains fit its acceleration of 3.55556 counts/s^2"),
+    ],
+)
+def test_a_recording_that_cannot_be_taken_is_refused_before_any_work(
+    monkeypatch, capsys, tmp_path, high, estimators, said
+):
+    monkeypatch.chdir(tmp_path)
+    rows = (f"{number / 1000:.3f},{number % 2 * high}\n" for number in range(3000))
+    (tmp_path / "made.csv").write_text("time_s,c\n" + "".join(rows))
+    for name in ("measure", "measure_recording"):
+        monkeypatch.setattr(f"hardwall.sim.commands.accuracy.{name}", lambda **_: pytest.fail("it measures"))
+    signals = ("--signal", "paper", "--signal", "made.csv:c")
+    code, out, err = call(
+        monkeypatch, capsys, "accuracy", *signals, "--rates", "1e4", "--estimators", estimators, "--workers", 1
+    )
+    assert (code, out) == (2, "")
+    assert err.startswith(f"hardwall: error: made.csv, column c: {said}")
+    assert err.count("\n") == 1
+
+
 def test_an_interrupted_run_loses_nothing_and_ends_its_workers(tmp_path):
     command = [HARDWALL, "accuracy", "--estimators", "fdm,levant", "--rates", "1e3,1e4,1e5,1e6,1e7", "--workers", "2"]
     (tmp_path / "numba").symlink_to(build_dir() / "numba")
