@@ -4,10 +4,12 @@ import math
 
 from ...model.checks import FieldError, shown
 from ...model.quadrature_speed import max_edge_rate
+from ...model.words import Word
 from ..world import device
 from ..world.euler import longest_s
 from .build import device_of
 from .schema import Scene
+from .sentences import plain
 
 SAMPLES_MAX = 10**9
 """The most samples in a run's settling or measuring: a minute or two with the model, hours with the RTL."""
@@ -25,6 +27,8 @@ KEYS = {
     "output_slew_limit": "controller.slew_limit_n_per_s",
     "count_m": "encoder.count_m",
 }
+WALL_MAX = {"wall_stiffness": "stiffness_max_n_per_m", "wall_damping": "damping_max_n_s_per_m"}
+"""The field of the axis that limits each word of the wall, more narrowly than the word itself."""
 
 
 def _key_of(field: str, scene: Scene) -> str:
@@ -41,7 +45,6 @@ def check(scene: Scene) -> None:
     _check_encoder(scene)
     _check_axis(scene)
     _check_protocol(scene)
-    _check_wall(scene)
     if scene.amplifier is not None:
         _check_amplifier(scene)
     if scene.output is not None:
@@ -69,6 +72,8 @@ def _check_axis(scene: Scene) -> None:
         if scene.estimator_output not in outputs:
             raise FieldError("output", f"must be one of {', '.join(outputs)}, not {scene.estimator_output!r}")
         _check_start(scene)
+        # A word holds more than the wall may have.
+        _check_wall(scene)
         _check_words(scene)
     except FieldError as error:
         raise ValueError(f"{_key_of(error.field, scene)} {error.message}") from None
@@ -82,14 +87,30 @@ def _check_axis(scene: Scene) -> None:
 
 def _check_words(scene: Scene) -> None:
     """Raise FieldError if a wall or a limit does not fit its word, or is so small that its word would be 0."""
-    si, words = scene.parameters, scene.words
+    si = scene.parameters
     for word in scene.spec.design.words:
-        if word.name in KEYS and si.get(word.name) and not words[word.name]:
-            raise FieldError(
-                word.name,
-                f"must be at least {word.to_si(1) / 2:g}, half of its word's LSB in this controller, "
-                f"not {si[word.name]!r}",
-            )
+        value = si.get(word.name)
+        if word.name in KEYS and value and not _fits(word, value):
+            raise FieldError(word.name, f"must be {_range_of(word, scene)}, not {value!r}")
+    scene.spec.design.encode(**si)
+
+
+def _fits(word: Word, value: float) -> bool:
+    """Return whether a value has a word that is not 0."""
+    try:
+        return word.from_si(value) != 0
+    except FieldError:
+        return False
+
+
+def _range_of(word: Word, scene: Scene) -> str:
+    """Return what the scene key of a word accepts; so are the numbers that it shows."""
+    half = word.to_si(1) / 2
+    least = f"{half:g}" if word.from_si(float(f"{half:g}")) else repr(half)
+    above_0 = f"{least} (half of its word's LSB) to "
+    if word.name not in WALL_MAX:
+        return f"{above_0}{word.si_max:g}"
+    return f"0, or {above_0}{plain(getattr(scene.spec, WALL_MAX[word.name]))} (what the controller is for)"
 
 
 def check_hit(scene: Scene) -> None:
@@ -123,14 +144,11 @@ def _check_protocol(scene: Scene) -> None:
 
 
 def _check_wall(scene: Scene) -> None:
-    for name, most in (
-        ("stiffness_n_per_m", scene.spec.stiffness_max_n_per_m),
-        ("damping_n_s_per_m", scene.spec.damping_max_n_s_per_m),
-    ):
-        if not 0 <= getattr(scene.wall, name) <= most:
-            raise ValueError(
-                f"wall.{name} must be 0 to {most:g}, what the controller is for, not {shown(getattr(scene.wall, name))}"
-            )
+    for name, limit in WALL_MAX.items():
+        value = getattr(scene.wall, KEYS[name].removeprefix("wall."))
+        if not 0 <= value <= getattr(scene.spec, limit):
+            word = next(word for word in scene.spec.design.words if word.name == name)
+            raise ValueError(f"{KEYS[name]} must be {_range_of(word, scene)}, not {shown(value)}")
 
 
 def _check_amplifier(scene: Scene) -> None:

@@ -17,6 +17,8 @@ from .schema import Scene
 from .sentences import sentence, stranger
 
 FOLDER = Path(__file__).with_name("builtin")
+WALL = {("wall", "stiffness_n_per_m"), ("wall", "damping_n_s_per_m")}
+"""The keys of the wall, which the controller limits."""
 BYTES_MAX = 10**6
 """The largest file of a scene."""
 
@@ -81,10 +83,28 @@ def parse(scene: str, text: str, changes: dict[str, Any] | None = None) -> Scene
     except ValidationError as error:
         # A misspelt key also makes a key missing; the message about the misspelling says more.
         worst = min(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
-        raise SceneError(f"{scene}: {sentence(worst)}") from None
+        raise SceneError(f"{scene}: {_of_the_wall(content, error) or sentence(worst)}") from None
     except ValueError as error:
         raise SceneError(f"{scene}: {error}") from None
     return result
+
+
+def _of_the_wall(content: dict[str, Any], error: ValidationError) -> str | None:
+    """Return what is wrong with a wall, by the range of the scene's controller, narrower than that of its keys.
+
+    None if something else is wrong with the scene, or the wall is none of numbers.
+    """
+    given = {problem["loc"]: problem["input"] for problem in error.errors()}
+    if not given.keys() <= WALL or not all(type(value) in (int, float) for value in given.values()):
+        return None
+    given = {key: value for (_, key), value in given.items()}
+    try:
+        other = Scene(name="", **content | {"wall": content["wall"] | dict.fromkeys(given, 0.0)})
+        check(other)
+        check(other.model_copy(update={"wall": other.wall.model_copy(update=given)}))
+    except ValueError as refusal:
+        return str(refusal)
+    return None
 
 
 def _change(content: dict[str, Any], scene: str, key: str, value: Any) -> None:

@@ -24,11 +24,11 @@ def accepted(kind: Any, marks: tuple = ()) -> str:
         return f"a list of {_limits(marks)['min_length']}, each {accepted(inner[0])}"
     if kind in (int, float):
         noun, limits = "a whole number" if kind is int else "a number", _limits(marks)
-        return f"{noun} of {_plain(limits['ge'])} to {_plain(limits['le'])}" if limits else noun
+        return f"{noun} of {plain(limits['ge'])} to {plain(limits['le'])}" if limits else noun
     return {bool: "true or false", str: "a name"}.get(kind, "a section")
 
 
-def _plain(number: float) -> str:
+def plain(number: float) -> str:
     """Return a limit in few digits, if these are all."""
     return f"{number:g}" if float(f"{number:g}") == number else str(number)
 

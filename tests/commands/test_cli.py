@@ -11,6 +11,9 @@ from hardwall.sim.scene import load
 from stimuli.command_line import call
 
 SEED = (load.FOLDER / "seed-2011.toml").read_text()
+STIFFNESS = "0, or 1.95313 (half of its word's LSB) to 200000 (what the controller is for)"
+DAMPING = "0, or 0.003125 (half of its word's LSB) to 400 (what the controller is for)"
+"""What the wall of the scene `seed-2011` may be."""
 
 
 @pytest.mark.parametrize(
@@ -40,8 +43,10 @@ SEED = (load.FOLDER / "seed-2011.toml").read_text()
             ["hit", "--set", "controller.gains.levant.alpha_m_per_s2=1e9"],
             "controller.gains.levant.alpha_m_per_s2 must be 9.31323e-08 to 51200 at these rates, not 1000000000.0",
         ),
-        (["hit", "--stiffness", "1e9"], "wall.stiffness_n_per_m must be 0 to 255996 N/m, not 1000000000.0"),
-        (["hit", "--stiffness", "250e3"], "wall.stiffness_n_per_m must be 0 to 200000, what the controller is for"),
+        (["hit", "--stiffness", "1e9"], f"wall.stiffness_n_per_m must be {STIFFNESS}, not 1000000000.0"),
+        (["hit", "--stiffness", "250e3"], f"wall.stiffness_n_per_m must be {STIFFNESS}, not 250000.0"),
+        (["hit", "--stiffness", "1e-6"], f"wall.stiffness_n_per_m must be {STIFFNESS}, not 1e-06"),
+        (["hit", "--stiffness", "1e11"], f"wall.stiffness_n_per_m must be {STIFFNESS}, not 100000000000.0"),
         (
             ["hit", "--set", "protocol.settle_s=5e5"],
             "protocol.settle_s must be at most 100000, 1e+09 samples, not 500000.0",
@@ -55,8 +60,16 @@ SEED = (load.FOLDER / "seed-2011.toml").read_text()
             ["hit", "--set", "controller.gains.fdm.x=1"],
             "controller.gains.fdm.x is not a key of a scene; its section has",
         ),
-        (["hit", "--stiffness", "-5"], "wall.stiffness_n_per_m must be a number of 0 to 1e+10, not -5.0"),
-        (["hit", "--damping", "1e6"], "wall.damping_n_s_per_m must be 0 to 409"),
+        (["hit", "--stiffness", "-5"], f"wall.stiffness_n_per_m must be {STIFFNESS}, not -5.0"),
+        (["hit", "--stiffness", "nan"], f"wall.stiffness_n_per_m must be {STIFFNESS}, not nan"),
+        (["hit", "--stiffness", "-5", "--set", "handle.mass_kg=0"], "handle.mass_kg must be a number of 1e-06 to 1000"),
+        (["hit", "--damping", "1e6"], f"wall.damping_n_s_per_m must be {DAMPING}, not 1000000.0"),
+        (["hit", "--damping", "405"], f"wall.damping_n_s_per_m must be {DAMPING}, not 405.0"),
+        (["hit", "--damping", "1e-6"], f"wall.damping_n_s_per_m must be {DAMPING}, not 1e-06"),
+        (
+            ["hit", "--set", "controller.slew_limit_n_per_s=1e15"],
+            "controller.slew_limit_n_per_s must be 0.5 (half of its word's LSB) to ",
+        ),
         (
             ["hit", "--set", "controller.speed_max_m_per_s=20.0"],
             "controller.speed_max_m_per_s must be at most 8, the decoder's limit",

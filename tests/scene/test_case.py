@@ -43,14 +43,20 @@ def test_what_a_hit_leaves_is_the_scene_s():
 @pytest.mark.parametrize(
     ("hit", "message"),
     [
-        ((-1.0, 2.0), "seed-2011: wall.stiffness_n_per_m must be 0 to 200000, what the controller is for, not -1.0"),
+        (
+            (-1.0, 2.0),
+            "seed-2011: wall.stiffness_n_per_m must be 0, or 1.95313 (half of its word's LSB) to 200000 (what the "
+            "controller is for), not -1.0",
+        ),
         (
             (1e9, 2.0),
-            "seed-2011: wall.stiffness_n_per_m must be 0 to 200000, what the controller is for, not 1000000000.0",
+            "seed-2011: wall.stiffness_n_per_m must be 0, or 1.95313 (half of its word's LSB) to 200000 (what the "
+            "controller is for), not 1000000000.0",
         ),
         (
             (1e3, 1e9),
-            "seed-2011: wall.damping_n_s_per_m must be 0 to 400, what the controller is for, not 1000000000.0",
+            "seed-2011: wall.damping_n_s_per_m must be 0, or 0.003125 (half of its word's LSB) to 400 (what the "
+            "controller is for), not 1000000000.0",
         ),
         (
             (1e3, 2.0, -9.0),

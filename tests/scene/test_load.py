@@ -85,8 +85,12 @@ def test_a_file_that_is_no_regular_one_or_too_large_is_refused(tmp_path, monkeyp
             {"encoder.phase_error_counts": 0.7},
             "encoder.phase_error_counts and duty_error_counts must move each edge by less than 0.5 counts, not 0.7",
         ),
-        ({"controller.slew_limit_n_per_s": 1e-9}, "controller.slew_limit_n_per_s must be at least 0.5, half of its"),
-        ({"wall.stiffness_n_per_m": 1.0}, "wall.stiffness_n_per_m must be at least 1.95313, half of its word's LSB"),
+        (
+            {"controller.slew_limit_n_per_s": 1e-9},
+            "controller.slew_limit_n_per_s must be 0.5 (half of its word's LSB) to",
+        ),
+        ({"wall.stiffness_n_per_m": 1.0}, "wall.stiffness_n_per_m must be 0, or 1.95313 (half of its word's LSB) to"),
+        ({"wall.stiffness_n_per_m": 10**400}, "wall.stiffness_n_per_m must be 0, or 1.95313 (half of its word's LSB)"),
         (
             {"protocol.settle_s": 100.0, "amplifier.delay_s": 101.0},
             "amplifier.delay_s must be at most protocol.settle_s, 100, not 101.0",
