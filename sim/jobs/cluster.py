@@ -30,6 +30,8 @@ POLL_S = 1.0
 SCHEMES = ("tcp", "tls")
 GROUP = "HARDWALL_GROUP"
 """The variable that tells the workers of a local cluster the number of their process group."""
+HOST_MAX = 253
+"""The most characters of a host's name."""
 SILENT = ("asyncio", "distributed", "tornado")
 """The loggers of Dask and of what it is made of."""
 
@@ -43,9 +45,11 @@ def check_address(text: str) -> None:
     try:
         scheme, place = parse_address(text)
         host, port = parse_host_port(place)
+        # Python's own look-up would refuse such a host much later, as if no scheduler answered.
+        named = host.isprintable() and " " not in host and len(host.encode("idna").rstrip(b".")) <= HOST_MAX
     except ValueError:
-        scheme, host, port = "", "", 0
-    if scheme not in SCHEMES or not host or not 0 < port < 1 << 16:
+        scheme, host, port, named = "", "", 0, False
+    if scheme not in SCHEMES or not host or not named or not 0 < port < 1 << 16:
         raise AddressError(f"must be an address such as tcp://10.0.0.7:8786, not {shown(text)}")
 
 

@@ -68,7 +68,21 @@ def test_a_scheduler_that_wants_certificates_needs_some(monkeypatch, capsys):
     assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize("address", ["abc", "", "tcp://", "tcp://a", "ftp://a:1", "a:0", "a:65536", ":8786", "::1:9"])
+NO_HOSTS = ["tcp://ho\nst:80", "a b:80", "tcp://a..b:80", "tcp://.:80", ".a:80", "\udcff:80"]
+LONG = ["tcp://" + "a" * 3000 + ":80", "tcp://" + "a." * 127 + "a:80"]
+"""The names of hosts have 63 characters to a dot, and 253 in all."""
+
+
+@pytest.mark.parametrize("address", [*NO_HOSTS, *LONG])
+def test_what_no_host_is_called_is_no_address(address):
+    with pytest.raises(cluster.AddressError, match=r"^must be an address such as tcp://10\.0\.0\.7:8786, not "):
+        cluster.check_address(address)
+
+
+@pytest.mark.parametrize(
+    "address",
+    [*("abc", "", "tcp://", "tcp://a", "ftp://a:1", "a:0", "a:65536", ":8786", "::1:9"), *NO_HOSTS],
+)
 @pytest.mark.parametrize("command", ["zwidth", "fit", "rates"])
 def test_what_is_no_address_is_refused_before_any_work(monkeypatch, capsys, address, command):
     monkeypatch.setattr(cluster, "client", lambda *_: pytest.fail("it connects"))
@@ -76,7 +90,13 @@ def test_what_is_no_address_is_refused_before_any_work(monkeypatch, capsys, addr
     assert call(monkeypatch, capsys, command, "--scheduler", address) == (2, "", expected)
 
 
-@pytest.mark.parametrize("address", ["tcp://10.0.0.7:8786", "node-7:8786", "tls://[::1]:8786"])
+@pytest.mark.parametrize(
+    "address",
+    [
+        *("tcp://10.0.0.7:8786", "node-7:8786", "tls://[::1]:8786", "tcp://[fe80::1%eth0]:8786"),
+        *("tcp://node.example.:8786", "tcp://b\xfccher.example:80", "tcp://" + "a." * 126 + "a:80"),
+    ],
+)
 def test_what_is_an_address_is_accepted(address):
     cluster.check_address(address)
 
