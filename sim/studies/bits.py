@@ -53,7 +53,7 @@ def bit(estimator: str, output: str, sample_hz: int, bits_dropped: int) -> dict 
         estimator, output, sample_hz, bits_dropped: what was measured.
         velocity_bits: width of the velocity word.
         rms_mm_s: RMS error on the signal `paper`, in fixed point.
-        lut4, ff, dsp: cells of the estimator alone.
+        lut4, ff, dsp, bram: cells of the estimator alone.
 
     Raises:
         SynthesisError: if a tool is missing or fails.

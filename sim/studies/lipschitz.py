@@ -37,6 +37,7 @@ class Lipschitz(Summary):
         velocities_m_per_s: true velocities of the handle.
         sines: sines fitted to the positions, in time from the start of the record.
         peak_m_per_s2: the handle's largest true acceleration, over one sample.
+        cut: remarks on what was asked for of the record, and lies beyond the run.
     """
 
     scene: Scene
@@ -45,6 +46,7 @@ class Lipschitz(Summary):
     velocities_m_per_s: np.ndarray
     sines: Sines
     peak_m_per_s2: float
+    cut: list[str]
 
     def fitted(self, order: int) -> np.ndarray:
         """Return the fit at the times of the record, or its derivative of the given order."""
@@ -76,6 +78,10 @@ class Lipschitz(Summary):
             "adjusted_alpha_least_m_per_s2": least_alpha_m_per_s2(adjusted, bound),
         }
 
+    def notes(self) -> list[str]:
+        """Return what the record lacks of what was asked for."""
+        return self.cut
+
 
 def least_alpha_m_per_s2(lambda_sqrt_m_per_s: float, bound_m_per_s2: float) -> float | None:
     """Return the least alpha with lambda^2 >= 4 C (alpha + C) / (alpha - C), or None if there is none."""
@@ -102,6 +108,15 @@ def study(case: Case, before_s: float, after_s: float, count: int) -> Lipschitz:
         near = f"{hit.DETAIL_S:g} s of coming within {-hit.DETAIL_FROM_M * 1e3:g} mm"
         raise RuntimeError(f"the handle did not reach the wall, or not within {near}: there is no impact to fit")
     whole, contact = result.overview, result.detail
+    run_s = result.samples / scene.spec.sample_hz
+    cut = [
+        f"--{side} {asked_s:g}: the run has {there_s:g} s {side} the contact, and all of it is taken"
+        for side, asked_s, there_s in (
+            ("before", before_s, result.contact_s),
+            ("after", after_s, run_s - result.contact_s),
+        )
+        if asked_s > there_s
+    ]
     times = whole.time_s - result.contact_s
     inside = np.flatnonzero((times >= -before_s) & (times <= after_s))
     kept = inside[:: max(-(-len(inside) // POINTS), 1)]
@@ -111,4 +126,4 @@ def study(case: Case, before_s: float, after_s: float, count: int) -> Lipschitz:
     except ValueError as error:
         raise RuntimeError(f"the record is too short: {error}") from None
     peak = np.abs(np.diff(contact.velocity_m_per_s)).max() * scene.spec.sample_hz
-    return Lipschitz(scene, times[kept], positions, whole.velocity_m_per_s[kept], sines, float(peak))
+    return Lipschitz(scene, times[kept], positions, whole.velocity_m_per_s[kept], sines, float(peak), cut)

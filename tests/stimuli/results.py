@@ -74,8 +74,9 @@ def rows() -> Accuracy:
 def bits_dropped() -> bits.Bits:
     """Return the errors and sizes of two estimators with some bits of velocity dropped."""
     rows = [
-        {"estimator": estimator, "output": output, "sample_hz": 1_000_000, "velocity_bits": 20 - dropped}
-        | {"rms_mm_s": (0.1 + dropped) * scale, "lut4": 500 * scale - dropped}
+        {"estimator": estimator, "output": output, "sample_hz": 1_000_000, "bits_dropped": dropped}
+        | {"velocity_bits": 20 - dropped, "rms_mm_s": (0.1 + dropped) * scale}
+        | {"lut4": 500 * scale - dropped, "ff": 300 * scale, "dsp": 3, "bram": 0}
         for estimator, output, scale in (("levant", "u", 2), ("levant", "u1", 1), ("kalman", "u", 3))
         for dropped in list(bits.DROPPED)[:3]
     ]
@@ -126,7 +127,7 @@ def fit() -> lipschitz.Lipschitz:
     times = np.linspace(-0.1, 0.4, 200)
     swing = sines.Sines(np.array([20.0]), np.array([1e-2]), np.array([0.0]))
     return lipschitz.Lipschitz(
-        load("seed-2011"), times, 1e-2 * np.sin(20 * times), 0.2 * np.cos(20 * times), swing, 36.0
+        load("seed-2011"), times, 1e-2 * np.sin(20 * times), 0.2 * np.cos(20 * times), swing, 36.0, []
     )
 
 

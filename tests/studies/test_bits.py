@@ -7,7 +7,7 @@ from hardwall.sim.estimates.signals import paper
 from hardwall.sim.studies import bits
 from hardwall.sim.walls.methods import Curve
 
-CELLS = {"lut4": 500, "ff": 300, "dsp": 4}
+CELLS = {"lut4": 500, "ff": 300, "dsp": 4, "bram": 0}
 RATE = 10_000
 
 

@@ -40,6 +40,17 @@ def test_a_longer_record_gives_a_smaller_bound(monkeypatch, capsys):
     assert bounds[0] > 1.5 * bounds[1] > 2 * bounds[2]
 
 
+def test_a_record_beyond_the_run_is_remarked_on(monkeypatch, capsys):
+    remarks = []
+    for options in ((), ("--before", 0.3, "--after", 5.4), ("--before", 0.6), ("--before", 1e6, "--after", 1e6)):
+        code, _, err = call(monkeypatch, capsys, "lipschitz", *options)
+        assert code == 0
+        remarks.append([line for line in err.splitlines() if line.startswith("--")])
+    before = "--before {}: the run has 0.5494 s before the contact, and all of it is taken"
+    after = "--after 1e+06: the run has 5.4506 s after the contact, and all of it is taken"
+    assert remarks == [[], [], [before.format("0.6")], [before.format("1e+06"), after]]
+
+
 def test_the_least_alpha_satisfies_the_condition_just():
     """In the paper, lambda 500 mm^(1/2)/s with C = 12 m/s^2 needs an alpha of 17.7 m/s^2 or more."""
     square = 250.0
