@@ -14,7 +14,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from hardwall.sim.commands.group import COMMANDS
-from stimuli.forked import Ended, run
+from stimuli.forked import BEGAN, Ended, run
 from stimuli.hostile import Call, calls
 from stimuli.reports import check_text
 
@@ -27,12 +27,14 @@ BAD, ERROR = 2, re.compile(r"hardwall: error: [^\n]+\n")
 def faults(call: Call, ended: Ended) -> list[str]:
     """Return what is wrong with how a call ended."""
     found = []
-    if ended.code not in (0, 1, BAD):
+    if ended.code not in (0, 1, BAD, BEGAN):
         found.append(f"exit code {ended.code}")
     if "Traceback" in ended.err or "Warning" in ended.err or "Exception ignored" in ended.err:
         found.append("a traceback or a warning of Python")
     if ended.code == BAD and not (ERROR.fullmatch(ended.err) and not ended.out):
         found.append("bad input is not one line on stderr")
+    if ended.code == 0 and not ended.out.strip():
+        found.append("a success without a word")
     if ended.code == 1 and not ERROR.search(ended.err):
         found.append("a failure without a message")
     if len(max(ended.err.split("\n"), key=len)) > LINE_MAX:
@@ -61,7 +63,7 @@ def test_hostile_calls(command):
             work = Path(folder) / "work"
             work.mkdir()
             call.put(work)
-            ended = run(call.arguments, Path(folder))
+            ended = run(call.arguments, Path(folder), call.environ)
             wrong = faults(call, ended)
         assert not wrong, f"{'; '.join(wrong)}\n{call}\n{ended.out[-2000:]}\n{ended.err[-4000:]}"
 
@@ -78,8 +80,9 @@ def test_the_fuzzer_sees_what_is_wrong():
         Ended(1, "", "no message"),
         Ended(-11, "", ""),
         Ended(70, "", "Traceback (most recent call last):"),
+        Ended(0, "", ""),
         Ended(0, '{"rms_mm": NaN}', ""),
-        Ended(0, "", "RuntimeWarning: overflow"),
+        Ended(0, "{}", "RuntimeWarning: overflow"),
         Ended(2, "", "hardwall: error: " + "x" * 2000 + "\n"),
     ):
         assert faults(call, ended)

@@ -4,15 +4,14 @@ Every figure is a median over rounds in which the contestants take turns: see `j
 """
 
 import json
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from ...model.build_folder import build_dir
 from ..jobs.result import Table, text_of
 from ..jobs.rounds import medians
+from ..jobs.scratch import scratch
 from ..rtl.cocotb_runner import Job, simulate_axis
 from ..scene.case import Case
 from ..scene.schema import Scene
@@ -69,12 +68,12 @@ def _cocotb(case: Case) -> Callable[[], float]:
     words = hit.run(_scene(case, {}, COCOTB_SAMPLES / spec.sample_hz), "fixed").force_sha256
 
     def run() -> float:
-        with tempfile.TemporaryDirectory() as folder:
-            report = Path(folder) / "report.json"
+        with scratch(build_dir() / "cocotb") as folder:
+            report = folder / "report.json"
             order = {"case": case.job(), "samples": COCOTB_SAMPLES, "report": str(report)}
             environ = {"HARDWALL_LOOP": json.dumps(order), "COCOTB_LOG_LEVEL": "WARNING"}
             log = build_dir() / "cocotb" / "bench.log"
-            simulate_axis(spec, Job("hardwall.sim.studies.cocotb_loop", Path(folder), environ, log=log))
+            simulate_axis(spec, Job("hardwall.sim.studies.cocotb_loop", folder, environ, log=log))
             result = json.loads(report.read_text())
         if result["force_sha256"] != words:
             raise RuntimeError(f"the RTL under cocotb and the model differ in their first {COCOTB_SAMPLES} force words")

@@ -61,6 +61,12 @@ def test_alone_it_prints_help_and_no_error(monkeypatch, capsys):
     assert "Usage: hardwall" in out
 
 
+def test_signals_are_heard_before_anything_long_is_imported():
+    program = "import sys, hardwall.sim.commands.app; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) & {*HEAVY, "typer", "rich", "importlib.metadata"} == set()
+
+
 def test_the_version_is_the_package_s(monkeypatch, capsys):
     code, out, _ = call(monkeypatch, capsys, "--version")
     assert (code, out) == (0, f"hardwall {importlib.metadata.version('hardwall')}\n")

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from hardwall.sim.commands.terminal import show
+from hardwall.sim.jobs.result import Table
 from hardwall.sim.scene import load
 from stimuli.command_line import call
 
@@ -193,6 +195,16 @@ def test_table_puts_reports_side_by_side(monkeypatch, capsys, tmp_path):
     code, _, err = call(monkeypatch, capsys, "table", *files)
     assert (code, err.count("\n")) == (2, 1)
     assert "must be a JSON report" in err
+
+
+@pytest.mark.parametrize("columns", [0, 1, 20])
+def test_a_terminal_of_hardly_any_width_loses_no_number(monkeypatch, capsys, columns):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    show(Table({"estimator": "left", "RMS (mm/s)": "right"}, [["levant-semi-implicit u", "0.415703"]]))
+    show(Table({}, [["rms_mm", "0.000123456"]]))
+    out = capsys.readouterr().out
+    assert "0.415703" in out
+    assert "0.000123456" in out
 
 
 def test_the_console_command_is_installed():

@@ -1,8 +1,8 @@
 """The command line in a forked child: the real `main`, with nothing to import or compile anew.
 
-A call that is accepted may be a day's work, so the child ends, with exit code 0, where the work of a study, a build or
-a synthesis would begin; runs of a hit, a replay and of accuracy at low rates are real, and kept short by a lower limit
-on the samples of a scene.
+A call that is accepted may be a day's work, so the child ends, with the exit code `BEGAN`, where the work of a study, a
+build or a synthesis would begin; runs of a hit, a replay and of accuracy at low rates are real, and kept short by a
+lower limit on the samples of a scene.
 """
 
 import faulthandler
@@ -21,11 +21,11 @@ from typing import Any, NamedTuple, NoReturn
 import scipy
 
 from hardwall.sim import pictures
-from hardwall.sim.commands import app
+from hardwall.sim.commands import app, synth
 from hardwall.sim.commands.group import COMMANDS
 from hardwall.sim.estimates.accuracy import measure
 from hardwall.sim.jobs import cluster, parallel, store
-from hardwall.sim.rtl import library, synthesis
+from hardwall.sim.rtl import library
 from hardwall.sim.scene import checks
 from hardwall.sim.studies import bench
 from hardwall.sim.walls import zwidth
@@ -43,7 +43,7 @@ STEPS_MAX = 100
 TIMEOUT_S = 0.5
 RATE_MAX_HZ = 20_000
 FILE_BYTES_MAX = 100 << 20
-CRASHED = 70
+CRASHED, BEGAN = 70, 71
 
 
 class Ended(NamedTuple):
@@ -77,7 +77,7 @@ def _shorten(folder: Path) -> None:
     """End this process where long work begins, and keep results in `folder`."""
     checks.SAMPLES_MAX, checks.STEPS_MAX, cluster.TIMEOUT_S = SAMPLES_MAX, STEPS_MAX, TIMEOUT_S
     parallel.run = _short(parallel.run)
-    bench.study = zwidth.run = library.build = synthesis.synthesise = synthesis.estimator_cells = _begin
+    bench.study = zwidth.run = library.build = synth.synthesise = _begin
     store.build_dir = lambda: folder / "build"
     connected = cluster.client
     cluster.client = lambda jobs, workers=None, scheduler=None: (
@@ -103,7 +103,7 @@ def _child(arguments: tuple[str, ...], folder: Path) -> int:
     try:
         app.main()
     except _Began:
-        return 0
+        return BEGAN
     except SystemExit as exit_:
         return exit_.code if isinstance(exit_.code, int) else int(exit_.code is not None)
     except BaseException:
@@ -112,12 +112,13 @@ def _child(arguments: tuple[str, ...], folder: Path) -> int:
     return 0
 
 
-def run(arguments: tuple[str, ...], folder: Path) -> Ended:
-    """Return how `hardwall ARGUMENTS` ends in the folder `work` of an otherwise empty `folder`."""
+def run(arguments: tuple[str, ...], folder: Path, environ: dict[str, str]) -> Ended:
+    """Return how `hardwall ARGUMENTS` ends in the folder `work` of an otherwise empty `folder`, with more variables."""
     child = os.fork()
     if not child:
         code = CRASHED
         try:
+            os.environ.update(environ)
             code = _child(arguments, folder)
             sys.stdout.flush()
             sys.stderr.flush()

@@ -84,10 +84,11 @@ SHORT = {
 
 @dataclass(frozen=True)
 class Call:
-    """A call of the command line, and the files in the folder where it is made."""
+    """A call of the command line, the files in the folder where it is made, and variables of its environment."""
 
     arguments: tuple[str, ...]
     files: dict[str, bytes] = field(default_factory=dict)
+    environ: dict[str, str] = field(default_factory=dict)
 
     def put(self, folder: Path) -> None:
         """Make the files, a folder and a pipe without a writer."""
@@ -207,6 +208,14 @@ def takes(name: str) -> dict[str, Any]:
     return {each.name: each for each in group.loaded(name).params if each.name != "help"}
 
 
+ENVIRONS = (
+    *({"COLUMNS": columns} for columns in ("0", "1", "20", "1000000", "x", "-1")),
+    *({name: "1"} for name in ("NO_COLOR", "FORCE_COLOR", "TTY_COMPATIBLE")),
+    *({"TERM": name} for name in ("dumb", "unknown", "")),
+)
+"""Variables that change how a terminal is written to."""
+
+
 @st.composite
 def calls(draw: st.DrawFn, name: str) -> Call:
     """Return calls of a command."""
@@ -225,4 +234,4 @@ def calls(draw: st.DrawFn, name: str) -> Call:
     for file, text in (("scene.toml", read("seed-2011")), ("recording.csv", _recording()), ("report.json", _report())):
         if file in " ".join(words):
             files[file] = draw(_spoilt(text))
-    return Call(tuple(words), files)
+    return Call(tuple(words), files, draw(_mostly(st.just({}), st.sampled_from(ENVIRONS))))
