@@ -16,6 +16,9 @@ from . import checks, design, quadrature
 from .axis import Axis, Record, step
 from .compiled import compiled, inlined
 
+SAMPLES_MAX = 10**9
+"""The most samples of a record: its arrays then take 32 GB."""
+
 
 class Edges(NamedTuple):
     """Edges of an encoder: the clocks from which the pins show a new level. Functions take their number separately."""
@@ -115,7 +118,7 @@ def run(axis: Axis, edge_clocks: ArrayLike, edge_levels: ArrayLike, samples: int
             register at the pins first holds the new level.
         edge_levels: integers of the same shape: the pins from then on, a | b << 1. Edges after
             the last sample have no effect.
-        samples: number of samples to take, 1 or more.
+        samples: number of samples to take, 1 to `SAMPLES_MAX`.
         level: level of the pins at reset, a | b << 1.
 
     Returns:
@@ -124,12 +127,12 @@ def run(axis: Axis, edge_clocks: ArrayLike, edge_levels: ArrayLike, samples: int
     Raises:
         TypeError: if `axis` is not an Axis, or another argument is not an integer or integers.
         ValueError: if the shapes differ, the clocks decrease or are negative, a level is not 0 to 3, or `samples` is
-            less than 1.
+            not 1 to `SAMPLES_MAX`.
     """
     if not isinstance(axis, Axis):
         raise TypeError(f"axis must be an Axis, not a value of type {type(axis).__name__}")
     edges = Edges(*checks.edges(edge_clocks, edge_levels))
-    checks.check_int("samples", samples, 1)
+    checks.check_int("samples", samples, 1, SAMPLES_MAX)
     checks.check_int("level", level, 0, 3)
     number = np.float64 if axis.floating else np.int64
     velocity, force, drive = (np.zeros(samples, number) for _ in range(3))

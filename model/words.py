@@ -3,10 +3,12 @@
 from dataclasses import dataclass
 
 from .arithmetic.fixed import UQ, Format, bits_for
-from .checks import FieldError, check_number
+from .checks import FieldError, check_number, shown
 
 GAIN_BITS = 16
 """Bits of a gain word: an operand that the multipliers of both iCE40UP (16 x 16) and ECP5 (18 x 18) hold."""
+ROUNDING = 1e-12
+"""The largest relative error of an SI value that was computed from a word, in whatever order."""
 
 
 def gain_format(largest: float) -> UQ:
@@ -58,6 +60,9 @@ class Word:
     def from_si(self, value: float) -> int:
         """Return the word nearest to `value` (SI).
 
+        A value may be beyond the last word by `ROUNDING`, or as far as the six digits of the bound in the message: its
+        word is then the last one.
+
         Raises:
             TypeError: if `value` is not a number.
             ValueError: if the value does not fit the word; the message gives the accepted range in SI units.
@@ -65,10 +70,12 @@ class Word:
         whole = self.format.f == 0 and not self.unit
         if not (isinstance(value, bool) and whole and self.format.max == 1):
             check_number(self.name, value)
+        least, most = self.si_min, self.si_max
+        accepted = f"{least:g} to {most:g}"
         if whole and value % 1:
-            raise FieldError(self.name, f"must be a whole number of {self.si_min:g} to {self.si_max:g}, not {value!r}")
-        try:
-            return self.format.from_real(value / self.si_per_unit)
-        except ValueError:
+            raise FieldError(self.name, f"must be a whole number of {accepted}, not {shown(value)}")
+        lowest, highest = (max(bound * (1 + ROUNDING), float(f"{bound:g}"), key=abs) for bound in (least, most))
+        if not lowest <= value <= highest:
             unit = f" {self.unit}" if self.unit else ""
-            raise FieldError(self.name, f"must be {self.si_min:g} to {self.si_max:g}{unit}, not {value!r}") from None
+            raise FieldError(self.name, f"must be {accepted}{unit}, not {shown(value)}")
+        return self.format.from_real(min(max(value, least), most) / self.si_per_unit)

@@ -10,7 +10,7 @@ from hardwall.model.arithmetic.fixed import SQ
 from hardwall.model.axis import Axis
 from hardwall.model.estimators import foaw, levant, registry
 from hardwall.model.spec import AxisSpec
-from stimuli.specs import PAPER, spec
+from stimuli.specs import PAPER, SPECS, spec
 
 AXIS = Axis(spec("mhz", "fdm"))
 HALF = 1 << (AXIS.spec.count_width - 1)
@@ -77,7 +77,8 @@ def test_counts_that_are_counts():
             ValueError,
             "edge_clocks and edge_levels must have one shape (edges,), not ((2,), (1,))",
         ),
-        ({"samples": 0}, ValueError, "samples must be 1 or more, not 0"),
+        ({"samples": 0}, ValueError, "samples must be 1 to 1000000000, not 0"),
+        ({"samples": 10**15}, ValueError, f"samples must be 1 to 1000000000, not {10**15}"),
         ({"samples": 5.0}, TypeError, "samples must be an int, not 5.0"),
         ({"level": 4}, ValueError, "level must be 0 to 3, not 4"),
         ({"level": "1"}, TypeError, "level must be an int, not '1'"),
@@ -97,6 +98,11 @@ def test_records_of_edges(arguments, error, message):
         ({"stiffness": 1.0}, ValueError, r"^parameter must be one of .*wall_stiffness.*, not 'stiffness'$"),
         ({"wall_stiffness": "1e3"}, TypeError, r"^wall_stiffness must be a number, not '1e3'$"),
         ({"wall_stiffness": 1e6}, ValueError, r"^wall_stiffness must be 0 to 255996 N/m, not 1000000.0$"),
+        ({"wall_stiffness": 255997}, ValueError, r"^wall_stiffness must be 0 to 255996 N/m, not 255997$"),
+        ({"wall_stiffness": -1.9}, ValueError, r"^wall_stiffness must be 0 to 255996 N/m, not -1.9$"),
+        ({"wall_stiffness": -1e-9}, ValueError, r"^wall_stiffness must be 0 to 255996 N/m, not -1e-09$"),
+        ({"wall_stiffness": math.inf}, ValueError, r"^wall_stiffness must be 0 to 255996 N/m, not inf$"),
+        ({"wall_stiffness": 10**400}, ValueError, r"^wall_stiffness must be 0 to 255996 N/m, not 10{56}\.\.\.$"),
         ({"wall_damping": math.nan}, ValueError, r"^wall_damping must be 0 to .* N s/m, not nan$"),
         ({"wall_left": 2}, ValueError, r"^wall_left must be 0 to 1, not 2$"),
         ({"wall_left": 0.5}, ValueError, r"^wall_left must be a whole number of 0 to 1, not 0.5$"),
@@ -107,6 +113,29 @@ def test_records_of_edges(arguments, error, message):
 def test_parameters_of_an_axis(arguments, error, message, floating):
     with pytest.raises(error, match=message):
         Axis(**({"spec": AXIS.spec, "floating": floating} | arguments))
+
+
+EVERY_DESIGN = [(name, estimator) for name in SPECS for estimator in registry.ESTIMATORS]
+
+
+@pytest.mark.parametrize(("name", "estimator"), EVERY_DESIGN)
+def test_the_si_value_of_every_word_is_accepted(name, estimator):
+    for word in spec(name, estimator).design.words:
+        fmt = word.format
+        for number in {fmt.min, fmt.min // 2, fmt.min + 1, fmt.max // 3, fmt.max - 1, fmt.max}:
+            assert word.from_si(word.to_si(number)) == word.from_si(number * word.to_si(1)) == number
+            # In this order the last digits may differ.
+            assert word.from_si(number / (1 / fmt.lsb / word.si_per_unit)) == number
+
+
+@pytest.mark.parametrize(("name", "estimator"), EVERY_DESIGN)
+def test_the_bounds_in_the_message_are_accepted_and_nothing_beyond(name, estimator):
+    for word in spec(name, estimator).design.words:
+        for bound, last, way in ((word.si_min, word.format.min, -1), (word.si_max, word.format.max, 1)):
+            shown = float(f"{bound:g}")
+            assert word.from_si(shown) == pytest.approx(last, rel=5e-6)
+            with pytest.raises(ValueError, match=f"^{word.name} must be "):
+                word.from_si(max(bound, shown, key=abs) + way * 1e-9 * max(word.to_si(1), abs(bound)))
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The model's public API under a type checker: correct use passes, wrong use is reported, and nothing is `Any`."""
+"""The public API of model and test bench under a type checker: correct use passes, wrong use is reported."""
 
 import re
 import subprocess
@@ -73,6 +73,75 @@ def client(spec: AxisSpec, axis: Axis) -> None:
     step(axis.params, spec.design.start(), 3, 0, 0, 1)  # arg-type
     spec.clock_hz = 3  # misc
 """
+BENCH_RIGHT = """
+import cocotb
+import numpy as np
+from amaranth.lib import wiring
+from cocotb.handle import HierarchyObject
+
+from hardwall.testing import CAMPAIGN, SAMPLES, SEED, Bench, check, parameters, rng, simulate
+
+def make(width: int) -> wiring.Component:
+    raise NotImplementedError
+
+@cocotb.test(**CAMPAIGN)
+async def follows_its_model(dut: HierarchyObject) -> None:
+    component = make(**parameters())
+    bench = Bench(dut, component)
+    await bench.reset()
+    bench.drive(limit=-3)
+    monitor = bench.monitor("valid", "sum")
+    await bench.transact("strobe", "valid", sample=SEED)
+    rows = [(sample,) for sample in rng().integers(0, 9, SAMPLES).tolist()]
+    taken, given = await bench.campaign("strobe", "valid", ("sample",), ("sum",), rows, latency=1)
+    check(taken, given, {"sum": np.cumsum(taken.column("sample"))}, component.latency)
+    reveal_type(taken.column("sample"))
+    reveal_type(given.rows)
+    reveal_type(monitor.clocks)
+    reveal_type(bench.clock_number())
+    reveal_type(bench.reader("sum")())
+    reveal_type(rng())
+    reveal_type(follows_its_model)
+
+def test_block() -> None:
+    simulate(__file__, make, width=16)
+"""
+BENCH_SHOWN = [
+    r"numpy\.ndarray\[.*\]",
+    r"list\[tuple\[int, \.\.\.\]\]",
+    r"list\[int\]",
+    r"int",
+    r"int",
+    r"numpy\.random\._generator\.Generator",
+    r"cocotb\._decorators\.TestGenerator",
+]
+BENCH_WRONG = """
+from amaranth.lib import wiring
+from cocotb.handle import HierarchyObject
+
+from hardwall.testing import Bench, check, simulate
+
+async def client(dut: HierarchyObject, component: wiring.Component) -> None:
+    Bench(dut)  # call-arg
+    Bench("dut", component)  # arg-type
+    bench = Bench(dut, component)
+    bench.drive(limit="3")  # arg-type
+    await bench.campaign("strobe", "valid", ("sample",), ("sum",), [3])  # list-item
+    taken, given = await bench.campaign("strobe", "valid", ("sample",), ("sum",), [(3,)])
+    taken.words  # attr-defined
+    check(taken, given)  # call-arg
+    check(taken, given, {"sum": 3})  # dict-item
+    simulate(__file__, 3)  # arg-type
+"""
+# Whoever installs hardwall has amaranth, and rooms of ours, without types. Every function of the bench has them.
+SETTINGS = """
+[mypy]
+[mypy-amaranth.*,hardwall.hdl.*,hardwall.sim.*]
+ignore_missing_imports = true
+[mypy-hardwall.testing.*]
+disallow_untyped_defs = true
+"""
+SNIPPETS = {"right": RIGHT, "wrong": WRONG, "bench_right": BENCH_RIGHT, "bench_wrong": BENCH_WRONG}
 
 
 @pytest.fixture(scope="module")
@@ -81,10 +150,13 @@ def said(tmp_path_factory) -> dict[str, list[tuple[int, str, str]]]:
     folder = tmp_path_factory.mktemp("typing")
     (folder / "hardwall").mkdir()
     (folder / "hardwall" / "model").symlink_to(ROOT / "model", target_is_directory=True)
-    (folder / "right.py").write_text(RIGHT)
-    (folder / "wrong.py").write_text(WRONG)
-    command = [sys.executable, "-m", "mypy", "--no-error-summary", "--config-file=", "--explicit-package-bases"]
-    command += ["--cache-dir", str(build_dir() / "mypy"), "right.py", "wrong.py", "hardwall/model"]
+    (folder / "hardwall" / "testing").symlink_to(ROOT / "tests" / "benches", target_is_directory=True)
+    (folder / "settings.ini").write_text(SETTINGS)
+    for name, text in SNIPPETS.items():
+        (folder / f"{name}.py").write_text(text)
+    command = [sys.executable, "-m", "mypy", "--no-error-summary", "--config-file=settings.ini"]
+    command += ["--explicit-package-bases", "--cache-dir", str(build_dir() / "mypy")]
+    command += [*(f"{name}.py" for name in SNIPPETS), "hardwall/model", "hardwall/testing"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert not done.stderr
     found: dict[str, list[tuple[int, str, str]]] = {}
@@ -94,25 +166,28 @@ def said(tmp_path_factory) -> dict[str, list[tuple[int, str, str]]]:
     return found
 
 
-def test_the_model_itself_passes(said):
+def test_the_model_and_the_bench_themselves_pass(said):
     assert {file: lines for file, lines in said.items() if file.startswith("hardwall")} == {}
 
 
-def test_what_is_right_passes_and_has_types(said):
-    assert [line for line in said["right.py"] if line[1] == "error"] == []
-    shown = [rest for _, _, rest in said["right.py"]]
-    assert len(shown) == len(SHOWN)
-    for rest, wanted in zip(shown, SHOWN, strict=True):
+@pytest.mark.parametrize(("name", "types"), [("right", SHOWN), ("bench_right", BENCH_SHOWN)])
+def test_what_is_right_passes_and_has_types(said, name, types):
+    assert [line for line in said[f"{name}.py"] if line[1] == "error"] == []
+    shown = [rest for _, _, rest in said[f"{name}.py"]]
+    assert len(shown) == len(types)
+    for rest, wanted in zip(shown, types, strict=True):
         assert re.fullmatch(rf'Revealed type is "{wanted}"', rest), rest
 
 
-def test_what_is_wrong_is_told_where_it_is(said):
-    wanted = [(n, line.split("# ")[1]) for n, line in enumerate(WRONG.splitlines(), 1) if "# " in line]
-    errors = [(n, re.search(r"\[([a-z-]+)\]$", rest)[1]) for n, kind, rest in said["wrong.py"] if kind == "error"]
+@pytest.mark.parametrize("name", ["wrong", "bench_wrong"])
+def test_what_is_wrong_is_told_where_it_is(said, name):
+    wanted = [(n, line.split("# ")[1]) for n, line in enumerate(SNIPPETS[name].splitlines(), 1) if "# " in line]
+    errors = [(n, re.search(r"\[([a-z-]+)\]$", rest)[1]) for n, kind, rest in said[f"{name}.py"] if kind == "error"]
     assert errors == wanted
 
 
-def test_whoever_installs_the_model_gets_its_types():
+@pytest.mark.parametrize(("name", "folder"), [("model", "model"), ("testing", "tests/benches")])
+def test_whoever_installs_a_typed_package_gets_its_types(name, folder):
     data = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["package-data"]
-    assert data["hardwall.model"] == ["py.typed"]
-    assert (ROOT / "model" / "py.typed").exists()
+    assert "py.typed" in data[f"hardwall.{name}"]
+    assert (ROOT / folder / "py.typed").exists()

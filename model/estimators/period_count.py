@@ -183,7 +183,8 @@ class Design(EstimatorDesign):
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 kernel's parameters; like the integer kernel it switches at whole counts."""
-        switch = self.switch.from_si(si.get("period_count_switch", gains.switch_m_per_s))
+        word = self.switch
+        switch = word.from_si(si["period_count_switch"]) if "period_count_switch" in si else word.reset
         return FloatParams(self.count_width, self.stamp_width, 1 << self.window_bits, switch, self.clocks)
 
     def start(self, floating: bool = False) -> State:

@@ -1,10 +1,12 @@
 """A component under test, inside the simulator: clocked, reset, driven, watched and put through campaigns."""
 
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import cocotb
 from amaranth.lib import wiring
 from cocotb.clock import Clock
+from cocotb.handle import HierarchyObject
 from cocotb.simtime import get_sim_time
 from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
 
@@ -30,7 +32,7 @@ class Monitor(Rows):
         self._strobe = getattr(bench.dut, strobe)
         cocotb.start_soon(self._record())
 
-    async def _record(self):
+    async def _record(self) -> None:
         clock, seen = RisingEdge(self._bench.dut.clk), self._bench.dut.bench_seen
         while True:
             if not int(self._strobe.value):
@@ -44,7 +46,7 @@ class Bench:
     """A clocked, reset component under test. Signedness, lost in Verilog, is taken from the component's members.
 
     Attributes:
-        dut: cocotb's handle of the harness around the component.
+        dut: cocotb's handle of the harness around the component; what it has is known at run time only.
         packing: how the component's ports lie in one word.
         inputs: how its inputs lie in one word.
         monitors: the monitors so far.
@@ -53,9 +55,11 @@ class Bench:
 
     period_ns = PERIOD_NS
 
-    def __init__(self, dut, component: wiring.Component):
-        self.dut, self.packing = dut, packing_of(component)
-        self.inputs, self.monitors, self.in_campaign = inputs_of(component), [], False
+    def __init__(self, dut: HierarchyObject, component: wiring.Component):
+        self.dut: Any = dut
+        self.packing, self.inputs = packing_of(component), inputs_of(component)
+        self.monitors: list[Monitor] = []
+        self.in_campaign = False
         self._component = component
         self._held: dict[str, int] = {}
         self._ahead = 0
@@ -148,10 +152,9 @@ class Bench:
             ValueError: if a number of clocks is out of its range.
             AssertionError: if an answer is missing or late, or comes without a strobe.
         """
-        if latency is None:
-            latency = getattr(self._component, "latency", None)
+        promised: Any = getattr(self._component, "latency", None) if latency is None else latency
         taken, given = (Rows(names, self.packing, [], []) for names in (inputs, outputs))
-        campaign = Campaign(strobe, done, taken, given, latency, max(latency or 1, 1) if every is None else every)
+        campaign = Campaign(strobe, done, taken, given, promised, max(promised or 1, 1) if every is None else every)
         held = self.inputs.pack({**self._held, **dict.fromkeys((strobe, *inputs), 0)})
         self.in_campaign = True
         try:

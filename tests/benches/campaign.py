@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Iterable
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import cocotb
 from cocotb.triggers import FallingEdge, RisingEdge, ValueChange
@@ -41,13 +42,13 @@ class Campaign:
         self._waiting: deque[int] = deque()
         self._coin = rng()
 
-    async def run(self, bench, held: int, rows: Iterable[tuple[int, ...]]) -> dict[str, int]:
+    async def run(self, bench: Any, held: int, rows: Iterable[tuple[int, ...]]) -> dict[str, int]:
         """Put rows of inputs through, beside the word `held` of the others; fill `taken`, `given`; return the last row.
 
         Raises:
             AssertionError: if an answer is missing or late, or comes without a strobe.
         """
-        dut, inputs, seen, scratch = bench.dut, bench.inputs, bench.packing, Path(cocotb.plusargs["scratch"])
+        dut, inputs, seen, scratch = bench.dut, bench.inputs, bench.packing, Path(str(cocotb.plusargs["scratch"]))
         watched = {self.strobe, self.done, *(monitor.strobe for monitor in bench.monitors)}
         # See sequencer.v: only the clocks of the bench take time, which a waveform needs.
         await (RisingEdge if TRACED else FallingEdge)(dut.clk)
@@ -80,7 +81,7 @@ class Campaign:
         spacings[-1] = max(spacings[-1], self.latency + 1)
         return spacings
 
-    def _sort(self, seen: Packing, start: int, events: Iterable[tuple[int, int]], monitors: list) -> None:
+    def _sort(self, seen: Packing, start: int, events: Iterable[tuple[int, int]], monitors: Iterable[Any]) -> None:
         """Sort the events of a batch into the rows of inputs taken, of outputs given, and of monitors."""
         is_strobe, is_done = seen.bit(self.strobe), seen.bit(self.done)
         watching = [(seen.bit(monitor.strobe), monitor) for monitor in monitors]

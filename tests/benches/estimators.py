@@ -1,28 +1,30 @@
 """The steps that every test of a velocity estimator shares: rows of inputs through the model, and through the RTL."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
+from cocotb.handle import HierarchyObject
 
 from hardwall.hdl.estimators.estimate import EstimatorBlock
 from hardwall.model.compiled import compiled
-from hardwall.model.estimators.estimate import estimate
+from hardwall.model.estimators.estimate import EstimatorDesign, estimate
 from hardwall.model.quadrature import Seen
 from hardwall.testing import Bench, check
 
 
-def names(design) -> tuple[str, ...]:
+def names(design: EstimatorDesign) -> tuple[str, ...]:
     """Return the names of a row's values, in order: the decoder's outputs, the restart, the run-time words."""
     return (*(f"seen__{name}" for name in design.inputs), "restart", *(word.name for word in design.words))
 
 
-def reset_words(design) -> list[int]:
+def reset_words(design: EstimatorDesign) -> list[int]:
     """Return the run-time words after reset, in a row's order."""
     return [word.reset for word in design.words]
 
 
 @compiled
-def _run(params, state, seen, restart, velocity, flags):
+def _run(params: tuple, state: tuple, seen: Any, restart: np.ndarray, velocity: np.ndarray, flags: np.ndarray) -> tuple:
     """Fill `velocity` and `flags` with the outputs for records of what the decoder shows; return the last state."""
     for k in range(len(velocity)):
         sight = Seen(
@@ -40,7 +42,7 @@ def _run(params, state, seen, restart, velocity, flags):
     return state
 
 
-def model(design, rows: Iterable[tuple[int, ...]], start) -> dict[str, np.ndarray]:
+def model(design: EstimatorDesign, rows: Iterable[tuple[int, ...]], start: tuple) -> dict[str, np.ndarray]:
     """Return velocity and flags for rows in the order of `names`, from the state `start`."""
     columns = np.array(list(rows), np.int64).T.copy()
     taken, (restart, *words) = dict(zip(design.inputs, columns, strict=False)), columns[len(design.inputs) :]
@@ -55,7 +57,9 @@ def model(design, rows: Iterable[tuple[int, ...]], start) -> dict[str, np.ndarra
     return {"velocity": velocity, "saturated": flags}
 
 
-async def follow(dut, component: EstimatorBlock, rows: Iterable[tuple[int, ...]], start) -> dict[str, np.ndarray]:
+async def follow(
+    dut: HierarchyObject, component: EstimatorBlock, rows: Iterable[tuple[int, ...]], start: tuple
+) -> dict[str, np.ndarray]:
     """Put rows through the RTL, check it against the model exactly, and return the model's outputs."""
     design, bench = component.design, Bench(dut, component)
     await bench.reset()

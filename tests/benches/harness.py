@@ -76,7 +76,7 @@ class Harness(wiring.Component):
         ports = {name: member for name, (member, _) in ports_of(component).items()}
         super().__init__({**ports, **{RESERVED + name: member for name, member in own.items()}})
 
-    def elaborate(self, platform):
+    def elaborate(self, platform: object) -> Module:
         m = Module()
         ports = {name: port for name, (_, port) in ports_of(self.component).items()}
         by_hand, by_sequencer = Cat(getattr(self, name) for name in self.inputs.shapes), Signal(self.inputs.width)

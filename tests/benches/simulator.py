@@ -10,8 +10,10 @@ import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any, Literal, TypedDict
 
 import numpy as np
+from amaranth.lib import wiring
 
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.rtl import cocotb_runner
@@ -26,11 +28,20 @@ TRACED = "HARDWALL_TRACED" in os.environ
 """Whether a failed campaign is run again to be traced."""
 TRACED_SAMPLES = int(traced) if (traced := os.environ.get("HARDWALL_TRACED_SAMPLES")) else None
 """The sample at which a failed campaign ends when it is run again to be traced."""
-CAMPAIGN = {"timeout_time": SAMPLES + 20_000, "timeout_unit": "us"}
+
+
+class Timeout(TypedDict):
+    """The arguments of `cocotb.test` that end a test which takes too long."""
+
+    timeout_time: int
+    timeout_unit: Literal["us"]
+
+
+CAMPAIGN: Timeout = {"timeout_time": SAMPLES + 20_000, "timeout_unit": "us"}
 """The timeout of a campaign's `cocotb.test`, 100 clocks a sample: hardware that stops answering fails, not hangs."""
 
 
-def simulate(test_file: str, make: Callable, **parameters) -> None:
+def simulate(test_file: str, make: Callable[..., wiring.Component], **parameters: Any) -> None:
     """Run the cocotb tests of `test_file` on the hardware that `make(**parameters)` returns.
 
     Built files go to `HARDWALL_BUILD`, else to `build/` of the checkout that contains the test, else to `build/` of the
@@ -80,7 +91,7 @@ def _again() -> str:
     return f", again: {' '.join([f'HARDWALL_SEED={SEED}', *given])} {python} -m pytest -n 0 {shlex.quote(test)}"
 
 
-def parameters() -> dict:
+def parameters() -> dict[str, Any]:
     """Return, inside the simulator, the parameters that `simulate` was called with."""
     return json.loads(os.environ["HARDWALL_PARAMETERS"])
 
