@@ -100,12 +100,9 @@ def test_the_api_has_every_module_of_the_model():
 
 
 PICTURES = sorted((ROOT / "docs/pictures").iterdir())
-OLD = pytest.mark.xfail(strict=True, reason="to be drawn anew: hardwall gains --plot docs/pictures/gains.png")
 
 
-@pytest.mark.parametrize(
-    "path", [pytest.param(path, id=path.name, marks=[OLD] * (path.name == "gains.png")) for path in PICTURES]
-)
+@pytest.mark.parametrize("path", PICTURES, ids=[path.name for path in PICTURES])
 def test_every_picture_is_as_wide_as_a_page_and_on_a_page(path):
     """A picture of another width was drawn before the style that all pictures share."""
     head = path.read_bytes()[:24]
