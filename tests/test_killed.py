@@ -108,8 +108,9 @@ def test_what_is_ended_goes_on(whole, tmp_path_factory, name):
             found, out, err = ended(process)
             wait_until(lambda process=process: not session(process))
         assert "Traceback" not in err
-        if found == 0:
-            assert timeless(json.loads(out)) == report  # the signal came too late
+        if found == 0 or found == -way != code:
+            # The signal came too late: all is done, or Python itself ends, and handles no signal any more.
+            assert timeless(json.loads(out)) == report
         else:
             assert found == code, err
             assert err.count("error") <= 1
