@@ -29,7 +29,12 @@ SHORT = {
     "zwidth.damping_from_n_s_per_m": 20.0, "zwidth.damping_to_n_s_per_m": 140.0, "zwidth.damping_step_n_s_per_m": 40.0,
 }  # fmt: skip
 FEW_WALLS = {"zwidth.stiffness_step_n_per_m": 30e3, "zwidth.damping_step_n_s_per_m": 120.0}
-SET, FEW = ([f"--set={key}={value}" for key, value in keys.items()] for keys in (SHORT, SHORT | FEW_WALLS))
+STABLE_WALLS = FEW_WALLS | {"zwidth.stiffness_step_n_per_m": 10e3}
+"""A trade needs a wall that is stable."""
+SET, FEW, STABLE = (
+    [f"--set={key}={value}" for key, value in keys.items()]
+    for keys in (SHORT, SHORT | FEW_WALLS, SHORT | STABLE_WALLS)
+)
 RUNS: dict[str, tuple[str, ...]] = {
     "zwidth": ("zwidth", "seed-2011", "--estimators", "adjusted,fdm-500", "--workers", "2", "--resume", *SET),
     "accuracy": ("accuracy", "--estimators", "levant,fdm,kalman", "--rates", "1e3,2e3,5e3", "--workers", "2"),
@@ -38,7 +43,7 @@ RUNS: dict[str, tuple[str, ...]] = {
     "rates": ("rates", "seed-2011", "--estimators", "fdm", "--rates", "1e3,1e4", "--workers", "2", "--resume", *FEW),
     "gains": ("gains", "seed-2011", "--workers", "2", "--resume", *FEW),
     "drop": ("drop", "seed-2011", "--workers", "2", "--resume", *FEW),
-    "trade": ("trade", "seed-2011", "--workers", "2", "--resume", *FEW),
+    "trade": ("trade", "seed-2011", "--workers", "2", "--resume", *STABLE),
 }
 NAMES = list(RUNS) if KILLS else ["zwidth", "accuracy"]
 TIMES = {"seconds", "samples_per_s", "hit_s", "map_s", "best_for_hits", "best_for_maps"}
