@@ -32,8 +32,7 @@ FEW_WALLS = {"zwidth.stiffness_step_n_per_m": 30e3, "zwidth.damping_step_n_s_per
 STABLE_WALLS = FEW_WALLS | {"zwidth.stiffness_step_n_per_m": 10e3}
 """A trade needs a wall that is stable."""
 SET, FEW, STABLE = (
-    [f"--set={key}={value}" for key, value in keys.items()]
-    for keys in (SHORT, SHORT | FEW_WALLS, SHORT | STABLE_WALLS)
+    [f"--set={key}={value}" for key, value in keys.items()] for keys in (SHORT, SHORT | FEW_WALLS, SHORT | STABLE_WALLS)
 )
 RUNS: dict[str, tuple[str, ...]] = {
     "zwidth": ("zwidth", "seed-2011", "--estimators", "adjusted,fdm-500", "--workers", "2", "--resume", *SET),
