@@ -7,7 +7,7 @@ import typer
 
 from ..jobs.store import Store
 from ..studies import costs
-from .options import EstimatorsOption, Part, SeedsOption, curves_of
+from .options import EstimatorsOption, PartName, SeedsOption, curves_of
 from .study import StudyOptions, study
 
 
@@ -15,7 +15,9 @@ from .study import StudyOptions, study
 def command(
     options: StudyOptions,
     wanted: EstimatorsOption = None,
-    device: Annotated[Part | None, typer.Option(help="the part to place and route for", show_default="each")] = None,
+    device: Annotated[
+        PartName | None, typer.Option(help="the part to place and route for", show_default="each")
+    ] = None,
     seeds: SeedsOption = 3,
 ) -> None:
     names = list(dict.fromkeys(curve.estimator for curve in curves_of(wanted)))

@@ -19,7 +19,7 @@ from .errors import BadInput
 
 Estimator = Literal[tuple(registry.ESTIMATORS)]
 Backend = Literal["float", "fixed", "rtl"]
-Part = Literal[tuple(PARTS)]
+PartName = Literal[tuple(PARTS)]
 
 
 def _scenes(incomplete: str) -> list[str]:
@@ -46,7 +46,7 @@ EstimatorsOption = Annotated[
 ]
 BackendOption = Annotated[Backend, typer.Option(help="float64 algorithm, bit-accurate model, or the Verilated RTL")]
 ModelOption = Annotated[Literal["float", "fixed"], typer.Option(help="float64 algorithm, or bit-accurate model")]
-DeviceOption = Annotated[Part, typer.Option(help="the part to place and route for")]
+DeviceOption = Annotated[PartName, typer.Option(help="the part to place and route for")]
 SeedsOption = Annotated[int, typer.Option(min=1, max=99, help="number of placements; fmax is their median")]
 RateOption = Annotated[float, typer.Option(metavar="HZ", help="sample rate")]
 

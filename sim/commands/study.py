@@ -76,11 +76,11 @@ class StudyOptions:
         Raises:
             Exception: what failed; see `_do_all`.
         """
-        files = dict(files or {})
+        steps = [partial(self._print, result), *(partial(_write, what, *file) for what, file in (files or {}).items())]
         if self.plot:
             # The picture is the last, because it takes longest.
-            files["picture"] = self.plot, partial(self._draw, result)
-        _do_all([partial(self._print, result), *(partial(_write, what, *file) for what, file in files.items())])
+            steps.append(partial(self._draw, result, self.plot))
+        _do_all(steps)
 
     def _print(self, result: Result) -> None:
         if self.as_json:
@@ -93,8 +93,11 @@ class StudyOptions:
         # Whatever happens to the files, the result is out.
         sys.stdout.flush()
 
-    def _draw(self, result: Result, path: Path) -> list[Path]:
-        return _picture("style").save_all(_picture(self.study).draw(result), path)
+    def _draw(self, result: Result, path: Path) -> None:
+        """Draw a result, which may have several pictures, and so several files."""
+        _make_folder_of(path)
+        for each in _picture("style").save_all(_picture(self.study).draw(result), path):
+            _say("picture", each)
 
 
 def _json_of(report: dict[str, Any]) -> str:
@@ -110,14 +113,21 @@ def _json_of(report: dict[str, Any]) -> str:
 
 
 def _write(what: str, path: Path, write: Callable[[Path], object]) -> None:
-    """Write a file, or several with names of their own, whose paths `write` returns; make their folder first."""
+    _make_folder_of(path)
+    write(path)
+    _say(what, path)
+
+
+def _make_folder_of(path: Path) -> None:
+    """Make the folder of a file, or of the one that a link leads to."""
     try:
         Path(os.path.realpath(path)).parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OSError(f"{path}: cannot be written ({error.strerror})") from None
-    written = write(path)
-    for each in written if isinstance(written, list) else [path]:
-        log.print(one_line(f"{what}: {each}"), soft_wrap=True)
+
+
+def _say(what: str, path: Path) -> None:
+    log.print(one_line(f"{what}: {path}"), soft_wrap=True)
 
 
 def _do_all(steps: Iterable[Callable[[], None]]) -> None:
