@@ -8,6 +8,7 @@ from cocotb.triggers import ClockCycles, RisingEdge
 from hardwall.hdl.output import Output
 from hardwall.model import output
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from stimuli.magnitudes import magnitudes
 from stimuli.specs import spec
 
 NAMES = ("output_force_limit", "output_slew_limit")
@@ -29,12 +30,11 @@ def stimulus(d: output.Design, samples: int):
             for force in (d.force.min, top, -1, 0, 1, top, d.force.min):
                 for _ in range(2 * d.decimation):
                     yield force, 0, limit, slew
-    random, words, force = rng(), limits, 0
-    for k in range(samples):
-        if k % 50 == 0:
-            words = [int(m * 2.0 ** -random.integers(0, 16)) for m in limits]
-        force = int(random.integers(d.force.min, top + 1) * 2.0 ** -random.integers(0, 16))
-        yield force, int(random.random() < 0.02), *words
+    random, length = rng(), 50
+    force = magnitudes(random, d.force.min, top, samples)
+    fault = (random.random(samples) < 0.02).astype(np.int64)
+    words = (magnitudes(random, 0, most, -(-samples // length)).repeat(length)[:samples] for most in limits)
+    yield from zip(*(column.tolist() for column in (force, fault, *words)), strict=True)
 
 
 def model(d: output.Design, rows) -> dict[str, np.ndarray]:

@@ -10,6 +10,7 @@ import pytest
 from hardwall.hdl.wall import Wall
 from hardwall.model import wall
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from stimuli.magnitudes import magnitudes
 from stimuli.specs import spec
 
 NAMES = ("wall_stiffness", "wall_damping", "wall_position", "wall_left", "wall_forbid_pull")
@@ -47,15 +48,13 @@ def stimulus(d: wall.Design, samples: int):
         for left in (0, 1):
             yield (-odd if left else odd), 0, tie, 0, 0, left, 0
     random = rng()
-    for _ in range(samples):
-        k, b = (int(random.integers(0, int(m * 2.0 ** -random.integers(0, 16)) + 1)) for m in gains)
-        depth = int(random.integers(-half, half) * 2.0 ** -random.integers(0, d.count_width))
-        velocity = int(
-            random.integers(d.velocity.min, d.velocity.max + 1) * 2.0 ** -random.integers(0, d.velocity.width)
-        )
-        position = int(random.integers(-half, half))
-        count = (position + depth + half) % (2 * half) - half
-        yield count, velocity, k, b, position, *random.integers(0, 2, 2).tolist()
+    k, b = (magnitudes(random, 0, most, samples) for most in gains)
+    depth = magnitudes(random, -half, half - 1, samples, d.count_width)
+    velocity = magnitudes(random, d.velocity.min, d.velocity.max, samples, d.velocity.width)
+    position = random.integers(-half, half, samples)
+    count = (position + depth + half) % (2 * half) - half
+    columns = count, velocity, k, b, position, *random.integers(0, 2, (2, samples))
+    yield from zip(*(column.tolist() for column in columns), strict=True)
 
 
 def model(d: wall.Design, rows) -> list[int]:

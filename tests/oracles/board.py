@@ -28,6 +28,7 @@ class Twin:
     def __init__(self, name: str):
         self.spec = spec(name)
         self.design = self.spec.design
+        self.period, self.drive_bits = self.spec.clocks_per_sample, self.spec.force.width - 2
         self.clocks = 0
         self.words = {word.name: word.reset for word in self.design.words}
         self.restart, self.waiting = 0, None
@@ -50,12 +51,12 @@ class Twin:
     @property
     def strobe(self) -> bool:
         """Return whether the next edge takes a sample."""
-        return self.clocks % self.spec.clocks_per_sample == self.spec.clocks_per_sample - 1
+        return self.clocks % self.period == self.period - 1
 
     def _raised(self) -> int:
         """Return the flags that rise with the next edge; the pin already shows them."""
-        encoder = self.decoder.illegal | self.decoder.overspeed << 1
-        return self.raised.get(self.clocks, 0) | (encoder if self.strobe else 0)
+        encoder = self.decoder.illegal | self.decoder.overspeed << 1 if self.strobe else 0
+        return self.raised.get(self.clocks, 0) | encoder
 
     def _sample(self) -> None:
         d, decoder, now = self.design, self.decoder, self.clocks
@@ -74,9 +75,8 @@ class Twin:
 
     def edge(self, a: int, b: int, z: int, given: dict[str, int]) -> None:
         """Advance by one clock edge, with the values that a frame gives to the axis at this edge, if any."""
-        bits = self.spec.force.width - 2
-        self.sum = self.sum % 2**bits + self.magnitude
-        self.pulse, self.sign = self.sum >> bits, self.negative
+        self.sum = self.sum % 2**self.drive_bits + self.magnitude
+        self.pulse, self.sign = self.sum >> self.drive_bits, self.negative
         self.magnitude, self.negative = abs(self.drive), int(self.drive < 0)
 
         self.sticky = (0 if given.get("clear_flags") else self.sticky) | self._raised()
@@ -86,8 +86,11 @@ class Twin:
                 self.words, self.waiting = self.waiting, None
             self._sample()
             self.restart = 0
-        pulses = [given.get(name, 0) for name in ("preload", "preload_count", "index_arm", "clear_flags")]
-        self.decoder = quadrature.step(self.decoder_params, self.decoder, inputs, quadrature.Strobes(*pulses))
+        strobes = quadrature.NO_STROBES
+        if given:
+            pulses = [given.get(name, 0) for name in ("preload", "preload_count", "index_arm", "clear_flags")]
+            strobes = quadrature.Strobes(*pulses)
+        self.decoder = quadrature.step(self.decoder_params, self.decoder, inputs, strobes)
         if self.clocks in self.loaded:
             setattr(self, *self.loaded.pop(self.clocks))
         if given.get("preload"):
@@ -103,6 +106,7 @@ class Host:
     def __init__(self, dut, name: str):
         self.dut, self.board, self.random = dut, make(name), rng()
         self.bench = Bench(dut, self.board)
+        self.pulse, self.sign = self.bench.reader("drive_pdm"), self.bench.reader("drive_sign")
         self.twin = Twin(name)
         self.given = {}
         self.captured = {}
@@ -131,9 +135,10 @@ class Host:
 
     async def edges(self, count: int):
         """Let `count` clock edges pass on the board and on the twin."""
+        edge = RisingEdge(self.dut.clk)
         for _ in range(count):
-            await RisingEdge(self.dut.clk)
-            seen = int(self.dut.drive_pdm.value), int(self.dut.drive_sign.value)
+            await edge
+            seen = self.pulse(), self.sign()
             assert not self.checked or seen == (self.twin.pulse, self.twin.sign), f"edge {self.twin.clocks}"
             self.pulses.append(seen)
             if self.twin.clocks in self.captured:
