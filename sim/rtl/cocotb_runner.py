@@ -19,6 +19,7 @@ from typing import TextIO
 from xml.etree import ElementTree
 
 from amaranth.lib import wiring
+from cocotb_tools import config
 from cocotb_tools.runner import Verilator
 
 from ...hdl.axis import Axis
@@ -210,6 +211,15 @@ def _run(model: _Model, job: Job, trace_to: Path | None = None) -> None:
 
 class _Runner(Verilator):
     """Cocotb's runner for Verilator, whose processes end with this process."""
+
+    def _build_command(self) -> list[list[str]]:
+        """Return its commands, with the model and cocotb's main program compiled as one.
+
+        The headers of Verilator take as long to read as most models, and so are read once.
+        """
+        *before, make = super()._build_command()
+        main = config.share_dir / "lib" / "verilator" / "verilator.cpp"
+        return [*map(list, before), [*make, "VM_USER_CLASSES=", f"OPT_FAST=-include {main}"]]
 
     def _execute_cmds(self, commands: Sequence[Sequence[str]], folder: Path, stdout: TextIO | None = None) -> None:
         stderr = None if stdout is None else subprocess.STDOUT

@@ -151,11 +151,11 @@ def integrated(device: Device, y, command: float, seconds: float) -> tuple[np.nd
         if along and y[1] == 0:
             y[1] = along * 1e-15  # SciPy does not find an event that begins at its own value
         table = rates(device, limited, stuck)
-        friction = np.zeros(5)
-        friction[1 if device.transmission else slice(1, 4, 2)] = -along * level / mass
+        matrix, constant = table[:, :5].copy(), table[:, 5:] @ inputs
+        constant[1 if device.transmission else slice(1, 4, 2)] -= along * level / mass
 
-        def change(_, state, table=table, friction=friction):
-            return table @ [*state, *inputs] + friction
+        def change(_, state, matrix=matrix, constant=constant):
+            return matrix @ state + constant
 
         # (function, the value at which the event happens, its direction, its name)
         watched = []
