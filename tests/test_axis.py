@@ -62,8 +62,11 @@ class Events:
     def records(self, first_clock: int, clocks: int) -> np.ndarray:
         """Return the level of every pin at every clock from `first_clock` on."""
         pins = np.zeros((len(PINS), clocks), np.int64)
-        for clock, row, value in self.rows:
-            pins[row, max(clock - first_clock, 0) :] = value
+        for row, levels in enumerate(pins):
+            changes = [(max(clock - first_clock, 0), value) for clock, changed, value in self.rows if changed == row]
+            ends = [*(begin for begin, _ in changes[1:]), clocks]
+            for (begin, value), end in zip(changes, ends, strict=True):
+                levels[begin:end] = value
         return pins
 
 
