@@ -6,7 +6,7 @@ from matplotlib.ticker import NullFormatter
 
 from ..studies.cutoff import LEVEL, PAPERS_HZ, Cutoffs, Optimum
 from .labels import label_points
-from .style import COLOURS, LABEL_PT, THEORY, new_figure, page
+from .style import COLOURS, LABEL_PT, THEORY, lay_out, new_figure, page
 
 TICKS_HZ = (30, 50, 100, 200, 500, 1000, 2000, 4000)
 FILTERED, UNFILTERED = COLOURS["butterworth"], COLOURS["fdm"]
@@ -26,6 +26,7 @@ def draw(cutoffs: Cutoffs) -> Figure:
     panels[-1].xaxis.set_minor_formatter(NullFormatter())
     panels[-1].set_xlabel("cutoff of the second-order Butterworth filter (Hz); dotted: the founding paper's")
     picture.align_ylabels(panels)
+    lay_out(picture)
     for axes, optimum in zip(panels, optima, strict=True):
         _label(axes, optimum)
     return picture

@@ -9,7 +9,19 @@ from ..studies.drop import ENOUGH, PAPERS, STARTS, STIFFNESSES_N_PER_M
 from ..studies.drop_result import STIFFNESS_N_PER_M, Drop, Law
 from ..walls.grid import grid_of
 from .labels import label_points
-from .style import AT_REST_M, COLOURS, LABEL_PT, THEORY, ink, length_text, looks, new_figure, page, plain_decades
+from .style import (
+    AT_REST_M,
+    COLOURS,
+    LABEL_PT,
+    THEORY,
+    ink,
+    lay_out,
+    length_text,
+    looks,
+    new_figure,
+    page,
+    plain_decades,
+)
 
 OUTSIDE = ("mass", "count", "delay", "stiffness")
 """The changed quantities that are not in the law."""
@@ -137,6 +149,7 @@ def _law(drop: Drop) -> Figure:
         axes.set_xlabel("predicted: B (N s/m)")
     panels[0].set_ylabel("measured: B (N s/m)")
     picture.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    lay_out(picture)
     for axes, name in zip(panels, PAPERS, strict=True):
         own = [each for each in known if each.method == name]
         far = [each for each in own if not 1 / BAND <= each.measured_n_s_per_m / each.predicted_n_s_per_m <= BAND]

@@ -9,7 +9,7 @@ from matplotlib.patheffects import withStroke
 from ..studies.gains import Search
 from ..studies.lipschitz import least_alpha_m_per_s2
 from .labels import label_points
-from .style import new_figure, page
+from .style import lay_out, new_figure, page
 
 ROWS = {False: "stable walls", True: "stable walls that are in place"}
 MARKS = {"proposed": "o", "adjusted": "s", "best": "*", "best in place": "D", "best within the condition": "P"}
@@ -44,6 +44,7 @@ def draw(search: Search) -> Figure:
         axes.set_xlabel(r"$\lambda$ (m$^{1/2}$/s)")
     for axes in panels[:, 0]:
         axes.set_ylabel(r"$\alpha$ (m/s²)")
+    lay_out(picture)
     for row in panels:
         for axes, output in zip(row, search.maps, strict=True):
             _mark(axes, search, output)

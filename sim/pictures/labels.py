@@ -10,7 +10,7 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
 
-from .style import LABEL_PT
+from .style import LABEL_PT, lay_out
 
 LEADING = 1.3
 """The distance between two lines of labels, in heights of their letters."""
@@ -44,7 +44,7 @@ def label_right(axes: Axes, labels: Sequence[tuple[str, float, str]]) -> None:
         )
         for (text, _, colour), height in zip(labels, heights, strict=True)
     ]
-    axes.figure.draw_without_rendering()
+    lay_out(axes.figure)
     room = LEADING * LABEL_PT / 72 * axes.figure.dpi / axes.get_window_extent().height
     sizes = [room * (1 + text.count("\n")) for text, _, _ in labels]
     for text, place in zip(texts, spread(heights, sizes), strict=True):
@@ -77,7 +77,7 @@ def _half(group: tuple[float, list[int]], sizes: Sequence[float]) -> float:
 
 
 AROUND = [
-    (radius * np.cos(angle), radius * np.sin(angle))
+    radius * np.array([np.cos(angle), np.sin(angle)])
     for radius in (0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 2.8, 3.5, 4.5, 5.5, 7.0, 8.5, 10.5, 13.0, 16.0)
     for angle in np.linspace(0, 2 * np.pi, 16, endpoint=False)
 ]
@@ -96,7 +96,7 @@ def label_points(
     """Write labels beside points or curves of a panel, at the nearest free position, with a leader where it is far.
 
     A position is free if it is in the panel, covers nothing, and is nearer to the label's own point or curve than to
-    anything else. The panel's limits must be final, and everything to its right or below it must be drawn already.
+    anything else. The panel's limits must be final, and the figure must be laid out.
 
     Args:
         axes: the panel.
@@ -107,7 +107,6 @@ def label_points(
         ground: colour behind the letters.
     """
     figure = axes.figure
-    figure.draw_without_rendering()
     renderer, frame = figure.canvas.get_renderer(), axes.get_window_extent()
     height = LABEL_PT / 72 * figure.dpi
 
@@ -189,12 +188,11 @@ def _place(size: np.ndarray, height: float, panel: _Panel) -> tuple[np.ndarray, 
     """Return the point that a label names, and the box of the label: left, bottom, right, top."""
     # Where two curves run together, a label would be ambiguous.
     alone = [point for point in panel.own if _gap(np.tile(point, 2), panel.foreign) > 0.7 * height]
-    anchors, led, free = alone or list(panel.own), [], []
+    anchors, led, free = np.array(alone or panel.own), [], []
     for away in AROUND:
-        for anchor in anchors:
-            # The text lies on the side of the anchor to which the offset points.
-            low = anchor + np.array(away) * height - size * (1 - np.sign(np.round(away, 6))) / 2
-            box = np.concatenate([low, low + size])
+        # The text lies on the side of the anchor to which the offset points.
+        low = anchors + away * height - size * (1 - np.sign(np.round(away, 6))) / 2
+        for anchor, box in zip(anchors, np.hstack([low, low + size]), strict=True):
             if not panel.free(box):
                 continue
             line = _leader(box, anchor)

@@ -4,7 +4,7 @@ from matplotlib.figure import Figure
 
 from ..studies.rates import Rates
 from .labels import label_points, label_right
-from .style import THEORY, ink, looks, new_figure, page
+from .style import THEORY, ink, lay_out, looks, new_figure, page
 
 STYLES = "-", "--", "-.", ":"
 OWN = 0.45
@@ -60,5 +60,6 @@ def draw(rates: Rates) -> Figure:
     inside = [list(zip(rates_khz, [k / 1e3 for k in gain.largest_n_per_m], strict=True)) for gain in gains]
     inside += [list(zip(rates_khz, [k / 1e3 for k in limit], strict=True)) for limit in limits.values()]
     named = [points for _, points, _ in leaving]
+    lay_out(picture)
     label_points(axes, leaving, lines=[line for line in inside if line not in named])
     return picture

@@ -98,20 +98,6 @@ def ink(estimator: str) -> str:
     return COLOURS.get(estimator, OTHER["color"])
 
 
-class _SteadyLayout(ConstrainedLayoutEngine):
-    """The constrained layout with the places of the axes rounded.
-
-    Its solver takes the equations in the order of the memory's addresses, so that the last bits of its answer, and with
-    them the names in an SVG, vary from run to run.
-    """
-
-    def execute(self, fig: Figure) -> None:
-        super().execute(fig)
-        for axes in fig.axes:
-            axes.set_position(np.round(axes.get_position(original=True).bounds, 9))
-            axes.set_in_layout(True)  # an axes that was placed is otherwise left out of the next layout
-
-
 def page(draw: Callable) -> Callable:
     """Decorate a function that returns a figure, or figures by name, so that it draws in the style of all pictures."""
 
@@ -125,10 +111,23 @@ def page(draw: Callable) -> Callable:
 
 def new_figure(height_in: float, title: str) -> Figure:
     """Return a figure as wide as a page, empty except for its title."""
-    figure = Figure(figsize=(PAGE_IN, height_in), dpi=DPI, layout=_SteadyLayout())
+    figure = Figure(figsize=(PAGE_IN, height_in), dpi=DPI)
     FigureCanvasAgg(figure)  # a canvas that can measure text
     figure.suptitle(title, x=0.01, ha="left")
     return figure
+
+
+def lay_out(figure: Figure) -> None:
+    """Give the panels of a figure their places, so that all that is written has room.
+
+    This is the constrained layout with the places rounded. Its solver takes the equations in the order of the memory's
+    addresses, so that the last bits of its answer, and with them the names in an SVG, vary from run to run. A figure
+    does not own its layout, because it would then be laid out for each drawing, and be drawn twice to be saved.
+    """
+    ConstrainedLayoutEngine().execute(figure)
+    for axes in figure.axes:
+        axes.set_position(np.round(axes.get_position(original=True).bounds, 9))
+        axes.set_in_layout(True)  # an axes that was placed is otherwise left out of the next layout
 
 
 def name_above(axes: Axes, columns: int = 2) -> None:
@@ -170,6 +169,7 @@ def save(figure: Figure, path: Path) -> None:
         raise ValueError(f"the name of a picture must end in {', '.join(SUFFIXES)}, not {str(path)!r}")
     metadata = {".png": None, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[path.suffix]
     with mpl.rc_context(SETTINGS), whole_file(path) as part:
+        lay_out(figure)
         figure.savefig(part, format=path.suffix[1:], dpi=DPI, metadata=metadata)
 
 

@@ -7,7 +7,7 @@ from ..studies.shortcuts import SCATTER
 from ..studies.trade import HIT, MAP, Point, Question, Trade
 from ..walls import methods
 from .labels import label_points
-from .style import COLOURS, LABEL_PT, THEORY, new_figure, page, plain_decades
+from .style import COLOURS, LABEL_PT, THEORY, lay_out, new_figure, page, plain_decades
 
 NAMED = 8
 """The largest number of settings of a panel that are labelled."""
@@ -48,6 +48,7 @@ def _picture(trade: Trade, question: Question) -> Figure:
     panels[-1].set_xlabel(time)
     picture.align_ylabels(panels)
     picture.supxlabel(NOTES, x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)
+    lay_out(picture)
     for axes, label in zip(panels, trade.walls, strict=True):
         _name(axes, trade, question, label)
     return picture

@@ -13,7 +13,7 @@ from ..walls.boundary import Grid
 from ..walls.grid import grid_of
 from ..walls.zwidth import Map
 from .labels import label_points
-from .style import LABEL_PT, THEORY, ink, looks, new_figure, page
+from .style import LABEL_PT, THEORY, ink, lay_out, looks, new_figure, page
 
 BORDER = "0.6"
 """The colour of the map's border."""
@@ -59,6 +59,7 @@ def draw(found: ZWidth) -> Figure:
         inks = [ink(own.controller.estimator) for own in scenes]
         labels = [(each.case.label, *where) for each, *where in zip(maps, boundaries, inks, strict=True)]
         dotted = [list(zip(grid.dampings, np.array(limit) / 1e3, strict=True)) for limit in limits if limit]
+        lay_out(picture)
         label_points(axes, labels, lines=[*dotted, border])
     return picture
 

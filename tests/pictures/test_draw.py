@@ -13,7 +13,7 @@ from hardwall.sim.estimates import figures
 from hardwall.sim.estimates.replay import replay
 from hardwall.sim.pictures import accuracy, bits, cutoff, drop, gains, hit, lipschitz, rates, trade, zwidth
 from hardwall.sim.pictures import replay as replayed
-from hardwall.sim.pictures.style import PAGE_IN, save
+from hardwall.sim.pictures.style import PAGE_IN, lay_out, save
 from hardwall.sim.studies.accuracy import Accuracy
 from hardwall.sim.studies.trade import HIT, MAP
 from stimuli import results
@@ -58,12 +58,15 @@ PICTURES = {
 
 @pytest.fixture(scope="module", params=PICTURES)
 def picture(request) -> Figure:
-    return PICTURES[request.param]()
+    """Return a picture as it is when it is saved; the tests that share it only look at it."""
+    figure = PICTURES[request.param]()
+    lay_out(figure)
+    figure.draw_without_rendering()
+    return figure
 
 
 def words(figure: Figure) -> list[Text]:
-    """Return the visible texts of a figure after its layout, except for those of the ticks."""
-    figure.draw_without_rendering()
+    """Return the visible texts of a figure, except for those of the ticks."""
     ticks = {text for tick in figure.findobj(Tick) for text in tick.findobj(Text)}
     texts = figure.findobj(Text, include_self=False)
     return [text for text in texts if text.get_visible() and text.get_text() and text not in ticks]
@@ -122,14 +125,11 @@ def test_a_picture_is_always_the_same_file(tmp_path, name, suffix):
     assert first == second
 
 
-@pytest.mark.parametrize("name", ["hit", "replay", "figure 1"])
-def test_an_error_stands_under_the_estimate(name):
-    figure = PICTURES[name]()
-    (error,) = [axes for axes in figure.axes if axes.get_ylabel().startswith("error")]
-    others = [axes for axes in figure.axes if axes.get_ylabel().startswith("velocity")]
-    top = others[0].get_position()
-    figure.draw_without_rendering()
-    assert error.get_position().y1 <= top.y0
+@pytest.mark.parametrize("picture", ["hit", "replay", "figure 1"], indirect=True)
+def test_an_error_stands_under_the_estimate(picture):
+    (error,) = [axes for axes in picture.axes if axes.get_ylabel().startswith("error")]
+    others = [axes for axes in picture.axes if axes.get_ylabel().startswith("velocity")]
+    assert error.get_position().y1 <= others[0].get_position().y0
 
 
 def columns(figure: Figure) -> tuple[list, list]:
@@ -168,9 +168,9 @@ def test_a_truth_that_a_noisy_estimate_would_hide_is_drawn_over_it():
         assert true.get_linewidth() > 2 * drawn.get_linewidth() or over
 
 
-@pytest.mark.parametrize("name", ["replay", "figure 1"])
-def test_the_estimate_lies_over_a_truth_that_is_broader(name):
-    for axes in PICTURES[name]().axes:
+@pytest.mark.parametrize("picture", ["replay", "figure 1"], indirect=True)
+def test_the_estimate_lies_over_a_truth_that_is_broader(picture):
+    for axes in picture.axes:
         if axes.get_ylabel().startswith("velocity"):
             true, estimate = axes.lines[0], axes.lines[-1]
             assert true.get_zorder() <= estimate.get_zorder()
@@ -184,12 +184,13 @@ def test_a_hit_says_how_it_settled_in_digits_that_count(rms_m, text):
     assert "0.0000" not in title
 
 
-@pytest.mark.parametrize("question", [HIT, MAP])
-def test_a_panel_of_the_trade_names_its_best_and_few_others(question):
+@pytest.mark.parametrize(
+    ("picture", "question"), [("trade, hit", HIT), ("trade, map", MAP)], indirect=["picture"], scope="module"
+)
+def test_a_panel_of_the_trade_names_its_best_and_few_others(picture, question):
     made = results.traded()
-    figure = trade.draw(made)[question.name]
-    assert len(figure.axes) == len(made.walls)
-    for axes, label in zip(figure.axes, made.walls, strict=True):
+    assert len(picture.axes) == len(made.walls)
+    for axes, label in zip(picture.axes, made.walls, strict=True):
         labels = {point.shortcut.label for point in made.points}
         names = [text.get_text() for text in axes.texts if text.get_text() in labels]
         assert 2 <= len(names) == len(set(names)) <= trade.NAMED
@@ -198,8 +199,9 @@ def test_a_panel_of_the_trade_names_its_best_and_few_others(question):
         assert not any(text.isdigit() for text in names)
 
 
-def test_the_passivity_limit_is_seen_or_said_to_be_absent():
-    absent = " ".join(text.get_text() for text in words(zwidth.draw(results.maps())))
+@pytest.mark.parametrize("picture", ["zwidth"], indirect=True)
+def test_the_passivity_limit_is_seen_or_said_to_be_absent(picture):
+    absent = " ".join(text.get_text() for text in words(picture))
     assert "passive walls (Colgate, Schenkel): none on this map" in absent
     plain = results.map_of("fdm-500", 2e4, 200)
     viscous = replace(plain, case=plain.case.changed({"handle.viscous_n_s_per_m": 100.0}))
@@ -208,15 +210,16 @@ def test_the_passivity_limit_is_seen_or_said_to_be_absent():
     assert "-." in [line.get_linestyle() for line in seen.axes[0].lines]
 
 
-def test_the_border_of_a_map_is_drawn_where_the_map_ends():
-    axes = zwidth.draw(results.maps()).axes[0]
+@pytest.mark.parametrize("picture", ["zwidth"], indirect=True)
+def test_the_border_of_a_map_is_drawn_where_the_map_ends(picture):
+    axes = picture.axes[0]
     (border,) = [line for line in axes.lines if line.get_color() == zwidth.BORDER]
     assert list(zip(*border.get_data(), strict=True)) == [(6, 100), (300, 100), (300, 0)]
 
 
-def test_gains_with_several_names_are_named_once():
-    figure = gains.draw(results.search())
-    for axes in figure.axes[:4]:
+@pytest.mark.parametrize("picture", ["gains"], indirect=True)
+def test_gains_with_several_names_are_named_once(picture):
+    for axes in picture.axes[:4]:
         names = [text.get_text() for text in axes.texts]
         assert "best,\nwithin the condition" in names
         assert len(names) == len(set(names)) == 5

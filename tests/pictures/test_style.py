@@ -10,6 +10,7 @@ from hardwall.sim.pictures.style import (
     MARKERS,
     OTHER,
     ink,
+    lay_out,
     length_text,
     looks,
     new_figure,
@@ -76,6 +77,7 @@ def test_names_of_a_crowd_of_points_do_not_touch():
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 1)
     axes.plot(*spots.T, "o")
+    lay_out(axes.figure)
     texts = label_points(axes, [(f"setting number {n}", spot, "black") for n, spot in enumerate(spots)])
     extents = boxes(texts)
     assert apart(extents)
@@ -95,6 +97,8 @@ def test_names_at_the_ends_of_lines_do_not_touch():
 
 def test_one_picture_is_its_file_and_several_have_their_names_in_theirs(tmp_path):
     one, two = new_figure(2.0, "one"), new_figure(2.0, "two")
+    one.subplots()
+    two.subplots()
     assert save_all(one, tmp_path / "drop.png") == [tmp_path / "drop.png"]
     written = save_all({"law": one, "maps": two}, tmp_path / "drop.svg")
     assert written == [tmp_path / "drop-law.svg", tmp_path / "drop-maps.svg"]
