@@ -37,7 +37,7 @@ def draw(found: ZWidth) -> Figure:
     axes = picture.subplots()
     styles = looks([(scene.controller.estimator, scene.estimator_output) for scene in scenes])
     boundaries = [[(point.damping_n_s_per_m, point.stable_n_per_m / 1e3) for point in each.boundary] for each in maps]
-    limits = [_linear(own, grid.dampings) for own in scenes]
+    limits = found.linear_limits
     for each, boundary, limit, style in zip(maps, boundaries, limits, styles, strict=True):
         label = f"{each.case.label}: {each.area / 1e3:.0f}"
         axes.plot(*zip(*boundary, strict=True), label=label, **style | {"ms": 3.5})
@@ -70,14 +70,6 @@ def _border(axes: Axes, grid: Grid) -> list[tuple[float, float]]:
     corners = [(first, top), (last, top), (last, 0.0)]
     axes.plot(*zip(*corners, strict=True), color=BORDER, lw=0.8, zorder=1.5)
     return corners
-
-
-def _linear(scene: Scene, dampings: list[float]) -> list[float] | None:
-    """Return the linear loop's limit (N/m) at every B; None for an estimator that is not linear."""
-    if scene.controller.estimator not in theory.LINEAR:
-        return None
-    loop = theory.Loop(scene)
-    return [theory.linear_limit_n_per_m(loop, damping) for damping in dampings]
 
 
 def _passive(axes: Axes, scene: Scene, dampings: list[float]) -> list[str]:

@@ -2,12 +2,15 @@
 
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 from ..jobs.result import Table, table_of
 from ..scene.case import Case
 from ..scene.schema import Scene
+from ..walls import theory
 from ..walls.figure_5 import Fact, facts
+from ..walls.grid import grid_of
 from ..walls.methods import Curve, methods
 from ..walls.zwidth import Effort, Map, Mapper
 
@@ -27,6 +30,11 @@ class ZWidth:
     maps: list[Map]
     facts: list[Fact]
     effort: Effort
+
+    @cached_property
+    def linear_limits(self) -> list[list[float] | None]:
+        """The linear loop's limit (N/m) at every B, for each map; None for an estimator that is not linear."""
+        return [_linear_limits(each.case.scene) for each in self.maps]
 
     def report(self) -> dict[str, Any]:
         """Return what the command line prints, units in the keys."""
@@ -85,6 +93,13 @@ def study(case: Case, curves: list[Curve] | None, mapper: Mapper) -> ZWidth:
     maps = mapper(f"{scene.name} Z-width", cases)
     shown = facts(dict(zip(papers, maps, strict=True))) if curves is None else []
     return ZWidth(scene, maps, shown, mapper.effort())
+
+
+def _linear_limits(scene: Scene) -> list[float] | None:
+    if scene.controller.estimator not in theory.LINEAR:
+        return None
+    loop = theory.Loop(scene)
+    return [theory.linear_limit_n_per_m(loop, damping) for damping in grid_of(scene).dampings]
 
 
 def area_text(each: Map) -> str:

@@ -1,5 +1,7 @@
 """Small results of studies, made by hand, from which pictures are drawn without a run."""
 
+from functools import cache
+
 import numpy as np
 
 from hardwall.model.estimators.levant import Gains
@@ -54,8 +56,9 @@ def zwidth(maps: list[Map]) -> ZWidth:
     return ZWidth(load("seed-2011"), maps, [], NOTHING)
 
 
+@cache
 def maps() -> ZWidth:
-    """Return a map of each of the founding paper's methods."""
+    """Return a map of each of the founding paper's methods, always the same, as its limits take long to compute."""
     ends = {"fdm-30": 90, "fdm-100": 190, "fdm-500": 300, "fdm-1000": 400, "proposed": 130, "adjusted": 180}
     return zwidth([map_of(name, 250 * end, end) for name, end in ends.items()])
 
