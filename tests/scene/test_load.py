@@ -1,6 +1,7 @@
 """Files and changes of scenes that are refused: in a line, and at once."""
 
 import os
+import re
 
 import pytest
 
@@ -106,6 +107,33 @@ def test_keys_that_contradict_each_other_are_both_named(changes, said):
     with pytest.raises(SceneError) as refusal:
         load("seed-2011", changes)
     assert str(refusal.value).startswith(f"seed-2011: {said}")
+
+
+@pytest.mark.parametrize(
+    ("scene", "changes", "key"),
+    [
+        ("desktop-arm", {}, "wall.damping_n_s_per_m"),
+        ("mhz", {"controller.stiffness_max_n_per_m": 123456.7}, "wall.stiffness_n_per_m"),
+    ],
+)
+def test_the_bounds_that_a_refused_wall_is_told_are_accepted(scene, changes, key):
+    with pytest.raises(SceneError) as refusal:
+        load(scene, changes | {key: 1e-12})
+    least, most = re.search(r" must be 0, or (\S+) \(.*\) to (\S+) \(", str(refusal.value)).groups()
+    for bound in (0.0, float(least), float(most)):
+        load(scene, changes | {key: bound})
+
+
+def test_a_wall_of_very_many_digits_is_refused_in_a_short_line():
+    with pytest.raises(SceneError, match=r", not 10{56}\.\.\.$"):
+        load("seed-2011", {"wall.stiffness_n_per_m": 10**400})
+
+
+@pytest.mark.parametrize("value", ["stiff", True, [1.0]])
+def test_a_wall_that_is_no_number_is_told_the_range_of_its_key(value):
+    with pytest.raises(SceneError) as refusal:
+        load("seed-2011", {"wall.stiffness_n_per_m": value})
+    assert str(refusal.value) == f"seed-2011: wall.stiffness_n_per_m must be a number of 0 to 1e+10, not {value!r}"
 
 
 def test_every_number_has_a_range():
