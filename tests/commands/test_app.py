@@ -6,9 +6,11 @@ import json
 import os
 import subprocess
 import sys
+from functools import partial
 
 import pytest
 
+from hardwall.sim.commands import app
 from hardwall.sim.commands.group import COMMANDS
 from hardwall.sim.commands.terminal import show
 from hardwall.sim.jobs.result import Table, Values, table_of
@@ -65,6 +67,15 @@ def test_signals_are_heard_before_anything_long_is_imported():
     program = "import sys, hardwall.sim.commands.app; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert set(done.stdout.split()) & {*HEAVY, "typer", "rich", "importlib.metadata"} == set()
+
+
+def test_signals_are_heard_before_anything_else_is_done(monkeypatch):
+    done = []
+    for name in ("jobs.ending.hear_signals", "jobs.ending.begin", "commands.streams.prepare"):
+        monkeypatch.setattr(f"hardwall.sim.{name}", partial(done.append, name))
+    monkeypatch.setattr("sys.argv", ["hardwall", "--version"])
+    app.main()
+    assert done[0] == "jobs.ending.hear_signals"
 
 
 def test_the_version_is_the_package_s(monkeypatch, capsys):
