@@ -89,6 +89,28 @@ def test_what_cannot_be_undone_does_not_hold_up_the_end(number):
         assert ended_by(number, process) == ("", "", "")
 
 
+# What starts a thread takes the lock of the list of threads, which the thread that is interrupted has.
+STARTING = """
+import threading, time
+from pathlib import Path
+from hardwall.sim.jobs import ending
+ending.hear_signals()
+with ending.undone(Path("undone").touch), threading._active_limbo_lock:
+    print("ready", flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_a_thread_that_is_being_started_does_not_hold_up_the_end(tmp_path, monkeypatch, number):
+    monkeypatch.chdir(tmp_path)
+    with started(sys.executable, "-c", STARTING) as process:
+        assert line(process) == "ready"
+        process.send_signal(signal.Signals[number])
+        assert ended_by(number, process) == ("", "", "")
+    assert (tmp_path / "undone").exists()
+
+
 # Nobody reads what a program says, and its pipe is full.
 UNHEARD = """
 import os, time
@@ -117,6 +139,26 @@ def test_a_reader_that_has_stopped_does_not_hold_up_the_end(tmp_path, monkeypatc
         wait_until(lambda: session(process) == [])
         assert process.wait() == ending.CODES[signal.Signals[number]][0]
     assert (tmp_path / "undone").exists()
+
+
+# What is printed has no reader any more.
+UNREAD = """
+import os, time
+from hardwall.sim.jobs import ending
+ending.hear_signals()
+print("unread")
+os.write(1, b"ready\\n")
+time.sleep(600)
+"""
+
+
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_stdout_that_was_closed_is_no_more_than_the_line_of_the_end(number):
+    with started(sys.executable, "-c", UNREAD) as process:
+        assert line(process) == "ready"
+        process.stdout.close()
+        process.send_signal(signal.Signals[number])
+        assert ended_by(number, process)[1:] == ("", "")
 
 
 def test_what_ends_without_a_signal_is_undone_once():
