@@ -96,6 +96,13 @@ def test_a_folder_that_went_meanwhile_is_an_error_in_a_line(tmp_path):
         _write("velocities", path, Path.touch)
 
 
+def test_the_folder_that_a_link_leads_to_is_made(tmp_path):
+    link = tmp_path / "link.csv"
+    link.symlink_to("new/folder/target.csv")
+    _write("velocities", link, Path.touch)
+    assert (tmp_path / "new/folder/target.csv").exists()
+
+
 def test_a_waveform_goes_where_a_link_leads(tmp_path):
     vcd, link = tmp_path / "x.vcd", tmp_path / "link.fst"
     vcd.write_text("$timescale 1ns $end\n$var wire 1 ! a $end\n$enddefinitions $end\n#0\n1!\n#1\n0!\n")
@@ -103,6 +110,13 @@ def test_a_waveform_goes_where_a_link_leads(tmp_path):
     assert vcd_to_fst(vcd, link) == 2
     assert link.is_symlink()
     assert (tmp_path / "target.fst").stat().st_size
+
+
+def test_a_waveform_that_cannot_be_written_is_an_error_that_names_it_once(tmp_path):
+    fst = tmp_path / "absent" / "x.fst"
+    with pytest.raises(OSError, match=r"/absent/x\.fst: cannot be written \(it cannot be created\)$") as failure:
+        vcd_to_fst(tmp_path / "x.vcd", fst)
+    assert str(failure.value).count(str(tmp_path)) == 1
 
 
 def test_a_number_that_json_lacks_is_an_error_in_a_line(capsys):
