@@ -2,11 +2,14 @@
 
 import json
 import os
+import subprocess
+import sys
 
 import pytest
 
 from hardwall.sim.commands import options
 from hardwall.sim.commands.errors import BadInput, one_line
+from hardwall.sim.rtl.parts import PARTS
 from stimuli.command_line import call
 
 LONG = "x" * 5000
@@ -105,6 +108,13 @@ def test_a_link_is_followed_and_one_that_leads_nowhere_is_refused(tmp_path):
     for name in ("far.csv", "near.csv"):
         assert options.output_file(tmp_path / name, "--out", (".csv",)) == tmp_path / name
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_part_that_is_in_the_table_is_a_device():
+    program = "from hardwall.sim.rtl.parts import PARTS; PARTS['more'] = None; "
+    program += "from hardwall.sim.commands.options import PartName; print(*PartName.__args__)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == [*PARTS, "more"]
 
 
 @pytest.mark.parametrize(
