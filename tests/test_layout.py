@@ -135,6 +135,11 @@ def test_imports_make_no_circle():
         pytest.fail(f"a circle of imports: {' -> '.join(error.args[1])}")
 
 
+def test_the_simulation_opens_axes_of_the_model_in_one_place():
+    openers = {identity(path) for path in SOURCES if "hardwall.model.axis.Axis" in imports(path)}
+    assert {name for name in openers if name.startswith("sim/")} == {"sim/loop/backends"}
+
+
 def paths_below(folder: Path) -> set[str]:
     """Return the paths of sources below a folder, without their suffixes."""
     return {str(path.relative_to(folder).with_suffix("")) for path in folder.rglob("*.py") if path.stem != "__init__"}
