@@ -6,16 +6,19 @@ with the files that it had, and comes again with the same seed.
 
 import os
 import re
+import signal
 import tempfile
+import time
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, find, given, settings
 from hypothesis import strategies as st
 
 from hardwall.sim.commands.group import COMMANDS
+from stimuli import forked
 from stimuli.forked import BEGAN, Ended, run
-from stimuli.hostile import Call, calls
+from stimuli.hostile import ENVIRONS, Call, calls
 from stimuli.reports import check_text
 
 CALLS = int(os.environ.get("HARDWALL_FUZZ", "180"))
@@ -68,6 +71,33 @@ def test_hostile_calls(command):
         assert not wrong, f"{'; '.join(wrong)}\n{call}\n{ended.out[-2000:]}\n{ended.err[-4000:]}"
 
     attack()
+
+
+def ended_in(folder: Path, *arguments: str, **environ: str) -> Ended:
+    """Return how a call ends in a folder that is made for it."""
+    (folder / "work").mkdir(parents=True)
+    return run(arguments, folder, environ)
+
+
+@pytest.mark.parametrize("words", ["bench seed-2011", "synth seed-2011", "zwidth", "hit --backend rtl"])
+def test_what_takes_long_is_only_begun(tmp_path, words):
+    assert ended_in(tmp_path, *words.split()).code == BEGAN
+
+
+def test_a_call_that_hangs_is_ended_and_says_where(tmp_path, monkeypatch):
+    monkeypatch.setattr(forked, "LIMIT_S", 1)
+    monkeypatch.setattr(forked.app, "main", lambda: time.sleep(600))
+    ended = ended_in(tmp_path, "hit")
+    assert ended.code == -signal.SIGALRM
+    assert "most recent call first" in ended.err
+    assert faults(Call(("hit",)), ended)
+
+
+def test_a_call_has_its_terminal(tmp_path):
+    few = settings(max_examples=100, phases=[Phase.generate])
+    assert find(calls("hit"), lambda call: call.environ, settings=few).environ in ENVIRONS
+    narrow, wide = (ended_in(tmp_path / columns, "hit", "--help", COLUMNS=columns).out for columns in ("40", "80"))
+    assert max(map(len, narrow.splitlines())) <= 40 < max(map(len, wide.splitlines())) <= 80
 
 
 def test_the_fuzzer_sees_what_is_wrong():
