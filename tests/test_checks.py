@@ -8,7 +8,7 @@ import pytest
 from hardwall.model import stamped
 from hardwall.model.arithmetic.fixed import SQ
 from hardwall.model.axis import Axis
-from hardwall.model.estimators import foaw, levant, registry
+from hardwall.model.estimators import foaw, levant, period_count, registry
 from hardwall.model.spec import AxisSpec
 from stimuli.specs import PAPER, SPECS, spec
 
@@ -113,6 +113,14 @@ def test_records_of_edges(arguments, error, message):
 def test_parameters_of_an_axis(arguments, error, message, floating):
     with pytest.raises(error, match=message):
         Axis(**({"spec": AXIS.spec, "floating": floating} | arguments))
+
+
+def test_gains_beyond_the_last_word_by_less_than_half_an_lsb_are_that_word_in_float_too():
+    known = spec("narrow", "period-count").design.estimator
+    beyond = known.switch.si_max + 0.4 * known.switch.to_si(1)
+    gains = period_count.Gains((1 << known.window_bits) / SPECS["narrow"]["sample_hz"], beyond)
+    design = AxisSpec(**SPECS["narrow"] | {"gains": gains}, estimator="period-count").design.estimator
+    assert design.float_params(gains, "u", {}).switch == design.switch.reset == known.switch.format.max
 
 
 EVERY_DESIGN = [(name, estimator) for name in SPECS for estimator in registry.ESTIMATORS]
