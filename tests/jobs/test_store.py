@@ -55,6 +55,12 @@ def test_a_pipe_in_the_place_of_the_store_is_not_waited_for(caplog):
     assert said.endswith("cannot be written (No such device or address): what this run makes is not kept")
 
 
+def test_a_store_that_is_too_large_is_not_read(monkeypatch):
+    Store("some").put({"a": 1}, 1)
+    monkeypatch.setattr(store, "BYTES_MAX", 4)
+    assert Store("some").get({"a": 1}) is None
+
+
 NO_RESULTS = {
     "a number": b"5", "a list": b"[1]", "nothing": b"null", "a text": b'"abc"',
     "an object": b'{"a": 1, "b": 2, "c": 3}',
