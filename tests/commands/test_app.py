@@ -4,12 +4,14 @@ import importlib
 import importlib.metadata
 import json
 import os
+import re
 import subprocess
 import sys
 from functools import partial
 
 import pytest
 
+from hardwall.model.estimators import registry
 from hardwall.sim.commands import app
 from hardwall.sim.commands.group import COMMANDS
 from hardwall.sim.commands.terminal import show
@@ -55,6 +57,11 @@ def test_every_command_has_its_file_and_its_help(monkeypatch, capsys, name):
     assert COMMANDS[name] in words
     assert f"Usage: hardwall {name}" in words
     assert callable(importlib.import_module(f"hardwall.sim.commands.{name}").command)
+
+
+def test_the_help_of_an_estimator_names_each(monkeypatch, capsys):
+    _, out, _ = call(monkeypatch, capsys, "hit", "--help")
+    assert set(registry.ESTIMATORS) - set(re.split(r"[\s│,]+", out)) == set()
 
 
 def test_alone_it_prints_help_and_no_error(monkeypatch, capsys):
