@@ -173,3 +173,8 @@ def test_a_run_begins_with_nothing_kept():
     assert "kept" in ending.remark()
     ending.begin()
     assert ending.remark() == ""
+
+
+def test_a_program_that_says_no_more_is_a_failure_of_its_test():
+    with started(sys.executable, "-c", "") as process, pytest.raises(AssertionError):
+        line(process)
