@@ -4,6 +4,7 @@ import shutil
 
 import pytest
 
+from hardwall.model.build_folder import build_dir
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import FOLDER
 from hardwall.sim.studies import bench
@@ -17,8 +18,10 @@ def test_the_benchmark_runs_on_a_scene_of_ones_own(tmp_path, monkeypatch):
     monkeypatch.setattr(bench, "SECONDS_OF_SCENE", {"float": 0.1, "fixed": 0.1, "rtl": 0.02})
     shutil.copy(FOLDER / "seed-2011.toml", tmp_path / "mine.toml")
     monkeypatch.chdir(tmp_path)
-    said = []
-    report = bench.study(Case.of("mine.toml"), said.append).report()
+    case, said, folders, simulated = Case.of("mine.toml"), [], [], bench.simulate_axis
+    (tmp_path / "mine.toml").unlink()  # it was read once
+    monkeypatch.setattr(bench, "simulate_axis", lambda spec, job: (folders.append(job.folder), simulated(spec, job)))
+    report = bench.study(case, said.append).report()
     assert set(report["samples_per_s"]) == {"float", "fixed", "rtl", "cocotb"}
     assert set(report["ns_per_sample_of_parts"]) == {
         "none", "coulomb friction", "amplifier delay", "encoder phase error", "converter", "amplifier lag",
@@ -28,3 +31,5 @@ def test_the_benchmark_runs_on_a_scene_of_ones_own(tmp_path, monkeypatch):
     assert report["rtl_over_cocotb"] == report["samples_per_s"]["rtl"] / report["samples_per_s"]["cocotb"]
     check("bench", report)
     assert len(said) == 1 + 4 + 7
+    # What is left there by a process that is killed is removed by the next.
+    assert {folder.parent for folder in folders} == {build_dir() / "cocotb"}
