@@ -10,8 +10,9 @@ import pytest
 from hardwall.hdl.estimators.cycle_times import CycleTimes
 from hardwall.model.estimators.cycle_times import NOTHING, Times, observe
 from hardwall.model.quadrature import Seen
-from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, simulate
 from stimuli.edges import anything, rows, turn
+from stimuli.seeded import seeded
 
 INPUTS = (*(f"seen__{name}" for name in Seen._fields), "restart")
 
@@ -32,13 +33,13 @@ def model(widths: Widths, cycles_max: int, inputs) -> dict[str, np.ndarray]:
 
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
-    component, random = CycleTimes(**parameters()), rng()
+    component, random = CycleTimes(**parameters()), seeded()
     # The longest sample that the stamps can measure.
     clocks = 1 << min(component.stamp_width - 2, 6)
     widths = Widths(component.count_width, component.stamp_width, clocks)
     bench = Bench(dut, component)
     await bench.reset()
-    turns = [rows(widths, *turn(widths, random, SAMPLES // 3, invert)) for invert in (False, True)]
+    turns = [rows(widths, *turn(widths, random, SAMPLES // 3), invert) for invert in (False, True)]
     stimulus = chain(*turns, anything(widths, random, SAMPLES // 3))
     inputs, outputs = await bench.campaign("strobe", "valid", INPUTS, Times._fields, stimulus)
     expected = model(widths, component.cycles_max, inputs.rows)

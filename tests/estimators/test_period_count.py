@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from fractions import Fraction
+from random import Random
 
 import cocotb
 import numpy as np
@@ -15,10 +16,11 @@ from hardwall.model.estimators.period_count import START
 from hardwall.model.quadrature import seen_count
 from hardwall.sim.estimates import accuracy, motions, signals
 from hardwall.sim.world.encoder import offsets
-from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, parameters, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.edges import anything, check_rounding_is_the_only_difference, rows, sights, turn, velocities
 from stimuli.papers_signal import RATES
+from stimuli.seeded import seeded
 from stimuli.specs import spec
 
 NAME = "period-count"
@@ -32,22 +34,22 @@ def make(name: str) -> Estimator:
     return Estimator(design(name))
 
 
-def with_words(d: period_count.Design, plain, random: np.random.Generator):
+def with_words(d: period_count.Design, plain, random: Random):
     """Yield rows with a word: mostly the reset value, otherwise any value."""
     switch = reset_words(d)[0]
     for row in plain:
         if random.random() < 0.002:
-            switch = reset_words(d)[0] if random.random() < 0.7 else int(random.integers(0, d.switch.format.max + 1))
-            switch = switch if random.random() < 0.8 else int(random.integers(0, 4))
+            switch = reset_words(d)[0] if random.random() < 0.7 else random.randrange(d.switch.format.max + 1)
+            switch = switch if random.random() < 0.8 else random.randrange(4)
         yield *row, switch
 
 
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     name = parameters()["name"]
-    d, random = design(name), rng()
+    d, random = design(name), seeded()
     samples = SAMPLES // (10 if name == "narrow" else 1)
-    turns = [rows(d, *turn(d, random, samples // 3, invert)) for invert in (False, True)]
+    turns = [rows(d, *turn(d, random, samples // 3), invert) for invert in (False, True)]
     plain = (row for part in (*turns, anything(d, random, samples // 3)) for row in part)
     expected = await follow(dut, make(name), with_words(d, plain, random), START)
     assert set(expected["saturated"]) == {0, 1}
@@ -84,7 +86,7 @@ def speeds(d: period_count.Design, strobes, edges, switch: int):
 
 @pytest.mark.parametrize(("name", "switch"), [("mhz", None), ("mhz", 60), ("paper", None), ("narrow", 5)])
 def test_model_is_the_exact_speed_rounded(name, switch):
-    d, random = design(name), rng()
+    d, random = design(name), seeded()
     switch = switch or reset_words(d)[0]
     # No window may alias, so the speeds stay within the axis's range.
     strobes, edges = turn(d, random, 20_000, most=2 if name == "narrow" else None)

@@ -1,39 +1,38 @@
 """Stimuli for estimators that time edges: the edges of a wheel that turns at random, and known motions."""
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from random import Random
+from typing import NamedTuple
 
 import numpy as np
 
-from hardwall.sim.estimates import accuracy, motions, playback, signals
+from hardwall.sim.estimates import accuracy, playback, signals
 
 
-@dataclass(frozen=True)
-class Edge:
-    """An edge: when it was decoded (clocks, unwrapped), its position (counts, unwrapped), its kind and direction."""
+class Edge(NamedTuple):
+    """An edge: when it was decoded (clocks, unwrapped), its position (counts, unwrapped), and its direction."""
 
     at: int
     number: int
-    kind: int
     down: int
 
 
-@dataclass(frozen=True)
-class Strobe:
-    """A sample: its clock, whether it restarts the estimator, and the number of edges before it."""
+class Strobe(NamedTuple):
+    """A sample: its clock, whether it restarts the estimator, and the number of edges kept before it."""
 
     at: int
     restart: int
     edges: int
 
 
-def turn(
-    design, random: np.random.Generator, samples: int, invert: bool = False, most: int | None = None
-) -> tuple[list[Strobe], list[Edge]]:
+def turn(design, random: Random, samples: int, most: int | None = None) -> tuple[list[Strobe], list[Edge]]:
     """Return strobes and edges: steady and accelerated motions of all speeds, turns within a count, stops, pauses.
 
     A sample lasts any time that the design allows, and has fewer edges than `most`, half the counter's range or one
-    edge a clock, whichever is least.
+    edge a clock, whichever is least. Of its edges, the last four are returned: the others are before them in the same
+    direction, and leave nothing in the decoder's outputs.
     """
     modulus, clocks = 1 << design.stamp_width, design.clocks
     most = min(clocks, (1 << (design.count_width - 1)) - 2, most or clocks)
@@ -42,29 +41,28 @@ def turn(
     up = True
     for _ in range(samples):
         if left == 0:
-            left = int(random.integers(1, 60))
+            left = random.randrange(1, 60)
             # From one edge in many samples to one a clock.
-            speed = float(random.choice([-1, 1])) * 10.0 ** random.uniform(-3.0, np.log10(most))
-            bend = speed * random.choice([0.0, random.normal(0.0, 0.2)])
+            speed = random.choice([-1, 1]) * 10.0 ** random.uniform(-3.0, math.log10(most))
+            bend = speed * random.choice([0.0, random.gauss(0.0, 0.2)])
             manner = random.random()
             if manner < 0.1:
                 speed = bend = 0.0
         left -= 1
         span = clocks
         if manner < 0.15:  # pauses: the stamps wrap
-            span = int(random.integers(1, (modulus >> 2) + 1))
+            span = random.randrange(1, (modulus >> 2) + 1)
         speed = min(max(speed + bend, -most), most)
-        aim = place + speed + (random.normal(0.0, 1.0) if 0.1 <= manner < 0.25 else 0.0)
+        aim = place + speed + (random.gauss(0.0, 1.0) if 0.1 <= manner < 0.25 else 0.0)
         aim = min(max(aim, place - most + 1), place + most - 1)
-        passed = range(int(np.floor(place)) + 1, int(np.floor(aim)) + 1)
+        passed = range(math.floor(place) + 1, math.floor(aim) + 1)
         if aim < place:
-            passed = range(int(np.floor(place)), int(np.floor(aim)), -1)
+            passed = range(math.floor(place), math.floor(aim), -1)
         n = min(len(passed), span - 1)
-        times = now + 1 + np.sort(random.choice(span - 1, n, replace=False)) if n else []
-        for at, number in zip(times, passed[:n], strict=True):
-            up = aim > place
-            kind = -number if invert else number
-            edges.append(Edge(int(at), number, kind & 3, int(not up)))
+        times = sorted(random.sample(range(now + 1, now + span), n))
+        up = aim > place if n else up
+        kept = zip(times[-4:], passed[max(n - 4, 0) : n], strict=True)
+        edges += [Edge(at, number, int(not up)) for at, number in kept]
         if n < len(passed):
             aim = passed[n - 1] + (0.5 if up else -0.5) if n else place
         place = aim
@@ -83,32 +81,30 @@ def run_length(edges: list[Edge]) -> int:
     return run
 
 
-def rows(design, strobes: list[Strobe], edges: list[Edge]):
-    """Yield the estimator's inputs at every strobe, in the order of its ports."""
-    modulus, half = 1 << design.stamp_width, 1 << (design.count_width - 1)
+def rows(design, strobes: list[Strobe], edges: list[Edge], invert: bool = False):
+    """Yield the estimator's inputs at every strobe, in the order of its ports; inverted, the kinds go downwards."""
+    modulus, half, way = 1 << design.stamp_width, 1 << (design.count_width - 1), -1 if invert else 1
     stamps, taken = [0, 0, 0, 0], 0
     for strobe in strobes:
         for edge in edges[taken : strobe.edges]:
-            stamps[edge.kind] = edge.at % modulus
+            stamps[way * edge.number & 3] = edge.at % modulus
         taken = strobe.edges
-        last = edges[taken - 1] if taken else Edge(0, 0, 0, 0)
+        last = edges[taken - 1] if taken else Edge(0, 0, 0)
         count = (last.number - last.down + half) % (2 * half) - half
         run = run_length(edges[max(taken - 4, 0) : taken])
-        yield count, strobe.at % modulus, *stamps, last.kind, last.down, run, strobe.restart
+        yield count, strobe.at % modulus, *stamps, way * last.number & 3, last.down, run, strobe.restart
 
 
-def anything(design, random: np.random.Generator, samples: int):
+def anything(design, random: Random, samples: int):
     """Yield rows that no encoder gives: every input anywhere in its range, often at the ends of the range."""
     half, stamps = 1 << (design.count_width - 1), 1 << design.stamp_width
     count = stamp = 0
     for _ in range(samples):
-        count += int(random.integers(-half, half) if random.random() < 0.1 else random.integers(-9, 10))
-        stamp += int(random.integers(1, stamps))
-        ages = [int(random.integers(0, 1 << int(random.integers(1, design.stamp_width + 1)))) for _ in range(4)]
-        ages = [
-            age if random.random() < 0.9 else int(random.choice([0, 1, stamps // 4 * 3, stamps - 1])) for age in ages
-        ]
-        kinds = [int(random.integers(0, m)) for m in (4, 2, 5)]
+        count += random.randrange(-half, half) if random.random() < 0.1 else random.randrange(-9, 10)
+        stamp += random.randrange(1, stamps)
+        ages = [random.getrandbits(random.randrange(1, design.stamp_width + 1)) for _ in range(4)]
+        ages = [age if random.random() < 0.9 else random.choice([0, 1, stamps // 4 * 3, stamps - 1]) for age in ages]
+        kinds = [random.randrange(m) for m in (4, 2, 5)]
         yield (
             (count + half) % (2 * half) - half,
             stamp % stamps,
@@ -118,8 +114,7 @@ def anything(design, random: np.random.Generator, samples: int):
         )
 
 
-@dataclass(frozen=True)
-class Sight:
+class Sight(NamedTuple):
     """The exact knowledge at a strobe, from all edges so far, unwrapped.
 
     Attributes:
@@ -147,7 +142,7 @@ def sights(design, strobes: list[Strobe], edges: list[Edge]) -> Iterator[Sight]:
     for strobe in strobes:
         restart = before is None or bool(strobe.restart)
         since = strobe.edges if restart else since
-        last = edges[strobe.edges - 1] if strobe.edges else Edge(0, 0, 0, 0)
+        last = edges[strobe.edges - 1] if strobe.edges else Edge(0, 0, 0)
         run = run_length(edges[max(strobe.edges - 4, 0) : strobe.edges])
         ages = [strobe.at - edge.at for edge in reversed(edges[max(strobe.edges - run, since) : strobe.edges])]
         ages = [age for age in ages if age < limit]
@@ -166,7 +161,7 @@ def _cycle(edges, before: Strobe, strobe: Strobe, run: int, since: int, limit: i
     if forward <= 0 or run < min(4, run_length(old) + forward):
         return None
     for edge in reversed(edges[max(since, before.edges - run_length(old)) : before.edges]):
-        if edge.kind == last.kind:
+        if (last.number - edge.number) % 4 == 0:
             return (abs(last.number - edge.number), last.at - edge.at) if before.at - edge.at < limit else None
     return None
 
@@ -179,7 +174,7 @@ def velocities(signal, axis, backend, encoder=(0.0, 0.0, 0.0, 0.0)):
 
 def exact(signal, axis, samples):
     """Return the exact velocity at every sample, m/s."""
-    return np.array([motions.velocity(signal.motion, k / axis.sample_hz) for k in range(samples)])
+    return accuracy.exact_velocity(signal.motion, np.arange(samples) / axis.sample_hz)
 
 
 def check_rounding_is_the_only_difference(name: str, rate: int) -> None:
