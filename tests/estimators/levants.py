@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Iterator
-from fractions import Fraction
+from functools import cache
 
 import cocotb
 import numpy as np
 
 from hardwall.model.axis import Axis
+from hardwall.model.compiled import compiled
 from hardwall.model.estimators import levant
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.quadrature import seen_count
@@ -15,6 +16,7 @@ from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng
 from hardwall.testing.estimators import follow, reset_words
 from stimuli.papers_signal import axis_at, swing
+from stimuli.seeded import seeded
 
 TURN_S = 1 + math.atan(2 * math.pi) / (2 * math.pi)
 """The time at which the paper's signal turns, so that its velocity is 0."""
@@ -31,15 +33,14 @@ REFUSED = [
 
 def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
     """Yield rows that visit the track, its saturations, the wrap of the count and the ends of the gains."""
-    random = rng()
+    random = seeded()
     half, fast = 1 << (d.count_width - 1), d.velocity.max >> d.velocity.f
     reset = reset_words(d)[:2]
     top = [d.lambda_.max, d.alpha.max]
     # A smooth motion through the wrap of the count, with nominal gains.
-    t = np.arange(samples // 4)
-    smooth = np.floor(half * (1 + 0.5 * np.sin(t * min(1, fast / half) / 2)) + random.random(len(t))).astype(np.int64)
-    for count in smooth.tolist():
-        yield count, 0, *reset, 0
+    pace = min(1, fast / half) / 2
+    for k in range(samples // 4):
+        yield math.floor(half * (1 + 0.5 * math.sin(k * pace)) + random.random()), 0, *reset, 0
     # The worst signs for overflow: full swings of the count at the largest gains, held until everything saturates.
     for period in (1, 2, 3, 7, 50):
         for k in range(samples // 50):
@@ -50,11 +51,9 @@ def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
     # A random walk with jumps, gains anywhere in their range, and restarts.
     count = 0
     for _ in range(samples - samples // 4 - samples // 10):
-        count += int(
-            random.integers(-half, half) if random.random() < 0.01 else random.integers(-2 * fast, 2 * fast + 1)
-        )
-        gains = reset if random.random() < 0.5 else [int(random.integers(0, m + 1)) for m in top]
-        yield count, int(random.random() < 0.002), *gains, int(random.integers(0, 2))
+        count += random.randrange(-half, half) if random.random() < 0.01 else random.randint(-2 * fast, 2 * fast)
+        gains = reset if random.random() < 0.5 else [random.randint(0, most) for most in top]
+        yield count, int(random.random() < 0.002), *gains, random.randrange(2)
 
 
 def wrapped(d: levant.Design, rows) -> list[tuple[int, ...]]:
@@ -100,15 +99,31 @@ def axis(axis_spec: AxisSpec, output: str = "u", floating: bool = False) -> Axis
     return Axis(axis_spec, floating, **axis_spec.design.estimator.choose(output))
 
 
-def rms_errors(axis_spec: AxisSpec, output: str, seconds: float, runs: int = 1) -> tuple[float, float]:
-    """Return the RMS errors on the paper's signal, m/s, in float64 and in fixed point, over runs with random phases."""
-    random, squares = rng(), np.zeros(2)
-    both = [axis(axis_spec, output, floating) for floating in (True, False)]
+@compiled
+def _squared_errors(params, state, counts, truth, unit):
+    """Return the sums of the squared errors of u and of u1: whichever is chosen, the state keeps u1."""
+    of_u = of_u1 = 0.0
+    for k in range(len(counts)):
+        state, u, _ = estimate(params, state, seen_count(counts[k]), 0)
+        of_u += (u * unit - truth[k]) ** 2
+        of_u1 += (state.u1 * unit - truth[k]) ** 2
+    return of_u, of_u1
+
+
+@cache
+def rms_errors(axis_spec: AxisSpec, seconds: float, runs: int) -> dict[str, tuple[float, float]]:
+    """Return by output the RMS errors on the paper's signal, m/s, in float64 and in fixed point, over all runs.
+
+    The runs have random phases.
+    """
+    d, unit = axis_spec.design.estimator, axis_spec.velocity_unit_m_per_s
+    random, squares = rng(), np.zeros((2, 2))
     for _ in range(runs):
         counts, truth = swing(axis_spec.sample_hz, seconds, TURN_S, random.random())
-        squares += [np.mean((one.run(counts).velocity_m_per_s - truth) ** 2) for one in both]
-    exact, fixed = np.sqrt(squares / runs)
-    return exact, fixed
+        for way, (floating, lsb) in enumerate(((True, 1.0), (False, d.velocity.lsb))):
+            params = Axis(axis_spec, floating).params.estimator
+            squares[:, way] += _squared_errors(params, d.start(floating), counts, truth, lsb * unit)
+    return dict(zip(("u", "u1"), np.sqrt(squares / (runs * len(truth))), strict=True))
 
 
 def displacements(axis_spec: AxisSpec, counts: np.ndarray) -> Iterator[tuple[float, float, float]]:
@@ -124,23 +139,26 @@ def displacements(axis_spec: AxisSpec, counts: np.ndarray) -> Iterator[tuple[flo
             yield math.copysign(1, b), abs(b), (velocity - state.u1) * d.velocity.lsb
 
 
-def oracle_run(d: levant.Design, rows, step) -> Iterator[tuple[int, int]]:
-    """Yield (velocity word, flags) of the variants that project, in exact rationals, on the unwrapped position.
+def half_up(dividend: int, divisor: int) -> int:
+    """Return the quotient, rounded to the nearest integer, halves up."""
+    return (2 * dividend + divisor) // (2 * divisor)
 
-    `step(lambda, alpha, b, first)` returns (near, g), the parts of |b| that alpha and the root take, rounded as
-    documented.
+
+def oracle_run(d: levant.Design, rows, step) -> Iterator[tuple[int, int]]:
+    """Yield (velocity word, flags) of the variants that project, in exact integers, on the unwrapped position.
+
+    All but lambda is in LSBs of the velocity. `step(lambda, alpha, b, first)` returns (near, g), the parts of |b| that
+    alpha and the root take, rounded as documented.
     """
-    lsb = Fraction(1, 2**d.velocity.f)
-    v_max, e_max = d.velocity.max * lsb, d.error.max * lsb
+    one, v_max, e_max = 2**d.velocity.f, d.velocity.max, d.error.max
     modulus, half = 2**d.count_width, 2 ** (d.count_width - 1)
     last = position = x = u1 = None
-    for count, restart, lambda_word, alpha_word, output in rows:
-        lam, alpha = Fraction(lambda_word, 2**d.lambda_.f), alpha_word * lsb
+    for count, restart, lam, alpha, output in rows:
         first = x is None or bool(restart)
         if first:
-            position, x, u1 = 0, Fraction(0), Fraction(0)
+            position = x = u1 = 0
         else:
-            position += (count - last + half) % modulus - half
+            position += ((count - last + half) % modulus - half) * one
         last = count
         far_b = x + u1 - position
         b = max(-e_max, min(e_max, far_b))
@@ -151,7 +169,7 @@ def oracle_run(d: levant.Design, rows, step) -> Iterator[tuple[int, int]]:
         far_u = u1 - sign * g
         u = max(-v_max, min(v_max, far_u))
         x = position + b - sign * (near + g)
-        yield (u1 if output else u) / lsb, int(b != far_b) | (u != far_u or u1 != far_u1) << 1
+        yield (u1 if output else u), int(b != far_b) | (u != far_u or u1 != far_u1) << 1
 
 
 def check_wrap_and_restart(axis_spec: AxisSpec) -> None:

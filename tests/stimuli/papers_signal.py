@@ -1,6 +1,6 @@
 """The founding paper's signal, 50 exp(-t) sin(2 pi t) mm in counts of 1 um, and its device at any rate."""
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -20,11 +20,18 @@ def axis_at(estimator: str, sample_hz: int, bound: float = BOUND, gains=None) ->
     return AxisSpec(**fields, estimator=estimator, gains=gains)
 
 
-def swing(sample_hz: int, seconds: float, from_s: float = 0.0, phase: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Return counts and exact velocity, m/s; `phase` shifts the encoder's scale, in counts."""
+@lru_cache(maxsize=1)
+def _motion(sample_hz: int, seconds: float, from_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return exact position, in counts, and exact velocity, m/s."""
     t = from_s + np.arange(round(seconds * sample_hz)) / sample_hz
     sine, cosine, decay = np.sin(2 * np.pi * t), np.cos(2 * np.pi * t), 50e-3 * np.exp(-t)
-    return np.floor(decay * sine / PAPER["count_m"] + phase).astype(np.int64), decay * (2 * np.pi * cosine - sine)
+    return decay * sine / PAPER["count_m"], decay * (2 * np.pi * cosine - sine)
+
+
+def swing(sample_hz: int, seconds: float, from_s: float = 0.0, phase: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return counts and exact velocity, m/s; `phase` shifts the encoder's scale, in counts."""
+    position, velocity = _motion(sample_hz, seconds, from_s)
+    return np.floor(position + phase).astype(np.int64), velocity
 
 
 def piece(sample_hz: int) -> tuple[np.ndarray, np.ndarray]:
