@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from functools import cache
 
 import cocotb
 import numpy as np
@@ -10,8 +11,9 @@ import pytest
 from hardwall.hdl.estimators.levant_edge import Estimator
 from hardwall.model.estimators import levant_edge
 from hardwall.model.estimators.levant_edge_design import LEARN_SHIFT, START
-from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model, names, reset_words
+from stimuli.seeded import seeded
 from stimuli.specs import spec
 
 
@@ -37,6 +39,12 @@ class Scale:
         self.edge = (self.count + self.down) & 3 ^ self.down << 1
         self.stamps[self.edge] = at
 
+    def pass_all_but_four(self, up: bool, edges: int) -> int:
+        """Pass the first of many edges in one direction, which the last four leave no trace of; return their number."""
+        first = max(edges - 4, 0)
+        self.count += first if up else -first
+        return first
+
     def row(self) -> tuple[int, ...]:
         half, mask = 1 << (self.d.count_width - 1), (1 << self.d.stamp_width) - 1
         stamps = [stamp & mask for stamp in self.stamps]
@@ -45,7 +53,7 @@ class Scale:
 
 def stimulus(d: levant_edge.Design, samples: int):
     """Yield rows: motion at every speed, through every wrap; rests, vibration, noise; gains at their ends."""
-    random = rng()
+    random = seeded()
     half, top = 1 << (d.count_width - 1), [word.format.max for word in d.words]
     scale = Scale(d, now=(1 << d.stamp_width) - 3 * d.clocks, count=half - 5)
     gains, restart = reset_words(d), 0
@@ -53,29 +61,30 @@ def stimulus(d: levant_edge.Design, samples: int):
     fast = (d.velocity.max >> d.velocity.f) + 2
     for k in range(6 * ((4 << d.shortest) // d.clocks + 20)):
         scale.now += d.clocks
-        for edge in range(fast):
-            scale.pass_edge(k // ((4 << d.shortest) // d.clocks + 20) % 2 == 0, scale.now - fast + edge)
+        up = k // ((4 << d.shortest) // d.clocks + 20) % 2 == 0
+        for edge in range(scale.pass_all_but_four(up, fast), fast):
+            scale.pass_edge(up, scale.now - fast + edge)
         yield *scale.row(), 0, *(top if k % 3 else gains)
     while samples > 0:
-        style, pace, up = int(random.integers(0, 8)), int(random.integers(0, 9)), random.random() < 0.5
+        style, pace, up = random.randrange(8), random.randrange(9), random.random() < 0.5
         draw = random.random()
-        gains = reset_words(d) if draw < 0.6 else [int(random.integers(0, most + 1)) for most in top]
+        gains = reset_words(d) if draw < 0.6 else [random.randint(0, most) for most in top]
         gains = [0, 0] if draw > 0.98 else top if draw > 0.9 else gains
         # A rest, at most until the stamps wrap.
         scale.now += int(2.0 ** random.uniform(0, d.stamp_width)) if random.random() < 0.3 else 0
-        for _ in range(int(random.integers(5, 60))):
+        for _ in range(random.randrange(5, 60)):
             scale.now += d.clocks
-            edges = int(random.integers(0, fast)) if pace == 0 else int(random.random() < 2.0 ** (1 - pace))
-            for edge in range(edges):
+            edges = random.randrange(fast) if pace == 0 else int(random.random() < 2.0 ** (1 - pace))
+            for edge in range(scale.pass_all_but_four(up, edges) if style > 1 else 0, edges):
                 if style == 0 or (style == 1 and random.random() < 0.1):
                     up = not up
-                scale.pass_edge(up, scale.now - 1 - int(random.integers(0, d.clocks)) // (edge + 1))
+                scale.pass_edge(up, scale.now - 1 - int(random.random() * d.clocks / (edge + 1)))
             if style == 2:
-                scale.count = int(random.integers(-half, half))
+                scale.count = random.randrange(-half, half)
             row = scale.row()
             if style == 3:
-                noise = [int(x) for x in random.integers(0, 1 << d.stamp_width, 5)]
-                row = (row[0], *noise, *(int(random.integers(0, most)) for most in (4, 2, 5)))
+                noise = [random.getrandbits(d.stamp_width) for _ in range(5)]
+                row = (row[0], *noise, *(random.randrange(most) for most in (4, 2, 5)))
             restart = int(random.random() < 0.002)
             yield *row, restart, *gains
             samples -= 1
@@ -119,6 +128,11 @@ def test_rtl(name):
     simulate(__file__, make, name=name)
 
 
+@cache
+def power(exponent: int) -> Fraction:
+    return Fraction(2) ** exponent
+
+
 class Oracle:
     """The module's equations in exact rationals, rounded down to an LSB as documented, on unwrapped positions."""
 
@@ -126,11 +140,11 @@ class Oracle:
         self.d, self.known = d, None
 
     def down_to(self, value, fmt, fraction=None):
-        scale = Fraction(2) ** (fmt.f if fraction is None else fraction)
+        scale = power(fmt.f if fraction is None else fraction)
         return math.floor(value * scale) / scale
 
     def fit(self, value, i, f):
-        return max(-(Fraction(2) ** (i - 1)), min(Fraction(2) ** (i - 1) - Fraction(2) ** -f, value))
+        return max(-power(i - 1), min(power(i - 1) - power(-f), value))
 
     def time(self, clocks):
         unit = 2 ** max(clocks.bit_length() - self.d.mantissa, 0)
@@ -173,7 +187,7 @@ class Oracle:
         line = self.fit(straight, v.i, v.f)
         flags |= 2 * (line != straight)
         if not loose:
-            most = Fraction(2) ** (v.i - 1) - Fraction(1, 2**v.f)
+            most = power(v.i - 1) - power(-v.f)
             bound = min(self.down_to(Fraction(5 * d.clocks, 2) / 2 ** max(age.bit_length() - 1, 0), v), most)
             sign = -1 if self.v < 0 else 1
             line = sign * max(-abs(self.v), min(sign * line, max(bound - abs(self.v), 0)))
@@ -190,8 +204,8 @@ class Oracle:
         error = self.down_to(mean * time / unit, e) - self.down_to(place / unit, e)
         size, sign = abs(error), (error > 0) - (error < 0)
         quotient = self.down_to(size * unit / time, v)
-        slope = change = min(quotient, Fraction(2) ** (v.i - 1) - Fraction(1, 2**v.f))
-        steepest = d.acceleration.max * Fraction(1, 2**d.acceleration.f)
+        slope = change = min(quotient, power(v.i - 1) - power(-v.f))
+        steepest = d.acceleration.max * power(-d.acceleration.f)
         bend = min(self.down_to(slope / 2**self.length, d.acceleration), steepest)
         if self.length <= d.mantissa:
             odd = self.length % 2
@@ -203,8 +217,8 @@ class Oracle:
         self.v = self.fit(far, v.i, v.f)
         self.a = self.fit(self.a - sign * bend, d.acceleration.i, d.acceleration.f)
         if full and kind != self.anchor[2]:
-            most = 2 ** (math.ceil(math.log2(d.clocks / 4)) + 1)
-            by = self.down_to(self.fit(error, math.log2(most), e.f) / 32 + Fraction(1, 2 ** (d.place.f + 1)), d.place)
+            bits = math.ceil(math.log2(d.clocks / 4)) + 1
+            by = self.down_to(self.fit(error, bits, e.f) / 32 + Fraction(1, 2 ** (d.place.f + 1)), d.place)
             for of, step in ((kind, by), (self.anchor[2], -by)):
                 self.places[of] = self.fit(self.places[of] + step, d.place.i, d.place.f)
         return int(edges != passed or slope != quotient) | 2 * (self.v != far)

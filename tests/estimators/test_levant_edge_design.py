@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -16,22 +17,41 @@ from hardwall.sim.world.encoder import offsets
 from hardwall.testing import rng
 
 
+class Shown(NamedTuple):
+    """What a decoder shows of a motion: the clocks of its edges, and the row (fields of `Seen`) after n edges.
+
+    An edge passed by clock n is stamped n, and the strobe of sample k sees the edges passed by clock k D. The rows lack
+    the time.
+    """
+
+    clocks: np.ndarray
+    rows: np.ndarray
+    clocks_per_sample: int
+    stamp_mask: int
+
+
 @compiled
-def _run(params, state, columns, out):
-    flags = 0
-    for k in range(columns.shape[1]):
-        c = columns[:, k]
-        seen = Seen(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8])
+def sight(shown, edges, k):
+    """Return what the strobe of sample k sees, and the number of edges before it, which is at least `edges`."""
+    now = k * shown.clocks_per_sample + 1
+    while edges < len(shown.clocks) and shown.clocks[edges] < now:
+        edges += 1
+    c = shown.rows[edges]
+    return Seen(c[0], now & shown.stamp_mask, c[2], c[3], c[4], c[5], c[6], c[7], c[8]), edges
+
+
+@compiled
+def _run(params, state, shown, out):
+    flags = edges = 0
+    for k in range(len(out)):
+        seen, edges = sight(shown, edges, k)
         state, out[k], flag = estimate(params, state, seen, 0)
         flags |= flag
     return flags
 
 
-def columns(axis, passed, samples: int) -> np.ndarray:
-    """Return the decoder's outputs at every strobe (fields of `Seen`, samples) for a motion's edges, without a decoder.
-
-    An edge passed by clock n is stamped n, and the strobe of sample k sees the edges passed by clock k D.
-    """
+def decoded(axis, passed) -> Shown:
+    """Return what the decoder shows of a motion's edges, without a decoder."""
     assert passed.start_cell % 4 == 0
     clocks = passed.edges.clocks - axis.clocks_per_sample + 1 + DECODER_CLOCKS
     code = np.array([0, 1, 3, 2])[np.r_[passed.start_level, passed.edges.levels]]  # of a | b << 1, in the order upwards
@@ -40,41 +60,34 @@ def columns(axis, passed, samples: int) -> np.ndarray:
     kind = ((count + down) & 3) ^ down << 1
     order = np.arange(len(step))
     turned = np.maximum.accumulate(np.where(np.r_[True, step[1:] != step[:-1]], order, 0))
-    now = np.arange(samples, dtype=np.int64) * axis.clocks_per_sample + 1
-    last = np.searchsorted(clocks, now) - 1
-    seen, mask = np.zeros((9, samples), np.int64), (1 << axis.stamp_width) - 1
-    moved = last >= 0
-    for row, values in ((0, count), (6, kind), (7, down), (8, np.minimum(order - turned + 1, 4))):
-        seen[row, moved] = values[last[moved]]
-    seen[1] = now & mask
+    rows, mask = np.zeros((len(step) + 1, len(Seen._fields)), np.int64), (1 << axis.stamp_width) - 1
+    rows[1:, [0, 6, 7, 8]] = np.stack([count, kind, down, np.minimum(order - turned + 1, 4)], 1)
     for k in range(4):
-        of = np.flatnonzero(kind == k)
-        nth = np.searchsorted(of, last, side="right") - 1
-        seen[2 + k, nth >= 0] = clocks[of[nth[nth >= 0]]] & mask
-    return seen
+        last = np.maximum.accumulate(np.where(kind == k, order, -1))
+        rows[1:, 2 + k] = np.where(last >= 0, clocks[last] & mask, 0)
+    return Shown(clocks, rows, axis.clocks_per_sample, mask)
 
 
-def run(axis, seen: np.ndarray, floating: bool) -> tuple[np.ndarray, int]:
+def run(axis, shown: Shown, samples: int, floating: bool) -> tuple[np.ndarray, int]:
     """Return the velocities (m/s) and all flags raised."""
-    d, out = axis.design.estimator, np.zeros(seen.shape[1], np.float64 if floating else np.int64)
+    d, out = axis.design.estimator, np.zeros(samples, np.float64 if floating else np.int64)
     if floating:
         params, state = d.float_params(axis.design.gains, "u", {}), FLOAT_START
     else:
         params, state = d.params({word.name: word.reset for word in d.words}), START
-    flags = _run(params, state, seen, out)
+    flags = _run(params, state, shown, out)
     return out * (axis.velocity_unit_m_per_s * (1.0 if floating else d.velocity.lsb)), flags
 
 
 @cache
 def motion(name: str, sample_hz: int, seconds: float, phase: float = 0.0, clock_hz: int = 0):
-    """Return (axis, decoder's outputs, exact velocities) of a signal, with gains for the C of a wall hit."""
+    """Return (axis, what the decoder shows, exact velocities) of a signal, with gains for the C of a wall hit."""
     axis = accuracy.axis_spec("levant-edge", sample_hz, signals.DEVICE_ACCELERATION)
     axis = replace(axis, clock_hz=clock_hz) if clock_hz else axis
     signal = replace(signals.load(name), seconds=seconds)
     passed = encoded_signal(signal, axis, offsets(float(phase)))
-    samples = int(seconds * sample_hz)
-    exact = accuracy.exact_velocity(signal.motion, np.arange(samples) / sample_hz)
-    return axis, columns(axis, passed, samples), exact
+    exact = accuracy.exact_velocity(signal.motion, np.arange(int(seconds * sample_hz)) / sample_hz)
+    return axis, decoded(axis, passed), exact
 
 
 def rms(values) -> float:
@@ -85,8 +98,8 @@ def rms(values) -> float:
 @pytest.mark.parametrize("floating", [True, False])
 def test_the_paper_s_signal_at_1_mhz(floating, phase, wanted):
     """The gains are for 12 m/s^2, not for the signal's 1.7; the module's table has the far smaller measured errors."""
-    axis, seen, exact = motion("paper", 1_000_000, 5.0, phase)
-    velocity, flags = run(axis, seen, floating)
+    axis, shown, exact = motion("paper", 1_000_000, 5.0, phase)
+    velocity, flags = run(axis, shown, len(exact), floating)
     assert flags == 0
     error = rms((velocity - exact)[1_000_000:])
     assert error <= wanted
@@ -98,8 +111,8 @@ def test_the_paper_s_signal_at_1_mhz(floating, phase, wanted):
     [(1_000, 5.0, 1.0), (10_000, 5.0, 1.0), (100_000, 5.0, 1.0), (1_000_000, 5.0, 1.0), (10_000_000, 0.4, 0.1)],
 )
 def test_words_cost_a_hundredth_of_the_error_at_most(sample_hz, seconds, judged_from_s):
-    axis, seen, exact = motion("paper", sample_hz, seconds)
-    (algorithm, _), (fixed, flags) = run(axis, seen, True), run(axis, seen, False)
+    axis, shown, exact = motion("paper", sample_hz, seconds)
+    (algorithm, _), (fixed, flags) = (run(axis, shown, len(exact), floating) for floating in (True, False))
     judged = slice(int(judged_from_s * sample_hz), None)
     assert flags == 0
     assert 0 < rms((fixed - algorithm)[judged]) <= 0.01 * rms((algorithm - exact)[judged])
@@ -116,16 +129,16 @@ def test_one_sample_of_words_is_within_the_derived_bound_of_the_algorithm(sample
     error and by its own LSB; over the age it gives the rest, with 2 d more. Cut times change every term by a relative
     2**(1 - mantissa).
     """
-    axis, seen, _ = motion("paper", sample_hz, 0.4 if sample_hz > 1_000_000 else 5.0)
+    axis, shown, velocities = motion("paper", sample_hz, 0.4 if sample_hz > 1_000_000 else 5.0)
     d, words = axis.design.estimator, {word.name: word.reset for word in axis.design.estimator.words}
     params = d.params(words)
     exact = d.float_params(axis.design.gains, "u", {word.name: word.to_si(word.reset) for word in d.words})
     lsb, checked, random = d.velocity.lsb, 0, rng()
     samples = max(200, (8 << d.shortest) // d.clocks)
-    for start in random.integers(0, seen.shape[1] - samples, 10).tolist():
-        state = START
+    for start in random.integers(0, len(velocities) - samples, 10).tolist():
+        state, edges = START, 0
         for k in range(start, start + samples):
-            now = Seen(*(int(x) for x in seen[:, k]))
+            now, edges = sight(shown, edges, k)
             places = tuple(place * d.place.lsb for place in state.places)
             same = state._replace(
                 velocity=state.velocity * lsb, acceleration=state.acceleration * d.acceleration.lsb, places=places
@@ -151,7 +164,7 @@ def test_one_sample_of_words_is_within_the_derived_bound_of_the_algorithm(sample
 @pytest.mark.parametrize(("name", "tolerance"), [("steady:1000", 2e-3), ("steady:0.1", 0.05)])
 def test_no_drift_at_the_ends_of_speed(name, tolerance):
     """The relative error is the stamp's over the shortest interval at speed, and that of 8 edges when slow."""
-    axis, seen, exact = motion(name, 1_000_000, 1.0)
-    velocity, flags = run(axis, seen, False)
+    axis, shown, exact = motion(name, 1_000_000, 1.0)
+    velocity, flags = run(axis, shown, len(exact), False)
     assert flags == 0
     assert np.abs(velocity / exact - 1)[500_000:].max() <= tolerance
