@@ -13,6 +13,7 @@ from hardwall.model.estimators import foaw
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import RATES, axis_at, piece
+from stimuli.seeded import seeded
 from stimuli.specs import spec
 
 WINDOWS = {"mhz": None, "narrow": None, "paper": 3.0}
@@ -30,7 +31,7 @@ def make(name: str) -> Estimator:
 
 def stimulus(name: str, samples: int):
     """Yield (count, restart, output, band, window): lines and parabolas, the worst signs, extreme words, wraps."""
-    d, random = design(name), rng()
+    d, random = design(name), seeded()
     half, fast = 1 << (d.count_width - 1), d.history.change.max
     _, reset_band, reset_window = reset_words(d)
     # Parabolas: windows of every length, through the wrap of the count.
@@ -49,11 +50,11 @@ def stimulus(name: str, samples: int):
         count += fast if k // max(reach // 5, 1) % 2 else -fast
         yield count, 0, k & 1, foaw.BAND.max, reset_window
     for _ in range(samples - samples // 4 - samples // 28 * 7 - samples // 8):
-        count += int(random.integers(-half, half) if random.random() < 0.01 else random.integers(-1, 2))
+        count += random.randrange(-half, half) if random.random() < 0.01 else random.randint(-1, 1)
         given = random.random() < 0.3
-        band = int(random.integers(0, foaw.BAND.max + 1)) if given else reset_band
-        window = int(random.integers(0, 16)) if given else reset_window
-        yield count, int(random.random() < 0.002), int(random.integers(0, 2)), band, window
+        band = random.randint(0, foaw.BAND.max) if given else reset_band
+        window = random.randrange(16) if given else reset_window
+        yield count, int(random.random() < 0.002), random.randrange(2), band, window
 
 
 @cocotb.test(**CAMPAIGN)
@@ -86,23 +87,22 @@ def test_rtl(name):
     simulate(__file__, make, name=name)
 
 
-def published(positions: list[int], k: int, tap: int, band: Fraction, longest: int, best: bool):
-    """Return (slope in counts a tap, window) by the published algorithm, which checks every sample at every step."""
+def published(positions: list[int], k: int, tap: int, band: int, longest: int, best: bool):
+    """Return (slope in counts a tap, window) by the published algorithm, which checks every sample at every step.
 
-    def at(i: int) -> int:
-        return positions[k - i * tap] if k > i * tap else 0
-
+    The band is in quarter counts. Distances from the line through the ends of n taps are n times as large, thus whole.
+    """
+    at = [positions[k - i * tap] if k > i * tap else 0 for i in range(longest + 1)]
     window = 1
     for n in range(2, longest + 1):
-        slope = Fraction(at(0) - at(n), n)
-        if any(abs(at(n) + slope * (n - i) - at(i)) > band for i in range(n + 1)):
+        if any(4 * abs(i * at[n] + (n - i) * at[0] - n * at[i]) > n * band for i in range(n + 1)):
             break
         window = n
     if not best:
-        return Fraction(at(0) - at(window), window), window
-    middle = Fraction(window, 2)
-    moment = sum((middle - i) * at(i) for i in range(window + 1))
-    return moment / sum((middle - i) ** 2 for i in range(window + 1)), window
+        return Fraction(at[0] - at[window], window), window
+    # The distances of the taps from the window's middle, twice as large.
+    moment = sum((window - 2 * i) * at[i] for i in range(window + 1))
+    return Fraction(2 * moment, sum((window - 2 * i) ** 2 for i in range(window + 1))), window
 
 
 def oracle(d: foaw.Design, rows):
@@ -122,7 +122,7 @@ def oracle(d: foaw.Design, rows):
         k = len(positions) - 1
         if k % every == 0:
             most_taps = min(max(longest, 1), foaw.TAPS)
-            slope, window = published(positions, k, tap, Fraction(band, 4), most_taps, bool(output))
+            slope, window = published(positions, k, tap, band, most_taps, bool(output))
             velocity = int(slope / tap * 2**d.velocity.f)
         yield velocity, limited, window
 

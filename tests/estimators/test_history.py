@@ -7,7 +7,8 @@ from cocotb.triggers import ClockCycles
 from hardwall.hdl.estimators.history import History
 from hardwall.model.estimators import history
 from hardwall.model.estimators.history import change_over, take
-from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
+from stimuli.seeded import seeded
 from stimuli.specs import spec
 
 WINDOWS = {"paper": 2e-3, "narrow": 40e-6, "mhz": 20e-3}
@@ -24,17 +25,17 @@ def make(name: str) -> History:
 
 def rows(d: history.Design, samples: int):
     """Yield (count, restart, age): motion, jumps, wraps, restarts, and ages over the whole memory."""
-    random, half, fast = rng(), 1 << (d.count_width - 1), d.change.max
+    random, half, fast, oldest = seeded(), 1 << (d.count_width - 1), d.change.max, d.age_max
     count = 0
     for k in range(samples):
         way = (k // 500) % 4
         if way < 2:
             count += (fast, -fast - 1)[way]
         elif way == 2:
-            count += int(random.integers(-2 * fast, 2 * fast + 1))
+            count += random.randint(-2 * fast, 2 * fast)
         elif k % 50 == 0:
-            count = int(random.choice([-half, half - 1, 0]))
-        age = int(random.choice([1, 2, d.age_max - 1, d.age_max, random.integers(1, d.age_max + 1)]))
+            count = random.choice([-half, half - 1, 0])
+        age = random.choice([1, 2, oldest - 1, oldest, random.randint(1, oldest)])
         yield (count + half) % (2 * half) - half, int(random.random() < 0.001), max(age, 1)
 
 
@@ -67,14 +68,14 @@ def test_rtl(name):
 def test_model_is_a_list_of_the_limited_sums(name):
     d = design(name)
     params, state, half = d.params(), d.start(), 1 << (d.count_width - 1)
-    positions, last, most = [], None, 0
+    positions, last, most, fastest = [], None, 0, d.change.max
     for count, restart, age in rows(d, 100_000):
         state, stored, limited = take(params, state, count, restart)
         if restart or last is None:
             positions = [0]
         else:
             moved = (count - last + half) % (2 * half) - half
-            change = max(-d.change.max, min(moved, d.change.max))
+            change = max(-fastest, min(moved, fastest))
             assert limited == (change != moved)
             positions.append(positions[-1] + change)
         last, most = count, max(most, len(positions))

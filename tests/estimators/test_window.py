@@ -13,6 +13,7 @@ from hardwall.model.estimators import window
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import RATES, axis_at, piece
+from stimuli.seeded import seeded
 from stimuli.specs import spec
 
 WINDOWS = {"mhz": None, "narrow": None, "paper": 3.0}
@@ -30,13 +31,12 @@ def make(name: str) -> Estimator:
 
 def stimulus(name: str, samples: int):
     """Yield (count, restart, length): smooth motion, the worst signs, every length, wraps, jumps, restarts."""
-    d, random = design(name), rng()
+    d, random = design(name), seeded()
     half, fast, top = 1 << (d.count_width - 1), d.history.change.max, d.history.age_max
     (reset,) = reset_words(d)
-    t = np.arange(samples // 4)
-    smooth = np.floor(half * (1 + 0.5 * np.sin(t * min(1, fast / half) / 2)) + random.random(len(t))).astype(np.int64)
-    for count in smooth.tolist():
-        yield count, 0, reset
+    pace = min(1, fast / half) / 2
+    for k in range(samples // 4):
+        yield math.floor(half * (1 + 0.5 * math.sin(k * pace)) + random.random()), 0, reset
     # The largest speeds and larger ones, in both directions, for longer than any short window; and a standstill.
     count = 0
     for way in (fast, -fast, fast + 1, -fast - 1, 0, 1, -1):
@@ -44,8 +44,8 @@ def stimulus(name: str, samples: int):
             count += way
             yield count, 0, (top, reset, 1, 0)[k // 7 % 4]
     for _ in range(samples - samples // 4 - samples // 28 * 7):
-        count += int(random.integers(-half, half) if random.random() < 0.01 else random.integers(-fast - 1, fast + 2))
-        length = int(random.integers(0, top + 1)) if random.random() < 0.5 else reset
+        count += random.randrange(-half, half) if random.random() < 0.01 else random.randint(-fast - 1, fast + 1)
+        length = random.randint(0, top) if random.random() < 0.5 else reset
         yield count, int(random.random() < 0.002), length
 
 
