@@ -9,6 +9,9 @@ from hardwall.model.quadrature import seen_count
 SECONDS = {1_000: 5.0, 10_000: 5.0, 100_000: 2.0, 1_000_000: 1.25, 10_000_000: 0.5}
 """The length of the paper's signal that is run at each rate, s; the first fifth is not judged."""
 
+BLOCK = 4096
+"""The samples of an impulse response that are summed at once: few enough for the processor's cache."""
+
 
 @compiled
 def _run(params, state, counts, velocity, flags):
@@ -36,8 +39,12 @@ def impulse(a: np.ndarray, b, samples: int) -> np.ndarray:
 
 
 def norms(a: np.ndarray, b, samples: int) -> np.ndarray:
-    """Return the sum of absolute values of every state's impulse response."""
-    return np.abs(impulse(a, b, samples)).sum(1)
+    """Return the sum of absolute values of every state's impulse response, over at least `samples` samples."""
+    states, power, total = impulse(a, b, BLOCK), np.linalg.matrix_power(a, BLOCK), 0.0
+    for _ in range(0, samples, BLOCK):
+        total = total + np.abs(states).sum(1)
+        states = power @ states
+    return total
 
 
 def rms(error: np.ndarray) -> float:

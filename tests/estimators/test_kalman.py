@@ -17,6 +17,7 @@ from hardwall.model.estimators.riccati import INDEX_MAX
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import BOUND, RATES, axis_at, swing
+from stimuli.seeded import seeded
 from stimuli.specs import spec
 
 PREDICT = np.array([[1, 1, 0.5], [0, 1, 1], [0, 0, 1]])
@@ -36,7 +37,7 @@ def reset_params(d: Design):
 
 def stimulus(name: str, samples: int):
     """Yield rows that visit a track, full swings, the wrap of the count and the ends of the gains."""
-    d, random = design(name), rng()
+    d, random = design(name), seeded()
     half = 1 << (d.count_width - 1)
     reset, top = reset_words(d), [word.format.max for word in d.words]
     two = d.words_for(spec(name, "kalman").design.gains, integrators=2)
@@ -45,10 +46,9 @@ def stimulus(name: str, samples: int):
     for _ in range(20):
         yield half - 1, 0, *reset
     # A smooth motion through the wrap of the count.
-    t = np.arange(samples // 4)
     turn = min(1.0, d.step_max / half) / 2
-    smooth = np.floor(half * (1 + 0.5 * np.sin(t * turn)) + random.random(len(t))).astype(np.int64)
-    for k, count in enumerate(smooth.tolist()):
+    for k in range(samples // 4):
+        count = math.floor(half * (1 + 0.5 * math.sin(k * turn)) + random.random())
         yield count, 0, *(double if k > samples // 8 else reset)
     # Full swings, the worst case for overflow of some state, with words at their ends, until everything saturates.
     for period in (1, 2, 3, 7, 50):
@@ -63,9 +63,9 @@ def stimulus(name: str, samples: int):
     count, chosen = 0, reset
     for _ in range(samples // 2):
         jump = random.random() < 0.01
-        count += int(random.integers(-half, half) if jump else random.integers(-d.step_max, d.step_max + 1))
+        count += random.randrange(-half, half) if jump else random.randint(-d.step_max, d.step_max)
         if random.random() < 0.02:
-            chosen = [reset, double, [int(random.integers(0, m + 1)) for m in top]][random.integers(0, 3)]
+            chosen = random.choice([reset, double, [random.randint(0, most) for most in top]])
         yield count, int(random.random() < 0.002), *chosen
 
 
@@ -229,8 +229,8 @@ def test_the_norms_are_those_of_the_module(integrators):
 SLOW = Gains.default(axis_at("fdm", 1_000_000)).__dict__ | {"acceleration_time_s": 1.0}
 
 
-@pytest.mark.parametrize("sample_hz", RATES)
 @pytest.mark.parametrize("gains", [None, Gains(**SLOW)], ids=["default", "slow"])
+@pytest.mark.parametrize("sample_hz", RATES)
 def test_fixed_is_float_within_the_derived_bound(sample_hz, gains):
     """On the paper's signal, rounding is within its norms; with the gains' errors it is within 1 % of the error."""
     axis = axis_at("kalman", sample_hz, gains=gains)
