@@ -45,9 +45,9 @@ def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
     for period in (1, 2, 3, 7, 50):
         for k in range(samples // 50):
             yield (-half, half // 2 - 1, half - 1)[k // period % 3], 0, *top, k & 1
-    # A ramp faster than the velocity format, long enough for alpha alone to carry u1 to its end.
+    # A ramp faster than the velocity format, from a start, long enough for alpha alone to carry u1 to its end.
     for k in range(d.velocity.max // top[1] + 50):
-        yield -k * (fast + 1), 0, *top, 0
+        yield -k * (fast + 1), int(k == 0), *top, 0
     # A random walk with jumps, gains anywhere in their range, and restarts.
     count = 0
     for _ in range(samples - samples // 4 - samples // 10):
