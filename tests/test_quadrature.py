@@ -8,10 +8,6 @@ import sys
 import cocotb
 import numpy as np
 import pytest
-from amaranth.hdl import Cat, Module, ResetSignal, unsigned
-from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
-from cocotb.triggers import RisingEdge
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -20,9 +16,7 @@ from hardwall.model import quadrature as model
 from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.compiled import compiled
 from hardwall.model.quadrature import NO_STROBES, START, Inputs, Params, State, Strobes, advance, run, step
-from hardwall.testing import SAMPLES, SEED, Bench, check, parameters, rng, simulate
-from hardwall.testing.harness import ports_of
-from hardwall.testing.packing import Packing, Rows
+from hardwall.testing import SAMPLES, SEED, Recorded, check, parameters, play, rng, simulate
 from stimuli.pins import (
     INPUTS,
     directed,
@@ -65,63 +59,34 @@ def run_all(params: Params, columns: dict[str, np.ndarray]) -> State:
 # RTL against model.
 
 
-class Recorded(wiring.Component):
-    """The decoder with its inputs in one word and its outputs in another, for one write and one read a clock."""
-
-    def __init__(self, **widths: int):
-        self.decoder = Quadrature(**widths)
-        # The estimators' inputs are a bus of the decoder; here its members have their own names, as in the model.
-        self.ports = {name.removeprefix("seen__"): port for name, (_, port) in ports_of(self.decoder).items()}
-        shapes = {name: port.shape() for name, port in self.ports.items()}
-        self.stimuli = Packing({name: shapes[name] for name in INPUTS})
-        self.records = Packing({"reset": unsigned(1), **{name: shapes[name] for name in (*INPUTS, *OUTPUTS)}})
-        super().__init__({"stimulus": In(self.stimuli.width), "record": Out(self.records.width)})
-
-    def elaborate(self, platform):
-        m = Module()
-        m.submodules.decoder = self.decoder
-        m.d.comb += Cat(self.ports[name] for name in INPUTS).eq(self.stimulus)
-        m.d.comb += self.record.eq(Cat(ResetSignal(), (self.ports[name] for name in (*INPUTS, *OUTPUTS))))
-        return m
-
-
-async def play(dut, inputs: dict[str, np.ndarray]) -> tuple[Quadrature, Rows, Rows]:
-    """Return the decoder, its inputs at every clock edge, and its outputs after that edge, as the pins carried them."""
-    component = Recorded(**parameters())
-    await Bench(dut, component).reset()
-    words = []
-    stimuli = [dict(zip(INPUTS, row, strict=True)) for row in zip(*(inputs[name] for name in INPUTS), strict=True)]
-    for row, reset in zip([*stimuli, {}], [*inputs["reset"].tolist(), 1], strict=True):
-        dut.stimulus.value = component.stimuli.pack(row)
-        dut.rst.value = reset
-        await RisingEdge(dut.clk)
-        # The values before the edge: the inputs that this edge takes, the outputs that the last edge made.
-        words.append(int(dut.record.value))
-    clocks = list(range(len(words) - 1))
-    taken = Rows(("reset", *INPUTS), component.records, words[:-1], clocks)
-    return component.decoder, taken, Rows(OUTPUTS, component.records, words[1:], clocks)
+def make(**widths: int) -> Recorded:
+    return Recorded(Quadrature(**widths))
 
 
 @cocotb.test()
 async def follows_model(dut):
     stimuli = joined(directed(), random_stimulus(rng(), SAMPLES, parameters()["count_width"]))
-    decoder, inputs, outputs = await play(dut, stimuli)
+    recorded = make(**parameters())
+    inputs, outputs = await play(dut, recorded, stimuli)
     for part in (inputs, outputs):
         assert all(len(set(part.column(name))) > 1 for name in part.names), "a pin never moved"
-    check(inputs, outputs, expected(decoder.params, {name: inputs.column(name) for name in inputs.names}))
+    params, columns = recorded.component.params, {name: inputs.column(name) for name in inputs.names}
+    check(inputs, outputs, expected(params, columns))
 
 
 @cocotb.test()
 async def counts_after_the_promised_latency(dut):
     a = np.arange(50) >= 10
-    decoder, _, outputs = await play(dut, joined(*(stimulus(50, a=a, glitch_clocks=length) for length in range(16))))
+    recorded = make(**parameters())
+    stimuli = joined(*(stimulus(50, a=a, glitch_clocks=length) for length in range(16)))
+    _, outputs = await play(dut, recorded, stimuli)
     counted = outputs.column("count").reshape(16, 50).argmax(axis=1)
-    assert [*(counted - 10 + 1)] == [decoder.latency(length) for length in range(16)]
+    assert [*(counted - 10 + 1)] == [recorded.component.latency(length) for length in range(16)]
 
 
 @pytest.mark.parametrize("widths", [WIDE, NARROW])
 def test_rtl(widths):
-    simulate(__file__, Recorded, **widths)
+    simulate(__file__, make, **widths)
 
 
 # The model's behaviour, clock by clock; by `directed` the RTL is checked on the same stimuli.

@@ -9,7 +9,8 @@ random campaigns.
 """
 
 from .bench import Bench
+from .recorded import Recorded, play
 from .simulator import CAMPAIGN, SAMPLES, SEED, parameters, rng, simulate
 from .verdict import check
 
-__all__ = ["CAMPAIGN", "SAMPLES", "SEED", "Bench", "check", "parameters", "rng", "simulate"]
+__all__ = ["CAMPAIGN", "SAMPLES", "SEED", "Bench", "Recorded", "check", "parameters", "play", "rng", "simulate"]

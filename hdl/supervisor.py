@@ -1,0 +1,188 @@
+"""The supervisor, between the output stage and the pins: it alone lets a drive out."""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed
+from amaranth.lib.wiring import In, Member, Out
+
+from hardwall.model import supervisor
+from hardwall.model.supervisor import ALWAYS, ARMED, COUNT, COUNT_BITS, DISARMED, LINK, REQUIRED, TRIPPED, WATCHDOG_MS
+
+from .arithmetic.fixed import shape
+from .block import Block
+
+
+class Supervisor(Block):
+    """The states DISARMED, ARMED and TRIPPED, and the drive, which is zero in all but ARMED.
+
+    Equation, at every clock:
+
+        standing <- causes & (enabled | required) & (all if ARMED else those always watched)
+        state    <- TRIPPED if standing
+                    DISARMED if TRIPPED and acknowledged == latched with acknowledge
+                    DISARMED if not TRIPPED, and enable is low or disarm is high
+                    ARMED if DISARMED, and arm, live and the reference that is asked for
+        driven   <- drive within +-min(ceiling, supervisor_force_limit) if ARMED stays ARMED, else 0
+        ceiling  <- 0 unless ARMED; with strobe + supervisor_ramp, up to the largest force of the axis
+
+    `link_timeout` is made here: it stands while ARMED and not `live`. The host is live from a `beat` whose word differs
+    from the last one's until `supervisor_watchdog` ms later, up to 1 ms less because the tick of 1 ms runs freely.
+    `latched` collects the causes until they are acknowledged, and an acknowledgement that does not name exactly these
+    has no effect, so a cause that came after the host's last look is not lost. `counts` are the occurrences of every
+    cause since reset.
+
+    Latency: one clock from `drive` to `driven`, from a cause or a low enable to zero, and from a lower
+    `supervisor_force_limit` to a drive that obeys it. No word is committed here: all act at the next clock.
+
+    Rounding and overflow: the ceiling is rounded down to the force LSB; counts saturate.
+
+    Parameters
+    ----------
+    design : hardwall.model.supervisor.Design
+        Formats; its module derives them.
+
+    Members
+    -------
+    strobe : In(1)
+        Pulse for every sample: the ceiling rises.
+    drive : In(SQ)
+        The output stage's drive, force LSB.
+    causes : In
+        The causes that are present, bits as in `supervisor.CAUSES`; `link_timeout` is ignored.
+    stamp : In
+        The number of this clock.
+    enable : In(1)
+        The loop of `drive_enable` is closed.
+    referenced : In(1)
+        The index has been found.
+    arm, disarm : In(1)
+        Pulses of the host.
+    acknowledge, acknowledged : In
+        A pulse, and the causes that the host has read.
+    beat, beat_word : In
+        A pulse, and a word that must differ from the last one.
+    one input for each word of `design.words` : In
+        Run-time parameters.
+    driven : Out(SQ)
+        The drive that is let out, force LSB.
+    state : Out(2)
+        0: DISARMED, 1: ARMED, 2: TRIPPED.
+    alive : Out(1)
+        A square wave while ARMED, for the charge pump of an amplifier's enable; otherwise low.
+    live : Out(1)
+        The host's heartbeat is not overdue.
+    latched : Out
+        Causes since the last acknowledgement.
+    first, first_stamp : Out
+        The causes of the clock that led to the last trip, and its number.
+    counts : Out
+        Occurrences of every cause, `COUNT_BITS` each, the first cause's lowest; they saturate.
+
+    Raises
+    ------
+    TypeError
+        If `design` is of another class.
+    """
+
+    design_class = supervisor.Design
+
+    @staticmethod
+    def members(design: supervisor.Design) -> dict[str, Member]:
+        return {
+            "strobe": In(1),
+            "drive": In(shape(design.force)),
+            "causes": In(COUNT),
+            "stamp": In(design.stamp_width),
+            "enable": In(1),
+            "referenced": In(1),
+            "arm": In(1),
+            "disarm": In(1),
+            "acknowledge": In(1),
+            "acknowledged": In(COUNT),
+            "beat": In(1),
+            "beat_word": In(supervisor.BEAT_BITS),
+            **{word.name: In(shape(word.format)) for word in design.words},
+            "driven": Out(shape(design.force)),
+            "state": Out(2),
+            "alive": Out(1),
+            "live": Out(1),
+            "latched": Out(COUNT),
+            "first": Out(COUNT),
+            "first_stamp": Out(design.stamp_width),
+            "counts": Out(COUNT * COUNT_BITS),
+        }
+
+    def elaborate(self, platform):
+        m = Module()
+        armed, tripped = self.state == ARMED, self.state == TRIPPED
+        standing, before = Signal(COUNT), Signal(COUNT)
+        watched = (self.supervisor_causes | REQUIRED) & (Const(ALWAYS, COUNT) | armed.replicate(COUNT))
+        present = Cat(~self.live if bit == LINK else cause for bit, cause in enumerate(self.causes))
+        m.d.comb += standing.eq(present & watched)
+        m.d.sync += before.eq(standing)
+
+        go = Signal()
+        m.d.comb += go.eq(armed & ~standing.any() & self.enable & ~self.disarm)
+        m.d.sync += self.latched.eq(self.latched | standing)
+        with m.If(standing.any()):
+            m.d.sync += self.state.eq(TRIPPED)
+            with m.If(~tripped):
+                m.d.sync += [self.first.eq(standing), self.first_stamp.eq(self.stamp)]
+        with m.Elif(tripped), m.If(self.acknowledge & (self.acknowledged == self.latched)):
+            m.d.sync += [self.state.eq(DISARMED), self.latched.eq(0)]
+        with m.Elif(~self.enable | self.disarm):
+            m.d.sync += self.state.eq(DISARMED)
+        with m.Elif(self.arm & self.live & (self.referenced | ~self.supervisor_reference)):
+            m.d.sync += self.state.eq(ARMED)
+
+        for bit in range(COUNT):
+            count = self.counts.word_select(bit, COUNT_BITS)
+            with m.If(standing[bit] & ~before[bit] & ~count.all()):
+                m.d.sync += count.eq(count + 1)
+
+        self._limit(m, go)
+        self._watch(m)
+        self._pump(m, go)
+        return m
+
+    def _limit(self, m: Module, go: Signal) -> None:
+        """Let the drive out within the ceiling and the force limit, and raise the ceiling."""
+        fraction, most, _, _ = self._design.params
+        ceiling, raised = Signal(range(most + 1)), Signal(range(most + (1 << len(self.supervisor_ramp))))
+        m.d.comb += raised.eq(ceiling + self.supervisor_ramp)
+        with m.If(~go):
+            m.d.sync += ceiling.eq(0)
+        with m.Elif(self.strobe):
+            m.d.sync += ceiling.eq(Mux(raised > most, most, raised))
+
+        limit = Signal(signed(len(self.drive)))
+        bound = ceiling[fraction:]
+        m.d.comb += limit.eq(Mux(bound < self.supervisor_force_limit, bound, self.supervisor_force_limit))
+        held = Mux(self.drive > limit, limit, Mux(self.drive + limit < 0, -limit, self.drive))
+        m.d.sync += self.driven.eq(Mux(go, held, 0))
+
+    def _watch(self, m: Module) -> None:
+        """Count the milliseconds that are left to the host."""
+        clocks = self._design.params.tick_clocks
+        tick, left = Signal(range(max(clocks, 2))), Signal(range(WATCHDOG_MS[1] + 1))
+        last_beat = Signal.like(self.beat_word)
+        ticks = tick == clocks - 1
+        m.d.sync += tick.eq(Mux(ticks, 0, tick + 1))
+        word = self.supervisor_watchdog
+        with m.If(self.beat & (self.beat_word != last_beat)):
+            m.d.sync += [
+                last_beat.eq(self.beat_word),
+                left.eq(Mux(word < WATCHDOG_MS[0], WATCHDOG_MS[0], Mux(word > WATCHDOG_MS[1], WATCHDOG_MS[1], word))),
+            ]
+        with m.Elif(ticks & left.any()):
+            m.d.sync += left.eq(left - 1)
+        m.d.comb += self.live.eq(left.any())
+
+    def _pump(self, m: Module, go: Signal) -> None:
+        """Toggle `alive` while ARMED."""
+        clocks = self._design.params.pump_clocks
+        pump = Signal(range(max(clocks, 2)))
+        with m.If(~go):
+            m.d.sync += [pump.eq(0), self.alive.eq(0)]
+        with m.Elif(pump == clocks - 1):
+            m.d.sync += [pump.eq(0), self.alive.eq(~self.alive)]
+        with m.Else():
+            m.d.sync += pump.eq(pump + 1)

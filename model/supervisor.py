@@ -1,0 +1,250 @@
+"""The supervisor: the one place that lets a drive out; twin of `hardwall.hdl.supervisor`.
+
+The drive is zero unless the supervisor is ARMED. It starts DISARMED; the host's arm takes it to ARMED, and a cause of
+`CAUSES` from any state to TRIPPED, which it leaves for DISARMED only when the host acknowledges exactly the causes that
+are latched. One `step` is one clock:
+
+    standing   = causes that are present, enabled and watched in this state; link_timeout is made here
+    state      <- TRIPPED if standing; else as `State` says
+    ceiling    <- 0 unless ARMED; at every strobe + ramp, up to the largest limit
+    drive      <- 0 unless ARMED; else drive within +-min(ceiling, force limit)
+
+so the drive is zero after the first clock edge at which a cause stands or the enable is low, and never above a limit
+that was lowered before that edge.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from .arithmetic.fixed import UQ, bits_for, saturate
+from .compiled import compiled
+from .requirements import AxisRequirements
+from .words import Word
+
+DISARMED, ARMED, TRIPPED = range(3)
+COUNT_BITS = 4
+"""Bits of the count of every cause, which saturates: a second occurrence matters, a twentieth does not."""
+WATCHDOG_MS = 50, 2000
+"""The least and the largest time without a beat of the host, ms: USB pauses for 16, people notice 2000."""
+WATCHDOG_RESET_MS = 200
+RAMP_S = 0.5
+"""The time in which the limit rises to the largest force after arming, at reset: a hand feels it come."""
+RAMP_S_MAX = 10.0
+"""The longest such time, which the format of the ramp resolves."""
+BEAT_BITS = 16
+"""Bits of the word of a beat: a register."""
+PUMP_HZ = 12_500
+"""The rate of `alive`: charge pumps of amplifiers want 10 kHz and more."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """A reason to trip.
+
+    Attributes:
+        name: the field's word for it.
+        always: watched in every state; the others only while ARMED, when they can do harm.
+        required: cannot be disabled.
+        doc: what is present when the cause is.
+    """
+
+    name: str
+    always: bool
+    required: bool
+    doc: str
+
+
+CAUSES = (
+    Cause("encoder_illegal", True, True, "both channels of the encoder changed at once: the position is unknown"),
+    Cause("encoder_overspeed", True, True, "edges came faster than the filter passes: the position is unknown"),
+    Cause("encoder_loss", True, False, "a channel and its complement are equal for longer than an edge takes"),
+    Cause("index_spacing", True, False, "two index pulses are no multiple of the counts of a turn apart"),
+    Cause("position_range", False, False, "the count is beyond the range that the host has set"),
+    Cause("position_wrap", False, True, "the count is about to wrap, and a wall would change its side"),
+    Cause("velocity_limit", False, False, "the estimated speed is beyond the limit that the host has set"),
+    Cause("runaway", False, False, "the drive is at its limit and the handle moves with it: polarity is reversed"),
+    Cause("estimator_saturated", False, False, "the estimator's output is saturated for longer than the host allows"),
+    Cause("strobe_busy", True, True, "a sample began before the last one had left: the hardware is misused"),
+    Cause("word_range", True, True, "a parameter in use is beyond its range: the configuration is damaged"),
+    Cause("link_timeout", False, True, "the host's heartbeat has stopped"),
+    Cause("external_fault", True, False, "the amplifier's fault loop is open"),
+    Cause("emergency_stop", True, True, "the loop of the emergency stop is open"),
+)
+COUNT = len(CAUSES)
+LINK = next(bit for bit, cause in enumerate(CAUSES) if cause.name == "link_timeout")
+ALL = (1 << COUNT) - 1
+ALWAYS = sum(1 << bit for bit, cause in enumerate(CAUSES) if cause.always)
+REQUIRED = sum(1 << bit for bit, cause in enumerate(CAUSES) if cause.required)
+OFF_AT_RESET = ("encoder_loss", "index_spacing")
+"""Causes that need more than every axis has: the encoder's complementary wires, and the counts of its turn."""
+ENABLED = ALL & ~sum(1 << bit for bit, cause in enumerate(CAUSES) if cause.name in OFF_AT_RESET)
+
+
+def names(causes: int) -> list[str]:
+    """Return the names of the causes whose bits are set."""
+    return [cause.name for bit, cause in enumerate(CAUSES) if causes >> bit & 1]
+
+
+class Params(NamedTuple):
+    """What is fixed for a design."""
+
+    ramp_fraction: int  # fraction bits of the ceiling
+    ceiling_max: int  # the largest limit, in units of the ceiling
+    tick_clocks: int  # clocks in a tick of the watchdog, 1 ms
+    pump_clocks: int  # clocks for which `alive` keeps a level
+
+
+class Inputs(NamedTuple):
+    """The inputs of the hardware just before a clock edge, by the same names."""
+
+    strobe: int = 0
+    drive: int = 0
+    causes: int = 0
+    stamp: int = 0
+    enable: int = 0
+    referenced: int = 0
+    arm: int = 0
+    disarm: int = 0
+    acknowledge: int = 0
+    acknowledged: int = 0
+    beat: int = 0
+    beat_word: int = 0
+    supervisor_force_limit: int = 0
+    supervisor_ramp: int = 0
+    supervisor_watchdog: int = 0
+    supervisor_causes: int = 0
+    supervisor_reference: int = 0
+
+
+class State(NamedTuple):
+    """Every register; those up to `counts` are also outputs of the hardware, by the same names."""
+
+    driven: int  # the drive that is let out, force LSB
+    state: int
+    alive: int
+    live: int  # the host's heartbeat is not overdue
+    latched: int  # causes since the last acknowledgement
+    first: int  # causes of the clock that led to the last trip
+    first_stamp: int  # the stamp of that clock
+    counts: int  # occurrences of every cause since reset, `COUNT_BITS` each, the first cause lowest
+    before: int  # the causes that stood at the last clock
+    ceiling: int
+    tick: int
+    left: int  # ms until the heartbeat is overdue
+    last_beat: int
+    pump: int
+
+
+START = State(0, DISARMED, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+
+
+class Design:
+    """Formats and run-time words of an axis's supervisor.
+
+    The ramp's word is the rise of the ceiling in a sample, with as many fraction bits as `RAMP_S_MAX` needs.
+    """
+
+    def __init__(self, axis: AxisRequirements):
+        r, most = axis.force_resolution_n, axis.force_limit_word
+        self.force, self.stamp_width = axis.force, axis.stamp_width
+        self.limit = UQ(axis.force.width - 2, 0)
+        fraction = max(bits_for(RAMP_S_MAX * axis.sample_hz / most), 0)
+        self.ramp = UQ(axis.force.width - 2, fraction)
+        self.params = Params(
+            ramp_fraction=fraction,
+            ceiling_max=most << fraction,
+            tick_clocks=max(axis.clock_hz // 1000, 1),
+            pump_clocks=max(axis.clock_hz // (2 * PUMP_HZ), 1),
+        )
+        ramp = most / (RAMP_S * axis.sample_hz) * 2**fraction
+        self.words = (
+            Word(
+                "supervisor_force_limit", self.limit, r, "N", most,
+                "largest drive, either way; holds at the next clock without a commit",
+            ),
+            Word(
+                "supervisor_ramp", self.ramp, r * axis.sample_hz, "N/s",
+                max(min(int(ramp), self.ramp.max), 1),
+                "rise of the limit after arming",
+            ),
+            Word(
+                "supervisor_watchdog", UQ(11, 0), 1e-3, "s", WATCHDOG_RESET_MS,
+                f"longest time between beats of the host; {WATCHDOG_MS[0]} to {WATCHDOG_MS[1]} ms, whatever is written",
+            ),
+            Word(
+                "supervisor_causes", UQ(COUNT, 0), 1.0, "", ENABLED,
+                "causes that trip, a bit each; those that are required trip whatever is written",
+            ),
+            Word(
+                "supervisor_reference", UQ(1, 0), 1.0, "", 0,
+                "1: arming needs a reference, found at the index",
+            ),
+        )  # fmt: skip
+
+
+@compiled
+def _counted(counts, raised):
+    """Return the counts, each one more where its cause is raised, saturated."""
+    top = (1 << COUNT_BITS) - 1
+    for bit in range(COUNT):
+        shift = bit * COUNT_BITS
+        if raised >> bit & 1 and (counts >> shift) & top != top:
+            counts += 1 << shift
+    return counts
+
+
+@compiled
+def step(params, state, inputs):
+    """Return the state after one clock edge.
+
+    Args:
+        params: the `params` of a `Design`.
+        state: `START`, or the state after the last edge.
+        inputs: `Inputs` just before the edge.
+    """
+    armed = state.state == ARMED
+    watched = (inputs.supervisor_causes | REQUIRED) & (ALL if armed else ALWAYS)
+    present = (inputs.causes & ~(1 << LINK)) | (0 if state.live else 1 << LINK)
+    standing = present & watched
+
+    now, latched = state.state, state.latched | standing
+    if standing:
+        now = TRIPPED
+    elif state.state == TRIPPED:
+        if inputs.acknowledge and inputs.acknowledged == state.latched:
+            now, latched = DISARMED, 0
+    elif not inputs.enable or inputs.disarm:
+        now = DISARMED
+    elif inputs.arm and state.live and (inputs.referenced or not inputs.supervisor_reference):
+        now = ARMED
+    trips = standing and state.state != TRIPPED
+
+    limit = min(state.ceiling >> params.ramp_fraction, inputs.supervisor_force_limit)
+    ceiling = state.ceiling
+    if inputs.strobe:
+        ceiling = min(ceiling + inputs.supervisor_ramp, params.ceiling_max)
+
+    beats = inputs.beat and inputs.beat_word != state.last_beat
+    ticks = state.tick == params.tick_clocks - 1
+    left = state.left - 1 if ticks and state.left else state.left
+    if beats:
+        left = saturate(inputs.supervisor_watchdog, WATCHDOG_MS[0], WATCHDOG_MS[1])
+
+    turns = state.pump == params.pump_clocks - 1
+    go = armed and now == ARMED
+    return State(
+        driven=saturate(inputs.drive, -limit, limit) if go else 0,
+        state=now,
+        alive=(state.alive ^ 1 if turns else state.alive) if go else 0,
+        live=int(left > 0),
+        latched=latched,
+        first=standing if trips else state.first,
+        first_stamp=inputs.stamp if trips else state.first_stamp,
+        counts=_counted(state.counts, standing & ~state.before),
+        before=standing,
+        ceiling=ceiling if go else 0,
+        tick=0 if ticks else state.tick + 1,
+        left=left,
+        last_beat=inputs.beat_word if beats else state.last_beat,
+        pump=(0 if turns else state.pump + 1) if go else 0,
+    )

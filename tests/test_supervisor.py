@@ -1,0 +1,260 @@
+"""The supervisor: RTL against model at every clock, and the model's promises about arming, trips and limits."""
+
+import dataclasses
+import random as plain
+
+import cocotb
+import numpy as np
+import pytest
+
+from hardwall.hdl.supervisor import Supervisor
+from hardwall.model import supervisor
+from hardwall.model.supervisor import ALL, ARMED, CAUSES, COUNT_BITS, DISARMED, LINK, REQUIRED, START, TRIPPED, Inputs
+from hardwall.testing import SAMPLES, SEED, Recorded, check, parameters, play, simulate
+from stimuli.specs import spec
+
+# A clock at which milliseconds are few clocks: the heartbeat is overdue after 1 000.
+SLOW = {"clock_hz": 20_000, "sample_hz": 500, "actuation_hz": 500}
+OUTPUTS = supervisor.State._fields[: supervisor.State._fields.index("counts") + 1]
+
+
+def design(name: str) -> supervisor.Design:
+    axis = spec("paper" if name == "slow" else name)
+    return supervisor.Design(
+        dataclasses.replace(axis, gains=None, speed_max_m_per_s=0.01, **SLOW) if name == "slow" else axis
+    )
+
+
+def make(name: str) -> Recorded:
+    return Recorded(Supervisor(design(name)))
+
+
+def settled(d: supervisor.Design, **changed: int) -> Inputs:
+    """Return inputs with every word as after reset, the loops closed and nothing asked."""
+    return Inputs(enable=1, **{word.name: word.reset for word in d.words})._replace(**changed)
+
+
+def campaign(name: str, clocks: int) -> dict[str, np.ndarray]:
+    """Return inputs at every clock from a host that looks at the model: it arms, beats, errs, and is interrupted."""
+    d, random = design(name), plain.Random(SEED)
+    state, rows, inputs, beating = START, [], settled(d), True
+    largest = {word.name: word.format.max for word in d.words}
+    for clock in range(clocks):
+        reset = int(clock == 0 or random.random() < 1e-4)
+        act, pulses = random.random(), {}
+        if act < 0.02 and state.state == DISARMED:
+            pulses = {"arm": 1}
+        elif act < 0.02 and state.state == TRIPPED:
+            wrong = random.random() < 0.3
+            pulses = {
+                "acknowledge": 1,
+                "acknowledged": state.latched ^ (1 << random.randrange(len(CAUSES)) if wrong else 0),
+            }
+        elif act < 0.03:
+            word = random.choice(d.words).name
+            top = largest[word] >> random.randrange(largest[word].bit_length())
+            inputs = inputs._replace(**{word: random.randint(0, top)})
+        elif act < 0.032:
+            inputs = settled(d, enable=int(random.random() < 0.8), referenced=random.randrange(2))
+            beating = random.random() < 0.7
+        elif act < 0.033:
+            pulses = {random.choice(("arm", "disarm", "acknowledge")): 1}
+        elif act < 0.036:
+            pulses = {
+                "causes": 1 << random.randrange(len(CAUSES)) | (random.randrange(ALL) if random.random() < 0.1 else 0)
+            }
+        elif act < 0.05 and beating:
+            pulses = {"beat": 1, "beat_word": random.randrange(1 << 16) if random.random() < 0.9 else state.last_beat}
+        drive = random.randint(d.force.min, d.force.max) >> random.randrange(d.force.width)
+        now = inputs._replace(
+            strobe=int(random.random() < 0.3), drive=drive, stamp=clock % (1 << d.stamp_width), **pulses
+        )
+        rows.append((reset, *now))
+        state = START if reset else supervisor.step(d.params, state, now)
+    return dict(zip(("reset", *Inputs._fields), np.array(rows, np.int64).T, strict=True))
+
+
+def expected(d: supervisor.Design, columns: dict[str, np.ndarray]) -> dict[str, list[int]]:
+    """Return the outputs after every clock."""
+    state, seen = START, []
+    for reset, *row in zip(columns["reset"].tolist(), *(columns[n].tolist() for n in Inputs._fields), strict=True):
+        state = START if reset else supervisor.step(d.params, state, Inputs(*row))
+        seen.append(state[: len(OUTPUTS)])
+    return dict(zip(OUTPUTS, map(list, zip(*seen, strict=True)), strict=True))
+
+
+@cocotb.test()
+async def follows_model(dut):
+    name = parameters()["name"]
+    inputs, outputs = await play(dut, make(name), campaign(name, SAMPLES // 2))
+    after = expected(design(name), {column: inputs.column(column) for column in inputs.names})
+    check(inputs, outputs, after)
+    # The campaign must reach every state, cause and limit.
+    assert set(after["state"]) == {DISARMED, ARMED, TRIPPED}
+    assert np.bitwise_or.reduce(after["latched"]) == (ALL if name == "slow" else ALL & ~(1 << LINK))
+    assert any(drive > 0 for drive in after["driven"])
+    assert any(drive < 0 for drive in after["driven"])
+    assert set(after["live"]) == {0, 1}
+    assert set(after["alive"]) == ({0, 1} if name == "slow" else {0})
+
+
+@pytest.mark.parametrize("name", ["slow", "narrow"])
+def test_rtl(name):
+    simulate(__file__, make, name=name)
+
+
+class Bench:
+    """A supervisor's model, clocked by hand."""
+
+    def __init__(self, name: str = "slow", **words: int):
+        self.design, self.state = design(name), START
+        self.inputs = settled(self.design, drive=self.design.force.max, **words)
+
+    def clock(self, **changed: int) -> supervisor.State:
+        self.state = supervisor.step(self.design.params, self.state, self.inputs._replace(**changed))
+        return self.state
+
+    def arm(self) -> supervisor.State:
+        self.clock(beat=1, beat_word=self.state.last_beat ^ 1)
+        return self.clock(arm=1)
+
+
+def test_nothing_arms_but_the_host_with_all_that_it_needs():
+    ready = Bench()
+    assert ready.arm().state == ARMED
+    for missing in ({"enable": 0}, {"disarm": 1}, {"causes": 1}, {"supervisor_reference": 1}):
+        bench = Bench()
+        bench.inputs = bench.inputs._replace(**missing)
+        assert bench.arm().state != ARMED, missing
+    silent = Bench()
+    assert silent.clock(arm=1).state == DISARMED
+    referenced = Bench(supervisor_reference=1, referenced=1)
+    assert referenced.arm().state == ARMED
+
+
+@pytest.mark.parametrize("bit", [bit for bit in range(len(CAUSES)) if bit != LINK], ids=lambda bit: CAUSES[bit].name)
+def test_a_cause_trips_at_the_next_clock_and_only_its_acknowledgement_and_an_arm_bring_the_drive_back(bit):
+    bench = Bench(supervisor_causes=ALL)
+    bench.arm()
+    for _ in range(5):
+        assert bench.clock(strobe=1).state == ARMED
+    assert bench.state.driven > 0
+    tripped = bench.clock(causes=1 << bit, stamp=77)
+    assert (tripped.driven, tripped.state, tripped.latched, tripped.first_stamp) == (0, TRIPPED, 1 << bit, 77)
+    assert bench.clock(arm=1).state == TRIPPED
+    for wrong in (0, ALL, 1 << (bit + 1) % len(CAUSES)):
+        assert bench.clock(acknowledge=1, acknowledged=wrong).state == TRIPPED
+    late = 1 << (bit + 2) % len(CAUSES)
+    if CAUSES[(bit + 2) % len(CAUSES)].always and late != 1 << LINK:
+        # A cause that came after the host's look is not lost.
+        bench.clock(causes=late, stamp=99)
+        assert bench.clock(acknowledge=1, acknowledged=1 << bit).state == TRIPPED
+        assert (bench.state.first, bench.state.first_stamp) == (1 << bit, 77)
+    calm = bench.clock(acknowledge=1, acknowledged=bench.state.latched)
+    assert (calm.state, calm.driven, calm.latched, calm.first) == (DISARMED, 0, 0, 1 << bit)
+    assert bench.clock().driven == 0
+    assert bench.arm().state == ARMED
+
+
+def test_causes_that_cannot_harm_while_disarmed_are_watched_only_while_armed():
+    for bit, cause in enumerate(CAUSES):
+        if bit != LINK:
+            assert Bench(supervisor_causes=ALL).clock(causes=1 << bit).state == (TRIPPED if cause.always else DISARMED)
+
+
+def test_only_causes_that_are_not_required_can_be_disabled():
+    for bit, cause in enumerate(CAUSES):
+        if bit != LINK:
+            bench = Bench(supervisor_causes=0)
+            bench.arm()
+            assert bench.clock(causes=1 << bit).state == (TRIPPED if cause.required else ARMED)
+
+
+def test_a_silent_host_trips_within_the_time_that_it_has_set_and_no_word_switches_that_off():
+    for word, held in ((50, 50), (200, 200), (2000, 2000), (0, 50), (2047, 2000)):
+        bench = Bench(supervisor_watchdog=word)
+        bench.arm()
+        clocks = 1
+        while bench.clock(strobe=1).state == ARMED:
+            clocks += 1
+        ms = bench.design.params.tick_clocks
+        assert bench.state.latched == 1 << LINK
+        assert (held - 1) * ms - 2 <= clocks <= held * ms + 2
+
+
+def test_a_beat_that_repeats_the_last_one_is_none():
+    bench = Bench(supervisor_watchdog=50)
+    bench.arm()
+    for _ in range(51 * bench.design.params.tick_clocks):
+        bench.clock(beat=1, beat_word=bench.state.last_beat)
+    assert bench.state.state == TRIPPED
+
+
+def test_enable_low_is_zero_at_once_and_high_again_brings_nothing_back():
+    bench = Bench()
+    bench.arm()
+    for _ in range(10):
+        bench.clock(strobe=1)
+    off = bench.clock(enable=0)
+    assert (off.driven, off.state, off.alive) == (0, DISARMED, 0)
+    assert {bench.clock(strobe=1).driven for _ in range(10)} == {0}
+
+
+def test_the_limit_rises_from_zero_in_the_time_that_is_set():
+    bench = Bench("paper")
+    assert bench.arm().driven == 0
+    drives = []
+    # Beats go on, but the model's milliseconds are many clocks: only strobes are played.
+    for _ in range(6000):
+        drives.append(bench.clock(strobe=1).driven)
+    top = bench.design.limit.from_real(40_000)
+    assert np.diff(drives).min() >= 0
+    assert abs(drives.index(top) - supervisor.RAMP_S * 10_000) < 5
+    assert drives[-1] == top
+
+
+def test_a_lower_limit_holds_at_the_next_clock_and_never_restarts_the_ramp():
+    bench = Bench("paper")
+    bench.arm()
+    for _ in range(6000):
+        bench.clock(strobe=1)
+    bench.inputs = bench.inputs._replace(supervisor_force_limit=7)
+    assert bench.clock().driven == 7
+    assert bench.clock(drive=bench.design.force.min).driven == -7
+    bench.inputs = bench.inputs._replace(supervisor_force_limit=9)
+    assert bench.clock().driven == 9
+
+
+def test_every_cause_is_counted_once_however_long_it_stands_and_the_counts_saturate():
+    for bit, cause in enumerate(CAUSES):
+        if cause.always:
+            bench = Bench(supervisor_causes=ALL)
+            for times in range(1, 20):
+                for _ in range(3):
+                    bench.clock(causes=1 << bit)
+                bench.clock()
+                counts = bench.state.counts
+                assert counts == min(times, (1 << COUNT_BITS) - 1) << COUNT_BITS * bit
+
+
+def test_alive_is_a_square_wave_of_its_rate_only_while_armed():
+    bench = Bench("mhz")
+    assert bench.clock().alive == 0
+    bench.arm()
+    levels = np.array([bench.clock().alive for _ in range(20_000)])
+    edges = np.flatnonzero(np.diff(levels))
+    assert set(np.diff(edges).tolist()) == {50_000_000 // (2 * supervisor.PUMP_HZ)}
+    assert bench.clock(disarm=1).alive == 0
+
+
+def test_names_and_words():
+    assert supervisor.names(1 << LINK | 1) == ["encoder_illegal", "link_timeout"]
+    assert REQUIRED >> LINK & 1
+    for name in ("slow", "narrow", "mhz", "wide"):
+        for word in design(name).words:
+            assert word.name == "supervisor_reference" or word.reset > 0
+
+
+def test_wrong_design_is_refused():
+    with pytest.raises(TypeError, match=r"not 3$"):
+        Supervisor(3)
