@@ -1,0 +1,206 @@
+"""Monitors: what is wrong with an axis, seen from its signals; twin of `hardwall.hdl.monitors`.
+
+One `step` is one clock. Every monitor gives one bit of `supervisor.CAUSES`, or the warning; thresholds are run-time
+words whose values after reset follow from the axis:
+
+    position_range        the count is below supervisor_position_low or above supervisor_position_high, which lie at
+                          twice the travel on either side: a handle anywhere in its travel, whatever its origin, is
+                          within
+    position_wrap         the count is in the last quarter of its range on either side, three times the travel away
+    velocity_limit        |velocity| > supervisor_velocity_limit, after reset one and a half times the largest speed,
+                          or the format's largest word if that is less
+    runaway               the handle has moved against a drive at its limit by more than supervisor_runaway since the
+                          drive came to the limit, after reset by a tenth of the travel: a wall that works turns the
+                          handle back, and with a reversed polarity it drives the handle in. A hand that pushes
+                          through the wall does the same.
+    estimator_saturated   more than supervisor_saturated samples in a row, after reset those of 10 ms
+    encoder_loss          a channel equals its complement for more than supervisor_loss clocks, after reset one more
+                          than the glitch filter passes over
+    index_spacing         two index edges in one direction of the same kind are no turn apart: the distance is neither
+                          0 nor a turn, within supervisor_index_tolerance counts
+    a_channel_idle        a warning, no cause: a hundred edges in a row were of one channel. A handle that dithers on
+                          one edge does that too, so no more is promised for a dead channel without its complement.
+"""
+
+from typing import NamedTuple
+
+from .arithmetic.fixed import SQ, UQ, wrap
+from .compiled import compiled
+from .requirements import AxisRequirements
+from .supervisor import CAUSES
+from .words import Word
+
+BITS = {cause.name: bit for bit, cause in enumerate(CAUSES)}
+POSITION_RANGE, POSITION_WRAP = BITS["position_range"], BITS["position_wrap"]
+VELOCITY_LIMIT, RUNAWAY = BITS["velocity_limit"], BITS["runaway"]
+ESTIMATOR_SATURATED, ENCODER_LOSS = BITS["estimator_saturated"], BITS["encoder_loss"]
+INDEX_SPACING = BITS["index_spacing"]
+MADE = (
+    "encoder_loss", "index_spacing", "position_range", "position_wrap", "velocity_limit", "runaway",
+    "estimator_saturated",
+)  # fmt: skip
+"""The causes that are made here; the others come from the decoder, the axis, the pins and the host."""
+SATURATED_S = 0.01
+IDLE_EDGES = 100
+"""Edges of one channel in a row that raise the warning: so many reversals on one edge are dither, or a dead channel."""
+LOSS_BITS = 8
+INDEX_TOLERANCE = 4
+"""Counts that an index edge may be away from its place, after reset: a pulse may be a cycle wide."""
+
+
+class Params(NamedTuple):
+    """Widths, in bits."""
+
+    count_width: int
+
+
+class Inputs(NamedTuple):
+    """The inputs of the hardware just before a clock edge, by the same names."""
+
+    count: int = 0  # type: ignore[assignment]  # a tuple has a method of this name
+    stepped: int = 0
+    edge: int = 0
+    indexed: int = 0
+    valid: int = 0
+    velocity: int = 0
+    saturated: int = 0
+    driven: int = 0
+    force_limit: int = 0
+    a: int = 0
+    a_n: int = 1
+    b: int = 0
+    b_n: int = 1
+    supervisor_position_low: int = 0
+    supervisor_position_high: int = 0
+    supervisor_velocity_limit: int = 0
+    supervisor_runaway: int = 0
+    supervisor_saturated: int = 0
+    supervisor_loss: int = 0
+    supervisor_turn: int = 0
+    supervisor_index_tolerance: int = 0
+
+
+class State(NamedTuple):
+    """Every register; the first two are the outputs of the hardware, by the same names."""
+
+    causes: int
+    a_channel_idle: int
+    side: int  # of the drive at its limit: 1, -1, or 0 if it is not there
+    anchor: int  # the count when it came there
+    samples: int  # successive samples with a saturated estimate
+    lost_a: int  # clocks for which a channel has equalled its complement
+    lost_b: int
+    channel: int  # channel of the last edge, 1: B
+    edges: int  # edges in a row of that channel
+    has_index: int
+    last_index: int  # the count at the last index edge
+
+
+START = State(*(0 for _ in State._fields))
+
+
+class Design:
+    """Formats and run-time words of an axis's monitors.
+
+    Args:
+        axis: the axis.
+        velocity: the format of its estimator's velocity.
+    """
+
+    def __init__(self, axis: AxisRequirements, velocity: SQ):
+        self.count_width, self.velocity, self.force = axis.count_width, velocity, axis.force
+        self.limit = UQ(axis.force.width - 2, 0)
+        self.params = Params(axis.count_width)
+        count, distance = SQ(axis.count_width, 0), UQ(axis.count_width - 1, 0)
+        speed = UQ(velocity.i - 1, velocity.f)
+        reach = min(int(2 * axis.travel_m / axis.count_m), count.max)
+        # A finite difference knows nothing below one count a sample.
+        fastest = int(max(1.5 * axis.speed_max_counts_per_sample, 2.0) * 2**velocity.f)
+        samples = max(int(SATURATED_S * axis.sample_hz), 1)
+        self.words = (
+            Word("supervisor_position_low", count, axis.count_m, "m", -reach, "least position while ARMED"),
+            Word("supervisor_position_high", count, axis.count_m, "m", reach, "largest position while ARMED"),
+            Word(
+                "supervisor_velocity_limit", speed, axis.velocity_unit_m_per_s, "m/s", min(fastest, speed.max),
+                "largest estimated speed while ARMED",
+            ),
+            Word(
+                "supervisor_runaway", distance, axis.count_m, "m", max(min(reach // 20, distance.max), 1),
+                "longest way against a drive at its limit",
+            ),
+            Word(
+                "supervisor_saturated", UQ(samples.bit_length() + 3, 0), 1 / axis.sample_hz, "s", samples,
+                "longest time of a saturated estimate",
+            ),
+            Word(
+                "supervisor_loss", UQ(LOSS_BITS, 0), 1 / axis.clock_hz, "s", axis.glitch_clocks_at_reset + 2,
+                "longest time for which a channel may equal its complement",
+            ),
+            Word("supervisor_turn", distance, 1.0, "", distance.max, "counts from index to index"),
+            Word(
+                "supervisor_index_tolerance", UQ(LOSS_BITS, 0), 1.0, "", INDEX_TOLERANCE,
+                "counts that an index edge may be away from its place",
+            ),
+        )  # fmt: skip
+
+
+@compiled
+def _index_is_wrong(params, state, inputs):
+    """Return whether an index edge is neither at the last one nor a turn away."""
+    distance = abs(wrap(inputs.count - state.last_index, params.count_width))
+    off = min(distance, abs(distance - inputs.supervisor_turn))
+    return inputs.indexed and state.has_index and off > inputs.supervisor_index_tolerance
+
+
+@compiled
+def step(params, state, inputs):
+    """Return the state after one clock edge.
+
+    Args:
+        params: the `params` of a `Design`.
+        state: `START`, or the state after the last edge.
+        inputs: `Inputs` just before the edge.
+    """
+    count, last_quarter = inputs.count, 3 << (params.count_width - 3)
+    side = 0
+    if inputs.force_limit and abs(inputs.driven) >= inputs.force_limit:
+        side = 1 if inputs.driven > 0 else -1
+    held = side and side == state.side
+    against = -side * wrap(count - state.anchor, params.count_width) if held else 0
+
+    samples = state.samples
+    if inputs.valid:
+        samples = min(samples + 1, inputs.supervisor_saturated + 1) if inputs.saturated else 0
+    longest = inputs.supervisor_loss + 1
+    lost_a = min(state.lost_a + 1, longest) if inputs.a == inputs.a_n else 0
+    lost_b = min(state.lost_b + 1, longest) if inputs.b == inputs.b_n else 0
+
+    channel, edges = state.channel, state.edges
+    if inputs.stepped:
+        channel = inputs.edge & 1
+        edges = min(edges + 1, IDLE_EDGES) if channel == state.channel else 1
+
+    out_of_range = count < inputs.supervisor_position_low or count > inputs.supervisor_position_high
+    too_fast = inputs.valid and abs(inputs.velocity) > inputs.supervisor_velocity_limit
+    causes = (
+        int(out_of_range) << POSITION_RANGE
+        | int(count >= last_quarter or count < -last_quarter) << POSITION_WRAP
+        | int(too_fast) << VELOCITY_LIMIT
+        | int(against > inputs.supervisor_runaway) << RUNAWAY
+        | int(samples > inputs.supervisor_saturated) << ESTIMATOR_SATURATED
+        | int(lost_a > inputs.supervisor_loss or lost_b > inputs.supervisor_loss) << ENCODER_LOSS
+        | int(_index_is_wrong(params, state, inputs)) << INDEX_SPACING
+    )
+    return State(
+        causes=causes,
+        a_channel_idle=int(edges == IDLE_EDGES),
+        side=side,
+        anchor=state.anchor if held else count,
+        samples=samples,
+        lost_a=lost_a,
+        lost_b=lost_b,
+        channel=channel,
+        edges=edges,
+        has_index=state.has_index | inputs.indexed,
+        last_index=count if inputs.indexed else state.last_index,
+    )
