@@ -14,11 +14,12 @@ class Output(Block):
 
     Equation, every `design.decimation` strobes, beginning with the first:
 
-        drive <- force, changed by at most output_slew_limit, then held within +-output_force_limit
+        drive <- force, whose magnitude grows by at most output_slew_limit, then held within +-output_force_limit
 
     No force limit at run time exceeds `design.force_limit`. Between actuations the drive holds. A strobe with `fault`
     makes the drive zero at `valid`. `enable` low makes the drive zero at the next clock, and it stays zero until
-    `enable` is high from strobe to `valid` of an actuation. Slewing starts again from zero.
+    `enable` is high from strobe to `valid` of an actuation. Slewing starts again from zero, and from zero too when the
+    force has changed its sign: the way to zero is never limited.
 
     Latency: `latency` clocks from `strobe` to the changed `drive`, with `valid`; the next `strobe` may come with
     `valid`.
@@ -43,7 +44,7 @@ class Output(Block):
     output_force_limit : In(UQ)
         Largest drive in either direction, force LSB; a larger word acts as `design.force_limit`.
     output_slew_limit : In(UQ)
-        Largest change of the drive in an actuation, force LSB.
+        Largest growth of the drive's magnitude in an actuation, force LSB.
     drive : Out(SQ)
         The drive that leaves the FPGA, force LSB.
     limited : Out(2)
@@ -79,7 +80,9 @@ class Output(Block):
         m = Module()
         phase = Signal(range(max(self._design.decimation, 2)))
         allowed = Signal()
-        target = Signal.like(self.force)
+        # The growth is measured from the drive, or from zero if the force has the other sign.
+        target, base = Signal.like(self.force), Signal.like(self.force)
+        before = Mux(self.force[-1] == self.drive[-1], self.drive, 0)
         change = Signal(signed(len(self.force) + 1))
         slewed = Signal(signed(len(self.output_slew_limit) + 2))
         slew, limit = Signal(signed(len(self.output_slew_limit) + 1)), Signal(signed(len(self.force)))
@@ -92,33 +95,35 @@ class Output(Block):
             return value > bound, value + bound < 0
 
         # The comparisons and the sums work in parallel: either alone is a carry chain.
-        rises, falls = outside(change, slew)
-        above, below = outside(slewed, limit)
+        above, below = outside(change, slew)
+        rises, falls = above & ~target[-1], below & target[-1]
+        over, under = outside(slewed, limit)
 
         m.d.sync += self.valid.eq(0)
         with m.FSM():
             with m.State("CHANGE"), m.If(self.strobe):
                 m.d.sync += [
                     target.eq(self.force),
-                    change.eq(self.force - self.drive),
+                    base.eq(before),
+                    change.eq(self.force - before),
                     allowed.eq(self.enable & ~self.fault),
                 ]
                 m.next = "SLEW"
             with m.State("SLEW"):
                 m.d.sync += [
-                    slewed.eq(Mux(rises, self.drive + slew, Mux(falls, self.drive - slew, target))),
+                    slewed.eq(Mux(rises, base + slew, Mux(falls, base - slew, target))),
                     self.limited[0].eq(rises | falls),
                 ]
                 m.next = "LIMIT"
             with m.State("LIMIT"):
                 actuated = (phase == 0) & allowed
                 with m.If(actuated):
-                    m.d.sync += self.drive.eq(Mux(above, limit, Mux(below, -limit, slewed)))
+                    m.d.sync += self.drive.eq(Mux(over, limit, Mux(under, -limit, slewed)))
                 with m.If(~allowed):
                     m.d.sync += self.drive.eq(0)
                 m.d.sync += [
                     phase.eq(Mux(phase == self._design.decimation - 1, 0, phase + 1)),
-                    self.limited.eq(Mux(actuated, self.limited[0] | (above | below) << 1, 0)),
+                    self.limited.eq(Mux(actuated, self.limited[0] | (over | under) << 1, 0)),
                     self.actuated.eq(phase == 0),
                     self.valid.eq(1),
                 ]

@@ -2,8 +2,9 @@
 
 Every `samples_per_actuation` samples the drive follows the force:
 
-    drive <- limit(slew(force)):   first |change| <= slew_limit, then |drive| <= force_limit, last
+    drive <- limit(slew(force)):   first |drive| grows by at most slew_limit, then |drive| <= force_limit, last
 
+The slew limit never holds a force on its way to zero: a drive beyond the force, or against it, gives way at once.
 Between actuations the drive holds. Without `enable`, or with a fault, the drive is zero at every sample; the slew limit
 then starts again from zero. The force limit is applied last.
 """
@@ -43,7 +44,7 @@ class Design:
     """Formats and run-time words of the output stage for an axis.
 
     `force_limit` is the axis's largest drive; a greater word at run time changes nothing.
-    `output_slew_limit` has one bit more than the largest change of the drive, so that its largest word limits nothing.
+    `output_slew_limit` has more bits than the largest growth of the drive, so that its largest word limits nothing.
     """
 
     latency = LATENCY
@@ -58,7 +59,7 @@ class Design:
         r = axis.force_resolution_n
         self.words = (
             Word("output_force_limit", limit, r, "N", axis.force_limit_word, "largest drive, either way"),
-            Word("output_slew_limit", self.slew, r * axis.actuation_hz, "N/s", self.slew.max, "fastest drive change"),
+            Word("output_slew_limit", self.slew, r * axis.actuation_hz, "N/s", self.slew.max, "fastest growth of the drive"),
         )
 
     def params(self, words: dict[str, int]) -> Params:
@@ -88,6 +89,6 @@ def step(params, state, force, enable):
         return State(phase, zero), 0
     if state.phase:
         return State(phase, state.drive), 0
-    slewed = saturate(force, state.drive - params.slew_limit, state.drive + params.slew_limit)
+    slewed = saturate(force, min(state.drive, zero) - params.slew_limit, max(state.drive, zero) + params.slew_limit)
     limited = saturate(slewed, -params.force_limit, params.force_limit)
     return State(phase, limited), int(slewed != force) | int(limited != slewed) << 1

@@ -109,7 +109,7 @@ def test_the_drive_never_exceeds_its_limits(name):
     rows = list(stimulus(d, 20_000))
     drive = model(d, rows)["drive"].tolist()
     before = 0
-    for k, (value, (_force, fault, limit, slew)) in enumerate(zip(drive, rows, strict=True)):
+    for k, (value, (force, fault, limit, slew)) in enumerate(zip(drive, rows, strict=True)):
         if fault:
             assert value == 0
         elif k % d.decimation:
@@ -117,8 +117,10 @@ def test_the_drive_never_exceeds_its_limits(name):
         else:
             limit = min(limit, d.force_limit)  # noqa: PLW2901
             assert abs(value) <= limit
-            # The slew limit holds unless the force limit, which is applied last, was lowered below the drive.
-            assert abs(value - before) <= slew or abs(value) == limit
+            # The drive grows from its present value or from zero, and to a smaller force it goes at once.
+            assert min(before, 0) - slew <= value <= max(before, 0) + slew
+            if min(before, 0) <= force <= max(before, 0):
+                assert value == max(-limit, min(force, limit))
         before = value
 
 
