@@ -59,7 +59,9 @@ class Design:
         r = axis.force_resolution_n
         self.words = (
             Word("output_force_limit", limit, r, "N", axis.force_limit_word, "largest drive, either way"),
-            Word("output_slew_limit", self.slew, r * axis.actuation_hz, "N/s", self.slew.max, "fastest growth of the drive"),
+            Word(
+                "output_slew_limit", self.slew, r * axis.actuation_hz, "N/s", self.slew.max, "fastest growth of drive"
+            ),
         )
 
     def params(self, words: dict[str, int]) -> Params:
