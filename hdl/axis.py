@@ -57,6 +57,14 @@ class Axis(wiring.Component):
         The live count; the last sample's velocity and wall force.
     flags : Out
         Sticky flags, bits as in `spec.design.flags`; the encoder's flags as the samples saw them.
+    stepped, edge : Out
+        High for one clock with the count of a new edge, and the kind of the last edge.
+    indexed : Out(1)
+        High for one clock with the count at a rising edge of Z.
+    estimated, saturated : Out(1)
+        High for one clock with a sample's velocity; with it, the estimator is saturated.
+    illegal, overspeed : Out(1)
+        The encoder's sticky flags, now.
     illegal_count : Out
         Illegal transitions since the last clear; saturates.
     index_count, index_armed, index_latched : Out
@@ -97,6 +105,13 @@ class Axis(wiring.Component):
                 "velocity": Out(shape(design.estimator.velocity)),
                 "wall_force": Out(shape(spec.force)),
                 "flags": Out(len(design.flags)),
+                "stepped": Out(1),
+                "edge": Out(2),
+                "indexed": Out(1),
+                "estimated": Out(1),
+                "saturated": Out(1),
+                "illegal": Out(1),
+                "overspeed": Out(1),
                 "illegal_count": Out(ILLEGAL_WIDTH),
                 "index_count": Out(count),
                 "index_armed": Out(1),
@@ -181,6 +196,13 @@ class Axis(wiring.Component):
             self.count.eq(decoder.seen.count),
             self.velocity.eq(estimator.velocity),
             self.wall_force.eq(wall.force),
+            self.stepped.eq(decoder.stepped),
+            self.edge.eq(decoder.seen.edge),
+            self.indexed.eq(decoder.indexed),
+            self.estimated.eq(estimator.valid),
+            self.saturated.eq(estimator.valid & estimator.saturated.any()),
+            self.illegal.eq(decoder.illegal),
+            self.overspeed.eq(decoder.overspeed),
             self.illegal_count.eq(decoder.illegal_count),
             self.index_count.eq(decoder.index_count),
             self.index_armed.eq(decoder.index_armed),

@@ -121,6 +121,8 @@ class Quadrature(wiring.Component):
         The latch is waiting for that edge; the latch has seen that edge.
     stepped : Out(1)
         High for one clock with the count of a new edge.
+    indexed : Out(1)
+        High for one clock with the count at a rising edge of Z.
     illegal, overspeed : Out(1)
         Sticky flags, see above.
     fault : Out(1)
@@ -165,6 +167,7 @@ class Quadrature(wiring.Component):
                 "index_armed": Out(1),
                 "index_latched": Out(1),
                 "stepped": Out(1),
+                "indexed": Out(1),
                 "illegal": Out(1),
                 "overspeed": Out(1),
                 "fault": Out(1),
@@ -253,6 +256,7 @@ class Quadrature(wiring.Component):
         m.d.sync += [
             seen.count.eq(count),
             self.stepped.eq(one),
+            self.indexed.eq(moved[2] & level[2]),
             seen.stamp.eq((seen.stamp + 1)[: self._stamp_width]),
         ]
         for bit, rise, fall in ((0, seen.stamp_a_rise, seen.stamp_a_fall), (1, seen.stamp_b_rise, seen.stamp_b_fall)):

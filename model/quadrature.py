@@ -56,6 +56,7 @@ class State(NamedTuple):
     stamp_a_fall: int
     stamp_b_fall: int
     stepped: int
+    indexed: int
     edge: int  # kind of the last counted edge: A_RISE, B_RISE, A_FALL or B_FALL
     down: int  # whether that edge counted -1
     run: int  # successive edges that counted in that direction, at most RUN_MAX; 0: none, or the past is not known
@@ -187,19 +188,21 @@ def step(params, state, inputs, strobes):
     risen = level & state.moved & 3
     kind = one_b + 2 * int(risen == 0)
     run = min(state.run + 1, RUN_MAX) if state.down == down else 1
-    indexed = state.index_armed & ~strobes.arm & (state.moved & level) >> 2
+    indexed = (state.moved & level) >> 2
+    latches = state.index_armed & ~strobes.arm & indexed
     illegal_count = (0 if strobes.clear else state.illegal_count) + both
     return State(
         count=count,
-        index_count=_either(indexed, count, state.index_count),
-        index_armed=strobes.arm | (state.index_armed & ~indexed),
-        index_latched=~strobes.arm & (state.index_latched | indexed),
+        index_count=_either(latches, count, state.index_count),
+        index_armed=strobes.arm | (state.index_armed & ~latches),
+        index_latched=~strobes.arm & (state.index_latched | latches),
         stamp=(state.stamp + 1) & ((1 << params.stamp_width) - 1),
         stamp_a_rise=_either(one_a & level, state.stamp, state.stamp_a_rise),
         stamp_b_rise=_either(one_b & level >> 1, state.stamp, state.stamp_b_rise),
         stamp_a_fall=_either(one_a & ~level, state.stamp, state.stamp_a_fall),
         stamp_b_fall=_either(one_b & ~(level >> 1), state.stamp, state.stamp_b_fall),
         stepped=one,
+        indexed=indexed,
         edge=_either(one, kind, state.edge),
         down=_either(one, down, state.down),
         run=_either(one, run, _either(both, 0, state.run)),
@@ -242,6 +245,7 @@ def _rest(params, state, pins, clocks):
         stamp_a_fall=state.stamp_a_fall,
         stamp_b_fall=state.stamp_b_fall,
         stepped=0,
+        indexed=0,
         edge=state.edge,
         down=state.down,
         run=state.run,
