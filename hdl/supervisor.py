@@ -21,7 +21,8 @@ class Supervisor(Block):
                     DISARMED if not TRIPPED, and enable is low or disarm is high
                     ARMED if DISARMED, and arm, live and the reference that is asked for
         driven   <- drive within +-min(ceiling, supervisor_force_limit) if ARMED stays ARMED, else 0
-        ceiling  <- 0 unless ARMED; with strobe + supervisor_ramp, up to the largest force of the axis
+        ceiling  <- 0 unless ARMED; supervisor_force_limit if that is lower; else with strobe + supervisor_ramp, at most
+                    the largest force of the axis
 
     `link_timeout` is made here: it stands while ARMED and not `live`. The host is live from a `beat` whose word differs
     from the last one's until `supervisor_watchdog` ms later, up to 1 ms less because the tick of 1 ms runs freely.
@@ -148,14 +149,16 @@ class Supervisor(Block):
         fraction, most, _, _ = self._design.params
         ceiling, raised = Signal(range(most + 1)), Signal(range(most + (1 << len(self.supervisor_ramp))))
         m.d.comb += raised.eq(ceiling + self.supervisor_ramp)
+        bound, limit = ceiling[fraction:], Signal(signed(len(self.drive)))
+        lowered = bound > self.supervisor_force_limit
         with m.If(~go):
             m.d.sync += ceiling.eq(0)
+        with m.Elif(lowered):
+            m.d.sync += ceiling.eq(Cat(Const(0, fraction), self.supervisor_force_limit))
         with m.Elif(self.strobe):
             m.d.sync += ceiling.eq(Mux(raised > most, most, raised))
 
-        limit = Signal(signed(len(self.drive)))
-        bound = ceiling[fraction:]
-        m.d.comb += limit.eq(Mux(bound < self.supervisor_force_limit, bound, self.supervisor_force_limit))
+        m.d.comb += limit.eq(Mux(lowered, self.supervisor_force_limit, bound))
         held = Mux(self.drive > limit, limit, Mux(self.drive + limit < 0, -limit, self.drive))
         m.d.sync += self.driven.eq(Mux(go, held, 0))
 

@@ -6,11 +6,12 @@ are latched. One `step` is one clock:
 
     standing   = causes that are present, enabled and watched in this state; link_timeout is made here
     state      <- TRIPPED if standing; else as `State` says
-    ceiling    <- 0 unless ARMED; at every strobe + ramp, up to the largest limit
+    ceiling    <- 0 unless ARMED; the force limit if that is lower; else at every strobe + ramp, up to the largest force
     drive      <- 0 unless ARMED; else drive within +-min(ceiling, force limit)
 
-so the drive is zero after the first clock edge at which a cause stands or the enable is low, and never above a limit
-that was lowered before that edge.
+so a lower limit acts at the next clock, and under a higher one the drive may grow no faster than after arming. A new
+wall leaves the ceiling alone: a host may move it as often as it likes. The drive is zero after the first clock edge at
+which a cause stands or the enable is low.
 """
 
 from dataclasses import dataclass
@@ -219,9 +220,11 @@ def step(params, state, inputs):
         now = ARMED
     trips = standing and state.state != TRIPPED
 
-    limit = min(state.ceiling >> params.ramp_fraction, inputs.supervisor_force_limit)
-    ceiling = state.ceiling
-    if inputs.strobe:
+    bound = state.ceiling >> params.ramp_fraction
+    limit, ceiling = min(bound, inputs.supervisor_force_limit), state.ceiling
+    if bound > inputs.supervisor_force_limit:
+        ceiling = inputs.supervisor_force_limit << params.ramp_fraction
+    elif inputs.strobe:
         ceiling = min(ceiling + inputs.supervisor_ramp, params.ceiling_max)
 
     beats = inputs.beat and inputs.beat_word != state.last_beat

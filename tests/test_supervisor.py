@@ -213,7 +213,7 @@ def test_the_limit_rises_from_zero_in_the_time_that_is_set():
     assert drives[-1] == top
 
 
-def test_a_lower_limit_holds_at_the_next_clock_and_never_restarts_the_ramp():
+def test_a_lower_limit_holds_at_the_next_clock_and_a_higher_one_is_reached_like_the_first():
     bench = Bench("paper")
     bench.arm()
     for _ in range(6000):
@@ -221,8 +221,11 @@ def test_a_lower_limit_holds_at_the_next_clock_and_never_restarts_the_ramp():
     bench.inputs = bench.inputs._replace(supervisor_force_limit=7)
     assert bench.clock().driven == 7
     assert bench.clock(drive=bench.design.force.min).driven == -7
-    bench.inputs = bench.inputs._replace(supervisor_force_limit=9)
-    assert bench.clock().driven == 9
+    bench.inputs = bench.inputs._replace(supervisor_force_limit=40_000)
+    drives = [bench.clock(strobe=1).driven for _ in range(6000)]
+    assert drives[0] == 7
+    assert np.diff(drives).max() <= 8 == -(-40_000 // int(supervisor.RAMP_S * 10_000))
+    assert drives[-1] == 40_000
 
 
 def test_every_cause_is_counted_once_however_long_it_stands_and_the_counts_saturate():
