@@ -63,6 +63,8 @@ class Axis(wiring.Component):
         High for one clock with the count at a rising edge of Z.
     estimated, saturated : Out(1)
         High for one clock with a sample's velocity; with it, the estimator is saturated.
+    strobe_busy : Out(1)
+        High for one clock if a sample begins before the last one's drive has changed, which no spec allows.
     illegal, overspeed : Out(1)
         The encoder's sticky flags, now.
     illegal_count : Out
@@ -110,6 +112,7 @@ class Axis(wiring.Component):
                 "indexed": Out(1),
                 "estimated": Out(1),
                 "saturated": Out(1),
+                "strobe_busy": Out(1),
                 "illegal": Out(1),
                 "overspeed": Out(1),
                 "illegal_count": Out(ILLEGAL_WIDTH),
@@ -165,6 +168,9 @@ class Axis(wiring.Component):
         restart = Signal()
         m.d.sync += restart.eq(self.preload | (restart & ~strobe))
 
+        working = Signal()
+        m.d.sync += working.eq(strobe | (working & ~output.valid))
+
         sampled_count = Signal.like(self.count)
         sampled_fault = Signal()
         with m.If(strobe):
@@ -201,6 +207,7 @@ class Axis(wiring.Component):
             self.indexed.eq(decoder.indexed),
             self.estimated.eq(estimator.valid),
             self.saturated.eq(estimator.valid & estimator.saturated.any()),
+            self.strobe_busy.eq(strobe & working & ~output.valid),
             self.illegal.eq(decoder.illegal),
             self.overspeed.eq(decoder.overspeed),
             self.illegal_count.eq(decoder.illegal_count),

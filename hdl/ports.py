@@ -39,6 +39,7 @@ MEANINGS = {
     "indexed": "high for one clock with the count at a rise of the index",
     "estimated": "high for one clock with the estimate of a sample",
     "saturated": "with estimated: the estimator is saturated",
+    "strobe_busy": "high for one clock if a sample begins before the last one's drive has changed",
     "illegal": "sticky: both channels changed at once; the position is unknown",
     "overspeed": "sticky: edges came faster than the filter passes; the position is unknown",
     "illegal_count": "illegal transitions since the last clear; saturates",

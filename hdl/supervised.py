@@ -1,0 +1,159 @@
+"""An axis that may touch a motor: the axis, its monitors, and the supervisor behind both."""
+
+from amaranth.hdl import Cat, Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.cdc import FFSynchronizer
+from amaranth.lib.wiring import In, Out
+
+from hardwall.model.spec import AxisSpec
+from hardwall.model.supervised import FIXED, Design
+from hardwall.model.supervisor import CAUSES
+
+from .arithmetic.fixed import shape
+from .axis import Axis
+from .monitors import Monitors
+from .supervisor import Supervisor
+
+LOOPS = ("drive_enable", "external_fault", "emergency_stop")
+"""Pins of normally closed loops: high is closed and well; low is open, cut, or not connected."""
+COMPLEMENTS = ("encoder_a_n", "encoder_b_n")
+REQUESTS = ("arm", "disarm", "acknowledge", "acknowledged", "beat", "beat_word")
+"""Inputs of the supervisor that come from the host."""
+SHOWN = ("driven", "state", "alive", "live", "latched", "first", "first_stamp", "counts")
+"""Outputs of the supervisor."""
+
+
+class SupervisedAxis(wiring.Component):
+    """An axis from pins to the drive that is let out: `Axis`, `Monitors` and `Supervisor`, which say what they do.
+
+    The axis itself computes a drive all the time, and no host limits it; the supervisor's force limit comes last. The
+    axis's own enable follows the loop of `drive_enable`, so that its slew limit begins at zero too.
+
+    Latency: `latency` clocks from the sample strobe to the changed `driven`, one more than the axis's. From a pin of
+    `LOOPS` that opens to a drive of zero `loop_latency` clock edges, the first of which sees it.
+
+    Rounding and overflow: as in the blocks.
+
+    Parameters
+    ----------
+    spec : hardwall.model.spec.AxisSpec
+        Rates, ranges and the estimator.
+
+    Members
+    -------
+    the pins, pulses and outputs of `Axis` : In and Out
+        As there; `drive` is what the axis asks for.
+    encoder_a_n, encoder_b_n : In(1)
+        Complements of the encoder's channels; asynchronous. They count for nothing unless encoder_loss is enabled.
+    drive_enable, external_fault, emergency_stop : In(1)
+        Loops: high is closed; asynchronous.
+    word_range : In(1)
+        A word in use is beyond its range.
+    the requests of the host to `Supervisor` : In
+        As there.
+    one input for each word of `design.words` : In
+        Run-time parameters; those of `design.committed` act at the sample after a commit, the others at the next clock.
+    the outputs of `Supervisor` : Out
+        As there; `driven` is the drive that may leave the FPGA.
+    a_channel_idle : Out(1)
+        A warning, see `Monitors`.
+
+    Raises
+    ------
+    TypeError
+        If `spec` is not an AxisSpec.
+    """
+
+    def __init__(self, spec: AxisSpec):
+        self._axis = Axis(spec)
+        self._design = design = Design(spec)
+        self._monitors, self._supervisor = Monitors(design.monitors), Supervisor(design.supervisor)
+        axis = {name: member for name, member in self._axis.signature.members.items() if name not in FIXED}
+        supervisor = self._supervisor.signature.members
+        super().__init__(
+            {
+                **axis,
+                **dict.fromkeys((*COMPLEMENTS, *LOOPS, "word_range"), In(1)),
+                **{name: supervisor[name] for name in (*REQUESTS, *SHOWN)},
+                **{word.name: In(shape(word.format)) for word in design.live},
+                "a_channel_idle": Out(1),
+            }
+        )
+
+    @property
+    def design(self) -> Design:
+        return self._design
+
+    @property
+    def latency(self) -> int:
+        """Clocks from the sample strobe to the changed `driven`."""
+        return self._axis.latency + 1
+
+    @property
+    def loop_latency(self) -> int:
+        """Clock edges from the first that sees a loop open to the one that zeroes the drive, both included."""
+        return 3
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.axis = axis = self._axis
+        m.submodules.monitors = monitors = self._monitors
+        m.submodules.supervisor = supervisor = self._supervisor
+
+        levels = {}
+        # A channel and its complement are compared as the same edge of the clock has seen them.
+        for name in ("encoder_a", "encoder_b", *COMPLEMENTS, *LOOPS):
+            levels[name] = Signal(name=f"{name}_level")
+            m.submodules[f"{name}_synchroniser"] = FFSynchronizer(getattr(self, name), levels[name])
+
+        for name, member in axis.signature.members.items():
+            if member.flow == Out:
+                m.d.comb += getattr(self, name).eq(getattr(axis, name))
+            elif name == "drive_enable":
+                m.d.comb += axis.drive_enable.eq(levels[name])
+            elif name not in FIXED:
+                m.d.comb += getattr(axis, name).eq(getattr(self, name))
+        fixed = {word.name: word.format.max for word in self._design.spec.design.words if word.name in FIXED}
+        m.d.comb += [getattr(axis, name).eq(word) for name, word in fixed.items()]
+
+        m.d.comb += [
+            monitors.count.eq(axis.count),
+            monitors.stepped.eq(axis.stepped),
+            monitors.edge.eq(axis.edge),
+            monitors.indexed.eq(axis.indexed),
+            monitors.valid.eq(axis.estimated),
+            monitors.velocity.eq(axis.velocity),
+            monitors.saturated.eq(axis.saturated),
+            monitors.driven.eq(supervisor.driven),
+            monitors.force_limit.eq(self.supervisor_force_limit),
+            monitors.a.eq(levels["encoder_a"]),
+            monitors.a_n.eq(levels["encoder_a_n"]),
+            monitors.b.eq(levels["encoder_b"]),
+            monitors.b_n.eq(levels["encoder_b_n"]),
+            self.a_channel_idle.eq(monitors.a_channel_idle),
+        ]
+
+        outside = {
+            "encoder_illegal": axis.illegal,
+            "encoder_overspeed": axis.overspeed,
+            "strobe_busy": axis.strobe_busy,
+            "word_range": self.word_range,
+            "external_fault": ~levels["external_fault"],
+            "emergency_stop": ~levels["emergency_stop"],
+        }
+        m.d.comb += [
+            supervisor.causes.eq(
+                Cat(outside.get(cause.name, made) for cause, made in zip(CAUSES, monitors.causes, strict=True))
+            ),
+            supervisor.strobe.eq(axis.sampled),
+            supervisor.drive.eq(axis.drive),
+            supervisor.stamp.eq(axis.stamp),
+            supervisor.enable.eq(levels["drive_enable"]),
+            supervisor.referenced.eq(axis.index_latched),
+        ]
+        for name in REQUESTS:
+            m.d.comb += getattr(supervisor, name).eq(getattr(self, name))
+        for block in (supervisor, monitors):
+            m.d.comb += [getattr(block, word.name).eq(getattr(self, word.name)) for word in block.design.words]
+        m.d.comb += [getattr(self, name).eq(getattr(supervisor, name)) for name in SHOWN]
+        return m
