@@ -1,0 +1,142 @@
+"""A UART: 8 data bits, no parity, one stop bit, at a rate that a fractional divider makes from the clock."""
+
+from amaranth.hdl import Cat, Const, Module, Signal
+from amaranth.lib import stream, wiring
+from amaranth.lib.cdc import FFSynchronizer
+from amaranth.lib.wiring import In, Out
+
+from hardwall.model.link.uart import DATA_BITS, FRAME_BITS, HALF, PHASE_BITS, Design
+
+
+def _checked(design: Design) -> Design:
+    if not isinstance(design, Design):
+        raise TypeError(f"design must be a uart.Design, not {design!r}")
+    return design
+
+
+class Receiver(wiring.Component):
+    """The bytes on a line that idles high.
+
+    Equation: a fall of the line begins a byte; bit k of it, the least significant first, is the line's level k + 3/2
+    bits later, and the stop bit's is taken 9 1/2 bits later. A line that is high again after half a bit was no start.
+
+    Latency: 2 clocks of the synchroniser, then the bits; `arrived` comes at the middle of the stop bit, so the next
+    start bit may be early. Throughput: bytes without a pause.
+
+    Rounding and overflow: each sample is within 1 clock of the middle of its bit; the model derives the mismatch of
+    rates that this leaves. A byte with a low stop bit arrives `spoilt`. A break arrives as one such byte, and nothing
+    more arrives until the line has been high.
+
+    Parameters
+    ----------
+    design : hardwall.model.link.uart.Design
+        Clock and rate.
+
+    Members
+    -------
+    pin : In(1)
+        The line; asynchronous.
+    byte : Out(8)
+        With `arrived`: the byte.
+    arrived : Out(1)
+        High for one clock.
+    spoilt : Out(1)
+        With `arrived`: the stop bit was low.
+
+    Raises
+    ------
+    TypeError
+        If `design` is not a Design.
+
+    Source: the RTU transmission mode of "Modbus over Serial Line, Specification and Implementation Guide", section
+    2.5.1, with one stop bit and no parity, as USB adapters and hosts have by default.
+    """
+
+    def __init__(self, design: Design):
+        self._design = _checked(design)
+        super().__init__({"pin": In(1), "byte": Out(DATA_BITS), "arrived": Out(1), "spoilt": Out(1)})
+
+    @property
+    def design(self) -> Design:
+        return self._design
+
+    def elaborate(self, platform):
+        m = Module()
+        pin, before = Signal(init=1), Signal(init=1)
+        m.submodules.synchroniser = FFSynchronizer(self.pin, pin, init=1)
+        busy = Signal()
+        bits = Signal(range(FRAME_BITS + 1))
+        phase, total = Signal(PHASE_BITS), Signal(PHASE_BITS + 1)
+        m.d.comb += total.eq(phase + self._design.step)
+        m.d.sync += [before.eq(pin), phase.eq(total[:-1]), self.arrived.eq(0)]
+        with m.If(~busy):
+            # Half a bit to the middle of the start bit, less the clock at which this is seen.
+            m.d.sync += [busy.eq(before & ~pin), phase.eq((HALF + self._design.step) % (2 * HALF)), bits.eq(0)]
+        with m.Elif(total[-1]):
+            m.d.sync += bits.eq(bits + 1)
+            with m.If(bits == 0):
+                m.d.sync += busy.eq(~pin)
+            with m.Elif(bits == FRAME_BITS - 1):
+                m.d.sync += [busy.eq(0), self.arrived.eq(1), self.spoilt.eq(~pin)]
+            with m.Else():
+                m.d.sync += self.byte.eq(Cat(self.byte[1:], pin))
+        return m
+
+
+class Transmitter(wiring.Component):
+    """Bytes to a line, one after the other.
+
+    Equation: a start bit, the 8 bits of the byte with the least significant first, and a stop bit, each a bit's time.
+
+    Latency: the line falls with the clock after the one that takes a byte. Throughput: a byte every 10 bits and a
+    clock.
+
+    Rounding and overflow: no edge is more than a clock late, and lateness does not add up.
+
+    Parameters
+    ----------
+    design : hardwall.model.link.uart.Design
+        Clock and rate.
+
+    Members
+    -------
+    bytes : In(stream.Signature(8))
+        The bytes to send.
+    pin : Out(1)
+        The line.
+
+    Raises
+    ------
+    TypeError
+        If `design` is not a Design.
+
+    Source: as of `Receiver`.
+    """
+
+    def __init__(self, design: Design):
+        self._design = _checked(design)
+        super().__init__({"bytes": In(stream.Signature(DATA_BITS)), "pin": Out(1, init=1)})
+
+    @property
+    def design(self) -> Design:
+        return self._design
+
+    def elaborate(self, platform):
+        m = Module()
+        shift = Signal(FRAME_BITS, init=1)
+        bits = Signal(range(FRAME_BITS + 1))
+        phase, total = Signal(PHASE_BITS), Signal(PHASE_BITS + 1)
+        m.d.comb += [
+            total.eq(phase + self._design.step),
+            self.bytes.ready.eq(bits == 0),
+            self.pin.eq(shift[0]),
+        ]
+        with m.If(self.bytes.ready):
+            m.d.sync += phase.eq(0)
+            with m.If(self.bytes.valid):
+                m.d.sync += [shift.eq(Cat(Const(0, 1), self.bytes.payload, Const(1, 1))), bits.eq(FRAME_BITS)]
+        with m.Else():
+            m.d.sync += phase.eq(total[:-1])
+            with m.If(total[-1]):
+                m.d.sync += [shift.eq(Cat(shift[1:], Const(1, 1))), bits.eq(bits - 1)]
+        return m

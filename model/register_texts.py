@@ -1,0 +1,97 @@
+"""The texts that are made from a register map: a Markdown page, a C header and JSON."""
+
+import json
+
+from .registers import ACTIVE, CAPTURE, LAYOUT, MAP, WRITTEN, Register, RegisterMap
+
+COLUMNS = ("address", "register", "kind", "access", "format", "one LSB", "range", "reset", "meaning")
+
+
+def _row(register: Register) -> str:
+    unit = f" {register.unit}" if register.unit else ""
+    cells = (
+        f"0x{register.address:04X}",
+        f"`{register.name}`",
+        register.kind.value,
+        register.kind.access,
+        str(register.format),
+        f"{register.lsb:.6g}{unit}" if unit else "",
+        f"{register.low} to {register.high}",
+        str(register.reset),
+        register.meaning,
+    )
+    return f"| {' | '.join(cells)} |\n"
+
+
+def markdown(registers: RegisterMap) -> str:
+    """Return the page `registers.md`: every register in the order of addresses, and the windows."""
+    head = f"| {' | '.join(COLUMNS)} |\n|{' --- |' * len(COLUMNS)}\n"
+    capture = registers.capture_registers
+    windows = [
+        f"The compressed map (zlib, JSON) of {len(registers.compressed)} bytes begins at 0x{MAP:04X}, two bytes a "
+        "register, the first one high.\n",
+        f"The capture memory of {capture} registers begins at 0x{CAPTURE:04X}.\n" if capture else "",
+    ]
+    return (
+        f"# Registers\n\nIdentity {registers.identity}, layout {LAYOUT}. Modbus RTU, unit 1. A value of two registers "
+        "has the high one first; half of one can be neither read nor written. Words that are written become active "
+        f"together, by `commit`; the active word of each is at 0x{ACTIVE - WRITTEN:02X} above it.\n\n"
+        + head
+        + "".join(map(_row, registers.registers))
+        + "\n"
+        + "\n".join(filter(None, windows))
+    )
+
+
+def c_header(registers: RegisterMap) -> str:
+    """Return the header `registers.h`: the address of every register, the SI value of its LSB, and its range."""
+    lines = [
+        f"/* Registers of a hardwall axis; identity {registers.identity}, layout {LAYOUT}. */",
+        "#ifndef HARDWALL_REGISTERS_H",
+        "#define HARDWALL_REGISTERS_H",
+        "",
+        f'#define HARDWALL_IDENTITY "{registers.identity}"',
+        f"#define HARDWALL_MAP 0x{MAP:04X}",
+        f"#define HARDWALL_CAPTURE 0x{CAPTURE:04X}",
+    ]
+    for register in registers.registers:
+        name = f"HARDWALL_{register.name.upper()}"
+        unit = f" in {register.unit}" if register.unit else ""
+        lines += ["", f"/* {register.meaning} ({register.kind.value}, {register.format}) */"]
+        lines.append(f"#define {name} 0x{register.address:04X}")
+        lines.append(f"#define {name}_LSB {register.lsb!r} /* one LSB{unit} */")
+        if register.kind.access != "read":
+            lines += [f"#define {name}_MIN ({register.low})", f"#define {name}_MAX ({register.high})"]
+    return "\n".join([*lines, "", "#endif", ""])
+
+
+def as_json(registers: RegisterMap) -> str:
+    """Return the whole map as JSON, with meanings and with the values of the constants."""
+    rows = [
+        {
+            "name": register.name,
+            "address": register.address,
+            "registers": register.size,
+            "kind": register.kind.value,
+            "access": register.kind.access,
+            "signed": register.format.signed,
+            "bits": register.format.width,
+            "si_per_lsb": register.lsb,
+            "unit": register.unit,
+            "least": register.low,
+            "most": register.high,
+            "reset": register.reset,
+            "meaning": register.meaning,
+        }
+        for register in registers.registers
+    ]
+    described = {
+        "layout": LAYOUT,
+        "identity": registers.identity,
+        "map_address": MAP,
+        "map_bytes": len(registers.compressed),
+        "capture_address": CAPTURE,
+        "capture_registers": registers.capture_registers,
+        "registers": rows,
+    }
+    return json.dumps(described, indent=2) + "\n"

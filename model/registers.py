@@ -1,0 +1,335 @@
+"""The registers of an axis, described once: the hardware, the host's map and every text about it are made from here.
+
+Addresses are those of Modbus: a register has 16 bits. A value of 32 bits has two registers, the high one first, at an
+even address; a value that has fewer bits is extended, by its sign if it has one. Pulses and counters have one register.
+
+    0x0000 to 0x001F  constants: what the device is
+    0x0020 to 0x003F  telemetry of the axis
+    0x0040 to 0x005F  status of the supervisor
+    0x0060 to 0x0067  counters of the link, one register each
+    0x0070 to 0x007F  pulses, one register each, assigned downwards from 0x007F
+    0x0080 to 0x00BF  words as written
+    0x00C0 to 0x00FF  words as active, each 0x40 above its written one
+    0x4000 to 0x7FFF  the window to the compressed map, two bytes a register, the first one high
+    0x8000 to 0xFFFF  the window to the capture memory
+
+The rule is stable: within a block registers follow in the order of their description, so what is added at the end of a
+block moves nothing, and neither the constants nor the telemetry move with the estimator. `commit` is the last pulse and
+ends where the written words begin: one frame can carry words and their commit.
+
+What is not assigned in the first 256 registers reads 0 and cannot be written.
+"""
+
+import dataclasses
+import hashlib
+import json
+import zlib
+from dataclasses import dataclass
+from enum import Enum
+
+from .arithmetic.fixed import SQ, UQ, Format
+from .checks import FieldError, check_int, shown
+from .design import ILLEGAL_WIDTH
+from .spec import AxisSpec
+
+LAYOUT = 1
+"""The version of the rule above, which is the first constant: a host that does not know it must not go on."""
+CONSTANTS, TELEMETRY, SUPERVISOR, COUNTERS, PULSES, WRITTEN, ACTIVE = 0, 0x20, 0x40, 0x60, 0x70, 0x80, 0xC0
+"""The first address of every block."""
+END = 0x100
+"""The address behind the last block."""
+MAP, CAPTURE, SPACE = 0x4000, 0x8000, 0x10000
+"""The first address of each window, and the address behind the last."""
+VALUE_BITS = 32
+"""Bits of a value in two registers."""
+COUNTER_BITS = 16
+
+
+class Kind(Enum):
+    """What a register is to the host; the value is the kind's name in texts."""
+
+    CONSTANT = "constant"
+    STATUS = "status"
+    COUNTER = "counter"
+    PULSE = "pulse"
+    WORD = "word"
+    ACTIVE = "active"
+
+    @property
+    def wide(self) -> bool:
+        """Whether the value has two registers."""
+        return self not in (Kind.COUNTER, Kind.PULSE)
+
+    @property
+    def access(self) -> str:
+        """How the host may use it: a pulse reads 0."""
+        return "read, write" if self in (Kind.PULSE, Kind.WORD) else "read"
+
+
+@dataclass(frozen=True)
+class Register:
+    """A value that the host can read or write.
+
+    Attributes:
+        name: its name, in every text and port.
+        kind: what it is to the host.
+        format: fixed-point format of its word.
+        meaning: one full sentence.
+        si_per_unit: SI value of the format's 1.0.
+        unit: SI unit, as text; empty for choices and plain numbers.
+        least, most: the range of the word that the hardware accepts; None for the format's.
+        reset: the word after a reset; of a constant, its value.
+        address: address of its first register; None before a map has placed it.
+
+    Raises:
+        ValueError: if the format is too wide for its registers, or a bound or the reset word does not fit it.
+    """
+
+    name: str
+    kind: Kind
+    format: Format
+    meaning: str
+    si_per_unit: float = 1.0
+    unit: str = ""
+    least: int | None = None
+    most: int | None = None
+    reset: int = 0
+    address: int | None = None
+
+    def __post_init__(self) -> None:
+        room = VALUE_BITS if self.kind.wide else COUNTER_BITS
+        if self.format.width > room:
+            raise FieldError(self.name, f"must have at most {room} bits, not {self.format}")
+        for field in ("least", "most", "reset"):
+            value = getattr(self, field)
+            if value is not None:
+                check_int(f"{field} of {self.name}", value, self.format.min, self.format.max)
+        if self.kind in (Kind.WORD, Kind.PULSE) and not self.low <= self.reset <= self.high < 1 << (room - 1):
+            bounds = f"{self.low} to {min(self.high, (1 << (room - 1)) - 1)}"
+            raise FieldError(self.name, f"must reset to, and end within, {bounds}, not {self.reset} and {self.high}")
+
+    @property
+    def low(self) -> int:
+        """The least word."""
+        return self.format.min if self.least is None else self.least
+
+    @property
+    def high(self) -> int:
+        """The largest word."""
+        return self.format.max if self.most is None else self.most
+
+    @property
+    def lsb(self) -> float:
+        """SI value of the word 1."""
+        return self.format.lsb * self.si_per_unit
+
+    @property
+    def size(self) -> int:
+        """Registers that it has."""
+        return 2 if self.kind.wide else 1
+
+    def to_registers(self, word: int) -> tuple[int, ...]:
+        """Return a word as registers, the high one first.
+
+        Raises:
+            ValueError: if the word is outside the register's range.
+        """
+        check_int(self.name, word, self.low, self.high)
+        return (word >> 16 & 0xFFFF, word & 0xFFFF) if self.kind.wide else (word & 0xFFFF,)
+
+    def from_registers(self, registers: tuple[int, ...]) -> int:
+        """Return the word that registers hold.
+
+        Raises:
+            ValueError: if there are more or fewer registers than it has.
+        """
+        if len(registers) != self.size:
+            raise FieldError(self.name, f"must have {self.size} registers, not {len(registers)}")
+        word = int.from_bytes(b"".join(register.to_bytes(2, "big") for register in registers), "big")
+        return word - (1 << 16 * self.size) if self.format.signed and word >> (16 * self.size - 1) else word
+
+
+def _telemetry(spec: AxisSpec) -> tuple[Register, ...]:
+    """Return the telemetry of an axis, in the order of its addresses."""
+    count, force = SQ(spec.count_width, 0), spec.force
+    flags = ", ".join(f"bit {bit} {name}" for bit, name in enumerate(spec.design.flags))
+    rows: list[tuple[str, Format, float, str, str]] = [
+        ("drive", force, spec.force_resolution_n, "N", "The force on the handle that leaves the FPGA."),
+        ("count", count, spec.count_m, "m", "The position of the encoder."),
+        (
+            "velocity",
+            spec.design.estimator.velocity,
+            spec.velocity_unit_m_per_s,
+            "m/s",
+            "The velocity estimated at the last sample.",
+        ),
+        ("wall_force", force, spec.force_resolution_n, "N", "The wall's force on the handle at the last sample."),
+        ("flags", UQ(len(spec.design.flags), 0), 1.0, "", f"The sticky flags are {flags}."),
+        ("illegal_count", UQ(ILLEGAL_WIDTH, 0), 1.0, "", "The illegal transitions since the last clear, saturated."),
+        ("index_count", count, spec.count_m, "m", "The position at the index, once it is latched."),
+        ("index_armed", UQ(1, 0), 1.0, "", "An index is waited for."),
+        ("index_latched", UQ(1, 0), 1.0, "", "The position at the index is valid."),
+    ]
+    stamp, second = UQ(spec.stamp_width, 0), 1 / spec.clock_hz
+    rows.append(("stamp", stamp, second, "s", "The number of the clock at which the values were taken."))
+    for pin in ("a", "b"):
+        for edge in ("rise", "fall"):
+            meaning = f"The stamp of the last {edge} of the encoder's pin {pin.upper()}."
+            rows.append((f"stamp_{pin}_{edge}", stamp, second, "s", meaning))
+    return tuple(Register(name, Kind.STATUS, fmt, said, si, unit) for name, fmt, si, unit, said in rows)
+
+
+LINK_COUNTERS = (
+    ("link_naks", "The device never refuses a frame for lack of time, so this is 0."),
+    ("link_busy", "The device never answers that it is busy, so this is 0."),
+    ("link_overruns", "Frames during which bytes arrived that were dropped because an answer was under way."),
+    ("link_messages", "Frames heard with a good CRC, to whatever unit."),
+    ("link_errors", "Frames that were dropped because of a bad CRC, a bad stop bit or a missing end."),
+    ("link_exceptions", "Exceptions answered."),
+    ("link_requests", "Frames to this unit, each of which was answered."),
+    ("link_unanswered", "Broadcasts heard, which the device ignores."),
+)
+"""The counters, in the order of the three lowest bits of the diagnostic sub-function that returns each."""
+AXIS_PULSES = (
+    ("commit", "Every word that was written becomes active at the axis's next sample, all together."),
+    ("clear_flags", "The sticky flags and the count of illegal transitions are cleared."),
+    ("preload", "The count is set to the active word preload_count, and the estimator starts afresh."),
+    ("index_arm", "The count is latched at the next rise of the index."),
+)
+"""The axis's pulses, in the order of their addresses downwards."""
+
+
+def _words(spec: AxisSpec) -> tuple[Register, ...]:
+    """Return the run-time words of an axis as written: the preload's count first, for every axis has it."""
+    meaning = "The pulse preload sets the count to this word once it is active."
+    preload = Register("preload_count", Kind.WORD, SQ(spec.count_width, 0), meaning, spec.count_m, "m")
+    return preload, *(
+        Register(
+            word.name,
+            Kind.WORD,
+            word.format,
+            f"{word.doc[0].upper()}{word.doc[1:]}.",
+            word.si_per_unit,
+            word.unit,
+            reset=word.reset,
+        )
+        for word in spec.design.words
+    )
+
+
+def _placed(base: int, room: int, registers: tuple[Register, ...]) -> tuple[Register, ...]:
+    """Return registers at successive addresses from `base` on, of which there are `room`."""
+    size = sum(register.size for register in registers)
+    if size > room:
+        raise ValueError(f"the block at {base:#06x} must have at most {room} registers, not {size}")
+    places, address = [], base
+    for register in registers:
+        places.append(dataclasses.replace(register, address=address))
+        address += register.size
+    return tuple(places)
+
+
+class RegisterMap:
+    """The registers of an axis, placed, with the identity of the build and the map that the device itself carries.
+
+    Args:
+        spec: the axis.
+        supervisor: status registers and pulses besides those of the axis, not placed yet.
+        capture_registers: registers of the capture memory; 0 for none.
+
+    Attributes:
+        spec, capture_registers: as given.
+        status, pulses, words, active: the registers of those kinds in the order of the hardware's ports; `pulses`
+            begins with `commit`, whose address is the highest.
+        registers: every register, in the order of addresses.
+
+    Raises:
+        TypeError: if `spec` is not an AxisSpec, or `supervisor` is not of registers.
+        ValueError: if a block is too small, two registers have one name, or a register of the supervisor is of a kind
+            that it cannot have.
+    """
+
+    def __init__(self, spec: AxisSpec, supervisor: tuple[Register, ...] = (), capture_registers: int = 0):
+        if not isinstance(spec, AxisSpec):
+            raise TypeError(f"spec must be an AxisSpec, not {shown(spec)}")
+        check_int("capture_registers", capture_registers, 0, SPACE - CAPTURE)
+        for register in supervisor:
+            if not isinstance(register, Register):
+                raise TypeError(f"supervisor must be of Register, not {shown(register)}")
+            if register.kind not in (Kind.STATUS, Kind.PULSE):
+                raise FieldError(register.name, f"must be a status or a pulse, not a {register.kind.value}")
+        self.spec, self.capture_registers = spec, capture_registers
+        more = tuple(register for register in supervisor if register.kind is Kind.STATUS)
+        telemetry = _placed(TELEMETRY, SUPERVISOR - TELEMETRY, _telemetry(spec))
+        self.status = telemetry + _placed(SUPERVISOR, COUNTERS - SUPERVISOR, more)
+        pulses = tuple(Register(name, Kind.PULSE, UQ(1, 0), meaning) for name, meaning in AXIS_PULSES)
+        pulses += tuple(register for register in supervisor if register.kind is Kind.PULSE)
+        lowest = WRITTEN - len(pulses)
+        self.pulses = _placed(lowest, WRITTEN - max(lowest, PULSES), pulses[::-1])[::-1]
+        self.words = _placed(WRITTEN, ACTIVE - WRITTEN, _words(spec))
+        self.active = tuple(
+            dataclasses.replace(
+                word,
+                name=f"active_{word.name}",
+                kind=Kind.ACTIVE,
+                address=word.address + ACTIVE - WRITTEN,
+                meaning=f"The word {word.name} that the axis uses.",
+            )
+            for word in self.words
+        )
+        counters = (Register(name, Kind.COUNTER, UQ(COUNTER_BITS, 0), meaning) for name, meaning in LINK_COUNTERS)
+        rest = (*self.status, *_placed(COUNTERS, PULSES - COUNTERS, tuple(counters)), *self.pulses[::-1])
+        rest += (*self.words, *self.active)
+        self.registers = self._constants(rest) + rest
+        names = [register.name for register in self.registers]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"the name of a register must be its own, not {name!r} of another")
+
+    def _constants(self, rest: tuple[Register, ...]) -> tuple[Register, ...]:
+        """Return the constants, which depend on all other registers; the map in the device is set by the way."""
+        facts = {field.name: getattr(self.spec, field.name) for field in dataclasses.fields(self.spec)}
+        facts["gains"] = self.spec.design.gains
+        described = repr((LAYOUT, self.capture_registers, facts, rest))
+        self.identity = hashlib.sha256(described.encode()).hexdigest()[:16]
+        text = json.dumps(self._rows(rest), separators=(",", ":"))
+        self.compressed = zlib.compress(text.encode(), 9)
+        high, low = int(self.identity[:8], 16), int(self.identity[8:], 16)
+        rows = (
+            ("layout", LAYOUT, "", "The version of the rule of addresses."),
+            ("identity_high", high, "", "The upper half of the hash of specification and map."),
+            ("identity_low", low, "", "The lower half of that hash."),
+            ("clock_hz", self.spec.clock_hz, "Hz", "The clock, which numbers the stamps."),
+            ("map_bytes", len(self.compressed), "", "The length of the compressed map in its window."),
+            ("capture_registers", self.capture_registers, "", "The length of the capture memory in its window."),
+        )
+        registers = (
+            Register(name, Kind.CONSTANT, UQ(VALUE_BITS, 0), meaning, 1.0, unit, reset=value)
+            for name, value, unit, meaning in rows
+        )
+        return _placed(CONSTANTS, TELEMETRY - CONSTANTS, tuple(registers))
+
+    def _rows(self, registers: tuple[Register, ...]) -> dict:
+        """Return the map as the device carries it: everything but the meanings, and no constant of the build."""
+        columns = ["address", "name", "kind", "signed", "bits", "si_per_lsb", "unit", "least", "most", "reset"]
+        rows = [
+            [r.address, r.name, r.kind.value, int(r.format.signed), r.format.width, r.lsb, r.unit, r.low, r.high, r.reset]
+            for r in registers
+        ]
+        return {"layout": LAYOUT, "identity": self.identity, "columns": columns, "registers": rows}
+
+    @property
+    def map_registers(self) -> int:
+        """Registers that the compressed map has in its window."""
+        return (len(self.compressed) + 1) // 2
+
+    def __getitem__(self, name: str) -> Register:
+        """Return the register of a name.
+
+        Raises:
+            KeyError: if there is none of that name; the message has all names.
+        """
+        for register in self.registers:
+            if register.name == name:
+                return register
+        raise KeyError(f"register must be one of {', '.join(each.name for each in self.registers)}, not {name!r}")
