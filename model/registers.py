@@ -43,6 +43,8 @@ MAP, CAPTURE, SPACE = 0x4000, 0x8000, 0x10000
 VALUE_BITS = 32
 """Bits of a value in two registers."""
 COUNTER_BITS = 16
+CONFORMITY = 0x81
+"""The identification is basic, and can be had as a stream or object by object."""
 
 
 class Kind(Enum):
@@ -319,9 +321,17 @@ class RegisterMap:
         return {"layout": LAYOUT, "identity": self.identity, "columns": columns, "registers": rows}
 
     @property
-    def map_registers(self) -> int:
-        """Registers that the compressed map has in its window."""
-        return (len(self.compressed) + 1) // 2
+    def identification(self) -> dict[tuple[bool, int], bytes]:
+        """The ends of the answers that identify the device, by whether one object is asked for, and by the first one.
+
+        An end has the conformity level, no more to follow, the number of objects, and the objects, each with its number
+        and its length: vendor, product, and the build's identity as its revision. All have an even length.
+        """
+        texts = b"hardwall", b"axis", self.identity.encode()
+        objects = [bytes([number, len(text)]) + text for number, text in enumerate(texts)]
+        streams = {(False, first): objects[first:] for first in range(len(objects))}
+        single = {(True, first): [each] for first, each in enumerate(objects)}
+        return {key: bytes([CONFORMITY, 0, 0, len(some)]) + b"".join(some) for key, some in (streams | single).items()}
 
     def __getitem__(self, name: str) -> Register:
         """Return the register of a name.

@@ -9,7 +9,7 @@ from hardwall.model.link.line import framed
 
 def words(*values: int) -> bytes:
     """Return 16-bit values, big-endian."""
-    return b"".join((value & 0xFFFF).to_bytes(2, "big") for value in values)
+    return b"".join((int(value) & 0xFFFF).to_bytes(2, "big") for value in values)
 
 
 def read(address: int, count: int, function: int = 3) -> bytes:

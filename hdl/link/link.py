@@ -1,0 +1,98 @@
+"""The link: Modbus RTU on a UART, from the pins of the line to the ports of an axis."""
+
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out, connect
+
+from hardwall.model.link import register_file, uart
+from hardwall.model.link.line import GAP_S
+from hardwall.model.registers import RegisterMap
+
+from .line import Line
+from .register_file import RegisterFile
+from .server import Server
+from .uart import Receiver, Transmitter
+
+
+class Link(wiring.Component):
+    """The registers of an axis behind the two pins of a serial line.
+
+    Unit 1 answers the functions 3, 4, 6, 16 and 23 (registers), 8 (counters) and 43/14 (identification) in frames of at
+    most 256 bytes; `hardwall.model.registers` has the addresses. The line's idle level is high.
+
+    Latency: an answer begins when the request has been carried out: less than 3000 clocks after its last stop bit and,
+    for a commit, a sample period more. A pulse is at its port before the answer begins.
+
+    Rounding and overflow: as in the blocks.
+
+    Parameters
+    ----------
+    registers : hardwall.model.registers.RegisterMap
+        The registers; its spec has the clock.
+    baud : int
+        Rate of the line, bits a second.
+
+    Members
+    -------
+    rx : In(1)
+        Line from the host; asynchronous.
+    tx : Out(1)
+        Line to the host.
+    the members of `RegisterFile` without `host` : In and Out
+        The ports to the axis.
+
+    Raises
+    ------
+    TypeError
+        If `registers` is not a RegisterMap, or `baud` is not an int.
+    ValueError
+        If the clock does not allow the rate.
+
+    Source: "Modbus over Serial Line, Specification and Implementation Guide V1.02" and "Modbus Application Protocol
+    Specification V1.1b3".
+    """
+
+    def __init__(self, registers: RegisterMap, baud: int = uart.BAUD):
+        design = register_file.Design(registers)
+        self._registers = registers
+        self._uart = uart.Design(registers.spec.clock_hz, baud)
+        self._file, self._server = RegisterFile(design), Server(design)
+        ports = dict(self._file.signature.members)
+        del ports["host"]
+        super().__init__({"rx": In(1), "tx": Out(1, init=1), **ports})
+
+    @property
+    def registers(self) -> RegisterMap:
+        return self._registers
+
+    @property
+    def baud(self) -> int:
+        return self._uart.baud
+
+    @property
+    def gap_clocks(self) -> int:
+        """Clocks of silence that end a frame without a length."""
+        return round(GAP_S * self._registers.spec.clock_hz)
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.receiver = receiver = Receiver(self._uart)
+        m.submodules.transmitter = transmitter = Transmitter(self._uart)
+        m.submodules.line = line = Line(self.gap_clocks)
+        m.submodules.server = server = self._server
+        m.submodules.file = file = self._file
+        connect(m, line.frames, server.frames)
+        connect(m, server.file, file.host)
+        connect(m, line.sent, transmitter.bytes)
+        m.d.comb += [
+            receiver.pin.eq(self.rx),
+            line.byte.eq(receiver.byte),
+            line.arrived.eq(receiver.arrived),
+            line.spoilt.eq(receiver.spoilt),
+            self.tx.eq(transmitter.pin),
+        ]
+        for name, member in self.signature.members.items():
+            if name not in ("rx", "tx"):
+                inner, outer = getattr(file, name), getattr(self, name)
+                m.d.comb += inner.eq(outer) if member.flow == In else outer.eq(inner)
+        return m

@@ -1,0 +1,182 @@
+"""The registers of an axis as hardware holds them: written words, active words, pulses, counters and a snapshot.
+
+A book of 16-bit cells has four areas of 256, which one port of a memory reads and one writes:
+
+- LIVE is what the host reads, by the address of the register.
+- RESET is what LIVE is set to by a reset: constants, and words as after a reset.
+- LEAST and MOST are the bounds of what may be written. LEAST also says, for a register of a status, how many of its bits
+  come from the snapshot (bits 0 to 4), and whether the others repeat its sign (`EXTENDED`).
+
+A written word stays in LIVE until a commit copies every one to its active cell and to the port that the axis reads;
+then the pulses of the frame go out, all at one clock, and the axis takes the words at its next sample.
+
+A status is read as it was at the last snapshot, all of them at one clock.
+"""
+
+from enum import IntEnum
+
+from ..registers import ACTIVE, CAPTURE, COUNTERS, END, MAP, PULSES, WRITTEN, RegisterMap
+
+CELL_BITS = 16
+CELL = (1 << CELL_BITS) - 1
+EXTENDED = 1 << CELL_BITS - 1
+"""In a LEAST cell of a status: the bits beyond those of the snapshot repeat the last one."""
+
+
+class Area(IntEnum):
+    """An area of the book."""
+
+    LIVE = 0
+    RESET = 1
+    LEAST = 2
+    MOST = 3
+
+
+class Operation(IntEnum):
+    """What a register file does at a request; the first four are the phases of a frame, in their order."""
+
+    CHECK_READ = 0
+    CHECK_WRITE = 1
+    WRITE = 2
+    READ = 3
+    COUNT = 4
+    FINISH = 5
+    SNAPSHOT = 6
+
+
+class Design:
+    """What the register file of a map holds.
+
+    Attributes:
+        registers: the map.
+        book: the cells of every area at configuration.
+        map_cells: the cells of the window to the compressed map, and behind them the answers of the identification.
+        answers_at: the address of each of those answers, and how many registers it has, by their keys in the map.
+        first_pulse, last_word: the addresses between which registers can be written: from, and behind.
+        last_status: the address behind the last status.
+    """
+
+    def __init__(self, registers: RegisterMap):
+        if not isinstance(registers, RegisterMap):
+            raise TypeError(f"registers must be a RegisterMap, not {registers!r}")
+        self.registers = registers
+        self.first_pulse = WRITTEN - len(registers.pulses)
+        self.last_word = WRITTEN + 2 * len(registers.words)
+        self.last_status = (registers.status[-1].address or 0) + 2
+        self.book = self._book()
+        text, self.answers_at = registers.compressed + bytes(len(registers.compressed) % 2), {}
+        for key, answer in registers.identification.items():
+            self.answers_at[key] = MAP + len(text) // 2, len(answer) // 2
+            text += answer
+        self.map_cells = [int.from_bytes(text[k : k + 2], "big") for k in range(0, len(text), 2)]
+
+    def _book(self) -> list[int]:
+        book = [0] * (END * len(Area))
+        for register in self.registers.registers:
+            places = range(register.address or 0, (register.address or 0) + register.size)
+            for area, word in ((Area.RESET, register.reset), (Area.LEAST, register.low), (Area.MOST, register.high)):
+                for place in places:
+                    shift = CELL_BITS * (places[-1] - place)
+                    book[area * END + place] = word >> shift & CELL
+        for status in self.registers.status:
+            extended, width = EXTENDED * status.format.signed, status.format.width
+            for half, place in enumerate(((status.address or 0) + 1, status.address or 0)):
+                bits = min(max(width - CELL_BITS * half, 0), CELL_BITS)
+                book[Area.LEAST * END + place] = extended | bits
+        return book
+
+    def wide(self, address: int) -> bool:
+        """Return whether a register is half of a value."""
+        return address < COUNTERS or WRITTEN <= address < END
+
+    def readable(self, address: int) -> bool:
+        """Return whether there is a register at an address."""
+        capture = self.registers.capture_registers
+        return address < END or MAP <= address < MAP + len(self.map_cells) or CAPTURE <= address < CAPTURE + capture
+
+    def writable(self, address: int) -> bool:
+        """Return whether the register at an address can be written."""
+        return self.first_pulse <= address < self.last_word
+
+
+class RegisterFile:
+    """The register file's twin: a method for every operation, and what comes out at its ports.
+
+    Attributes:
+        live: the cells that the host reads.
+        active: the word at every port to the axis, by name.
+        pulses: names of the pulses that went out at the last FINISH, and `marked`, those that go out at the next.
+        absent, outside, refused: what the checks have found since `clear`.
+    """
+
+    def __init__(self, design: Design):
+        self.design = design
+        self.live = design.book[Area.RESET * END : (Area.RESET + 1) * END]
+        self.active = {word.name: word.reset for word in design.registers.words}
+        self.pulses: tuple[str, ...] = ()
+        self.marked: list[str] = []
+        self._tied = [True, True]
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget what the checks have found."""
+        self.absent = self.outside = self.refused = False
+
+    def _half(self, address: int, first: bool, last: bool) -> bool:
+        """Return whether the other half of a value is missing: it begins at an even address and ends at an odd one."""
+        return self.design.wide(address) and ((first and address % 2 == 1) or (last and address % 2 == 0))
+
+    def check_read(self, address: int, first: bool, last: bool) -> None:
+        """Find out whether a register can be read, as the first or the last of a frame or neither."""
+        self.absent |= not self.design.readable(address) or self._half(address, first, last)
+
+    def check_write(self, address: int, first: bool, last: bool, value: int, refusing: frozenset[str]) -> None:
+        """Find out whether a register can be written with `value`, while the device refuses some pulses.
+
+        The halves of a value must come in order: a word is compared with its bounds from the top, each half as long as
+        the halves above it are equal to the bound's.
+        """
+        self.absent |= not self.design.writable(address) or self._half(address, first, last)
+        if self.design.first_pulse <= address < WRITTEN and value & 1:
+            self.refused |= self.design.registers.pulses[WRITTEN - 1 - address].name in refusing
+        top = not self.design.wide(address) or address % 2 == 0
+        flip = EXTENDED if top else 0
+        for k, area in enumerate((Area.LEAST, Area.MOST)):
+            bound = self.design.book[area * END + address % END] ^ flip
+            tied, word = top or self._tied[k], value ^ flip
+            self.outside |= tied and (word < bound if area is Area.LEAST else word > bound)
+            self._tied[k] = tied and word == bound
+
+    def read(self, address: int, capture: list[int]) -> int:
+        """Return the register at an address that can be read."""
+        if address < END:
+            return self.live[address]
+        return self.design.map_cells[address - MAP] if address < CAPTURE else capture[address - CAPTURE]
+
+    def write(self, address: int, value: int) -> None:
+        """Write a register that can be written, or a counter."""
+        if PULSES <= address < WRITTEN:
+            if value & 1:
+                self.marked.append(self.design.registers.pulses[WRITTEN - 1 - address].name)
+        else:
+            self.live[address] = value
+
+    def count(self, address: int) -> None:
+        """Count one in a counter, which wraps."""
+        self.live[address] = self.live[address] + 1 & CELL
+
+    def finish(self) -> None:
+        """Make the written words active if `commit` is marked, and let the marked pulses go out together."""
+        if "commit" in self.marked:
+            for word in self.design.registers.words:
+                place = (word.address or 0) + ACTIVE - WRITTEN
+                halves = self.live[word.address : (word.address or 0) + 2]
+                self.live[place : place + 2] = halves
+                self.active[word.name] = word.from_registers(tuple(halves))
+        self.pulses, self.marked = tuple(self.marked), []
+
+    def snapshot(self, status: dict[str, int]) -> None:
+        """Take the words of every status."""
+        for register in self.design.registers.status:
+            halves = register.to_registers(status[register.name])
+            self.live[register.address : (register.address or 0) + 2] = halves

@@ -1,0 +1,152 @@
+"""The application layer of Modbus: functions, exceptions and counters over a register file.
+
+A frame with a verdict other than a request is only counted. A request is checked as a whole before anything of it is
+done, in the order of the specification:
+
+1. Exception 1: the function, the sub-function or the kind of identification is not known.
+2. Exception 3: a number of registers or of bytes is not within its bounds, or they do not agree.
+3. Exception 2: there is no such register, it cannot be written, or the frame has half of a value.
+4. Exception 3: a value is out of its register's range.
+5. Exception 4: the device refuses a pulse in its present state.
+
+Function 23 writes before it reads. Functions 3 and 4 read the same registers.
+"""
+
+from ..registers import COUNTERS
+from .line import UNIT, Verdict
+from .register_file import Design, RegisterFile
+
+READ_MAX, WRITE_MAX, WRITE_AND_READ_MAX = 125, 123, 121
+"""Registers that a frame of 256 bytes can read, write, and write beside reading."""
+READS, WRITES = (3, 4, 23), (6, 16, 23)
+WRITE_ONE, DIAGNOSE, IDENTIFY = 6, 8, 43
+DEVICE_IDENTIFICATION = 14
+ECHO, CLEAR, FIRST_COUNTER, LAST_COUNTER = 0x00, 0x0A, 0x0B, 0x12
+"""Sub-functions of diagnostics; the counter of one is at its three lowest bits."""
+NAMED = 4
+"""The kind of identification that asks for one object; those below it ask for a stream."""
+FUNCTION, ABSENT, VALUE, FAILURE = 1, 2, 3, 4
+"""The exceptions."""
+OVERRUNS, MESSAGES, ERRORS, EXCEPTIONS, REQUESTS, UNANSWERED = 2, 3, 4, 5, 6, 7
+"""Places of the counters in their block."""
+COUNTED_AS = {
+    Verdict.SPOILT: (ERRORS,),
+    Verdict.OVERRUN: (OVERRUNS,),
+    Verdict.FOREIGN: (MESSAGES,),
+    Verdict.BROADCAST: (MESSAGES, UNANSWERED),
+    Verdict.REQUEST: (MESSAGES, REQUESTS),
+}
+
+
+class _Refusal(Exception):
+    """A request that ends with an exception of Modbus, its code."""
+
+
+def _word(data: bytes, place: int) -> int:
+    return int.from_bytes(data[place : place + 2], "big")
+
+
+class Server:
+    """The server's twin.
+
+    Args:
+        design: the registers.
+
+    Attributes:
+        file: the register file.
+        status: the word of every status now.
+        refusing: names of the pulses that the device refuses now.
+        capture: the registers of the capture memory.
+    """
+
+    def __init__(self, design: Design):
+        self.file = RegisterFile(design)
+        self.status = {status.name: 0 for status in design.registers.status}
+        self.refusing: frozenset[str] = frozenset()
+        self.capture = [0] * design.registers.capture_registers
+
+    def take(self, verdict: Verdict, frame: bytes) -> bytes | None:
+        """Take a frame with its verdict; return the answer without its CRC, or None."""
+        for counter in COUNTED_AS[verdict]:
+            self._count(counter)
+        if verdict is not Verdict.REQUEST:
+            return None
+        try:
+            return self._answer(bytes(frame[:-2]))
+        except _Refusal as refusal:
+            self._count(EXCEPTIONS)
+            return bytes([UNIT, frame[1] | 0x80, *refusal.args])
+
+    def _count(self, counter: int) -> None:
+        self.file.count(COUNTERS + counter)
+
+    def _answer(self, request: bytes) -> bytes:
+        function = request[1]
+        if function == DIAGNOSE:
+            return self._diagnose(request)
+        if function == IDENTIFY:
+            return self._identify(request)
+        if function not in (*READS, *WRITES):
+            raise _Refusal(FUNCTION)
+        return self._transfer(request)
+
+    def _transfer(self, request: bytes) -> bytes:
+        """Read or write registers, or both."""
+        function, file = request[1], self.file
+        read = _word(request, 2), _word(request, 4)
+        written, data = read, request[7:]
+        if function == WRITE_ONE:
+            written, data = (read[0], 1), request[4:]
+        elif function == 23:
+            written, data = (_word(request, 6), _word(request, 8)), request[11:]
+        values = [_word(data, place) for place in range(0, len(data) - 1, 2)]
+        if function in READS and not 1 <= read[1] <= READ_MAX:
+            raise _Refusal(VALUE)
+        most = WRITE_AND_READ_MAX if function in READS else WRITE_MAX
+        if function in WRITES and not (1 <= written[1] <= most and len(data) == 2 * written[1]):
+            raise _Refusal(VALUE)
+        file.clear()
+        if function in READS:
+            for k in range(read[1]):
+                file.check_read(read[0] + k, k == 0, k == read[1] - 1)
+        if function in WRITES:
+            for k, value in enumerate(values):
+                file.check_write(written[0] + k, k == 0, k == written[1] - 1, value, self.refusing)
+        for found, code in ((file.absent, ABSENT), (file.outside, VALUE), (file.refused, FAILURE)):
+            if found:
+                raise _Refusal(code)
+        if function in WRITES:
+            for k, value in enumerate(values):
+                file.write(written[0] + k, value)
+            file.finish()
+        if function not in READS:
+            return request[:6]
+        file.snapshot(self.status)
+        registers = [file.read(read[0] + k, self.capture) for k in range(read[1])]
+        return request[:2] + bytes([2 * read[1]]) + b"".join(each.to_bytes(2, "big") for each in registers)
+
+    def _diagnose(self, request: bytes) -> bytes:
+        sub, data = _word(request, 2), _word(request, 4)
+        if sub == ECHO:
+            return request
+        if not CLEAR <= sub <= LAST_COUNTER:
+            raise _Refusal(FUNCTION)
+        if data:
+            raise _Refusal(VALUE)
+        if sub == CLEAR:
+            for counter in range(8):
+                self.file.write(COUNTERS + counter, 0)
+            return request
+        return request[:4] + self.file.read(COUNTERS + sub % 8, []).to_bytes(2, "big")
+
+    def _identify(self, request: bytes) -> bytes:
+        kind, code, number = request[2:5]
+        if kind != DEVICE_IDENTIFICATION:
+            raise _Refusal(FUNCTION)
+        if not 1 <= code <= NAMED:
+            raise _Refusal(VALUE)
+        answers = self.file.design.registers.identification
+        known = (True, number) in answers
+        if code == NAMED and not known:
+            raise _Refusal(ABSENT)
+        return request[:4] + answers[code == NAMED, number if known else 0]
