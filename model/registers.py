@@ -152,15 +152,21 @@ class Register:
 
 
 def _telemetry(spec: AxisSpec) -> tuple[Register, ...]:
-    """Return the telemetry of an axis, in the order of its addresses."""
+    """Return the telemetry of an axis, in the order of its addresses.
+
+    Some estimators have a velocity of more than 32 bits: its register has the upper ones, rounded down.
+    """
     count, force = SQ(spec.count_width, 0), spec.force
+    velocity = spec.design.estimator.velocity
+    if velocity.width > VALUE_BITS:
+        velocity = SQ(velocity.i, VALUE_BITS - velocity.i)
     flags = ", ".join(f"bit {bit} {name}" for bit, name in enumerate(spec.design.flags))
     rows: list[tuple[str, Format, float, str, str]] = [
         ("drive", force, spec.force_resolution_n, "N", "The force on the handle that leaves the FPGA."),
         ("count", count, spec.count_m, "m", "The position of the encoder."),
         (
             "velocity",
-            spec.design.estimator.velocity,
+            velocity,
             spec.velocity_unit_m_per_s,
             "m/s",
             "The velocity estimated at the last sample.",

@@ -25,6 +25,7 @@ NOT_TWINNED = {
     "estimators/levant_edge_signals": "the registers of levant_edge by name; that block's twin has their values",
     "export": "text of the hardware",
     "frame": "the places of fields on the wire, which the host uses as it is",
+    "link/link": "the blocks of the link, joined; each of them has its twin",
     "ports": "text about the hardware",
 }
 # Tests of more than one source, and what they cover.

@@ -156,8 +156,9 @@ class RegisterFile:
     def write(self, address: int, value: int) -> None:
         """Write a register that can be written, or a counter."""
         if PULSES <= address < WRITTEN:
-            if value & 1:
-                self.marked.append(self.design.registers.pulses[WRITTEN - 1 - address].name)
+            name = self.design.registers.pulses[WRITTEN - 1 - address].name
+            if value & 1 and name not in self.marked:
+                self.marked.append(name)
         else:
             self.live[address] = value
 

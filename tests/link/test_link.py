@@ -1,0 +1,204 @@
+"""The link from pin to pin: Modbus clients and a UART that others wrote, against the registers of an axis."""
+
+import json
+import logging
+import zlib
+
+import cocotb
+import pytest
+from amaranth.hdl import Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In
+from cocotb.task import bridge, resume
+from cocotb.triggers import ClockCycles, Timer
+from cocotbext.uart import UartSink, UartSource
+from pymodbus import FramerType, ModbusException
+from pymodbus.client.base import ModbusBaseSyncClient
+from pymodbus.transport import CommParams, CommType
+
+from hardwall.hdl.link.link import Link
+from hardwall.model.registers import CAPTURE, MAP
+from hardwall.testing import Bench, parameters, simulate
+from stimuli.supervised import CAPTURE_REGISTERS, captured, supervised
+
+BAUD = 3_000_000
+"""4 clocks a bit at the spec's 12 MHz."""
+SILENCE_NS = 60_000
+"""As long a silence of the device, 150 bytes, is no answer, unless a gap must end the request."""
+
+
+class Device(wiring.Component):
+    """The link with a capture memory."""
+
+    def __init__(self, name: str):
+        self.link = Link(supervised(name), BAUD)
+        ports = dict(self.link.signature.members)
+        del ports["capture_address"], ports["capture_data"]
+        super().__init__(ports)
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.link = link = self.link
+        place = Signal.like(link.capture_address)
+        m.d.sync += place.eq(link.capture_address)
+        m.d.comb += link.capture_data.eq(captured(place))
+        for name, member in self.signature.members.items():
+            inner, outer = getattr(link, name), getattr(self, name)
+            m.d.comb += inner.eq(outer) if member.flow == In else outer.eq(inner)
+        return m
+
+
+def make(name: str) -> Device:
+    return Device(name)
+
+
+class Client(ModbusBaseSyncClient):
+    """pymodbus's client, its bytes carried by cocotbext-uart in the simulator's time."""
+
+    def __init__(self, dut, bit_ns: float):
+        super().__init__(FramerType.RTU, 0, CommParams(comm_type=CommType.SERIAL, timeout_connect=60), None, None, None)
+        self.silence_ns = SILENCE_NS
+        self.source, self.sink = UartSource(dut.rx, baud=1e9 / bit_ns), UartSink(dut.tx, baud=1e9 / bit_ns)
+        for end in (self.source, self.sink):
+            end.log.setLevel(logging.WARNING)
+
+    def connect(self) -> bool:
+        return True
+
+    @resume
+    async def _send(self, request: bytes) -> None:
+        self.sink.clear()
+        await self.source.write(request)
+        await self.source.wait()
+
+    @resume
+    async def _receive(self) -> bytes:
+        await self.sink.wait(self.silence_ns, "ns")
+        return bytes(self.sink.read_nowait())
+
+    def send(self, request: bytes, addr=None) -> int:
+        self._send(request)
+        return len(request)
+
+    def recv(self, size=None) -> bytes:
+        return self._receive()
+
+
+async def opened(dut, error: float = 0.0) -> Client:
+    """Return a client of a device that was reset, with a line whose rate is wrong by a fraction `error`."""
+    bench, link = Bench(dut, make(**parameters())), make(**parameters()).link
+    await bench.reset()
+    bench.drive(rx=1)
+    await ClockCycles(dut.clk, 4)
+    bit_ns = bench.period_ns * link.registers.spec.clock_hz / link.baud
+    client = Client(dut, bit_ns * (1 + error))
+    # The reset's low line was a byte: the gap forgets it.
+    await Timer(bench.period_ns * (link.gap_clocks + 100), "ns")
+    return client
+
+
+def values(answer) -> list[int]:
+    assert not answer.isError(), answer
+    return answer.registers
+
+
+@cocotb.test()
+async def everything_can_be_read_by_function_3(dut):
+    client, registers = await opened(dut), supervised(**parameters())
+
+    def window(first: int, count: int) -> list[int]:
+        read = []
+        while len(read) < count:
+            some = min(125, count - len(read))
+            read += values(client.read_holding_registers(first + len(read), count=some, device_id=1))
+        return read
+
+    @bridge
+    def run() -> None:
+        constants = values(client.read_holding_registers(0, count=12, device_id=1))
+        named = {r.name: r.from_registers(tuple(constants[r.address : r.address + 2])) for r in registers.registers[:6]}
+        assert f"{named['identity_high']:08x}{named['identity_low']:08x}" == registers.identity
+        size = named["map_bytes"]
+        packed = b"".join(each.to_bytes(2, "big") for each in window(MAP, (size + 1) // 2))[:size]
+        described = json.loads(zlib.decompress(packed))
+        assert described["identity"] == registers.identity
+        rows = [dict(zip(described["columns"], row, strict=True)) for row in described["registers"]]
+        assert [row["address"] for row in rows] == [r.address for r in registers.registers[6:]]
+        assert named["capture_registers"] == CAPTURE_REGISTERS
+        assert window(CAPTURE, CAPTURE_REGISTERS) == [captured(k) for k in range(CAPTURE_REGISTERS)]
+
+    await run()
+
+
+@cocotb.test()
+async def words_are_written_committed_and_read_back(dut):
+    client, registers = await opened(dut), supervised(**parameters())
+    dut.count.value, dut.drive.value, dut.trip_stamp.value = (1 << 21) - 5, 3, 0xFEDCBA98
+    place = {register.name: register.address for register in registers.registers}
+
+    @bridge
+    def run() -> None:
+        unit = {"device_id": 1}
+        stiffness = place["wall_stiffness"]
+        assert not client.write_registers(stiffness, [0, 1234, 0, 77], **unit).isError()
+        assert values(client.read_input_registers(stiffness, count=4, **unit)) == [0, 1234, 0, 77]
+        assert values(client.read_holding_registers(place["active_wall_stiffness"], count=4, **unit)) == [0, 0, 0, 0]
+        assert not client.write_register(place["commit"], 1, **unit).isError()
+        assert values(client.read_holding_registers(place["active_wall_stiffness"], count=4, **unit)) == [0, 1234, 0, 77]
+        # One frame writes, commits and reads.
+        both = client.readwrite_registers(
+            read_address=place["drive"],
+            read_count=4,
+            write_address=place["commit"],
+            values=[1, 0xFFFF, 0xFFF0],
+            **unit,
+        )
+        assert values(both) == [0, 3, 0xFFFF, 0xFFFB]
+        assert values(client.read_holding_registers(place["trip_stamp"], count=2, **unit)) == [0xFEDC, 0xBA98]
+
+    await run()
+    assert int(dut.wall_stiffness.value) == 1234
+    assert dut.preload_count.value.to_signed() == -16
+
+
+@cocotb.test()
+async def exceptions_counters_and_identification(dut):
+    client, registers = await opened(dut, error=0.025), supervised(**parameters())
+    place = {register.name: register.address for register in registers.registers}
+    dut.refuse.value = -1 & (1 << len(registers.pulses)) - 1
+
+    @bridge
+    def run() -> None:
+        unit = {"device_id": 1}
+        client.silence_ns += Bench.period_ns * make(**parameters()).link.gap_clocks
+        codes = [
+            client.read_coils(0, count=1, **unit).exception_code,
+            client.read_holding_registers(1, count=2, **unit).exception_code,
+            client.write_registers(place["encoder_invert"], [0, 2], **unit).exception_code,
+            client.write_register(place["arm"], 1, **unit).exception_code,
+        ]
+        assert codes == [1, 2, 3, 4]
+        client.silence_ns = SILENCE_NS
+        assert client.diag_query_data(b"\x5a\xa5", **unit).message == b"\x5a\xa5"
+        assert client.diag_read_bus_message_count(**unit).message == 6
+        assert client.diag_read_bus_exception_error_count(**unit).message == 4
+        objects = client.read_device_information(read_code=1, object_id=0, **unit).information
+        assert objects == {0: b"hardwall", 1: b"axis", 2: registers.identity.encode()}
+        assert client.read_device_information(read_code=4, object_id=1, **unit).information == {1: b"axis"}
+        with pytest.raises(ModbusException, match="No response"):
+            client.read_holding_registers(0, count=2, device_id=9)
+        assert client.diag_clear_counters(**unit).isError() is False
+        assert client.diag_read_bus_message_count(**unit).message == 1
+
+    await run()
+
+
+def test_rtl():
+    simulate(__file__, make, name="paper")
+
+
+def test_wrong_parameters_are_refused():
+    with pytest.raises(TypeError, match=r"not 3$"):
+        Link(3)
+    with pytest.raises(ValueError, match=r"baud must be 115200 to 3000000, not 9600$"):
+        Link(supervised("paper"), 9600)

@@ -1,0 +1,189 @@
+"""The register file: every operation of RTL and twin alike, at the clocks promised, and every bound of every word."""
+
+import cocotb
+import pytest
+from cocotb.triggers import ClockCycles, RisingEdge
+
+from hardwall.hdl.link.register_file import RegisterFile
+from hardwall.model.link import register_file as model
+from hardwall.model.link.register_file import Operation
+from hardwall.model.registers import COUNTERS
+from hardwall.testing import Bench, parameters, rng, simulate
+from stimuli.supervised import supervised
+
+CLOCKS = {
+    Operation.CHECK_READ: 1,
+    Operation.CHECK_WRITE: 3,
+    Operation.READ: 1,
+    Operation.WRITE: 2,
+    Operation.COUNT: 2,
+}
+
+
+def make(name: str) -> RegisterFile:
+    return RegisterFile(model.Design(supervised(name)))
+
+
+class Host:
+    """A server beside a register file, and the twin."""
+
+    def __init__(self, dut):
+        self.dut, self.component, self.random = dut, make(**parameters()), rng()
+        self.bench, self.design = Bench(dut, self.component), self.component.design
+        self.registers, self.twin = self.design.registers, model.RegisterFile(self.design)
+
+    async def do(self, operation: Operation, address: int = 0, value: int = 0, first: int = 0, last: int = 0) -> int:
+        """Do an operation; return the clocks until it was done."""
+        self.bench.drive(host__operation=operation, host__address=address, host__value=value)
+        self.bench.drive(host__first=first, host__last=last, host__start=1)
+        clocks = 0
+        while True:
+            await RisingEdge(self.dut.clk)
+            if int(self.dut.host__done.value):
+                break
+            clocks += 1
+            assert clocks < 4000, "the register file hangs"
+        self.bench.drive(host__start=0)
+        assert clocks == CLOCKS.get(operation, clocks), operation.name
+        return clocks
+
+    async def clear(self) -> None:
+        self.bench.drive(host__clear=1)
+        await RisingEdge(self.dut.clk)
+        self.bench.drive(host__clear=0)
+        await RisingEdge(self.dut.clk)
+        self.twin.clear()
+
+    def found(self) -> tuple[int, ...]:
+        return tuple(int(getattr(self.dut, f"host__{name}").value) for name in ("absent", "outside", "refused"))
+
+    def expected(self) -> tuple[int, ...]:
+        return tuple(map(int, (self.twin.absent, self.twin.outside, self.twin.refused)))
+
+    async def read(self, address: int) -> int:
+        await self.do(Operation.READ, address)
+        return int(self.dut.host__data.value)
+
+
+@cocotb.test()
+async def every_bound_of_every_word(dut):
+    host = Host(dut)
+    await host.bench.reset()
+    assert await host.do(Operation.SNAPSHOT) <= host.component.boot_clocks + (
+        host.component.snapshot_clocks
+    )
+    for register in (*host.registers.words, *host.registers.pulses):
+        span = 16 * register.size
+        tried = {register.low, register.high, register.low - 1, register.high + 1, 0, -1, 1, 1 << 16, -(1 << 16)}
+        tried |= {(1 << span - 1) - 1, -(1 << span - 1), register.low ^ 1 << 16, register.high ^ 1 << 15}
+        for value in {each & (1 << span) - 1 for each in tried}:
+            await host.clear()
+            for k in range(register.size):
+                half = value >> 16 * (register.size - 1 - k) & 0xFFFF
+                first, last = k == 0, k == register.size - 1
+                await host.do(Operation.CHECK_WRITE, register.address + k, half, first, last)
+                host.twin.check_write(register.address + k, first, last, half, frozenset())
+            await RisingEdge(dut.clk)
+            signed = value - (1 << span) if value >> span - 1 else value
+            assert host.found() == host.expected() == (0, int(not register.low <= signed <= register.high), 0)
+
+
+@cocotb.test()
+async def random_operations(dut):
+    host, random = Host(dut), rng()
+    await host.bench.reset()
+    words, pulses, statuses = host.registers.words, host.registers.pulses, host.registers.status
+    await host.do(Operation.SNAPSHOT)
+    host.twin.snapshot({each.name: 0 for each in statuses})
+    pulsed, before = [host.bench.monitor(pulse.name) for pulse in pulses], [0] * len(pulses)
+    for _ in range(400):
+        case, first, last = random.random(), int(random.integers(0, 2)), int(random.integers(0, 2))
+        address = int(random.choice((random.integers(0, 256), random.integers(0, 1 << 17))))
+        value = int(random.integers(0, 1 << 16))
+        if case < 0.25:
+            await host.do(Operation.CHECK_READ, address, 0, first, last)
+            host.twin.check_read(address, first, last)
+        elif case < 0.4:
+            refused = [int(random.random() < 0.2) for _ in pulses]
+            host.bench.drive(refuse=sum(bit << k for k, bit in enumerate(refused)))
+            names = frozenset(pulse.name for pulse, bit in zip(pulses, refused, strict=True) if bit)
+            await host.do(Operation.CHECK_WRITE, address, value, first, last)
+            host.twin.check_write(address, first, last, value, names)
+        elif case < 0.7:
+            address = int(random.integers(host.design.first_pulse, host.design.last_word))
+            register = next(each for each in (*pulses, *words) if address - each.address in range(each.size))
+            word = int(random.integers(register.low, register.high + 1))
+            for k, half in enumerate(register.to_registers(word)):
+                await host.do(Operation.WRITE, register.address + k, half)
+                host.twin.write(register.address + k, half)
+        elif case < 0.8:
+            await host.do(Operation.COUNT, COUNTERS + value % 8)
+            host.twin.count(COUNTERS + value % 8)
+        elif case < 0.9:
+            await host.do(Operation.FINISH)
+            host.twin.finish()
+            await RisingEdge(dut.clk)
+            seen = [len(monitor.clocks) for monitor in pulsed]
+            assert [now - then for now, then in zip(seen, before, strict=True)] == [
+                host.twin.pulses.count(pulse.name) > 0 for pulse in pulses
+            ]
+            before = seen
+            assert host.twin.active == {word.name: host.bench.reader(word.name)() for word in words}
+        else:
+            now = {each.name: int(random.integers(each.format.min, each.format.max + 1)) for each in statuses}
+            host.bench.drive(**now)
+            assert await host.do(Operation.SNAPSHOT) == host.component.snapshot_clocks
+            host.twin.snapshot(now)
+        await RisingEdge(dut.clk)
+        assert host.found() == host.expected()
+        if host.expected() != (0, 0, 0):
+            await host.clear()
+    for address in (*range(256), 0x4000, 0x4000 + len(host.design.map_cells) - 1):
+        assert await host.read(address) == host.twin.read(address, [])
+
+
+@cocotb.test()
+async def a_commit_is_done_when_the_axis_has_it(dut):
+    host = Host(dut)
+    await host.bench.reset()
+    await host.do(Operation.SNAPSHOT)
+    await host.do(Operation.WRITE, host.registers["commit"].address, 1)
+    cocotb.start_soon(host.do(Operation.FINISH))
+    await RisingEdge(dut.commit)
+    await RisingEdge(dut.clk)
+    host.bench.drive(commit_pending=1)
+    await ClockCycles(dut.clk, 100)
+    assert int(dut.host__done.value) == 0
+    host.bench.drive(commit_pending=0)
+    await ClockCycles(dut.clk, 3)
+    host.bench.drive(host__start=0)
+
+
+@pytest.mark.parametrize("name", ["mhz", "wide"])
+def test_rtl(name):
+    simulate(__file__, make, name=name)
+
+
+def test_the_book_holds_what_the_map_describes():
+    design = model.Design(supervised("mhz"))
+    file, registers = model.RegisterFile(design), design.registers
+    for register in registers.registers:
+        halves = tuple(file.live[register.address : register.address + register.size])
+        assert register.from_registers(halves) == register.reset
+    assert len(design.map_cells) * 2 >= len(registers.compressed)
+
+
+def test_a_status_is_extended_by_its_sign():
+    design = model.Design(supervised("mhz"))
+    file = model.RegisterFile(design)
+    status = {each.name: each.format.min if each.format.signed else each.format.max for each in design.registers.status}
+    file.snapshot(status)
+    for each in design.registers.status:
+        assert each.from_registers(tuple(file.live[each.address : each.address + 2])) == status[each.name]
+
+
+def test_wrong_parameters_are_refused():
+    with pytest.raises(TypeError, match=r"not 3$"):
+        RegisterFile(3)
+    with pytest.raises(TypeError, match=r"registers must be a RegisterMap, not 3$"):
+        model.Design(3)
