@@ -320,10 +320,10 @@ class RegisterMap:
     def _rows(self, registers: tuple[Register, ...]) -> dict:
         """Return the map as the device carries it: everything but the meanings, and no constant of the build."""
         columns = ["address", "name", "kind", "signed", "bits", "si_per_lsb", "unit", "least", "most", "reset"]
-        rows = [
-            [r.address, r.name, r.kind.value, int(r.format.signed), r.format.width, r.lsb, r.unit, r.low, r.high, r.reset]
-            for r in registers
-        ]
+        rows = []
+        for r in registers:
+            number = [int(r.format.signed), r.format.width, r.lsb, r.unit]
+            rows.append([r.address, r.name, r.kind.value, *number, r.low, r.high, r.reset])
         return {"layout": LAYOUT, "identity": self.identity, "columns": columns, "registers": rows}
 
     @property

@@ -13,7 +13,8 @@ REGISTERS = supervised("mhz")
 def test_the_page_has_every_register():
     page = register_texts.markdown(REGISTERS)
     rows = [line.split(" | ") for line in page.splitlines() if line.startswith("| 0x")]
-    assert [(row[0][2:], row[1]) for row in rows] == [(f"0x{r.address:04X}", f"`{r.name}`") for r in REGISTERS.registers]
+    registers = REGISTERS.registers
+    assert [(row[0][2:], row[1]) for row in rows] == [(f"0x{r.address:04X}", f"`{r.name}`") for r in registers]
     assert REGISTERS.identity in page
     assert f"{CAPTURE_REGISTERS} registers begins at 0x8000" in page
 
@@ -31,7 +32,8 @@ def test_a_compiler_reads_the_header(tmp_path):
     (tmp_path / "registers.h").write_text(register_texts.c_header(REGISTERS), encoding="ascii")
     names = [register.name.upper() for register in REGISTERS.registers]
     prints = "".join(f'printf("%d\\n", HARDWALL_{name});' for name in names)
-    source = f'#include <stdio.h>\n#include "registers.h"\nint main(void) {{ {prints} return HARDWALL_LAYOUT_LSB != 1.0; }}'
+    includes = '#include <stdio.h>\n#include "registers.h"\n'
+    source = f"{includes}int main(void) {{ {prints} return HARDWALL_LAYOUT_LSB != 1.0; }}"
     (tmp_path / "main.c").write_text(source, encoding="ascii")
     subprocess.run(["c++", "-Wall", "-Werror", "-x", "c++", "main.c", "-o", "main"], cwd=tmp_path, check=True)
     done = subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True)

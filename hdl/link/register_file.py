@@ -66,7 +66,8 @@ class RegisterFile(wiring.Component):
     - CHECK_READ, CHECK_WRITE: raise `absent`, `outside` or `refused` if the register cannot be read, or written with
       `host.value`. The halves of a value are checked in the order of their addresses, one after the other.
     - READ: give the register.
-    - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. Only what was checked is written.
+    - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. Only what
+      was checked is written.
     - COUNT: add 1 to a counter, which wraps.
     - FINISH: if `commit` is marked, copy every written word to its active one and to its port. Then all marked pulses
       are high for one clock, the same one; the words have been at their ports for a clock or more, and stay until the
@@ -162,7 +163,7 @@ class RegisterFile(wiring.Component):
         marks = Signal(len(registers.pulses))
         wanted = Signal.like(marks)
         for bit, pulse in enumerate(registers.pulses):
-            m.d.comb += wanted[bit].eq(is_pulse & (below == pulse.address) & host.value[0])
+            m.d.comb += wanted[bit].eq(is_pulse & (below[:4] == pulse.address % 16) & host.value[0])
 
         step = Signal(range(END))
         place, area = Signal(range(END)), Signal(Area)
@@ -230,7 +231,8 @@ class RegisterFile(wiring.Component):
                         with m.If(marks[0]):
                             m.next = "COPY"
                     with m.Case(Operation.SNAPSHOT):
-                        m.d.sync += [step.eq(TELEMETRY), status.eq(Cat(getattr(self, s.name) for s in registers.status))]
+                        live = Cat(getattr(self, each.name) for each in registers.status)
+                        m.d.sync += [step.eq(TELEMETRY), status.eq(live)]
                         m.next = "SWEEP"
             with m.State("LEAST"):
                 m.d.comb += [place.eq(below), area.eq(Area.MOST)]
@@ -261,7 +263,7 @@ class RegisterFile(wiring.Component):
                 for word in registers.words:
                     port = getattr(self, word.name)
                     for low, register in ((CELL_BITS, word.address), (0, word.address + 1)):
-                        with m.If(step == register):
+                        with m.If(step[:6] == register % 64):
                             part = port[low : low + CELL_BITS]
                             m.d.sync += part.eq(read.data[: len(part)])
             with m.State("PULSE"):

@@ -193,7 +193,7 @@ class Server(wiring.Component):
                 take()
                 with m.If(beat == 3):
                     m.d.sync += left.eq(taken)
-                    bad = (taken == 0) | (taken > most)
+                    bad = (taken == 0) | taken[7:].any() | (taken[:7] > most)
                     with m.If(function == model.DIAGNOSE):
                         m.next = "DIAGNOSE"
                     with m.Elif(phase[0] == phase[1]):
@@ -250,12 +250,13 @@ class Server(wiring.Component):
                 m.d.sync += phase.eq(Operation.READ)
                 with m.If(sub == model.ECHO):
                     send_head(ECHOED)
-                with m.Elif((sub < model.CLEAR) | (sub > model.LAST_COUNTER)):
+                with m.Elif(sub[5:].any() | (sub[:5] < model.CLEAR) | (sub[:5] > model.LAST_COUNTER)):
                     refuse(model.FUNCTION)
                 with m.Elif(word != 0):
                     refuse(model.VALUE)
                 with m.Elif(sub == model.CLEAR):
-                    m.d.sync += [address.eq(COUNTERS), left.eq(COUNTERS_CLEARED), clearing.eq(1), phase.eq(Operation.WRITE)]
+                    m.d.sync += [address.eq(COUNTERS), left.eq(COUNTERS_CLEARED), clearing.eq(1)]
+                    m.d.sync += phase.eq(Operation.WRITE)
                     m.next = "ASK"
                 with m.Else():
                     m.d.sync += [address.eq(COUNTERS | sub[:3]), left.eq(1)]

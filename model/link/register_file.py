@@ -4,8 +4,8 @@ A book of 16-bit cells has four areas of 256, which one port of a memory reads a
 
 - LIVE is what the host reads, by the address of the register.
 - RESET is what LIVE is set to by a reset: constants, and words as after a reset.
-- LEAST and MOST are the bounds of what may be written. LEAST also says, for a register of a status, how many of its bits
-  come from the snapshot (bits 0 to 4), and whether the others repeat its sign (`EXTENDED`).
+- LEAST and MOST are the bounds of what may be written. LEAST also says, for a register of a status, how many of its
+  bits come from the snapshot (bits 0 to 4), and whether the others repeat its sign (`EXTENDED`).
 
 A written word stays in LIVE until a commit copies every one to its active cell and to the port that the axis reads;
 then the pulses of the frame go out, all at one clock, and the axis takes the words at its next sample.

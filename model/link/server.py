@@ -93,37 +93,42 @@ class Server:
     def _transfer(self, request: bytes) -> bytes:
         """Read or write registers, or both."""
         function, file = request[1], self.file
-        read = _word(request, 2), _word(request, 4)
-        written, data = read, request[7:]
-        if function == WRITE_ONE:
-            written, data = (read[0], 1), request[4:]
-        elif function == 23:
-            written, data = (_word(request, 6), _word(request, 8)), request[11:]
-        values = [_word(data, place) for place in range(0, len(data) - 1, 2)]
-        if function in READS and not 1 <= read[1] <= READ_MAX:
-            raise _Refusal(VALUE)
-        most = WRITE_AND_READ_MAX if function in READS else WRITE_MAX
-        if function in WRITES and not (1 <= written[1] <= most and len(data) == 2 * written[1]):
-            raise _Refusal(VALUE)
+        address, count, written, values = self._fields(request)
         file.clear()
         if function in READS:
-            for k in range(read[1]):
-                file.check_read(read[0] + k, k == 0, k == read[1] - 1)
-        if function in WRITES:
-            for k, value in enumerate(values):
-                file.check_write(written[0] + k, k == 0, k == written[1] - 1, value, self.refusing)
+            for k in range(count):
+                file.check_read(address + k, k == 0, k == count - 1)
+        for k, value in enumerate(values):
+            file.check_write(written + k, k == 0, k == len(values) - 1, value, self.refusing)
         for found, code in ((file.absent, ABSENT), (file.outside, VALUE), (file.refused, FAILURE)):
             if found:
                 raise _Refusal(code)
         if function in WRITES:
             for k, value in enumerate(values):
-                file.write(written[0] + k, value)
+                file.write(written + k, value)
             file.finish()
         if function not in READS:
             return request[:6]
         file.snapshot(self.status)
-        registers = [file.read(read[0] + k, self.capture) for k in range(read[1])]
-        return request[:2] + bytes([2 * read[1]]) + b"".join(each.to_bytes(2, "big") for each in registers)
+        registers = [file.read(address + k, self.capture) for k in range(count)]
+        return request[:2] + bytes([2 * count]) + b"".join(each.to_bytes(2, "big") for each in registers)
+
+    def _fields(self, request: bytes) -> tuple[int, int, int, list[int]]:
+        """Return the first address and the number of registers to read, and the first address and values to write."""
+        function = request[1]
+        address, count = _word(request, 2), _word(request, 4)
+        written, quantity, data, most = address, count, request[7:], WRITE_MAX
+        if function == WRITE_ONE:
+            quantity, data = 1, request[4:]
+        elif function in READS:
+            written, quantity, data, most = _word(request, 6), _word(request, 8), request[11:], WRITE_AND_READ_MAX
+        if function in READS and not 1 <= count <= READ_MAX:
+            raise _Refusal(VALUE)
+        if function not in WRITES:
+            return address, count, 0, []
+        if not (1 <= quantity <= most and len(data) == 2 * quantity):
+            raise _Refusal(VALUE)
+        return address, count, written, [_word(data, place) for place in range(0, len(data), 2)]
 
     def _diagnose(self, request: bytes) -> bytes:
         sub, data = _word(request, 2), _word(request, 4)

@@ -142,9 +142,10 @@ async def words_are_written_committed_and_read_back(dut):
         stiffness = place["wall_stiffness"]
         assert not client.write_registers(stiffness, [0, 1234, 0, 77], **unit).isError()
         assert values(client.read_input_registers(stiffness, count=4, **unit)) == [0, 1234, 0, 77]
-        assert values(client.read_holding_registers(place["active_wall_stiffness"], count=4, **unit)) == [0, 0, 0, 0]
+        active = place["active_wall_stiffness"]
+        assert values(client.read_holding_registers(active, count=4, **unit)) == [0, 0, 0, 0]
         assert not client.write_register(place["commit"], 1, **unit).isError()
-        assert values(client.read_holding_registers(place["active_wall_stiffness"], count=4, **unit)) == [0, 1234, 0, 77]
+        assert values(client.read_holding_registers(active, count=4, **unit)) == [0, 1234, 0, 77]
         # One frame writes, commits and reads.
         both = client.readwrite_registers(
             read_address=place["drive"],

@@ -69,9 +69,8 @@ class Host:
 async def every_bound_of_every_word(dut):
     host = Host(dut)
     await host.bench.reset()
-    assert await host.do(Operation.SNAPSHOT) <= host.component.boot_clocks + (
-        host.component.snapshot_clocks
-    )
+    most = host.component.boot_clocks + host.component.snapshot_clocks
+    assert await host.do(Operation.SNAPSHOT) <= most
     for register in (*host.registers.words, *host.registers.pulses):
         span = 16 * register.size
         tried = {register.low, register.high, register.low - 1, register.high + 1, 0, -1, 1, 1 << 16, -(1 << 16)}

@@ -176,7 +176,8 @@ class World:
             if edge < 0.3:
                 value = int(random.choice((word.low, word.high, 0)))
             elif edge < 0.36:
-                value = int(random.choice((word.low - 1, word.high + 1, word.high + (1 << 16), -(1 << 31), (1 << 31) - 1)))
+                beyond = word.low - 1, word.high + 1, word.high + (1 << 16), -(1 << 31), (1 << 31) - 1
+                value = int(random.choice(beyond))
             values += [value >> 16 & 0xFFFF, value & 0xFFFF]
         address = words[first].address
         if first == 0 and random.random() < 0.7:
@@ -207,22 +208,21 @@ class World:
     def random_pdu(self) -> bytes:
         """Return a function and its data."""
         random = self.random
-        case, (address, values), (source, count) = random.random(), self.random_write(), self.random_read()
-        if case < 0.3:
-            return frames.read(source, count, int(random.choice((3, 4))))
-        if case < 0.6:
-            return frames.write(address, values)
-        if case < 0.7:
-            return frames.write_one(int(random.integers(0x70, 0x82)), int(random.choice((0, 1, 1, 1, 2))))
-        if case < 0.8:
-            return frames.write_and_read(address, values, source, count)
-        if case < 0.87:
-            return bytes([8]) + frames.words(random.integers(0, 21), random.choice((0, 0, 0, 5)))
-        if case < 0.95:
-            return bytes([43, random.choice((14, 14, 14, 13)), random.integers(0, 6), random.integers(0, 5)])
+        (address, values), (source, count) = self.random_write(), self.random_read()
         mangled = bytearray(frames.write(address, values))
         mangled[int(random.integers(3, 6))] ^= 1 << random.integers(0, 8)
-        return bytes(mangled)
+        cases = [
+            frames.read(source, count),
+            frames.read(source, count, 4),
+            frames.write(address, values),
+            frames.write(address, values),
+            frames.write_one(int(random.integers(0x70, 0x82)), int(random.choice((0, 1, 1, 1, 2)))),
+            frames.write_and_read(address, values, source, count),
+            bytes([8]) + frames.words(random.integers(0, 21), random.choice((0, 0, 0, 5))),
+            bytes([43, random.choice((14, 14, 14, 13)), random.integers(0, 6), random.integers(0, 5)]),
+            bytes(mangled),
+        ]
+        return cases[random.integers(0, len(cases))]
 
 
 @cocotb.test()
