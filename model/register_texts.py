@@ -2,7 +2,8 @@
 
 import json
 
-from .registers import ACTIVE, CAPTURE, LAYOUT, MAP, WRITTEN, Register, RegisterMap
+from .register import Register
+from .registers import ACTIVE, CAPTURE, LAYOUT, MAP, WRITTEN, RegisterMap
 
 COLUMNS = ("address", "register", "kind", "access", "format", "one LSB", "range", "reset", "meaning")
 

@@ -8,7 +8,8 @@ import pytest
 
 from hardwall.model.arithmetic.fixed import SQ, UQ
 from hardwall.model.estimators import registry
-from hardwall.model.registers import ACTIVE, WRITTEN, Kind, Register, RegisterMap
+from hardwall.model.register import Kind, Register
+from hardwall.model.registers import ACTIVE, WRITTEN, RegisterMap
 from stimuli.specs import SPECS, spec
 from stimuli.supervised import SUPERVISOR, supervised
 

@@ -69,14 +69,14 @@ class RegisterFile(wiring.Component):
     - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. Only what
       was checked is written.
     - COUNT: add 1 to a counter, which wraps.
-    - FINISH: if `commit` is marked, copy every written word to its active one and to its port. Then all marked pulses
-      are high for one clock, the same one; the words have been at their ports for a clock or more, and stay until the
-      next commit. `done` comes when `commit_pending` has fallen, so what is read back as active is in use.
+    - FINISH: if `commit` is marked, copy every written word to its active one and shift it to its port. Then all marked
+      pulses are high for one clock, the same one; the words have been at their ports for a clock or more, and stay
+      until the next commit. `done` comes when `commit_pending` has fallen, so what is read back as active is in use.
     - SNAPSHOT: take every status, all at the clock of `start`, for what is read from then on.
 
     Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ and READ; 2 for WRITE and COUNT; 3 for
-    CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if `commit` is marked, 2 for every register of a word
-    and the wait for the sample. After a reset the first `start` may come at once; it waits up to `boot_clocks`.
+    CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if `commit` is marked, `commit_clocks` and the wait
+    for the sample. After a reset the first `start` may come at once; it waits up to `boot_clocks`.
 
     Rounding and overflow: a value of fewer bits than its registers is extended by its sign or by zeros.
 
@@ -102,7 +102,7 @@ class RegisterFile(wiring.Component):
     commit_pending : In(1)
         A commit waits for its sample.
     capture_address : Out(15)
-        The register of the capture memory that is read.
+        The register of the capture memory that is read; there is none if the map has no capture memory.
     capture_data : In(16)
         That register, one clock later.
 
@@ -125,8 +125,7 @@ class RegisterFile(wiring.Component):
                 **{pulse.name: Out(1) for pulse in registers.pulses},
                 "refuse": In(len(registers.pulses)),
                 "commit_pending": In(1),
-                "capture_address": Out(range(SPACE - CAPTURE)),
-                "capture_data": In(CELL_BITS),
+                **({"capture_address": Out(15), "capture_data": In(CELL_BITS)} if registers.capture_registers else {}),
             }
         )
 
@@ -138,6 +137,11 @@ class RegisterFile(wiring.Component):
     def boot_clocks(self) -> int:
         """Clocks after a reset until an operation begins."""
         return 2 * END
+
+    @property
+    def commit_clocks(self) -> int:
+        """Clocks by which a commit makes a FINISH longer, without the wait for the sample."""
+        return 2 * len(self._design.registers.words) * (CELL_BITS + 5)
 
     @property
     def snapshot_clocks(self) -> int:
@@ -169,15 +173,19 @@ class RegisterFile(wiring.Component):
         place, area = Signal(range(END)), Signal(Area)
         shift, status = Signal(CELL_BITS), Signal(sum(each.format.width for each in registers.status))
         left, extended, bit = Signal(range(CELL_BITS + 1)), Signal(), Signal(range(CELL_BITS))
+        ports, committing = Cat(getattr(self, word.name) for word in registers.words), Signal()
         counting, storing = Signal(), Signal()
         m.d.comb += [
             read.addr.eq(Cat(place, area)),
             write.addr.eq(place),
             write.data.eq(Mux(storing, shift, read.data + counting)),
             map_read.addr.eq(address),
-            self.capture_address.eq(address),
-            host.data.eq(Mux(address[15], self.capture_data, Mux(address[14], map_read.data, read.data))),
+            host.data.eq(Mux(address[14], map_read.data, read.data)),
         ]
+        if registers.capture_registers:
+            m.d.comb += self.capture_address.eq(address)
+            with m.If(address[15]):
+                m.d.comb += host.data.eq(self.capture_data)
         with m.If(host.clear):
             m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0)]
 
@@ -226,7 +234,7 @@ class RegisterFile(wiring.Component):
                     with m.Case(Operation.COUNT):
                         m.next = "COUNT"
                     with m.Case(Operation.FINISH):
-                        m.d.sync += step.eq(WRITTEN)
+                        m.d.sync += [step.eq(ACTIVE), committing.eq(marks[0])]
                         m.next = "PULSE"
                         with m.If(marks[0]):
                             m.next = "COPY"
@@ -251,47 +259,50 @@ class RegisterFile(wiring.Component):
             with m.State("COUNT"):
                 m.d.comb += [place.eq(below), counting.eq(1), write.en.eq(1)]
                 m.next = "DONE"
-            with m.State("COPY"):
-                m.d.comb += place.eq(step)
-                m.next = "COPY_WRITE"
-            with m.State("COPY_WRITE"):
-                m.d.comb += [place.eq(step | ACTIVE), write.en.eq(1)]
-                m.d.sync += step.eq(step + 1)
-                m.next = "COPY"
-                with m.If(step == design.last_word - 1):
-                    m.next = "PULSE"
-                for word in registers.words:
-                    port = getattr(self, word.name)
-                    for low, register in ((CELL_BITS, word.address), (0, word.address + 1)):
-                        with m.If(step[:6] == register % 64):
-                            part = port[low : low + CELL_BITS]
-                            m.d.sync += part.eq(read.data[: len(part)])
             with m.State("PULSE"):
                 m.d.comb += Cat(getattr(self, pulse.name) for pulse in registers.pulses).eq(marks)
                 m.d.sync += marks.eq(0)
                 m.next = "WAIT"
             with m.State("WAIT"), m.If(~self.commit_pending):
                 m.next = "DONE"
+
+            # A register from the snapshot to its cell, or from a written cell to the active one and to its port: bit by
+            # bit, and the low half of a value first.
+            with m.State("COPY"):
+                m.d.comb += place.eq((step ^ 1) & ~(ACTIVE ^ WRITTEN))
+                m.next = "COPIED"
+            with m.State("COPIED"):
+                m.d.sync += shift.eq(read.data)
+                m.next = "SWEEP"
             with m.State("SWEEP"):
-                # The low half of a value comes first.
                 m.d.comb += [place.eq(step ^ 1), area.eq(Area.LEAST)]
                 m.next = "BITS"
             with m.State("BITS"):
+                m.d.comb += [place.eq(step ^ 1), storing.eq(1), write.en.eq(committing)]
                 m.d.sync += [left.eq(read.data), extended.eq(read.data[-1])]
                 m.next = "SHIFT"
             with m.State("SHIFT"):
                 fresh = left != 0
                 m.d.sync += [shift.eq(Cat(shift[1:], Mux(fresh, status[0], extended & shift[-1]))), bit.eq(bit + 1)]
                 with m.If(fresh):
-                    m.d.sync += [status.eq(status[1:]), left.eq(left - 1)]
+                    m.d.sync += left.eq(left - 1)
+                    with m.If(committing):
+                        m.d.sync += ports.eq(Cat(ports[1:], shift[0]))
+                    with m.Else():
+                        m.d.sync += status.eq(status[1:])
                 with m.If(bit.all()):
                     m.next = "STORE"
             with m.State("STORE"):
-                m.d.comb += [place.eq(step ^ 1), storing.eq(1), write.en.eq(1)]
+                m.d.comb += [place.eq(step ^ 1), storing.eq(1), write.en.eq(~committing)]
                 m.d.sync += step.eq(step + 1)
                 m.next = "SWEEP"
                 with m.If(step == design.last_status - 1):
                     m.next = "DONE"
+                with m.If(committing):
+                    m.next = "COPY"
+                    with m.If(step == design.last_active - 1):
+                        m.d.sync += committing.eq(0)
+                        m.next = "PULSE"
             with m.State("DONE"):
                 m.d.comb += [host.done.eq(1), place.eq(below)]
                 m.next = "IDLE"

@@ -4,8 +4,9 @@ A book of 16-bit cells has four areas of 256, which one port of a memory reads a
 
 - LIVE is what the host reads, by the address of the register.
 - RESET is what LIVE is set to by a reset: constants, and words as after a reset.
-- LEAST and MOST are the bounds of what may be written. LEAST also says, for a register of a status, how many of its
-  bits come from the snapshot (bits 0 to 4), and whether the others repeat its sign (`EXTENDED`).
+- LEAST and MOST are the bounds of what may be written. LEAST also says, for a register of a status or of an active
+  word, how many bits of it come from the snapshot or go to the port (bits 0 to 4), and whether the others repeat its
+  sign (`EXTENDED`).
 
 A written word stays in LIVE until a commit copies every one to its active cell and to the port that the axis reads;
 then the pulses of the frame go out, all at one clock, and the axis takes the words at its next sample.
@@ -53,7 +54,7 @@ class Design:
         map_cells: the cells of the window to the compressed map, and behind them the answers of the identification.
         answers_at: the address of each of those answers, and how many registers it has, by their keys in the map.
         first_pulse, last_word: the addresses between which registers can be written: from, and behind.
-        last_status: the address behind the last status.
+        last_status, last_active: the addresses behind the last status and the last active word.
     """
 
     def __init__(self, registers: RegisterMap):
@@ -62,6 +63,7 @@ class Design:
         self.registers = registers
         self.first_pulse = WRITTEN - len(registers.pulses)
         self.last_word = WRITTEN + 2 * len(registers.words)
+        self.last_active = self.last_word + ACTIVE - WRITTEN
         self.last_status = (registers.status[-1].address or 0) + 2
         self.book = self._book()
         text, self.answers_at = registers.compressed + bytes(len(registers.compressed) % 2), {}
@@ -78,9 +80,9 @@ class Design:
                 for place in places:
                     shift = CELL_BITS * (places[-1] - place)
                     book[area * END + place] = word >> shift & CELL
-        for status in self.registers.status:
-            extended, width = EXTENDED * status.format.signed, status.format.width
-            for half, place in enumerate(((status.address or 0) + 1, status.address or 0)):
+        for moved in (*self.registers.status, *self.registers.active):
+            extended, width = EXTENDED * moved.format.signed, moved.format.width
+            for half, place in enumerate(((moved.address or 0) + 1, moved.address or 0)):
                 bits = min(max(width - CELL_BITS * half, 0), CELL_BITS)
                 book[Area.LEAST * END + place] = extended | bits
         return book

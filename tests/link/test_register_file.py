@@ -119,8 +119,9 @@ async def random_operations(dut):
             await host.do(Operation.COUNT, COUNTERS + value % 8)
             host.twin.count(COUNTERS + value % 8)
         elif case < 0.9:
-            await host.do(Operation.FINISH)
+            clocks = await host.do(Operation.FINISH)
             host.twin.finish()
+            assert clocks == 3 + host.component.commit_clocks * ("commit" in host.twin.pulses)
             await RisingEdge(dut.clk)
             seen = [len(monitor.clocks) for monitor in pulsed]
             assert [now - then for now, then in zip(seen, before, strict=True)] == [

@@ -3,7 +3,8 @@
 from functools import cache
 
 from hardwall.model.arithmetic.fixed import SQ, UQ
-from hardwall.model.registers import Kind, Register, RegisterMap
+from hardwall.model.register import Kind, Register
+from hardwall.model.registers import RegisterMap
 
 from .specs import spec
 
