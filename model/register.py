@@ -10,6 +10,8 @@ VALUE_BITS = 32
 """Bits of a value in two registers."""
 COUNTER_BITS = 16
 """Bits of a value in one register."""
+UNPLACED = -1
+"""The address of a register before a map has placed it."""
 
 
 class Kind(Enum):
@@ -46,7 +48,7 @@ class Register:
         unit: SI unit, as text; empty for choices and plain numbers.
         least, most: the range of the word that the hardware accepts; None for the format's.
         reset: the word after a reset; of a constant, its value.
-        address: address of its first register; None before a map has placed it.
+        address: address of its first register; `UNPLACED` before a map has placed it.
 
     Raises:
         ValueError: if the format is too wide for its registers, or a bound or the reset word does not fit it.
@@ -61,7 +63,7 @@ class Register:
     least: int | None = None
     most: int | None = None
     reset: int = 0
-    address: int | None = None
+    address: int = UNPLACED
 
     def __post_init__(self) -> None:
         room = VALUE_BITS if self.kind.wide else COUNTER_BITS

@@ -10,7 +10,8 @@ even address; a value that has fewer bits is extended, by its sign if it has one
     0x0070 to 0x007F  pulses, one register each, assigned downwards from 0x007F
     0x0080 to 0x00BF  words as written
     0x00C0 to 0x00FF  words as active, each 0x40 above its written one
-    0x4000 to 0x7FFF  the window to the compressed map, two bytes a register, the first one high
+    0x4000 to 0x7FFF  the window to the compressed map, two bytes a register, the first one high; behind the map, the
+                      ends of the answers of the identification
     0x8000 to 0xFFFF  the window to the capture memory
 
 The rule is stable: within a block registers follow in the order of their description, so what is added at the end of a
@@ -142,6 +143,8 @@ class RegisterMap:
         status, pulses, words, active: the registers of those kinds in the order of the hardware's ports; `pulses`
             begins with `commit`, whose address is the highest.
         registers: every register, in the order of addresses.
+        identity: the hash of the build, 16 hexadecimal digits.
+        compressed: the map that the device carries, of all but the constants: zlib, JSON.
 
     Raises:
         TypeError: if `spec` is not an AxisSpec, or `supervisor` is not of registers.
@@ -180,25 +183,37 @@ class RegisterMap:
         counters = (Register(name, Kind.COUNTER, UQ(COUNTER_BITS, 0), meaning) for name, meaning in LINK_COUNTERS)
         rest = (*self.status, *_placed(COUNTERS, PULSES - COUNTERS, tuple(counters)), *self.pulses[::-1])
         rest += (*self.words, *self.active)
-        self.registers = self._constants(rest) + rest
+        self.identity = self._hash(rest)
+        self.compressed = self._compressed(rest)
+        self.registers = self._constants() + rest
         names = [register.name for register in self.registers]
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"the name of a register must be its own, not {name!r} of another")
 
-    def _constants(self, rest: tuple[Register, ...]) -> tuple[Register, ...]:
-        """Return the constants, which depend on all other registers; the map in the device is set by the way."""
+    def _hash(self, rest: tuple[Register, ...]) -> str:
+        """Return the identity: 16 hexadecimal digits of the SHA-256 of the specification and of all that is placed."""
         facts = {field.name: getattr(self.spec, field.name) for field in dataclasses.fields(self.spec)}
         facts["gains"] = self.spec.design.gains
         described = repr((LAYOUT, self.capture_registers, facts, rest))
-        self.identity = hashlib.sha256(described.encode()).hexdigest()[:16]
-        text = json.dumps(self._rows(rest), separators=(",", ":"))
-        self.compressed = zlib.compress(text.encode(), 9)
-        high, low = int(self.identity[:8], 16), int(self.identity[8:], 16)
+        return hashlib.sha256(described.encode()).hexdigest()[:16]
+
+    def _compressed(self, rest: tuple[Register, ...]) -> bytes:
+        """Return the map that the device carries: JSON, compressed, without meanings and without the constants."""
+        rows = []
+        for r in rest:
+            number = [int(r.format.signed), r.format.width, r.lsb, r.unit]
+            rows.append([r.address, r.name, r.kind.value, *number, r.low, r.high, r.reset])
+        columns = ["address", "name", "kind", "signed", "bits", "si_per_lsb", "unit", "least", "most", "reset"]
+        described = {"layout": LAYOUT, "identity": self.identity, "columns": columns, "registers": rows}
+        return zlib.compress(json.dumps(described, separators=(",", ":")).encode(), 9)
+
+    def _constants(self) -> tuple[Register, ...]:
+        """Return the constants, which follow from everything else."""
         rows = (
             ("layout", LAYOUT, "", "The version of the rule of addresses."),
-            ("identity_high", high, "", "The upper half of the hash of specification and map."),
-            ("identity_low", low, "", "The lower half of that hash."),
+            ("identity_high", int(self.identity[:8], 16), "", "The upper half of the hash of specification and map."),
+            ("identity_low", int(self.identity[8:], 16), "", "The lower half of that hash."),
             ("clock_hz", self.spec.clock_hz, "Hz", "The clock, which numbers the stamps."),
             ("map_bytes", len(self.compressed), "", "The length of the compressed map in its window."),
             ("capture_registers", self.capture_registers, "", "The length of the capture memory in its window."),
@@ -208,15 +223,6 @@ class RegisterMap:
             for name, value, unit, meaning in rows
         )
         return _placed(CONSTANTS, TELEMETRY - CONSTANTS, tuple(registers))
-
-    def _rows(self, registers: tuple[Register, ...]) -> dict:
-        """Return the map as the device carries it: everything but the meanings, and no constant of the build."""
-        columns = ["address", "name", "kind", "signed", "bits", "si_per_lsb", "unit", "least", "most", "reset"]
-        rows = []
-        for r in registers:
-            number = [int(r.format.signed), r.format.width, r.lsb, r.unit]
-            rows.append([r.address, r.name, r.kind.value, *number, r.low, r.high, r.reset])
-        return {"layout": LAYOUT, "identity": self.identity, "columns": columns, "registers": rows}
 
     @property
     def identification(self) -> dict[tuple[bool, int], bytes]:

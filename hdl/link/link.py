@@ -20,8 +20,8 @@ class Link(wiring.Component):
     Unit 1 answers the functions 3, 4, 6, 16 and 23 (registers), 8 (counters) and 43/14 (identification) in frames of at
     most 256 bytes; `hardwall.model.registers` has the addresses. The line's idle level is high.
 
-    Latency: an answer begins when the request has been carried out: less than 3000 clocks after its last stop bit and,
-    for a commit, a sample period more. A pulse is at its port before the answer begins.
+    Latency: an answer begins when the request has been carried out: less than 6000 clocks after its last byte, and for
+    a commit up to a sample period more. A pulse is at its port before the answer begins.
 
     Rounding and overflow: as in the blocks.
 

@@ -34,7 +34,7 @@ class Verdict(IntEnum):
     REQUEST = 4  # to this unit
 
 
-def crc(data: bytes) -> int:
+def crc(data: bytes | bytearray) -> int:
     """Return the CRC-16 of Modbus: polynomial 0x8005, least significant bit first, from 0xFFFF."""
     register = 0xFFFF
     for byte in data:
@@ -49,7 +49,7 @@ def framed(data: bytes) -> bytes:
     return data + crc(data).to_bytes(2, "little")
 
 
-def length_of(frame: bytes) -> int | None:
+def length_of(frame: bytes | bytearray) -> int | None:
     """Return the length of a frame by its beginning; None if it is not known, or not yet."""
     if len(frame) < 2:
         return None

@@ -64,9 +64,10 @@ class Design:
         self.first_pulse = WRITTEN - len(registers.pulses)
         self.last_word = WRITTEN + 2 * len(registers.words)
         self.last_active = self.last_word + ACTIVE - WRITTEN
-        self.last_status = (registers.status[-1].address or 0) + 2
+        self.last_status = registers.status[-1].address + 2
         self.book = self._book()
-        text, self.answers_at = registers.compressed + bytes(len(registers.compressed) % 2), {}
+        text = registers.compressed + bytes(len(registers.compressed) % 2)
+        self.answers_at: dict[tuple[bool, int], tuple[int, int]] = {}
         for key, answer in registers.identification.items():
             self.answers_at[key] = MAP + len(text) // 2, len(answer) // 2
             text += answer
@@ -75,14 +76,14 @@ class Design:
     def _book(self) -> list[int]:
         book = [0] * (END * len(Area))
         for register in self.registers.registers:
-            places = range(register.address or 0, (register.address or 0) + register.size)
+            places = range(register.address, register.address + register.size)
             for area, word in ((Area.RESET, register.reset), (Area.LEAST, register.low), (Area.MOST, register.high)):
                 for place in places:
                     shift = CELL_BITS * (places[-1] - place)
                     book[area * END + place] = word >> shift & CELL
         for moved in (*self.registers.status, *self.registers.active):
             extended, width = EXTENDED * moved.format.signed, moved.format.width
-            for half, place in enumerate(((moved.address or 0) + 1, moved.address or 0)):
+            for half, place in enumerate((moved.address + 1, moved.address)):
                 bits = min(max(width - CELL_BITS * half, 0), CELL_BITS)
                 book[Area.LEAST * END + place] = extended | bits
         return book
@@ -172,8 +173,8 @@ class RegisterFile:
         """Make the written words active if `commit` is marked, and let the marked pulses go out together."""
         if "commit" in self.marked:
             for word in self.design.registers.words:
-                place = (word.address or 0) + ACTIVE - WRITTEN
-                halves = self.live[word.address : (word.address or 0) + 2]
+                place = word.address + ACTIVE - WRITTEN
+                halves = self.live[word.address : word.address + 2]
                 self.live[place : place + 2] = halves
                 self.active[word.name] = word.from_registers(tuple(halves))
         self.pulses, self.marked = tuple(self.marked), []
@@ -182,4 +183,4 @@ class RegisterFile:
         """Take the words of every status."""
         for register in self.design.registers.status:
             halves = register.to_registers(status[register.name])
-            self.live[register.address : (register.address or 0) + 2] = halves
+            self.live[register.address : register.address + 2] = halves

@@ -354,6 +354,23 @@ async def written_words_wait_for_their_commit(dut):
     assert dut.wall_position.value.to_signed() == -2
 
 
+@cocotb.test()
+async def the_largest_request_is_answered_in_time(dut):
+    world = World(dut)
+    await world.reset()
+    await world.request(frames.read(0, 2))
+    pulses, values = world.registers.pulses, []
+    for word in world.registers.words:
+        values += word.to_registers(word.reset)
+    pdu = frames.write_and_read(pulses[-1].address, [0] * (len(pulses) - 1) + [1, *values], 0, 124)
+    begun, asked = len(world.sent.rows), world.bench.clock_number()
+    await world.request(pdu)
+    written, component = len(pulses) + len(values), RegisterFile(world.design)
+    most = 30 + 20 * written + 3 * 124 + component.snapshot_clocks + component.commit_clocks
+    # The commit waits 50 clocks for its sample.
+    assert world.sent.clocks[begun] - asked - len(pdu) <= most + 50 < 6000
+
+
 @pytest.mark.parametrize("name", ["mhz"])
 def test_rtl(name):
     simulate(__file__, make, name=name)
