@@ -88,11 +88,12 @@ class Monitors(Block):
     def elaborate(self, platform):
         m = Module()
         top = self.count[-3:]
+        fastest = Cat(Const(0, self._design.params.velocity_shift), self.supervisor_velocity_limit)
         found = {
             POSITION_RANGE: (self.count < self.supervisor_position_low) | (self.count > self.supervisor_position_high),
             # Beyond three quarters of the range of two's complement, by the first three bits.
             POSITION_WRAP: (top == 0b011) | (top == 0b100),
-            VELOCITY_LIMIT: self.valid & (abs(self.velocity) > self.supervisor_velocity_limit),
+            VELOCITY_LIMIT: self.valid & (abs(self.velocity) > fastest),
             RUNAWAY: self._runaway(m),
             ESTIMATOR_SATURATED: self._longer(m, "samples", self.saturated, self.supervisor_saturated, self.valid),
             ENCODER_LOSS: self._longer(m, "lost_a", self.a == self.a_n, self.supervisor_loss)

@@ -44,14 +44,16 @@ SATURATED_S = 0.01
 IDLE_EDGES = 100
 """Edges of one channel in a row that raise the warning: so many reversals on one edge are dither, or a dead channel."""
 LOSS_BITS = 8
+REGISTER_BITS = 31
 INDEX_TOLERANCE = 4
 """Counts that an index edge may be away from its place, after reset: a pulse may be a cycle wide."""
 
 
 class Params(NamedTuple):
-    """Widths, in bits."""
+    """The count's width, and the bits that the word of the velocity's limit lacks below the velocity's."""
 
     count_width: int
+    velocity_shift: int
 
 
 class Inputs(NamedTuple):
@@ -110,12 +112,13 @@ class Design:
     def __init__(self, axis: AxisRequirements, velocity: SQ):
         self.count_width, self.velocity, self.force = axis.count_width, velocity, axis.force
         self.limit = UQ(axis.force.width - 2, 0)
-        self.params = Params(axis.count_width)
+        # The word has as many bits as a host's register holds without its sign.
+        self.params = Params(axis.count_width, max(velocity.width - 1 - REGISTER_BITS, 0))
         count, distance = SQ(axis.count_width, 0), UQ(axis.count_width - 1, 0)
-        speed = UQ(velocity.i - 1, velocity.f)
+        speed = UQ(velocity.i - 1, velocity.f - self.params.velocity_shift)
         reach = min(int(2 * axis.travel_m / axis.count_m), count.max)
         # A finite difference knows nothing below one count a sample.
-        fastest = int(max(1.5 * axis.speed_max_counts_per_sample, 2.0) * 2**velocity.f)
+        fastest = int(max(1.5 * axis.speed_max_counts_per_sample, 2.0) * 2**speed.f)
         samples = max(int(SATURATED_S * axis.sample_hz), 1)
         self.words = (
             Word("supervisor_position_low", count, axis.count_m, "m", -reach, "least position while ARMED"),
@@ -181,7 +184,7 @@ def step(params, state, inputs):
         edges = min(edges + 1, IDLE_EDGES) if channel == state.channel else 1
 
     out_of_range = count < inputs.supervisor_position_low or count > inputs.supervisor_position_high
-    too_fast = inputs.valid and abs(inputs.velocity) > inputs.supervisor_velocity_limit
+    too_fast = inputs.valid and abs(inputs.velocity) > inputs.supervisor_velocity_limit << params.velocity_shift
     causes = (
         int(out_of_range) << POSITION_RANGE
         | int(count >= last_quarter or count < -last_quarter) << POSITION_WRAP

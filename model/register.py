@@ -5,6 +5,7 @@ from enum import Enum
 
 from .arithmetic.fixed import Format
 from .checks import FieldError, check_int
+from .words import Word
 
 VALUE_BITS = 32
 """Bits of a value in two registers."""
@@ -116,3 +117,9 @@ class Register:
             raise FieldError(self.name, f"must have {self.size} registers, not {len(registers)}")
         word = int.from_bytes(b"".join(register.to_bytes(2, "big") for register in registers), "big")
         return word - (1 << 16 * self.size) if self.format.signed and word >> (16 * self.size - 1) else word
+
+
+def word_register(word: Word, least: int | None = None, most: int | None = None) -> Register:
+    """Return the register of a run-time word, which accepts words from `least` to `most`; None for the format's."""
+    meaning = f"{word.doc[0].upper()}{word.doc[1:]}."
+    return Register(word.name, Kind.WORD, word.format, meaning, word.si_per_unit, word.unit, least, most, word.reset)

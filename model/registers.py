@@ -29,7 +29,7 @@ import zlib
 from .arithmetic.fixed import SQ, UQ, Format
 from .checks import FieldError, check_int, shown
 from .design import ILLEGAL_WIDTH
-from .register import COUNTER_BITS, VALUE_BITS, Kind, Register
+from .register import COUNTER_BITS, VALUE_BITS, Kind, Register, word_register
 from .spec import AxisSpec
 
 LAYOUT = 1
@@ -104,18 +104,7 @@ def _words(spec: AxisSpec) -> tuple[Register, ...]:
     """Return the run-time words of an axis as written: the preload's count first, for every axis has it."""
     meaning = "The pulse preload sets the count to this word once it is active."
     preload = Register("preload_count", Kind.WORD, SQ(spec.count_width, 0), meaning, spec.count_m, "m")
-    return preload, *(
-        Register(
-            word.name,
-            Kind.WORD,
-            word.format,
-            f"{word.doc[0].upper()}{word.doc[1:]}.",
-            word.si_per_unit,
-            word.unit,
-            reset=word.reset,
-        )
-        for word in spec.design.words
-    )
+    return preload, *map(word_register, spec.design.words)
 
 
 def _placed(base: int, room: int, registers: tuple[Register, ...]) -> tuple[Register, ...]:
@@ -135,7 +124,7 @@ class RegisterMap:
 
     Args:
         spec: the axis.
-        supervisor: status registers and pulses besides those of the axis, not placed yet.
+        supervisor: status registers, pulses and words besides those of the axis, not placed yet.
         capture_registers: registers of the capture memory; 0 for none.
 
     Attributes:
@@ -159,8 +148,8 @@ class RegisterMap:
         for register in supervisor:
             if not isinstance(register, Register):
                 raise TypeError(f"supervisor must be of Register, not {shown(register)}")
-            if register.kind not in (Kind.STATUS, Kind.PULSE):
-                raise FieldError(register.name, f"must be a status or a pulse, not a {register.kind.value}")
+            if register.kind not in (Kind.STATUS, Kind.PULSE, Kind.WORD):
+                raise FieldError(register.name, f"must be a status, a pulse or a word, not a {register.kind.value}")
         self.spec, self.capture_registers = spec, capture_registers
         more = tuple(register for register in supervisor if register.kind is Kind.STATUS)
         telemetry = _placed(TELEMETRY, SUPERVISOR - TELEMETRY, _telemetry(spec))
@@ -169,7 +158,8 @@ class RegisterMap:
         pulses += tuple(register for register in supervisor if register.kind is Kind.PULSE)
         lowest = WRITTEN - len(pulses)
         self.pulses = _placed(lowest, WRITTEN - max(lowest, PULSES), pulses[::-1])[::-1]
-        self.words = _placed(WRITTEN, ACTIVE - WRITTEN, _words(spec))
+        words = _words(spec) + tuple(register for register in supervisor if register.kind is Kind.WORD)
+        self.words = _placed(WRITTEN, ACTIVE - WRITTEN, words)
         self.active = tuple(
             dataclasses.replace(
                 word,

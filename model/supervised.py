@@ -1,8 +1,11 @@
 """An axis with its supervisor: every run-time word, and what the words of the axis alone are then fixed to."""
 
 from . import monitors, supervisor
+from .arithmetic.fixed import UQ
+from .register import VALUE_BITS, Kind, Register, word_register
 from .spec import AxisSpec
-from .supervisor import CAUSES
+from .supervisor import BEAT_BITS, CAUSES, COUNT, COUNT_BITS, WATCHDOG_MS
+from .words import Word
 
 FIXED = ("output_force_limit",)
 """Words of the axis that no host writes: the supervisor's force limit holds at once, and after everything."""
@@ -29,9 +32,50 @@ class Design:
         self.live = (*self.supervisor.words, *self.monitors.words)
 
     @property
-    def words(self):
+    def words(self) -> tuple[Word, ...]:
         """Every word that a host writes."""
         return (*self.committed, *self.live)
+
+    def registers(self) -> tuple[Register, ...]:
+        """Return what a host sees of the supervisor and the monitors, and what it asks of them, as registers."""
+        spec, causes = self.spec, ", ".join(f"bit {bit} {cause.name}" for bit, cause in enumerate(CAUSES))
+        per_value = VALUE_BITS // COUNT_BITS
+        status = [
+            ("state", UQ(2, 0), "The state of the supervisor: 0 DISARMED, 1 ARMED, 2 TRIPPED."),
+            ("live", UQ(1, 0), "The host's heartbeat is not overdue."),
+            ("latched", UQ(COUNT, 0), f"The causes since the last acknowledgement: {causes}."),
+            ("first", UQ(COUNT, 0), "The causes of the clock that led to the last trip."),
+            ("a_channel_idle", UQ(1, 0), "A warning: the last edges were all of one channel."),
+            *(
+                (
+                    f"counts_{first // per_value}",
+                    UQ(COUNT_BITS * min(per_value, COUNT - first), 0),
+                    f"The occurrences of {min(per_value, COUNT - first)} causes, from bit {first} on.",
+                )
+                for first in range(0, COUNT, per_value)
+            ),
+        ]
+        pulses = [
+            ("arm", "The axis is armed, if all allows it."),
+            ("disarm", "The axis is disarmed."),
+            ("acknowledge", "The causes in the active word acknowledged are acknowledged, if they are those latched."),
+            ("beat", "The host lives, if the active word beat_word is a new one."),
+        ]
+        bounds = {
+            "supervisor_force_limit": (0, spec.force_limit_word),
+            "supervisor_ramp": (1, None),
+            "supervisor_watchdog": WATCHDOG_MS,
+        }
+        second = 1 / spec.clock_hz
+        return (
+            *(Register(name, Kind.STATUS, fmt, meaning) for name, fmt, meaning in status),
+            Register("first_stamp", Kind.STATUS, UQ(spec.stamp_width, 0), "The number of that clock.", second, "s"),
+            Register("driven", Kind.STATUS, spec.force, "The drive that is let out.", spec.force_resolution_n, "N"),
+            *(Register(name, Kind.PULSE, UQ(1, 0), meaning) for name, meaning in pulses),
+            *(word_register(word, *bounds.get(word.name, ())) for word in self.live),
+            Register("acknowledged", Kind.WORD, UQ(COUNT, 0), "The causes that the host has read."),
+            Register("beat_word", Kind.WORD, UQ(BEAT_BITS, 0), "A word that differs from that of the last beat."),
+        )
 
 
 assert {*FROM_AXIS, *FROM_OUTSIDE, *monitors.MADE, "link_timeout"} == {cause.name for cause in CAUSES}

@@ -15,13 +15,13 @@ from stimuli.specs import spec
 OUTPUTS = monitors.State._fields[:2]
 
 
-def design(name: str) -> monitors.Design:
-    axis = spec(name)
+def design(name: str, estimator: str = "levant") -> monitors.Design:
+    axis = spec(name, estimator)
     return monitors.Design(axis, axis.design.estimator.velocity)
 
 
-def make(name: str) -> Recorded:
-    return Recorded(Monitors(design(name)))
+def make(name: str, estimator: str) -> Recorded:
+    return Recorded(Monitors(design(name, estimator)))
 
 
 def campaign(d: monitors.Design, clocks: int) -> dict[str, np.ndarray]:
@@ -63,9 +63,10 @@ def expected(d: monitors.Design, columns: dict[str, np.ndarray]) -> dict[str, li
 
 @cocotb.test()
 async def follows_model(dut):
-    name = parameters()["name"]
-    inputs, outputs = await play(dut, make(name), campaign(design(name), SAMPLES // 2))
-    after = expected(design(name), {column: inputs.column(column) for column in inputs.names})
+    recorded = make(**parameters())
+    d = recorded.component.design
+    inputs, outputs = await play(dut, recorded, campaign(d, SAMPLES // 2))
+    after = expected(d, {column: inputs.column(column) for column in inputs.names})
     check(inputs, outputs, after)
     causes = np.array(after["causes"])
     for cause in names(int(np.bitwise_or.reduce(causes))):
@@ -76,9 +77,9 @@ async def follows_model(dut):
     assert set(after["a_channel_idle"]) == {0, 1}
 
 
-@pytest.mark.parametrize("name", ["mhz", "narrow"])
-def test_rtl(name):
-    simulate(__file__, make, name=name)
+@pytest.mark.parametrize(("name", "estimator"), [("mhz", "levant"), ("narrow", "levant-adaptive")])
+def test_rtl(name, estimator):
+    simulate(__file__, make, name=name, estimator=estimator)
 
 
 class Bench:

@@ -10,8 +10,9 @@ from hardwall.model.arithmetic.fixed import SQ, UQ
 from hardwall.model.estimators import registry
 from hardwall.model.register import Kind, Register
 from hardwall.model.registers import ACTIVE, WRITTEN, RegisterMap
+from hardwall.model.supervised import Design
 from stimuli.specs import SPECS, spec
-from stimuli.supervised import SUPERVISOR, supervised
+from stimuli.supervised import supervised
 
 
 @pytest.mark.parametrize("name", SPECS)
@@ -25,14 +26,15 @@ def test_every_axis_has_a_map(name, estimator):
     assert registers.pulses[0].address + 1 == registers.words[0].address == WRITTEN
     for word, active in zip(registers.words, registers.active, strict=True):
         assert active.address - word.address == ACTIVE - WRITTEN
-    assert {word.name for word in registers.words} == {"preload_count", *(w.name for w in registers.spec.design.words)}
+    words = {word.name for word in (*registers.spec.design.words, *Design(registers.spec).live)}
+    assert {word.name for word in registers.words} == words | {"preload_count", "acknowledged", "beat_word"}
 
 
 def test_the_addresses_that_every_host_knows():
     registers = supervised("mhz")
     assert [each.address for each in registers.registers if each.kind is Kind.CONSTANT] == [0, 2, 4, 6, 8, 10]
     known = {"drive": 0x20, "stamp": 0x32, "state": 0x40, "link_errors": 0x64, "commit": 0x7F, "clear_flags": 0x7E}
-    known |= {"heartbeat": 0x79, "preload_count": 0x80, "encoder_glitch_clocks": 0x82, "active_encoder_invert": 0xC4}
+    known |= {"beat": 0x78, "preload_count": 0x80, "encoder_glitch_clocks": 0x82, "active_encoder_invert": 0xC4}
     assert {name: registers[name].address for name in known} == known
     # What the supervisor adds moves nothing.
     alone = RegisterMap(spec("mhz"))
@@ -44,7 +46,7 @@ def test_the_map_in_the_device_is_the_map():
     described = json.loads(zlib.decompress(registers.compressed))
     rows = {row[1]: dict(zip(described["columns"], row, strict=True)) for row in described["registers"]}
     assert described["identity"] == registers.identity
-    assert len(registers.compressed) < 1024
+    assert len(registers.compressed) < 2048
     word, row = registers["wall_position"], rows["wall_position"]
     assert row == {
         "address": word.address,
@@ -64,8 +66,8 @@ def test_every_change_of_spec_or_map_changes_the_identity():
     base = spec("mhz")
     others = [
         RegisterMap(base),
-        RegisterMap(base, SUPERVISOR),
-        RegisterMap(base, SUPERVISOR, 8),
+        RegisterMap(base, Design(base).registers()),
+        RegisterMap(base, Design(base).registers(), 8),
         RegisterMap(dataclasses.replace(base, travel_m=0.2)),
         RegisterMap(dataclasses.replace(base, force_max_n=41.0)),
         RegisterMap(spec("mhz", "fdm")),
@@ -97,8 +99,8 @@ def test_what_cannot_be_is_refused():
         RegisterMap(3)
     with pytest.raises(TypeError, match=r"supervisor must be of Register, not 3$"):
         RegisterMap(spec("mhz"), (3,))
-    with pytest.raises(ValueError, match=r"more must be a status or a pulse, not a word$"):
-        RegisterMap(spec("mhz"), (dataclasses.replace(status, kind=Kind.WORD),))
+    with pytest.raises(ValueError, match=r"more must be a status, a pulse or a word, not a constant$"):
+        RegisterMap(spec("mhz"), (dataclasses.replace(status, kind=Kind.CONSTANT),))
     with pytest.raises(ValueError, match=r"must be its own, not 'drive' of another$"):
         RegisterMap(spec("mhz"), (dataclasses.replace(status, name="drive"),))
     with pytest.raises(ValueError, match=r"block at 0x0040 must have at most 32 registers, not 34$"):
