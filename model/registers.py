@@ -55,7 +55,7 @@ def _telemetry(spec: AxisSpec) -> tuple[Register, ...]:
         velocity = SQ(velocity.i, VALUE_BITS - velocity.i)
     flags = ", ".join(f"bit {bit} {name}" for bit, name in enumerate(spec.design.flags))
     rows: list[tuple[str, Format, float, str, str]] = [
-        ("drive", force, spec.force_resolution_n, "N", "The force on the handle that leaves the FPGA."),
+        ("drive", force, spec.force_resolution_n, "N", "The force on the handle that the axis asks for."),
         ("count", count, spec.count_m, "m", "The position of the encoder."),
         (
             "velocity",
