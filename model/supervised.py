@@ -76,6 +76,3 @@ class Design:
             Register("acknowledged", Kind.WORD, UQ(COUNT, 0), "The causes that the host has read."),
             Register("beat_word", Kind.WORD, UQ(BEAT_BITS, 0), "A word that differs from that of the last beat."),
         )
-
-
-assert {*FROM_AXIS, *FROM_OUTSIDE, *monitors.MADE, "link_timeout"} == {cause.name for cause in CAUSES}

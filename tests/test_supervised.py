@@ -130,6 +130,11 @@ def test_rtl(name):
     simulate(__file__, make, name=name)
 
 
+def test_every_cause_has_one_source():
+    sources = [*FROM_AXIS, *FROM_OUTSIDE, *monitors.MADE, "link_timeout"]
+    assert sorted(sources) == sorted(cause.name for cause in CAUSES)
+
+
 def test_every_word_is_written_once():
     design = SupervisedAxis(spec("mhz")).design
     names = [word.name for word in design.words]
