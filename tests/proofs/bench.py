@@ -1,0 +1,81 @@
+"""The top of a proof: blocks whose inputs are free, what is assumed of these, and what is promised.
+
+Everything is free that a proof does not bind: every input at every clock, and the reset too, so a promise that is
+proven holds for every sequence of inputs and resets.
+"""
+
+from collections.abc import Callable
+
+from amaranth.asserts import AnyConst, AnySeq
+from amaranth.hdl import Assert, Assume, Elaboratable, Fragment, Module, ResetSignal, Shape, Signal, Value
+from amaranth.lib import wiring
+
+from .widths import Widths, signals_of
+
+
+class Bench(Elaboratable):
+    """The top of a proof.
+
+    Attributes:
+        m: the module, for a proof's own registers; it is in the blocks' clock domain and has their reset.
+        reset: that reset.
+        inner: the signals inside the blocks, by `block`, and a dot before the name of each submodule on the way.
+    """
+
+    def __init__(self, describe: Callable[["Bench"], None]):
+        self.m = Module()
+        self.reset = Signal()
+        self.inner: dict[str, Signal] = {}
+        self.m.d.comb += self.reset.eq(ResetSignal())
+        describe(self)
+
+    def block(self, component: wiring.Component, widths: Widths | None = None, **given: Value) -> wiring.Component:
+        """Add a block and return it; its inputs are free but those that are given by name.
+
+        Args:
+            component: the block.
+            widths: what looks at the block's arithmetic; None to leave it as it is.
+            given: values of inputs.
+        """
+        fragment = Fragment.get(component, None)
+        self.inner |= signals_of(fragment)
+        self.m.submodules[type(component).__name__.lower()] = fragment if widths is None else widths(fragment)
+        for path, member, signal in component.signature.flatten(component):
+            if member.flow is wiring.In:
+                name = "__".join(map(str, path))
+                self.m.d.comb += Value.cast(signal).eq(given[name] if name in given else self.free(signal.shape()))
+        return component
+
+    def free(self, shape: Shape | int = 1) -> Value:
+        """Return a value that is free at every clock."""
+        return AnySeq(shape)
+
+    def constant(self, shape: Shape | int = 1) -> Value:
+        """Return a value that is free, and the same at every clock."""
+        return AnyConst(shape)
+
+    def past(self, value: Value, clocks: int = 1) -> Value:
+        """Return a value of some clocks ago, across resets; 0 in the first clocks."""
+        for _ in range(clocks):
+            before = Signal(Value.cast(value).shape(), reset_less=True)
+            self.m.d.sync += before.eq(value)
+            value = before
+        return value
+
+    def assume(self, condition: Value) -> None:
+        """Assume a condition at every clock."""
+        self.m.d.comb += Assume(condition, src_loc_at=1)
+
+    def promise(self, condition: Value) -> None:
+        """Promise a condition at every clock."""
+        self.m.d.comb += Assert(condition, src_loc_at=1)
+
+    def within(self, **bounds: int | tuple[int, int]) -> None:
+        """Promise the ranges of inner signals by name: from the negative of a bound to it, or a lower and an upper."""
+        for name, bound in bounds.items():
+            low, high = bound if isinstance(bound, tuple) else (-bound, bound)
+            signal = self.inner[name]
+            self.m.d.comb += Assert((signal >= low) & (signal <= high), src_loc_at=1)
+
+    def elaborate(self, platform) -> Module:
+        return self.m

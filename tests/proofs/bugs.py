@@ -1,0 +1,59 @@
+"""Bugs that are put into a copy of a block's code, so that its proof is seen to fail."""
+
+import inspect
+import textwrap
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Bug:
+    """A change of the text of one function of the hardware.
+
+    Attributes:
+        function: the function, mostly the `elaborate` of a block.
+        right: a part of its source, which occurs once.
+        wrong: what stands in its place.
+    """
+
+    function: Callable
+    right: str
+    wrong: str
+
+    def __str__(self) -> str:
+        return f"{self.wrong or 'nothing'} for {self.right}"
+
+    @contextmanager
+    def seeded(self) -> Iterator[None]:
+        """Let the function have the bug inside the context; its source is not touched.
+
+        Raises:
+            ValueError: if the source does not have the right part exactly once.
+        """
+        source = textwrap.dedent(inspect.getsource(self.function))
+        if source.count(self.right) != 1:
+            raise ValueError(f"{self.function.__qualname__} must have {self.right!r} once, not {source.count(self.right)}")
+        before = self.function.__code__
+        self.function.__code__ = _code(source.replace(self.right, self.wrong), before)
+        try:
+            yield
+        finally:
+            self.function.__code__ = before
+
+
+def _code(source: str, before):
+    """Return the code of a function's source, with the closure, the name and the lines of the code that it replaces."""
+    # Inside a class, `super()` compiles as it does in a method; a variable of the closure is a local of the function around.
+    cells = [name for name in before.co_freevars if name != "__class__"]
+    around = f"def around({', '.join(cells)}):\n    class Owner:\n{textwrap.indent(source, ' ' * 8)}"
+    names = {}
+    exec(compile("\n" * (before.co_firstlineno - 3) + around, before.co_filename, "exec"), names)
+    (code,) = _named(names["around"].__code__, before.co_name)
+    return code
+
+
+def _named(code, name: str) -> list:
+    """Return the codes of a name inside a code."""
+    inner = [each for each in code.co_consts if inspect.iscode(each)]
+    return [each for each in inner if each.co_name == name] or [found for each in inner for found in _named(each, name)]

@@ -1,0 +1,64 @@
+"""What the output stage promises: limits, zero, and the exact result between them."""
+
+from amaranth.hdl import Mux, Signal, signed
+
+from hardwall.hdl.output import Output
+from stimuli.specs import spec
+
+from .bench import Bench
+from .bugs import Bug
+from .property import Property
+from .widths import Widths
+
+FORCE_LIMIT_IS_LAST = "Mux(above, limit, Mux(below, -limit, slewed))"
+
+
+def output(name: str) -> Output:
+    return Output(spec(name).design.output)
+
+
+def never_beyond_the_axis(bench: Bench) -> None:
+    stage = bench.block(output("mhz"))
+    most = stage.design.force_limit
+    bench.promise((stage.drive <= most) & (stage.drive >= -most))
+
+
+def zero_without_enable(bench: Bench) -> None:
+    stage = bench.block(output("mhz"))
+    bench.promise(bench.past(stage.enable) | (stage.drive == 0))
+
+
+def zero_until_enabled_from_strobe_to_valid(bench: Bench) -> None:
+    stage = bench.block(output("mhz"))
+    now_and_before = [bench.past(stage.enable, clocks) for clocks in range(1, stage.latency + 1)]
+    rose = (stage.drive != 0) & (bench.past(stage.drive) == 0)
+    for enabled in now_and_before:
+        bench.promise(~rose | enabled)
+
+
+PROPERTIES = [
+    Property(
+        "the drive never exceeds the axis's limit",
+        "output mhz",
+        never_beyond_the_axis,
+        depth=4,
+        bugs=(
+            Bug(Output.elaborate, FORCE_LIMIT_IS_LAST, "slewed"),
+            Bug(Output.elaborate, "Mux(self.output_force_limit > most, most, self.output_force_limit)", "self.output_force_limit"),
+        ),
+    ),
+    Property(
+        "the drive is zero one clock after enable is low",
+        "output mhz",
+        zero_without_enable,
+        depth=4,
+        bugs=(Bug(Output.elaborate, "[self.drive.eq(0), allowed.eq(0)]", "[allowed.eq(0)]"),),
+    ),
+    Property(
+        "the drive stays zero until enable is high from strobe to valid",
+        "output mhz",
+        zero_until_enabled_from_strobe_to_valid,
+        depth=6,
+        bugs=(Bug(Output.elaborate, "[self.drive.eq(0), allowed.eq(0)]", "[self.drive.eq(0)]"),),
+    ),
+]

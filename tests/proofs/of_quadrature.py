@@ -1,0 +1,157 @@
+"""What the decoder promises: no glitch counts, no count is wrong before a flag, and no fault is lost."""
+
+from amaranth.asserts import Initial
+from amaranth.hdl import Cat, Mux, Signal, Value, signed
+
+from hardwall.hdl.quadrature import Quadrature
+
+from .bench import Bench
+from .bugs import Bug
+from .property import Property
+
+SYNCHRONISER = 2
+STARTING = 3
+"""Clocks after a reset in which the levels follow the pins."""
+
+
+def cell(levels: Value) -> Value:
+    """Return the number of a cell in a cycle of four, from the levels of A and B."""
+    return Cat(levels[0] ^ levels[1], levels[1])
+
+
+class IdealFilter:
+    """The levels of A, B and Z behind an ideal filter, which knows for how long each pin has had its level.
+
+    Attributes:
+        starting: clocks until the levels no longer follow the pins after a reset.
+        lasted: for each pin, the successive clocks for which it has had the level that it has now.
+        level: the filtered levels.
+    """
+
+    def __init__(self, bench: Bench, pins: Value, limit: Value):
+        m, seen = bench.m, bench.past(pins, SYNCHRONISER)
+        self.seen = seen
+        self.starting, self.level, self.lasted = Signal(2, init=STARTING), Signal(3), []
+        m.d.sync += self.starting.eq(Mux(self.starting == 0, 0, self.starting - 1))
+        for bit in range(3):
+            before, now = Signal(5, reset_less=True), Signal(5)
+            m.d.sync += before.eq(now)
+            m.d.comb += now.eq(Mux(seen[bit] != bench.past(seen[bit]), 1, Mux(before.all(), before, before + 1)))
+            with m.If((now > limit) | (self.starting != 0)):
+                m.d.sync += self.level[bit].eq(seen[bit])
+            self.lasted.append(now)
+
+
+def a_glitch_never_counts(bench: Bench) -> None:
+    pins, limit = bench.free(3), bench.free(4)
+    decoder = bench.block(Quadrature(5, 2, 4), a=pins[0], b=pins[1], z=pins[2], glitch_clocks=limit)
+    moved = bench.inner["moved"]
+    for bit, lasted in enumerate(IdealFilter(bench, pins, limit).lasted):
+        bench.promise(bench.inner[f"held_{'abz'[bit]}"] <= bench.past(lasted))
+        bench.promise(~moved[bit] | bench.past(lasted > limit))
+    still = decoder.seen.count == bench.past(decoder.seen.count)
+    bench.promise(still | bench.past(moved[0] ^ moved[1]) | bench.past(decoder.preload) | bench.past(bench.reset))
+
+
+def counts_as_an_ideal_decoder(bench: Bench) -> None:
+    pins, limit = bench.free(3), bench.constant(4)
+    decoder = bench.block(Quadrature(5, 2, 4, 3), a=pins[0], b=pins[1], z=pins[2], glitch_clocks=limit)
+    ideal = IdealFilter(bench, pins, limit)
+    for bit, lasted in enumerate(ideal.lasted):
+        bench.promise(bench.inner[f"held_{'abz'[bit]}"] <= bench.past(lasted))
+        waited = bench.past(bench.inner["waiting"][bit] & ~bench.reset)
+        bench.promise(~waited | (bench.inner[f"held_{'abz'[bit]}"] == bench.past(lasted)))
+    bench.promise(bench.inner["starting"] == ideal.starting)
+    bench.promise(bench.inner["level"] == ideal.level)
+
+    # The level of the last clock, from which a step of more than one cell has no direction.
+    before, count, illegal = Signal(2), Signal.like(decoder.seen.count), Signal()
+    step = Signal(2)
+    bench.m.d.comb += step.eq(cell(ideal.level) - cell(before))
+    change = Mux(step[0], Mux(step[1] ^ decoder.invert, -1, 1), 0)
+    bench.m.d.sync += [
+        before.eq(Mux(ideal.starting == 0, ideal.level, ideal.seen)[:2]),
+        count.eq(Mux(decoder.preload, decoder.preload_count, count) + change),
+        illegal.eq((step == 2) | illegal & ~decoder.clear),
+    ]
+    bench.promise(decoder.seen.count == count)
+    bench.promise(decoder.illegal == illegal)
+
+
+def no_wrong_count_before_a_flag(bench: Bench) -> None:
+    """Whenever both pins have rested for the decoder's latency, the count is the number of edges, or a fault is up.
+
+    The encoder moves as it likes: at every clock each of A and B may change once. If both do, they do in either order.
+    """
+    limit, phase, moves, forth = bench.constant(2), bench.constant(2), bench.free(2), bench.free()
+    place, level, pins, rested = Signal(signed(4), init=0), Signal(2), Signal(2), Signal(4)
+    decoder = bench.block(
+        Quadrature(4, 2, 2, 1), a=pins[0], b=pins[1], glitch_clocks=limit, invert=0, preload=0, clear=0
+    )
+    bench.assume(~bench.reset)
+    bench.assume(~Initial() | (moves == 0))
+    now, one = Signal(signed(4)), moves[0] ^ moves[1]
+    # From an even cell A is the edge ahead, from an odd cell B.
+    ahead = Mux((place + phase)[0], moves[1], moves[0])
+    bench.m.d.comb += [
+        now.eq(place + Mux(moves.all(), Mux(forth, 2, -2), Mux(one, Mux(ahead, 1, -1), 0))),
+        level.eq(now + phase),
+        pins.eq(Cat(level[0] ^ level[1], level[1])),
+    ]
+    bench.m.d.sync += [place.eq(now), rested.eq(Mux(moves.any(), 0, Mux(rested.all(), rested, rested + 1)))]
+    bench.promise(decoder.fault | (rested < limit + 3) | (decoder.seen.count == place))
+
+
+def no_fault_is_lost(bench: Bench) -> None:
+    decoder = bench.block(Quadrature(5, 2, 2, 3))
+    moved, most = bench.inner["moved"], decoder.illegal_count.shape().width
+    kept = ~bench.past(decoder.clear) & ~bench.past(bench.reset)
+    for flag in (decoder.illegal, decoder.overspeed):
+        bench.promise(~(bench.past(flag) & kept) | flag)
+    both = bench.past(moved[:2].all()) & ~bench.past(bench.reset)
+    before = Mux(bench.past(decoder.clear), 0, bench.past(decoder.illegal_count))
+    bench.promise(~both | decoder.illegal)
+    bench.promise(~(both | kept) | (decoder.illegal_count == Mux(both & (before != (1 << most) - 1), before + 1, before)))
+    bench.promise(decoder.fault == (decoder.illegal | decoder.overspeed))
+
+
+PROPERTIES = [
+    Property(
+        "a pulse that the filter must reject never counts",
+        "quadrature",
+        a_glitch_never_counts,
+        depth=4,
+        bugs=(
+            Bug(Quadrature.elaborate, "held >= self.glitch_clocks", "held + 1 >= self.glitch_clocks"),
+            Bug(Quadrature.elaborate, "Mux(waiting[bit], (held + 1)[: self._glitch_width], 0)", "Mux(waiting[bit], (held + 1)[: self._glitch_width], held)"),
+        ),
+    ),
+    Property(
+        "the count follows an ideal decoder of the filtered pins",
+        "quadrature",
+        counts_as_an_ideal_decoder,
+        depth=4,
+        bugs=(
+            Bug(Quadrature.elaborate, "Mux(down, -1, 1)", "Mux(down, 1, 1)"),
+            Bug(Quadrature.elaborate, "level ^ accepted, pins", "level ^ accepted, 0"),
+        ),
+    ),
+    Property(
+        "no fault is lost between a read and a clear",
+        "quadrature",
+        no_fault_is_lost,
+        depth=4,
+        bugs=(
+            Bug(Quadrature.elaborate, "both | (self.illegal & ~self.clear)", "(both | self.illegal) & ~self.clear"),
+            Bug(Quadrature.elaborate, "both & ~kept.all()", "both"),
+        ),
+    ),
+    Property(
+        "the count is right or a fault is up, however the encoder moves",
+        "quadrature",
+        no_wrong_count_before_a_flag,
+        depth=20,
+        bounded=True,
+        bugs=(Bug(Quadrature.elaborate, "self.overspeed.eq(outrun | (self.overspeed & ~self.clear))", "self.overspeed.eq(0)"),),
+    ),
+]
