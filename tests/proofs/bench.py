@@ -10,7 +10,7 @@ from amaranth.asserts import AnyConst, AnySeq
 from amaranth.hdl import Assert, Assume, Elaboratable, Fragment, Module, ResetSignal, Shape, Signal, Value
 from amaranth.lib import wiring
 
-from .widths import Widths, signals_of
+from .widths import FreeProducts, signals_of
 
 
 class Bench(Elaboratable):
@@ -29,17 +29,17 @@ class Bench(Elaboratable):
         self.m.d.comb += self.reset.eq(ResetSignal())
         describe(self)
 
-    def block(self, component: wiring.Component, widths: Widths | None = None, **given: Value) -> wiring.Component:
+    def block(self, component: wiring.Component, freed: FreeProducts | None = None, **given: Value) -> wiring.Component:
         """Add a block and return it; its inputs are free but those that are given by name.
 
         Args:
             component: the block.
-            widths: what looks at the block's arithmetic; None to leave it as it is.
+            freed: frees the block's products, and may look at its arithmetic; None to leave it as it is.
             given: values of inputs.
         """
         fragment = Fragment.get(component, None)
         self.inner |= signals_of(fragment)
-        self.m.submodules[type(component).__name__.lower()] = fragment if widths is None else widths(fragment)
+        self.m.submodules[type(component).__name__.lower()] = fragment if freed is None else freed(fragment)
         for path, member, signal in component.signature.flatten(component):
             if member.flow is wiring.In:
                 name = "__".join(map(str, path))
@@ -54,10 +54,10 @@ class Bench(Elaboratable):
         """Return a value that is free, and the same at every clock."""
         return AnyConst(shape)
 
-    def past(self, value: Value, clocks: int = 1) -> Value:
-        """Return a value of some clocks ago, across resets; 0 in the first clocks."""
+    def past(self, value: Value, clocks: int = 1, init: int = 0) -> Value:
+        """Return a value of some clocks ago, across resets; `init` in the first clocks."""
         for _ in range(clocks):
-            before = Signal(Value.cast(value).shape(), reset_less=True)
+            before = Signal(Value.cast(value).shape(), init=init, reset_less=True)
             self.m.d.sync += before.eq(value)
             value = before
         return value

@@ -1,5 +1,6 @@
 """Properties: a promise of the hardware, how it is proven, and the bugs with which its proof must fail."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -41,7 +42,7 @@ class Property:
     @property
     def name(self) -> str:
         """A name for files and tests."""
-        return f"{self.block} {self.promise}".replace(",", "").replace(" ", "-")
+        return "-".join(re.findall(r"\w+", f"{self.block} {self.promise}"))
 
     def rtlil(self, bug: Bug | None = None) -> str:
         """Return the top of the proof for Yosys, with a bug in the hardware or without."""

@@ -70,19 +70,8 @@ def signals_of(fragment: Fragment, path: str = "") -> dict[str, Signal]:
     return found
 
 
-class Widths(FragmentTransformer, StatementTransformer, ValueTransformer):
-    """Adds the assertions of this module to a block, and frees its products.
-
-    Args:
-        wraps: names of the signals that are meant to wrap.
-
-    Attributes:
-        places: for each assertion, the name of its signal and the line of source.
-    """
-
-    def __init__(self, wraps: Iterable[str] = ()):
-        self.wraps = set(wraps)
-        self.places: list[tuple[str, str]] = []
+class FreeProducts(FragmentTransformer, StatementTransformer, ValueTransformer):
+    """Puts free values in the place of a block's products."""
 
     on_value = ValueTransformer.on_value
 
@@ -94,6 +83,21 @@ class Widths(FragmentTransformer, StatementTransformer, ValueTransformer):
         low, high = (Const(corner, value.shape()) for corner in (min(corners), max(corners)))
         free = AnySeq(value.shape())
         return Mux((free < low) | (free > high), low, free)
+
+
+class Widths(FreeProducts):
+    """Frees a block's products, and adds the assertions of this module.
+
+    Args:
+        wraps: names of the signals that are meant to wrap.
+
+    Attributes:
+        places: for each assertion, the name of its signal and the line of source.
+    """
+
+    def __init__(self, wraps: Iterable[str] = ()):
+        self.wraps = set(wraps)
+        self.places: list[tuple[str, str]] = []
 
     def on_Assign(self, stmt: Assign) -> list:
         taken = self.on_value(stmt.rhs)

@@ -1,0 +1,157 @@
+"""What root and division promise: the exact result, rounded down, at the clock that they name.
+
+A ghost beside each carries the square of the root so far, or the product of the quotient so far and the divisor: by
+(2 r + b)^2 = 4 r^2 + (4 r + 1) b for a bit b, and (2 q + b) d = 2 q d + b d, so that every step is a sum. In small
+widths the ghosts are also held against the solver's own products.
+"""
+
+from functools import partial
+
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
+
+from hardwall.hdl.arithmetic.divide import Divide
+from hardwall.hdl.arithmetic.signed_divide import SignedDivide
+from hardwall.hdl.arithmetic.sqrt import Sqrt
+from hardwall.model.arithmetic.signed_divide import BITS_PER_CLOCK
+
+from .bench import Bench
+from .bugs import Bug
+from .property import Property
+
+
+SMALL = 12
+"""The largest width for which the solver multiplies."""
+
+
+def root_is_exact(width: int, bench: Bench) -> None:
+    """The radicand is what has moved out so far, square + remainder, and the digits that are left."""
+    block = bench.block(Sqrt(width))
+    bits, inner, m = len(block.root), bench.inner, bench.m
+    left, remainder = inner["left"], inner["remainder"]
+    radicand, square = Signal(2 * bits), Signal(2 * bits)
+    # At a step the root doubles and takes its next bit, which is the last bit of the root after it.
+    before = bench.past(block.root)
+    after = Signal(2 * bits + 2)
+    now = Signal(2 * bits)
+    stepped, started = bench.past((left != 0) & ~block.start), bench.past(block.start)
+    m.d.sync += square.eq(now)
+    m.d.comb += [
+        after.eq((square << 2) + Mux(block.root[0], (before << 2) + 1, 0)),
+        now.eq(Mux(started, 0, Mux(stepped, after, square))),
+    ]
+    with m.If(block.start):
+        m.d.sync += radicand.eq(block.radicand)
+    taken = radicand >> (left << 1)
+    resetting = bench.past(bench.reset)
+    bench.promise(left <= bits)
+    bench.promise(resetting | (left == 0) | (taken == now + remainder))
+    bench.promise(resetting | (inner["digits"] == (radicand << ((bits - left) << 1)[: bits.bit_length() + 1])[: 2 * bits]))
+    bench.promise(remainder <= block.root << 1)
+    bench.promise((block.root >> (bits - left)[: len(left)]) == 0)
+    if width <= SMALL:
+        bench.promise(resetting | (now == block.root * block.root))
+    bench.promise(~block.done | (now <= radicand) & (radicand - now <= block.root << 1))
+
+
+class Division:
+    """A division beside the one in a block, and what the two keep.
+
+    Attributes:
+        dividend, divisor: the operands of the division under way.
+        product: the quotient so far, times the divisor.
+        remainder: what the quotient leaves of the dividend so far.
+    """
+
+    def __init__(self, bench: Bench, block: Divide, path: str = ""):
+        inner, m, each = bench.inner, bench.m, block.bits_per_clock
+        digits, left, saturated = (inner[path + name] for name in ("digits", "left", "saturated"))
+        steps, self.remainder = len(digits) // each, inner[path + "remainder"]
+        self.dividend, self.divisor = Signal(block.dividend_width), Signal(block.divisor_width)
+        begun = Signal()
+        before, self.product = (Signal(block.divisor_width + len(digits) + each) for _ in range(2))
+        sums = (Mux(digits[bit], self.divisor << bit, 0) for bit in range(each))
+        stepped = bench.past((left != 0) & ~block.start)
+        m.d.sync += before.eq(self.product)
+        m.d.comb += self.product.eq(
+            Mux(bench.past(block.start), 0, Mux(stepped, (before << each) + sum(sums), before))
+        )
+        with m.If(block.start):
+            m.d.sync += [self.dividend.eq(block.dividend), self.divisor.eq(block.divisor), begun.eq(1)]
+        taken = Cat(Const(0, 0), self.dividend) >> (left * each)
+        moved = (Const(steps) - left)[: len(left)] * each
+        ones = (Const(1) << moved) - 1
+        bench.promise(left <= steps)
+        for kept in (
+            inner[path + "divisor"] == self.divisor,
+            saturated == ((self.dividend >> block.quotient_width) >= self.divisor),
+            saturated | (self.remainder < self.divisor),
+            saturated | (taken == self.product + self.remainder),
+            (digits >> moved) == (self.dividend << moved)[: len(digits)] >> moved,
+            ~saturated | ((digits & ones) == ones),
+        ):
+            bench.promise(~begun | kept)
+        bench.promise(begun | (left == 0) & ~block.done)
+        if len(digits) + len(self.divisor) <= SMALL:
+            bench.promise(~begun | saturated | (self.product == (digits & ones) * self.divisor))
+
+
+def quotient_is_exact(sizes: tuple[int, int, int, int], bench: Bench) -> None:
+    block = bench.block(Divide(*sizes))
+    run = Division(bench, block)
+    largest = (1 << block.quotient_width) - 1
+    fits = run.divisor << block.quotient_width > run.dividend
+    bench.promise(~block.done | (block.saturated == ~fits))
+    bench.promise(~block.done | fits | (block.quotient == largest))
+    left_over = run.dividend - run.product
+    bench.promise(~block.done | ~fits | (left_over >= 0) & (left_over < run.divisor))
+
+
+def signed_quotient_is_exact(sizes: tuple[int, int, int, int], bench: Bench) -> None:
+    """With `done`, the quotient has the sign of the dividend and the magnitude of the division of the magnitudes."""
+    block = bench.block(SignedDivide(*sizes))
+    bits = block.quotient_bits
+    inner = Divide(block.dividend_width + block.fraction, block.divisor_width, bits, BITS_PER_CLOCK)
+    dividend, divisor = Signal.like(block.dividend), Signal.like(block.divisor)
+    with bench.m.If(block.start):
+        bench.m.d.sync += [dividend.eq(block.dividend), divisor.eq(block.divisor)]
+    size = Mux(block.dividend < 0, -block.dividend, block.dividend) << block.fraction
+    bench.m.d.comb += [inner.start.eq(block.start), inner.dividend.eq(size), inner.divisor.eq(block.divisor)]
+    bench.m.d.comb += [inner.quotient.eq(bench.inner["magnitudes.digits"]), inner.done.eq(bench.inner["magnitudes.done"])]
+    Division(bench, inner, "magnitudes.")
+    whole = Mux(dividend < 0, -dividend, dividend) << block.fraction
+    magnitude = Mux(block.quotient < 0, -block.quotient, block.quotient)
+    fits = whole < divisor << bits
+    rest = whole - magnitude * divisor
+    bench.promise(bench.inner["negative"] == (dividend < 0))
+    bench.promise(~block.done | (block.quotient == 0) | ((block.quotient < 0) == (dividend < 0)))
+    bench.promise(~block.done | fits | (magnitude == (1 << bits) - 1))
+    bench.promise(~block.done | ~fits | (rest >= 0) & (rest < divisor))
+
+
+PROPERTIES = [
+    Property(
+        "the root is exact and rounded down",
+        f"sqrt {width}",
+        partial(root_is_exact, width),
+        depth=3,
+        bugs=(Bug(Sqrt.elaborate, "fits = taken >= trial", "fits = taken > trial"),),
+    )
+    for width in (7, 12, 31)
+] + [
+    Property(
+        "the quotient is exact, rounded down, or saturates",
+        f"divide {'/'.join(map(str, sizes))}",
+        partial(quotient_is_exact, sizes),
+        depth=3,
+        bugs=(Bug(Divide.elaborate, "fits | self.saturated", "fits"),),
+    )
+    for sizes in ((8, 4, 5, 1), (24, 12, 14, 2))
+] + [
+    Property(
+        "the quotient is exact, rounded toward zero, or saturates",
+        "signed_divide 5/3/1/4",
+        partial(signed_quotient_is_exact, (5, 3, 1, 4)),
+        depth=3,
+        bugs=(Bug(SignedDivide.elaborate, "Mux(negative, -magnitudes.quotient, magnitudes.quotient)", "magnitudes.quotient"),),
+    )
+]

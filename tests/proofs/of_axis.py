@@ -1,0 +1,95 @@
+"""What the whole axis promises, with any estimator's arithmetic: limits, zero, and parameters that change together."""
+
+from functools import partial
+
+from hardwall.hdl.axis import Axis
+from hardwall.hdl.output import Output
+from hardwall.model.spec import AxisSpec
+from stimuli.specs import MHZ, spec
+
+from .bench import Bench
+from .bugs import Bug
+from .property import Property
+from .widths import FreeProducts
+
+
+def axis_of(estimator: str) -> Axis:
+    """Return an axis of 1 MHz with the slowest clock that has time for a sample, so that proofs see many samples."""
+    latency = spec("mhz", estimator).design.latency_to_drive
+    return Axis(AxisSpec(**{**MHZ, "clock_hz": (latency + 2) * MHZ["sample_hz"]}, estimator=estimator))
+
+
+def never_beyond_its_limit(estimator: str, bench: Bench) -> None:
+    axis = bench.block(axis_of(estimator), FreeProducts())
+    most = axis.spec.force_limit_word
+    bench.promise((axis.drive <= most) & (axis.drive >= -most))
+
+
+def zero_without_enable(estimator: str, bench: Bench) -> None:
+    axis = bench.block(axis_of(estimator), FreeProducts())
+    bench.promise(bench.past(axis.drive_enable) | (axis.drive == 0))
+
+
+def parameters_change_at_a_strobe(estimator: str, bench: Bench) -> None:
+    axis = bench.block(axis_of(estimator), FreeProducts())
+    allowed = bench.past(bench.inner["strobe"] & axis.commit_pending) | bench.past(bench.reset)
+    taken = bench.past(bench.inner["strobe"] & axis.commit_pending) & ~bench.past(bench.reset)
+    for word in axis.spec.design.words:
+        active = bench.inner[f"active_{word.name}"]
+        bench.promise(allowed | (active == bench.past(active, init=word.reset)))
+        bench.promise(~taken | (active == bench.past(getattr(axis, word.name))))
+
+
+def zero_before_a_commit(estimator: str, bench: Bench) -> None:
+    axis = bench.block(axis_of(estimator))
+    inner = bench.inner
+    bench.assume(~axis.commit)
+    bench.promise(~axis.commit_pending)
+    for word in axis.spec.design.words:
+        bench.promise(inner[f"active_{word.name}"] == word.reset)
+    half = 1 << (axis.spec.design.wall.push - 1)
+    for name in ("wall.gain", "wall.product", "wall.force", "output_stage.target", "output_stage.change"):
+        bench.promise(inner[name] == 0)
+    for name in ("wall.spring", "wall.total"):
+        bench.promise((inner[name] == 0) | (inner[name] == half))
+    bench.promise(inner["output_stage.slewed"] == 0)
+    bench.promise(axis.drive == 0)
+
+
+def of(estimator: str) -> list[Property]:
+    block = f"axis mhz {estimator}"
+    return [
+        Property(
+            "the drive never exceeds the axis's limit",
+            block,
+            partial(never_beyond_its_limit, estimator),
+            depth=4,
+            bugs=(Bug(Output.elaborate, "Mux(above, limit, Mux(below, -limit, slewed))", "Mux(above, limit, slewed)"),),
+        ),
+        Property(
+            "the drive is zero one clock after drive_enable is low",
+            block,
+            partial(zero_without_enable, estimator),
+            depth=4,
+            bugs=(Bug(Axis.elaborate, "output.enable.eq(self.drive_enable)", "output.enable.eq(1)"),),
+        ),
+        Property(
+            "parameters take effect together, at a strobe after a commit",
+            block,
+            partial(parameters_change_at_a_strobe, estimator),
+            depth=4,
+            bugs=(
+                Bug(Axis.elaborate, "m.If(strobe & self.commit_pending)", "m.If(self.commit_pending)"),
+            ),
+        ),
+        Property(
+            "the drive is zero until a commit",
+            block,
+            partial(zero_before_a_commit, estimator),
+            depth=12,
+            bugs=(),
+        ),
+    ]
+
+
+PROPERTIES = [*of("fdm"), *of("levant")]
