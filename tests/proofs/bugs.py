@@ -33,7 +33,9 @@ class Bug:
         """
         source = textwrap.dedent(inspect.getsource(self.function))
         if source.count(self.right) != 1:
-            raise ValueError(f"{self.function.__qualname__} must have {self.right!r} once, not {source.count(self.right)}")
+            raise ValueError(
+                f"{self.function.__qualname__} must have {self.right!r} once, not {source.count(self.right)}"
+            )
         before = self.function.__code__
         self.function.__code__ = _code(source.replace(self.right, self.wrong), before)
         try:

@@ -7,7 +7,7 @@ widths the ghosts are also held against the solver's own products.
 
 from functools import partial
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
+from amaranth.hdl import Cat, Const, Mux, Signal
 
 from hardwall.hdl.arithmetic.divide import Divide
 from hardwall.hdl.arithmetic.signed_divide import SignedDivide
@@ -17,7 +17,6 @@ from hardwall.model.arithmetic.signed_divide import BITS_PER_CLOCK
 from .bench import Bench
 from .bugs import Bug
 from .property import Property
-
 
 SMALL = 12
 """The largest width for which the solver multiplies."""
@@ -45,7 +44,9 @@ def root_is_exact(width: int, bench: Bench) -> None:
     resetting = bench.past(bench.reset)
     bench.promise(left <= bits)
     bench.promise(resetting | (left == 0) | (taken == now + remainder))
-    bench.promise(resetting | (inner["digits"] == (radicand << ((bits - left) << 1)[: bits.bit_length() + 1])[: 2 * bits]))
+    bench.promise(
+        resetting | (inner["digits"] == (radicand << ((bits - left) << 1)[: bits.bit_length() + 1])[: 2 * bits])
+    )
     bench.promise(remainder <= block.root << 1)
     bench.promise((block.root >> (bits - left)[: len(left)]) == 0)
     if width <= SMALL:
@@ -72,9 +73,7 @@ class Division:
         sums = (Mux(digits[bit], self.divisor << bit, 0) for bit in range(each))
         stepped = bench.past((left != 0) & ~block.start)
         m.d.sync += before.eq(self.product)
-        m.d.comb += self.product.eq(
-            Mux(bench.past(block.start), 0, Mux(stepped, (before << each) + sum(sums), before))
-        )
+        m.d.comb += self.product.eq(Mux(bench.past(block.start), 0, Mux(stepped, (before << each) + sum(sums), before)))
         with m.If(block.start):
             m.d.sync += [self.dividend.eq(block.dividend), self.divisor.eq(block.divisor), begun.eq(1)]
         taken = Cat(Const(0, 0), self.dividend) >> (left * each)
@@ -116,7 +115,10 @@ def signed_quotient_is_exact(sizes: tuple[int, int, int, int], bench: Bench) -> 
         bench.m.d.sync += [dividend.eq(block.dividend), divisor.eq(block.divisor)]
     size = Mux(block.dividend < 0, -block.dividend, block.dividend) << block.fraction
     bench.m.d.comb += [inner.start.eq(block.start), inner.dividend.eq(size), inner.divisor.eq(block.divisor)]
-    bench.m.d.comb += [inner.quotient.eq(bench.inner["magnitudes.digits"]), inner.done.eq(bench.inner["magnitudes.done"])]
+    bench.m.d.comb += [
+        inner.quotient.eq(bench.inner["magnitudes.digits"]),
+        inner.done.eq(bench.inner["magnitudes.done"]),
+    ]
     Division(bench, inner, "magnitudes.")
     whole = Mux(dividend < 0, -dividend, dividend) << block.fraction
     magnitude = Mux(block.quotient < 0, -block.quotient, block.quotient)
@@ -128,30 +130,40 @@ def signed_quotient_is_exact(sizes: tuple[int, int, int, int], bench: Bench) -> 
     bench.promise(~block.done | ~fits | (rest >= 0) & (rest < divisor))
 
 
-PROPERTIES = [
-    Property(
-        "the root is exact and rounded down",
-        f"sqrt {width}",
-        partial(root_is_exact, width),
-        depth=3,
-        bugs=(Bug(Sqrt.elaborate, "fits = taken >= trial", "fits = taken > trial"),),
-    )
-    for width in (7, 12, 31)
-] + [
-    Property(
-        "the quotient is exact, rounded down, or saturates",
-        f"divide {'/'.join(map(str, sizes))}",
-        partial(quotient_is_exact, sizes),
-        depth=3,
-        bugs=(Bug(Divide.elaborate, "fits | self.saturated", "fits"),),
-    )
-    for sizes in ((8, 4, 5, 1), (24, 12, 14, 2))
-] + [
-    Property(
-        "the quotient is exact, rounded toward zero, or saturates",
-        "signed_divide 5/3/1/4",
-        partial(signed_quotient_is_exact, (5, 3, 1, 4)),
-        depth=3,
-        bugs=(Bug(SignedDivide.elaborate, "Mux(negative, -magnitudes.quotient, magnitudes.quotient)", "magnitudes.quotient"),),
-    )
-]
+PROPERTIES = (
+    [
+        Property(
+            "the root is exact and rounded down",
+            f"sqrt {width}",
+            partial(root_is_exact, width),
+            depth=3,
+            bugs=(Bug(Sqrt.elaborate, "fits = taken >= trial", "fits = taken > trial"),),
+        )
+        for width in (7, 12, 31)
+    ]
+    + [
+        Property(
+            "the quotient is exact, rounded down, or saturates",
+            f"divide {'/'.join(map(str, sizes))}",
+            partial(quotient_is_exact, sizes),
+            depth=3,
+            bugs=(Bug(Divide.elaborate, "fits | self.saturated", "fits"),),
+        )
+        for sizes in ((8, 4, 5, 1), (24, 12, 14, 2))
+    ]
+    + [
+        Property(
+            "the quotient is exact, rounded toward zero, or saturates",
+            "signed_divide 5/3/1/4",
+            partial(signed_quotient_is_exact, (5, 3, 1, 4)),
+            depth=3,
+            bugs=(
+                Bug(
+                    SignedDivide.elaborate,
+                    "Mux(negative, -magnitudes.quotient, magnitudes.quotient)",
+                    "magnitudes.quotient",
+                ),
+            ),
+        )
+    ]
+)

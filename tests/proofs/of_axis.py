@@ -56,7 +56,11 @@ def zero_before_a_commit(estimator: str, bench: Bench) -> None:
     bench.promise(axis.drive == 0)
 
 
-def of(estimator: str) -> list[Property]:
+PAST_THE_OUTPUT = Bug(Axis.elaborate, "self.drive.eq(output.drive)", "self.drive.eq(decoder.seen.count)")
+
+
+def of(estimator: str, *deep: Bug) -> list[Property]:
+    """Return the properties of the axis with an estimator; `deep` are bugs that show in the second sample."""
     block = f"axis mhz {estimator}"
     return [
         Property(
@@ -64,32 +68,38 @@ def of(estimator: str) -> list[Property]:
             block,
             partial(never_beyond_its_limit, estimator),
             depth=4,
-            bugs=(Bug(Output.elaborate, "Mux(above, limit, Mux(below, -limit, slewed))", "Mux(above, limit, slewed)"),),
+            bugs=(PAST_THE_OUTPUT, *deep[:1]),
         ),
         Property(
             "the drive is zero one clock after drive_enable is low",
             block,
             partial(zero_without_enable, estimator),
             depth=4,
-            bugs=(Bug(Axis.elaborate, "output.enable.eq(self.drive_enable)", "output.enable.eq(1)"),),
+            bugs=(PAST_THE_OUTPUT, *deep[1:]),
+            quick=estimator == "levant",
         ),
         Property(
             "parameters take effect together, at a strobe after a commit",
             block,
             partial(parameters_change_at_a_strobe, estimator),
             depth=4,
-            bugs=(
-                Bug(Axis.elaborate, "m.If(strobe & self.commit_pending)", "m.If(self.commit_pending)"),
-            ),
+            bugs=(Bug(Axis.elaborate, "m.If(strobe & self.commit_pending)", "m.If(self.commit_pending)"),),
         ),
         Property(
             "the drive is zero until a commit",
             block,
             partial(zero_before_a_commit, estimator),
             depth=12,
-            bugs=(),
+            bugs=(PAST_THE_OUTPUT, Bug(Axis.elaborate, "init=word.reset", "init=1")),
         ),
     ]
 
 
-PROPERTIES = [*of("fdm"), *of("levant")]
+PROPERTIES = [
+    *of(
+        "fdm",
+        Bug(Output.elaborate, "Mux(above, limit, Mux(below, -limit, slewed))", "Mux(above, limit, slewed)"),
+        Bug(Axis.elaborate, "output.enable.eq(self.drive_enable)", "output.enable.eq(1)"),
+    ),
+    *of("levant"),
+]

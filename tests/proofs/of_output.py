@@ -1,14 +1,11 @@
 """What the output stage promises: limits, zero, and the exact result between them."""
 
-from amaranth.hdl import Mux, Signal, signed
-
 from hardwall.hdl.output import Output
 from stimuli.specs import spec
 
 from .bench import Bench
 from .bugs import Bug
 from .property import Property
-from .widths import Widths
 
 FORCE_LIMIT_IS_LAST = "Mux(above, limit, Mux(below, -limit, slewed))"
 
@@ -44,7 +41,11 @@ PROPERTIES = [
         depth=4,
         bugs=(
             Bug(Output.elaborate, FORCE_LIMIT_IS_LAST, "slewed"),
-            Bug(Output.elaborate, "Mux(self.output_force_limit > most, most, self.output_force_limit)", "self.output_force_limit"),
+            Bug(
+                Output.elaborate,
+                "Mux(self.output_force_limit > most, most, self.output_force_limit)",
+                "self.output_force_limit",
+            ),
         ),
     ),
     Property(

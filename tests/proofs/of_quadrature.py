@@ -142,7 +142,9 @@ def no_fault_is_lost(bench: Bench) -> None:
     both = bench.past(moved[:2].all()) & ~bench.past(bench.reset)
     before = Mux(bench.past(decoder.clear), 0, bench.past(decoder.illegal_count))
     bench.promise(~both | decoder.illegal)
-    bench.promise(~(both | kept) | (decoder.illegal_count == Mux(both & (before != (1 << most) - 1), before + 1, before)))
+    bench.promise(
+        ~(both | kept) | (decoder.illegal_count == Mux(both & (before != (1 << most) - 1), before + 1, before))
+    )
     bench.promise(decoder.fault == (decoder.illegal | decoder.overspeed))
 
 
@@ -154,7 +156,11 @@ PROPERTIES = [
         depth=4,
         bugs=(
             Bug(Quadrature.elaborate, "held >= self.glitch_clocks", "held + 1 >= self.glitch_clocks"),
-            Bug(Quadrature.elaborate, "Mux(waiting[bit], (held + 1)[: self._glitch_width], 0)", "Mux(waiting[bit], (held + 1)[: self._glitch_width], held)"),
+            Bug(
+                Quadrature.elaborate,
+                "Mux(waiting[bit], (held + 1)[: self._glitch_width], 0)",
+                "Mux(waiting[bit], (held + 1)[: self._glitch_width], held)",
+            ),
         ),
     ),
     Property(
@@ -182,6 +188,12 @@ PROPERTIES = [
         "quadrature",
         no_wrong_count_before_a_flag,
         depth=10,
-        bugs=(Bug(Quadrature.elaborate, "self.overspeed.eq(outrun | (self.overspeed & ~self.clear))", "self.overspeed.eq(0)"),),
+        bugs=(
+            Bug(
+                Quadrature.elaborate,
+                "self.overspeed.eq(outrun | (self.overspeed & ~self.clear))",
+                "self.overspeed.eq(0)",
+            ),
+        ),
     ),
 ]

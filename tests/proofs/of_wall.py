@@ -4,7 +4,6 @@ from functools import partial
 
 from amaranth.hdl import Mux, Signal, Value
 
-from hardwall.hdl.arithmetic.fixed import shift_floor
 from hardwall.hdl.wall import Wall
 from stimuli.specs import spec
 

@@ -5,14 +5,24 @@ Induction needs the ranges of the registers, which the formats are derived from:
 
 from collections.abc import Callable
 from functools import partial
+from typing import NamedTuple
 
 from amaranth.lib import wiring
 
 from hardwall.hdl.arithmetic.divide import Divide
 from hardwall.hdl.arithmetic.signed_divide import SignedDivide
 from hardwall.hdl.arithmetic.sqrt import Sqrt
-from hardwall.hdl.estimators import butterworth, finite_difference, foaw, history, kalman, levant
-from hardwall.hdl.estimators import levant_adaptive, levant_implicit, levant_semi_implicit, window
+from hardwall.hdl.estimators import (
+    butterworth,
+    finite_difference,
+    kalman,
+    levant,
+    levant_semi_implicit,
+    period,
+    period_count,
+)
+from hardwall.hdl.estimators.estimate import EstimatorBlock
+from hardwall.hdl.estimators.history import History
 from hardwall.hdl.estimators.registry import block_of
 from hardwall.hdl.output import Output
 from hardwall.hdl.quadrature import Quadrature
@@ -26,9 +36,10 @@ from .property import Property
 from .widths import Widths
 
 AXES = ("mhz",)
+QUICK = ("wall", "levant")
 
 
-def estimator(name: str, axis: str):
+def estimator(name: str, axis: str) -> EstimatorBlock:
     return block_of(spec(axis, name).design.estimator)
 
 
@@ -64,44 +75,125 @@ def adaptive(bench: Bench, block: wiring.Component) -> None:
         bench.promise((inner["reached"] != level) | (inner["elapsed"] < block.design.reach_samples(level + 1)))
 
 
-def past(bench: Bench, design, path: str = "") -> None:
-    bench.within(**{f"{path}phase": (0, design.every - 1), f"{path}step": design.change.max})
+def past(bench: Bench, block: wiring.Component) -> None:
+    design = block.design.history
+    bench.within(**{"history.phase": (0, design.every - 1), "history.step": design.change.max})
 
 
 def nothing(bench: Bench, block: wiring.Component) -> None:
     """Promise nothing more."""
 
 
+class Case(NamedTuple):
+    """A block: what is meant to wrap in it, what its registers keep besides, and a bug by which a value wraps."""
+
+    make: Callable[[str], wiring.Component]
+    wraps: tuple[str, ...]
+    bug: Bug
+    keeps: Callable[[Bench, wiring.Component], None] = nothing
+    depth: int = 6
+    within: int = 30
+
+
+# The difference of two counts or stamps, and a memory's address, are modulo their width. The registers of a division
+# shift bits out, and their exact result is proven; a counter that its next assignment clears may pass its end.
+MOVED = ("moved",)
 DIGITS = ("digits", "remainder", "quotient")
-HISTORY = ("moved", "head", "read__addr", "write__data", "data", "position", "change")
-CASES: dict[str, tuple[Callable, tuple[str, ...], Callable, int]] = {
-    "quadrature": (lambda axis: Quadrature(20, 16), ("count", "stamp", "seen__stamp"), start, 4),
-    "output": (lambda axis: Output(spec(axis).design.output), (), phase, 6),
-    "wall": (lambda axis: Wall(spec(axis).design.wall), ("depth",), nothing, 6),
-    "sqrt": (lambda axis: Sqrt(31), ("digits",), lambda bench, block: root(bench), 3),
-    "divide": (lambda axis: Divide(24, 12, 14, 2), DIGITS, nothing, 6),
-    "signed_divide": (lambda axis: SignedDivide(20, 10, 4, 14), DIGITS, nothing, 6),
-    "fdm": (partial(estimator, "fdm"), ("moved",), nothing, 6),
-    "levant": (partial(estimator, "levant"), ("moved", "digits"), levants, 6),
-    "levant-semi-implicit": (partial(estimator, "levant-semi-implicit"), ("moved", "digits"), levants, 6),
-    "levant-implicit": (partial(estimator, "levant-implicit"), ("moved", "digits"), levants, 6),
-    "levant-adaptive": (partial(estimator, "levant-adaptive"), ("moved", "digits"), adaptive, 6),
-    "butterworth": (partial(estimator, "butterworth"), ("moved",), nothing, 6),
-    "kalman": (partial(estimator, "kalman"), ("moved",), nothing, 6),
-    "window": (partial(estimator, "window"), (*HISTORY, *DIGITS), lambda b, c: past(b, c.design.history, "history."), 6),
-    "foaw": (partial(estimator, "foaw"), (*HISTORY, *DIGITS, "age"), lambda b, c: past(b, c.design.history, "history."), 6),
-    "period": (partial(estimator, "period"), (*DIGITS, "moved", "age", "change", "gap", "cycles", "kind", "behind"), nothing, 6),
-    "period-count": (partial(estimator, "period-count"), (*DIGITS, "moved", "age", "change", "gap", "cycles", "kind", "behind"), nothing, 6),
+HISTORY = (*MOVED, "head", "read__addr", "write__data", "data", "position", "change")
+CYCLES = (*DIGITS, *MOVED, "age", "change", "gap", "cycles", "kind", "behind", "samples")
+# Of the search for the longest window only the counters and the division are proven.
+SEARCH = ("weight", "slope", "before", "below", "above", "total", "sums", "dividend")
+
+PRODUCT = Bug(
+    levant_semi_implicit.Estimator.elaborate, "len(self._word(0)) + len(factor)", "len(self._word(0)) + len(factor) - 1"
+)
+FAST = Bug(History.elaborate, "held = saturate(moved, -design.change.max, design.change.max)", "held = moved")
+CASES = {
+    "quadrature": Case(
+        lambda axis: Quadrature(20, 16),
+        ("count", "seen__stamp"),
+        Bug(Quadrature.elaborate, "held >= self.glitch_clocks", "held > self.glitch_clocks"),
+        start,
+    ),
+    "sqrt": Case(
+        lambda axis: Sqrt(31),
+        ("digits",),
+        Bug(Sqrt.elaborate, "Signal(bits + 2)", "Signal(bits)"),
+        lambda b, _: root(b),
+    ),
+    "divide": Case(
+        lambda axis: Divide(24, 12, 14, 2), DIGITS, Bug(Divide.elaborate, "left.eq(left - 1)", "left.eq(left - 2)")
+    ),
+    "signed_divide": Case(
+        lambda axis: SignedDivide(20, 10, 4, 14), DIGITS, Bug(SignedDivide.elaborate, "[:width]", "[: width - 1]")
+    ),
+    "wall": Case(
+        lambda axis: Wall(spec(axis).design.wall),
+        ("depth",),
+        Bug(Wall.elaborate, "signed(len(gain) + len(operand))", "signed(len(gain) + len(operand) - 1)"),
+    ),
+    "output": Case(
+        lambda axis: Output(spec(axis).design.output),
+        (),
+        Bug(Output.elaborate, "Signal(signed(len(self.force) + 1))", "Signal(signed(len(self.force)))"),
+        phase,
+    ),
+    "fdm": Case(
+        partial(estimator, "fdm"),
+        MOVED,
+        Bug(finite_difference.Estimator.elaborate, "saturate(moved, fmt.min, fmt.max)", "moved"),
+    ),
+    "levant": Case(
+        partial(estimator, "levant"),
+        (*MOVED, "digits"),
+        Bug(levant.Estimator.elaborate, "design.root.width + 1)", "design.root.width)"),
+        levants,
+    ),
+    "levant-semi-implicit": Case(partial(estimator, "levant-semi-implicit"), (*MOVED, "digits"), PRODUCT, levants),
+    "levant-implicit": Case(partial(estimator, "levant-implicit"), (*MOVED, "digits"), PRODUCT, levants),
+    "levant-adaptive": Case(partial(estimator, "levant-adaptive"), (*MOVED, "digits"), PRODUCT, adaptive),
+    "butterworth": Case(
+        partial(estimator, "butterworth"),
+        MOVED,
+        Bug(butterworth.Estimator.elaborate, "held = saturate(total, -state_max, state_max)", "held = total"),
+    ),
+    "kalman": Case(
+        partial(estimator, "kalman"),
+        MOVED,
+        Bug(kalman.Estimator.elaborate, "held_v = saturate(total, -v_max, v_max)", "held_v = total"),
+    ),
+    "window": Case(partial(estimator, "window"), (*HISTORY, *DIGITS), FAST, past),
+    "foaw": Case(partial(estimator, "foaw"), (*HISTORY, *DIGITS, *SEARCH), FAST, past),
+    "period": Case(
+        partial(estimator, "period"),
+        CYCLES,
+        Bug(period.Estimator.elaborate, "far > design.velocity.max", "far > 2 * design.velocity.max"),
+        within=60,
+    ),
+    "period-count": Case(
+        partial(estimator, "period-count"),
+        CYCLES,
+        Bug(period_count.Estimator.elaborate, "saturate(far, -velocity.max, velocity.max)", "far"),
+        within=60,
+    ),
 }
 
 
-def describe(make, wraps, more, bench: Bench) -> None:
-    block = bench.block(make(), Widths(wraps))
-    more(bench, block)
+def describe(case: Case, axis: str, bench: Bench) -> None:
+    block = bench.block(case.make(axis), Widths(case.wraps))
+    case.keeps(bench, block)
 
 
 PROPERTIES = [
-    Property("no arithmetic wraps", f"{name} {axis}", partial(describe, partial(make, axis), wraps, more), depth, bugs=())
-    for name, (make, wraps, more, depth) in CASES.items()
+    Property(
+        "no arithmetic wraps",
+        f"{name} {axis}",
+        partial(describe, case, axis),
+        case.depth,
+        bugs=(case.bug,),
+        within=case.within,
+        quick=name in QUICK,
+    )
+    for name, case in CASES.items()
     for axis in AXES
 ]

@@ -9,9 +9,6 @@ from amaranth.back import rtlil
 from .bench import Bench
 from .bugs import Bug
 
-WITHIN = 30
-"""The clocks from reset in which the bug of a property must show."""
-
 
 @dataclass(frozen=True)
 class Property:
@@ -23,8 +20,9 @@ class Property:
         describe: builds the top of the proof on a bench.
         depth: clocks of the induction, or of a bounded proof.
         bounded: whether only the clocks after reset are searched; otherwise the proof is by induction, for ever.
-        bugs: each makes the proof fail within `WITHIN` clocks of reset.
+        bugs: each makes a promise fail after a reset.
         quick: whether it is also one of the regressions.
+        within: the clocks from power-up in which each bug must show.
     """
 
     promise: str
@@ -34,6 +32,7 @@ class Property:
     bugs: tuple[Bug, ...]
     bounded: bool = False
     quick: bool = False
+    within: int = 30
 
     @property
     def method(self) -> str:

@@ -86,12 +86,12 @@ def solve(name: str, rtlil: str, depth: int, bounded: bool, timeout: int = 600) 
     if found is None or found[1] not in ("PASS", "FAIL", "UNKNOWN", "TIMEOUT"):
         raise SolverError(f"the proof of {name} ended with exit code {done.returncode}; see {folder / 'log'}")
     refuted = found[1] == "FAIL"
-    steps = [int(step) for step in re.findall(r"failed assertion .* step (\d+)", text)]
+    steps = re.findall(r"engine_0(?:\.basecase)?: .*Checking assertions in step (\d+)", text)
     traces = sorted((folder / "run/engine_0").glob("trace*.vcd"), key=lambda path: "induct" in path.name)
     return Verdict(
         proved=found[1] == "PASS",
         refuted=refuted,
-        clock=min(steps, default=None),
+        clock=int(steps[-1]) if refuted and steps else None,
         trace=traces[0] if traces else None,
         failed=tuple(sorted(set(re.findall(r"Assert failed in [^:]*: (\S+)", text)))),
         seconds=seconds,

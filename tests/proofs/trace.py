@@ -27,7 +27,9 @@ def values_by_clock(vcd: str) -> dict[str, list[int]]:
             case [bits, code] if bits.startswith("b") and code in names and states:
                 states[-1][code] = int(bits[1:].replace("x", "0"), 2)
     every = [(code, name) for code, of_code in names.items() for name in of_code]
-    return {name: [state.get(code, 0) for state in states] for code, name in every if name.rpartition(".")[2] not in UNSEEN}
+    return {
+        name: [state.get(code, 0) for state in states] for code, name in every if name.rpartition(".")[2] not in UNSEEN
+    }
 
 
 def _depth(signal: tuple[str, list[int]]) -> int:
@@ -52,11 +54,15 @@ def table(trace: Path, rtlil: str) -> str:
             lines.append((path.removeprefix("top."), [str((value + half) % (2 * half) - half) for value in values]))
     head = ("clock", [str(clock) for clock in range(max((len(values) for _, values in lines), default=0))])
     label = max((len(name) for name, _ in lines), default=0)
-    columns = [max(len(cell) for cell in column) for column in zip(*(cells for _, cells in [head, *lines]), strict=True)]
+    columns = [
+        max(len(cell) for cell in column) for column in zip(*(cells for _, cells in [head, *lines]), strict=True)
+    ]
     while columns and label + sum(width + 1 for width in columns) > ROOM:
         columns.pop(0)
     rows = []
     for name, cells in [head, *lines]:
         shown = cells[len(cells) - len(columns) :]
-        rows.append(" ".join([name.ljust(label), *(cell.rjust(width) for cell, width in zip(shown, columns, strict=True))]))
+        rows.append(
+            " ".join([name.ljust(label), *(cell.rjust(width) for cell, width in zip(shown, columns, strict=True))])
+        )
     return "\n".join(rows) + "\n"

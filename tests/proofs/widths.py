@@ -46,15 +46,22 @@ def names_of(statement: Assign, signal: Signal) -> set[str]:
 
 
 class Collector(FragmentTransformer, StatementTransformer):
-    """Collects the signals that statements drive, by name."""
+    """Collects the signals that statements drive, by name: the first of each name.
+
+    Attributes:
+        named: the signals with a name of their own.
+        unnamed: the others, by every name that could be theirs.
+    """
 
     def __init__(self):
-        self.signals: dict[str, Signal] = {}
+        self.named: dict[str, Signal] = {}
+        self.unnamed: dict[str, Signal] = {}
 
     def on_Assign(self, stmt: Assign) -> Assign:
         for signal in stmt.lhs._lhs_signals():
+            found = self.unnamed if signal.name.startswith("$") else self.named
             for name in names_of(stmt, signal):
-                self.signals.setdefault(name, signal)
+                found.setdefault(name, signal)
         return stmt
 
 
@@ -64,7 +71,7 @@ def signals_of(fragment: Fragment, path: str = "") -> dict[str, Signal]:
     for statements in fragment.statements.values():
         for statement in statements:
             collector.on_statement(statement)
-    found = {path + name: signal for name, signal in collector.signals.items()}
+    found = {path + name: signal for name, signal in (collector.unnamed | collector.named).items()}
     for part, name, _ in fragment.subfragments:
         found |= signals_of(part, f"{path}{name}.")
     return found

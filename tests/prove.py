@@ -1,0 +1,48 @@
+"""The proofs of the hardware: every property, and every bug with which its proof must fail.
+
+    make prove                      prove everything
+    make prove ONLY="axis mhz"      only the properties of blocks whose names begin so
+
+Prints a table, the counterexample of what is refuted, and one last line for a script; exits with 1 if anything falls
+short: a property that is not proven, or a bug that is not found.
+"""
+
+import sys
+
+from proofs.properties import PROPERTIES
+from proofs.run import Outcome, run
+
+from hardwall.sim.commands.terminal import show
+from hardwall.sim.jobs.result import Table
+
+COLUMNS = {
+    "block": "left",
+    "property": "left",
+    "method, clocks": "left",
+    "seconds": "right",
+    "result": "left",
+    "seeded bugs found at clock": "left",
+}
+
+
+def row(outcome: Outcome) -> list[str]:
+    """Return an outcome as a row of the table."""
+    found = ", ".join("missed" if verdict.clock is None else str(verdict.clock) for verdict in outcome.bugs)
+    known = outcome.property
+    return [known.block, known.promise, known.method, f"{outcome.verdict.seconds:.1f}", outcome.result, found]
+
+
+def main(begins: str) -> int:
+    """Prove the properties of the blocks whose names begin so; return the exit code."""
+    chosen = [known for known in PROPERTIES if known.block.startswith(begins)]
+    outcomes = run(chosen, lambda outcome: print(outcome.line, file=sys.stderr, flush=True))
+    show(Table(COLUMNS, [row(outcome) for outcome in outcomes]))
+    for outcome in outcomes:
+        print(outcome.explanation, end="")
+    proved = sum(outcome.ok for outcome in outcomes)
+    print(f"prove: {len(outcomes)} properties, {proved} proved")
+    return 0 if outcomes and proved == len(outcomes) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(" ".join(sys.argv[1:])))
