@@ -2,7 +2,7 @@
 #
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
 #   ARGS="-k levant"          more options for pytest (test, soak, fuzz)
-#   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests)
+#   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests), or of the blocks (prove)
 #   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
 #                             the seeds, the samples for every seed, and the samples of endurance (soak)
 #   CALLS=1000 KILLS=16       the hostile calls, and the runs that are ended (fuzz)
@@ -50,7 +50,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test lint bench synth choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove lint bench synth choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -58,6 +58,9 @@ all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the l
 
 test: $(VENV)/.test | tools ## every regression: the model against exact arithmetic, the RTL against the model
 	@$(PYTEST) $(if $(CI),--junitxml build/junit.xml) $(ARGS)
+
+prove: $(VENV)/.prove | tools ## every promise about safety and every width, proven; every proof is seen to fail with a bug
+	@$(VENV)/bin/python tests/prove.py $(ONLY)
 
 lint: $(VENV)/.test | tools ## style and common mistakes
 	@failed=0; $(RUN) ruff check . || failed=1; $(RUN) ruff format --check . || failed=1; exit $$failed
@@ -134,7 +137,7 @@ build/hit-%.json build/hit-%.png: $(SOURCES) $(VENV)/.sim | tools
 build/mhz-%.json build/mhz-%.png: $(SOURCES) $(VENV)/.sim | tools
 	$(call hit,mhz,fixed,its bit-accurate model)
 
-# ---- the tools: .sim for the loop, .test for the regressions, .synth for place and route, .docs for the pages --------
+# ---- the tools: .sim for the loop, .test for the regressions, .prove, .synth for place and route, .docs for the pages
 
 # .venv is made anew for another PYTHON, when its interpreter is gone, and in a tree that was moved or copied.
 MADE_IN := $(file <$(VENV)/.made)
@@ -168,6 +171,9 @@ $(VENV)/.sim: pyproject.toml $(VENV)/.made | tools
 
 $(VENV)/.test: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)test,the tests' tools)
+
+$(VENV)/.prove: pyproject.toml $(VENV)/.sim | tools
+	$(call install,sim$(comma)prove,the solver)
 
 $(VENV)/.synth: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)synth,place and route)

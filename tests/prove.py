@@ -9,11 +9,10 @@ short: a property that is not proven, or a bug that is not found.
 
 import sys
 
-from proofs.properties import PROPERTIES
-from proofs.run import Outcome, run
-
 from hardwall.sim.commands.terminal import show
 from hardwall.sim.jobs.result import Table
+from proofs.properties import PROPERTIES
+from proofs.run import Outcome, run
 
 COLUMNS = {
     "block": "left",

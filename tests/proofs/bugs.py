@@ -46,7 +46,7 @@ class Bug:
 
 def _code(source: str, before):
     """Return the code of a function's source, with the closure, the name and the lines of the code that it replaces."""
-    # Inside a class, `super()` compiles as it does in a method; a variable of the closure is a local of the function around.
+    # In a class `super()` compiles as in a method, and variables of the closure are those of the function around it.
     cells = [name for name in before.co_freevars if name != "__class__"]
     around = f"def around({', '.join(cells)}):\n    class Owner:\n{textwrap.indent(source, ' ' * 8)}"
     names = {}

@@ -119,11 +119,12 @@ def signed_quotient_is_exact(sizes: tuple[int, int, int, int], bench: Bench) -> 
         inner.quotient.eq(bench.inner["magnitudes.digits"]),
         inner.done.eq(bench.inner["magnitudes.done"]),
     ]
-    Division(bench, inner, "magnitudes.")
+    run = Division(bench, inner, "magnitudes.")
     whole = Mux(dividend < 0, -dividend, dividend) << block.fraction
     magnitude = Mux(block.quotient < 0, -block.quotient, block.quotient)
     fits = whole < divisor << bits
     rest = whole - magnitude * divisor
+    bench.promise((run.dividend == whole) & (run.divisor == divisor))
     bench.promise(bench.inner["negative"] == (dividend < 0))
     bench.promise(~block.done | (block.quotient == 0) | ((block.quotient < 0) == (dividend < 0)))
     bench.promise(~block.done | fits | (magnitude == (1 << bits) - 1))
@@ -138,6 +139,7 @@ PROPERTIES = (
             partial(root_is_exact, width),
             depth=3,
             bugs=(Bug(Sqrt.elaborate, "fits = taken >= trial", "fits = taken > trial"),),
+            quick=width == SMALL,
         )
         for width in (7, 12, 31)
     ]
@@ -148,6 +150,7 @@ PROPERTIES = (
             partial(quotient_is_exact, sizes),
             depth=3,
             bugs=(Bug(Divide.elaborate, "fits | self.saturated", "fits"),),
+            quick=sum(sizes) < 2 * SMALL,
         )
         for sizes in ((8, 4, 5, 1), (24, 12, 14, 2))
     ]

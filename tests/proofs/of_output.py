@@ -1,5 +1,7 @@
 """What the output stage promises: limits, zero, and the exact result between them."""
 
+from amaranth.hdl import Signal
+
 from hardwall.hdl.output import Output
 from stimuli.specs import spec
 
@@ -33,6 +35,21 @@ def zero_until_enabled_from_strobe_to_valid(bench: Bench) -> None:
         bench.promise(~rose | enabled)
 
 
+def within_the_limit_at_run_time(bench: Bench) -> None:
+    stage = bench.block(output("mhz"))
+    word = bench.past(stage.output_force_limit, clocks=2)
+    bench.promise(~(stage.valid & stage.actuated) | (stage.drive <= word) & (stage.drive >= -word))
+
+
+def zero_after_a_fault(bench: Bench) -> None:
+    stage = bench.block(output("mhz"))
+    idle, faulty = bench.inner["fsm_state"] == 0, Signal()
+    with bench.m.If(idle & stage.strobe):
+        bench.m.d.sync += faulty.eq(stage.fault)
+    bench.promise(idle | ~faulty | ~bench.inner["allowed"])
+    bench.promise(~stage.valid | ~faulty | (stage.drive == 0))
+
+
 PROPERTIES = [
     Property(
         "the drive never exceeds the axis's limit",
@@ -61,5 +78,22 @@ PROPERTIES = [
         zero_until_enabled_from_strobe_to_valid,
         depth=6,
         bugs=(Bug(Output.elaborate, "[self.drive.eq(0), allowed.eq(0)]", "[self.drive.eq(0)]"),),
+        quick=True,
+    ),
+    Property(
+        "at an actuation the drive is within the limit at run time, two clocks before",
+        "output mhz",
+        within_the_limit_at_run_time,
+        depth=4,
+        bugs=(Bug(Output.elaborate, FORCE_LIMIT_IS_LAST, "Mux(above, limit, slewed)"),),
+        quick=True,
+    ),
+    Property(
+        "a fault with the strobe makes the drive zero at valid",
+        "output mhz",
+        zero_after_a_fault,
+        depth=5,
+        bugs=(Bug(Output.elaborate, "self.enable & ~self.fault", "self.enable"),),
+        quick=True,
     ),
 ]

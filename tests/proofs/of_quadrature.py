@@ -154,6 +154,7 @@ PROPERTIES = [
         "quadrature",
         a_glitch_never_counts,
         depth=4,
+        quick=True,
         bugs=(
             Bug(Quadrature.elaborate, "held >= self.glitch_clocks", "held + 1 >= self.glitch_clocks"),
             Bug(
@@ -188,6 +189,7 @@ PROPERTIES = [
         "quadrature",
         no_wrong_count_before_a_flag,
         depth=10,
+        quick=True,
         bugs=(
             Bug(
                 Quadrature.elaborate,

@@ -18,7 +18,7 @@ def wall(axis: str) -> Wall:
 
 
 def latched(bench: Bench, block: Wall) -> dict[str, Value]:
-    """Return the inputs with the last strobe that was taken; from there to `valid` all but the strobe must be constant."""
+    """Return the inputs as the last strobe took them; they are assumed to be constant from there to `valid`."""
     idle = bench.inner["fsm_state"] == 0
     taken = {}
     for name in ("count", "velocity", *(word.name for word in block.design.words)):
@@ -55,6 +55,7 @@ PROPERTIES = [
         "wall mhz",
         partial(never_pulls, "mhz"),
         depth=10,
+        quick=True,
         bugs=(Bug(Wall.elaborate, "below & self.wall_forbid_pull, 0", "below & self.wall_left, 0"),),
     ),
 ]

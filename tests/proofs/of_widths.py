@@ -18,15 +18,16 @@ from hardwall.hdl.estimators import (
     kalman,
     levant,
     levant_semi_implicit,
-    period,
-    period_count,
 )
+from hardwall.hdl.estimators.cycle_times import CycleTimes
 from hardwall.hdl.estimators.estimate import EstimatorBlock
+from hardwall.hdl.estimators.foaw import FIRST
 from hardwall.hdl.estimators.history import History
 from hardwall.hdl.estimators.registry import block_of
 from hardwall.hdl.output import Output
 from hardwall.hdl.quadrature import Quadrature
 from hardwall.hdl.wall import Wall
+from hardwall.model.estimators.foaw import TAPS
 from hardwall.model.quadrature import START
 from stimuli.specs import spec
 
@@ -84,6 +85,11 @@ def nothing(bench: Bench, block: wiring.Component) -> None:
     """Promise nothing more."""
 
 
+def search(bench: Bench, block: wiring.Component) -> None:
+    past(bench, block)
+    bench.within(clock=(0, FIRST + TAPS + 3))
+
+
 class Case(NamedTuple):
     """A block: what is meant to wrap in it, what its registers keep besides, and a bug by which a value wraps."""
 
@@ -102,12 +108,13 @@ DIGITS = ("digits", "remainder", "quotient")
 HISTORY = (*MOVED, "head", "read__addr", "write__data", "data", "position", "change")
 CYCLES = (*DIGITS, *MOVED, "age", "change", "gap", "cycles", "kind", "behind", "samples")
 # Of the search for the longest window only the counters and the division are proven.
-SEARCH = ("weight", "slope", "before", "below", "above", "total", "sums", "dividend")
+SEARCH = ("age", "weight", "slope", "before", "below", "above", "total", "sums", "dividend")
 
 PRODUCT = Bug(
     levant_semi_implicit.Estimator.elaborate, "len(self._word(0)) + len(factor)", "len(self._word(0)) + len(factor) - 1"
 )
 FAST = Bug(History.elaborate, "held = saturate(moved, -design.change.max, design.change.max)", "held = moved")
+FORWARD = Bug(CycleTimes.elaborate, "forward = Signal(signed(len(count) + 1))", "forward = Signal(signed(len(count)))")
 CASES = {
     "quadrature": Case(
         lambda axis: Quadrature(20, 16),
@@ -146,7 +153,7 @@ CASES = {
     "levant": Case(
         partial(estimator, "levant"),
         (*MOVED, "digits"),
-        Bug(levant.Estimator.elaborate, "design.root.width + 1)", "design.root.width)"),
+        Bug(levant.arrive, "lead.eq(Mux(fresh, 0, lead))", "lead.eq(Mux(fresh, 1 << len(lead), lead))"),
         levants,
     ),
     "levant-semi-implicit": Case(partial(estimator, "levant-semi-implicit"), (*MOVED, "digits"), PRODUCT, levants),
@@ -160,22 +167,12 @@ CASES = {
     "kalman": Case(
         partial(estimator, "kalman"),
         MOVED,
-        Bug(kalman.Estimator.elaborate, "held_v = saturate(total, -v_max, v_max)", "held_v = total"),
+        Bug(kalman.Estimator.elaborate, "signed(len(operand) + len(gain))", "signed(len(operand) + len(gain) - 1)"),
     ),
     "window": Case(partial(estimator, "window"), (*HISTORY, *DIGITS), FAST, past),
-    "foaw": Case(partial(estimator, "foaw"), (*HISTORY, *DIGITS, *SEARCH), FAST, past),
-    "period": Case(
-        partial(estimator, "period"),
-        CYCLES,
-        Bug(period.Estimator.elaborate, "far > design.velocity.max", "far > 2 * design.velocity.max"),
-        within=60,
-    ),
-    "period-count": Case(
-        partial(estimator, "period-count"),
-        CYCLES,
-        Bug(period_count.Estimator.elaborate, "saturate(far, -velocity.max, velocity.max)", "far"),
-        within=60,
-    ),
+    "foaw": Case(partial(estimator, "foaw"), (*HISTORY, *DIGITS, *SEARCH), FAST, search),
+    "period": Case(partial(estimator, "period"), CYCLES, FORWARD),
+    "period-count": Case(partial(estimator, "period-count"), CYCLES, FORWARD),
 }
 
 

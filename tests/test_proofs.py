@@ -1,0 +1,98 @@
+"""The quick ones of the proofs, each with its bugs, and the means: `make prove` proves everything."""
+
+import inspect
+
+import prove
+import pytest
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+
+from hardwall.hdl.output import Output
+from proofs import properties
+from proofs.bench import Bench
+from proofs.bugs import Bug
+from proofs.property import Property
+from proofs.run import run
+from proofs.widths import Widths
+
+QUICK = [known for known in properties.PROPERTIES if known.quick]
+
+
+class Sum(wiring.Component):
+    """A sum that fits its register, and a difference that does not."""
+
+    a: In(4)
+    b: In(4)
+    sum: Out(5)
+    difference: Out(4)
+
+    def elaborate(self, platform):
+        m = Module()
+        m.d.sync += [self.sum.eq(self.a + self.b), self.difference.eq(self.a - self.b)]
+        return m
+
+
+def sums(*wraps: str) -> Property:
+    """Return the property that nothing wraps but these, with a bug by which the sum does."""
+    larger = Bug(Sum.elaborate, "self.a + self.b", "self.a + self.b + 2")
+    name = " ".join(["sum", *wraps])
+    return Property("nothing wraps", name, lambda bench: bench.block(Sum(), Widths(wraps)), 2, (larger,), within=4)
+
+
+def test_every_property_has_a_bug_and_a_name_of_its_own():
+    assert [known.name for known in properties.PROPERTIES if not known.bugs] == []
+    assert len({known.name for known in properties.PROPERTIES}) == len(properties.PROPERTIES)
+
+
+@pytest.mark.parametrize("known", QUICK, ids=[known.name for known in QUICK])
+def test_is_proven_and_its_bugs_are_found(known):
+    (outcome,) = run([known], lambda _: None)
+    assert outcome.verdict.proved, outcome.explanation
+    assert [verdict.refuted for verdict in outcome.bugs] == [True] * len(known.bugs)
+
+
+@pytest.mark.parametrize("known", properties.PROPERTIES, ids=[known.name for known in properties.PROPERTIES])
+def test_every_bug_changes_the_hardware(known):
+    right = known.rtlil()
+    assert [bug for bug in known.bugs if known.rtlil(bug) == right] == []
+    assert known.rtlil() == right
+
+
+def test_a_bug_must_be_of_a_part_that_the_source_has_once():
+    code = Output.elaborate.__code__
+    with pytest.raises(ValueError, match=r"^Output\.elaborate must have 'self\.drive' once, not \d+$"):
+        Bug(Output.elaborate, "self.drive", "0").seeded().__enter__()
+    with Bug(Output.elaborate, "phase == 0) & allowed", "phase == 0) & 1").seeded():
+        assert Output.elaborate.__code__ is not code
+    assert Output.elaborate.__code__ is code
+    assert "& allowed" in inspect.getsource(Output.elaborate)
+
+
+def test_a_value_that_loses_a_bit_is_found_unless_it_is_meant_to_wrap():
+    widths = Widths(("difference",))
+    Bench(lambda bench: bench.block(Sum(), widths)).elaborate(None)
+    assert widths.places == []
+    every = Widths()
+    Bench(lambda bench: bench.block(Sum(), every)).elaborate(None)
+    assert [name for name, _ in every.places] == ["difference"]
+
+
+@pytest.mark.parametrize(
+    ("known", "result", "last"),
+    [
+        (sums("difference"), "proved", "prove: 1 properties, 1 proved"),
+        (sums(), "refuted", "prove: 1 properties, 0 proved"),
+        (sums("difference", "sum"), "proved, but a bug is not found", "prove: 1 properties, 0 proved"),
+    ],
+    ids=["proved", "refuted", "missed"],
+)
+def test_the_command_ends_in_a_line_for_a_script(known, result, last, monkeypatch, capsys):
+    monkeypatch.setattr(prove, "PROPERTIES", [known])
+    code = prove.main("")
+    out, err = capsys.readouterr()
+    assert out.splitlines()[-1] == last
+    assert f"nothing wraps: {result} (" in err
+    assert code == int(result != "proved")
+    # A counterexample is told by clock.
+    assert ("\nclock " in out) == (result == "refuted")
