@@ -1,10 +1,11 @@
 """The quick ones of the proofs, each with its bugs, and the means: `make prove` proves everything."""
 
 import inspect
+from itertools import product
 
 import prove
 import pytest
-from amaranth.hdl import Module
+from amaranth.hdl import Module, Shape
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -14,7 +15,7 @@ from proofs.bench import Bench
 from proofs.bugs import Bug
 from proofs.property import Property
 from proofs.run import run
-from proofs.widths import Widths
+from proofs.widths import Widths, extremes, range_of_product
 
 QUICK = [known for known in properties.PROPERTIES if known.quick]
 
@@ -76,6 +77,15 @@ def test_a_value_that_loses_a_bit_is_found_unless_it_is_meant_to_wrap():
     every = Widths()
     Bench(lambda bench: bench.block(Sum(), every)).elaborate(None)
     assert [name for name, _ in every.places] == ["difference"]
+
+
+@pytest.mark.parametrize("signs", [(False, False), (False, True), (True, False), (True, True)])
+def test_the_range_of_a_product_is_that_of_all_products(signs):
+    for widths in product(range(1, 5), repeat=2):
+        shapes = [Shape(width, signed) for width, signed in zip(widths, signs, strict=True)]
+        (a, b), (c, d) = map(extremes, shapes)
+        products = {x * y for x in range(a, b + 1) for y in range(c, d + 1)}
+        assert range_of_product(*shapes) == (min(products), max(products))
 
 
 @pytest.mark.parametrize(

@@ -86,10 +86,15 @@ class FreeProducts(FragmentTransformer, StatementTransformer, ValueTransformer):
         operands = [self.on_value(operand) for operand in value.operands]
         if value.operator != "*" or any(isinstance(operand, Const) for operand in operands):
             return Operator(value.operator, operands)
-        corners = [a * b for a, b in product(*(extremes(operand.shape()) for operand in operands))]
-        low, high = (Const(corner, value.shape()) for corner in (min(corners), max(corners)))
         free = AnySeq(value.shape())
+        low, high = (Const(bound, value.shape()) for bound in range_of_product(*(each.shape() for each in operands)))
         return Mux((free < low) | (free > high), low, free)
+
+
+def range_of_product(one: Shape, other: Shape) -> tuple[int, int]:
+    """Return the least and the greatest product of values of two shapes: both are products of extremes."""
+    corners = [a * b for a, b in product(extremes(one), extremes(other))]
+    return min(corners), max(corners)
 
 
 class Widths(FreeProducts):
