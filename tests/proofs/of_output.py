@@ -9,7 +9,7 @@ from .bench import Bench
 from .bugs import Bug
 from .property import Property
 
-FORCE_LIMIT_IS_LAST = "Mux(above, limit, Mux(below, -limit, slewed))"
+FORCE_LIMIT_IS_LAST = "Mux(over, limit, Mux(under, -limit, slewed))"
 
 
 def output(name: str) -> Output:
@@ -85,7 +85,7 @@ PROPERTIES = [
         "output mhz",
         within_the_limit_at_run_time,
         depth=4,
-        bugs=(Bug(Output.elaborate, FORCE_LIMIT_IS_LAST, "Mux(above, limit, slewed)"),),
+        bugs=(Bug(Output.elaborate, FORCE_LIMIT_IS_LAST, "Mux(over, limit, slewed)"),),
         quick=True,
     ),
     Property(

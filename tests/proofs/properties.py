@@ -1,12 +1,13 @@
 """Every property, in the order of the path of data."""
 
-from . import of_arithmetic, of_axis, of_output, of_quadrature, of_wall, of_widths
+from . import of_arithmetic, of_axis, of_output, of_quadrature, of_supervisor, of_wall, of_widths
 
 PROPERTIES = [
     *of_quadrature.PROPERTIES,
     *of_arithmetic.PROPERTIES,
     *of_wall.PROPERTIES,
     *of_output.PROPERTIES,
+    *of_supervisor.PROPERTIES,
     *of_axis.PROPERTIES,
     *of_widths.PROPERTIES,
 ]
