@@ -98,7 +98,7 @@ def of(estimator: str, *deep: Bug) -> list[Property]:
 PROPERTIES = [
     *of(
         "fdm",
-        Bug(Output.elaborate, "Mux(over, limit, Mux(under, -limit, slewed))", "Mux(above, limit, slewed)"),
+        Bug(Output.elaborate, "Mux(over, limit, Mux(under, -limit, slewed))", "Mux(over, limit, slewed)"),
         Bug(Axis.elaborate, "output.enable.eq(self.drive_enable)", "output.enable.eq(1)"),
     ),
     *of("levant"),
