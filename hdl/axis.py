@@ -57,7 +57,7 @@ class Axis(wiring.Component):
         The live count; the last sample's velocity and wall force.
     flags : Out
         Sticky flags, bits as in `spec.design.flags`; the encoder's flags as the samples saw them.
-    stepped, edge : Out
+    stepped, edge_kind : Out
         High for one clock with the count of a new edge, and the kind of the last edge.
     indexed : Out(1)
         High for one clock with the count at a rising edge of Z.
@@ -108,7 +108,7 @@ class Axis(wiring.Component):
                 "wall_force": Out(shape(spec.force)),
                 "flags": Out(len(design.flags)),
                 "stepped": Out(1),
-                "edge": Out(2),
+                "edge_kind": Out(2),
                 "indexed": Out(1),
                 "estimated": Out(1),
                 "saturated": Out(1),
@@ -203,7 +203,7 @@ class Axis(wiring.Component):
             self.velocity.eq(estimator.velocity),
             self.wall_force.eq(wall.force),
             self.stepped.eq(decoder.stepped),
-            self.edge.eq(decoder.seen.edge),
+            self.edge_kind.eq(decoder.seen.edge),
             self.indexed.eq(decoder.indexed),
             self.estimated.eq(estimator.valid),
             self.saturated.eq(estimator.valid & estimator.saturated.any()),

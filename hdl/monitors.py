@@ -25,9 +25,9 @@ class Monitors(Block):
 
     Equation: in the model's module, bit by bit.
 
-    Latency: one clock from the inputs to `causes`. `velocity` and `saturated` are looked at with `valid`, `edge` with
-    `stepped`, and the count's distance to the last index edge with `indexed`: these causes are pulses. The others last
-    for as long as what is wrong does.
+    Latency: one clock from the inputs to `causes`. `velocity` and `saturated` are looked at with `valid`, `edge_kind`
+    with `stepped`, and the count's distance to the last index edge with `indexed`: these causes are pulses. The others
+    last for as long as what is wrong does.
 
     Rounding and overflow: distances are taken modulo the count's width; counters stop at their limits.
 
@@ -40,7 +40,7 @@ class Monitors(Block):
     -------
     count : In(SQ)
         The live count.
-    stepped, edge : In
+    stepped, edge_kind : In
         The count has changed, and the kind of the edge that changed it.
     indexed : In(1)
         Pulse: the index edge was counted.
@@ -72,7 +72,7 @@ class Monitors(Block):
         return {
             "count": In(signed(design.count_width)),
             "stepped": In(1),
-            "edge": In(2),
+            "edge_kind": In(2),
             "indexed": In(1),
             "valid": In(1),
             "velocity": In(shape(design.velocity)),
@@ -106,8 +106,8 @@ class Monitors(Block):
         following = Signal.like(edges)
         m.d.comb += following.eq(edges)
         with m.If(self.stepped):
-            m.d.sync += channel.eq(self.edge[0])
-            with m.If(channel != self.edge[0]):
+            m.d.sync += channel.eq(self.edge_kind[0])
+            with m.If(channel != self.edge_kind[0]):
                 m.d.comb += following.eq(1)
             with m.Elif(edges != IDLE_EDGES):
                 m.d.comb += following.eq(edges + 1)

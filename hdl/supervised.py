@@ -119,7 +119,7 @@ class SupervisedAxis(wiring.Component):
         m.d.comb += [
             monitors.count.eq(axis.count),
             monitors.stepped.eq(axis.stepped),
-            monitors.edge.eq(axis.edge),
+            monitors.edge_kind.eq(axis.edge_kind),
             monitors.indexed.eq(axis.indexed),
             monitors.valid.eq(axis.estimated),
             monitors.velocity.eq(axis.velocity),

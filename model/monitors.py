@@ -61,7 +61,7 @@ class Inputs(NamedTuple):
 
     count: int = 0  # type: ignore[assignment]  # a tuple has a method of this name
     stepped: int = 0
-    edge: int = 0
+    edge_kind: int = 0
     indexed: int = 0
     valid: int = 0
     velocity: int = 0
@@ -180,7 +180,7 @@ def step(params, state, inputs):
 
     channel, edges = state.channel, state.edges
     if inputs.stepped:
-        channel = inputs.edge & 1
+        channel = inputs.edge_kind & 1
         edges = min(edges + 1, IDLE_EDGES) if channel == state.channel else 1
 
     out_of_range = count < inputs.supervisor_position_low or count > inputs.supervisor_position_high

@@ -42,7 +42,7 @@ def campaign(d: monitors.Design, clocks: int) -> dict[str, np.ndarray]:
     columns = {
         "reset": (random.random(clocks) < 1e-3).astype(np.int64),
         "count": word(-half, half - 1, 30),
-        "stepped": bit(0.5, 2), "edge": held(random.integers(0, 4, clocks) & ~1, 60) ^ bit(0.05, 60),
+        "stepped": bit(0.5, 2), "edge_kind": held(random.integers(0, 4, clocks) & ~1, 60) ^ bit(0.05, 60),
         "indexed": bit(0.2, 2), "valid": bit(0.5, 3), "saturated": bit(0.7, 200),
         "velocity": word(d.velocity.min, d.velocity.max, 3), "driven": word(-force, force, 60),
         "force_limit": word(0, force, 200), "a": a, "a_n": a ^ bit(0.7, 30), "b": b, "b_n": b ^ bit(0.7, 30),
@@ -175,13 +175,13 @@ def test_index_edges_are_turns_apart():
 def test_edges_of_one_channel_alone_are_a_warning():
     bench = Bench()
     for edge in range(4 * IDLE_EDGES):
-        bench.clock(stepped=1, edge=edge % 4)
+        bench.clock(stepped=1, edge_kind=edge % 4)
         assert not bench.state.a_channel_idle
     for edge in range(IDLE_EDGES):
         assert not bench.state.a_channel_idle
-        bench.clock(stepped=1, edge=edge % 2 * 2)
+        bench.clock(stepped=1, edge_kind=edge % 2 * 2)
     assert bench.state.a_channel_idle
-    bench.clock(stepped=1, edge=1)
+    bench.clock(stepped=1, edge_kind=1)
     assert not bench.state.a_channel_idle
 
 
