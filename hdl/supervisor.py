@@ -131,7 +131,7 @@ class Supervisor(Block):
             m.d.sync += [self.state.eq(DISARMED), self.latched.eq(0)]
         with m.Elif(~self.enable | self.disarm):
             m.d.sync += self.state.eq(DISARMED)
-        with m.Elif(self.arm & self.live & (self.referenced | ~self.supervisor_reference)):
+        with m.Elif((self.state == DISARMED) & self.arm & self.live & (self.referenced | ~self.supervisor_reference)):
             m.d.sync += self.state.eq(ARMED)
 
         for bit in range(COUNT):
