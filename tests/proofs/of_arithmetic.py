@@ -6,8 +6,9 @@ widths the ghosts are also held against the solver's own products.
 """
 
 from functools import partial
+from typing import NamedTuple
 
-from amaranth.hdl import Cat, Const, Mux, Signal
+from amaranth.hdl import Const, Mux, Signal, Value
 
 from hardwall.hdl.arithmetic.divide import Divide
 from hardwall.hdl.arithmetic.signed_divide import SignedDivide
@@ -54,6 +55,14 @@ def root_is_exact(width: int, bench: Bench) -> None:
     bench.promise(~block.done | (now <= radicand) & (radicand - now <= block.root << 1))
 
 
+class Taken(NamedTuple):
+    """What a division takes, and when."""
+
+    start: Value
+    dividend: Value
+    divisor: Value
+
+
 class Division:
     """A division beside the one in a block, and what the two keep.
 
@@ -63,40 +72,40 @@ class Division:
         remainder: what the quotient leaves of the dividend so far.
     """
 
-    def __init__(self, bench: Bench, block: Divide, path: str = ""):
-        inner, m, each = bench.inner, bench.m, block.bits_per_clock
+    def __init__(self, bench: Bench, taken: Taken, quotient_width: int, each: int, path: str = ""):
+        inner, m = bench.inner, bench.m
         digits, left, saturated = (inner[path + name] for name in ("digits", "left", "saturated"))
         steps, self.remainder = len(digits) // each, inner[path + "remainder"]
-        self.dividend, self.divisor = Signal(block.dividend_width), Signal(block.divisor_width)
+        self.dividend, self.divisor = Signal(len(taken.dividend)), Signal(len(taken.divisor))
         begun = Signal()
-        before, self.product = (Signal(block.divisor_width + len(digits) + each) for _ in range(2))
+        before, self.product = (Signal(len(taken.divisor) + len(digits) + each) for _ in range(2))
         sums = (Mux(digits[bit], self.divisor << bit, 0) for bit in range(each))
-        stepped = bench.past((left != 0) & ~block.start)
+        stepped = bench.past((left != 0) & ~taken.start)
         m.d.sync += before.eq(self.product)
-        m.d.comb += self.product.eq(Mux(bench.past(block.start), 0, Mux(stepped, (before << each) + sum(sums), before)))
-        with m.If(block.start):
-            m.d.sync += [self.dividend.eq(block.dividend), self.divisor.eq(block.divisor), begun.eq(1)]
-        taken = Cat(Const(0, 0), self.dividend) >> (left * each)
+        m.d.comb += self.product.eq(Mux(bench.past(taken.start), 0, Mux(stepped, (before << each) + sum(sums), before)))
+        with m.If(taken.start):
+            m.d.sync += [self.dividend.eq(taken.dividend), self.divisor.eq(taken.divisor), begun.eq(1)]
         moved = (Const(steps) - left)[: len(left)] * each
         ones = (Const(1) << moved) - 1
         bench.promise(left <= steps)
         for kept in (
             inner[path + "divisor"] == self.divisor,
-            saturated == ((self.dividend >> block.quotient_width) >= self.divisor),
+            saturated == ((self.dividend >> quotient_width) >= self.divisor),
             saturated | (self.remainder < self.divisor),
-            saturated | (taken == self.product + self.remainder),
+            saturated | ((self.dividend >> (left * each)) == self.product + self.remainder),
             (digits >> moved) == (self.dividend << moved)[: len(digits)] >> moved,
             ~saturated | ((digits & ones) == ones),
         ):
             bench.promise(~begun | kept)
-        bench.promise(begun | (left == 0) & ~block.done)
+        bench.promise(begun | (left == 0) & ~inner[path + "done"])
         if len(digits) + len(self.divisor) <= SMALL:
             bench.promise(~begun | saturated | (self.product == (digits & ones) * self.divisor))
 
 
 def quotient_is_exact(sizes: tuple[int, int, int, int], bench: Bench) -> None:
     block = bench.block(Divide(*sizes))
-    run = Division(bench, block)
+    taken = Taken(block.start, block.dividend, block.divisor)
+    run = Division(bench, taken, block.quotient_width, block.bits_per_clock)
     largest = (1 << block.quotient_width) - 1
     fits = run.divisor << block.quotient_width > run.dividend
     bench.promise(~block.done | (block.saturated == ~fits))
@@ -109,18 +118,12 @@ def signed_quotient_is_exact(sizes: tuple[int, int, int, int], bench: Bench) -> 
     """With `done`, the quotient has the sign of the dividend and the magnitude of the division of the magnitudes."""
     block = bench.block(SignedDivide(*sizes))
     bits = block.quotient_bits
-    inner = Divide(block.dividend_width + block.fraction, block.divisor_width, bits, BITS_PER_CLOCK)
     dividend, divisor = Signal.like(block.dividend), Signal.like(block.divisor)
     with bench.m.If(block.start):
         bench.m.d.sync += [dividend.eq(block.dividend), divisor.eq(block.divisor)]
-    size = Mux(block.dividend < 0, -block.dividend, block.dividend) << block.fraction
-    bench.m.d.comb += [inner.start.eq(block.start), inner.dividend.eq(size), inner.divisor.eq(block.divisor)]
-    bench.m.d.comb += [
-        inner.quotient.eq(bench.inner["magnitudes.digits"]),
-        inner.done.eq(bench.inner["magnitudes.done"]),
-    ]
-    run = Division(bench, inner, "magnitudes.")
-    whole = Mux(dividend < 0, -dividend, dividend) << block.fraction
+    now, whole = (Mux(value < 0, -value, value) << block.fraction for value in (block.dividend, dividend))
+    taken = Taken(block.start, now[: block.dividend_width + block.fraction], block.divisor)
+    run = Division(bench, taken, bits, BITS_PER_CLOCK, "magnitudes.")
     magnitude = Mux(block.quotient < 0, -block.quotient, block.quotient)
     fits = whole < divisor << bits
     rest = whole - magnitude * divisor
