@@ -1,64 +1,39 @@
-"""An axis for real packages: few pins, a serial port for parameters and telemetry, and a drive that a filter can take.
+"""An axis for real packages: the pins of an encoder, three loops, a serial line, and a drive that a filter can take."""
 
-The serial port has a `Frame` for each direction: `Board.commands` to the axis, `Board.telemetry` from it.
-"""
-
-from amaranth.hdl import Cat, ClockDomain, Const, Module, Mux, Shape, Signal, Value
+from amaranth.hdl import Cat, ClockDomain, Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
+from hardwall.model.link import uart
+from hardwall.model.register import VALUE_BITS
+from hardwall.model.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
+from hardwall.model.supervisor import ARMED
 
-from .axis import Axis
-from .frame import BYTE, Frame
+from .link.link import Link
+from .supervised import COMPLEMENTS, LOOPS, SupervisedAxis
 
-PULSES = ("commit", "clear_flags", "preload", "index_arm")
-"""The pulses that a frame can give to the axis: the first bits of the frame."""
-TELEMETRY = (
-    "drive",
-    "count",
-    "velocity",
-    "wall_force",
-    "flags",
-    "illegal_count",
-    "index_count",
-    "index_armed",
-    "index_latched",
-    "stamp",
-    "stamp_a_rise",
-    "stamp_b_rise",
-    "stamp_a_fall",
-    "stamp_b_fall",
-)
+ENCODER = ("encoder_a", "encoder_b", "encoder_z", *COMPLEMENTS)
+"""Pins of the encoder."""
 
 
 class Board(wiring.Component):
-    """One axis behind a dozen pins.
+    """A supervised axis behind a dozen pins: `SupervisedAxis` and `Link`, which say what they do.
 
-    Serial port: an SPI device, mode 0, most significant bit first. One frame of `frame_bits`, a whole number of bytes,
-    goes in each direction. While `scan_select_n` is high the shift register follows the telemetry; its fall freezes
-    the telemetry, and every rise of `scan_clock` then shifts one bit out and one bit in. When `scan_select_n` rises
-    after exactly one frame whose last bit is 0, the pulses whose bits are set in the frame go to the axis, all at one
-    clock, with the words of the same frame: a `commit` makes the axis take every parameter at its next sample. After
-    any other frame, or any other number of bits, nothing happens: a frame of zeros, an incomplete frame and a line
-    stuck high only read telemetry.
+    A host reads and writes the registers of `registers`; what it asks for in one frame happens at one clock. It is
+    refused an `arm` unless the axis is `ready`, and a `preload` while ARMED.
 
-    While a commit waits for its sample the register holds the words and ignores the port: a frame begun then is not
-    taken, its answer is not telemetry, and it has no effect. So a host leaves a sample period between frames.
+    Drive: first-order sigma-delta modulation of `driven`, as sign and magnitude. With N = `drive_bits`, per clock
 
-    Every level of `scan_clock` and `scan_select_n` must last 3 clocks, and `scan_in` must be stable from 1 clock before
-    the rise of `scan_clock` to 2 clocks after it; `scan_out` follows that rise by 2 to 4 clocks. So the serial clock
-    may run at up to a sixth of the clock's rate.
+        sum <- sum mod 2**N + |driven|        drive_pdm = (sum >= 2**N)
 
-    Drive: first-order sigma-delta modulation of the drive word, as sign and magnitude. With N = `drive_bits`, per clock
+    so the density of ones is exactly |driven| / 2**N: 2**N clocks of a steady drive have |driven| ones. The word
+    `drive_invert` reverses the sign; it is taken in every state but ARMED.
 
-        sum <- sum mod 2**N + |drive|        drive_pdm = (sum >= 2**N)
-
-    so the density of ones is exactly |drive| / 2**N: 2**N clocks of a steady drive have |drive| ones.
-
-    Latency: `latency` clocks from the sample strobe to the first pulse that the changed drive makes. `drive_enable` low
-    makes `drive_pdm` low at once, through a gate that needs no clock, and the drive zero `enable_latency` clocks later.
+    Safe is `drive_pdm` and `alive` low, which they are from power-up on. Latency: `latency` clocks from the sample
+    strobe to the first pulse that the changed drive makes. `drive_enable` or `emergency_stop` low makes `drive_pdm` low
+    at once, through a gate that needs no clock; any cause makes it low `safe_latency` clocks after it stands.
 
     Rounding and overflow: none; the remainder that no pulse has carried yet, less than one pulse, stays in the sum,
     also when the sign changes. The axis limits the drive to less than 2**N.
@@ -69,6 +44,8 @@ class Board(wiring.Component):
     ----------
     spec : hardwall.model.spec.AxisSpec
         The axis.
+    baud : int, optional
+        Rate of the serial line, bits a second; 921 600 if it is not given, or what the clock allows of that.
 
     Members
     -------
@@ -78,146 +55,119 @@ class Board(wiring.Component):
         Asynchronous pin; resets while high.
     encoder_a, encoder_b, encoder_z : In(1)
         Asynchronous pins.
-    drive_enable : In(1)
-        Asynchronous pin; low turns the drive off. It must read low when nothing is connected.
-    scan_select_n, scan_clock, scan_in : In(1)
-        Asynchronous pins of the serial port.
-    scan_out : Out(1)
-        The serial port's answer.
+    encoder_a_n, encoder_b_n : In(1)
+        Complements of the channels; asynchronous pins.
+    drive_enable, external_fault, emergency_stop : In(1)
+        Loops: high is closed; asynchronous pins, which must read low when nothing is connected.
+    uart_rx : In(1)
+        Line from the host; an asynchronous pin, which must read high when nothing is connected.
+    uart_tx : Out(1)
+        Line to the host.
     drive_pdm : Out(1)
-        Pulses of density |drive| / 2**N.
+        Pulses of density |driven| / 2**N.
     drive_sign : Out(1)
-        1: the drive is negative.
+        1: the drive is negative, or positive if it is inverted.
+    alive : Out(1)
+        A square wave while ARMED, for the charge pump of an amplifier's enable.
 
     Raises
     ------
     TypeError
         If `spec` is not an AxisSpec.
+    ValueError
+        If the clock is too slow for a serial line, or does not allow `baud`.
     """
 
-    def __init__(self, spec: AxisSpec):
-        self._axis = Axis(spec)
-        self._spec = spec
-        members = self._axis.signature.members
-        names = (*PULSES, "preload_count", *(word.name for word in spec.design.words)), TELEMETRY
-        fields = [{name: Shape.cast(members[name].shape) for name in way} for way in names]
-        longest = max(sum(shape.width for shape in way.values()) for way in fields)
-        bits = -(-(longest + 1) // BYTE) * BYTE
-        self._commands, self._telemetry = (Frame(way, bits) for way in fields)
+    def __init__(self, spec: AxisSpec, baud: int | None = None):
+        self.axis = SupervisedAxis(spec)
+        self.link = Link(RegisterMap(spec), uart.usual_baud(spec.clock_hz) if baud is None else baud)
         super().__init__(
             {
                 "clk": In(1),
                 "rst": In(1),
-                "encoder_a": In(1),
-                "encoder_b": In(1),
-                "encoder_z": In(1),
-                "drive_enable": In(1),
-                "scan_select_n": In(1),
-                "scan_clock": In(1),
-                "scan_in": In(1),
-                "scan_out": Out(1),
+                **dict.fromkeys((*ENCODER, *LOOPS), In(1)),
+                "uart_rx": In(1, init=1),
+                "uart_tx": Out(1, init=1),
                 "drive_pdm": Out(1),
                 "drive_sign": Out(1),
+                "alive": Out(1),
             }
         )
 
     @property
     def spec(self) -> AxisSpec:
-        return self._spec
+        return self.axis.design.spec
+
+    @property
+    def registers(self) -> RegisterMap:
+        return self.link.registers
+
+    @property
+    def baud(self) -> int:
+        return self.link.baud
+
+    @property
+    def drive_latency(self) -> int:
+        """Clocks from the sample strobe to the changed drive that is let out."""
+        return self.axis.latency
 
     @property
     def latency(self) -> int:
         """Clocks from the sample strobe to the first pulse that the changed drive makes."""
-        return self._axis.latency + 2
+        return self.axis.latency + 2
 
     @property
-    def enable_latency(self) -> int:
-        """Clock edges from the first that sees `drive_enable` low to the one that zeroes the drive, both included."""
-        return 3
+    def safe_latency(self) -> int:
+        """Clocks from a cause that stands to the first clock without a pulse: of the supervisor, and of the pulses."""
+        return 1 + 2
 
     @property
     def drive_bits(self) -> int:
         """Bits of the drive's magnitude (N above), which are the bits of its largest limit."""
-        return self._spec.force.width - 2
-
-    @property
-    def commands(self) -> Frame:
-        """The frame to the axis."""
-        return self._commands
-
-    @property
-    def telemetry(self) -> Frame:
-        """The frame from the axis."""
-        return self._telemetry
-
-    @property
-    def frame_bits(self) -> int:
-        """Bits of a frame in either direction: whole bytes, whose last bit is unused."""
-        return self._commands.bits
+        return self.spec.force.width - 2
 
     def elaborate(self, platform):
         m = Module()
-        m.submodules.axis = axis = self._axis
+        m.submodules.axis = axis = self.axis
+        m.submodules.link = link = self.link
         m.domains.sync = domain = ClockDomain()
         m.d.comb += domain.clk.eq(self.clk)
+        reset = Signal(init=1)
+        m.submodules.rst_synchroniser = FFSynchronizer(self.rst, reset, init=1)
+        m.d.comb += domain.rst.eq(reset)
 
-        def synchronised(pin: Value, name: str, init: int = 0) -> Signal:
-            seen = Signal(name=f"{name}_seen", init=init)
-            m.submodules[f"{name}_synchroniser"] = FFSynchronizer(pin, seen, init=init)
-            return seen
+        m.d.comb += [getattr(axis, name).eq(getattr(self, name)) for name in (*ENCODER, *LOOPS)]
+        m.d.comb += [link.rx.eq(self.uart_rx), self.uart_tx.eq(link.tx)]
 
-        m.d.comb += domain.rst.eq(synchronised(self.rst, "rst", init=1))
-        enable = synchronised(self.drive_enable, "drive_enable")
-        select_n = synchronised(self.scan_select_n, "scan_select_n", init=1)
-        clock = synchronised(self.scan_clock, "scan_clock")
-        bit = synchronised(self.scan_in, "scan_in")
+        registers = self.registers
+        for asked in (*registers.words, *registers.live, *registers.pulses):
+            m.d.comb += getattr(axis, asked.name).eq(getattr(link, asked.name))
+        parts = {
+            f"counts_{k}": axis.counts.word_select(k, VALUE_BITS) for k in range(-(-len(axis.counts) // VALUE_BITS))
+        }
+        for shown in registers.status:
+            # A value that is wider than its register gives the upper bits.
+            value = parts[shown.name] if shown.name in parts else getattr(axis, shown.name)
+            m.d.comb += getattr(link, shown.name).eq(value >> max(len(value) - shown.format.width, 0))
+        armed = axis.state == ARMED
+        refused = {"arm": ~axis.ready, "preload": armed}
         m.d.comb += [
-            axis.encoder_a.eq(self.encoder_a),
-            axis.encoder_b.eq(self.encoder_b),
-            axis.encoder_z.eq(self.encoder_z),
-            axis.drive_enable.eq(enable),
+            link.refuse.eq(Cat(refused.get(pulse.name, 0) for pulse in registers.pulses)),
+            link.commit_pending.eq(axis.commit_pending),
         ]
 
-        # The first field of a frame is at the top of the register, where bits leave it.
-        frame = Signal(self.frame_bits)
-        taken = Signal(range(self.frame_bits + 2))
-        select_n_before, clock_before = Signal(init=1), Signal()
-        given = Signal()
-        m.d.sync += [
-            select_n_before.eq(select_n),
-            clock_before.eq(clock),
-            given.eq(select_n & ~select_n_before & (taken == self.frame_bits) & ~frame[0]),
-        ]
-        with m.If(given):
-            # A frame acts only once: the number of bits is now one that no frame has.
-            m.d.sync += taken.eq(self.frame_bits + 1)
-        with m.Elif(~axis.commit_pending):
-            with m.If(select_n & select_n_before):
-                m.d.sync += [frame.eq(_packed([getattr(axis, name) for name in TELEMETRY], len(frame))), taken.eq(0)]
-            with m.Elif(~select_n & clock & ~clock_before):
-                # Beyond a frame the number of bits stays at a frame's plus one.
-                m.d.sync += [frame.eq(Cat(bit, frame)), taken.eq(Mux(taken > self.frame_bits, taken, taken + 1))]
-        m.d.comb += self.scan_out.eq(frame[-1])
-
-        for name, low, shape in self.commands:
-            field = frame[low : low + shape.width]
-            m.d.comb += getattr(axis, name).eq(field & given if name in PULSES else field)
-
-        # The axis limits the drive, so its magnitude needs only the bits of the limit.
+        # The supervisor limits the drive, so its magnitude needs only the bits of the limit.
         total = Signal(self.drive_bits + 1)
         magnitude = Signal(self.drive_bits)
         negative = Signal()
         m.d.sync += [
-            magnitude.eq(Mux(axis.drive < 0, -axis.drive, axis.drive)),
-            negative.eq(axis.drive < 0),
+            magnitude.eq(Mux(axis.driven < 0, -axis.driven, axis.driven)),
+            negative.eq((axis.driven < 0) ^ axis.drive_inverted),
             total.eq(total[:-1] + magnitude),
             self.drive_sign.eq(negative),
         ]
-        m.d.comb += self.drive_pdm.eq(total[-1] & self.drive_enable)
+        m.d.comb += [
+            self.drive_pdm.eq(total[-1] & self.drive_enable & self.emergency_stop),
+            self.alive.eq(axis.alive),
+        ]
         return m
-
-
-def _packed(fields: list[Value], bits: int) -> Value:
-    """Return the fields in one word of `bits` bits, the first field at the top and zeros below the last."""
-    used = sum(map(len, fields))
-    return Cat(Const(0, bits - used), *reversed(fields))

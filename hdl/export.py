@@ -10,12 +10,13 @@ os.environ.setdefault("AMARANTH_USE_YOSYS", "builtin")
 from amaranth.back import verilog
 from amaranth.lib import wiring
 
+from hardwall.model import register_texts
 from hardwall.model.spec import AxisSpec
 from hardwall.model.whole_file import whole_file
 
 from .axis import Axis
 from .board import Board
-from .ports import frame_table, port_table
+from .ports import port_table
 
 
 def to_verilog(component: wiring.Component, name: str) -> str:
@@ -39,9 +40,11 @@ def _source(component: Axis | Board, name: str, what: str) -> str:
 
 
 def write(spec: AxisSpec, folder: Path) -> tuple[Path, ...]:
-    """Write `axis.v`, `board.v` and `ports.md` into `folder`, which is made if it is missing; return their paths.
+    """Write the Verilog, its ports and its registers into `folder`, which is made if it is missing; return the paths.
 
-    The text depends only on the spec and on the versions of this project and its Yosys.
+    `axis.v` and `board.v` have their ports in `ports.md`; the registers of the board are in `registers.md`,
+    `registers.h` for C, and `registers.json`. The text depends only on the spec and on the versions of this project and
+    its Yosys.
 
     Raises:
         TypeError: if `spec` is not an AxisSpec.
@@ -51,7 +54,7 @@ def write(spec: AxisSpec, folder: Path) -> tuple[Path, ...]:
     facts = "".join(f"    {line}\n" for line in _facts(spec))
     files = {
         "axis.v": _source(axis, "axis", "One axis of hardwall, encoder pins to drive: every parameter is a port."),
-        "board.v": _source(board, "board", "One axis of hardwall behind a dozen pins, with a serial port."),
+        "board.v": _source(board, "board", "One supervised axis of hardwall behind a dozen pins, with a serial line."),
         "ports.md": (
             f"# Ports\n\nOf the axis\n\n{facts}\n"
             f"A sample every {spec.clocks_per_sample} clocks; the drive changes {axis.latency} clocks after it is "
@@ -59,11 +62,12 @@ def write(spec: AxisSpec, folder: Path) -> tuple[Path, ...]:
             "fraction.\n\n"
             f"## axis.v\n\n{port_table(axis)}\n"
             f"## board.v\n\n{port_table(board)}\n"
-            f"### The serial port\n\nAn SPI device, mode 0: {board.frame_bits} bits each way, the first of them number "
-            f"{board.frame_bits - 1}.\n\n"
-            f"To the axis:\n\n{frame_table(board.commands)}\n"
-            f"From the axis:\n\n{frame_table(board.telemetry)}"
+            f"The serial line has {board.baud} baud, 8 data bits, no parity and one stop bit. It speaks Modbus RTU as "
+            "unit 1; registers.md has the registers.\n"
         ),
+        "registers.md": register_texts.markdown(board.registers),
+        "registers.h": register_texts.c_header(board.registers),
+        "registers.json": register_texts.as_json(board.registers),
     }
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)

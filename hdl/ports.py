@@ -1,4 +1,4 @@
-"""Markdown tables of the ports of a component's Verilog, and of the frames of a board's serial port."""
+"""A Markdown table of the ports of a component's Verilog."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -12,7 +12,6 @@ from hardwall.model.spec import AxisSpec
 
 from .axis import Axis
 from .board import Board
-from .frame import Frame
 
 COLUMNS = ("port", "direction", "width", "format", "one LSB", "range", "reset", "what it is")
 MEANINGS = {
@@ -21,7 +20,11 @@ MEANINGS = {
     "encoder_a": "encoder's pin A; asynchronous",
     "encoder_b": "encoder's pin B; asynchronous",
     "encoder_z": "encoder's index pin; asynchronous",
+    "encoder_a_n": "complement of A; asynchronous; unused unless encoder_loss is enabled",
+    "encoder_b_n": "complement of B; asynchronous; unused unless encoder_loss is enabled",
     "drive_enable": "low: the drive is zero",
+    "external_fault": "loop of the amplifier's fault; low is a cause, unless it is disabled",
+    "emergency_stop": "loop of the emergency stop; low: the drive is zero",
     "clear_flags": "pulse: clear flags and illegal_count",
     "preload": "pulse: set the count; the estimator starts afresh at the next sample",
     "preload_count": "what preload sets the count to",
@@ -52,12 +55,11 @@ MEANINGS = {
     "stamp_a_fall": "stamp of the last fall of A",
     "stamp_b_fall": "stamp of the last fall of B",
     "commit_pending": "parameters wait for the next sample",
-    "scan_select_n": "low: a frame is on its way; asynchronous",
-    "scan_clock": "serial clock; a bit each way at its rise; asynchronous",
-    "scan_in": "frame to the axis, most significant bit first; asynchronous",
-    "scan_out": "frame from the axis, most significant bit first",
-    "drive_pdm": "pulses; their density is the magnitude of the drive",
-    "drive_sign": "1: the drive is negative",
+    "uart_rx": "serial line from the host, Modbus RTU; idle high; asynchronous",
+    "uart_tx": "serial line to the host; idle high",
+    "drive_pdm": "pulses; their density is the magnitude of the drive; safe when low",
+    "drive_sign": "1: the drive is negative, or positive if it is inverted",
+    "alive": "square wave while ARMED, for the charge pump of an amplifier's enable; safe when low",
 }
 """The meaning of every port; a run-time word has its own text."""
 
@@ -123,14 +125,3 @@ def port_table(component: Axis | Board) -> str:
     if not isinstance(component, Axis | Board):
         raise TypeError(f"component must be an Axis or a Board, not {component!r}")
     return _table(COLUMNS, _rows(component))
-
-
-def frame_table(frame: Frame) -> str:
-    """Return a Markdown table of the fields of a frame, in the order on the wire."""
-    rows = []
-    for name, low, shape in frame:
-        bits = f"{low}" if shape.width == 1 else f"{low + shape.width - 1}:{low}"
-        rows.append((bits, f"`{name}`", "signed" if shape.signed else "unsigned"))
-    if frame.unused:
-        rows.append((f"{frame.unused - 1}:0", "", "unused"))
-    return _table(("bits", "field", "read as"), rows)

@@ -7,7 +7,7 @@ from amaranth.lib.wiring import In, Out
 
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervised import FIXED, Design
-from hardwall.model.supervisor import CAUSES
+from hardwall.model.supervisor import ARMED, CAUSES
 
 from .arithmetic.fixed import shape
 from .axis import Axis
@@ -17,9 +17,9 @@ from .supervisor import Supervisor
 LOOPS = ("drive_enable", "external_fault", "emergency_stop")
 """Pins of normally closed loops: high is closed and well; low is open, cut, or not connected."""
 COMPLEMENTS = ("encoder_a_n", "encoder_b_n")
-REQUESTS = ("arm", "disarm", "acknowledge", "acknowledged", "beat", "beat_word")
+REQUESTS = ("arm", "disarm", "acknowledge", "acknowledged", "heartbeat")
 """Inputs of the supervisor that come from the host."""
-SHOWN = ("driven", "state", "alive", "live", "latched", "first", "first_stamp", "counts")
+SHOWN = ("driven", "state", "alive", "live", "ready", "latched", "first", "first_stamp", "counts")
 """Outputs of the supervisor."""
 
 
@@ -47,14 +47,15 @@ class SupervisedAxis(wiring.Component):
         Complements of the encoder's channels; asynchronous. They count for nothing unless encoder_loss is enabled.
     drive_enable, external_fault, emergency_stop : In(1)
         Loops: high is closed; asynchronous.
-    word_range : In(1)
-        A word in use is beyond its range.
     the requests of the host to `Supervisor` : In
         As there.
     one input for each word of `design.words` : In
         Run-time parameters; those of `design.committed` act at the sample after a commit, the others at the next clock.
+        One of the latter beyond its range in `design.ranges` is the cause word_range.
     the outputs of `Supervisor` : Out
         As there; `driven` is the drive that may leave the FPGA.
+    drive_inverted : Out(1)
+        The sign of the drive's pins is to be reversed: `drive_invert`, as it was when the axis was last not ARMED.
     a_channel_idle : Out(1)
         A warning, see `Monitors`.
 
@@ -73,9 +74,10 @@ class SupervisedAxis(wiring.Component):
         super().__init__(
             {
                 **axis,
-                **dict.fromkeys((*COMPLEMENTS, *LOOPS, "word_range"), In(1)),
+                **dict.fromkeys((*COMPLEMENTS, *LOOPS), In(1)),
                 **{name: supervisor[name] for name in (*REQUESTS, *SHOWN)},
                 **{word.name: In(shape(word.format)) for word in design.live},
+                "drive_inverted": Out(1),
                 "a_channel_idle": Out(1),
             }
         )
@@ -133,11 +135,15 @@ class SupervisedAxis(wiring.Component):
             self.a_channel_idle.eq(monitors.a_channel_idle),
         ]
 
+        beyond = []
+        for name, (least, most) in self._design.ranges.items():
+            word = getattr(self, name)
+            beyond += [word < least] * (least > 0) + [word > most] * (most < (1 << len(word)) - 1)
         outside = {
             "encoder_illegal": axis.illegal,
             "encoder_overspeed": axis.overspeed,
             "strobe_busy": axis.strobe_busy,
-            "word_range": self.word_range,
+            "word_range": Cat(beyond).any(),
             "external_fault": ~levels["external_fault"],
             "emergency_stop": ~levels["emergency_stop"],
         }
@@ -156,4 +162,6 @@ class SupervisedAxis(wiring.Component):
         for block in (supervisor, monitors):
             m.d.comb += [getattr(block, word.name).eq(getattr(self, word.name)) for word in block.design.words]
         m.d.comb += [getattr(self, name).eq(getattr(supervisor, name)) for name in SHOWN]
+        with m.If(self.state != ARMED):
+            m.d.sync += self.drive_inverted.eq(self.drive_invert)
         return m

@@ -19,13 +19,13 @@ class Supervisor(Block):
         state    <- TRIPPED if standing
                     DISARMED if TRIPPED and acknowledged == latched with acknowledge
                     DISARMED if not TRIPPED, and enable is low or disarm is high
-                    ARMED if DISARMED, and arm, live and the reference that is asked for
+                    ARMED if DISARMED, and arm, live and the reference that is asked for; all but arm is `ready`
         driven   <- drive within +-min(ceiling, supervisor_force_limit) if ARMED stays ARMED, else 0
         ceiling  <- 0 unless ARMED; supervisor_force_limit if that is lower; else with strobe + supervisor_ramp, at most
                     the largest force of the axis
 
-    `link_timeout` is made here: it stands while ARMED and not `live`. The host is live from a `beat` whose word differs
-    from the last one's until `supervisor_watchdog` ms later, up to 1 ms less because the tick of 1 ms runs freely.
+    `link_timeout` is made here: it stands while ARMED and not `live`. The host is live from a change of `heartbeat`
+    until `supervisor_watchdog` ms later, up to 1 ms less because the tick of 1 ms runs freely.
     `latched` collects the causes until they are acknowledged, and an acknowledgement that does not name exactly these
     has no effect, so a cause that came after the host's last look is not lost. `counts` are the occurrences of every
     cause since reset.
@@ -58,8 +58,8 @@ class Supervisor(Block):
         Pulses of the host.
     acknowledge, acknowledged : In
         A pulse, and the causes that the host has read.
-    beat, beat_word : In
-        A pulse, and a word that must differ from the last one.
+    heartbeat : In
+        A word of the host; every change of it is a beat.
     one input for each word of `design.words` : In
         Run-time parameters.
     driven : Out(SQ)
@@ -70,6 +70,8 @@ class Supervisor(Block):
         A square wave while ARMED, for the charge pump of an amplifier's enable; otherwise low.
     live : Out(1)
         The host's heartbeat is not overdue.
+    ready : Out(1)
+        An `arm` at the last clock would have led to ARMED.
     latched : Out
         Causes since the last acknowledgement.
     first, first_stamp : Out
@@ -98,13 +100,13 @@ class Supervisor(Block):
             "disarm": In(1),
             "acknowledge": In(1),
             "acknowledged": In(COUNT),
-            "beat": In(1),
-            "beat_word": In(supervisor.BEAT_BITS),
+            "heartbeat": In(supervisor.BEAT_BITS),
             **{word.name: In(shape(word.format)) for word in design.words},
             "driven": Out(shape(design.force)),
             "state": Out(2),
             "alive": Out(1),
             "live": Out(1),
+            "ready": Out(1),
             "latched": Out(COUNT),
             "first": Out(COUNT),
             "first_stamp": Out(design.stamp_width),
@@ -120,7 +122,10 @@ class Supervisor(Block):
         m.d.comb += standing.eq(present & watched)
         m.d.sync += before.eq(standing)
 
-        go = Signal()
+        go, ready = Signal(), Signal()
+        allowed = self.enable & self.live & (self.referenced | ~self.supervisor_reference)
+        m.d.comb += ready.eq((self.state == DISARMED) & ~standing.any() & allowed)
+        m.d.sync += self.ready.eq(ready)
         m.d.comb += go.eq(armed & ~standing.any() & self.enable & ~self.disarm)
         m.d.sync += self.latched.eq(self.latched | standing)
         with m.If(standing.any()):
@@ -131,7 +136,7 @@ class Supervisor(Block):
             m.d.sync += [self.state.eq(DISARMED), self.latched.eq(0)]
         with m.Elif(~self.enable | self.disarm):
             m.d.sync += self.state.eq(DISARMED)
-        with m.Elif((self.state == DISARMED) & self.arm & self.live & (self.referenced | ~self.supervisor_reference)):
+        with m.Elif(self.arm & ready):
             m.d.sync += self.state.eq(ARMED)
 
         for bit in range(COUNT):
@@ -166,15 +171,15 @@ class Supervisor(Block):
         """Count the milliseconds that are left to the host."""
         clocks = self._design.params.tick_clocks
         tick, left = Signal(range(max(clocks, 2))), Signal(range(WATCHDOG_MS[1] + 1))
-        last_beat = Signal.like(self.beat_word)
+        last_beat = Signal.like(self.heartbeat)
         ticks = tick == clocks - 1
         m.d.sync += tick.eq(Mux(ticks, 0, tick + 1))
         word = self.supervisor_watchdog
-        with m.If(self.beat & (self.beat_word != last_beat)):
-            m.d.sync += [
-                last_beat.eq(self.beat_word),
-                left.eq(Mux(word < WATCHDOG_MS[0], WATCHDOG_MS[0], Mux(word > WATCHDOG_MS[1], WATCHDOG_MS[1], word))),
-            ]
+        m.d.sync += last_beat.eq(self.heartbeat)
+        with m.If(self.heartbeat != last_beat):
+            m.d.sync += left.eq(
+                Mux(word < WATCHDOG_MS[0], WATCHDOG_MS[0], Mux(word > WATCHDOG_MS[1], WATCHDOG_MS[1], word))
+            )
         with m.Elif(ticks & left.any()):
             m.d.sync += left.eq(left - 1)
         m.d.comb += self.live.eq(left.any())

@@ -23,6 +23,7 @@ class Kind(Enum):
     COUNTER = "counter"
     PULSE = "pulse"
     WORD = "word"
+    LIVE = "live word"
     ACTIVE = "active"
 
     @property
@@ -33,7 +34,7 @@ class Kind(Enum):
     @property
     def access(self) -> str:
         """How the host may use it: a pulse reads 0."""
-        return "read, write" if self in (Kind.PULSE, Kind.WORD) else "read"
+        return "read, write" if self in (Kind.PULSE, Kind.WORD, Kind.LIVE) else "read"
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,9 @@ class Register:
             value = getattr(self, field)
             if value is not None:
                 check_int(f"{field} of {self.name}", value, self.format.min, self.format.max)
-        if self.kind in (Kind.WORD, Kind.PULSE) and not self.low <= self.reset <= self.high < 1 << (room - 1):
+        if self.kind in (Kind.WORD, Kind.LIVE, Kind.PULSE) and not self.low <= self.reset <= self.high < 1 << (
+            room - 1
+        ):
             bounds = f"{self.low} to {min(self.high, (1 << (room - 1)) - 1)}"
             raise FieldError(self.name, f"must reset to, and end within, {bounds}, not {self.reset} and {self.high}")
 
@@ -119,7 +122,7 @@ class Register:
         return word - (1 << 16 * self.size) if self.format.signed and word >> (16 * self.size - 1) else word
 
 
-def word_register(word: Word, least: int | None = None, most: int | None = None) -> Register:
+def word_register(word: Word, kind: Kind = Kind.WORD, least: int | None = None, most: int | None = None) -> Register:
     """Return the register of a run-time word, which accepts words from `least` to `most`; None for the format's."""
     meaning = f"{word.doc[0].upper()}{word.doc[1:]}."
-    return Register(word.name, Kind.WORD, word.format, meaning, word.si_per_unit, word.unit, least, most, word.reset)
+    return Register(word.name, kind, word.format, meaning, word.si_per_unit, word.unit, least, most, word.reset)

@@ -8,14 +8,15 @@ even address; a value that has fewer bits is extended, by its sign if it has one
     0x0040 to 0x005F  status of the supervisor
     0x0060 to 0x0067  counters of the link, one register each
     0x0070 to 0x007F  pulses, one register each, assigned downwards from 0x007F
-    0x0080 to 0x00BF  words as written
-    0x00C0 to 0x00FF  words as active, each 0x40 above its written one
+    0x0080 to 0x009F  words as written
+    0x00A0 to 0x00BF  words as active, each 0x20 above its written one
+    0x00C0 to 0x00FF  live words, which act at the next clock
     0x4000 to 0x7FFF  the window to the compressed map, two bytes a register, the first one high; behind the map, the
                       ends of the answers of the identification
     0x8000 to 0xFFFF  the window to the capture memory
 
 The rule is stable: within a block registers follow in the order of their description, so what is added at the end of a
-block moves nothing, and neither the constants nor the telemetry move with the estimator. `commit` is the last pulse and
+block moves nothing, and only the words and the active ones move with the estimator. `commit` is the last pulse and
 ends where the written words begin: one frame can carry words and their commit.
 
 What is not assigned in the first 256 registers reads 0 and cannot be written.
@@ -27,14 +28,15 @@ import json
 import zlib
 
 from .arithmetic.fixed import SQ, UQ, Format
-from .checks import FieldError, check_int, shown
+from .checks import check_int, shown
 from .design import ILLEGAL_WIDTH
 from .register import COUNTER_BITS, VALUE_BITS, Kind, Register, word_register
 from .spec import AxisSpec
+from .supervised import Design
 
 LAYOUT = 1
 """The version of the rule above, which is the first constant: a host that does not know it must not go on."""
-CONSTANTS, TELEMETRY, SUPERVISOR, COUNTERS, PULSES, WRITTEN, ACTIVE = 0, 0x20, 0x40, 0x60, 0x70, 0x80, 0xC0
+CONSTANTS, TELEMETRY, SUPERVISOR, COUNTERS, PULSES, WRITTEN, ACTIVE, LIVE = 0, 0x20, 0x40, 0x60, 0x70, 0x80, 0xA0, 0xC0
 """The first address of every block."""
 END = 0x100
 """The address behind the last block."""
@@ -100,11 +102,11 @@ AXIS_PULSES = (
 """The axis's pulses, in the order of their addresses downwards."""
 
 
-def _words(spec: AxisSpec) -> tuple[Register, ...]:
-    """Return the run-time words of an axis as written: the preload's count first, for every axis has it."""
-    meaning = "The pulse preload sets the count to this word once it is active."
+def _words(design: Design) -> tuple[Register, ...]:
+    """Return the committed words of an axis as written: the preload's count first, for every axis has it."""
+    spec, meaning = design.spec, "The pulse preload sets the count to this word once it is active."
     preload = Register("preload_count", Kind.WORD, SQ(spec.count_width, 0), meaning, spec.count_m, "m")
-    return preload, *map(word_register, spec.design.words)
+    return preload, *map(word_register, design.committed)
 
 
 def _placed(base: int, room: int, registers: tuple[Register, ...]) -> tuple[Register, ...]:
@@ -120,46 +122,43 @@ def _placed(base: int, room: int, registers: tuple[Register, ...]) -> tuple[Regi
 
 
 class RegisterMap:
-    """The registers of an axis, placed, with the identity of the build and the map that the device itself carries.
+    """The registers of a supervised axis, placed, with the identity of the build and the map that the device carries.
 
     Args:
         spec: the axis.
-        supervisor: status registers, pulses and words besides those of the axis, not placed yet.
         capture_registers: registers of the capture memory; 0 for none.
 
     Attributes:
         spec, capture_registers: as given.
-        status, pulses, words, active: the registers of those kinds in the order of the hardware's ports; `pulses`
-            begins with `commit`, whose address is the highest.
+        status, pulses, words, active, live: the registers of those kinds in the order of the hardware's ports;
+            `pulses` begins with `commit`, whose address is the highest.
         registers: every register, in the order of addresses.
         identity: the hash of the build, 16 hexadecimal digits.
         compressed: the map that the device carries, of all but the constants: zlib, JSON.
 
     Raises:
-        TypeError: if `spec` is not an AxisSpec, or `supervisor` is not of registers.
-        ValueError: if a block is too small, two registers have one name, or a register of the supervisor is of a kind
-            that it cannot have.
+        TypeError: if `spec` is not an AxisSpec.
+        ValueError: if `capture_registers` is out of its range.
     """
 
-    def __init__(self, spec: AxisSpec, supervisor: tuple[Register, ...] = (), capture_registers: int = 0):
+    def __init__(self, spec: AxisSpec, capture_registers: int = 0):
         if not isinstance(spec, AxisSpec):
             raise TypeError(f"spec must be an AxisSpec, not {shown(spec)}")
         check_int("capture_registers", capture_registers, 0, SPACE - CAPTURE)
-        for register in supervisor:
-            if not isinstance(register, Register):
-                raise TypeError(f"supervisor must be of Register, not {shown(register)}")
-            if register.kind not in (Kind.STATUS, Kind.PULSE, Kind.WORD):
-                raise FieldError(register.name, f"must be a status, a pulse or a word, not a {register.kind.value}")
         self.spec, self.capture_registers = spec, capture_registers
-        more = tuple(register for register in supervisor if register.kind is Kind.STATUS)
+        design = Design(spec)
+
+        def own(kind: Kind) -> tuple[Register, ...]:
+            return tuple(register for register in design.registers() if register.kind is kind)
+
         telemetry = _placed(TELEMETRY, SUPERVISOR - TELEMETRY, _telemetry(spec))
-        self.status = telemetry + _placed(SUPERVISOR, COUNTERS - SUPERVISOR, more)
+        self.status = telemetry + _placed(SUPERVISOR, COUNTERS - SUPERVISOR, own(Kind.STATUS))
         pulses = tuple(Register(name, Kind.PULSE, UQ(1, 0), meaning) for name, meaning in AXIS_PULSES)
-        pulses += tuple(register for register in supervisor if register.kind is Kind.PULSE)
+        pulses += own(Kind.PULSE)
         lowest = WRITTEN - len(pulses)
         self.pulses = _placed(lowest, WRITTEN - max(lowest, PULSES), pulses[::-1])[::-1]
-        words = _words(spec) + tuple(register for register in supervisor if register.kind is Kind.WORD)
-        self.words = _placed(WRITTEN, ACTIVE - WRITTEN, words)
+        self.words = _placed(WRITTEN, ACTIVE - WRITTEN, _words(design))
+        self.live = _placed(LIVE, END - LIVE, own(Kind.LIVE))
         self.active = tuple(
             dataclasses.replace(
                 word,
@@ -172,14 +171,10 @@ class RegisterMap:
         )
         counters = (Register(name, Kind.COUNTER, UQ(COUNTER_BITS, 0), meaning) for name, meaning in LINK_COUNTERS)
         rest = (*self.status, *_placed(COUNTERS, PULSES - COUNTERS, tuple(counters)), *self.pulses[::-1])
-        rest += (*self.words, *self.active)
+        rest += (*self.words, *self.active, *self.live)
         self.identity = self._hash(rest)
         self.compressed = self._compressed(rest)
         self.registers = self._constants() + rest
-        names = [register.name for register in self.registers]
-        for name in names:
-            if names.count(name) > 1:
-                raise ValueError(f"the name of a register must be its own, not {name!r} of another")
 
     def _hash(self, rest: tuple[Register, ...]) -> str:
         """Return the identity: 16 hexadecimal digits of the SHA-256 of the specification and of all that is placed."""

@@ -11,7 +11,7 @@ FIXED = ("output_force_limit",)
 """Words of the axis that no host writes: the supervisor's force limit holds at once, and after everything."""
 FROM_AXIS = ("encoder_illegal", "encoder_overspeed", "strobe_busy")
 FROM_OUTSIDE = ("word_range", "external_fault", "emergency_stop")
-"""Causes that the axis shows, and causes that pins and the host's registers show; the others are the monitors'."""
+"""Causes that the axis shows, and causes that the live words and pins show; the others are the monitors'."""
 
 
 class Design:
@@ -22,6 +22,7 @@ class Design:
         monitors, supervisor: the designs of the blocks beside it.
         committed: words that take effect together, at a sample after a commit.
         live: words that act at the next clock.
+        ranges: the least and the largest of the live words that may not have every value of their formats.
     """
 
     def __init__(self, spec: AxisSpec):
@@ -29,7 +30,13 @@ class Design:
         self.monitors = monitors.Design(spec, spec.design.estimator.velocity)
         self.supervisor = supervisor.Design(spec)
         self.committed = tuple(word for word in spec.design.words if word.name not in FIXED)
-        self.live = (*self.supervisor.words, *self.monitors.words)
+        doc = "1: the sign of the drive's pins is reversed; taken in every state but ARMED"
+        self.live = (*self.supervisor.words, *self.monitors.words, Word("drive_invert", UQ(1, 0), 1.0, "", 0, doc))
+        self.ranges = {
+            "supervisor_force_limit": (0, spec.force_limit_word),
+            "supervisor_ramp": (1, self.supervisor.ramp.max),
+            "supervisor_watchdog": WATCHDOG_MS,
+        }
 
     @property
     def words(self) -> tuple[Word, ...]:
@@ -43,6 +50,7 @@ class Design:
         status = [
             ("state", UQ(2, 0), "The state of the supervisor: 0 DISARMED, 1 ARMED, 2 TRIPPED."),
             ("live", UQ(1, 0), "The host's heartbeat is not overdue."),
+            ("ready", UQ(1, 0), "The axis can be armed."),
             ("latched", UQ(COUNT, 0), f"The causes since the last acknowledgement: {causes}."),
             ("first", UQ(COUNT, 0), "The causes of the clock that led to the last trip."),
             ("a_channel_idle", UQ(1, 0), "A warning: the last edges were all of one channel."),
@@ -56,23 +64,17 @@ class Design:
             ),
         ]
         pulses = [
-            ("arm", "The axis is armed, if all allows it."),
+            ("arm", "The axis is armed; refused unless ready."),
             ("disarm", "The axis is disarmed."),
-            ("acknowledge", "The causes in the active word acknowledged are acknowledged, if they are those latched."),
-            ("beat", "The host lives, if the active word beat_word is a new one."),
+            ("acknowledge", "The causes in acknowledged are acknowledged, if they are those latched."),
         ]
-        bounds = {
-            "supervisor_force_limit": (0, spec.force_limit_word),
-            "supervisor_ramp": (1, None),
-            "supervisor_watchdog": WATCHDOG_MS,
-        }
         second = 1 / spec.clock_hz
         return (
             *(Register(name, Kind.STATUS, fmt, meaning) for name, fmt, meaning in status),
             Register("first_stamp", Kind.STATUS, UQ(spec.stamp_width, 0), "The number of that clock.", second, "s"),
             Register("driven", Kind.STATUS, spec.force, "The drive that is let out.", spec.force_resolution_n, "N"),
             *(Register(name, Kind.PULSE, UQ(1, 0), meaning) for name, meaning in pulses),
-            *(word_register(word, *bounds.get(word.name, ())) for word in self.live),
-            Register("acknowledged", Kind.WORD, UQ(COUNT, 0), "The causes that the host has read."),
-            Register("beat_word", Kind.WORD, UQ(BEAT_BITS, 0), "A word that differs from that of the last beat."),
+            Register("heartbeat", Kind.LIVE, UQ(BEAT_BITS, 0), "A word that the host changes again and again."),
+            Register("acknowledged", Kind.LIVE, UQ(COUNT, 0), "The causes that the host has read."),
+            *(word_register(word, Kind.LIVE, *self.ranges.get(word.name, ())) for word in self.live),
         )

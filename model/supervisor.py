@@ -108,8 +108,7 @@ class Inputs(NamedTuple):
     disarm: int = 0
     acknowledge: int = 0
     acknowledged: int = 0
-    beat: int = 0
-    beat_word: int = 0
+    heartbeat: int = 0
     supervisor_force_limit: int = 0
     supervisor_ramp: int = 0
     supervisor_watchdog: int = 0
@@ -124,6 +123,7 @@ class State(NamedTuple):
     state: int
     alive: int
     live: int  # the host's heartbeat is not overdue
+    ready: int  # an arm at the last clock would have armed
     latched: int  # causes since the last acknowledgement
     first: int  # causes of the clock that led to the last trip
     first_stamp: int  # the stamp of that clock
@@ -136,7 +136,7 @@ class State(NamedTuple):
     pump: int
 
 
-START = State(0, DISARMED, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+START = State(0, DISARMED, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
 
 
 class Design:
@@ -207,6 +207,8 @@ def step(params, state, inputs):
     watched = (inputs.supervisor_causes | REQUIRED) & (ALL if armed else ALWAYS)
     present = (inputs.causes & ~(1 << LINK)) | (0 if state.live else 1 << LINK)
     standing = present & watched
+    allowed = inputs.enable and state.live and (inputs.referenced or not inputs.supervisor_reference)
+    ready = state.state == DISARMED and not standing and allowed
 
     now, latched = state.state, state.latched | standing
     if standing:
@@ -216,7 +218,7 @@ def step(params, state, inputs):
             now, latched = DISARMED, 0
     elif not inputs.enable or inputs.disarm:
         now = DISARMED
-    elif inputs.arm and state.live and (inputs.referenced or not inputs.supervisor_reference):
+    elif inputs.arm and ready:
         now = ARMED
     trips = standing and state.state != TRIPPED
 
@@ -227,7 +229,7 @@ def step(params, state, inputs):
     elif inputs.strobe:
         ceiling = min(ceiling + inputs.supervisor_ramp, params.ceiling_max)
 
-    beats = inputs.beat and inputs.beat_word != state.last_beat
+    beats = inputs.heartbeat != state.last_beat
     ticks = state.tick == params.tick_clocks - 1
     left = state.left - 1 if ticks and state.left else state.left
     if beats:
@@ -240,6 +242,7 @@ def step(params, state, inputs):
         state=now,
         alive=(state.alive ^ 1 if turns else state.alive) if go else 0,
         live=int(left > 0),
+        ready=int(ready),
         latched=latched,
         first=standing if trips else state.first,
         first_stamp=inputs.stamp if trips else state.first_stamp,
@@ -248,6 +251,6 @@ def step(params, state, inputs):
         ceiling=ceiling if go else 0,
         tick=0 if ticks else state.tick + 1,
         left=left,
-        last_beat=inputs.beat_word if beats else state.last_beat,
+        last_beat=inputs.heartbeat,
         pump=(0 if turns else state.pump + 1) if go else 0,
     )

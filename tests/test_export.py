@@ -10,11 +10,13 @@ import pytest
 from hardwall.hdl.axis import Axis
 from hardwall.hdl.board import Board
 from hardwall.hdl.export import to_verilog, write
-from hardwall.hdl.ports import COLUMNS, frame_table, port_table
+from hardwall.hdl.ports import COLUMNS, port_table
+from hardwall.model import register_texts
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from stimuli.specs import spec
 
 TOPS = {"axis": Axis, "board": Board}
+WRITTEN = ("axis.v", "board.v", "ports.md", "registers.md", "registers.h", "registers.json")
 # Designs that instantiate the axis depend on these names; the words depend on its estimator.
 AXIS_PORTS = """
 clk rst encoder_a encoder_b encoder_z drive_enable clear_flags preload preload_count index_arm commit
@@ -24,7 +26,8 @@ stepped edge_kind indexed estimated saturated strobe_busy illegal overspeed ille
 index_latched stamp stamp_a_rise stamp_b_rise stamp_a_fall stamp_b_fall commit_pending
 """
 BOARD_PORTS = """
-clk rst encoder_a encoder_b encoder_z drive_enable scan_select_n scan_clock scan_in scan_out drive_pdm drive_sign
+clk rst encoder_a encoder_b encoder_z encoder_a_n encoder_b_n drive_enable external_fault emergency_stop uart_rx uart_tx
+drive_pdm drive_sign alive
 """
 
 
@@ -87,7 +90,7 @@ def test_other_components_are_refused():
 @pytest.fixture(scope="module")
 def written(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("verilog") / "made"
-    assert write(spec("mhz"), folder) == tuple(folder / name for name in ("axis.v", "board.v", "ports.md"))
+    assert write(spec("mhz"), folder) == tuple(folder / name for name in WRITTEN)
     return folder
 
 
@@ -125,15 +128,17 @@ def test_written_verilog_says_what_it_is_of(written, top):
 def test_written_tables_are_all_there(written):
     text = (written / "ports.md").read_text()
     axis, board = Axis(spec("mhz")), Board(spec("mhz"))
-    for table in (port_table(axis), port_table(board), frame_table(board.commands), frame_table(board.telemetry)):
+    for table in (port_table(axis), port_table(board)):
         assert f"\n\n{table}" in text
     assert f"\nA sample every 50 clocks; the drive changes {axis.latency} clocks after it is taken. " in text
-    bits = board.frame_bits
-    assert f"\nAn SPI device, mode 0: {bits} bits each way, the first of them number {bits - 1}.\n" in text
-    assert list(map(text.index, ("To the axis:", "From the axis:"))) == sorted(
-        text.index(frame_table(frame)) - len(head) - 2
-        for frame, head in ((board.commands, "To the axis:"), (board.telemetry, "From the axis:"))
-    )
+    assert "\nThe serial line has 921600 baud, 8 data bits, no parity and one stop bit. " in text
+
+
+def test_written_registers_are_those_of_the_board(written):
+    registers = Board(spec("mhz")).registers
+    assert (written / "registers.md").read_text() == register_texts.markdown(registers)
+    assert (written / "registers.h").read_text() == register_texts.c_header(registers)
+    assert (written / "registers.json").read_text() == register_texts.as_json(registers)
 
 
 def test_text_is_the_same_in_another_process(written, tmp_path):
@@ -145,4 +150,4 @@ def test_text_is_the_same_in_another_process(written, tmp_path):
     subprocess.run(command, cwd=Path(__file__).parent, env=environment() | {"PYTHONHASHSEED": "7"}, check=True)
     for path in written.iterdir():
         assert (tmp_path / path.name).read_bytes() == path.read_bytes()
-    assert len(list(tmp_path.iterdir())) == 3
+    assert len(list(tmp_path.iterdir())) == len(WRITTEN)

@@ -21,10 +21,9 @@ FLOORS = ("world", "jobs", "rtl", "loop", "scene", "walls", "estimates", "studie
 # Modules of hdl that are no blocks of the data path and have no arithmetic of their own to model.
 NOT_TWINNED = {
     "block": "the base class of blocks",
-    "board": "the axis behind a serial port; its twin, clock by clock, is in tests/oracles/board.py",
+    "board": "the supervised axis behind a link; its twin, clock by clock, is in tests/oracles/board.py",
     "estimators/levant_edge_signals": "the registers of levant_edge by name; that block's twin has their values",
     "export": "text of the hardware",
-    "frame": "the places of fields on the wire, which the host uses as it is",
     "link/link": "the blocks of the link, joined; each of them has its twin",
     "ports": "text about the hardware",
 }

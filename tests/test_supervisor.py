@@ -55,7 +55,8 @@ def campaign(name: str, clocks: int) -> dict[str, np.ndarray]:
             top = largest[word] >> random.randrange(largest[word].bit_length())
             inputs = inputs._replace(**{word: random.randint(0, top)})
         elif act < 0.032:
-            inputs = settled(d, enable=int(random.random() < 0.8), referenced=random.randrange(2))
+            loops = {"enable": int(random.random() < 0.8), "referenced": random.randrange(2)}
+            inputs = settled(d, heartbeat=inputs.heartbeat, **loops)
             beating = random.random() < 0.7
         elif act < 0.033:
             pulses = {random.choice(("arm", "disarm", "acknowledge")): 1}
@@ -64,7 +65,7 @@ def campaign(name: str, clocks: int) -> dict[str, np.ndarray]:
                 "causes": 1 << random.randrange(len(CAUSES)) | (random.randrange(ALL) if random.random() < 0.1 else 0)
             }
         elif act < 0.05 and beating:
-            pulses = {"beat": 1, "beat_word": random.randrange(1 << 16) if random.random() < 0.9 else state.last_beat}
+            inputs = inputs._replace(heartbeat=random.randrange(1 << 16))
         drive = random.randint(d.force.min, d.force.max) >> random.randrange(d.force.width)
         now = inputs._replace(
             strobe=int(random.random() < 0.3), drive=drive, stamp=clock % (1 << d.stamp_width), **pulses
@@ -115,7 +116,8 @@ class Bench:
         return self.state
 
     def arm(self) -> supervisor.State:
-        self.clock(beat=1, beat_word=self.state.last_beat ^ 1)
+        self.inputs = self.inputs._replace(heartbeat=self.inputs.heartbeat ^ 1)
+        self.clock()
         return self.clock(arm=1)
 
 
@@ -182,12 +184,23 @@ def test_a_silent_host_trips_within_the_time_that_it_has_set_and_no_word_switche
         assert (held - 1) * ms - 2 <= clocks <= held * ms + 2
 
 
-def test_a_beat_that_repeats_the_last_one_is_none():
+def test_a_host_that_goes_on_beating_stays_armed():
     bench = Bench(supervisor_watchdog=50)
     bench.arm()
-    for _ in range(51 * bench.design.params.tick_clocks):
-        bench.clock(beat=1, beat_word=bench.state.last_beat)
-    assert bench.state.state == TRIPPED
+    for _ in range(10):
+        for _ in range(48 * bench.design.params.tick_clocks):
+            bench.clock()
+        bench.inputs = bench.inputs._replace(heartbeat=bench.inputs.heartbeat + 1)
+    assert bench.clock().state == ARMED
+
+
+def test_an_arm_is_announced():
+    bench = Bench()
+    assert bench.clock().ready == 0
+    bench.inputs = bench.inputs._replace(heartbeat=1)
+    assert [bench.clock().ready for _ in range(3)] == [0, 1, 1]
+    assert bench.clock(enable=0).ready == 0
+    assert bench.clock(causes=1).ready == 0
 
 
 def test_enable_low_is_zero_at_once_and_high_again_brings_nothing_back():

@@ -1,12 +1,12 @@
 """The registers of an axis: shadowed words, pulses, counters, a snapshot of every status, and windows to memories."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal
+from amaranth.hdl import Cat, Const, Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.link.register_file import CELL_BITS, Area, Design, Operation
-from hardwall.model.registers import ACTIVE, CAPTURE, COUNTERS, END, MAP, PULSES, SPACE, TELEMETRY, WRITTEN
+from hardwall.model.registers import ACTIVE, CAPTURE, COUNTERS, END, LIVE, MAP, PULSES, SPACE, TELEMETRY, WRITTEN
 
 from ..arithmetic.fixed import shape
 
@@ -66,8 +66,8 @@ class RegisterFile(wiring.Component):
     - CHECK_READ, CHECK_WRITE: raise `absent`, `outside` or `refused` if the register cannot be read, or written with
       `host.value`. The halves of a value are checked in the order of their addresses, one after the other.
     - READ: give the register.
-    - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. Only what
-      was checked is written.
+    - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. A live word is at its port with
+      `done` of its lower half, which is written after the upper one. Only what was checked is written.
     - COUNT: add 1 to a counter, which wraps.
     - FINISH: if `commit` is marked, copy every written word to its active one and shift it to its port. Then all marked
       pulses are high for one clock, the same one; the words have been at their ports for a clock or more, and stay
@@ -94,7 +94,9 @@ class RegisterFile(wiring.Component):
     one input for each status of the map : In
         Live.
     one output for each word of the map : Out
-        The active word.
+        The active word; it moves while a commit copies the words, up to the clock of the pulse.
+    one output for each live word of the map : Out
+        The word as written.
     one output for each pulse of the map : Out(1)
         High for one clock.
     refuse : In
@@ -121,7 +123,7 @@ class RegisterFile(wiring.Component):
             {
                 "host": In(Requests()),
                 **{status.name: In(shape(status.format)) for status in registers.status},
-                **{word.name: Out(shape(word.format), init=word.reset) for word in registers.words},
+                **{word.name: Out(shape(word.format), init=word.reset) for word in (*registers.words, *registers.live)},
                 **{pulse.name: Out(1) for pulse in registers.pulses},
                 "refuse": In(len(registers.pulses)),
                 "commit_pending": In(1),
@@ -158,10 +160,9 @@ class RegisterFile(wiring.Component):
         # What there is at the address.
         address = host.address
         below = address[: END.bit_length() - 1]
-        in_book, in_map, in_capture = address < END, address[14:] == MAP >> 14, address[15:] == CAPTURE >> 15
+        in_book, in_map, in_capture = address < END, address[14:] == MAP >> 14, Const(0)
         wide = in_book & ((address < COUNTERS) | (address >= WRITTEN))
         in_map &= address[:14] < len(design.map_cells)
-        in_capture &= address[:15] < registers.capture_registers
         is_pulse = in_book & (below[4:] == PULSES >> 4)
         half = wide & ((host.first & address[0]) | (host.last & ~address[0]))
         marks = Signal(len(registers.pulses))
@@ -174,7 +175,7 @@ class RegisterFile(wiring.Component):
         shift, status = Signal(CELL_BITS), Signal(sum(each.format.width for each in registers.status))
         left, extended, bit = Signal(range(CELL_BITS + 1)), Signal(), Signal(range(CELL_BITS))
         ports, committing = Cat(getattr(self, word.name) for word in registers.words), Signal()
-        counting, storing = Signal(), Signal()
+        counting, storing, high = Signal(), Signal(), Signal(CELL_BITS)
         m.d.comb += [
             read.addr.eq(Cat(place, area)),
             write.addr.eq(place),
@@ -183,6 +184,7 @@ class RegisterFile(wiring.Component):
             host.data.eq(Mux(address[14], map_read.data, read.data)),
         ]
         if registers.capture_registers:
+            in_capture = (address[15:] == CAPTURE >> 15) & (address[:15] < registers.capture_registers)
             m.d.comb += self.capture_address.eq(address)
             with m.If(address[15]):
                 m.d.comb += host.data.eq(self.capture_data)
@@ -221,7 +223,9 @@ class RegisterFile(wiring.Component):
                         m.next = "DONE"
                     with m.Case(Operation.CHECK_WRITE):
                         m.d.comb += area.eq(Area.LEAST)
-                        with m.If(~in_book | (below < design.first_pulse) | (below >= design.last_word) | half):
+                        word = (below >= design.first_pulse) & (below < design.last_word)
+                        live = (below >= LIVE) & (below < design.last_live)
+                        with m.If(~in_book | ~(word | live) | half):
                             m.d.sync += host.absent.eq(1)
                         with m.If((wanted & self.refuse).any()):
                             m.d.sync += host.refused.eq(1)
@@ -255,6 +259,10 @@ class RegisterFile(wiring.Component):
                 m.next = "DONE"
             with m.State("KEEP"):
                 m.d.comb += [place.eq(below), storing.eq(1), write.en.eq(~is_pulse)]
+                m.d.sync += high.eq(shift)
+                for word in registers.live:
+                    with m.If(below == word.address + 1):
+                        m.d.sync += getattr(self, word.name).eq(Cat(shift, high))
                 m.next = "DONE"
             with m.State("COUNT"):
                 m.d.comb += [place.eq(below), counting.eq(1), write.en.eq(1)]

@@ -9,14 +9,15 @@ A book of 16-bit cells has four areas of 256, which one port of a memory reads a
   sign (`EXTENDED`).
 
 A written word stays in LIVE until a commit copies every one to its active cell and to the port that the axis reads;
-then the pulses of the frame go out, all at one clock, and the axis takes the words at its next sample.
+then the pulses of the frame go out, all at one clock, and the axis takes the words at its next sample. A live word is
+at its port as soon as its lower half is written.
 
 A status is read as it was at the last snapshot, all of them at one clock.
 """
 
 from enum import IntEnum
 
-from ..registers import ACTIVE, CAPTURE, COUNTERS, END, MAP, PULSES, WRITTEN, RegisterMap
+from ..registers import ACTIVE, CAPTURE, COUNTERS, END, LIVE, MAP, PULSES, WRITTEN, RegisterMap
 
 CELL_BITS = 16
 CELL = (1 << CELL_BITS) - 1
@@ -53,8 +54,8 @@ class Design:
         book: the cells of every area at configuration.
         map_cells: the cells of the window to the compressed map, and behind them the answers of the identification.
         answers_at: the address of each of those answers, and how many registers it has, by their keys in the map.
-        first_pulse, last_word: the addresses between which registers can be written: from, and behind.
-        last_status, last_active: the addresses behind the last status and the last active word.
+        first_pulse: the address of the first pulse.
+        last_status, last_word, last_active, last_live: the addresses behind the last of each kind.
     """
 
     def __init__(self, registers: RegisterMap):
@@ -63,7 +64,8 @@ class Design:
         self.registers = registers
         self.first_pulse = WRITTEN - len(registers.pulses)
         self.last_word = WRITTEN + 2 * len(registers.words)
-        self.last_active = self.last_word + ACTIVE - WRITTEN
+        self.last_live = LIVE + 2 * len(registers.live)
+        self.last_active = ACTIVE + 2 * len(registers.words)
         self.last_status = registers.status[-1].address + 2
         self.book = self._book()
         text = registers.compressed + bytes(len(registers.compressed) % 2)
@@ -99,7 +101,7 @@ class Design:
 
     def writable(self, address: int) -> bool:
         """Return whether the register at an address can be written."""
-        return self.first_pulse <= address < self.last_word
+        return self.first_pulse <= address < self.last_word or LIVE <= address < self.last_live
 
 
 class RegisterFile:
@@ -107,7 +109,7 @@ class RegisterFile:
 
     Attributes:
         live: the cells that the host reads.
-        active: the word at every port to the axis, by name.
+        active: the word at every port to the axis, by name, live words included.
         pulses: names of the pulses that went out at the last FINISH, and `marked`, those that go out at the next.
         absent, outside, refused: what the checks have found since `clear`.
     """
@@ -115,7 +117,7 @@ class RegisterFile:
     def __init__(self, design: Design):
         self.design = design
         self.live = design.book[Area.RESET * END : (Area.RESET + 1) * END]
-        self.active = {word.name: word.reset for word in design.registers.words}
+        self.active = {word.name: word.reset for word in (*design.registers.words, *design.registers.live)}
         self.pulses: tuple[str, ...] = ()
         self.marked: list[str] = []
         self._tied = [True, True]
@@ -164,6 +166,9 @@ class RegisterFile:
                 self.marked.append(name)
         else:
             self.live[address] = value
+            for word in self.design.registers.live:
+                if address == word.address + 1:
+                    self.active[word.name] = word.from_registers((self.live[word.address], value))
 
     def count(self, address: int) -> None:
         """Count one in a counter, which wraps."""

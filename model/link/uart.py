@@ -38,6 +38,12 @@ FRAME_BITS = DATA_BITS + 2
 HALF = 1 << PHASE_BITS - 1
 
 
+def usual_baud(clock_hz: int) -> int:
+    """Return `BAUD`, or the largest half, quarter or eighth of it that a clock allows; the last if it allows none."""
+    rates = [BAUD >> halvings for halvings in range(4)]
+    return next((rate for rate in rates if rate * CLOCKS_PER_BIT_MIN <= clock_hz), rates[-1])
+
+
 @dataclass(frozen=True)
 class Design:
     """The divider of a UART at a clock, for a rate.

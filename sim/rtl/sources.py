@@ -7,7 +7,7 @@ from ...model.spec import AxisSpec
 
 
 def write_verilog(spec: AxisSpec, folder: Path) -> list[Path]:
-    """Write `axis.v`, `board.v` and `ports.md` of an axis into an existing folder; return their paths.
+    """Write the Verilog of an axis, its ports and its registers into an existing folder; return the paths.
 
     Raises:
         OSError: if the files cannot be written.

@@ -202,8 +202,8 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
             least 0.
         lut4, ff, dsp, bram: cells in use; available: cells of the part (flip-flops: one a LUT4).
         clocks_per_sample: least clocks between two samples; max_sample_hz: the sample rate that follows at fmax_mhz.
-        latency_clocks: clock edges from the first that sees a pin changed to the one that changes the drive, both
-            included, if the sample is taken as soon as the decoder has counted the edge.
+        latency_clocks: clock edges from the first that sees a pin changed to the one that changes the drive that the
+            supervisor lets out, both included, if the sample is taken as soon as the decoder has counted the edge.
         critical_path: the longest path with the slowest seed.
         folder: the folder of netlist, logs and reports.
 
@@ -216,7 +216,8 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
     if not seeds:
         raise ValueError(f"seeds must be one or more, not {seeds!r}")
     part = PARTS[device]
-    verilog, constraints = to_verilog(Board(spec), "board"), _constraints(part)
+    board = Board(spec)
+    verilog, constraints = to_verilog(board, "board"), _constraints(part)
     folder = _netlist(device, part, verilog, constraints, spec.clock_hz)
     cells = _cells_of(folder)
     if part.multiplier_ns is not None and _half_registered(cells):
@@ -227,7 +228,6 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
     fmax = statistics.median(1e3 / period for period in periods)
     slack = 1e9 / spec.clock_hz - 1e3 / fmax
     sizes = {name: reports[0]["utilization"][kind] for name, kind in part.counted.items()}
-    clocks = spec.design.latency_to_drive
     return {
         "estimator": spec.estimator,
         "device": device,
@@ -240,9 +240,9 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
         **{name: size["used"] for name, size in sizes.items()},
         "ff": sum(cell["type"].startswith(part.flip_flops) for cell in cells.values()),
         "available": {name: size["available"] for name, size in sizes.items()},
-        "clocks_per_sample": clocks,
-        "max_sample_hz": round(fmax * 1e6 / clocks),
-        "latency_clocks": quadrature.latency(glitch_clocks) + clocks,
+        "clocks_per_sample": spec.design.latency_to_drive,
+        "max_sample_hz": round(fmax * 1e6 / spec.design.latency_to_drive),
+        "latency_clocks": quadrature.latency(glitch_clocks) + board.drive_latency,
         "critical_path": "{1}, {0:.1f} ns".format(*max(timings)),
         "folder": str(folder),
     }

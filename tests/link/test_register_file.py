@@ -71,7 +71,7 @@ async def every_bound_of_every_word(dut):
     await host.bench.reset()
     most = host.component.boot_clocks + host.component.snapshot_clocks
     assert await host.do(Operation.SNAPSHOT) <= most
-    for register in (*host.registers.words, *host.registers.pulses):
+    for register in (*host.registers.words, *host.registers.live, *host.registers.pulses):
         span = 16 * register.size
         tried = {register.low, register.high, register.low - 1, register.high + 1, 0, -1, 1, 1 << 16, -(1 << 16)}
         tried |= {(1 << span - 1) - 1, -(1 << span - 1), register.low ^ 1 << 16, register.high ^ 1 << 15}
@@ -91,7 +91,8 @@ async def every_bound_of_every_word(dut):
 async def random_operations(dut):
     host, random = Host(dut), rng()
     await host.bench.reset()
-    words, pulses, statuses = host.registers.words, host.registers.pulses, host.registers.status
+    words, pulses = (*host.registers.words, *host.registers.live), host.registers.pulses
+    statuses = host.registers.status
     await host.do(Operation.SNAPSHOT)
     host.twin.snapshot({each.name: 0 for each in statuses})
     pulsed, before = [host.bench.monitor(pulse.name) for pulse in pulses], [0] * len(pulses)
@@ -109,12 +110,13 @@ async def random_operations(dut):
             await host.do(Operation.CHECK_WRITE, address, value, first, last)
             host.twin.check_write(address, first, last, value, names)
         elif case < 0.7:
-            address = int(random.integers(host.design.first_pulse, host.design.last_word))
-            register = next(each for each in (*pulses, *words) if address - each.address in range(each.size))
+            register = random.choice((*pulses, *words))
             word = int(random.integers(register.low, register.high + 1))
             for k, half in enumerate(register.to_registers(word)):
                 await host.do(Operation.WRITE, register.address + k, half)
                 host.twin.write(register.address + k, half)
+            for each in host.registers.live:
+                assert host.bench.reader(each.name)() == host.twin.active[each.name]
         elif case < 0.8:
             await host.do(Operation.COUNT, COUNTERS + value % 8)
             host.twin.count(COUNTERS + value % 8)

@@ -116,7 +116,7 @@ class World:
         self.line, self.server = Line(), server.Server(self.design)
         self.server.capture = [captured(k) for k in range(self.registers.capture_registers)]
         self.sent = self.bench.monitor("sending", "sent")
-        self.pulsed = self.bench.monitor("pulsed", "pulses", *(word.name for word in self.registers.words))
+        self.pulsed = self.bench.monitor("pulsed", "pulses", *self.server.file.active)
         self.idle = self.bench.reader("idle")
         self.answers = 0
         cocotb.start_soon(self._axis())
@@ -193,7 +193,7 @@ class World:
 
     def random_write(self) -> tuple[int, list[int]]:
         """Return the first address and the values of a write that is mostly right."""
-        random, words, values = self.random, self.registers.words, []
+        random, words, values = self.random, (*self.registers.words, *self.registers.live), []
         first = int(random.integers(0, len(words)))
         for word in words[first : first + int(random.integers(1, 6))]:
             value = int(random.integers(word.low, word.high + 1))

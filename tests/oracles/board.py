@@ -1,56 +1,134 @@
 """The board as its models say it is, clock for clock, and a host that talks to the board under test."""
 
-from cocotb.triggers import RisingEdge
+import dataclasses
+import logging
+from collections import deque
 
-from hardwall.hdl.board import TELEMETRY, Board
-from hardwall.hdl.frame import BYTE
+import cocotb
+from amaranth.hdl import Cat, Module, Shape
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
+from cocotbext.uart import UartSink, UartSource
+
+from hardwall.hdl.board import ENCODER, Board
+from hardwall.hdl.supervised import LOOPS, SHOWN
 from hardwall.model import output, quadrature, wall
 from hardwall.model.estimators.estimate import estimate
+from hardwall.model.link import register_file, server
+from hardwall.model.link.line import Verdict, framed
+from hardwall.model.register import VALUE_BITS, Kind
+from hardwall.model.supervised import FIXED
 from hardwall.testing import Bench, rng
+from hardwall.testing.packing import Packing
+from stimuli import frames
 from stimuli.specs import spec
 
-HALF = 3
-"""The fewest clocks allowed for a level on the serial port."""
+from .supervised import Follower
+
+BAUD = 3_000_000
+"""4 clocks a bit at `CLOCK_HZ`."""
+CLOCK_HZ = 12_000_000
 SYNCHRONISER = 2
 """Clock edges from a change of a pin to the last edge that does not act on it."""
+IDLE = (*LOOPS, "encoder_a_n", "encoder_b_n")
+"""Pins that are high while the handle rests at its origin and all is well."""
+SEEN = (
+    "sampled", "stepped", "edge_kind", "indexed", "estimated", "saturated", "strobe_busy", "illegal", "overspeed",
+    "count", "velocity", "drive", "stamp", "index_latched", *SHOWN, "a_channel_idle", "drive_inverted",
+)  # fmt: skip
+"""Ports of the axis inside that the models are fed with or held to."""
+PATIENCE = 60_000
+"""Clocks after which an answer is overdue."""
 
 
-def make(name: str) -> Board:
-    return Board(spec(name))
+def make(name: str, estimator: str) -> "Watched":
+    rates = {"clock_hz": CLOCK_HZ, "sample_hz": 200_000, "actuation_hz": 100_000}
+    return Watched(Board(dataclasses.replace(spec(name, estimator), **rates), BAUD))
+
+
+class Watched(wiring.Component):
+    """A board with its pins, and in two words what its link asks of the axis and what the axis shows.
+
+    Attributes:
+        board: the board.
+        asked: how the ports of the link to the axis lie in `asking`.
+        shown: how `SEEN` lies in `showing`.
+    """
+
+    def __init__(self, board: Board):
+        self.board, registers = board, board.registers
+        asked = (each.name for each in (*registers.words, *registers.live, *registers.pulses))
+        self._asked = {name: getattr(board.link, name) for name in asked}
+        self._shown = {name: getattr(board.axis, name) for name in SEEN}
+        self.asked, self.shown = (
+            Packing({name: Shape.cast(port.shape()) for name, port in ports.items()})
+            for ports in (self._asked, self._shown)
+        )
+        inside = {"asking": Out(self.asked.width), "showing": Out(self.shown.width)}
+        super().__init__({**board.signature.members, **inside})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.board = self.board
+        for name, member in self.board.signature.members.items():
+            inner, outer = getattr(self.board, name), getattr(self, name)
+            m.d.comb += inner.eq(outer) if member.flow == In else outer.eq(inner)
+        m.d.comb += [self.asking.eq(Cat(self._asked.values())), self.showing.eq(Cat(self._shown.values()))]
+        return m
+
+
+def unpacked(packing: Packing, word: int) -> dict[str, int]:
+    """Return the values in a word, by name."""
+    return {name: packing.column(name, [word])[0] for name in packing.shapes}
 
 
 class Twin:
     """The state of the board's axis and its pulses, clock for clock, from the models alone.
 
-    The blocks have their own benches; the twin adds the clock edge at which their results can be seen.
+    The blocks have their own benches; the twin adds the clock edge at which their results can be seen. When the link
+    asks for something, and what the axis shows to its monitors, is taken from the board.
     """
 
-    def __init__(self, name: str):
-        self.spec = spec(name)
+    def __init__(self, board: Board):
+        self.spec, self.board = board.spec, board
         self.design = self.spec.design
         self.period, self.drive_bits = self.spec.clocks_per_sample, self.spec.force.width - 2
         self.clocks = 0
-        self.words = {word.name: word.reset for word in self.design.words}
+        self.words = {word.name: word.reset for word in self.design.words} | self._fixed()
         self.restart, self.waiting = 0, None
         self.decoder_params = self.spec.design.decoder
         self.decoder, self.estimator, self.output = quadrature.START, self.design.start().estimator, output.START
         self.velocity = self.wall_force = self.drive = self.sticky = 0
-        self.loaded, self.raised = {}, {}
+        self.allowed = False
+        self.due, self.raised = {}, {}
+        self.follower = Follower(board.axis.design, IDLE)
         self.sum = self.magnitude = self.negative = self.pulse = self.sign = 0
 
-    def telemetry(self) -> dict[str, int]:
-        """Return the telemetry that a capture at the next edge takes."""
-        own = {
-            "drive": self.drive,
-            "velocity": self.velocity,
-            "wall_force": self.wall_force,
-            "flags": self.sticky | self._raised(),
-        }
-        return {name: own[name] if name in own else getattr(self.decoder, name) for name in TELEMETRY}
+    def _fixed(self) -> dict[str, int]:
+        return {word.name: word.format.max for word in self.design.words if word.name in FIXED}
+
+    def shown(self) -> tuple:
+        """Return what the status registers are made from, as a snapshot at the next edge takes it."""
+        own = self.drive, self.velocity, self.wall_force, self.sticky | self._raised()
+        return self.decoder, own, self.follower.wanted()
+
+    def status(self, shown: tuple) -> dict[str, int]:
+        """Return the words of every status register from what `shown` has returned."""
+        decoder, own, wanted = shown
+        named = dict(zip(("drive", "velocity", "wall_force", "flags"), own, strict=True)) | wanted
+        named |= {f"counts_{k}": wanted["counts"] >> VALUE_BITS * k & 0xFFFFFFFF for k in range(2)}
+        status = {}
+        for register in self.board.registers.status:
+            value = named[register.name] if register.name in named else getattr(decoder, register.name)
+            if register.name == "velocity":
+                value >>= self.design.estimator.velocity.width - register.format.width
+            status[register.name] = value
+        return status
 
     @property
     def strobe(self) -> bool:
-        """Return whether the next edge takes a sample."""
+        """Whether the next edge takes a sample."""
         return self.clocks % self.period == self.period - 1
 
     def _raised(self) -> int:
@@ -61,132 +139,224 @@ class Twin:
     def _sample(self) -> None:
         d, decoder, now = self.design, self.decoder, self.clocks
         params = d.params(self.words)
-        seen = quadrature.seen(decoder)
-        self.estimator, velocity, raised = estimate(params.estimator, self.estimator, seen, self.restart)
+        self.estimator, velocity, raised = estimate(
+            params.estimator, self.estimator, quadrature.seen(decoder), self.restart
+        )
         force = wall.render(params.wall, decoder.count, velocity)
         fault = decoder.illegal | decoder.overspeed
-        self.output, limited = output.step(params.output, self.output, force, not fault)
-        # A result is seen `latency` edges after the strobe, so its register is loaded at the edge before.
-        self.loaded[now + d.estimator.latency - 1] = "velocity", velocity
-        self.loaded[now + d.estimator.latency + d.wall.latency - 1] = "wall_force", force
-        self.loaded[now + d.latency_to_drive - 1] = "drive", self.output.drive
-        self.raised[now + d.estimator.latency] = raised << params.estimator_bit
-        self.raised[now + d.latency_to_drive] = limited << params.output_bit
 
-    def edge(self, a: int, b: int, z: int, given: dict[str, int]) -> None:
-        """Advance by one clock edge, with the values that a frame gives to the axis at this edge, if any."""
+        def allow() -> None:
+            self.allowed = not fault
+
+        def drive() -> None:
+            # The output stage slews from the drive, which a low enable has made zero.
+            begun = self.output._replace(drive=self.drive)
+            self.output, limited = output.step(params.output, begun, force, self.allowed)
+            self.drive = self.output.drive
+            self.raised[self.clocks + 1] = limited << params.output_bit
+
+        # A result is seen `latency` edges after the strobe, so its register is loaded at the edge before.
+        estimated = now + d.estimator.latency
+        walled = estimated + d.wall.latency
+        self.due[estimated - 1] = lambda: setattr(self, "velocity", velocity)
+        self.raised[estimated] = raised << params.estimator_bit
+        self.due[walled - 1] = lambda: setattr(self, "wall_force", force)
+        self.due[walled] = allow
+        self.due[now + d.latency_to_drive - 1] = drive
+
+    def edge(self, pins: dict[str, int], asked: dict[str, int], seen: dict[str, int]) -> None:
+        """Advance by one clock edge, with the pins, what the link asks, and what the axis shows just before it."""
+        driven = self.follower.supervisor.driven
         self.sum = self.sum % 2**self.drive_bits + self.magnitude
         self.pulse, self.sign = self.sum >> self.drive_bits, self.negative
-        self.magnitude, self.negative = abs(self.drive), int(self.drive < 0)
+        self.magnitude, self.negative = abs(driven), int(driven < 0) ^ self.follower.inverted
 
-        self.sticky = (0 if given.get("clear_flags") else self.sticky) | self._raised()
-        inputs = quadrature.Inputs(a, b, z, self.words["encoder_glitch_clocks"], self.words["encoder_invert"])
+        enabled = self.follower.level("drive_enable")
+        self.follower.edge({**pins, **asked}, seen)
+        self.sticky = (0 if asked["clear_flags"] else self.sticky) | self._raised()
+        channels = [pins[name] for name in ENCODER[:3]]
+        inputs = quadrature.Inputs(*channels, self.words["encoder_glitch_clocks"], self.words["encoder_invert"])
         if self.strobe:
             if self.waiting:
                 self.words, self.waiting = self.waiting, None
             self._sample()
             self.restart = 0
-        strobes = quadrature.NO_STROBES
-        if given:
-            pulses = [given.get(name, 0) for name in ("preload", "preload_count", "index_arm", "clear_flags")]
-            strobes = quadrature.Strobes(*pulses)
-        self.decoder = quadrature.step(self.decoder_params, self.decoder, inputs, strobes)
-        if self.clocks in self.loaded:
-            setattr(self, *self.loaded.pop(self.clocks))
-        if given.get("preload"):
+        pulses = [asked[name] for name in ("preload", "preload_count", "index_arm", "clear_flags")]
+        self.decoder = quadrature.step(self.decoder_params, self.decoder, inputs, quadrature.Strobes(*pulses))
+        if self.clocks in self.due:
+            self.due.pop(self.clocks)()
+        if not enabled:
+            self.drive, self.allowed = 0, False
+        if asked["preload"]:
             self.restart = 1
-        if given.get("commit"):
-            self.waiting = {name: given[name] for name in self.words}
+        if asked["commit"]:
+            self.waiting = {name: asked[name] for name in self.words if name in asked} | self._fixed()
         self.clocks += 1
 
 
 class Host:
-    """The world around the board: a serial host, a turning encoder, and the twin, compared at every edge."""
+    """The world around the board: a host on the line, a turning encoder, loops, and the twin, compared at every edge.
 
-    def __init__(self, dut, name: str):
-        self.dut, self.board, self.random = dut, make(name), rng()
-        self.bench = Bench(dut, self.board)
-        self.pulse, self.sign = self.bench.reader("drive_pdm"), self.bench.reader("drive_sign")
-        self.twin = Twin(name)
-        self.given = {}
-        self.captured = {}
-        self.phase, self.pins = 0, (0, 0, 0)
-        self.rate = self.illegal_rate = 0.0
-        self.pulses = []
-        self.checked = True
+    Attributes:
+        rate, illegal_rate: probabilities, a clock, of an edge and of an illegal one.
+        open_rate: the probability, a clock, that a loop opens.
+        pulses: the levels of the drive's pins at every edge.
+        history: what the twin showed at the last edges, by stamp.
+        refused: exceptions that were answered.
+    """
 
-    async def reset(self):
+    def __init__(self, dut, name: str, estimator: str):
+        self.component = make(name, estimator)
+        self.dut, self.board, self.random = dut, self.component.board, rng()
+        self.registers = self.board.registers
+        self.bench, self.twin = Bench(dut, self.component), Twin(self.board)
+        self.pins = {name: int(name in IDLE) for name in (*ENCODER, *LOOPS)}
+        self.phase, self.rate, self.illegal_rate, self.open_rate = 0, 0.0, 0.0, 0.0
+        self.pulses: list[tuple[int, int]] = []
+        self.history: deque[tuple[int, tuple]] = deque(maxlen=PATIENCE)
+        self.server = server.Server(register_file.Design(self.registers))
+        self.place = {register.name: register.address for register in self.registers.registers}
+        self.refused: list[int] = []
+
+    async def reset(self) -> None:
         await self.bench.reset()
-        self.bench.drive(scan_select_n=1, drive_enable=1)
+        self.bench.drive(uart_rx=1, **self.pins)
+        bit_ns = self.bench.period_ns * CLOCK_HZ / BAUD
+        self.source, self.sink = UartSource(self.dut.uart_rx, 1e9 / bit_ns), UartSink(self.dut.uart_tx, 1e9 / bit_ns)
+        for end in (self.source, self.sink):
+            end.log.setLevel(logging.WARNING)
         # The reset is seen inside for as long as this; the first edge without it is the twin's first.
-        for _ in range(SYNCHRONISER):
-            await RisingEdge(self.dut.clk)
+        await ClockCycles(self.dut.clk, SYNCHRONISER)
+        self._following = cocotb.start_soon(self._follow())
 
     def _turn(self) -> None:
-        """Move the encoder at random by one edge, seldom by two at once."""
-        if self.random.random() >= self.rate:
-            return
-        z = self.pins[2] ^ int(self.random.random() < 0.1)
-        self.phase += 1 if self.random.random() < 0.6 else -1
-        self.phase += int(self.random.random() < self.illegal_rate)
-        a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[self.phase % 4]
-        self.pins = a, b, z
-        self.bench.drive(encoder_a=a, encoder_b=b, encoder_z=z)
+        """Move the encoder at random by one edge, seldom by two at once, and open or close a loop."""
+        random, moved = self.random, {}
+        chance = random.random(2)
+        if chance[0] < self.rate:
+            # The handle wanders about its origin, for an axis of a few counts is nowhere else within its range.
+            self.phase += 1 if random.random() < (0.3 if self.phase > 0 else 0.7) else -1
+            self.phase += int(random.random() < self.illegal_rate)
+            a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[self.phase % 4]
+            z = self.pins["encoder_z"] ^ int(random.random() < 0.1)
+            moved = {"encoder_a": a, "encoder_b": b, "encoder_z": z, "encoder_a_n": 1 - a, "encoder_b_n": 1 - b}
+        if chance[1] < self.open_rate:
+            name = LOOPS[int(random.integers(0, len(LOOPS)))]
+            moved[name] = self.pins[name] ^ 1
+        self.change(**moved)
 
-    async def edges(self, count: int):
-        """Let `count` clock edges pass on the board and on the twin."""
-        edge = RisingEdge(self.dut.clk)
-        for _ in range(count):
+    def change(self, **pins: int) -> None:
+        """Set pins, on the board and on the twin."""
+        if pins:
+            self.pins |= pins
+            self.bench.drive(**pins)
+
+    async def _follow(self) -> None:
+        """Let the twin see every clock edge, and compare it with the board."""
+        edge, asking, showing = RisingEdge(self.dut.clk), self.dut.asking, self.dut.showing
+        pulse, sign = self.bench.reader("drive_pdm"), self.bench.reader("drive_sign")
+        component, twin, last, asked = self.component, self.twin, -1, {}
+        while True:
             await edge
-            seen = self.pulse(), self.sign()
-            assert not self.checked or seen == (self.twin.pulse, self.twin.sign), f"edge {self.twin.clocks}"
-            self.pulses.append(seen)
-            if self.twin.clocks in self.captured:
-                self.captured[self.twin.clocks] = self.twin.telemetry()
-            self.twin.edge(*self.pins, self.given.pop(self.twin.clocks, {}))
+            pins, word = (pulse(), sign()), int(asking.value)
+            if word != last:
+                asked, last = unpacked(component.asked, word), word
+            found = unpacked(component.shown, int(showing.value))
+            gate = self.pins["drive_enable"] & self.pins["emergency_stop"]
+            assert pins == (twin.pulse & gate, twin.sign), f"edge {twin.clocks}"
+            wanted = twin.follower.wanted() | {"drive": twin.drive, "count": twin.decoder.count}
+            unlike = {name: (found[name], value) for name, value in wanted.items() if found[name] != value}
+            assert not unlike, f"edge {twin.clocks}: the board's and the twin's {unlike}"
+            self.pulses.append(pins)
+            self.history.append((twin.decoder.stamp, twin.shown()))
+            twin.edge(self.pins, asked, found)
             self._turn()
-
-    async def exchange(self, values: dict[str, int], bits: int | None = None, heard: bool = True, stuck: int = 0):
-        """Send a frame, or its first `bits`, or zeros before it; return the answer and the expected telemetry.
-
-        Bits set in `stuck` are sent as ones. The axis must get nothing unless `heard`, or if the frame is not whole.
-        """
-        frame = int.from_bytes(self.board.commands.encode(values), "big") | stuck
-        length = self.board.frame_bits
-        bits = length if bits is None else bits
-        # The twin has seen `clocks` edges, so the next edge has that number. The first edge to act on a change is
-        # number `clocks` + SYNCHRONISER; the register followed the telemetry up to the edge before.
-        frozen = self.twin.clocks + SYNCHRONISER - 1
-        self.captured[frozen] = None
-        self.bench.drive(scan_select_n=0)
-        await self.edges(HALF)
-        answer = 0
-        for bit in range(bits):
-            self.bench.drive(scan_clock=0, scan_in=frame >> (max(length, bits) - 1 - bit) & 1)
-            await self.edges(HALF)
-            answer = answer << 1 | int(self.dut.scan_out.value)
-            self.bench.drive(scan_clock=1)
-            await self.edges(HALF)
-        self.bench.drive(scan_clock=0)
-        await self.edges(HALF)
-        if heard and bits == length:
-            # One edge sees the rise, and the pulses are there at the next.
-            self.given[self.twin.clocks + SYNCHRONISER + 1] = values
-        self.bench.drive(scan_select_n=1)
-        await self.edges(HALF)
-        expected = self.captured.pop(frozen)
-        telemetry = self.board.telemetry.decode(answer.to_bytes(length // BYTE, "big")) if bits == length else None
-        return telemetry, expected
-
-    async def commit(self, **values: int):
-        """Send words, with the others as after reset, and wait until they hold and have reached the pulses."""
-        reset = {word.name: word.reset for word in self.twin.design.words}
-        answer = await self.exchange({"commit": 1, "clear_flags": 1, **reset, **values})
-        await self.edges(self.settling)
-        return answer
 
     @property
     def settling(self) -> int:
-        """Return the most clocks until a commit has taken effect on the pulses, including the wait for its sample."""
+        """The most clocks until a commit or an arm has taken effect on the pulses, with the steepest ramp."""
         axis = self.twin.spec
-        return (axis.samples_per_actuation + 1) * axis.clocks_per_sample + self.board.latency + 4
+        return (axis.samples_per_actuation + 2) * axis.clocks_per_sample + self.board.latency + 4
+
+    async def edges(self, count: int) -> None:
+        """Let `count` clock edges pass."""
+        await ClockCycles(self.dut.clk, count)
+        if self._following.done():
+            await self._following
+
+    async def request(self, pdu: bytes) -> bytes:
+        """Return the answer to a request without unit and CRC; it must be the twin's, and the words of the link too."""
+        frame = framed(b"\1" + pdu)
+        await self.source.write(frame)
+        await self.source.wait()
+        begun = len(self.pulses)
+        answer = bytes(await self._answer(frame))
+        await self.edges(1)
+        states = [shown[2] for _, shown in list(self.history)[begun - len(self.pulses) :]]
+        expected = []
+        # What is refused depends on the state while the frame is checked, which may change on the way.
+        for ready, armed in sorted({(state["ready"], state["state"] == 1) for state in states}):
+            self.server.refusing = frozenset(("arm",) * (not ready) + ("preload",) * armed)
+            expected.append(self.server.refusing)
+        self.server.refusing = self._refusing(answer, expected)
+        self.server.status = self._snapshot(pdu, answer)
+        assert answer == framed(self.server.take(Verdict.REQUEST, frame))
+        if answer[1] & 0x80:
+            self.refused.append(answer[2])
+        found = unpacked(self.component.asked, int(self.dut.asking.value))
+        assert {name: found[name] for name in self.server.file.active} == self.server.file.active
+        return answer[1:-2]
+
+    @staticmethod
+    def _refusing(answer: bytes, possible: list[frozenset[str]]) -> frozenset[str]:
+        """Return what the board refused, if its state changed meanwhile: more, if it answered that it refused."""
+        return max(possible, key=len) if answer[1:3] == bytes([0x90, server.FAILURE]) else min(possible, key=len)
+
+    async def _answer(self, frame: bytes) -> bytes:
+        """Return the bytes that the board sends until it has been silent for two bytes, CRC included."""
+        timeout = Timer(PATIENCE * self.bench.period_ns, "ns")
+        first = cocotb.start_soon(self.sink.wait())
+        assert await First(first.complete, timeout) is not timeout, f"no answer to {frame.hex(' ')}"
+        got = b""
+        while not self.sink.empty():
+            got += bytes(self.sink.read_nowait())
+            await ClockCycles(self.dut.clk, 20 * CLOCK_HZ // BAUD)
+        return got
+
+    def _snapshot(self, pdu: bytes, answer: bytes) -> dict[str, int]:
+        """Return the status that the board must have shown when it read its own stamp."""
+        first, size = self.place["stamp"] - int.from_bytes(pdu[1:3], "big"), 4
+        if pdu[0] != 3 or answer[1] != 3 or not 0 <= first <= answer[2] // 2 - 2:
+            return {status.name: 0 for status in self.registers.status}
+        stamp = int.from_bytes(answer[3 + 2 * first : 3 + 2 * first + size], "big")
+        (shown,) = [shown for known, shown in self.history if known == stamp]
+        return self.twin.status(shown)
+
+    async def look(self, first: str = "drive", last: str = "driven") -> dict[str, int]:
+        """Return the status from one register to another, as read from the board in one frame."""
+        begin, end = self.place[first], self.place[last] + 2
+        data = (await self.request(frames.read(begin, end - begin)))[2:]
+        cells = [int.from_bytes(data[k : k + 2], "big") for k in range(0, len(data), 2)]
+        read = [r for r in self.registers.status if begin <= r.address < end]
+        return {r.name: r.from_registers(tuple(cells[r.address - begin : r.address - begin + 2])) for r in read}
+
+    async def write(self, **values: int) -> bytes:
+        """Write words that lie side by side, or pulses up to `commit` and the words behind it, in one frame."""
+        chosen = sorted((r for r in self.registers.registers if r.name in values), key=lambda r: r.address)
+        assert len(chosen) == len(values)
+        first, last = chosen[0], chosen[-1]
+        cells = []
+        for register in self.registers.registers:
+            if first.address <= register.address <= last.address:
+                given = values.get(register.name)
+                if given is None:
+                    given = 0 if register.kind is Kind.PULSE else self.server.file.active[register.name]
+                cells += register.to_registers(given)
+        return await self.request(frames.write(first.address, cells))
+
+    async def arm(self) -> None:
+        """Beat, acknowledge what is latched, and arm."""
+        await self.write(heartbeat=self.server.file.active["heartbeat"] + 1 & 0xFFFF)
+        await self.write(acknowledged=(await self.look())["latched"])
+        await self.write(acknowledge=1, clear_flags=1)
+        await self.write(arm=1)

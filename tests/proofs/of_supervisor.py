@@ -101,7 +101,7 @@ PROPERTIES = [
         zero_when_the_host_is_silent,
         depth=2,
         # A bug in the cause itself shows after the shortest watchdog, 50 ms of clocks: the block's own tests find it.
-        bugs=(Bug(Supervisor.elaborate, "self.arm & self.live", "self.arm"),),
+        bugs=(Bug(Supervisor.elaborate, "self.enable & self.live", "self.enable"),),
         within=12,
     ),
     Property(
@@ -109,7 +109,7 @@ PROPERTIES = [
         WHERE,
         armed_by_the_host_alone,
         depth=2,
-        bugs=(Bug(Supervisor.elaborate, "self.arm & self.live", "self.live"),),
+        bugs=(Bug(Supervisor.elaborate, "self.arm & ready", "ready"),),
         within=12,
     ),
     Property(

@@ -81,7 +81,11 @@ def test_report_of_a_part_that_nextpnr_knows(tools):
     assert (report["lut4"], report["dsp"], report["bram"], report["ff"]) == (0, 1, 2, 3)
     assert report["available"] == {"lut4": 100, "dsp": 101, "bram": 102}
     assert (report["clocks_per_sample"], report["max_sample_hz"]) == (latency, round(60e6 / latency))
-    assert report["latency_clocks"] == quadrature.latency(2) + latency
+    assert (
+        report["latency_clocks"]
+        == quadrature.latency(2) + Board(axis).drive_latency
+        == quadrature.latency(2) + latency + 1
+    )
     assert report["critical_path"] == "axis.from to axis.to, 20.0 ns"
     folder = Path(report["folder"])
     seeds = ["seed-5", "seed-6", "seed-9"]
@@ -222,4 +226,5 @@ def test_a_small_axis_on_a_real_part(tmp_path, monkeypatch):
     assert 10 < report["fmax_mhz"] < 200
     assert 0 < report["ff"] < report["lut4"] < report["available"]["lut4"] == 5280
     assert 1 <= report["dsp"] <= 8
-    assert report["bram"] == 0
+    # The registers and their map.
+    assert report["bram"] == 8

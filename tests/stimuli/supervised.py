@@ -1,9 +1,8 @@
-"""A register map with what a supervisor adds, and a capture memory."""
+"""A register map with a capture memory."""
 
 from functools import cache
 
 from hardwall.model.registers import RegisterMap
-from hardwall.model.supervised import Design
 
 from .specs import spec
 
@@ -12,9 +11,8 @@ CAPTURE_REGISTERS = 300
 
 @cache
 def supervised(name: str, estimator: str = "levant") -> RegisterMap:
-    """Return the registers of an axis with a supervisor and a capture memory."""
-    axis = spec(name, estimator)
-    return RegisterMap(axis, Design(axis).registers(), CAPTURE_REGISTERS)
+    """Return the registers of an axis with a capture memory."""
+    return RegisterMap(spec(name, estimator), CAPTURE_REGISTERS)
 
 
 def captured(address: int) -> int:

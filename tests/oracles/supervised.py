@@ -1,0 +1,67 @@
+"""Monitors and supervisor beside a supervised axis: from what the axis shows and the host asks, what must come out."""
+
+from hardwall.hdl.supervised import COMPLEMENTS, LOOPS, SHOWN
+from hardwall.model import monitors, supervisor
+from hardwall.model.supervised import FROM_AXIS, FROM_OUTSIDE, Design
+from hardwall.model.supervisor import CAUSES
+
+SYNCHRONISER = 2
+PINS = ("encoder_a", "encoder_b", *COMPLEMENTS, *LOOPS)
+BITS = {cause.name: 1 << bit for bit, cause in enumerate(CAUSES)}
+
+
+class Follower:
+    """The models of monitors and supervisor, clock for clock.
+
+    Args:
+        design: the axis's.
+        high: the pins that were high before the first edge.
+
+    Attributes:
+        supervisor: the supervisor's state.
+        inverted: whether the sign of the drive's pins is to be reversed.
+        reached: every cause that was latched so far.
+    """
+
+    def __init__(self, design: Design, high: tuple[str, ...] = ()):
+        self._design = design
+        self._monitors, self.supervisor = monitors.START, supervisor.START
+        self._pins = [{name: int(name in high) for name in PINS}] * (SYNCHRONISER + 1)
+        self.inverted = self.reached = 0
+
+    def wanted(self) -> dict[str, int]:
+        """Return the outputs now, by name."""
+        shown = {name: getattr(self.supervisor, name) for name in SHOWN}
+        return shown | {"a_channel_idle": self._monitors.a_channel_idle, "drive_inverted": self.inverted}
+
+    def level(self, pin: str) -> int:
+        """Return the level of a pin as the axis sees it at the next edge."""
+        return self._pins[1][pin]
+
+    def edge(self, given: dict[str, int], shown: dict[str, int]) -> None:
+        """Advance by a clock edge, with the inputs just before it, and what the axis shows then."""
+        self._pins = [*self._pins[1:], {name: given[name] for name in PINS}]
+        level = self._pins[0]
+        own = {name: shown[name] for name in monitors.Inputs._fields if name in shown}
+        own |= {word.name: given[word.name] for word in self._design.monitors.words}
+        seen = monitors.Inputs(**own | {
+            "valid": shown["estimated"], "force_limit": given["supervisor_force_limit"],
+            "a": level["encoder_a"], "a_n": level["encoder_a_n"], "b": level["encoder_b"], "b_n": level["encoder_b_n"],
+        })  # fmt: skip
+        stands = {"encoder_illegal": shown["illegal"], "encoder_overspeed": shown["overspeed"]}
+        ranges = self._design.ranges.items()
+        beyond = any(not least <= given[name] <= most for name, (least, most) in ranges)
+        stands |= {"strobe_busy": shown["strobe_busy"], "word_range": beyond}
+        stands |= {"external_fault": not level["external_fault"], "emergency_stop": not level["emergency_stop"]}
+        assert set(stands) == {*FROM_AXIS, *FROM_OUTSIDE}
+        causes = self._monitors.causes | sum(BITS[name] for name, present in stands.items() if present)
+        own = {name: given[name] for name in supervisor.Inputs._fields if name in given}
+        heard = supervisor.Inputs(**own | {
+            "strobe": shown["sampled"], "drive": shown["drive"], "causes": causes, "stamp": shown["stamp"],
+            "enable": level["drive_enable"], "referenced": shown["index_latched"],
+        })  # fmt: skip
+        if self.supervisor.state != supervisor.ARMED:
+            self.inverted = given["drive_invert"]
+        self._monitors = monitors.step(self._design.monitors.params, self._monitors, seen)
+        self.supervisor = supervisor.step(self._design.supervisor.params, self.supervisor, heard)
+        self.reached |= self.supervisor.latched
