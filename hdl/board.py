@@ -1,4 +1,4 @@
-"""An axis for real packages: the pins of an encoder, three loops, a serial line, and a drive that a filter can take."""
+"""An axis for real packages: the pins of an encoder, three loops, a link, and a drive that a filter can take."""
 
 from amaranth.hdl import Cat, ClockDomain, Module, Mux, Signal
 from amaranth.lib import wiring
@@ -11,6 +11,7 @@ from hardwall.model.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervisor import ARMED
 
+from .link.axi_link import AxiLink
 from .link.link import Link
 from .supervised import COMPLEMENTS, LOOPS, SupervisedAxis
 
@@ -19,7 +20,7 @@ ENCODER = ("encoder_a", "encoder_b", "encoder_z", *COMPLEMENTS)
 
 
 class Board(wiring.Component):
-    """A supervised axis behind a dozen pins: `SupervisedAxis` and `Link`, which say what they do.
+    """A supervised axis behind a dozen pins: `SupervisedAxis` and its link, which say what they do.
 
     A host reads and writes the registers of `registers`; what it asks for in one frame happens at one clock. It is
     refused an `arm` unless the axis is `ready`, and a `preload` while ARMED.
@@ -44,8 +45,9 @@ class Board(wiring.Component):
     ----------
     spec : hardwall.model.spec.AxisSpec
         The axis.
-    baud : int, optional
-        Rate of the serial line, bits a second; 921 600 if it is not given, or what the clock allows of that.
+    link : Link or AxiLink, optional
+        What the host talks to, with the registers of this axis; a serial line of 921 600 baud if it is not given, or
+        what the clock allows of that.
 
     Members
     -------
@@ -59,10 +61,8 @@ class Board(wiring.Component):
         Complements of the channels; asynchronous pins.
     drive_enable, external_fault, emergency_stop : In(1)
         Loops: high is closed; asynchronous pins, which must read low when nothing is connected.
-    uart_rx : In(1)
-        Line from the host; an asynchronous pin, which must read high when nothing is connected.
-    uart_tx : Out(1)
-        Line to the host.
+    the pins of the link : In and Out
+        `uart_rx`, an asynchronous pin that must read high when nothing is connected, and `uart_tx`; or an AXI bus.
     drive_pdm : Out(1)
         Pulses of density |driven| / 2**N.
     drive_sign : Out(1)
@@ -75,19 +75,20 @@ class Board(wiring.Component):
     TypeError
         If `spec` is not an AxisSpec.
     ValueError
-        If the clock is too slow for a serial line, or does not allow `baud`.
+        If the clock is too slow for a serial line, or the link has the registers of another axis.
     """
 
-    def __init__(self, spec: AxisSpec, baud: int | None = None):
-        self.axis = SupervisedAxis(spec)
-        self.link = Link(RegisterMap(spec), uart.usual_baud(spec.clock_hz) if baud is None else baud)
+    def __init__(self, spec: AxisSpec, link: Link | AxiLink | None = None):
+        self.axis, registers = SupervisedAxis(spec), RegisterMap(spec)
+        self.link = Link(registers, uart.usual_baud(spec.clock_hz)) if link is None else link
+        if self.link.registers.identity != registers.identity:
+            raise ValueError(f"link must have the registers {registers.identity}, not {self.link.registers.identity}")
         super().__init__(
             {
                 "clk": In(1),
                 "rst": In(1),
                 **dict.fromkeys((*ENCODER, *LOOPS), In(1)),
-                "uart_rx": In(1, init=1),
-                "uart_tx": Out(1, init=1),
+                **self.link.PINS,
                 "drive_pdm": Out(1),
                 "drive_sign": Out(1),
                 "alive": Out(1),
@@ -101,10 +102,6 @@ class Board(wiring.Component):
     @property
     def registers(self) -> RegisterMap:
         return self.link.registers
-
-    @property
-    def baud(self) -> int:
-        return self.link.baud
 
     @property
     def drive_latency(self) -> int:
@@ -137,7 +134,9 @@ class Board(wiring.Component):
         m.d.comb += domain.rst.eq(reset)
 
         m.d.comb += [getattr(axis, name).eq(getattr(self, name)) for name in (*ENCODER, *LOOPS)]
-        m.d.comb += [link.rx.eq(self.uart_rx), self.uart_tx.eq(link.tx)]
+        for name, member in link.PINS.items():
+            inner, outer = getattr(link, name), getattr(self, name)
+            m.d.comb += inner.eq(outer) if member.flow == In else outer.eq(inner)
 
         registers = self.registers
         for asked in (*registers.words, *registers.live, *registers.pulses):

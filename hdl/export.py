@@ -16,6 +16,7 @@ from hardwall.model.whole_file import whole_file
 
 from .axis import Axis
 from .board import Board
+from .link.axi_link import AxiLink
 from .ports import port_table
 
 
@@ -42,7 +43,7 @@ def _source(component: Axis | Board, name: str, what: str) -> str:
 def write(spec: AxisSpec, folder: Path) -> tuple[Path, ...]:
     """Write the Verilog, its ports and its registers into `folder`, which is made if it is missing; return the paths.
 
-    `axis.v` and `board.v` have their ports in `ports.md`; the registers of the board are in `registers.md`,
+    `axis.v`, `board.v` and `axi.v` have their ports in `ports.md`; the registers of the last two are in `registers.md`,
     `registers.h` for C, and `registers.json`. The text depends only on the spec and on the versions of this project and
     its Yosys.
 
@@ -51,9 +52,11 @@ def write(spec: AxisSpec, folder: Path) -> tuple[Path, ...]:
         OSError: if a file cannot be written.
     """
     axis, board = Axis(spec), Board(spec)
+    axi = Board(spec, AxiLink(board.registers))
     facts = "".join(f"    {line}\n" for line in _facts(spec))
     files = {
         "axis.v": _source(axis, "axis", "One axis of hardwall, encoder pins to drive: every parameter is a port."),
+        "axi.v": _source(axi, "axi", "One supervised axis of hardwall behind an AXI4-Lite bus, for a processor."),
         "board.v": _source(board, "board", "One supervised axis of hardwall behind a dozen pins, with a serial line."),
         "ports.md": (
             f"# Ports\n\nOf the axis\n\n{facts}\n"
@@ -62,8 +65,11 @@ def write(spec: AxisSpec, folder: Path) -> tuple[Path, ...]:
             "fraction.\n\n"
             f"## axis.v\n\n{port_table(axis)}\n"
             f"## board.v\n\n{port_table(board)}\n"
-            f"The serial line has {board.baud} baud, 8 data bits, no parity and one stop bit. It speaks Modbus RTU as "
-            "unit 1; registers.md has the registers.\n"
+            f"The serial line has {board.link.baud} baud, 8 data bits, no parity and one stop bit. It speaks Modbus "
+            "RTU as unit 1; registers.md has the registers.\n\n"
+            f"## axi.v\n\n{port_table(axi)}\n"
+            "The word at the byte address 2 A of the bus has the registers A, in its upper half, and A + 1: a value of "
+            "32 bits is one word.\n"
         ),
         "registers.md": register_texts.markdown(board.registers),
         "registers.h": register_texts.c_header(board.registers),

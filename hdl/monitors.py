@@ -25,7 +25,8 @@ class Monitors(Block):
 
     Equation: in the model's module, bit by bit.
 
-    Latency: one clock from the inputs to `causes`. `velocity` and `saturated` are looked at with `valid`, `edge_kind`
+    Latency: one clock from the inputs to `causes`, and `index_clocks` from an index edge, for its distance is compared
+    in steps. `velocity` and `saturated` are looked at with `valid`, `edge_kind`
     with `stepped`, and the count's distance to the last index edge with `indexed`: these causes are pulses. The others
     last for as long as what is wrong does.
 
@@ -85,6 +86,11 @@ class Monitors(Block):
             "a_channel_idle": Out(1),
         }
 
+    @property
+    def index_clocks(self) -> int:
+        """Clocks from an index edge to its cause."""
+        return 4
+
     def elaborate(self, platform):
         m = Module()
         top = self.count[-3:]
@@ -130,8 +136,10 @@ class Monitors(Block):
         m.d.sync += side_before.eq(side)
         with m.If(~held):
             m.d.sync += anchor.eq(self.count)
-        against = Mux(side > 0, -moved, moved)
-        return held & (against > self.supervisor_runaway)
+        most = Signal(signed(len(self.count) + 1))
+        m.d.comb += most.eq(self.supervisor_runaway)
+        # Both comparisons work in parallel: a negation before one would be a carry chain more.
+        return held & Mux(side > 0, moved + most < 0, moved > most)
 
     def _longer(self, m: Module, name: str, wrong: Value, limit: Value, when: Value | int = 1) -> Value:
         """Return whether something has been wrong for more than `limit` clocks, counted where `when` is high."""
@@ -147,11 +155,15 @@ class Monitors(Block):
         has_index, last_index = Signal(), Signal.like(self.count)
         with m.If(self.indexed):
             m.d.sync += [has_index.eq(1), last_index.eq(self.count)]
-        moved, distance, off = Signal.like(self.count), Signal(len(self.count)), Signal(len(self.count))
-        m.d.comb += [
+        moved, distance = Signal.like(self.count), Signal(len(self.count))
+        beyond = Signal(signed(len(self.count) + 1))
+        measured, judged, near = Signal(), Signal(), Signal(init=1)
+        m.d.sync += [
+            measured.eq(self.indexed & has_index),
             moved.eq(self.count - last_index),
+            judged.eq(measured),
             distance.eq(abs(moved)),
-            off.eq(abs(distance - self.supervisor_turn)),
+            near.eq(~judged | (distance <= self.supervisor_index_tolerance)),
+            beyond.eq(distance - self.supervisor_turn),
         ]
-        near = (distance <= self.supervisor_index_tolerance) | (off <= self.supervisor_index_tolerance)
-        return self.indexed & has_index & ~near
+        return ~near & (abs(beyond) > self.supervisor_index_tolerance)

@@ -96,9 +96,15 @@ class State(NamedTuple):
     edges: int  # edges in a row of that channel
     has_index: int
     last_index: int  # the count at the last index edge
+    measured: int  # an index edge has a distance from the last one, `moved`
+    moved: int
+    judged: int  # an index edge was `distance` counts away, to either side
+    distance: int
+    near: int  # an index edge was at the last one, or there was none
+    beyond: int  # its distance, less a turn
 
 
-START = State(*(0 for _ in State._fields))
+START = State(*(0 for _ in State._fields))._replace(near=1)
 
 
 class Design:
@@ -148,14 +154,6 @@ class Design:
 
 
 @compiled
-def _index_is_wrong(params, state, inputs):
-    """Return whether an index edge is neither at the last one nor a turn away."""
-    distance = abs(wrap(inputs.count - state.last_index, params.count_width))
-    off = min(distance, abs(distance - inputs.supervisor_turn))
-    return inputs.indexed and state.has_index and off > inputs.supervisor_index_tolerance
-
-
-@compiled
 def step(params, state, inputs):
     """Return the state after one clock edge.
 
@@ -169,6 +167,7 @@ def step(params, state, inputs):
     if inputs.force_limit and abs(inputs.driven) >= inputs.force_limit:
         side = 1 if inputs.driven > 0 else -1
     held = side and side == state.side
+    anchor = state.anchor if held else count
     against = -side * wrap(count - state.anchor, params.count_width) if held else 0
 
     samples = state.samples
@@ -183,6 +182,10 @@ def step(params, state, inputs):
         channel = inputs.edge_kind & 1
         edges = min(edges + 1, IDLE_EDGES) if channel == state.channel else 1
 
+    last_index = count if inputs.indexed else state.last_index
+    measured = int(inputs.indexed and state.has_index)
+    near = int(not state.judged or state.distance <= inputs.supervisor_index_tolerance)
+
     out_of_range = count < inputs.supervisor_position_low or count > inputs.supervisor_position_high
     too_fast = inputs.valid and abs(inputs.velocity) > inputs.supervisor_velocity_limit << params.velocity_shift
     causes = (
@@ -192,18 +195,24 @@ def step(params, state, inputs):
         | int(against > inputs.supervisor_runaway) << RUNAWAY
         | int(samples > inputs.supervisor_saturated) << ESTIMATOR_SATURATED
         | int(lost_a > inputs.supervisor_loss or lost_b > inputs.supervisor_loss) << ENCODER_LOSS
-        | int(_index_is_wrong(params, state, inputs)) << INDEX_SPACING
+        | int(not state.near and abs(state.beyond) > inputs.supervisor_index_tolerance) << INDEX_SPACING
     )
     return State(
         causes=causes,
         a_channel_idle=int(edges == IDLE_EDGES),
         side=side,
-        anchor=state.anchor if held else count,
+        anchor=anchor,
         samples=samples,
         lost_a=lost_a,
         lost_b=lost_b,
         channel=channel,
         edges=edges,
         has_index=state.has_index | inputs.indexed,
-        last_index=count if inputs.indexed else state.last_index,
+        last_index=last_index,
+        measured=measured,
+        moved=wrap(count - state.last_index, params.count_width),
+        judged=state.measured,
+        distance=abs(state.moved),
+        near=near,
+        beyond=state.distance - inputs.supervisor_turn,
     )

@@ -5,10 +5,13 @@ import pytest
 from cocotb.triggers import Timer
 
 from hardwall.hdl.board import Board
+from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.model.link.server import FAILURE
+from hardwall.model.registers import RegisterMap
 from hardwall.model.supervisor import ALL, ARMED, DISARMED, REQUIRED, TRIPPED
 from hardwall.testing import SAMPLES, parameters, simulate
 from oracles.board import Host, make
+from stimuli.specs import spec
 
 CLOCKS = max(SAMPLES, 80_000)
 """Fewer clocks do not reach every case."""
@@ -109,6 +112,8 @@ def test_rtl(name, estimator):
     simulate(__file__, make, name=name, estimator=estimator)
 
 
-def test_wrong_spec_is_refused():
+def test_wrong_parameters_are_refused():
     with pytest.raises(TypeError, match=r"not 3$"):
         Board(3)
+    with pytest.raises(ValueError, match=r"^link must have the registers \w{16}, not \w{16}$"):
+        Board(spec("mhz"), AxiLink(RegisterMap(spec("paper"))))

@@ -10,13 +10,15 @@ import pytest
 from hardwall.hdl.axis import Axis
 from hardwall.hdl.board import Board
 from hardwall.hdl.export import to_verilog, write
+from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.hdl.ports import COLUMNS, port_table
 from hardwall.model import register_texts
+from hardwall.model.registers import RegisterMap
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from stimuli.specs import spec
 
-TOPS = {"axis": Axis, "board": Board}
-WRITTEN = ("axis.v", "board.v", "ports.md", "registers.md", "registers.h", "registers.json")
+TOPS = {"axis": Axis, "board": Board, "axi": lambda axis: Board(axis, AxiLink(RegisterMap(axis)))}
+WRITTEN = ("axis.v", "axi.v", "board.v", "ports.md", "registers.md", "registers.h", "registers.json")
 # Designs that instantiate the axis depend on these names; the words depend on its estimator.
 AXIS_PORTS = """
 clk rst encoder_a encoder_b encoder_z drive_enable clear_flags preload preload_count index_arm commit
@@ -28,6 +30,11 @@ index_latched stamp stamp_a_rise stamp_b_rise stamp_a_fall stamp_b_fall commit_p
 BOARD_PORTS = """
 clk rst encoder_a encoder_b encoder_z encoder_a_n encoder_b_n drive_enable external_fault emergency_stop uart_rx uart_tx
 drive_pdm drive_sign alive
+"""
+AXI_PORTS = """
+clk rst encoder_a encoder_b encoder_z encoder_a_n encoder_b_n drive_enable external_fault emergency_stop
+axi_awaddr axi_awprot axi_awvalid axi_awready axi_wdata axi_wstrb axi_wvalid axi_wready axi_bresp axi_bvalid axi_bready
+axi_araddr axi_arprot axi_arvalid axi_arready axi_rdata axi_rresp axi_rvalid axi_rready drive_pdm drive_sign alive
 """
 
 
@@ -59,7 +66,7 @@ def test_table_and_verilog_have_the_same_ports(name, estimator, top):
     assert all(row["what it is"] for row in table)
 
 
-@pytest.mark.parametrize(("top", "names"), [("axis", AXIS_PORTS), ("board", BOARD_PORTS)])
+@pytest.mark.parametrize(("top", "names"), [("axis", AXIS_PORTS), ("board", BOARD_PORTS), ("axi", AXI_PORTS)])
 def test_port_names_are_stable(top, names):
     component = TOPS[top](spec("mhz"))
     assert [row["port"].strip("`") for row in rows(port_table(component))] == names.split()
@@ -128,7 +135,7 @@ def test_written_verilog_says_what_it_is_of(written, top):
 def test_written_tables_are_all_there(written):
     text = (written / "ports.md").read_text()
     axis, board = Axis(spec("mhz")), Board(spec("mhz"))
-    for table in (port_table(axis), port_table(board)):
+    for table in (port_table(axis), port_table(board), port_table(TOPS["axi"](spec("mhz")))):
         assert f"\n\n{table}" in text
     assert f"\nA sample every 50 clocks; the drive changes {axis.latency} clocks after it is taken. " in text
     assert "\nThe serial line has 921600 baud, 8 data bits, no parity and one stop bit. " in text

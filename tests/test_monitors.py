@@ -165,11 +165,11 @@ def test_a_channel_that_equals_its_complement_is_lost(channel):
 
 def test_index_edges_are_turns_apart():
     bench = Bench(supervisor_turn=1000, supervisor_index_tolerance=2)
-    for count in (17, 19, 1018, 2020, 1019, 17, 17):
-        assert bench.clock(indexed=1, count=count) == []
-    assert bench.clock(indexed=0, count=500) == []
-    assert bench.clock(indexed=1, count=1020) == ["index_spacing"]
-    assert bench.clock(indexed=1, count=1023) == ["index_spacing"]
+    counts = (17, 19, 1018, 2020, 1019, 17, 17, 1020, 1023)
+    # Edges may come at successive clocks; the cause of each comes `index_clocks` later.
+    found = [bench.clock(indexed=1, count=count) for count in counts]
+    found += [bench.clock(count=500) for _ in range(Monitors(bench.design).index_clocks)]
+    assert found == [[]] * 10 + [["index_spacing"]] * 2 + [[]]
 
 
 def test_edges_of_one_channel_alone_are_a_warning():

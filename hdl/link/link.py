@@ -1,5 +1,7 @@
 """The link: Modbus RTU on a UART, from the pins of the line to the ports of an axis."""
 
+from typing import ClassVar
+
 from amaranth.hdl import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out, connect
@@ -34,9 +36,9 @@ class Link(wiring.Component):
 
     Members
     -------
-    rx : In(1)
+    uart_rx : In(1)
         Line from the host; asynchronous.
-    tx : Out(1)
+    uart_tx : Out(1)
         Line to the host.
     the members of `RegisterFile` without `host` : In and Out
         The ports to the axis.
@@ -52,14 +54,14 @@ class Link(wiring.Component):
     Specification V1.1b3".
     """
 
+    PINS: ClassVar = {"uart_rx": In(1, init=1), "uart_tx": Out(1, init=1)}
+
     def __init__(self, registers: RegisterMap, baud: int = uart.BAUD):
         design = register_file.Design(registers)
         self._registers = registers
         self._uart = uart.Design(registers.spec.clock_hz, baud)
         self._file, self._server = RegisterFile(design), Server(design)
-        ports = dict(self._file.signature.members)
-        del ports["host"]
-        super().__init__({"rx": In(1), "tx": Out(1, init=1), **ports})
+        super().__init__({**self.PINS, **self._file.ports})
 
     @property
     def registers(self) -> RegisterMap:
@@ -85,14 +87,11 @@ class Link(wiring.Component):
         connect(m, server.file, file.host)
         connect(m, line.sent, transmitter.bytes)
         m.d.comb += [
-            receiver.pin.eq(self.rx),
+            receiver.pin.eq(self.uart_rx),
             line.byte.eq(receiver.byte),
             line.arrived.eq(receiver.arrived),
             line.spoilt.eq(receiver.spoilt),
-            self.tx.eq(transmitter.pin),
+            self.uart_tx.eq(transmitter.pin),
         ]
-        for name, member in self.signature.members.items():
-            if name not in ("rx", "tx"):
-                inner, outer = getattr(file, name), getattr(self, name)
-                m.d.comb += inner.eq(outer) if member.flow == In else outer.eq(inner)
+        file.lead_out(m, self)
         return m

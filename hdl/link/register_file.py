@@ -3,7 +3,7 @@
 from amaranth.hdl import Cat, Const, Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.link.register_file import CELL_BITS, Area, Design, Operation
 from hardwall.model.registers import ACTIVE, CAPTURE, COUNTERS, END, LIVE, MAP, PULSES, SPACE, TELEMETRY, WRITTEN
@@ -134,6 +134,17 @@ class RegisterFile(wiring.Component):
     @property
     def design(self) -> Design:
         return self._design
+
+    @property
+    def ports(self) -> dict[str, Member]:
+        """The members to the axis: all but `host`."""
+        return {name: member for name, member in self.signature.members.items() if name != "host"}
+
+    def lead_out(self, m: Module, outer: wiring.Component) -> None:
+        """Connect the ports to those of the same names of a component around the register file."""
+        for name, member in self.ports.items():
+            inner, other = getattr(self, name), getattr(outer, name)
+            m.d.comb += inner.eq(other) if member.flow == In else other.eq(inner)
 
     @property
     def boot_clocks(self) -> int:

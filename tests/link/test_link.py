@@ -58,7 +58,7 @@ class Client(ModbusBaseSyncClient):
     def __init__(self, dut, bit_ns: float):
         super().__init__(FramerType.RTU, 0, CommParams(comm_type=CommType.SERIAL, timeout_connect=60), None, None, None)
         self.silence_ns = SILENCE_NS
-        self.source, self.sink = UartSource(dut.rx, baud=1e9 / bit_ns), UartSink(dut.tx, baud=1e9 / bit_ns)
+        self.source, self.sink = UartSource(dut.uart_rx, baud=1e9 / bit_ns), UartSink(dut.uart_tx, baud=1e9 / bit_ns)
         for end in (self.source, self.sink):
             end.log.setLevel(logging.WARNING)
 
@@ -88,7 +88,7 @@ async def opened(dut, error: float = 0.0) -> Client:
     """Return a client of a device that was reset, with a line whose rate is wrong by a fraction `error`."""
     bench, link = Bench(dut, make(**parameters())), make(**parameters()).link
     await bench.reset()
-    bench.drive(rx=1)
+    bench.drive(uart_rx=1)
     await ClockCycles(dut.clk, 4)
     bit_ns = bench.period_ns * link.registers.spec.clock_hz / link.baud
     client = Client(dut, bit_ns * (1 + error))

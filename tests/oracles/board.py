@@ -12,12 +12,14 @@ from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
 from cocotbext.uart import UartSink, UartSource
 
 from hardwall.hdl.board import ENCODER, Board
+from hardwall.hdl.link.link import Link
 from hardwall.hdl.supervised import LOOPS, SHOWN
 from hardwall.model import output, quadrature, wall
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.link import register_file, server
 from hardwall.model.link.line import Verdict, framed
 from hardwall.model.register import VALUE_BITS, Kind
+from hardwall.model.registers import RegisterMap
 from hardwall.model.supervised import FIXED
 from hardwall.testing import Bench, rng
 from hardwall.testing.packing import Packing
@@ -44,7 +46,8 @@ PATIENCE = 60_000
 
 def make(name: str, estimator: str) -> "Watched":
     rates = {"clock_hz": CLOCK_HZ, "sample_hz": 200_000, "actuation_hz": 100_000}
-    return Watched(Board(dataclasses.replace(spec(name, estimator), **rates), BAUD))
+    axis = dataclasses.replace(spec(name, estimator), **rates)
+    return Watched(Board(axis, Link(RegisterMap(axis), BAUD)))
 
 
 class Watched(wiring.Component):

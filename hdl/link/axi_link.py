@@ -1,0 +1,57 @@
+"""The link of an axis that has a processor beside it: an AXI4-Lite bus, from its signals to the ports of an axis."""
+
+from amaranth.hdl import Module
+from amaranth.lib import wiring
+from amaranth.lib.wiring import connect
+
+from hardwall.model.link import register_file
+from hardwall.model.registers import RegisterMap
+
+from .axi import Subordinate
+from .register_file import RegisterFile
+
+
+class AxiLink(wiring.Component):
+    """The registers of an axis behind an AXI4-Lite bus of the axis's own clock.
+
+    Latency, rounding and overflow: as in the blocks.
+
+    Parameters
+    ----------
+    registers : hardwall.model.registers.RegisterMap
+        The registers.
+
+    Members
+    -------
+    the signals of `Subordinate` : In and Out
+        The bus.
+    the members of `RegisterFile` without `host` : In and Out
+        The ports to the axis.
+
+    Raises
+    ------
+    TypeError
+        If `registers` is not a RegisterMap.
+    """
+
+    PINS = Subordinate.PINS
+
+    def __init__(self, registers: RegisterMap):
+        self._registers = registers
+        self._file = RegisterFile(register_file.Design(registers))
+        super().__init__({**self.PINS, **self._file.ports})
+
+    @property
+    def registers(self) -> RegisterMap:
+        return self._registers
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.subordinate = subordinate = Subordinate()
+        m.submodules.file = file = self._file
+        connect(m, subordinate.file, file.host)
+        for name, member in self.PINS.items():
+            inner, outer = getattr(subordinate, name), getattr(self, name)
+            m.d.comb += inner.eq(outer) if member.flow == wiring.In else outer.eq(inner)
+        file.lead_out(m, self)
+        return m

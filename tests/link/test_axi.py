@@ -1,0 +1,183 @@
+"""The AXI4-Lite subordinate with its register file: transfers of a bus master that others wrote, RTL and twin alike."""
+
+import logging
+
+import cocotb
+import pytest
+from amaranth.hdl import Cat, Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import Out
+from cocotb.triggers import ClockCycles, RisingEdge
+from cocotbext.axi import AxiLiteBus, AxiLiteMaster
+
+from hardwall.hdl.link.axi_link import AxiLink
+from hardwall.model.link import axi, register_file
+from hardwall.model.link.axi import Response
+from hardwall.model.registers import ACTIVE, CAPTURE, COUNTERS, LIVE, MAP, PULSES, SUPERVISOR, TELEMETRY, WRITTEN
+from hardwall.testing import Bench, parameters, rng, simulate
+from stimuli.supervised import CAPTURE_REGISTERS, captured, supervised
+
+TRANSFERS = 1500
+
+
+class Device(wiring.Component):
+    """The link with a capture memory, and its pulses side by side."""
+
+    def __init__(self, name: str):
+        self.link = AxiLink(supervised(name))
+        ports = dict(self.link.signature.members)
+        for gone in ("capture_address", "capture_data", *(pulse.name for pulse in self.link.registers.pulses)):
+            del ports[gone]
+        super().__init__({**ports, "pulses": Out(len(self.link.registers.pulses)), "pulsed": Out(1)})
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.link = link = self.link
+        place = Signal.like(link.capture_address)
+        m.d.sync += place.eq(link.capture_address)
+        m.d.comb += [
+            link.capture_data.eq(captured(place)),
+            self.pulses.eq(Cat(getattr(link, pulse.name) for pulse in link.registers.pulses)),
+            self.pulsed.eq(self.pulses.any()),
+        ]
+        for name in self.signature.members:
+            if name in link.signature.members:
+                inner, outer = getattr(link, name), getattr(self, name)
+                m.d.comb += inner.eq(outer) if link.signature.members[name].flow == wiring.In else outer.eq(inner)
+        return m
+
+
+def make(name: str) -> Device:
+    return Device(name)
+
+
+class World:
+    """A bus master and an axis around the link, with the twin beside it."""
+
+    def __init__(self, dut):
+        component = make(**parameters())
+        self.dut, self.bench, self.random = dut, Bench(dut, component), rng()
+        self.registers = component.link.registers
+        self.twin = axi.Subordinate(register_file.Design(self.registers))
+        self.twin.capture = [captured(k) for k in range(CAPTURE_REGISTERS)]
+        self.pulsed = self.bench.monitor("pulsed", "pulses", *self.twin.file.active)
+        self.seen = set()
+
+    async def reset(self) -> None:
+        await self.bench.reset()
+        self.master = AxiLiteMaster(AxiLiteBus.from_prefix(self.dut, "axi"), self.dut.clk)
+        for part in (self.master.write_if, self.master.read_if):
+            part.log.setLevel(logging.WARNING)
+        cocotb.start_soon(self._axis())
+
+    async def _axis(self) -> None:
+        """Keep a commit waiting for some clocks, as the axis does until its sample."""
+        while True:
+            await RisingEdge(self.dut.pulsed)
+            await RisingEdge(self.dut.clk)
+            if int(self.dut.pulses.value) & 1:
+                self.bench.drive(commit_pending=1)
+                await ClockCycles(self.dut.clk, 50)
+                self.bench.drive(commit_pending=0)
+
+    def live(self) -> None:
+        """Give every status, and the refused pulses, a random value."""
+        status = {r.name: int(self.random.integers(r.format.min, r.format.max + 1)) for r in self.registers.status}
+        refused = [int(self.random.random() < 0.2) for _ in self.registers.pulses]
+        self.twin.status = status
+        pairs = zip(self.registers.pulses, refused, strict=True)
+        self.twin.refusing = frozenset(pulse.name for pulse, bit in pairs if bit)
+        self.bench.drive(**status, refuse=sum(bit << k for k, bit in enumerate(refused)))
+
+    async def write(self, address: int, data: bytes) -> Response:
+        """Write bytes within a word at a byte address, and compare what it causes with the twin's."""
+        begun, first = len(self.pulsed.rows), address % 4
+        word, strobes = int.from_bytes(data, "little") << 8 * first, ((1 << len(data)) - 1) << first
+        expected = self.twin.write(address, word, strobes)
+        got = Response((await self.master.write(address, data)).resp)
+        assert got == expected, f"{address:#x} {data.hex()}"
+        pulses = sum(1 << k for k, p in enumerate(self.registers.pulses) if p.name in self.twin.pulses)
+        words = tuple(self.twin.file.active.values())
+        await ClockCycles(self.dut.clk, 2)
+        assert self.pulsed.rows[begun:] == ([(pulses, *words)] if pulses else [])
+        self.seen.add(("write", got))
+        return got
+
+    async def write_word(self, address: int, value: int) -> Response:
+        return await self.write(2 * address, (value & 0xFFFFFFFF).to_bytes(4, "little"))
+
+    async def read(self, address: int) -> int:
+        """Read the word with a register, and compare it with the twin's."""
+        response, expected = self.twin.read(2 * address)
+        got = await self.master.read(2 * address & ~3, 4)
+        assert (Response(got.resp), int.from_bytes(got.data, "little")) == (response, expected), f"{address:#x}"
+        self.seen.add(("read", response))
+        return expected
+
+
+@cocotb.test()
+async def random_transfers(dut):
+    world = World(dut)
+    await world.reset()
+    random, registers = world.random, world.registers
+    words = (*registers.words, *registers.live)
+    for _ in range(TRANSFERS):
+        world.live()
+        act = random.random()
+        if act < 0.35:
+            word = words[int(random.integers(0, len(words)))]
+            value = int(random.choice((word.low, word.high, word.low - 1, word.high + 1, random.integers(0, 1 << 32))))
+            await world.write_word(word.address, value)
+        elif act < 0.5:
+            # One pulse, or two side by side.
+            place = int(random.integers(PULSES + 8, WRITTEN))
+            value = int(random.integers(0, 3) if random.random() < 0.1 else 1)
+            await world.write(2 * (place ^ 1), value.to_bytes(2, "little"))
+            await world.write_word(place & ~1, int(random.choice((0, 1, 1 << 16, 1 << 16 | 1))))
+        elif act < 0.6:
+            address = 2 * int(random.choice((random.integers(0, 256), random.integers(0, 1 << 16))))
+            first = int(random.integers(0, 4))
+            await world.write(address & ~3 | first, random.bytes(int(random.integers(1, 5 - first))))
+        else:
+            blocks = (0, TELEMETRY, SUPERVISOR, COUNTERS, WRITTEN, ACTIVE, LIVE, MAP, CAPTURE, 0x3000)
+            begin = int(random.choice(blocks)) + 2 * int(random.integers(0, 8))
+            for word in range(int(random.integers(1, 5))):
+                if random.random() < 0.3:
+                    world.live()
+                await world.read(begin + 2 * word)
+    ends = {(way, end) for way in ("read", "write") for end in Response} - {("read", Response.SLVERR)}
+    assert world.seen == ends
+
+
+@cocotb.test()
+async def words_read_in_order_are_of_one_clock(dut):
+    world = World(dut)
+    await world.reset()
+    stamp = world.registers["stamp"]
+    world.bench.drive(stamp=5, stamp_a_rise=6)
+    world.twin.status |= {"stamp": 5, "stamp_a_rise": 6}
+    assert await world.read(stamp.address) == 5
+    world.bench.drive(stamp=7, stamp_a_rise=8)
+    world.twin.status |= {"stamp": 7, "stamp_a_rise": 8}
+    assert await world.read(stamp.address + 2) == 6
+    assert await world.read(stamp.address) == 7
+
+
+@pytest.mark.parametrize("name", ["mhz"])
+def test_rtl(name):
+    simulate(__file__, make, name=name)
+
+
+def test_a_word_is_a_value_with_its_upper_half_first():
+    twin = axi.Subordinate(register_file.Design(supervised("mhz")))
+    limit = supervised("mhz")["supervisor_force_limit"]
+    assert twin.write(2 * limit.address, 12345, 0b1111) == Response.OKAY
+    assert twin.file.active["supervisor_force_limit"] == 12345
+    assert twin.read(2 * limit.address) == (Response.OKAY, 12345)
+    # Half of a value cannot be written.
+    assert twin.write(2 * limit.address, 1, 0b0011) == Response.DECERR
+
+
+def test_wrong_registers_are_refused():
+    with pytest.raises(TypeError, match=r"not 3$"):
+        AxiLink(3)
