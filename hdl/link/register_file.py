@@ -74,7 +74,7 @@ class RegisterFile(wiring.Component):
       until the next commit. `done` comes when `commit_pending` has fallen, so what is read back as active is in use.
     - SNAPSHOT: take every status, all at the clock of `start`, for what is read from then on.
 
-    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ and READ; 2 for WRITE and COUNT; 3 for
+    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ and READ; 2 for WRITE and COUNT; 4 for
     CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if `commit` is marked, `commit_clocks` and the wait
     for the sample. After a reset the first `start` may come at once; it waits up to `boot_clocks`.
 
@@ -207,8 +207,9 @@ class RegisterFile(wiring.Component):
         top, tied = ~wide | ~address[0], Signal(2, init=3)
         bound, value = Signal(CELL_BITS), Signal(CELL_BITS)
         difference = Signal(CELL_BITS + 1)
+        # The memory's answer comes late in a clock, so it waits for the next one.
+        m.d.sync += bound.eq(Cat(read.data[:-1], read.data[-1] ^ top))
         m.d.comb += [
-            bound.eq(Cat(read.data[:-1], read.data[-1] ^ top)),
             value.eq(Cat(host.value[:-1], host.value[-1] ^ top)),
             difference.eq(bound - value),
         ]
@@ -259,11 +260,13 @@ class RegisterFile(wiring.Component):
                         m.next = "SWEEP"
             with m.State("LEAST"):
                 m.d.comb += [place.eq(below), area.eq(Area.MOST)]
+                m.next = "ABOVE"
+            with m.State("ABOVE"):
                 m.d.sync += tied[0].eq((top | tied[0]) & equal)
                 with m.If((top | tied[0]) & ~difference[-1] & ~equal):
                     m.d.sync += host.outside.eq(1)
-                m.next = "MOST"
-            with m.State("MOST"):
+                m.next = "BELOW"
+            with m.State("BELOW"):
                 m.d.sync += tied[1].eq((top | tied[1]) & equal)
                 with m.If((top | tied[1]) & difference[-1]):
                     m.d.sync += host.outside.eq(1)

@@ -13,7 +13,7 @@ from stimuli.supervised import supervised
 
 CLOCKS = {
     Operation.CHECK_READ: 1,
-    Operation.CHECK_WRITE: 3,
+    Operation.CHECK_WRITE: 4,
     Operation.READ: 1,
     Operation.WRITE: 2,
     Operation.COUNT: 2,
