@@ -2,7 +2,8 @@
 #
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
 #   ARGS="-k levant"          more options for pytest (test, soak, fuzz)
-#   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests), or of the blocks (prove)
+#   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests), of the blocks (prove), or of the
+#                             faults (faults)
 #   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
 #                             the seeds, the samples for every seed, and the samples of endurance (soak)
 #   CALLS=1000 KILLS=16       the hostile calls, and the runs that are ended (fuzz)
@@ -50,7 +51,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove lint bench synth choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove faults lint bench synth choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -61,6 +62,9 @@ test: $(VENV)/.test | tools ## every regression: the model against exact arithme
 
 prove: $(VENV)/.prove | tools ## every promise about safety and every width, proven; every proof is seen to fail with a bug
 	@$(VENV)/bin/python tests/prove.py $(ONLY)
+
+faults: $(VENV)/.test | tools ## faults injected into the board and its plant: what trips, how soon, and the force meanwhile
+	@$(VENV)/bin/python tests/faults.py $(ONLY)
 
 lint: $(VENV)/.test | tools ## style and common mistakes
 	@failed=0; $(RUN) ruff check . || failed=1; $(RUN) ruff format --check . || failed=1; exit $$failed
@@ -184,7 +188,7 @@ $(VENV)/.docs: pyproject.toml $(VENV)/.sim | tools
 # ---- system packages, checked before anything starts ----------------------------------------------------------------
 
 # These tasks embed Python in the simulator, by cocotb.
-EMBEDDED := $(filter test bench soak,$(MAKECMDGOALS))
+EMBEDDED := $(filter test faults bench soak,$(MAKECMDGOALS))
 
 define CHECK_PYTHON
 import sys

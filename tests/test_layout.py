@@ -38,6 +38,7 @@ BROAD = {
     "test_digests": "whatever the program computes",
     "test_docs": "the pages",
     "test_endurance": "every estimator",
+    "test_faults": "faults injected into the board in the closed loop, and the means",
     "test_fuzz": "every command, called as no one would",
     "test_killed": "every command that stores results",
     "test_layout": "the tree",

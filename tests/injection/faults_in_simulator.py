@@ -1,0 +1,28 @@
+"""The side of the faults that runs in the simulator: one after the other, each from a reset."""
+
+import dataclasses
+import json
+from pathlib import Path
+
+import cocotb
+
+from hardwall.testing import parameters
+from injection.every import FAULTS
+from injection.judged import judged
+from injection.rig import Rig
+
+
+@cocotb.test()
+async def every_fault(dut):
+    order = parameters()
+    chosen = {fault.name: fault for fault in FAULTS}
+    clock = None
+    with Path(order["report"]).open("w", encoding="utf-8") as report:
+        for name in order["names"]:
+            rig = Rig(dut)
+            clock = await rig.start(clock)
+            outcome = await judged(rig, chosen[name])
+            if chosen[name].expected.stopped:
+                await rig.start_clock()
+            rig.close()
+            print(json.dumps(dataclasses.asdict(outcome)), file=report, flush=True)

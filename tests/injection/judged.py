@@ -1,0 +1,118 @@
+"""One fault in the loop, from the steady contact to the way back to ARMED, and the verdict on it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from hardwall.model.supervisor import ARMED, DISARMED, TRIPPED, names
+from hardwall.testing import SEED
+
+from .fault import PULSES, STATES, TREMOR_N, Expected, Fault, Outcome
+from .rig import NotSteadyError, Rig
+from .scene import CLOCKS_PER_MS, FULL_SCALE_N, SPEC, STEP_CLOCKS
+
+REST_MS = 0.2
+"""How long the drive is watched after every act of the host on the way back."""
+
+
+async def judged(rig: Rig, fault: Fault) -> Outcome:
+    """Inject a fault into a steady contact; return what came of it."""
+    try:
+        await rig.contact(fault.words, fault.committed, fault.offset)
+    except NotSteadyError as error:
+        return Outcome(fault.name, fault.expected.text, "", None, 0.0, 0.0, 0.0, (str(error),))
+    # The fault comes at any clock of a sample, the same one for the same seed.
+    await rig.run(np.random.default_rng([SEED, *fault.name.encode()]).uniform(0, STEP_CLOCKS / CLOCKS_PER_MS))
+    before = rig.driven_n
+    rig.begin()
+    try:
+        await fault.inject(rig)
+    except NotSteadyError as error:
+        rig.claim(False, str(error))
+    await rig.run(fault.observed_ms)
+    drives = _drives(rig, before)
+    outcome = _outcome(rig, fault, drives)
+    wrong = _shortcomings(rig, fault.expected, outcome, drives)
+    if not fault.expected.stopped:
+        await _way_back(rig, fault)
+    return replace(outcome, wrong=(*wrong, *rig.wrong))
+
+
+async def _way_back(rig: Rig, fault: Fault) -> None:
+    """Make good what was wrong; the drive must stay zero until the host acknowledges what was latched, and arms.
+
+    An axis that is still ARMED must hear a disarm.
+    """
+    host = rig.host
+    if fault.expected.state == ARMED:
+        await host.write(disarm=1)
+        rig.claim(rig.sees(DISARMED), "a disarm is not heard")
+        return
+    await fault.repair(rig)
+    rig.handle.held = rig.handle.number
+    turns, last_pulse = len(rig.turns), rig.last_pulse
+    await host.heartbeat()
+    latched = rig.see("latched")
+    if fault.expected.state == TRIPPED:
+        rig.claim(not await host.arm(), "an arm is taken before the acknowledgement")
+        await host.acknowledge(latched ^ 1)
+        rig.claim(rig.sees(TRIPPED), "other causes than the latched ones are acknowledged")
+        await host.acknowledge(latched)
+        rig.claim(rig.sees(DISARMED), f"{' + '.join(names(rig.see('latched')))} is not acknowledged")
+    await rig.run(REST_MS)
+    rig.claim(turns == len(rig.turns) and last_pulse == rig.last_pulse, "the drive came back before the arm")
+    if fault.rearms:
+        rig.claim(await host.arm(), "an arm is refused")
+        await rig.run(REST_MS)
+        rig.claim(rig.sees(ARMED), "the axis cannot be armed again")
+
+
+def _drives(rig: Rig, before: float) -> list[tuple[int, float]]:
+    """Return the clocks after the fault from which the drive was what, in N."""
+    after = [(clock, word * SPEC.force_resolution_n) for clock, word in rig.turns if clock > rig.began]
+    return [(rig.began, before), *after]
+
+
+def _outcome(rig: Rig, fault: Fault, drives: list[tuple[int, float]]) -> Outcome:
+    """Return what was measured, without the verdict."""
+    expected = fault.expected
+    down = next((clock for k, (clock, _) in enumerate(drives) if _is_down(expected, drives[k:])), None)
+    largest = max(abs(driven) for _, driven in drives)
+    clocks = None if down is None else down - rig.began
+    if expected.stopped:
+        clocks, largest = rig.stuck_clocks, max(largest, FULL_SCALE_N * rig.see("drive_pdm"))
+    tripped = rig.sees(TRIPPED)
+    came = " + ".join(names(rig.see("first"))) if tripped else STATES[rig.see("state")]
+    return Outcome(
+        name=fault.name,
+        expected=expected.text,
+        came="no clock" if expected.stopped else came,
+        clocks=clocks,
+        largest_n=largest,
+        impulse_n_s=abs(rig.impulse_n_s),
+        observed_ms=(rig.now - rig.began) / CLOCKS_PER_MS,
+        wrong=(),
+    )
+
+
+def _is_down(expected: Expected, drives: list[tuple[int, float]]) -> bool:
+    return all(abs(driven) <= expected.down_n for _, driven in drives)
+
+
+def _shortcomings(rig: Rig, expected: Expected, outcome: Outcome, drives: list[tuple[int, float]]) -> list[str]:
+    """Return what is not as expected."""
+    wrong = []
+    came = " + ".join(expected.causes) or ("no clock" if expected.stopped else STATES[expected.state])
+    if outcome.came != came:
+        wrong.append(f"{outcome.came}, not {came}")
+    if expected.within is not None and (outcome.clocks is None or outcome.clocks > expected.within):
+        wrong.append(f"the drive is not down within {expected.within} clocks")
+    if expected.within is not None and expected.state != ARMED and not expected.stopped:
+        most = expected.within + PULSES if expected.pins_within is None else expected.pins_within
+        if rig.last_pulse > rig.began + most:
+            wrong.append(f"a pulse {rig.last_pulse - rig.began} clocks after the fault")
+    if outcome.largest_n > expected.largest_n + SPEC.force_resolution_n:
+        wrong.append(f"{outcome.largest_n:.3f} N is more than {expected.largest_n:.3f} N")
+    if expected.steady and any(abs(driven - drives[0][1]) > TREMOR_N for _, driven in drives):
+        wrong.append("the force is not as before")
+    return wrong

@@ -1,0 +1,37 @@
+"""Faults injected into the board under the simulator, with a seeded bug or without."""
+
+import json
+from collections.abc import Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from hardwall.model.build_folder import build_dir
+from hardwall.sim.rtl import cocotb_runner
+from hardwall.testing import SEED
+from proofs.bugs import Bug
+
+from .damaged import Damaged
+from .fault import Fault, Outcome
+
+IN_SIMULATOR = Path(__file__).with_name("faults_in_simulator.py")
+
+
+def run(faults: Sequence[Fault], bug: Bug | None = None) -> list[Outcome]:
+    """Return what comes of faults, one after the other.
+
+    Raises:
+        RuntimeError: if the simulation fails, or a fault has no outcome.
+    """
+    log = build_dir() / "faults.log"
+    log.parent.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory() as folder, bug.seeded() if bug else nullcontext():
+        report = Path(folder) / "report"
+        order = {"names": [fault.name for fault in faults], "report": str(report)}
+        environ = {"HARDWALL_PARAMETERS": json.dumps(order)}
+        job = cocotb_runner.Job(IN_SIMULATOR.stem, IN_SIMULATOR.parent, environ, SEED, log=log)
+        cocotb_runner.simulate(Damaged(), "damaged", job)
+        rows = [json.loads(line) for line in report.read_text(encoding="utf-8").splitlines()]
+    if [row["name"] for row in rows] != order["names"]:
+        raise RuntimeError(f"{len(rows)} of {len(faults)} faults have an outcome: see {log}")
+    return [Outcome(**{**row, "wrong": tuple(row["wrong"])}) for row in rows]

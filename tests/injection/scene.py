@@ -1,0 +1,46 @@
+"""The scene of the faults: an axis at 12 MHz, and a hand that pushes a handle into a wall."""
+
+import dataclasses
+
+from hardwall.hdl.board import Board
+from hardwall.model.registers import RegisterMap
+from hardwall.model.spec import AxisSpec
+from hardwall.model.supervised import Design
+from stimuli.specs import spec
+
+CLOCK_HZ, BAUD = 12_000_000, 3_000_000
+SPEC: AxisSpec = dataclasses.replace(
+    spec("paper"), clock_hz=CLOCK_HZ, sample_hz=200_000, actuation_hz=100_000, glitch_clocks=None
+)
+DESIGN, REGISTERS = Design(SPEC), RegisterMap(SPEC)
+WORDS = {word.name: word for word in DESIGN.words}
+STEP_CLOCKS = SPEC.clocks_per_sample * SPEC.samples_per_actuation
+"""The plant's step, over which the pulses of the drive act as their mean."""
+CLOCKS_PER_MS = CLOCK_HZ // 1000
+DRIVE_BITS = SPEC.force.width - 2
+FULL_SCALE_N = SPEC.force_resolution_n * 2**DRIVE_BITS
+"""The force of a drive whose pulses never end: what a pin that is stuck high asks for."""
+
+MASS_KG, VISCOUS_N_S_PER_M = 0.35, 1.0
+PUSH_N, STIFFNESS_N_PER_M, DAMPING_N_S_PER_M = 11.7, 5e3, 20.0
+START, MARK, REST = -5, 0, 100
+"""Counts: the handle starts at the first, its index is at the second, and the hand holds it at the third."""
+DEPTH = round(PUSH_N / STIFFNESS_N_PER_M / SPEC.count_m)
+"""Counts in the wall at which its spring holds the hand."""
+TURN = 4000
+GLITCH = SPEC.glitch_clocks_at_reset
+
+LOOP = 3
+"""Clock edges from a pin of a loop, or a synchronised level, to the drive at zero."""
+COUNTED = GLITCH + 4
+"""Clock edges from a pin of the encoder to the count."""
+
+
+def words(**values: float) -> dict[str, int]:
+    """Return words by name for values in SI units."""
+    return {name: WORDS[name].from_si(value) for name, value in values.items()}
+
+
+def board() -> Board:
+    """Return the board under test."""
+    return Board(SPEC, BAUD)
