@@ -9,7 +9,7 @@ from hardwall.testing import SEED
 
 from .fault import PULSES, STATES, TREMOR_N, Expected, Fault, Outcome
 from .rig import NotSteadyError, Rig
-from .scene import CLOCKS_PER_MS, FULL_SCALE_N, SPEC, STEP_CLOCKS
+from .scene import CLOCKS_PER_MS, SPEC, STEP_CLOCKS
 
 REST_MS = 0.2
 """How long the drive is watched after every act of the host on the way back."""
@@ -80,7 +80,7 @@ def _outcome(rig: Rig, fault: Fault, drives: list[tuple[int, float]]) -> Outcome
     largest = max(abs(driven) for _, driven in drives)
     clocks = None if down is None else down - rig.began
     if expected.stopped:
-        clocks, largest = rig.stuck_clocks, max(largest, FULL_SCALE_N * rig.see("drive_pdm"))
+        clocks, largest = rig.stuck_clocks, max(largest, rig.stuck_n)
     tripped = rig.sees(TRIPPED)
     came = " + ".join(names(rig.see("first"))) if tripped else STATES[rig.see("state")]
     return Outcome(

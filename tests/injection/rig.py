@@ -53,6 +53,7 @@ class Rig:
         began: the clock after whose edge the fault is there.
         turns: clocks and words of every change of the drive that is let out.
         wrong: what the fault itself has found to be wrong.
+        stuck_n: the largest force without a clock.
     """
 
     def __init__(self, dut):
@@ -63,7 +64,9 @@ class Rig:
         self.began = 0
         self.turns: list[tuple[int, int]] = []
         self.wrong: list[str] = []
-        self._drive_n, self._stuck, self._stuck_n_s = 0.0, None, 0.0
+        self.stuck_n = self._stuck_n_s = self._drive_n = 0.0
+        self._stuck: int | None = None
+        self._number = START
         self._alive_at = self._pulses = self._pulses_before = 0
         self._tasks: list = []
 
@@ -119,7 +122,7 @@ class Rig:
 
     def wire(self) -> None:
         """Let the board see the wires of the encoder as they are now."""
-        self.pins(**self.handle.levels(self.handle.number))
+        self.pins(**self.handle.levels(self._number))
 
     async def _watch_drive(self) -> None:
         change = ValueChange(self.dut.driven)
@@ -135,14 +138,14 @@ class Rig:
 
     async def _turn(self) -> None:
         """Close the loop, step by step."""
-        handle = self.handle
         while True:
             passed = 0
-            for clock, number in handle.step(-self._drive_n if self.swapped else self._drive_n):
+            for clock, number in self.handle.step(-self._drive_n if self.swapped else self._drive_n):
                 if clock - 1 > passed:
                     await Timer((clock - 1 - passed) * CLOCK_NS, "ns")
                     passed = clock - 1
-                self.pins(**handle.levels(number))
+                self._number = number
+                self.wire()
                 self.on_count(number)
             await Timer((STEP_CLOCKS - passed) * CLOCK_NS, "ns")
             self._drive_n = self._given_n()
@@ -157,6 +160,7 @@ class Rig:
         pumping = self.now - self._alive_at <= PUMP_CLOCKS
         given = (1 - 2 * self.see("drive_sign")) * self.see("drive_pdm") * FULL_SCALE_N * pumping
         self._stuck_n_s += given * STEP_CLOCKS / CLOCK_HZ
+        self.stuck_n = max(self.stuck_n, abs(given))
         if given:
             self._stuck = self.now
         return given

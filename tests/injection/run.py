@@ -1,10 +1,10 @@
 """Faults injected into the board under the simulator, with a seeded bug or without."""
 
+import hashlib
 import json
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.rtl import cocotb_runner
@@ -23,15 +23,16 @@ def run(faults: Sequence[Fault], bug: Bug | None = None) -> list[Outcome]:
     Raises:
         RuntimeError: if the simulation fails, or a fault has no outcome.
     """
-    log = build_dir() / "faults.log"
-    log.parent.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory() as folder, bug.seeded() if bug else nullcontext():
-        report = Path(folder) / "report"
-        order = {"names": [fault.name for fault in faults], "report": str(report)}
-        environ = {"HARDWALL_PARAMETERS": json.dumps(order)}
-        job = cocotb_runner.Job(IN_SIMULATOR.stem, IN_SIMULATOR.parent, environ, SEED, log=log)
+    names = [fault.name for fault in faults]
+    digest = hashlib.sha256(repr((names, str(bug))).encode()).hexdigest()[:16]
+    folder = build_dir() / "faults" / digest
+    folder.mkdir(parents=True, exist_ok=True)
+    report, log = folder / "report", folder / "log"
+    environ = {"HARDWALL_PARAMETERS": json.dumps({"names": names, "report": str(report)})}
+    job = cocotb_runner.Job(IN_SIMULATOR.stem, IN_SIMULATOR.parent, environ, SEED, log=log)
+    with bug.seeded() if bug else nullcontext():
         cocotb_runner.simulate(Damaged(), "damaged", job)
-        rows = [json.loads(line) for line in report.read_text(encoding="utf-8").splitlines()]
-    if [row["name"] for row in rows] != order["names"]:
+    rows = [json.loads(line) for line in report.read_text(encoding="utf-8").splitlines()]
+    if [row["name"] for row in rows] != names:
         raise RuntimeError(f"{len(rows)} of {len(faults)} faults have an outcome: see {log}")
     return [Outcome(**{**row, "wrong": tuple(row["wrong"])}) for row in rows]
