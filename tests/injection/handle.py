@@ -13,7 +13,6 @@ ENCODER = Encoder(SPEC.count_m, float(CLOCK_HZ))
 PLANT = Rigid(Handle(MASS_KG, VISCOUS_N_S_PER_M), None)
 INTERVAL = Interval(span(PLANT.handle, STEP_CLOCKS / CLOCK_HZ), 0, STEP_CLOCKS)
 EDGES_MAX = STEP_CLOCKS
-WIRES = ("encoder_a", "encoder_b", "encoder_z", "encoder_a_n", "encoder_b_n")
 Wires = dict[str, int]
 
 
@@ -60,10 +59,6 @@ class Grasped:
     def number(self) -> int:
         """The count of the handle."""
         return int(self._moment.cell.number)
-
-    @property
-    def position_m(self) -> float:
-        return float(self._moment.motion.position_m)
 
     @property
     def speed_m_per_s(self) -> float:

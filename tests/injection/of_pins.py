@@ -1,5 +1,6 @@
 """Faults of the loops, of the reset pin, of the clock, and of words and signals inside."""
 
+from hardwall.hdl.supervised import LOOPS
 from hardwall.model.supervisor import DISARMED
 
 from .fault import UNCHANGED, Expected, Fault, trips
@@ -80,7 +81,6 @@ def stops(level: int, *loops: str):
 
 PUMPED = PUMP_CLOCKS + 2 * STEP_CLOCKS
 """The most clocks until the plant of these tests sees that a charge pump has run down."""
-LOOPS = ("drive_enable", "external_fault", "emergency_stop")
 
 FAULTS = (
     Fault(
