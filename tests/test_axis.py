@@ -7,42 +7,16 @@ from cocotb.triggers import RisingEdge, Timer, ValueChange
 
 from hardwall.hdl.axis import Axis
 from hardwall.model import clocked, quadrature, stamped
-from hardwall.model.design import Design
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
-from stimuli.specs import ADJUSTED, MHZ, spec
+from stimuli import handle
+from stimuli.axes import busy, random_words
 
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
-SLACK = 12
-"""Clocks of every sample after the drive has changed, in which the host may act."""
-
-
-def busy(estimator: str) -> AxisSpec:
-    """Return an axis that samples nearly as fast as its latency allows."""
-    latency = spec("mhz", estimator).design.latency_to_drive
-    gains = ADJUSTED if estimator == "levant" else None
-    rates = {"clock_hz": 100_000 * (latency + SLACK), "sample_hz": 100_000, "actuation_hz": 50_000}
-    return AxisSpec(**{**MHZ, **rates, "speed_max_m_per_s": 0.5, "travel_m": 1e-3}, estimator=estimator, gains=gains)
 
 
 def make(estimator: str) -> Axis:
     return Axis(busy(estimator))
-
-
-def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
-    """Return words for a wall that is often hit, with gains from zero to the largest."""
-    words = {word.name: word.reset for word in design.words}
-    for name in ("wall_stiffness", "wall_damping", "output_force_limit", "output_slew_limit"):
-        top = next(word.format.max for word in design.words if word.name == name)
-        words[name] = int(top * 2.0 ** -random.integers(0, 16))
-    words["wall_position"] = int(random.integers(-30, 30))
-    words["wall_left"], words["wall_forbid_pull"] = random.integers(0, 2, 2).tolist()
-    words["encoder_glitch_clocks"] = int(random.choice([0, 1, 2, 5]))
-    words["encoder_invert"] = int(random.random() < 0.2)
-    outputs, selector = design.estimator.outputs, design.estimator.output_word()
-    if len(outputs) > 1:
-        words[selector] = int(random.integers(0, len(outputs)))
-    return words
 
 
 class Events:
@@ -97,20 +71,12 @@ def reference(spec: AxisSpec, pins: np.ndarray, commits: list[tuple[int, dict[st
 
 async def motion(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Generator) -> None:
     """Move the encoder by one edge at a time: slowly, fast, back and forth, and sometimes too fast or glitching."""
-    quarter, period = 0, bench.period_ns
     end = bench.clock_number() + samples * spec.clocks_per_sample
-    spacing, direction = 20.0, 1
-    while bench.clock_number() < end:
-        if random.random() < 0.02:
-            spacing = float(random.choice([4, 8, 15, 40, 200])) if random.random() < 0.98 else 1.0
-            direction = int(random.choice([-1, 1]))
-        # Both pins change at once now and then, which is always an illegal transition.
-        quarter = (quarter + direction * (2 if random.random() < 0.002 else 1)) % 4
-        a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[quarter]
-        bench.drive(encoder_a=a, encoder_b=b)
-        if random.random() < 0.01:
-            bench.drive(encoder_z=int(random.integers(0, 2)))
-        await Timer(max(1, int(random.exponential(spacing))) * period, "ns")
+    for pins, clocks in handle.edges(random):
+        if bench.clock_number() >= end:
+            return
+        bench.drive(**pins)
+        await Timer(clocks * bench.period_ns, "ns")
 
 
 async def committed_with(dut) -> None:

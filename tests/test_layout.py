@@ -40,6 +40,7 @@ BROAD = {
     "test_endurance": "every estimator",
     "test_faults": "faults injected into the board in the closed loop, and the means",
     "test_fuzz": "every command, called as no one would",
+    "test_gates": "netlists beside their RTL, and the means",
     "test_killed": "every command that stores results",
     "test_layout": "the tree",
     "test_makefile": "the tasks",

@@ -66,6 +66,8 @@ class Job:
         log: a file for what the simulator prints; default: this process's stdout.
         build: the folder for builds; default: the project's.
         more: Verilog of the modules that the component's instances name.
+        options: more options of Verilator; they come last.
+        plusargs: more options of the simulator's process.
     """
 
     module: str
@@ -76,6 +78,8 @@ class Job:
     log: Path | None = None
     build: Path | None = None
     more: str = field(default="", repr=False)
+    options: tuple[str, ...] = ()
+    plusargs: tuple[str, ...] = ()
 
 
 class CocotbFailedError(RuntimeError):
@@ -166,7 +170,7 @@ class _Model:
         return cls(name, to_verilog(component, name) + job.more, f"`verilator_config\n{visible}")
 
     def folder(self, job: Job) -> Path:
-        digest = _digest(self.verilog + self.visible + TOOLS + repr(BUILD_OPTIONS))
+        digest = _digest(self.verilog + self.visible + TOOLS + repr([*BUILD_OPTIONS, *job.options]))
         return (job.build or build_dir()) / "cocotb" / f"{self.name}-{digest}{'-traced' * self.traced}"
 
 
@@ -174,7 +178,7 @@ def _run(model: _Model, job: Job, trace_to: Path | None = None) -> None:
     """Build a model if necessary, and run the tests; write its signals to the file `trace_to`, if given."""
     build = model.folder(job)
     build.mkdir(parents=True, exist_ok=True)
-    runner = _built(build, model)
+    runner = _built(build, model, job.options)
     results = build / f"results-{_digest(repr((job.module, job.checks, sorted(job.environ.items()))))}.xml"
     with scratch(build) as own:
         wrong_sample = own / "wrong-sample"
@@ -191,7 +195,7 @@ def _run(model: _Model, job: Job, trace_to: Path | None = None) -> None:
                 waves=model.traced,
                 test_args=["--trace-file", str(trace_to)] if trace_to else [],
                 # A folder of this run's own, for the Verilog and for Python.
-                plusargs=[f"+scratch={own}"],
+                plusargs=[f"+scratch={own}", *job.plusargs],
                 extra_env={
                     **job.environ,
                     "HARDWALL_WRONG_SAMPLE": str(wrong_sample),
@@ -229,8 +233,8 @@ class _Runner(Verilator):
                 raise RuntimeError(f"{command[0]} ended with exit code {ended}")
 
 
-def _built(build: Path, model: _Model) -> _Runner:
-    """Return a runner of the model built in the folder `build`."""
+def _built(build: Path, model: _Model, options: Sequence[str]) -> _Runner:
+    """Return a runner of the model built in the folder `build`, with more options of Verilator."""
     sources = {f"{model.name}.vlt": model.visible, f"{model.name}.v": model.verilog}
     check_paths(build)
     os.environ.update(environment())
@@ -245,7 +249,7 @@ def _built(build: Path, model: _Model) -> _Runner:
             sources=[build / file for file in sources],
             hdl_toplevel=model.name,
             build_dir=build,
-            build_args=BUILD_OPTIONS,
+            build_args=[*BUILD_OPTIONS, *options],
             timescale=("1ns", "1ns"),
             waves=model.traced,
             log_file=build / "build.log",

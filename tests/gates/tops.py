@@ -1,0 +1,101 @@
+"""What is mapped to every family: the cells that need a model of ours, the axis, and the board."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from amaranth.hdl import Module, Mux, Signal, signed, unsigned
+from amaranth.lib import wiring
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Out
+
+from hardwall.hdl.axis import Axis
+from hardwall.hdl.board import Board
+from oracles import board
+from stimuli.axes import busy
+
+WIDTH = 18
+SIGNS = tuple((a, b) for a in (unsigned, signed) for b in (unsigned, signed))
+
+
+class Cells(wiring.Component):
+    """Products of every kind of sign, and memories that are read while they are written: what models of cells can do.
+
+    What a memory shows before its first clock is left open by RTL and data sheets alike, and is not shown.
+
+    Attributes:
+        memories: the width and the number of words of every memory, and its content at power-up; the last is only read.
+    """
+
+    memories = ((16, 512, range(7, 512 * 127, 127)), (8, 1024, ()), (16, 1024, range(65535, 1023, -63)))
+
+    def __init__(self):
+        products = {f"product_{k}": Out(2 * WIDTH) for k in range(len(SIGNS))}
+        reads = {f"read_{k}": Out(width) for k, (width, _, _) in enumerate(self.memories)}
+        super().__init__(
+            {
+                "a": In(WIDTH),
+                "b": In(WIDTH),
+                "write": In(1),
+                "write_address": In(10),
+                "read_address": In(10),
+                **products,
+                **reads,
+            }
+        )
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        for k, (a, b) in enumerate(SIGNS):
+            x, y = Signal(a(WIDTH), name=f"a_{k}"), Signal(b(WIDTH), name=f"b_{k}")
+            m.d.comb += [x.eq(self.a), y.eq(self.b)]
+            m.d.sync += getattr(self, f"product_{k}").eq(x * y)
+        clocked = Signal(reset_less=True)
+        m.d.sync += clocked.eq(1)
+        for k, (width, depth, content) in enumerate(self.memories):
+            m.submodules[f"memory_{k}"] = memory = Memory(shape=width, depth=depth, init=content)
+            read = memory.read_port()
+            m.d.comb += [
+                read.addr.eq(self.read_address),
+                getattr(self, f"read_{k}").eq(Mux(clocked, read.data, 0)),
+            ]
+            if k < len(self.memories) - 1:
+                write = memory.write_port()
+                m.d.comb += [write.en.eq(self.write), write.addr.eq(self.write_address), write.data.eq(self.a)]
+        return m
+
+
+@dataclass(frozen=True)
+class Top:
+    """A component that is mapped.
+
+    Attributes:
+        name: its name in the table.
+        stimulus: the name of its stimulus in `side_by_side`.
+        make: returns the component for a name of an estimator.
+        estimator: that name.
+        still: outputs that never change.
+    """
+
+    name: str
+    stimulus: str
+    make: Callable[[str], wiring.Component]
+    estimator: str = ""
+    still: tuple[str, ...] = ()
+
+    def component(self) -> wiring.Component:
+        return self.make(self.estimator)
+
+
+def board_of(estimator: str) -> Board:
+    """Return a board with a quick serial line, so that a host gets through a conversation in a few samples."""
+    return board.make("paper", estimator).board
+
+
+# No spec lets a sample begin before the last one's drive has changed.
+NEVER = ("strobe_busy",)
+TOPS = (
+    Top("cells", "cells", lambda _: Cells()),
+    Top("axis fdm", "axis", lambda estimator: Axis(busy(estimator)), "fdm", NEVER),
+    Top("axis levant", "axis", lambda estimator: Axis(busy(estimator)), "levant", NEVER),
+    Top("board levant", "board", board_of, "levant"),
+)

@@ -1,0 +1,35 @@
+"""Axes that sample as fast as they can, and words for them."""
+
+import numpy as np
+
+from hardwall.model.design import Design
+from hardwall.model.spec import AxisSpec
+
+from .specs import ADJUSTED, MHZ, spec
+
+SLACK = 12
+"""Clocks of every sample after the drive has changed, in which the host may act."""
+
+
+def busy(estimator: str) -> AxisSpec:
+    """Return an axis that samples nearly as fast as its latency allows."""
+    latency = spec("mhz", estimator).design.latency_to_drive
+    gains = ADJUSTED if estimator == "levant" else None
+    rates = {"clock_hz": 100_000 * (latency + SLACK), "sample_hz": 100_000, "actuation_hz": 50_000}
+    return AxisSpec(**{**MHZ, **rates, "speed_max_m_per_s": 0.5, "travel_m": 1e-3}, estimator=estimator, gains=gains)
+
+
+def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
+    """Return words for a wall that is often hit, with gains from zero to the largest."""
+    words = {word.name: word.reset for word in design.words}
+    for name in ("wall_stiffness", "wall_damping", "output_force_limit", "output_slew_limit"):
+        top = next(word.format.max for word in design.words if word.name == name)
+        words[name] = int(top * 2.0 ** -random.integers(0, 16))
+    words["wall_position"] = int(random.integers(-30, 30))
+    words["wall_left"], words["wall_forbid_pull"] = random.integers(0, 2, 2).tolist()
+    words["encoder_glitch_clocks"] = int(random.choice([0, 1, 2, 5]))
+    words["encoder_invert"] = int(random.random() < 0.2)
+    outputs, selector = design.estimator.outputs, design.estimator.output_word()
+    if len(outputs) > 1:
+        words[selector] = int(random.integers(0, len(outputs)))
+    return words

@@ -1,0 +1,98 @@
+"""The quick ones of the netlists beside their RTL, and the means: `make gate` simulates every netlist."""
+
+import re
+from dataclasses import replace
+
+import gate
+import pytest
+
+from gates import run
+from gates.families import FAMILIES
+from gates.netlist import Netlist, mapped
+from gates.run import Case, Outcome, compared
+from gates.tops import TOPS
+from hardwall.sim.rtl.parts import PARTS
+
+ECP5 = FAMILIES[0]
+CELLS, AXIS = Case(ECP5, TOPS[0]), Case(ECP5, TOPS[1])
+
+
+def netlist_of(case: Case) -> Netlist:
+    return mapped(case.top.component(), case.family)
+
+
+def test_products_and_memories_are_those_of_their_cells():
+    """The models of cells that are ours have the product and the memory of plain Verilog."""
+    outcome = compared(CELLS, netlist_of(CELLS), 5_000)
+    assert (outcome.netlist.cells["dsp"], outcome.netlist.cells["bram"]) == (4, 3)
+    assert outcome.ok, outcome.explanation
+
+
+def test_the_netlist_of_an_axis_is_equal_to_it():
+    outcome = compared(AXIS, netlist_of(AXIS), 2_000)
+    assert outcome.netlist.cells["dsp"] == 1
+    assert outcome.clocks >= 2_000 * netlist_of(AXIS).component.spec.clocks_per_sample
+    assert outcome.ok, outcome.explanation
+
+
+def inverted(found: re.Match) -> str:
+    return f".INIT(16'h{0xFFFF ^ int(found[1], 16):04x})"
+
+
+def test_a_wrong_table_of_a_cell_is_found():
+    right = netlist_of(CELLS)
+    wrong = replace(right, gates=re.sub(r"\.INIT\(16'h(\w+)\)", inverted, right.gates, count=1))
+    assert wrong.gates != right.gates
+    outcome = compared(CELLS, wrong, 1_000)
+    assert outcome.different > 0
+    assert not outcome.ok
+    (line, *values) = outcome.explanation.splitlines()
+    assert line == f"ECP5 cells: differs at {outcome.different} clocks, first at clock {outcome.first}"
+    assert values
+
+
+def test_registers_without_a_value_at_power_up_are_found():
+    right = netlist_of(CELLS)
+    blank = replace(right, models=right.models.replace("initial Q = srval;", ""))
+    assert blank.models != right.models
+    outcome = compared(CELLS, blank, 1_000)
+    # Nothing is reset for a while, and the first clock edge finds what power-up left.
+    assert outcome.different > 0
+    assert outcome.first == 0
+
+
+def test_netlists_are_mapped_as_the_parts_are():
+    assert {family.synth for family in FAMILIES} >= {part.synth for part in PARTS.values()}
+    assert FAMILIES[1].count(["SB_LUT4", "SB_DFFESR", "SB_DFF", "SB_MAC16"]) == {
+        "lut4": 1, "dsp": 1, "bram": 0, "ff": 2
+    }  # fmt: skip
+
+
+OUTCOME = Outcome(CELLS, Netlist(None, "", "", "", dict.fromkeys(gate.CELLS, 5)), 10, 20, 0, 0, {}, ())
+
+
+@pytest.mark.parametrize(
+    ("outcome", "said"),
+    [
+        (OUTCOME, "gate: 1 netlists, 1 equal"),
+        (replace(OUTCOME, clocks=9), "gate: 1 netlists, 0 equal"),
+        (replace(OUTCOME, different=1, unlike={"a": (1, 2)}), "gate: 1 netlists, 0 equal"),
+        (replace(OUTCOME, still=("a",)), "gate: 1 netlists, 0 equal"),
+    ],
+    ids=["equal", "too short", "different", "still"],
+)
+def test_the_command_ends_in_a_line_for_a_script(outcome, said, monkeypatch, capsys):
+    monkeypatch.setattr(gate, "CASES", [CELLS])
+    monkeypatch.setattr(run, "mapped", lambda component, family: outcome.netlist)
+    monkeypatch.setattr(run, "compared", lambda case, netlist, samples: outcome)
+    code = gate.main("ECP5")
+    out, err = capsys.readouterr()
+    assert out.splitlines()[-1] == said
+    assert f"{outcome.line}\n" == err
+    assert code == int(not outcome.ok)
+    assert ("RTL 1, netlist 2" in out) == bool(outcome.unlike)
+
+
+def test_no_netlist_is_no_success(monkeypatch, capsys):
+    assert gate.main("no such family") == 1
+    assert capsys.readouterr().out.splitlines()[-1] == "gate: 0 netlists, 0 equal"
