@@ -88,9 +88,7 @@ class Host:
         words |= {"wall_left": left, "wall_position": position, "preload_count": count}
         words["encoder_glitch_clocks"] = int(random.choice((0, 1, 2)))
         if random.random() < 0.7:
-            words["wall_stiffness"] = self._registers["wall_stiffness"].high
-            words["output_force_limit"] = self._registers["output_force_limit"].high
-            words["output_slew_limit"] = self._registers["output_slew_limit"].high
+            words |= {name: self._registers[name].high for name in ("wall_stiffness", "output_slew_limit")}
         return words
 
     async def _arm(self) -> None:
