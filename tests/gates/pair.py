@@ -15,7 +15,9 @@ class Pair(wiring.Component):
     """The modules `RTL` and `GATES` of a component, and what tells them apart.
 
     Outputs are compared as every clock edge finds them, the first edge after power-up too. Nothing here is ever reset;
-    `rst` is an input of the component like any other.
+    `rst` is an input of the component like any other. The clock begins after the first fall of `clk`, because a
+    simulator that gives random values to what has none gives them to its inputs too, and a clock that begins high has
+    risen.
 
     Attributes:
         outputs: how the component's outputs lie in `first_rtl`, `first_gates`, `seen_low` and `seen_high`.
@@ -47,12 +49,20 @@ class Pair(wiring.Component):
     def elaborate(self, platform: object) -> Module:
         m = Module()
         m.domains.sync = domain = ClockDomain(reset_less=True)
-        m.d.comb += domain.clk.eq(self.clk)
+        m.domains.fall = fall = ClockDomain(reset_less=True, clk_edge="neg")
+        begun = Signal()
+        m.d.fall += begun.eq(1)
+        m.d.comb += [fall.clk.eq(self.clk), domain.clk.eq(self.clk & begun)]
+        given = {"clk": domain.clk, "rst": self.rst}
+        given |= {name: getattr(self, name) for name, member in self._ports.items() if member.flow == In}
         found = {}
         for module in (RTL, GATES):
             own = {name: Signal(shape, name=f"{module}_{name}") for name, shape in self.outputs.shapes.items()}
-            inputs = {f"i_{name}": getattr(self, name) for name in ("clk", "rst", *self._ports) if name not in own}
-            m.submodules[module] = Instance(module, **inputs, **{f"o_{name}": port for name, port in own.items()})
+            m.submodules[module] = Instance(
+                module,
+                **{f"i_{name}": port for name, port in given.items()},
+                **{f"o_{name}": port for name, port in own.items()},
+            )
             found[module] = Cat(own.values())
         m.d.comb += Cat(getattr(self, name) for name in self.outputs.shapes).eq(found[RTL])
         m.d.sync += [
