@@ -15,7 +15,7 @@ from cocotb.clock import Clock
 from cocotb.triggers import Timer
 
 from gates import host
-from gates.pair import Pair
+from gates.pair import START, Pair
 from gates.tops import TOPS, WIDTH, Top
 from hardwall.hdl.supervised import LOOPS
 from hardwall.testing import parameters, rng
@@ -154,10 +154,8 @@ async def outputs_are_compared(dut):
     given = parameters()
     top = next(top for top in TOPS if top.name == given["top"])
     driven = Driven(dut, top)
-    # The fall from which the pair has a clock, with all inputs low; after it, every change comes at a fall.
-    for level in (1, 0):
-        dut.clk.value = level
-        await driven.clocks(1)
+    await driven.clocks(1)
+    driven.drive(start=START)
     Clock(dut.clk, PERIOD_NS, "ns").start(start_high=False)
     stimulus: Callable = globals()[top.stimulus]
     cocotb.start_soon(stimulus(driven))
