@@ -2,13 +2,16 @@
 
 import dataclasses
 import os
+import re
 from pathlib import Path
 
 # Use the Yosys wheel that comes with Amaranth: the same version, and so the same text, on every machine.
 os.environ.setdefault("AMARANTH_USE_YOSYS", "builtin")
 
 from amaranth.back import verilog
+from amaranth.hdl import Module, Signal
 from amaranth.lib import wiring
+from amaranth.lib.cdc import FFSynchronizer
 
 from hardwall.model import register_texts
 from hardwall.model.spec import AxisSpec
@@ -19,13 +22,56 @@ from .board import Board
 from .link.axi_link import AxiLink
 from .ports import port_table
 
+SYNCHRONISER = {"ASYNC_REG": "TRUE", "keep": "true"}
+"""Attributes of every stage of a synchroniser: place the stages side by side, and neither merge nor move them."""
+START = r"\$start "
+"""The name of the signal whose only change, at the start of a simulation, lets every `always @*` run once."""
+_TRIGGER = re.compile(r"^  reg (\\\$auto\$verilog_backend\S+ ) = 0;$", re.MULTILINE)
+
+
+class _AnyPart:
+    """A platform of Amaranth without a part: its synchronisers have the attributes that tools of several parts read."""
+
+    def get_ff_sync(self, synchroniser: FFSynchronizer) -> Module:
+        """Return the hardware of a synchroniser, as Amaranth makes it but for the attributes."""
+        m = Module()
+        level = synchroniser.i
+        for number in range(synchroniser._stages):
+            stage = Signal(
+                level.shape(),
+                name=f"stage{number}",
+                init=synchroniser._init,
+                reset_less=synchroniser._reset_less,
+                attrs=SYNCHRONISER,
+            )
+            m.d[synchroniser._o_domain] += stage.eq(level)
+            level = stage
+        m.d.comb += synchroniser.o.eq(level)
+        return m
+
+
+def _with_start(text: str) -> str:
+    """Return Verilog whose `always @*` blocks run once at the start, whatever the version of the language.
+
+    Yosys lets each of them read a signal that is declared with the initial value 0. In Verilog-2005 this value is an
+    assignment at time 0, and the change from x lets the block run. In SystemVerilog a declared value is there before
+    any block waits: nothing changes, and what a block makes of constants and of unchanged registers stays x. Assigned
+    without blocking, the value comes after every block has begun to wait, in both languages.
+    """
+    for trigger in _TRIGGER.findall(text):
+        text = text.replace(f"  reg {trigger} = 0;\n", f"  reg {START};\n  initial {START}<= 1'h0;\n")
+        text = text.replace(trigger, START)
+    return text
+
 
 def to_verilog(component: wiring.Component, name: str) -> str:
     """Return the Verilog of `component` as module `name`, with ports `clk` and `rst` besides its members.
 
-    Source attributes are left out, so that the text depends only on the design and can be cached by its content.
+    Source attributes are left out, so that the text depends only on the design and can be cached by its content. It is
+    Verilog-2005, and means the same where it is read as SystemVerilog.
     """
-    return verilog.convert(component, name=name, emit_src=False, strip_internal_attrs=True)
+    text = verilog.convert(component, name=name, platform=_AnyPart(), emit_src=False, strip_internal_attrs=True)
+    return _with_start(text)
 
 
 def _facts(spec: AxisSpec) -> list[str]:

@@ -9,7 +9,7 @@ import pytest
 
 from hardwall.hdl.axis import Axis
 from hardwall.hdl.board import Board
-from hardwall.hdl.export import to_verilog, write
+from hardwall.hdl.export import SYNCHRONISER, to_verilog, write
 from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.hdl.ports import COLUMNS, port_table
 from hardwall.model import register_texts
@@ -120,6 +120,44 @@ def test_written_verilog_passes_the_lint(written, top):
     command = ["verilator", "--lint-only", *LINT_OPTIONS, "--top-module", top, str(written / f"{top}.v")]
     done = subprocess.run(command, env=environment(), capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_every_waiver_of_the_lint_has_its_reason():
+    (waivers,) = (Path(option) for option in LINT_OPTIONS if option.endswith(".vlt"))
+    head, *paragraphs = waivers.read_text(encoding="ascii").split("\n\n")
+    assert "lint_off" not in head
+    for paragraph in paragraphs:
+        *reason, waiver = paragraph.splitlines()
+        assert reason
+        assert all(line.startswith("// ") for line in reason)
+        assert waiver.startswith("lint_off -rule ")
+
+
+@pytest.mark.parametrize(("top", "synchronisers"), [("axis", 1), ("board", 10)])
+def test_every_stage_of_a_synchroniser_is_marked(written, top, synchronisers):
+    """The registers of a module whose name ends so are its stages, and no other register is marked."""
+    text = (written / f"{top}.v").read_text()
+    modules = re.findall(r"^module \\?(\S+) \(.*?\);\n(.*?)^endmodule", text, re.S | re.M)
+    marks = "".join(f'  (* {name} = "{value}" *)\n' for name, value in SYNCHRONISER.items())
+    register = re.compile(rf"^({re.escape(marks)})?(?:  output .*;\n)?  reg (?:\[\d+:0\] )?\S+ += \d+'h", re.M)
+    found = {name: register.findall(body) for name, body in modules if name.endswith("synchroniser")}
+    assert list(found.values()) == [[marks, marks]] * synchronisers
+    others = [body for name, body in modules if name not in found]
+    assert sum(len(register.findall(body)) for body in others) > 20
+    assert "ASYNC_REG" not in "".join(others)
+
+
+@pytest.mark.parametrize("top", TOPS)
+def test_blocks_of_logic_run_once_at_the_start_in_every_version_of_the_language(written, top):
+    """A value that is declared does not let a block run in SystemVerilog, and a blocking one may come too early."""
+    text = (written / f"{top}.v").read_text()
+    assert "verilog_backend" not in text
+    blocks = re.findall(r"^  always @\*.*\n(.*)\n", text, re.M)
+    assert blocks
+    assert set(blocks) == {r"    if (\$start ) begin end"}
+    for module in text.split("endmodule\n"):
+        declared = module.count("  reg \\$start ;\n  initial \\$start <= 1'h0;\n")
+        assert declared == ("always @*" in module)
 
 
 @pytest.mark.parametrize("top", TOPS)

@@ -35,6 +35,7 @@ BROAD = {
     "commands/test_reports": "every report in JSON",
     "estimators/test_levants": "what several of Levant's differentiators promise alike",
     "pictures/test_draw": "every picture",
+    "rtl/test_simulators": "the written Verilog, in another simulator",
     "test_digests": "whatever the program computes",
     "test_docs": "the pages",
     "test_endurance": "every estimator",

