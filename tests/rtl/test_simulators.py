@@ -102,9 +102,7 @@ def board_stimulus(board: Board) -> dict[str, np.ndarray]:
     # Until the words are committed, the filter of the reset takes the motion for too fast.
     columns = walk(len(line), len(line) // 2) | {"uart_rx": np.array(line)}
     complements = {f"encoder_{each}_n": 1 - columns[f"encoder_{each}"] for each in "ab"}
-    return (
-        columns | complements | dict.fromkeys(("drive_enable", "external_fault", "emergency_stop"), np.ones(len(line)))
-    )
+    return columns | complements | dict.fromkeys(LOOPS, np.ones(len(line)))
 
 
 def write_bench(component: wiring.Component, top: str, columns: dict[str, np.ndarray], folder: Path) -> dict[str, int]:
