@@ -49,6 +49,9 @@ BUILD_OPTIONS = [
     str(1 << 30),
     "--no-public-flat-rw",
 ]
+COVERAGE_OPTIONS = ["--coverage-line", "--coverage-toggle"]
+COVERAGE = "HARDWALL_COVERAGE"
+"""The variable that names a folder, to which every simulation then adds a file of what it covered of the Verilog."""
 TRACED_LINES = 50_000_000
 """The most lines of a waveform; the lines after them are cut off."""
 
@@ -116,7 +119,7 @@ def trace(component: wiring.Component, name: str, job: Job, failed: CocotbFailed
         # A few samples after the wrong one show the response to it.
         environ["HARDWALL_TRACED_SAMPLES"] = str(failed.wrong_sample + 3)
     again = replace(job, environ=environ, checks=rf"(^|\.)({names})$")
-    model = replace(_Model.of(component, name, job), traced=True)
+    model = replace(_Model.of(component, name, job), traced=True, covered=None)
     build = model.folder(job)
     waveform = build / f"{job.module}-{_digest(repr((job.checks, sorted(job.environ.items()))))}.fst"
     pipe = waveform.with_suffix(f".{os.getpid()}.vcd")
@@ -156,21 +159,34 @@ class _Model:
         verilog: the component as Verilog.
         visible: configuration of Verilator that shows the ports to cocotb.
         traced: whether its signals can be traced.
+        covered: the folder for what its tests cover; None: they do not count it.
     """
 
     name: str
     verilog: str
     visible: str
     traced: bool = False
+    covered: Path | None = None
+
+    @property
+    def options(self) -> list[str]:
+        """Options of Verilator."""
+        return BUILD_OPTIONS + (COVERAGE_OPTIONS if self.covered else [])
 
     @classmethod
     def of(cls, component: wiring.Component, name: str, job: Job) -> "_Model":
         ports = ["clk", "rst", *component.signature.members]
         visible = "".join(f'public_flat_rw -module "{name}" -var "{port}"\n' for port in ports)
-        return cls(name, to_verilog(component, name) + job.more, f"`verilator_config\n{visible}")
+        folder = os.environ.get(COVERAGE)
+        covered = Path(folder).absolute() if folder else None
+        return cls(name, to_verilog(component, name) + job.more, f"`verilator_config\n{visible}", covered=covered)
+
+    def counted(self, run: str) -> list[str]:
+        """Return the arguments by which a run writes what it covered."""
+        return [f"+verilator+coverage+file+{self.covered / self.name}-{run}.dat"] if self.covered else []
 
     def folder(self, job: Job) -> Path:
-        digest = _digest(self.verilog + self.visible + TOOLS + repr([*BUILD_OPTIONS, *job.options]))
+        digest = _digest(self.verilog + self.visible + TOOLS + repr([*self.options, *job.options]))
         return (job.build or build_dir()) / "cocotb" / f"{self.name}-{digest}{'-traced' * self.traced}"
 
 
@@ -179,7 +195,8 @@ def _run(model: _Model, job: Job, trace_to: Path | None = None) -> None:
     build = model.folder(job)
     build.mkdir(parents=True, exist_ok=True)
     runner = _built(build, model, job.options)
-    results = build / f"results-{_digest(repr((job.module, job.checks, sorted(job.environ.items()))))}.xml"
+    run = _digest(repr((job.module, job.checks, sorted(job.environ.items()))))
+    results = build / f"results-{run}.xml"
     with scratch(build) as own:
         wrong_sample = own / "wrong-sample"
         try:
@@ -195,7 +212,7 @@ def _run(model: _Model, job: Job, trace_to: Path | None = None) -> None:
                 waves=model.traced,
                 test_args=["--trace-file", str(trace_to)] if trace_to else [],
                 # A folder of this run's own, for the Verilog and for Python.
-                plusargs=[f"+scratch={own}", *job.plusargs],
+                plusargs=[f"+scratch={own}", *model.counted(run), *job.plusargs],
                 extra_env={
                     **job.environ,
                     "HARDWALL_WRONG_SAMPLE": str(wrong_sample),
@@ -249,7 +266,7 @@ def _built(build: Path, model: _Model, options: Sequence[str]) -> _Runner:
             sources=[build / file for file in sources],
             hdl_toplevel=model.name,
             build_dir=build,
-            build_args=[*BUILD_OPTIONS, *options],
+            build_args=[*model.options, *options],
             timescale=("1ns", "1ns"),
             waves=model.traced,
             log_file=build / "build.log",

@@ -1,0 +1,71 @@
+"""The coverage of the hardware: lines, branches and toggles of every block that its own tests reach under Verilator.
+
+    make coverage                   every block
+    make coverage ONLY=link/        only the blocks whose names begin so
+
+Prints a table in percent, a line for every point that is missed without a reason, and one last line for a script;
+exits with 1 if a block falls short of a goal: lines 100 %, branches and toggles 98 %, of which points that have their
+reason in `covering/reasons.toml` are taken as reached. `covering/points.py` says which points count.
+
+This file is not called `coverage`, because Numba imports a package of that name where it finds one.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from covering.blocks import BLOCKS, Block
+from covering.points import merged
+from covering.report import Coverage, reasons_for
+
+from hardwall.model.build_folder import build_dir
+from hardwall.sim.commands.terminal import show
+from hardwall.sim.jobs.result import Table
+from hardwall.sim.rtl.cocotb_runner import COVERAGE
+
+COLUMNS = {
+    "block": "left",
+    "lines, %": "right",
+    "branches, %": "right",
+    "toggles, %": "right",
+    "missed with a reason": "right",
+    "without": "right",
+    "result": "left",
+}
+
+
+def measure(block: Block, folder: Path) -> Coverage | None:
+    """Run the tests of a block, and return what they cover; None if they fail."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    command = [sys.executable, "-m", "pytest", "-q", "-n", str(os.cpu_count()), "-m", "rtl", str(block.test)]
+    done = subprocess.run(
+        command, env={**os.environ, COVERAGE: str(folder)}, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        print(done.stdout, end="", file=sys.stderr)
+        return None
+    return Coverage(block.name, merged(sorted(folder.glob("*.dat")), block.modules), reasons_for(block.name))
+
+
+def main(begins: str) -> int:
+    """Measure the blocks whose names begin so; return the exit code."""
+    chosen = [block for block in BLOCKS if block.name.startswith(begins)]
+    found: list[Coverage] = []
+    for number, block in enumerate(chosen, 1):
+        print(f"{number} of {len(chosen)}: {block.name}", file=sys.stderr, flush=True)
+        coverage = measure(block, build_dir() / "coverage" / block.name.replace("/", "-"))
+        if coverage:
+            found.append(coverage)
+    show(Table(COLUMNS, [coverage.row for coverage in found]))
+    for coverage in found:
+        print(coverage.explanation, end="")
+    covered = sum(coverage.ok for coverage in found)
+    print(f"coverage: {len(chosen)} blocks, {covered} covered")
+    return 0 if chosen and covered == len(chosen) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main(" ".join(sys.argv[1:])))

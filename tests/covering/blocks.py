@@ -1,0 +1,49 @@
+"""The blocks whose coverage is counted, and the tests that cover each."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from hardwall.model.estimators.registry import ESTIMATORS
+
+TESTS = Path(__file__).parent.parent
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block of the hardware.
+
+    Attributes:
+        name: its path below `hdl`.
+        modules: its modules below the top of its test. Blocks inside it have tests of their own.
+    """
+
+    name: str
+    modules: tuple[str, ...] = ("component",)
+
+    @property
+    def test(self) -> Path:
+        """The file of its tests."""
+        folder, _, stem = self.name.rpartition("/")
+        return TESTS / folder / f"test_{stem}.py"
+
+
+RECORDED = ("component.component",)
+"""The module of a block that a recorder feeds."""
+BLOCKS = (
+    *(Block(f"arithmetic/{name}") for name in ("divide", "signed_divide", "sqrt")),
+    *(Block(f"estimators/{name}") for name in ("cycle_times", "history")),
+    *(Block("estimators/finite_difference" if n == "fdm" else f"estimators/{n.replace('-', '_')}") for n in ESTIMATORS),
+    Block("quadrature"),
+    Block("wall"),
+    Block("output"),
+    Block("monitors", RECORDED),
+    Block("supervisor", RECORDED),
+    Block("axis"),
+    Block("supervised"),
+    Block("link/uart", ("component.receiver", "component.transmitter")),
+    Block("link/line", ("component.line",)),
+    Block("link/register_file"),
+    Block("link/server", ("component.server",)),
+    Block("link/link", ("component.link",)),
+    Block("board", ("component.board",)),
+)

@@ -1,0 +1,93 @@
+"""What the tests of a block cover of it, held against the goals and the written reasons."""
+
+import re
+import tomllib
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from .points import KINDS, Point
+
+GOALS = {"line": 1.0, "branch": 0.98, "toggle": 0.98}
+REASONS = Path(__file__).with_name("reasons.toml")
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why a point of a block cannot be reached, or need not be.
+
+    Attributes:
+        block: the block.
+        point: the name of a point, or of several with `*`.
+        reason: one sentence or more.
+    """
+
+    block: str
+    point: str
+    reason: str
+
+    def is_of(self, point: Point) -> bool:
+        """Return whether it explains a point."""
+        pattern = ".*".join(map(re.escape, self.point.split("*")))
+        return re.fullmatch(pattern, f"{point.kind} {point.name}") is not None
+
+
+def reasons_for(block: str, file: Path = REASONS) -> list[Reason]:
+    """Return the reasons that are written for a block."""
+    listed = tomllib.loads(file.read_text(encoding="utf-8")).get("reason", [])
+    return [reason for each in listed if (reason := Reason(**each)).block == block]
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """The coverage of a block.
+
+    Attributes:
+        block: its name.
+        counts: how often every point was reached.
+        reasons: the reasons that are written for it.
+    """
+
+    block: str
+    counts: Counter[Point]
+    reasons: list[Reason]
+
+    @cached_property
+    def missed(self) -> list[Point]:
+        """Points that were not reached."""
+        return [point for point, count in self.counts.items() if not count]
+
+    @cached_property
+    def unexplained(self) -> list[Point]:
+        """Points that were not reached, for no written reason."""
+        return [point for point in self.missed if not any(reason.is_of(point) for reason in self.reasons)]
+
+    @property
+    def stale(self) -> list[Reason]:
+        """Reasons for what was reached or is not there."""
+        return [reason for reason in self.reasons if not any(reason.is_of(point) for point in self.missed)]
+
+    def share(self, kind: str, missed: list[Point]) -> float:
+        """Return the share of the points of a kind that are not among those missed."""
+        total = sum(point.kind == kind for point in self.counts)
+        return 1 - sum(point.kind == kind for point in missed) / total if total else 1.0
+
+    @property
+    def ok(self) -> bool:
+        """Whether every kind meets its goal, with the points that have a reason, and no reason is stale."""
+        return not self.stale and all(self.share(kind, self.unexplained) >= goal for kind, goal in GOALS.items())
+
+    @property
+    def row(self) -> list[str]:
+        """Its row of the table."""
+        shares = [f"{100 * self.share(kind, self.missed):.2f}" for kind in KINDS]
+        explained = len(self.missed) - len(self.unexplained)
+        return [self.block, *shares, str(explained), str(len(self.unexplained)), "covered" if self.ok else "FAILED"]
+
+    @property
+    def explanation(self) -> str:
+        """What is missed without a reason, and every stale reason; one line for each."""
+        missed = [f"{self.block}: missed: {point.kind} {point.name}" for point in self.unexplained]
+        stale = [f"{self.block}: reached, so that its reason must go: {reason.point}" for reason in self.stale]
+        return "".join(f"{line}\n" for line in missed + stale)
