@@ -51,7 +51,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate lint bench synth choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage lint bench synth choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -68,6 +68,9 @@ faults: $(VENV)/.test | tools ## faults injected into the board and its plant: w
 
 gate: $(VENV)/.test | tools ## netlists of three families of FPGAs beside the RTL, from power-up on: all outputs, every clock
 	@$(VENV)/bin/python tests/gate.py $(ONLY)
+
+coverage: $(VENV)/.test | tools ## lines, branches and toggles of every block that its tests reach (half an hour)
+	@$(VENV)/bin/python tests/cover.py $(ONLY)
 
 lint: $(VENV)/.test | tools ## style and common mistakes
 	@failed=0; $(RUN) ruff check . || failed=1; $(RUN) ruff format --check . || failed=1; exit $$failed
@@ -191,7 +194,7 @@ $(VENV)/.docs: pyproject.toml $(VENV)/.sim | tools
 # ---- system packages, checked before anything starts ----------------------------------------------------------------
 
 # These tasks embed Python in the simulator, by cocotb.
-EMBEDDED := $(filter test faults bench soak gate,$(MAKECMDGOALS))
+EMBEDDED := $(filter test faults gate coverage bench soak,$(MAKECMDGOALS))
 
 define CHECK_PYTHON
 import sys

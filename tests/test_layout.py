@@ -36,6 +36,7 @@ BROAD = {
     "estimators/test_levants": "what several of Levant's differentiators promise alike",
     "pictures/test_draw": "every picture",
     "rtl/test_simulators": "the written Verilog, in another simulator",
+    "test_cover": "the means of the coverage",
     "test_digests": "whatever the program computes",
     "test_docs": "the pages",
     "test_endurance": "every estimator",

@@ -20,8 +20,8 @@ from functools import cache
 from pathlib import Path
 
 KINDS = ("line", "branch", "toggle")
-DOLLAR = "__024"
-"""How Verilator writes `$` in a name."""
+DOLLAR, UNDERSCORE = "__024", "__05F"
+"""How Verilator writes `$`, and one of two `_` side by side, in a name."""
 _POINT = re.compile(r"^C '(?P<fields>.*)' (?P<count>\d+)$")
 
 
@@ -78,11 +78,12 @@ def read(file: Path, modules: Iterable[str]) -> Counter[Point]:
             continue
         if kind == "toggle":
             if DOLLAR not in fields["o"]:
-                counts[Point(kind, f"{own}.{fields['o']}")] += count
+                counts[Point(kind, f"{own}.{fields['o'].replace(UNDERSCORE, '_')}")] += count
         elif "$start" not in (source := _source(fields)):
             written[kind].append((f"{own} {fields['o']}", source, count))
+    texts = [[point[:2] for point in points] for points in written.values()]
+    digest = hashlib.sha256(repr(texts).encode()).hexdigest()
     for kind, points in written.items():
-        digest = hashlib.sha256(repr([point[:2] for point in points]).encode()).hexdigest()
         for number, (what, source, count) in enumerate(points):
             counts[Point(kind, f"{what}: {source}", (digest, number))] += count
     if not counts:

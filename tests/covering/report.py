@@ -10,6 +10,7 @@ from pathlib import Path
 from .points import KINDS, Point
 
 GOALS = {"line": 1.0, "branch": 0.98, "toggle": 0.98}
+_BIT = re.compile(r"(toggle [^\[:]+|.*?)(?:\[(\d+)\])?((?<=.):[01]->[01])?")
 REASONS = Path(__file__).with_name("reasons.toml")
 
 
@@ -37,6 +38,18 @@ def reasons_for(block: str, file: Path = REASONS) -> list[Reason]:
     """Return the reasons that are written for a block."""
     listed = tomllib.loads(file.read_text(encoding="utf-8")).get("reason", [])
     return [reason for each in listed if (reason := Reason(**each)).block == block]
+
+
+def grouped(points: list[Point]) -> list[str]:
+    """Return the names of points, with the bits of a signal that miss the same toggle as one."""
+    bits: dict[tuple[str, str], list[int]] = {}
+    for point in points:
+        signal, bit, way = _BIT.fullmatch(f"{point.kind} {point.name}").groups()
+        bits.setdefault((signal, way or ""), []).append(int(bit or -1))
+    return [
+        f"{signal}[{' '.join(map(str, sorted(numbers)))}]{way}" if numbers != [-1] * len(numbers) else f"{signal}{way}"
+        for (signal, way), numbers in bits.items()
+    ]
 
 
 @dataclass(frozen=True)
@@ -88,6 +101,6 @@ class Coverage:
     @property
     def explanation(self) -> str:
         """What is missed without a reason, and every stale reason; one line for each."""
-        missed = [f"{self.block}: missed: {point.kind} {point.name}" for point in self.unexplained]
+        missed = [f"{self.block}: missed: {name}" for name in grouped(self.unexplained)]
         stale = [f"{self.block}: reached, so that its reason must go: {reason.point}" for reason in self.stale]
         return "".join(f"{line}\n" for line in missed + stale)

@@ -1,0 +1,111 @@
+"""The means of `make coverage`: points are read, merged over sizes of a block, and held against goals and reasons."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from covering.blocks import BLOCKS, TESTS
+from covering.points import Point, merged
+from covering.report import Coverage, Reason, grouped, reasons_for
+
+from hardwall.hdl import axis
+
+VERILOG = """module part;
+  always @* begin
+    if (\\$start ) begin end
+    if (\\$7 ) begin
+      sum = 4'h3;
+    end
+  end
+endmodule
+"""
+POINTS = [
+    ("v_line/top.part", 5, "block"),
+    ("v_branch/top.part", 4, "if"),
+    ("v_branch/top.part", 4, "else"),
+    ("v_branch/top.part", 3, "if"),
+    ("v_branch/top", 4, "if"),
+    ("v_toggle/top.part", 1, "sum[1]:0->1"),
+    ("v_toggle/top.part", 1, "sum[0]:0->1"),
+    ("v_toggle/top.part", 1, "__0247[0]:0->1"),
+]
+OF_THE_BENCH = {TESTS / "test_typing.py", TESTS / "testing/test_campaign.py"}
+"""Tests that simulate hardware of their own."""
+REACHED = Point("toggle", "part.sum[0]:0->1")
+MISSED = Point("toggle", "part.sum[1]:0->1")
+
+
+def simulation(folder: Path, name: str, verilog: str, *counts: int) -> Path:
+    """Write what a simulation leaves, with the counts of `POINTS`."""
+    (folder / f"{name}.v").write_text(verilog, encoding="ascii")
+    lines = ["# SystemC::Coverage-3"]
+    for (page, line, what), count in zip(POINTS, counts, strict=True):
+        fields = {"f": folder / f"{name}.v", "l": line, "page": page, "o": what}
+        lines.append("C '" + "".join(f"\1{key}\2{value}" for key, value in fields.items()) + f"' {count}")
+    file = folder / f"{name}.dat"
+    file.write_text("\n".join(lines), encoding="ascii")
+    return file
+
+
+def test_points_of_two_sizes_are_one_where_the_text_differs_in_numbers(tmp_path):
+    files = [
+        simulation(tmp_path, "small", VERILOG, 1, 1, 0, 0, 0, 0, 1, 0),
+        simulation(tmp_path, "large", VERILOG.replace("$7", "$11").replace("4'h3", "9'h3"), 1, 0, 2, 0, 0, 0, 1, 0),
+    ]
+    counts = {f"{point.kind} {point.name}": count for point, count in merged(files, ("part",)).items()}
+    assert counts == {
+        "line part block: sum = 0'h0;": 2,
+        r"branch part if: if (\$0 ) begin": 1,
+        r"branch part else: if (\$0 ) begin": 2,
+        "toggle part.sum[1]:0->1": 0,
+        "toggle part.sum[0]:0->1": 2,
+    }
+
+
+def test_a_branch_of_another_text_is_another_branch(tmp_path):
+    files = [
+        simulation(tmp_path, "one", VERILOG, 1, 1, 0, 0, 0, 0, 1, 0),
+        simulation(tmp_path, "other", VERILOG.replace("sum =", "sum <="), 1, 0, 2, 0, 0, 0, 1, 0),
+    ]
+    assert sorted(count for point, count in merged(files, ("part",)).items() if point.kind == "branch") == [0, 0, 1, 2]
+
+
+def test_a_file_without_the_module_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"has no point of other$"):
+        merged([simulation(tmp_path, "one", VERILOG, *[1] * len(POINTS))], ("other",))
+
+
+def test_a_point_that_is_missed_needs_a_reason():
+    counts = merged([], ()) | {REACHED: 1, MISSED: 0}
+    without = Coverage("part", counts, [])
+    assert not without.ok
+    assert without.row == ["part", "100.00", "100.00", "50.00", "0", "1", "FAILED"]
+    assert without.explanation == "part: missed: toggle part.sum[1]:0->1\n"
+    explained = Coverage("part", counts, [Reason("part", "toggle part.sum[1]*", "It is constant.")])
+    assert explained.ok
+    assert explained.row == ["part", "100.00", "100.00", "50.00", "1", "0", "covered"]
+
+
+def test_a_reason_for_what_is_reached_is_a_failure():
+    counts = merged([], ()) | {REACHED: 1}
+    stale = Coverage("part", counts, [Reason("part", "toggle part.sum[0]*", "It is constant.")])
+    assert not stale.ok
+    assert stale.explanation == "part: reached, so that its reason must go: toggle part.sum[0]*\n"
+
+
+def test_bits_that_miss_the_same_are_listed_together():
+    points = [Point("toggle", f"part.{bit}") for bit in ("a[3]:0->1", "a[1]:0->1", "a[3]:1->0", "b:0->1")]
+    line = Point("line", "part block: sum[3] = 0'h0;", ("x", 3))
+    expected = ["toggle part.a[1 3]:0->1", "toggle part.a[3]:1->0", "toggle part.b:0->1", f"line {line.name}"]
+    assert grouped([*points, line]) == expected
+
+
+def test_every_block_has_its_test_and_every_reason_its_block():
+    tests = {file for file in TESTS.rglob("test_*.py") if re.search(r"^    simulate\(__file__", file.read_text(), re.M)}
+    assert {block.test for block in BLOCKS} == tests - OF_THE_BENCH
+    hdl = Path(axis.__file__).parent
+    assert [block.name for block in BLOCKS if not (hdl / f"{block.name}.py").exists()] == []
+    written = sum(len(reasons_for(block.name)) for block in BLOCKS)
+    text = (Path(sys.modules[Reason.__module__].__file__).parent / "reasons.toml").read_text(encoding="utf-8")
+    assert written == text.count("[[reason]]")
