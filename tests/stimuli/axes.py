@@ -20,14 +20,17 @@ def busy(estimator: str) -> AxisSpec:
 
 
 def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
-    """Return words for a wall that is often hit, with gains from zero to the largest."""
+    """Return words for a wall that is often hit, and words of every size for the estimator and the limits."""
     words = {word.name: word.reset for word in design.words}
+    if random.random() < 0.5:
+        for word in design.estimator.words:
+            words[word.name] = int(random.integers(0, int(word.format.max * 2.0 ** -random.integers(0, 8)) + 1))
     for name in ("wall_stiffness", "wall_damping", "output_force_limit", "output_slew_limit"):
         top = next(word.format.max for word in design.words if word.name == name)
-        words[name] = int(top * 2.0 ** -random.integers(0, 16))
+        words[name] = int(random.integers(0, int(top * 2.0 ** -random.integers(0, 16)) + 1))
     words["wall_position"] = int(random.integers(-30, 30))
     words["wall_left"], words["wall_forbid_pull"] = random.integers(0, 2, 2).tolist()
-    words["encoder_glitch_clocks"] = int(random.choice([0, 1, 2, 5]))
+    words["encoder_glitch_clocks"] = int(random.choice([0, 1, 2, 5, 15]))
     words["encoder_invert"] = int(random.random() < 0.2)
     outputs, selector = design.estimator.outputs, design.estimator.output_word()
     if len(outputs) > 1:
