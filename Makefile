@@ -69,7 +69,7 @@ faults: $(VENV)/.test | tools ## faults injected into the board and its plant: w
 gate: $(VENV)/.test | tools ## netlists of three families of FPGAs beside the RTL, from power-up on: all outputs, every clock
 	@$(VENV)/bin/python tests/gate.py $(ONLY)
 
-coverage: $(VENV)/.test | tools ## lines, branches and toggles of every block that its tests reach (half an hour)
+coverage: $(VENV)/.test | tools ## lines, branches and toggles of every block that its tests reach (an hour)
 	@$(VENV)/bin/python tests/cover.py $(ONLY)
 
 lint: $(VENV)/.test | tools ## style and common mistakes
