@@ -154,6 +154,14 @@ class Design:
 
 
 @compiled
+def _side(inputs):
+    """Return the side of the drive at its limit: 1, -1, or 0 if it is not there."""
+    if inputs.force_limit and abs(inputs.driven) >= inputs.force_limit:
+        return 1 if inputs.driven > 0 else -1
+    return 0
+
+
+@compiled
 def step(params, state, inputs):
     """Return the state after one clock edge.
 
@@ -163,9 +171,7 @@ def step(params, state, inputs):
         inputs: `Inputs` just before the edge.
     """
     count, last_quarter = inputs.count, 3 << (params.count_width - 3)
-    side = 0
-    if inputs.force_limit and abs(inputs.driven) >= inputs.force_limit:
-        side = 1 if inputs.driven > 0 else -1
+    side = _side(inputs)
     held = side and side == state.side
     anchor = state.anchor if held else count
     against = -side * wrap(count - state.anchor, params.count_width) if held else 0

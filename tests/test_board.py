@@ -27,7 +27,7 @@ def random_words(host: Host) -> dict[str, int]:
         size = 2.0 ** -random.integers(0, register.format.width)
         words[register.name] = int((register.format.max + 1) * random.random() * size)
     left, near = int(random.integers(0, 2)), 2.0 ** -random.integers(1, axis.count_width)
-    depth = int(random.integers(-half, half) * near)
+    depth = int(random.integers(0, half) * near)
     place = min(max(count + (depth if left else -depth), -half), half - 1)
     words |= {"encoder_glitch_clocks": int(random.choice((0, 1, 2))), "preload_count": count}
     return words | {"wall_left": left, "wall_position": place}

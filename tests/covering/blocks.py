@@ -45,5 +45,7 @@ BLOCKS = (
     Block("link/register_file"),
     Block("link/server", ("component.server",)),
     Block("link/link", ("component.link",)),
+    Block("link/axi", ("component.link.subordinate",)),
+    Block("link/axi_link"),
     Block("board", ("component.board",)),
 )

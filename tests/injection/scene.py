@@ -3,6 +3,7 @@
 import dataclasses
 
 from hardwall.hdl.board import Board
+from hardwall.hdl.link.link import Link
 from hardwall.model.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervised import Design
@@ -43,4 +44,4 @@ def words(**values: float) -> dict[str, int]:
 
 def board() -> Board:
     """Return the board under test."""
-    return Board(SPEC, BAUD)
+    return Board(SPEC, Link(RegisterMap(SPEC), BAUD))
