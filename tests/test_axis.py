@@ -124,7 +124,7 @@ async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Gen
 async def follows_model(dut):
     spec = busy(**parameters())
     # Every estimator has its own campaign; this one tests the wiring.
-    samples, random = SAMPLES // (5 if spec.estimator in ("levant", "fdm") else 40), rng()
+    samples, random = SAMPLES // (5 if spec.estimator in ("levant", "fdm") else 20), rng()
     bench = Bench(dut, Axis(spec))
     await bench.reset()
     bench.drive(**dict.fromkeys(PINS, 0), commit=0)

@@ -17,8 +17,10 @@ from amaranth.lib.wiring import In
 from hardwall.hdl.axis import Axis
 from hardwall.hdl.board import Board
 from hardwall.hdl.export import to_verilog
+from hardwall.hdl.link.link import Link
 from hardwall.hdl.supervised import LOOPS
 from hardwall.model.link.line import framed
+from hardwall.model.registers import RegisterMap
 from hardwall.model.supervisor import REQUIRED
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from hardwall.testing import rng
@@ -166,7 +168,7 @@ CASES = {
 def test_other_simulators_compute_the_same(top, tmp_path):
     kind, stimulus, values = CASES[top]
     axis = dataclasses.replace(spec("mhz"), **RATES)
-    component = kind(axis) if kind is Axis else kind(axis, BAUD)
+    component = kind(axis) if kind is Axis else kind(axis, Link(RegisterMap(axis), BAUD))
     widths = write_bench(component, top, stimulus(component), tmp_path)
     expected = verilated(tmp_path, top)
     for name, least in values.items():
