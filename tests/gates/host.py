@@ -33,7 +33,7 @@ class Host:
 
     def __init__(self, dut: Any, board: Board, period_ns: int, random: np.random.Generator):
         self._registers, self._random = board.registers, random
-        bit_ns = round(board.spec.clock_hz / board.baud) * period_ns
+        bit_ns = round(board.spec.clock_hz / board.link.baud) * period_ns
         self._byte_ns, self._patience_ns = BYTE_BITS * bit_ns, PATIENCE * period_ns
         self._source, self._sink = UartSource(dut.uart_rx, 1e9 / bit_ns), UartSink(dut.uart_tx, 1e9 / bit_ns)
         for end in (self._source, self._sink):
