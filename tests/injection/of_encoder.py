@@ -3,13 +3,14 @@
 import math
 from collections.abc import Callable
 
+from hardwall.hdl.monitors import Monitors
 from hardwall.model.quadrature_speed import clocks_to_fault
 from oracles.supervised import BITS
 
 from .fault import UNCHANGED, Expected, Fault, trips
 from .handle import Wires, sound, wires
 from .rig import Rig
-from .scene import CLOCKS_PER_MS, COUNTED, GLITCH, PUSH_N, REST, STEP_CLOCKS, TURN, WORDS
+from .scene import CLOCKS_PER_MS, COUNTED, DESIGN, GLITCH, PUSH_N, REST, STEP_CLOCKS, TURN, WORDS
 
 HARDER_N = 20.0
 BURST = 80
@@ -18,7 +19,8 @@ ILLEGAL = COUNTED + 1
 FAST = math.ceil(clocks_to_fault(BURST / STEP_CLOCKS, GLITCH)) + 1
 LOST = 2 + WORDS["supervisor_loss"].reset + 1 + 1
 """Clock edges from wires that are equal to the drive at zero: synchroniser, `supervisor_loss`, monitor, supervisor."""
-INDEXED = COUNTED + 2
+INDEXED = COUNTED + Monitors(DESIGN.monitors).index_clocks + 1
+"""Clock edges from an index edge to the drive at zero: count, monitor, supervisor."""
 PAIRS = {"causes": BITS["encoder_loss"]}
 INDEX = {"causes": BITS["index_spacing"], "live": {"supervisor_turn": TURN}}
 
