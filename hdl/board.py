@@ -11,6 +11,7 @@ from hardwall.model.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervisor import ARMED
 
+from .lead_out import lead_out
 from .link.axi_link import AxiLink
 from .link.link import Link
 from .supervised import COMPLEMENTS, LOOPS, SupervisedAxis
@@ -133,10 +134,8 @@ class Board(wiring.Component):
         m.submodules.rst_synchroniser = FFSynchronizer(self.rst, reset, init=1)
         m.d.comb += domain.rst.eq(reset)
 
-        m.d.comb += [getattr(axis, name).eq(getattr(self, name)) for name in (*ENCODER, *LOOPS)]
-        for name, member in link.PINS.items():
-            inner, outer = getattr(link, name), getattr(self, name)
-            m.d.comb += inner.eq(outer) if member.flow == In else outer.eq(inner)
+        m.d.comb += lead_out(axis, self, (*ENCODER, *LOOPS, "alive"))
+        m.d.comb += lead_out(link, self, link.PINS)
 
         registers = self.registers
         for asked in (*registers.words, *registers.live, *registers.pulses):
@@ -165,8 +164,5 @@ class Board(wiring.Component):
             total.eq(total[:-1] + magnitude),
             self.drive_sign.eq(negative),
         ]
-        m.d.comb += [
-            self.drive_pdm.eq(total[-1] & self.drive_enable & self.emergency_stop),
-            self.alive.eq(axis.alive),
-        ]
+        m.d.comb += self.drive_pdm.eq(total[-1] & self.drive_enable & self.emergency_stop)
         return m

@@ -24,6 +24,7 @@ NOT_TWINNED = {
     "board": "the supervised axis behind a link; its twin, clock by clock, is in tests/oracles/board.py",
     "estimators/levant_edge_signals": "the registers of levant_edge by name; that block's twin has their values",
     "export": "text of the hardware",
+    "lead_out": "wires",
     "link/axi_link": "the subordinate of a bus and the register file, joined; each of them has its twin",
     "link/link": "the blocks of the link, joined; each of them has its twin",
     "ports": "text about the hardware",

@@ -93,10 +93,9 @@ class Subordinate(wiring.Component):
         with m.FSM():
             with m.State("IDLE"):
                 m.d.comb += file.clear.eq(1)
-                m.d.sync += writing.eq(self.axi_awvalid & self.axi_wvalid)
-                with m.If(~awake):
-                    pass
-                with m.Elif(self.axi_awvalid & self.axi_wvalid):
+                asked = self.axi_awvalid & self.axi_wvalid
+                m.d.sync += writing.eq(asked)
+                with m.If(awake & asked):
                     m.d.comb += [self.axi_awready.eq(1), self.axi_wready.eq(1)]
                     m.d.sync += [place.eq(self.axi_awaddr[2:]), data.eq(self.axi_wdata)]
                     m.d.sync += self.axi_bresp.eq(Response.SLVERR)
@@ -107,7 +106,7 @@ class Subordinate(wiring.Component):
                                 m.d.sync += [halves.eq(those), self.axi_bresp.eq(Response.OKAY)]
                                 if those:
                                     begin(Operation.CHECK_WRITE, int(not those & 2))
-                with m.Elif(self.axi_arvalid):
+                with m.Elif(awake & self.axi_arvalid):
                     m.d.comb += self.axi_arready.eq(1)
                     m.d.sync += [place.eq(self.axi_araddr[2:]), halves.eq(3), following.eq(self.axi_araddr[2:] + 1)]
                     begin(Operation.CHECK_READ)

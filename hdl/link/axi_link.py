@@ -7,6 +7,7 @@ from amaranth.lib.wiring import connect
 from hardwall.model.link import register_file
 from hardwall.model.registers import RegisterMap
 
+from ..lead_out import lead_out
 from .axi import Subordinate
 from .register_file import RegisterFile
 
@@ -50,8 +51,5 @@ class AxiLink(wiring.Component):
         m.submodules.subordinate = subordinate = Subordinate()
         m.submodules.file = file = self._file
         connect(m, subordinate.file, file.host)
-        for name, member in self.PINS.items():
-            inner, outer = getattr(subordinate, name), getattr(self, name)
-            m.d.comb += inner.eq(outer) if member.flow == wiring.In else outer.eq(inner)
-        file.lead_out(m, self)
+        m.d.comb += [lead_out(subordinate, self, self.PINS), lead_out(file, self, file.ports)]
         return m

@@ -10,6 +10,7 @@ from hardwall.model.link import register_file, uart
 from hardwall.model.link.line import GAP_S
 from hardwall.model.registers import RegisterMap
 
+from ..lead_out import lead_out
 from .line import Line
 from .register_file import RegisterFile
 from .server import Server
@@ -93,5 +94,5 @@ class Link(wiring.Component):
             line.spoilt.eq(receiver.spoilt),
             self.uart_tx.eq(transmitter.pin),
         ]
-        file.lead_out(m, self)
+        m.d.comb += lead_out(file, self, file.ports)
         return m

@@ -140,12 +140,6 @@ class RegisterFile(wiring.Component):
         """The members to the axis: all but `host`."""
         return {name: member for name, member in self.signature.members.items() if name != "host"}
 
-    def lead_out(self, m: Module, outer: wiring.Component) -> None:
-        """Connect the ports to those of the same names of a component around the register file."""
-        for name, member in self.ports.items():
-            inner, other = getattr(self, name), getattr(outer, name)
-            m.d.comb += inner.eq(other) if member.flow == In else other.eq(inner)
-
     @property
     def boot_clocks(self) -> int:
         """Clocks after a reset until an operation begins."""

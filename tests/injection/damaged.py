@@ -4,6 +4,8 @@ from amaranth.hdl import ClockDomain, Module, Shape, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from hardwall.hdl.lead_out import lead_out
+
 from .scene import board
 
 LIVE = ("supervisor_force_limit", "supervisor_ramp", "supervisor_watchdog")
@@ -65,9 +67,7 @@ class Damaged(wiring.Component):
         m = Module()
         m.d.comb += [getattr(self, name).eq(getattr(self.board.axis, name)) for name in SHOWN]
         m.submodules.board = self.board
-        for name, member in self.board.signature.members.items():
-            inner, outer = getattr(self.board, name), getattr(self, name)
-            m.d.comb += inner.eq(outer) if member.flow == In else outer.eq(inner)
+        m.d.comb += lead_out(self.board, self, self.board.signature.members)
         # The pin is read by a clock of its own, which no reset holds.
         m.domains.watch = watch = ClockDomain("watch", reset_less=True)
         m.d.comb += watch.clk.eq(self.clk)
