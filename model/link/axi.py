@@ -35,18 +35,12 @@ class Subordinate:
         design: the registers.
 
     Attributes:
-        file: the register file.
-        status: the word of every status now.
-        refusing: names of the pulses that the device refuses now.
-        capture: the registers of the capture memory.
+        file: the register file, whose inputs are the axis's.
         pulses: names of the pulses of the last write.
     """
 
     def __init__(self, design: Design):
         self.file = RegisterFile(design)
-        self.status = {status.name: 0 for status in design.registers.status}
-        self.refusing: frozenset[str] = frozenset()
-        self.capture = [0] * design.registers.capture_registers
         self.pulses: tuple[str, ...] = ()
         self._next = 0
 
@@ -60,7 +54,7 @@ class Subordinate:
         place = address >> 2 << 1
         values = {place + half: data >> CELL_BITS * (1 - half) & CELL for half in halves}
         for at, value in values.items():
-            file.check_write(at, at == place + halves[0], at == place + halves[-1], value, self.refusing)
+            file.check_write(at, at == place + halves[0], at == place + halves[-1], value)
         if file.absent:
             return Response.DECERR
         if file.outside or file.refused:
@@ -76,10 +70,10 @@ class Subordinate:
         file, place = self.file, address >> 2 << 1
         file.clear()
         if TELEMETRY <= place < COUNTERS and place != self._next:
-            file.snapshot(self.status)
+            file.snapshot()
         self._next = place + 2
         file.check_read(place, True, False)
         file.check_read(place + 1, False, True)
         if file.absent:
             return Response.DECERR, 0
-        return Response.OKAY, file.read(place, self.capture) << CELL_BITS | file.read(place + 1, self.capture)
+        return Response.OKAY, file.read(place) << CELL_BITS | file.read(place + 1)

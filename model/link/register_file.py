@@ -111,6 +111,9 @@ class RegisterFile:
         live: the cells that the host reads.
         active: the word at every port to the axis, by name, live words included.
         pulses: names of the pulses that went out at the last FINISH, and `marked`, those that go out at the next.
+        status: the word of every status now.
+        refusing: names of the pulses that the device refuses now.
+        capture: the registers of the capture memory.
         absent, outside, refused: what the checks have found since `clear`.
     """
 
@@ -120,6 +123,9 @@ class RegisterFile:
         self.active = {word.name: word.reset for word in (*design.registers.words, *design.registers.live)}
         self.pulses: tuple[str, ...] = ()
         self.marked: list[str] = []
+        self.status = {status.name: 0 for status in design.registers.status}
+        self.refusing: frozenset[str] = frozenset()
+        self.capture = [0] * design.registers.capture_registers
         self._tied = [True, True]
         self.clear()
 
@@ -135,15 +141,15 @@ class RegisterFile:
         """Find out whether a register can be read, as the first or the last of a frame or neither."""
         self.absent |= not self.design.readable(address) or self._half(address, first, last)
 
-    def check_write(self, address: int, first: bool, last: bool, value: int, refusing: frozenset[str]) -> None:
-        """Find out whether a register can be written with `value`, while the device refuses some pulses.
+    def check_write(self, address: int, first: bool, last: bool, value: int) -> None:
+        """Find out whether a register can be written with `value`.
 
         The halves of a value must come in order: a word is compared with its bounds from the top, each half as long as
         the halves above it are equal to the bound's.
         """
         self.absent |= not self.design.writable(address) or self._half(address, first, last)
         if self.design.first_pulse <= address < WRITTEN and value & 1:
-            self.refused |= self.design.registers.pulses[WRITTEN - 1 - address].name in refusing
+            self.refused |= self.design.registers.pulses[WRITTEN - 1 - address].name in self.refusing
         top = not self.design.wide(address) or address % 2 == 0
         flip = EXTENDED if top else 0
         for k, area in enumerate((Area.LEAST, Area.MOST)):
@@ -152,11 +158,11 @@ class RegisterFile:
             self.outside |= tied and (word < bound if area is Area.LEAST else word > bound)
             self._tied[k] = tied and word == bound
 
-    def read(self, address: int, capture: list[int]) -> int:
+    def read(self, address: int) -> int:
         """Return the register at an address that can be read."""
         if address < END:
             return self.live[address]
-        return self.design.map_cells[address - MAP] if address < CAPTURE else capture[address - CAPTURE]
+        return self.design.map_cells[address - MAP] if address < CAPTURE else self.capture[address - CAPTURE]
 
     def write(self, address: int, value: int) -> None:
         """Write a register that can be written, or a counter."""
@@ -184,8 +190,8 @@ class RegisterFile:
                 self.active[word.name] = word.from_registers(tuple(halves))
         self.pulses, self.marked = tuple(self.marked), []
 
-    def snapshot(self, status: dict[str, int]) -> None:
+    def snapshot(self) -> None:
         """Take the words of every status."""
         for register in self.design.registers.status:
-            halves = register.to_registers(status[register.name])
+            halves = register.to_registers(self.status[register.name])
             self.live[register.address : register.address + 2] = halves

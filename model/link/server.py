@@ -53,17 +53,11 @@ class Server:
         design: the registers.
 
     Attributes:
-        file: the register file.
-        status: the word of every status now.
-        refusing: names of the pulses that the device refuses now.
-        capture: the registers of the capture memory.
+        file: the register file, whose inputs are the axis's.
     """
 
     def __init__(self, design: Design):
         self.file = RegisterFile(design)
-        self.status = {status.name: 0 for status in design.registers.status}
-        self.refusing: frozenset[str] = frozenset()
-        self.capture = [0] * design.registers.capture_registers
 
     def take(self, verdict: Verdict, frame: bytes) -> bytes | None:
         """Take a frame with its verdict; return the answer without its CRC, or None."""
@@ -99,7 +93,7 @@ class Server:
             for k in range(count):
                 file.check_read(address + k, k == 0, k == count - 1)
         for k, value in enumerate(values):
-            file.check_write(written + k, k == 0, k == len(values) - 1, value, self.refusing)
+            file.check_write(written + k, k == 0, k == len(values) - 1, value)
         for found, code in ((file.absent, ABSENT), (file.outside, VALUE), (file.refused, FAILURE)):
             if found:
                 raise _Refusal(code)
@@ -109,8 +103,8 @@ class Server:
             file.finish()
         if function not in READS:
             return request[:6]
-        file.snapshot(self.status)
-        registers = [file.read(address + k, self.capture) for k in range(count)]
+        file.snapshot()
+        registers = [file.read(address + k) for k in range(count)]
         return request[:2] + bytes([2 * count]) + b"".join(each.to_bytes(2, "big") for each in registers)
 
     def _fields(self, request: bytes) -> tuple[int, int, int, list[int]]:
@@ -142,7 +136,7 @@ class Server:
             for counter in range(8):
                 self.file.write(COUNTERS + counter, 0)
             return request
-        return request[:4] + self.file.read(COUNTERS + sub % 8, []).to_bytes(2, "big")
+        return request[:4] + self.file.read(COUNTERS + sub % 8).to_bytes(2, "big")
 
     def _identify(self, request: bytes) -> bytes:
         kind, code, number = request[2:5]

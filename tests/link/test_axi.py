@@ -10,6 +10,7 @@ from amaranth.lib.wiring import Out
 from cocotb.triggers import ClockCycles, RisingEdge
 from cocotbext.axi import AxiLiteBus, AxiLiteMaster
 
+from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.model.link import axi, register_file
 from hardwall.model.link.axi import Response
@@ -40,10 +41,7 @@ class Device(wiring.Component):
             self.pulses.eq(Cat(getattr(link, pulse.name) for pulse in link.registers.pulses)),
             self.pulsed.eq(self.pulses.any()),
         ]
-        for name in self.signature.members:
-            if name in link.signature.members:
-                inner, outer = getattr(link, name), getattr(self, name)
-                m.d.comb += inner.eq(outer) if link.signature.members[name].flow == wiring.In else outer.eq(inner)
+        m.d.comb += lead_out(link, self, [name for name in self.signature.members if hasattr(link, name)])
         return m
 
 
@@ -59,7 +57,7 @@ class World:
         self.dut, self.bench, self.random = dut, Bench(dut, component), rng()
         self.registers = component.link.registers
         self.twin = axi.Subordinate(register_file.Design(self.registers))
-        self.twin.capture = [captured(k) for k in range(CAPTURE_REGISTERS)]
+        self.twin.file.capture = [captured(k) for k in range(CAPTURE_REGISTERS)]
         self.pulsed = self.bench.monitor("pulsed", "pulses", *self.twin.file.active)
         self.seen = set()
 
@@ -84,9 +82,9 @@ class World:
         """Give every status, and the refused pulses, a random value."""
         status = {r.name: int(self.random.integers(r.format.min, r.format.max + 1)) for r in self.registers.status}
         refused = [int(self.random.random() < 0.2) for _ in self.registers.pulses]
-        self.twin.status = status
+        self.twin.file.status = status
         pairs = zip(self.registers.pulses, refused, strict=True)
-        self.twin.refusing = frozenset(pulse.name for pulse, bit in pairs if bit)
+        self.twin.file.refusing = frozenset(pulse.name for pulse, bit in pairs if bit)
         self.bench.drive(**status, refuse=sum(bit << k for k, bit in enumerate(refused)))
 
     async def write(self, address: int, data: bytes) -> Response:
@@ -155,10 +153,10 @@ async def words_read_in_order_are_of_one_clock(dut):
     await world.reset()
     stamp = world.registers["stamp"]
     world.bench.drive(stamp=5, stamp_a_rise=6)
-    world.twin.status |= {"stamp": 5, "stamp_a_rise": 6}
+    world.twin.file.status |= {"stamp": 5, "stamp_a_rise": 6}
     assert await world.read(stamp.address) == 5
     world.bench.drive(stamp=7, stamp_a_rise=8)
-    world.twin.status |= {"stamp": 7, "stamp_a_rise": 8}
+    world.twin.file.status |= {"stamp": 7, "stamp_a_rise": 8}
     assert await world.read(stamp.address + 2) == 6
     assert await world.read(stamp.address) == 7
 

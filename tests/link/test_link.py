@@ -8,7 +8,6 @@ import cocotb
 import pytest
 from amaranth.hdl import Module, Signal
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In
 from cocotb.task import bridge, resume
 from cocotb.triggers import ClockCycles, Timer
 from cocotbext.uart import UartSink, UartSource
@@ -16,6 +15,7 @@ from pymodbus import FramerType, ModbusException
 from pymodbus.client.base import ModbusBaseSyncClient
 from pymodbus.transport import CommParams, CommType
 
+from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.link.link import Link
 from hardwall.model.registers import CAPTURE, MAP
 from hardwall.testing import Bench, parameters, simulate
@@ -42,9 +42,7 @@ class Device(wiring.Component):
         place = Signal.like(link.capture_address)
         m.d.sync += place.eq(link.capture_address)
         m.d.comb += link.capture_data.eq(captured(place))
-        for name, member in self.signature.members.items():
-            inner, outer = getattr(link, name), getattr(self, name)
-            m.d.comb += inner.eq(outer) if member.flow == In else outer.eq(inner)
+        m.d.comb += lead_out(link, self, self.signature.members)
         return m
 
 

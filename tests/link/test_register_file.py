@@ -81,7 +81,7 @@ async def every_bound_of_every_word(dut):
                 half = value >> 16 * (register.size - 1 - k) & 0xFFFF
                 first, last = k == 0, k == register.size - 1
                 await host.do(Operation.CHECK_WRITE, register.address + k, half, first, last)
-                host.twin.check_write(register.address + k, first, last, half, frozenset())
+                host.twin.check_write(register.address + k, first, last, half)
             await RisingEdge(dut.clk)
             signed = value - (1 << span) if value >> span - 1 else value
             assert host.found() == host.expected() == (0, int(not register.low <= signed <= register.high), 0)
@@ -94,7 +94,7 @@ async def random_operations(dut):
     words, pulses = (*host.registers.words, *host.registers.live), host.registers.pulses
     statuses = host.registers.status
     await host.do(Operation.SNAPSHOT)
-    host.twin.snapshot({each.name: 0 for each in statuses})
+    host.twin.snapshot()
     pulsed, before = [host.bench.monitor(pulse.name) for pulse in pulses], [0] * len(pulses)
     for _ in range(400):
         case, first, last = random.random(), int(random.integers(0, 2)), int(random.integers(0, 2))
@@ -106,9 +106,9 @@ async def random_operations(dut):
         elif case < 0.4:
             refused = [int(random.random() < 0.2) for _ in pulses]
             host.bench.drive(refuse=sum(bit << k for k, bit in enumerate(refused)))
-            names = frozenset(pulse.name for pulse, bit in zip(pulses, refused, strict=True) if bit)
+            host.twin.refusing = frozenset(pulse.name for pulse, bit in zip(pulses, refused, strict=True) if bit)
             await host.do(Operation.CHECK_WRITE, address, value, first, last)
-            host.twin.check_write(address, first, last, value, names)
+            host.twin.check_write(address, first, last, value)
         elif case < 0.7:
             register = random.choice((*pulses, *words))
             word = int(random.integers(register.low, register.high + 1))
@@ -135,13 +135,14 @@ async def random_operations(dut):
             now = {each.name: int(random.integers(each.format.min, each.format.max + 1)) for each in statuses}
             host.bench.drive(**now)
             assert await host.do(Operation.SNAPSHOT) == host.component.snapshot_clocks
-            host.twin.snapshot(now)
+            host.twin.status = now
+            host.twin.snapshot()
         await RisingEdge(dut.clk)
         assert host.found() == host.expected()
         if host.expected() != (0, 0, 0):
             await host.clear()
     for address in (*range(256), 0x4000, 0x4000 + len(host.design.map_cells) - 1):
-        assert await host.read(address) == host.twin.read(address, [])
+        assert await host.read(address) == host.twin.read(address)
 
 
 @cocotb.test()
@@ -179,7 +180,8 @@ def test_a_status_is_extended_by_its_sign():
     design = model.Design(supervised("mhz"))
     file = model.RegisterFile(design)
     status = {each.name: each.format.min if each.format.signed else each.format.max for each in design.registers.status}
-    file.snapshot(status)
+    file.status = status
+    file.snapshot()
     for each in design.registers.status:
         assert each.from_registers(tuple(file.live[each.address : each.address + 2])) == status[each.name]
 

@@ -7,6 +7,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out, connect
 from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
 
+from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.link import line as hdl_line
 from hardwall.hdl.link.register_file import RegisterFile
 from hardwall.hdl.link.server import Server
@@ -94,10 +95,7 @@ class Stack(wiring.Component):
             self.pulsed.eq(pulses.any()),
             file.capture_data.eq(captured(place)),
         ]
-        for name, member in self.signature.members.items():
-            if name in file.signature.members:
-                inner, outer = getattr(file, name), getattr(self, name)
-                m.d.comb += inner.eq(outer) if member.flow == In else outer.eq(inner)
+        m.d.comb += lead_out(file, self, [name for name in self.signature.members if hasattr(file, name)])
         return m
 
 
@@ -114,7 +112,6 @@ class World:
         self.registers = component.design.registers
         self.design = component.design
         self.line, self.server = Line(), server.Server(self.design)
-        self.server.capture = [captured(k) for k in range(self.registers.capture_registers)]
         self.sent = self.bench.monitor("sending", "sent")
         self.pulsed = self.bench.monitor("pulsed", "pulses", *self.server.file.active)
         self.idle = self.bench.reader("idle")
@@ -135,16 +132,17 @@ class World:
     async def reset(self) -> None:
         await self.bench.reset()
         self.line, self.server.file = Line(), register_file.RegisterFile(self.design)
+        self.server.file.capture = [captured(k) for k in range(self.registers.capture_registers)]
 
     def live(self) -> None:
         """Give every status, and the refused pulses, a random value."""
-        self.server.status = {
+        self.server.file.status = {
             each.name: int(self.random.integers(each.format.min, each.format.max + 1)) for each in self.registers.status
         }
         refused = [int(self.random.random() < 0.1) for _ in self.registers.pulses]
         pairs = zip(self.registers.pulses, refused, strict=True)
-        self.server.refusing = frozenset(pulse.name for pulse, bit in pairs if bit)
-        self.bench.drive(**self.server.status, refuse=sum(bit << k for k, bit in enumerate(refused)))
+        self.server.file.refusing = frozenset(pulse.name for pulse, bit in pairs if bit)
+        self.bench.drive(**self.server.file.status, refuse=sum(bit << k for k, bit in enumerate(refused)))
 
     async def send(self, data: bytes, pace: int = 1, spoilt: int = -1) -> bytes | None:
         """Send bytes, wait for what they cause, and compare it with the twin's; return the last answer."""
@@ -275,7 +273,7 @@ async def every_exception(dut):
         answer = await world.send(framed(b"\1" + pdu)) or await world.gap()
         assert answer == bytes([1, pdu[0] | 0x80, code])
     world.bench.drive(refuse=-1)
-    world.server.refusing = frozenset(pulse.name for pulse in world.registers.pulses)
+    world.server.file.refusing = frozenset(pulse.name for pulse in world.registers.pulses)
     assert await world.request(frames.write(world.registers["commit"].address, [1, 0, 7])) == b"\x90\4"
     assert (await world.request(frames.read(WRITTEN, 2)))[2:] == frames.words(0, 0)
 
@@ -389,7 +387,7 @@ def test_every_exception(pdu, code):
 
 def test_the_device_may_refuse_a_pulse():
     under_test = server.Server(register_file.Design(supervised("mhz")))
-    under_test.refusing = frozenset({"arm"})
+    under_test.file.refusing = frozenset({"arm"})
     arm = supervised("mhz")["arm"].address
     assert under_test.take(Verdict.REQUEST, framed(b"\1" + frames.write_one(arm, 1))) == b"\1\x86\4"
     assert under_test.take(Verdict.REQUEST, framed(b"\1" + frames.write_one(arm, 0)))[1] == 6

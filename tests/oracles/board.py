@@ -7,11 +7,12 @@ from collections import deque
 import cocotb
 from amaranth.hdl import Cat, Module, Shape
 from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.lib.wiring import Out
 from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
 from cocotbext.uart import UartSink, UartSource
 
 from hardwall.hdl.board import ENCODER, Board
+from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.link.link import Link
 from hardwall.hdl.supervised import LOOPS, SHOWN
 from hardwall.model import output, quadrature, wall
@@ -79,9 +80,7 @@ class Watched(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         m.submodules.board = self.board
-        for name, member in self.board.signature.members.items():
-            inner, outer = getattr(self.board, name), getattr(self, name)
-            m.d.comb += inner.eq(outer) if member.flow == In else outer.eq(inner)
+        m.d.comb += lead_out(self.board, self, self.board.signature.members)
         m.d.comb += [self.asking.eq(Cat(self._asked.values())), self.showing.eq(Cat(self._shown.values()))]
         return m
 
@@ -304,10 +303,9 @@ class Host:
         expected = []
         # What is refused depends on the state while the frame is checked, which may change on the way.
         for ready, armed in sorted({(state["ready"], state["state"] == 1) for state in states}):
-            self.server.refusing = frozenset(("arm",) * (not ready) + ("preload",) * armed)
-            expected.append(self.server.refusing)
-        self.server.refusing = self._refusing(answer, expected)
-        self.server.status = self._snapshot(pdu, answer)
+            expected.append(frozenset(("arm",) * (not ready) + ("preload",) * armed))
+        self.server.file.refusing = self._refusing(answer, expected)
+        self.server.file.status = self._snapshot(pdu, answer)
         assert answer == framed(self.server.take(Verdict.REQUEST, frame))
         if answer[1] & 0x80:
             self.refused.append(answer[2])
