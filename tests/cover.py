@@ -19,9 +19,9 @@ from pathlib import Path
 from covering.blocks import BLOCKS, Block
 from covering.points import merged
 from covering.report import Coverage, reasons_for
+from targets import conclude
 
 from hardwall.model.build_folder import build_dir
-from hardwall.sim.commands.terminal import show
 from hardwall.sim.jobs.result import Table
 from hardwall.sim.rtl.cocotb_runner import COVERAGE
 
@@ -59,12 +59,9 @@ def main(begins: str) -> int:
         coverage = measure(block, build_dir() / "coverage" / block.name.replace("/", "-"))
         if coverage:
             found.append(coverage)
-    show(Table(COLUMNS, [coverage.row for coverage in found]))
-    for coverage in found:
-        print(coverage.explanation, end="")
-    covered = sum(coverage.ok for coverage in found)
-    print(f"coverage: {len(chosen)} blocks, {covered} covered")
-    return 0 if chosen and covered == len(chosen) else 1
+    table, short = Table(COLUMNS, [coverage.row for coverage in found]), (each.explanation for each in found)
+    good = sum(coverage.ok for coverage in found)
+    return conclude(table, short, "coverage: {} blocks, {} covered", len(chosen), good)
 
 
 if __name__ == "__main__":

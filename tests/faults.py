@@ -8,7 +8,8 @@ Prints a table and one last line for a script; exits with 1 if any fault does no
 
 import sys
 
-from hardwall.sim.commands.terminal import show
+from targets import conclude
+
 from hardwall.sim.jobs.result import Table
 from injection.every import FAULTS
 from injection.run import run
@@ -29,10 +30,10 @@ COLUMNS = {
 def main(begins: str) -> int:
     """Inject the faults whose names begin so; return the exit code."""
     outcomes = run([fault for fault in FAULTS if fault.name.startswith(begins)])
-    show(Table(COLUMNS, [outcome.row for outcome in outcomes]))
-    safe = sum(outcome.safe for outcome in outcomes)
-    print(f"faults: {len(outcomes)} faults, {safe} safe")
-    return 0 if outcomes and safe == len(outcomes) else 1
+    good = sum(outcome.safe for outcome in outcomes)
+    return conclude(
+        Table(COLUMNS, [outcome.row for outcome in outcomes]), (), "faults: {} faults, {} safe", len(outcomes), good
+    )
 
 
 if __name__ == "__main__":

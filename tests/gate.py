@@ -11,10 +11,11 @@ each; `HARDWALL_SEED` draws other stimuli.
 import os
 import sys
 
+from targets import conclude
+
 from gates.families import FAMILIES
 from gates.run import Case, Outcome, run
 from gates.tops import TOPS
-from hardwall.sim.commands.terminal import show
 from hardwall.sim.jobs.result import Table
 
 SAMPLES = int(os.environ.get("HARDWALL_SAMPLES", "20000"))
@@ -41,12 +42,9 @@ def main(begins: str, samples: int = SAMPLES) -> int:
     """Simulate the netlists whose names begin so; return the exit code."""
     chosen = [case for case in CASES if case.name.startswith(begins)]
     outcomes = run(chosen, samples, lambda outcome: print(outcome.line, file=sys.stderr, flush=True))
-    show(Table(COLUMNS, [row(outcome) for outcome in outcomes]))
-    for outcome in outcomes:
-        print(outcome.explanation, end="")
-    equal = sum(outcome.ok for outcome in outcomes)
-    print(f"gate: {len(outcomes)} netlists, {equal} equal")
-    return 0 if outcomes and equal == len(outcomes) else 1
+    table, short = Table(COLUMNS, [row(outcome) for outcome in outcomes]), (each.explanation for each in outcomes)
+    good = sum(outcome.ok for outcome in outcomes)
+    return conclude(table, short, "gate: {} netlists, {} equal", len(outcomes), good)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,8 @@ short: a property that is not proven, or a bug that is not found.
 
 import sys
 
-from hardwall.sim.commands.terminal import show
+from targets import conclude
+
 from hardwall.sim.jobs.result import Table
 from proofs.properties import PROPERTIES
 from proofs.run import Outcome, run
@@ -35,12 +36,9 @@ def main(begins: str) -> int:
     """Prove the properties of the blocks whose names begin so; return the exit code."""
     chosen = [known for known in PROPERTIES if known.block.startswith(begins)]
     outcomes = run(chosen, lambda outcome: print(outcome.line, file=sys.stderr, flush=True))
-    show(Table(COLUMNS, [row(outcome) for outcome in outcomes]))
-    for outcome in outcomes:
-        print(outcome.explanation, end="")
-    proved = sum(outcome.ok for outcome in outcomes)
-    print(f"prove: {len(outcomes)} properties, {proved} proved")
-    return 0 if outcomes and proved == len(outcomes) else 1
+    table, short = Table(COLUMNS, [row(outcome) for outcome in outcomes]), (each.explanation for each in outcomes)
+    good = sum(outcome.ok for outcome in outcomes)
+    return conclude(table, short, "prove: {} properties, {} proved", len(outcomes), good)
 
 
 if __name__ == "__main__":
