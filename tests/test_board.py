@@ -6,11 +6,12 @@ from cocotb.triggers import Timer
 
 from hardwall.hdl.board import Board
 from hardwall.hdl.link.axi_link import AxiLink
+from hardwall.hdl.supervised import LOOPS
 from hardwall.model.link.server import FAILURE
 from hardwall.model.registers import RegisterMap
 from hardwall.model.supervisor import ALL, ARMED, DISARMED, REQUIRED, TRIPPED
 from hardwall.testing import SAMPLES, parameters, simulate
-from oracles.board import Host, make
+from oracles.board import SYNCHRONISER, Host, make
 from stimuli.specs import spec
 
 CLOCKS = max(SAMPLES, 80_000)
@@ -84,20 +85,22 @@ async def a_random_host_at_a_random_handle(dut):
 
 
 @cocotb.test()
-async def an_open_loop_needs_no_clock(dut):
+async def an_open_loop_stops_the_pulses(dut):
     host = Host(dut, **parameters())
     await host.reset()
     most, words = host.twin.spec.force_limit_word, {"wall_stiffness": host.registers["wall_stiffness"].high}
     await host.write(supervisor_ramp=host.registers["supervisor_ramp"].high)
     await host.write(commit=1, wall_position=1 + host.registers["wall_position"].low, **words)
-    for loop in ("drive_enable", "emergency_stop"):
+    for loop in LOOPS:
         await host.arm()
         await host.edges(host.settling)
         assert (await host.look())["driven"] == -most
         while not int(dut.drive_pdm.value):
             await host.edges(1)
-        # The pin falls between two edges, and the pulse with it.
+        # The pin falls between two edges, and the pulse with it; a fault of the amplifier comes through the supervisor.
         host.change(**{loop: 0})
+        if loop == "external_fault":
+            await host.edges(SYNCHRONISER + host.board.safe_latency)
         await Timer(1, "ns")
         assert int(dut.drive_pdm.value) == 0
         host.pulses.clear()

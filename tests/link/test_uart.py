@@ -196,3 +196,16 @@ def test_wrong_rates_are_refused():
         Receiver(3)
     with pytest.raises(TypeError, match=r"not 3$"):
         Transmitter(3)
+
+
+@pytest.mark.parametrize(
+    ("clock_hz", "baud"),
+    [(50_000_000, 921_600), (3_686_400, 921_600), (3_686_399, 460_800), (921_600, 230_400), (460_800, 115_200)],
+)
+def test_a_slow_clock_has_the_fastest_usual_rate_that_it_allows(clock_hz, baud):
+    assert uart.usual_baud(clock_hz) == baud == uart.Design(clock_hz, baud).baud
+
+
+def test_a_clock_that_allows_no_rate_is_refused():
+    with pytest.raises(ValueError, match=r"^clock_hz must be 460800 or more for a UART, not 460799$"):
+        uart.Design(460_799, uart.usual_baud(460_799))
