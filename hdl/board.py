@@ -1,16 +1,18 @@
 """An axis for real packages: the pins of an encoder, three loops, a link, and a drive that a filter can take."""
 
-from amaranth.hdl import Cat, ClockDomain, Module, Mux, Signal
+from amaranth.hdl import Cat, ClockDomain, DomainRenamer, Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
+from hardwall.model import clock_monitor
 from hardwall.model.link import uart
 from hardwall.model.register import VALUE_BITS
 from hardwall.model.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervisor import ARMED
 
+from .clock_monitor import ClockMonitor
 from .lead_out import lead_out
 from .link.axi_link import AxiLink
 from .link.link import Link
@@ -33,14 +35,20 @@ class Board(wiring.Component):
     so the density of ones is exactly |driven| / 2**N: 2**N clocks of a steady drive have |driven| ones. The word
     `drive_invert` reverses the sign; it is taken in every state but ARMED.
 
-    Safe is `drive_pdm` and `alive` low, which they are from power-up on. Latency: `latency` clocks from the sample
-    strobe to the first pulse that the changed drive makes. `drive_enable` or `emergency_stop` low makes `drive_pdm` low
-    at once, through a gate that needs no clock; any cause makes it low `safe_latency` clocks after it stands.
+    Safe is `drive_pdm` and `alive` low, which they are from power-up on. A clock that stops would keep them as they
+    were: the oscillator, a second clock, finds that out, at most `clock_monitor.Design.stop_latency_s` later, makes
+    them low, and acts as the loop of `drive_enable` does, so that the axis is DISARMED when the clock comes back. Until
+    both clocks run and the reset has ended, `outputs_enable` is low: the outputs may be left to their pull-downs.
+
+    Latency: `latency` clocks from the sample strobe to the first pulse that the changed drive makes. `drive_enable` or
+    `emergency_stop` low makes `drive_pdm` low at once, through a gate that needs no clock; any cause makes it low
+    `safe_latency` clocks after it stands.
 
     Rounding and overflow: none; the remainder that no pulse has carried yet, less than one pulse, stays in the sum,
     also when the sign changes. The axis limits the drive to less than 2**N.
 
-    Reset: `rst` resets everything but the synchronisers, 2 to 3 clocks later; power-up does the same.
+    Reset: `rst` resets everything but the synchronisers and the clock's monitor, 2 to 3 clocks later; power-up does the
+    same.
 
     Parameters
     ----------
@@ -56,6 +64,9 @@ class Board(wiring.Component):
         Clock of `spec.clock_hz`.
     rst : In(1)
         Asynchronous pin; resets while high.
+    oscillator : In(1)
+        A clock of any frequency in `clock_monitor.OSCILLATOR_HZ` that does not come from `clk`'s source, such as the
+        part's internal oscillator.
     encoder_a, encoder_b, encoder_z : In(1)
         Asynchronous pins.
     encoder_a_n, encoder_b_n : In(1)
@@ -70,6 +81,8 @@ class Board(wiring.Component):
         1: the drive is negative, or positive if it is inverted.
     alive : Out(1)
         A square wave while ARMED, for the charge pump of an amplifier's enable.
+    outputs_enable : Out(1)
+        Enable of the output buffers of the three above: the clock runs, and the reset has ended.
 
     Raises
     ------
@@ -88,11 +101,13 @@ class Board(wiring.Component):
             {
                 "clk": In(1),
                 "rst": In(1),
+                "oscillator": In(1),
                 **dict.fromkeys((*ENCODER, *LOOPS), In(1)),
                 **self.link.PINS,
                 "drive_pdm": Out(1),
                 "drive_sign": Out(1),
                 "alive": Out(1),
+                "outputs_enable": Out(1),
             }
         )
 
@@ -134,7 +149,9 @@ class Board(wiring.Component):
         m.submodules.rst_synchroniser = FFSynchronizer(self.rst, reset, init=1)
         m.d.comb += domain.rst.eq(reset)
 
-        m.d.comb += lead_out(axis, self, (*ENCODER, *LOOPS, "alive"))
+        running = self._watch_clock(m)
+        m.d.comb += lead_out(axis, self, (*ENCODER, "external_fault", "emergency_stop"))
+        m.d.comb += [axis.drive_enable.eq(self.drive_enable & running), self.outputs_enable.eq(running & ~reset)]
         m.d.comb += lead_out(link, self, link.PINS)
 
         registers = self.registers
@@ -164,5 +181,21 @@ class Board(wiring.Component):
             total.eq(total[:-1] + magnitude),
             self.drive_sign.eq(negative),
         ]
-        m.d.comb += self.drive_pdm.eq(total[-1] & self.drive_enable & self.emergency_stop)
+        m.d.comb += [
+            self.drive_pdm.eq(total[-1] & self.drive_enable & self.emergency_stop & running),
+            self.alive.eq(axis.alive & running),
+        ]
         return m
+
+    def _watch_clock(self, m: Module) -> Signal:
+        """Return whether the clock runs, as the oscillator has found."""
+        design = clock_monitor.Design(self.spec.clock_hz)
+        m.domains.oscillator = domain = ClockDomain(reset_less=True)
+        m.d.comb += domain.clk.eq(self.oscillator)
+        monitor = ClockMonitor(design)
+        m.submodules.clock_monitor = DomainRenamer("oscillator")(monitor)
+        # The clock runs while a reset lasts, too.
+        beat = Signal(design.beat_clocks.bit_length(), reset_less=True)
+        m.d.sync += beat.eq(beat + 1)
+        m.d.comb += monitor.beat.eq(beat[-1])
+        return monitor.running

@@ -17,6 +17,7 @@ COLUMNS = ("port", "direction", "width", "format", "one LSB", "range", "reset", 
 MEANINGS = {
     "clk": "clock; everything is done at its rise",
     "rst": "reset while high",
+    "oscillator": "another clock, 1 to 10 MHz, not of the same source: it finds out if the first one stops",
     "encoder_a": "encoder's pin A; asynchronous",
     "encoder_b": "encoder's pin B; asynchronous",
     "encoder_z": "encoder's index pin; asynchronous",
@@ -79,6 +80,7 @@ MEANINGS = {
     "drive_pdm": "pulses; their density is the magnitude of the drive; safe when low",
     "drive_sign": "1: the drive is negative, or positive if it is inverted",
     "alive": "square wave while ARMED, for the charge pump of an amplifier's enable; safe when low",
+    "outputs_enable": "enable of the buffers of drive_pdm, drive_sign and alive: both clocks run, the reset has ended",
 }
 """The meaning of every port; a run-time word has its own text."""
 

@@ -104,9 +104,9 @@ async def an_open_loop_stops_the_pulses(dut):
         await Timer(1, "ns")
         assert int(dut.drive_pdm.value) == 0
         host.pulses.clear()
-        await host.edges(2**host.board.drive_bits)
+        await host.edges(host.settling)
         host.change(**{loop: 1})
-        await host.edges(2**host.board.drive_bits)
+        await host.edges(host.settling)
         assert not any(pulse for pulse, _ in host.pulses)
 
 

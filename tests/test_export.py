@@ -28,13 +28,14 @@ stepped edge_kind indexed estimated saturated strobe_busy illegal overspeed ille
 index_latched stamp stamp_a_rise stamp_b_rise stamp_a_fall stamp_b_fall commit_pending
 """
 BOARD_PORTS = """
-clk rst encoder_a encoder_b encoder_z encoder_a_n encoder_b_n drive_enable external_fault emergency_stop uart_rx uart_tx
-drive_pdm drive_sign alive
+clk rst oscillator encoder_a encoder_b encoder_z encoder_a_n encoder_b_n drive_enable external_fault emergency_stop
+uart_rx uart_tx drive_pdm drive_sign alive outputs_enable
 """
 AXI_PORTS = """
-clk rst encoder_a encoder_b encoder_z encoder_a_n encoder_b_n drive_enable external_fault emergency_stop
+clk rst oscillator encoder_a encoder_b encoder_z encoder_a_n encoder_b_n drive_enable external_fault emergency_stop
 axi_awaddr axi_awprot axi_awvalid axi_awready axi_wdata axi_wstrb axi_wvalid axi_wready axi_bresp axi_bvalid axi_bready
 axi_araddr axi_arprot axi_arvalid axi_arready axi_rdata axi_rresp axi_rvalid axi_rready drive_pdm drive_sign alive
+outputs_enable
 """
 
 
@@ -133,7 +134,7 @@ def test_every_waiver_of_the_lint_has_its_reason():
         assert waiver.startswith("lint_off -rule ")
 
 
-@pytest.mark.parametrize(("top", "synchronisers"), [("axis", 1), ("board", 10)])
+@pytest.mark.parametrize(("top", "synchronisers"), [("axis", 1), ("board", 11)])
 def test_every_stage_of_a_synchroniser_is_marked(written, top, synchronisers):
     """The registers of a module whose name ends so are its stages, and no other register is marked."""
     text = (written / f"{top}.v").read_text()

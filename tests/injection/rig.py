@@ -1,11 +1,12 @@
 """The closed loop around the board under test: its clock, its plant step by step, its host, and what is measured."""
 
+import sys
 from collections.abc import Callable
 
 import cocotb
 from cocotb.clock import Clock
 from cocotb.simtime import get_sim_time
-from cocotb.triggers import Timer, ValueChange
+from cocotb.triggers import FallingEdge, Timer, ValueChange
 
 from hardwall.hdl.supervised import LOOPS
 from hardwall.model.supervisor import ARMED, names
@@ -14,10 +15,12 @@ from .damaged import INSIDE, LIVE
 from .handle import Grasped
 from .scene import (
     CLOCK_HZ,
+    CLOCK_NS,
     CLOCKS_PER_MS,
     DAMPING_N_S_PER_M,
     DEPTH,
     FULL_SCALE_N,
+    OSCILLATOR_NS,
     PUSH_N,
     REGISTERS,
     REST,
@@ -27,9 +30,10 @@ from .scene import (
     STIFFNESS_N_PER_M,
     words,
 )
-from .serial_host import CLOCK_NS, SerialHost
+from .serial_host import SerialHost
 
-RESET_CLOCKS, SETTLING_MS = 8, 1.0
+RESET_CLOCKS, SETTLING_MS = 100, 1.0
+"""The reset lasts until the oscillator has seen that the clock runs."""
 PULSE_N = FULL_SCALE_N / STEP_CLOCKS
 """The mean force over a step of one pulse in it."""
 STEADY_N, STEADY_M_PER_S = 0.3, 2e-3
@@ -66,8 +70,9 @@ class Rig:
         self.wrong: list[str] = []
         self.stuck_n = self._stuck_n_s = self._drive_n = 0.0
         self._stuck: int | None = None
+        self._stopped: list[Clock] = []
         self._number = START
-        self._alive_at = self._pulses = self._pulses_before = 0
+        self._alive_at = self._fell_at = self._pulses = self._pulses_before = 0
         self._tasks: list = []
 
     @property
@@ -88,8 +93,8 @@ class Rig:
     def driven_n(self) -> float:
         return self.see("driven") * SPEC.force_resolution_n
 
-    async def start(self, clock: Clock | None) -> Clock:
-        """Reset the board, with everything else well; return the clock, which goes on for the next rig."""
+    async def start(self, clocks: tuple[Clock, Clock] | None) -> tuple[Clock, Clock]:
+        """Reset the board, with everything else well; return the clock and the oscillator, for the next rig too."""
         dut = self.dut
         for name in LOOPS:
             getattr(dut, name).value = 1
@@ -97,17 +102,19 @@ class Rig:
             getattr(dut, f"upset_{name}").value = 0
         dut.uart_rx.value = dut.rst.value = 1
         self.wire()
-        if clock is None:
-            clock = Clock(dut.clk, CLOCK_NS, "ns", impl="gpi")
-            clock.start()
+        if clocks is None:
+            clocks = Clock(dut.clk, CLOCK_NS, "ns", impl="gpi"), Clock(dut.oscillator, OSCILLATOR_NS, "ns", impl="gpi")
+            for each in clocks:
+                each.start()
             await Timer(CLOCK_NS // 2, "ns")
         await Timer(RESET_CLOCKS * CLOCK_NS, "ns")
         dut.rst.value = 0
         await Timer(RESET_CLOCKS * CLOCK_NS, "ns")
-        self.clock, self._pulses = clock, self.see("pulses")
+        self.clock, self.oscillator = clocks
+        self._pulses = self.see("pulses")
         self.host = SerialHost(dut)
         self._tasks = [cocotb.start_soon(each) for each in (self._turn(), self._watch_drive(), self._watch_alive())]
-        return clock
+        return clocks
 
     def close(self) -> None:
         """End the loop."""
@@ -157,29 +164,46 @@ class Rig:
             given = (pulses - self._pulses) * PULSE_N
             self._pulses = pulses
             return given
-        pumping = self.now - self._alive_at <= PUMP_CLOCKS
-        given = (1 - 2 * self.see("drive_sign")) * self.see("drive_pdm") * FULL_SCALE_N * pumping
+        # The pin is at one level until it falls, and acts only as long as the pump lasts.
+        ends = min(self.now, self._fell_at, self._alive_at + PUMP_CLOCKS)
+        given = (1 - 2 * self.see("drive_sign")) * max(ends - self._stuck, 0) * PULSE_N
         self._stuck_n_s += given * STEP_CLOCKS / CLOCK_HZ
-        self.stuck_n = max(self.stuck_n, abs(given))
         if given:
-            self._stuck = self.now
+            self._stuck, self.stuck_n = ends, FULL_SCALE_N
         return given
+
+    async def _watch_pin(self) -> None:
+        await FallingEdge(self.dut.drive_pdm)
+        self._fell_at = self.now + 1
 
     def stop_clock(self) -> None:
         """Stop the board's clock; from now on the amplifier looks at `alive`, and its drive is the level of the pin."""
-        self._stuck = self.now
-        self.clock.stop()
+        self._stuck = self._fell_at = self.now
+        if self.see("drive_pdm"):
+            self._fell_at = sys.maxsize
+            self._tasks.append(cocotb.start_soon(self._watch_pin()))
+        self._stop(self.clock)
 
-    async def start_clock(self) -> None:
-        """Let the clock go on."""
-        await Timer(CLOCK_NS // 2, "ns")
-        self.clock.start()
-        await Timer(CLOCK_NS // 2, "ns")
+    def stop_oscillator(self) -> None:
+        """Stop the clock that watches the board's."""
+        self._stop(self.oscillator)
+
+    def _stop(self, clock: Clock) -> None:
+        self._stopped.append(clock)
+        clock.stop()
+
+    async def start_clocks(self) -> None:
+        """Let what was stopped go on, and count pulses again."""
+        while self._stopped:
+            await Timer(CLOCK_NS // 2, "ns")
+            self._stopped.pop().start()
+            await Timer(CLOCK_NS // 2, "ns")
+        self._stuck, self._pulses = None, self.see("pulses")
 
     @property
     def stuck_clocks(self) -> int:
-        """Clocks from the fault to the last step in which an amplifier without a clock gave a force."""
-        return self._stuck - self.began + STEP_CLOCKS
+        """Clocks from the fault to the end of the force of an amplifier without a clock."""
+        return self._stuck - self.began
 
     def begin(self) -> None:
         """Take it that the fault is there from now on."""

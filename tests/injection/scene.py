@@ -31,6 +31,10 @@ DEPTH = round(PUSH_N / STIFFNESS_N_PER_M / SPEC.count_m)
 TURN = 4000
 GLITCH = SPEC.glitch_clocks_at_reset
 
+CLOCK_NS, OSCILLATOR_NS = 10, 22
+"""Periods in the simulation, whose time is not that of the scene."""
+OSCILLATOR_HZ = CLOCK_HZ * CLOCK_NS / OSCILLATOR_NS
+
 LOOP = 3
 """Clock edges from a pin of a loop, or a synchronised level, to the drive at zero."""
 COUNTED = GLITCH + 4

@@ -10,9 +10,8 @@ from hardwall.model.link.line import framed
 from hardwall.model.register import Kind
 from stimuli import frames
 
-from .scene import BAUD, CLOCK_HZ, CLOCKS_PER_MS, REGISTERS
+from .scene import BAUD, CLOCK_HZ, CLOCK_NS, CLOCKS_PER_MS, REGISTERS
 
-CLOCK_NS = 10
 BIT_NS = CLOCK_NS * CLOCK_HZ // BAUD
 SILENCE_NS = 30 * BIT_NS
 """The end of an answer: three bytes of silence."""

@@ -4,6 +4,7 @@ import logging
 
 import cocotb
 import pytest
+from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles
 from cocotbext.axi import AxiLiteBus, AxiLiteMaster
 
@@ -26,6 +27,7 @@ async def a_processor_brings_an_axis_up(dut):
     bench, registers, axis = Bench(dut, board), board.registers, board.spec
     await bench.reset()
     bench.drive(encoder_a_n=1, encoder_b_n=1, drive_enable=1, external_fault=1)
+    Clock(dut.oscillator, 20 * bench.period_ns, "ns").start()
     master = AxiLiteMaster(AxiLiteBus.from_prefix(dut, "axi"), dut.clk)
     for part in (master.write_if, master.read_if):
         part.log.setLevel(logging.WARNING)

@@ -8,6 +8,7 @@ import cocotb
 from amaranth.hdl import Cat, Module, Shape
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
+from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
 from cocotbext.uart import UartSink, UartSource
 
@@ -32,6 +33,10 @@ from .supervised import Follower
 BAUD = 3_000_000
 """4 clocks a bit at `CLOCK_HZ`."""
 CLOCK_HZ = 12_000_000
+OSCILLATOR_NS = 22
+"""Where the clock's period is 10 ns."""
+STARTING = 100
+"""Clocks in which the oscillator has seen that the clock runs."""
 SYNCHRONISER = 2
 """Clock edges from a change of a pin to the last edge that does not act on it."""
 IDLE = (*LOOPS, "encoder_a_n", "encoder_b_n")
@@ -83,11 +88,6 @@ class Watched(wiring.Component):
         m.d.comb += lead_out(self.board, self, self.board.signature.members)
         m.d.comb += [self.asking.eq(Cat(self._asked.values())), self.showing.eq(Cat(self._shown.values()))]
         return m
-
-
-def unpacked(packing: Packing, word: int) -> dict[str, int]:
-    """Return the values in a word, by name."""
-    return {name: packing.column(name, [word])[0] for name in packing.shapes}
 
 
 class Twin:
@@ -227,7 +227,11 @@ class Host:
 
     async def reset(self) -> None:
         await self.bench.reset()
-        self.bench.drive(uart_rx=1, **self.pins)
+        self.bench.drive(uart_rx=1, rst=1, **self.pins)
+        Clock(self.dut.oscillator, OSCILLATOR_NS, "ns", impl="gpi").start()
+        await ClockCycles(self.dut.clk, STARTING)
+        assert int(self.dut.outputs_enable.value) == 0
+        self.bench.drive(rst=0)
         bit_ns = self.bench.period_ns * CLOCK_HZ / BAUD
         self.source, self.sink = UartSource(self.dut.uart_rx, 1e9 / bit_ns), UartSink(self.dut.uart_tx, 1e9 / bit_ns)
         for end in (self.source, self.sink):
@@ -261,14 +265,15 @@ class Host:
     async def _follow(self) -> None:
         """Let the twin see every clock edge, and compare it with the board."""
         edge, asking, showing = RisingEdge(self.dut.clk), self.dut.asking, self.dut.showing
-        pulse, sign = self.bench.reader("drive_pdm"), self.bench.reader("drive_sign")
+        pulse, sign, enable = (self.bench.reader(name) for name in ("drive_pdm", "drive_sign", "outputs_enable"))
         component, twin, last, asked = self.component, self.twin, -1, {}
         while True:
             await edge
             pins, word = (pulse(), sign()), int(asking.value)
+            assert enable()
             if word != last:
-                asked, last = unpacked(component.asked, word), word
-            found = unpacked(component.shown, int(showing.value))
+                asked, last = component.asked.unpack(word), word
+            found = component.shown.unpack(int(showing.value))
             gate = self.pins["drive_enable"] & self.pins["emergency_stop"]
             assert pins == (twin.pulse & gate, twin.sign), f"edge {twin.clocks}"
             wanted = twin.follower.wanted() | {"drive": twin.drive, "count": twin.decoder.count}
@@ -309,7 +314,7 @@ class Host:
         assert answer == framed(self.server.take(Verdict.REQUEST, frame))
         if answer[1] & 0x80:
             self.refused.append(answer[2])
-        found = unpacked(self.component.asked, int(self.dut.asking.value))
+        found = self.component.asked.unpack(int(self.dut.asking.value))
         assert {name: found[name] for name in self.server.file.active} == self.server.file.active
         return answer[1:-2]
 

@@ -104,7 +104,8 @@ def board_stimulus(board: Board) -> dict[str, np.ndarray]:
     # Until the words are committed, the filter of the reset takes the motion for too fast.
     columns = walk(len(line), len(line) // 2) | {"uart_rx": np.array(line)}
     complements = {f"encoder_{each}_n": 1 - columns[f"encoder_{each}"] for each in "ab"}
-    return columns | complements | dict.fromkeys(LOOPS, np.ones(len(line)))
+    oscillator = np.arange(len(line)) // 2 % 2
+    return columns | complements | {"oscillator": oscillator} | dict.fromkeys(LOOPS, np.ones(len(line)))
 
 
 def write_bench(component: wiring.Component, top: str, columns: dict[str, np.ndarray], folder: Path) -> dict[str, int]:
@@ -160,7 +161,7 @@ def column(lines: list[str], widths: dict[str, int], name: str) -> list[int]:
 
 CASES = {
     "axis": (Axis, axis_stimulus, {"drive": 20, "count": 60, "velocity": 40, "flags": 3}),
-    "board": (Board, board_stimulus, {"uart_tx": 2, "drive_pdm": 2, "alive": 2}),
+    "board": (Board, board_stimulus, {"uart_tx": 2, "drive_pdm": 2, "alive": 2, "outputs_enable": 2}),
 }
 
 

@@ -1,6 +1,7 @@
 """Synthesis: its report, and its messages on failure. Full runs on both parts are `make synth`."""
 
 import importlib.util
+import re
 import sys
 from importlib.resources import files
 from pathlib import Path
@@ -18,6 +19,9 @@ from hardwall.sim.studies import costs
 from stimuli.reports import check
 from stimuli.specs import spec
 
+PADS = {"oscillator", "outputs_enable"}
+"""Ports of the board that are no pins."""
+
 # A stand-in for either tool. Speed and size follow from the seed, so that every number of the report is known.
 TOOL = """#!{python}
 import json, pathlib, sys
@@ -30,16 +34,20 @@ if seed == 13:
 if not seed:
     cells = ["TRELLIS_FF"] * 3 + ["LUT4"] * 4 + ["SB_DFFESR"] * 5 + ["SB_DFF"]
     netlist = {{str(k): {{"type": kind, "parameters": {{}}}} for k, kind in enumerate(cells)}}
-    pathlib.Path("board.json").write_text(json.dumps({{"modules": {{"board": {{"cells": netlist}}}}}}))
+    pathlib.Path("top.json").write_text(json.dumps({{"modules": {{"top": {{"cells": netlist}}}}}}))
 else:
     step = lambda cell, delay: {{"delay": delay, "from": {{"cell": cell}}, "to": {{"cell": cell}}}}
     path = lambda start, end, delay: {{
-        "from": start, "to": end, "path": [step("axis.from_SB_DFF_Q_1", 0.0), step("axis.to_TRELLIS_FF_Q_DI", delay)]
+        "from": start, "to": end,
+        "path": [step("board.axis.from_SB_DFF_Q_1", 0.0), step("board.axis.to_TRELLIS_FF_Q_DI", delay)]
     }}
     clock, none = "posedge clk$net", "posedge $PACKER_GND_NET_$glb_clk"
     kinds = ["TRELLIS_COMB", "MULT18X18D", "DP16KD", "ICESTORM_LC", "ICESTORM_DSP", "ICESTORM_RAM"]
     pathlib.Path("report.json").write_text(json.dumps({{
-        "fmax": {{"clk$net": {{"achieved": 10.0 * seed, "constraint": 1.0}}}},
+        "fmax": {{
+            "oscillator": {{"achieved": 1.0, "constraint": 1.0}},
+            "clk$net": {{"achieved": 10.0 * seed, "constraint": 1.0}}
+        }},
         "utilization": {{kind: {{"used": k, "available": 100 + k}} for k, kind in enumerate(kinds)}},
         "critical_paths": [path(clock, clock, 100.0 / seed), path(clock, none, 5.0), path(none, clock, 6.0)],
     }}))
@@ -90,7 +98,7 @@ def test_report_of_a_part_that_nextpnr_knows(tools):
     folder = Path(report["folder"])
     seeds = ["seed-5", "seed-6", "seed-9"]
     assert sorted(path.name for path in folder.iterdir()) == [
-        LIST, "board.json", "board.v", *seeds, "ulx3s-25f.lpf", "yosys.log"
+        LIST, "board.v", *seeds, "top.json", "ulx3s-25f.lpf", "ulx3s-25f.v", "yosys.log"
     ]  # fmt: skip
     for seed in seeds:
         assert sorted(path.name for path in (folder / seed).iterdir()) == [LIST, "nextpnr.log", "report.json"]
@@ -136,7 +144,7 @@ def test_what_was_done_is_not_done_again(tools):
     assert len(tools.read_text().split()) == 6
 
 
-@pytest.mark.parametrize(("damaged", "again"), [("board.json", ["0", "5"]), ("seed-5/report.json", ["5"])])
+@pytest.mark.parametrize(("damaged", "again"), [("top.json", ["0", "5"]), ("seed-5/report.json", ["5"])])
 def test_what_was_damaged_is_made_again(tools, damaged, again):
     first = placed(load("mhz"), "ecp5-25k", (5,))
     path = Path(first["folder"]) / damaged
@@ -184,7 +192,7 @@ def test_what_cannot_be_is_refused(device, seeds, message):
 def test_absent_constraints_are_one_line(tools, monkeypatch, tmp_path):
     """Without pin constraints a tool would place the ports anywhere without a message."""
     monkeypatch.setattr(synthesis, "files", lambda package: tmp_path)
-    with pytest.raises(SynthesisError, match=r"^constraints/ulx3s-25f\.lpf is not installed, and [^\n]*$"):
+    with pytest.raises(SynthesisError, match=r"^constraints/ulx3s-25f\.v is not installed, and [^\n]*$"):
         placed(load("mhz"), "ecp5-25k")
     assert not tools.exists(), "no tool was called"
 
@@ -203,11 +211,18 @@ def test_constraints_place_every_port_once(part):
     else:
         placed = [tuple(line[-2:]) for line in words if line[:1] == ["set_io"]]
     ports, pins = zip(*placed, strict=True)
-    assert sorted(ports) == sorted(Board(spec("mhz")).signature.members)
+    assert sorted(ports) == sorted(set(Board(spec("mhz")).signature.members) - PADS)
     assert len(set(pins)) == len(pins)
     # A run uses all constraints of the file except the frequency, which comes from the scene.
     assert part.frequency in path.read_text()
     assert part.frequency not in synthesis._constraints(part)
+
+
+@pytest.mark.parametrize("part", PARTS.values(), ids=PARTS)
+def test_the_pads_are_around_every_port_of_the_board(part):
+    text = (files("hardwall.constraints") / part.pads).read_text()
+    connected = re.findall(r"\.(\w+)\(", text.partition("board board (")[2])
+    assert sorted(connected) == sorted(Board(spec("mhz")).signature.members)
 
 
 # Place and route takes hundreds of megabytes, which `make test` does not install.

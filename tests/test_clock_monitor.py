@@ -1,0 +1,95 @@
+"""The monitor of a clock: RTL against model at every clock of the oscillator, and the promises about what it finds."""
+
+import random as plain
+
+import cocotb
+import numpy as np
+import pytest
+
+from hardwall.hdl.clock_monitor import ClockMonitor
+from hardwall.model import clock_monitor
+from hardwall.model.clock_monitor import OSCILLATOR_HZ, START, Design, Inputs
+from hardwall.testing import SAMPLES, SEED, Recorded, check, parameters, play, simulate
+
+CLOCKS_HZ = [460_800, 12_000_000, 25_000_000, 50_000_000, 1_000_000_000]
+
+
+def make(clock_hz: int) -> Recorded:
+    return Recorded(ClockMonitor(Design(clock_hz)))
+
+
+def campaign(design: Design, clocks: int) -> np.ndarray:
+    """Return the level of a beat at every clock: it changes soon, at the last moment, too late, or stands."""
+    random, limit = plain.Random(SEED), design.params.limit
+    levels, level = [], 0
+    while len(levels) < clocks:
+        held = random.choice((random.randint(1, 3), limit - 1, limit, limit + 1, random.randint(1, 3 * limit)))
+        levels += [level] * held
+        level ^= 1
+    return np.array(levels[:clocks])
+
+
+@cocotb.test()
+async def follows_model(dut):
+    design = Design(parameters()["clock_hz"])
+    beat = campaign(design, SAMPLES // 2)
+    inputs, outputs = await play(dut, make(design.clock_hz), {"reset": np.zeros_like(beat), "beat": beat})
+    state, running = START, []
+    for level in inputs.column("beat"):
+        state = clock_monitor.step(design.params, state, Inputs(level))
+        running.append(state.running)
+    check(inputs, outputs, {"running": running})
+    assert set(running) == {0, 1}
+
+
+@pytest.mark.parametrize("clock_hz", [12_000_000, 50_000_000])
+def test_rtl(clock_hz):
+    simulate(__file__, make, clock_hz=clock_hz)
+
+
+def watched(design: Design, oscillator_hz: float, phase: float, stops_s: float, lasts_s: float) -> tuple[list, list]:
+    """Return the times of the oscillator's edges and `running` after each, for a clock that stops."""
+    state, times, running = START, [], []
+    for k in range(int(lasts_s * oscillator_hz)):
+        now = (k + phase) / oscillator_hz
+        edges = int(min(now, stops_s) * design.clock_hz)
+        state = clock_monitor.step(design.params, state, Inputs(edges // design.beat_clocks & 1))
+        times.append(now)
+        running.append(state.running)
+    return times, running
+
+
+@pytest.mark.parametrize("clock_hz", CLOCKS_HZ)
+def test_a_clock_that_runs_is_never_taken_for_one_that_stands_and_one_that_stops_is_found_in_time(clock_hz):
+    design, random = Design(clock_hz), plain.Random(SEED)
+    level_s = design.beat_clocks / clock_hz
+    for oscillator_hz in (*OSCILLATOR_HZ, *(random.uniform(*OSCILLATOR_HZ) for _ in range(8))):
+        # Two levels pass at most until the first change has been seen.
+        started_s, latency_s = 2 * level_s + 4 / oscillator_hz, design.stop_latency_s(oscillator_hz)
+        stops_s = started_s + 20 * level_s + random.random() * level_s
+        times, running = watched(design, oscillator_hz, random.random(), stops_s, stops_s + latency_s + 3 * level_s)
+        for now, runs in zip(times, running, strict=True):
+            if started_s < now < stops_s:
+                assert runs, (oscillator_hz, now)
+            if now > stops_s + latency_s:
+                assert not runs, (oscillator_hz, now)
+
+
+@pytest.mark.parametrize("clock_hz", CLOCKS_HZ)
+def test_no_level_of_the_beat_is_missed(clock_hz):
+    design = Design(clock_hz)
+    assert design.beat_clocks / clock_hz >= 2 / OSCILLATOR_HZ[0]
+    # It is the shortest such level of a power of two.
+    assert design.beat_clocks / 2 / clock_hz < 2 / OSCILLATOR_HZ[0]
+
+
+def test_it_is_found_within_microseconds():
+    assert Design(50_000_000).stop_latency_s(2.4e6) < 20e-6
+    assert Design(12_000_000).stop_latency_s(6e6) < 7e-6
+
+
+def test_wrong_clocks_are_refused():
+    with pytest.raises(ValueError, match=r"^clock_hz must be 1 or more, not 0$"):
+        Design(0)
+    with pytest.raises(TypeError, match=r"not 3$"):
+        ClockMonitor(3)
