@@ -10,11 +10,11 @@ from gates import run
 from gates.families import FAMILIES
 from gates.netlist import Netlist, mapped
 from gates.run import Case, Outcome, compared
-from gates.tops import TOPS
+from gates.tops import SMALL, TOPS
 from hardwall.sim.rtl.parts import PARTS
 
 ECP5 = FAMILIES[0]
-CELLS, AXIS = Case(ECP5, TOPS[0]), Case(ECP5, TOPS[1])
+CELLS, AXIS, SMALLEST = (Case(ECP5, top) for top in (TOPS[0], TOPS[1], SMALL))
 
 
 def netlist_of(case: Case) -> Netlist:
@@ -42,14 +42,14 @@ def inverted(found: re.Match) -> str:
 
 
 def test_a_wrong_table_of_a_cell_is_found():
-    right = netlist_of(CELLS)
+    right = netlist_of(SMALLEST)
     wrong = replace(right, gates=re.sub(r"\.INIT\(16'h(\w+)\)", inverted, right.gates, count=1))
     assert wrong.gates != right.gates
-    outcome = compared(CELLS, wrong, 1_000)
+    outcome = compared(SMALLEST, wrong, 1_000)
     assert outcome.different > 0
     assert not outcome.ok
     (line, *values) = outcome.explanation.splitlines()
-    assert line == f"ECP5 cells: differs at {outcome.different} clocks, first at clock {outcome.first}"
+    assert line == f"ECP5 small: differs at {outcome.different} clocks, first at clock {outcome.first}"
     assert values
 
 

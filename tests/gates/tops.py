@@ -63,6 +63,22 @@ class Cells(wiring.Component):
         return m
 
 
+class Small(wiring.Component):
+    """Registers behind logic, with the inputs of `Cells`: enough for a wrong cell to be found."""
+
+    a: In(WIDTH)
+    b: In(WIDTH)
+    write: In(1)
+    write_address: In(10)
+    read_address: In(10)
+    found: Out(WIDTH)
+
+    def elaborate(self, platform: object) -> Module:
+        m = Module()
+        m.d.sync += self.found.eq(Mux(self.write, self.a ^ self.b, self.a & self.b))
+        return m
+
+
 @dataclass(frozen=True)
 class Top:
     """A component that is mapped.
@@ -89,3 +105,5 @@ TOPS = (
     Top("axis levant", "axis", lambda: Axis(busy("levant")), (*NEVER, "saturated")),
     Top("board levant", "board", lambda: board_of("paper", "levant")),
 )
+SMALL = Top("small", "cells", Small)
+"""For tests of the means alone."""

@@ -19,9 +19,12 @@ ESTIMATORS = {
     f"{name} {output}": {"controller.estimator": name, "controller.output": output} for name, output in EVERY_OUTPUT
 }
 CORE = ("levant u", "levant u1", "fdm u")
-WHOLE = tuple(ESTIMATORS) if os.environ.get("HARDWALL_LOOPS") == "all" else CORE
+EVERY = os.environ.get("HARDWALL_LOOPS") == "all"
+WHOLE = tuple(ESTIMATORS) if EVERY else CORE
 """These run whole in both walls, by `make soak` all; the others run for two seconds in one wall, a second in the other.
 """
+QUICK = (*CORE, "levant-edge u") if EVERY else ("levant u", "levant-edge u")
+"""These run at 1 MHz."""
 SLOW = {"controller.clock_hz": 1_000_000, "controller.speed_max_m_per_s": 0.3}
 """A clock with few idle clocks between samples, which are most of the scene's own: these run in `WHOLE`."""
 
@@ -87,7 +90,7 @@ def test_rtl_gives_the_models_force_words_and_flags_when_the_encoder_is_too_fast
     assert result.max_force_n == 0, "a position that is a guess drives nothing"
 
 
-@pytest.mark.parametrize("estimator", [*CORE, "levant-edge u"])
+@pytest.mark.parametrize("estimator", QUICK)
 def test_rtl_gives_the_models_force_words_at_a_megahertz(estimator):
     result = same_words("mhz", ESTIMATORS[estimator] | ONE_SECOND)
     assert result.samples == 1_000_000

@@ -86,7 +86,6 @@ PROPERTIES = [
         within_the_limit_at_run_time,
         depth=4,
         bugs=(Bug(Output.elaborate, FORCE_LIMIT_IS_LAST, "Mux(over, limit, slewed)"),),
-        quick=True,
     ),
     Property(
         "a fault with the strobe makes the drive zero at valid",
@@ -94,6 +93,5 @@ PROPERTIES = [
         zero_after_a_fault,
         depth=5,
         bugs=(Bug(Output.elaborate, "self.enable & ~self.fault", "self.enable"),),
-        quick=True,
     ),
 ]

@@ -83,7 +83,6 @@ PROPERTIES = [
         zero_after_enable,
         depth=2,
         bugs=(Bug(Supervisor.elaborate, "& self.enable & ~self.disarm", "& ~self.disarm"),),
-        quick=True,
         within=12,
     ),
     Property(

@@ -39,7 +39,7 @@ from .widths import Widths
 AXES = ("paper", "mhz", "narrow", "wide")
 """The axes of the tests: the paper's rates, a megahertz, and formats at both extremes."""
 ALONE = ("",)
-QUICK = ("wall", "levant")
+QUICK = ("wall",)
 
 
 def estimator(name: str, axis: str) -> EstimatorBlock:

@@ -72,6 +72,8 @@ def tools(tmp_path, monkeypatch) -> Path:
         (programs / name).chmod(0o755)
     monkeypatch.setattr(synthesis, "TOOLS", programs)
     monkeypatch.setattr(synthesis, "version", lambda tool: "1.0")
+    # The stand-ins do not read it.
+    monkeypatch.setattr(synthesis, "to_verilog", lambda component, name: f"{name} {component.signature}")
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path / "build"))
     return calls
 
