@@ -43,6 +43,19 @@ class SynthesisError(RuntimeError):
     """A tool is missing or failed, or the design does not fit; one line that names the log."""
 
 
+class DoesNotFitError(SynthesisError):
+    """A part has fewer cells than a board needs.
+
+    Attributes:
+        lacking: the cells in use and those of the part, of each resource of which there are too few: lut4, dsp, bram.
+    """
+
+    def __init__(self, device: str, lacking: dict[str, tuple[int, int]]):
+        said = ", ".join(f"{used} of {available} {name.upper()}" for name, (used, available) in lacking.items())
+        super().__init__(f"the board does not fit {device}: it has {said}")
+        self.lacking = lacking
+
+
 def _run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
     """Run a tool of the Python environment in `work`, and write its output to the file `log`.
 
@@ -124,12 +137,26 @@ def _place_and_route(name: str, part: Part, folder: Path, clock_hz: int, seed: i
         # A clock that is too fast is a result, not a failure.
         command += ["--report", "report.json", "--timing-allow-fail"]
         command += [part.constraints[1], part.constraints[0]]
-        _run(work, work / "nextpnr.log", command, f"place and route for {name} with seed {seed}")
+        log = work / "nextpnr.log"
+        try:
+            _run(work, log, command, f"place and route for {name} with seed {seed}")
+        except SynthesisError:
+            lacking = _lacking(part, log.read_text(encoding="utf-8", errors="replace")) if log.exists() else {}
+            if lacking:
+                raise DoesNotFitError(name, lacking) from None
+            raise
         for file in inputs:
             (work / file).unlink()
 
     report = whole_folder(folder / f"seed-{seed}", place_into) / "report.json"
     return json.loads(report.read_text(encoding="utf-8"))
+
+
+def _lacking(part: Part, log: str) -> dict[str, tuple[int, int]]:
+    """Return the cells in use and those of the part, of what a log of nextpnr says that there are too few."""
+    cells = {kind: (int(used), int(most)) for kind, used, most in re.findall(r"(\w+): +(\d+)/ *(\d+) +\d+%", log)}
+    found = {name: cells[kind] for name, kind in part.counted.items() if kind in cells}
+    return {name: (used, most) for name, (used, most) in found.items() if used > most}
 
 
 def _delay_ns(report: dict, start: str, end: str) -> float | None:
@@ -230,7 +257,8 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
 
     Raises:
         ValueError: if there is no such part, or no seed.
-        SynthesisError: if a tool is missing or fails, for example because the design does not fit.
+        DoesNotFitError: if the part has too few cells.
+        SynthesisError: if a tool is missing or fails.
     """
     if device not in PARTS:
         raise ValueError(f"device must be one of {', '.join(PARTS)}, not {device!r}")

@@ -45,7 +45,8 @@ class Choice:
             delay = "" if row["impact_delay_s"] is None else f"{row['impact_delay_s'] * 1e6:.3g}"
             errors.append([estimator, *own, delay])
             logic = [str(row[name]) for name in ("lut4", "ff", "dsp", "bram", "latency_clocks")]
-            costs.append([estimator, *logic, f"{row['max_sample_hz']:,}"])
+            rate = row["max_sample_hz"]
+            costs.append([estimator, *logic, "does not fit" if rate is None else f"{rate:,}"])
         numbers = ("LUT4", "FF", "DSP", "BRAM", "clocks", "max samples/s")
         return [
             table_of(("RMS error (mm/s)",), (*names, "impact delay (us)"), errors),
@@ -88,7 +89,7 @@ def table(pairs: list[tuple[str, str]], measured: list[dict], costs: list[dict])
                 "rms_mm_s": {name: row["rms_mm_s"] for name, row in own.items()},
                 "impact_delay_s": own["impact"]["delay_s"],
                 **{name: cost[name] for name in ("device", "lut4", "ff", "dsp", "bram", "latency_clocks")},
-                "max_sample_hz": cost["board"]["max_sample_hz"],
+                "max_sample_hz": cost["board"] and cost["board"]["max_sample_hz"],
             }
         )
     return rows

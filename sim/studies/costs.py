@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..jobs.result import Table, table_of
-from ..rtl.synthesis import estimator_cells, synthesise
+from ..rtl.synthesis import DoesNotFitError, estimator_cells, synthesise
 from ..scene.load import load
 
 RATES = {
@@ -52,6 +52,9 @@ def _alone(row: dict[str, Any]) -> list[str]:
 
 def _board(row: dict[str, Any]) -> list[str]:
     board = row["board"]
+    if board is None:
+        lacking = (f"{used} of {most} {name.upper()}" for name, (used, most) in row["lacking"].items())
+        return [row["estimator"], "", "", "", "does not fit", ", ".join(lacking)]
     cells = [str(board[name]) for name in ("lut4", "ff", "dsp")]
     return [row["estimator"], *cells, f"{board['fmax_mhz']:.1f}", f"{board['max_sample_hz']:,}"]
 
@@ -68,12 +71,18 @@ def cost(estimator: str, device: str, seeds: Iterable[int]) -> dict:
         estimator, device, clock_mhz, sample_hz: what was synthesised.
         lut4, ff, dsp, bram: cells of the estimator alone, before placing.
         latency_clocks: latency of the estimator, from strobe to valid.
-        board: the report of `synthesis.synthesise`.
+        board: the report of `synthesis.synthesise`; None if the part has too few cells.
+        lacking: the cells that the board would use and those of the part, of each resource of which there are too few.
 
     Raises:
-        SynthesisError: if a tool is missing or fails, for instance because the board does not fit.
+        SynthesisError: if a tool is missing or fails.
     """
     scene = load("mhz", RATES[device] | {"controller.estimator": estimator, "controller.output": None})
+    board, lacking = None, {}
+    try:
+        board = {"scene": scene.name} | synthesise(scene.spec, device, list(seeds), scene.glitch_clocks)
+    except DoesNotFitError as error:
+        lacking = {name: list(cells) for name, cells in error.lacking.items()}
     return {
         "estimator": estimator,
         "device": device,
@@ -81,5 +90,6 @@ def cost(estimator: str, device: str, seeds: Iterable[int]) -> dict:
         "sample_hz": scene.spec.sample_hz,
         **estimator_cells(scene.spec, device),
         "latency_clocks": scene.spec.design.estimator.latency,
-        "board": {"scene": scene.name} | synthesise(scene.spec, device, list(seeds), scene.glitch_clocks),
+        "board": board,
+        "lacking": lacking,
     }

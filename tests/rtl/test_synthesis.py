@@ -28,8 +28,9 @@ import json, pathlib, sys
 seed = int(sys.argv[sys.argv.index("--seed") + 1]) if "--seed" in sys.argv else 0
 with open({calls!r}, "a") as calls:
     print(seed, file=calls)
-print("Info: as if\\n" + "ERROR: " * (seed == 13) + "Unable to place cell 'x', no BELs remaining.")
-if seed == 13:
+print("Info: as if\\nInfo: \\t  ICESTORM_LC:  " + ("5950" if seed == 17 else "1") + "/ 5280   9%")
+print("ERROR: " * (seed in (13, 17)) + "Unable to place cell 'x', no BELs remaining.")
+if seed in (13, 17):
     sys.exit(1)
 if not seed:
     cells = ["TRELLIS_FF"] * 3 + ["LUT4"] * 4 + ["SB_DFFESR"] * 5 + ["SB_DFF"]
@@ -168,6 +169,16 @@ def test_a_design_that_does_not_fit_is_one_line_with_the_log(tools):
     # No unfinished file is left that could be taken for a result.
     assert [path.name for path in (tools.parent / "build" / "synth").glob("building-*")] == []
     assert not list((tools.parent / "build" / "synth").glob("*/seed-13*"))
+
+
+def test_a_part_that_is_too_small_is_told_in_numbers(tools):
+    with pytest.raises(SynthesisError, match=r"^the board does not fit ice40-up5k: it has 5950 of 5280 LUT4$"):
+        placed(load("mhz"), "ice40-up5k", (17,))
+    row = costs.cost("fdm", "ice40-up5k", (17,))
+    assert (row["board"], row["lacking"]) == (None, {"lut4": [5950, 5280]})
+    reported = costs.Costs([row])
+    check("costs", reported.report())
+    assert reported.tables()[1].rows == [["fdm", "", "", "", "does not fit", "5950 of 5280 LUT4"]]
 
 
 def test_an_absent_tool_is_one_line(tools, monkeypatch):

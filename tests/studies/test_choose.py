@@ -22,3 +22,11 @@ def test_every_error_is_in_its_own_place():
             assert (job["estimator"], job["output"]) == (estimator, output)
             assert choose.SITUATIONS[name].items() <= job.items()
         assert row["impact_delay_s"] == -row["rms_mm_s"]["impact"]
+
+
+def test_a_board_that_does_not_fit_has_no_rate():
+    measured = [{"rms_mm_s": 1.0, "delay_s": None}] * len(choose.SITUATIONS)
+    rows = choose.table([("fdm", "u")], measured, [COST | {"estimator": "fdm", "board": None}])
+    chosen = choose.Choice(rows)
+    check("choose", chosen.report())
+    assert chosen.tables()[1].rows == [["fdm", "10", "20", "1", "0", "7", "does not fit"]]
