@@ -27,7 +27,8 @@ class SupervisedAxis(wiring.Component):
     """An axis from pins to the drive that is let out: `Axis`, `Monitors` and `Supervisor`, which say what they do.
 
     The axis itself computes a drive all the time, and no host limits it; the supervisor's force limit comes last. The
-    axis's own enable follows the loop of `drive_enable`, so that its slew limit begins at zero too.
+    axis's own enable follows the loop of `drive_enable`, so that its slew limit begins at zero too. A commit of another
+    `encoder_invert` is a `disarm`.
 
     Latency: `latency` clocks from the sample strobe to the changed `driven`, one more than the axis's. From a pin of
     `LOOPS` that opens to a drive of zero `loop_latency` clock edges, the first of which sees it.
@@ -157,8 +158,14 @@ class SupervisedAxis(wiring.Component):
             supervisor.enable.eq(levels["drive_enable"]),
             supervisor.referenced.eq(axis.index_latched),
         ]
+        # The other direction turns the wall around: the drive is zero before the axis takes it.
+        inverted = Signal()
+        with m.If(self.commit):
+            m.d.sync += inverted.eq(self.encoder_invert)
+        turned = self.commit & (self.encoder_invert ^ inverted)
         for name in REQUESTS:
-            m.d.comb += getattr(supervisor, name).eq(getattr(self, name))
+            asked = getattr(self, name)
+            m.d.comb += getattr(supervisor, name).eq(asked | turned if name == "disarm" else asked)
         for block in (supervisor, monitors):
             m.d.comb += [getattr(block, word.name).eq(getattr(self, word.name)) for word in block.design.words]
         m.d.comb += [getattr(self, name).eq(getattr(supervisor, name)) for name in SHOWN]

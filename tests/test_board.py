@@ -31,7 +31,9 @@ def random_words(host: Host) -> dict[str, int]:
     depth = int(random.integers(0, half) * near)
     place = min(max(count + (depth if left else -depth), -half), half - 1)
     words |= {"encoder_glitch_clocks": int(random.choice((0, 1, 2))), "preload_count": count}
-    return words | {"wall_left": left, "wall_position": place}
+    # The other direction disarms.
+    inverted = host.server.file.active["encoder_invert"] ^ int(random.random() < 0.1)
+    return words | {"wall_left": left, "wall_position": place, "encoder_invert": inverted}
 
 
 async def random_live_word(host: Host) -> None:
@@ -67,7 +69,8 @@ async def a_random_host_at_a_random_handle(dut):
         elif status["state"] == DISARMED:
             await host.write(heartbeat=int(random.integers(0, 1 << 16)))
             await host.write(arm=1)
-        act = random.random()
+        # What was armed just now mostly gets a wall, and pushes.
+        act = random.random() * (0.55 if status["state"] == DISARMED else 1)
         if act < 0.5:
             words = random_words(host) | ({"wall_stiffness": stiffness.high} if random.random() < 0.7 else {})
             index_arm, preload = (int(random.random() < chance) for chance in (0.5, 0.2))

@@ -67,6 +67,7 @@ class World:
             now["disarm"] = 1
         elif act < 0.0315:
             now["commit"] = 1
+            self.inputs["encoder_invert"] = int(random.random() < 0.2)
         elif act < 0.032:
             self.inputs["supervisor_force_limit"] = random.choice((1, 2, self.spec.force_limit_word))
         elif act < 0.033:

@@ -86,7 +86,8 @@ class Host:
         left, depth = int(random.integers(0, 2)), int(2.0 ** random.uniform(0, 10))
         position = int(np.clip(count + (depth if left else -depth), place.low, place.high))
         words |= {"wall_left": left, "wall_position": position, "preload_count": count}
-        words["encoder_glitch_clocks"] = int(random.choice((0, 1, 2)))
+        # The other direction disarms.
+        words |= {"encoder_glitch_clocks": int(random.choice((0, 1, 2))), "encoder_invert": int(random.random() < 0.1)}
         if random.random() < 0.7:
             words |= {name: self._registers[name].high for name in ("wall_stiffness", "output_slew_limit")}
         return words

@@ -2,6 +2,8 @@
 
 import math
 
+from hardwall.hdl.link.register_file import RegisterFile
+from hardwall.model.link.register_file import Design
 from hardwall.model.link.server import FAILURE, VALUE
 from hardwall.model.supervisor import DISARMED, TRIPPED, WATCHDOG_MS
 from stimuli import frames
@@ -175,5 +177,11 @@ FAULTS = (
     ),
     Fault("the host asks for a preload", writes(FAILURE, preload=1), UNCHANGED),
     Fault("the host reverses drive_invert", writes(drive_invert=1), UNCHANGED),
+    Fault(
+        "the host commits encoder_invert",
+        writes(commit=1, encoder_invert=1),
+        Expected(state=DISARMED, within=TAKEN + RegisterFile(Design(REGISTERS)).commit_clocks),
+        writes(commit=1, encoder_invert=0),
+    ),
     Fault("the host arms an ARMED axis", writes(FAILURE, arm=1), UNCHANGED),
 )

@@ -1,8 +1,12 @@
 """Faults of motion: a handle that goes where or as it must not, and reversed polarity."""
 
+from collections.abc import Callable
+
+from hardwall.sim.world.encoder import level
 from oracles.supervised import BITS
 
 from .fault import Expected, Fault, trips
+from .handle import Wires
 from .of_encoder import HARDER_N, first_edge
 from .rig import Rig
 from .scene import CLOCKS_PER_MS, COUNTED, PUSH_N, REST, SPEC, START, words
@@ -13,6 +17,12 @@ MARGIN = 100
 LAST_QUARTER = 3 << SPEC.count_width - 3
 SEEN = COUNTED + 2
 """Clock edges from a pin of the encoder to the drive at zero, by way of the count and a monitor."""
+OTHERS = {
+    "encoder_a": "encoder_b",
+    "encoder_b": "encoder_a",
+    "encoder_a_n": "encoder_b_n",
+    "encoder_b_n": "encoder_a_n",
+}
 SHOVE_N, FASTEST_M_PER_S = 80.0, 0.1
 EASED_N = 5.0
 FASTEST_PACE = 96
@@ -53,11 +63,25 @@ def reversed_motor(milliseconds: float):
     return inject
 
 
+def turned(number: int) -> Callable[[Wires], Wires]:
+    """Return the fault that the encoder counts the other way, which changes no level at this count.
+
+    Its channels are in each other's place; where they differ, they are complemented too.
+    """
+    differ = level(number) in (1, 2)
+
+    def fault(levels: Wires) -> Wires:
+        return {name: levels[OTHERS.get(name, name)] ^ (differ and name in OTHERS) for name in levels}
+
+    return fault
+
+
 def reversed_encoder(push_n: float, milliseconds: float):
     """Return the fault that the encoder counts the other way, while the hand pushes more or less."""
 
     async def inject(rig: Rig) -> None:
-        await rig.host.commit(encoder_invert=1)
+        rig.handle.fault = turned(rig.handle.number)
+        rig.wire()
         rig.begin()
         rig.handle.push_n = push_n
         await rig.run(milliseconds)

@@ -27,7 +27,7 @@ class Follower:
         self._design = design
         self._monitors, self.supervisor = monitors.START, supervisor.START
         self._pins = [{name: int(name in high) for name in PINS}] * (SYNCHRONISER + 1)
-        self.inverted = self.reached = 0
+        self.inverted = self.reached = self._encoder_inverted = 0
 
     def wanted(self) -> dict[str, int]:
         """Return the outputs now, by name."""
@@ -56,6 +56,8 @@ class Follower:
         assert set(stands) == {*FROM_AXIS, *FROM_OUTSIDE}
         causes = self._monitors.causes | sum(BITS[name] for name, present in stands.items() if present)
         own = {name: given[name] for name in supervisor.Inputs._fields if name in given}
+        if given["commit"] and given["encoder_invert"] != self._encoder_inverted:
+            self._encoder_inverted, own["disarm"] = given["encoder_invert"], 1
         heard = supervisor.Inputs(**own | {
             "strobe": shown["sampled"], "drive": shown["drive"], "causes": causes, "stamp": shown["stamp"],
             "enable": level["drive_enable"], "referenced": shown["index_latched"],
