@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 from hardwall.model import clock_monitor
 from hardwall.model.link import uart
 from hardwall.model.register import VALUE_BITS
-from hardwall.model.registers import RegisterMap
+from hardwall.model.registers import EDGE_STAMPS, RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervisor import ARMED
 
@@ -161,12 +161,17 @@ class Board(wiring.Component):
             f"counts_{k}": axis.counts.word_select(k, VALUE_BITS) for k in range(-(-len(axis.counts) // VALUE_BITS))
         }
         for shown in registers.status:
+            # The link remembers the stamps of edges itself.
+            if shown.name in EDGE_STAMPS:
+                continue
             # A value that is wider than its register gives the upper bits.
             value = parts[shown.name] if shown.name in parts else getattr(axis, shown.name)
             m.d.comb += getattr(link, shown.name).eq(value >> max(len(value) - shown.format.width, 0))
         armed = axis.state == ARMED
         refused = {"arm": ~axis.ready, "preload": armed}
         m.d.comb += [
+            link.stepped.eq(axis.stepped),
+            link.edge_kind.eq(axis.edge_kind),
             link.refuse.eq(Cat(refused.get(pulse.name, 0) for pulse in registers.pulses)),
             link.commit_pending.eq(axis.commit_pending),
         ]

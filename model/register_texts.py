@@ -3,7 +3,7 @@
 import json
 
 from .register import Register
-from .registers import ACTIVE, CAPTURE, LAYOUT, MAP, WRITTEN, RegisterMap
+from .registers import ACTIVE, CAPTURE, EVENTS, LAYOUT, MAP, WRITTEN, RegisterMap
 
 COLUMNS = ("address", "register", "kind", "access", "format", "one LSB", "range", "reset", "meaning")
 
@@ -36,7 +36,9 @@ def markdown(registers: RegisterMap) -> str:
     return (
         f"# Registers\n\nIdentity {registers.identity}, layout {LAYOUT}. Modbus RTU, unit 1. A value of two registers "
         "has the high one first; half of one can be neither read nor written. Words that are written become active "
-        f"together, by `commit`; the active word of each is at 0x{ACTIVE - WRITTEN:02X} above it.\n\n"
+        f"together, by `commit`; the active word of each is at 0x{ACTIVE - WRITTEN:02X} above it. What a frame reads "
+        "of the status is of one clock, but for the stamps of edges, the counts of causes, and "
+        f"{', '.join(EVENTS)}: these are taken soon after it, each whole.\n\n"
         + head
         + "".join(map(_row, registers.registers))
         + "\n"

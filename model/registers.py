@@ -42,6 +42,12 @@ END = 0x100
 """The address behind the last block."""
 MAP, CAPTURE, SPACE = 0x4000, 0x8000, 0x10000
 """The first address of each window, and the address behind the last."""
+EDGE_STAMPS = ("stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall")
+"""The stamps of edges, in the order of the edges' kinds."""
+COUNTS = "counts_"
+"""How the names of the status begin that count the causes."""
+EVENTS = ("illegal_count", "index_count", "latched", "first", "first_stamp")
+"""The other status that only events change."""
 CONFORMITY = 0x81
 """The identification is basic, and can be had as a stream or object by object."""
 

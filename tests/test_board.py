@@ -73,7 +73,7 @@ async def a_random_host_at_a_random_handle(dut):
         act = random.random() * (0.55 if status["state"] == DISARMED else 1)
         if act < 0.5:
             words = random_words(host) | ({"wall_stiffness": stiffness.high} if random.random() < 0.7 else {})
-            index_arm, preload = (int(random.random() < chance) for chance in (0.5, 0.2))
+            index_arm, preload = (int(random.random() < chance) for chance in (0.8, 0.2))
             await host.write(commit=1, index_arm=index_arm, preload=preload, **words)
         elif act < 0.9:
             await random_live_word(host)

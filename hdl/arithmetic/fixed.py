@@ -45,3 +45,13 @@ def fitted(value: Value, bits: int) -> Value:
     top = value[bits - 1 :]
     held = Mux(value[-1], -1 << (bits - 1), (1 << (bits - 1)) - 1)
     return Mux(top.any() & ~top.all(), held, value[:bits].as_signed())
+
+
+def less(value: Value, bound: int) -> Value:
+    """Return whether an unsigned value is less than a constant, without a chain of carries."""
+    if bound >> len(value):
+        return Const(1)
+    below = Const(0, 1)
+    for bit, each in enumerate(value):
+        below = ~each | below if bound >> bit & 1 else ~each & below
+    return below

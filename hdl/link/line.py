@@ -10,6 +10,8 @@ from hardwall.model.checks import check_int
 from hardwall.model.link.line import BROADCAST, COUNTED, FIXED, FRAME_MAX, FRAME_MIN, UNIT, Verdict
 
 BYTE = 8
+UNMIXED = {"no_rw_check": 1}
+"""The attribute of a memory of which nothing is used that is read from a place at the clock at which it is written."""
 
 
 class Frames(wiring.Signature):
@@ -111,7 +113,7 @@ class Line(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         frames = self.frames
-        m.submodules.frame = frame = Memory(shape=BYTE, depth=FRAME_MAX, init=[])
+        m.submodules.frame = frame = Memory(shape=BYTE, depth=FRAME_MAX, init=[], attrs=UNMIXED)
         write, read = frame.write_port(), frame.read_port()
         m.submodules.crc = check = CRC16_MODBUS(data_width=BYTE).create()
         position, last = Signal(range(FRAME_MAX)), Signal(range(FRAME_MAX + BYTE + max(COUNTED.values())))

@@ -5,12 +5,15 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Member, Out
 
-from hardwall.model.link.register_file import CELL_BITS, Area, Design, Operation
-from hardwall.model.registers import ACTIVE, CAPTURE, COUNTERS, END, LIVE, MAP, PULSES, SPACE, TELEMETRY, WRITTEN
+from hardwall.model.link.register_file import CELL_BITS, NEXT, SOURCE, Area, Design, Operation, Source
+from hardwall.model.registers import ACTIVE, CAPTURE, COUNTERS, EDGE_STAMPS, END, LIVE, MAP, PULSES, SPACE, WRITTEN
 
-from ..arithmetic.fixed import shape
+from ..arithmetic.fixed import less, shape
+from .line import UNMIXED
 
 ADDRESS_BITS = SPACE.bit_length()
+SWEPT = CELL_BITS + 4
+"""Clocks that a snapshot takes for a cell."""
 
 
 class Requests(wiring.Signature):
@@ -69,18 +72,20 @@ class RegisterFile(wiring.Component):
     - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. A live word is at its port with
       `done` of its lower half, which is written after the upper one. Only what was checked is written.
     - COUNT: add 1 to a counter, which wraps.
-    - FINISH: if `commit` is marked, copy every written word to its active one and shift it to its port. Then all marked
-      pulses are high for one clock, the same one; the words have been at their ports for a clock or more, and stay
-      until the next commit. `done` comes when `commit_pending` has fallen, so what is read back as active is in use.
-    - SNAPSHOT: take every status, all at the clock of `start`, for what is read from then on.
+    - FINISH: if `commit` is marked, copy every written word to its active one; if it or `preload` is, shift the active
+      words to their ports. Then all marked pulses are high for one clock, the same one; the words have been at their
+      ports for a clock or more, and stay until `done`, which comes when `commit_pending` has fallen: so what is read
+      back as active is in use.
+    - SNAPSHOT: take the status for what is read from then on, in the turns of `design.turns`: what is taken in one turn
+      is of one clock, and every value is whole. `taken_clocks` has the clock of each.
 
-    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ and READ; 2 for WRITE and COUNT; 4 for
-    CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if `commit` is marked, `commit_clocks` and the wait
-    for the sample. After a reset the first `start` may come at once; it waits up to `boot_clocks`.
+    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ and READ; 2 for WRITE, 3 for COUNT; 4 for
+    CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if `commit` or `preload` is marked, `shift_clocks`
+    and the wait for the sample. After a reset the first `start` may come at once; it waits up to `boot_clocks`.
 
     Rounding and overflow: a value of fewer bits than its registers is extended by its sign or by zeros.
 
-    Reset: every word, port and counter is as after a reset when the first operation is done.
+    Reset: every cell and live word is as after a reset when the first operation is done, and no edge has been seen.
 
     Parameters
     ----------
@@ -91,10 +96,13 @@ class RegisterFile(wiring.Component):
     -------
     host : In(Requests)
         The operations.
-    one input for each status of the map : In
+    one input for each status of the map, but for the stamps of edges : In
         Live.
+    stepped, edge_kind : In
+        High for one clock with the stamp behind an edge's; with it, the kind of the edge.
     one output for each word of the map : Out
-        The active word; it moves while a commit copies the words, up to the clock of the pulse.
+        The active word while a FINISH needs it: from a clock before `commit` or `preload` until `done`. At other times
+        it is anything.
     one output for each live word of the map : Out
         The word as written.
     one output for each pulse of the map : Out(1)
@@ -122,8 +130,11 @@ class RegisterFile(wiring.Component):
         super().__init__(
             {
                 "host": In(Requests()),
-                **{status.name: In(shape(status.format)) for status in registers.status},
-                **{word.name: Out(shape(word.format), init=word.reset) for word in (*registers.words, *registers.live)},
+                **{each.name: In(shape(each.format)) for each in registers.status if each.name not in EDGE_STAMPS},
+                "stepped": In(1),
+                "edge_kind": In(range(len(EDGE_STAMPS))),
+                **{word.name: Out(shape(word.format)) for word in registers.words},
+                **{word.name: Out(shape(word.format), init=word.reset) for word in registers.live},
                 **{pulse.name: Out(1) for pulse in registers.pulses},
                 "refuse": In(len(registers.pulses)),
                 "commit_pending": In(1),
@@ -143,53 +154,90 @@ class RegisterFile(wiring.Component):
     @property
     def boot_clocks(self) -> int:
         """Clocks after a reset until an operation begins."""
-        return 2 * END
+        return 3 * END
 
     @property
-    def commit_clocks(self) -> int:
-        """Clocks by which a commit makes a FINISH longer, without the wait for the sample."""
-        return 2 * len(self._design.registers.words) * (CELL_BITS + 5)
+    def shift_clocks(self) -> int:
+        """Clocks by which words that are shifted make a FINISH longer, without the wait for the sample."""
+        return 2 * len(self._design.registers.words) * (CELL_BITS + 6)
 
     @property
     def snapshot_clocks(self) -> int:
         """Clocks from `start` of a SNAPSHOT to `done`."""
-        return (self._design.last_status - TELEMETRY) * (CELL_BITS + 3) + 1
+        return 2 * len(self._design.registers.status) * SWEPT + 1
+
+    @property
+    def taken_clocks(self) -> dict[str, int]:
+        """Clocks from `start` of a SNAPSHOT to the one whose status is taken, by name.
+
+        Of an edge it is the stamp as the axis shows it then, with `stepped`.
+        """
+        taken, begun = {}, 0
+        for _, turn in self._design.turns:
+            taken |= {each.name: SWEPT * begun + 3 - 2 * (each.name in EDGE_STAMPS) for each in turn}
+            begun += 2 * len(turn)
+        return taken
+
+    def _edges(self, m: Module, place: Signal) -> tuple[Signal, Signal]:
+        """Return one more than the stamp of the last edge of a kind, a clock after its place, and whether it has none.
+
+        A kind's place is the address of its status, halved; four in a row differ in the two lowest bits. A place that
+        is written is not read: what was read before holds, for which a place must be asked for at two clocks. Edges
+        of one kind are two clocks apart, for one of another kind is between them.
+        """
+        places = [self._design.registers[name].address >> 1 & 3 for name in EDGE_STAMPS]
+        # A memory is no logic: without the attribute so small a one would be made of flip-flops.
+        of_kind = {"shape": len(self.stamp), "depth": len(places), "init": []}
+        m.submodules.edges = edges = Memory(**of_kind, attrs=UNMIXED | {"ram_style": "block"})
+        write, read = edges.write_port(), edges.read_port()
+        stamped = Signal(len(places))
+        with m.Switch(self.edge_kind):
+            for kind, place_of_kind in enumerate(places):
+                with m.Case(kind):
+                    m.d.comb += write.addr.eq(place_of_kind)
+        m.d.comb += [write.data.eq(self.stamp), write.en.eq(self.stepped), read.addr.eq(place)]
+        m.d.comb += read.en.eq(~self.stepped | (write.addr != place))
+        with m.If(self.stepped):
+            m.d.sync += stamped.bit_select(write.addr, 1).eq(1)
+        return read.data, ~stamped.bit_select(place, 1)
 
     def elaborate(self, platform):
         m = Module()
         design, registers, host = self._design, self._design.registers, self.host
-        m.submodules.book = book = Memory(shape=CELL_BITS, depth=len(design.book), init=design.book)
-        m.submodules.map = window = Memory(shape=CELL_BITS, depth=len(design.map_cells), init=design.map_cells)
-        read, write, map_read = book.read_port(), book.write_port(), window.read_port()
+        # The window lies behind the book, at a power of two. A depth that is one too needs no logic between the blocks
+        # that the memory is made of.
+        within = (max(len(design.book), len(design.map_cells)) - 1).bit_length()
+        cells = design.book + [0] * ((1 << within) - len(design.book)) + design.map_cells
+        m.submodules.cells = memory = Memory(shape=CELL_BITS, depth=2 << within, init=cells, attrs=UNMIXED)
+        read, write = memory.read_port(), memory.write_port()
 
         # What there is at the address.
         address = host.address
         below = address[: END.bit_length() - 1]
-        in_book, in_map, in_capture = address < END, address[14:] == MAP >> 14, Const(0)
-        wide = in_book & ((address < COUNTERS) | (address >= WRITTEN))
-        in_map &= address[:14] < len(design.map_cells)
+        in_book, in_map, in_capture = address[len(below) :] == 0, address[14:] == MAP >> 14, Const(0)
+        # Counters and pulses have one register.
+        wide = in_book & (below[5:] != COUNTERS >> 5)
+        in_map &= less(address[:14], len(design.map_cells))
         is_pulse = in_book & (below[4:] == PULSES >> 4)
         half = wide & ((host.first & address[0]) | (host.last & ~address[0]))
         marks = Signal(len(registers.pulses))
         wanted = Signal.like(marks)
         for bit, pulse in enumerate(registers.pulses):
             m.d.comb += wanted[bit].eq(is_pulse & (below[:4] == pulse.address % 16) & host.value[0])
+        names = [pulse.name for pulse in registers.pulses]
+        commit, preload = marks[names.index("commit")], marks[names.index("preload")]
 
-        step = Signal(range(END))
-        place, area = Signal(range(END)), Signal(Area)
-        shift, status = Signal(CELL_BITS), Signal(sum(each.format.width for each in registers.status))
-        left, extended, bit = Signal(range(CELL_BITS + 1)), Signal(), Signal(range(CELL_BITS))
-        ports, committing = Cat(getattr(self, word.name) for word in registers.words), Signal()
-        counting, storing, high = Signal(), Signal(), Signal(CELL_BITS)
+        # The lowest bits of the address, an area, and whether it is in the window.
+        step, shift = Signal(range(END)), Signal(CELL_BITS)
+        place, area, window, counting = Signal(range(END)), Signal(Area), Signal(), Signal()
         m.d.comb += [
-            read.addr.eq(Cat(place, area)),
+            read.addr.eq(Cat(place, Mux(window, address[len(place) : within], area), window)),
             write.addr.eq(place),
-            write.data.eq(Mux(storing, shift, read.data + counting)),
-            map_read.addr.eq(address),
-            host.data.eq(Mux(address[14], map_read.data, read.data)),
+            write.data.eq(shift + counting),
+            host.data.eq(read.data),
         ]
         if registers.capture_registers:
-            in_capture = (address[15:] == CAPTURE >> 15) & (address[:15] < registers.capture_registers)
+            in_capture = (address[15:] == CAPTURE >> 15) & less(address[:15], registers.capture_registers)
             m.d.comb += self.capture_address.eq(address)
             with m.If(address[15]):
                 m.d.comb += host.data.eq(self.capture_data)
@@ -201,17 +249,53 @@ class RegisterFile(wiring.Component):
         top, tied = ~wide | ~address[0], Signal(2, init=3)
         bound, value = Signal(CELL_BITS), Signal(CELL_BITS)
         difference = Signal(CELL_BITS + 1)
-        # The memory's answer comes late in a clock, so it waits for the next one.
-        m.d.sync += bound.eq(Cat(read.data[:-1], read.data[-1] ^ top))
         m.d.comb += [
+            bound.eq(Cat(shift[:-1], shift[-1] ^ top)),
             value.eq(Cat(host.value[:-1], host.value[-1] ^ top)),
             difference.eq(bound - value),
         ]
         equal = ~difference.any()
 
+        # The chain: the bits of status that wait for their cells, or the words at their ports. The bits of a stamp
+        # are those of a number that is 1 too high: `borrow` takes it off, bit by bit.
+        stamp, unseen = self._edges(m, step[1:3])
+        by_source = {source: [] for source in Source}
+        for source, turn in design.turns:
+            by_source[source] += [getattr(self, each.name) for each in turn if each.name not in EDGE_STAMPS]
+        by_source[Source.EDGE].insert(0, stamp)
+        loads = {source: Cat(values) for source, values in by_source.items()}
+        ports = Cat(getattr(self, word.name) for word in registers.words)
+        chain = Signal(max(len(ports), *map(len, loads.values())), reset_less=True)
+        shifted = Cat(chain[1:], shift[0])
+        source, left, bit = Signal(3), Signal(range(CELL_BITS + 1)), Signal(range(CELL_BITS))
+        extended, borrow, hidden, last, committing = Signal(), Signal(), Signal(), Signal(), Signal()
+        fresh, moving = left != 0, Signal()
+        taken = (chain[0] ^ borrow) & ~hidden
+        m.d.comb += ports.eq(chain[-len(ports) :])
+        head = max(len(loads[each]) for each in (Source.EDGE, Source.EVENTS))
+        shifted, moment, edge, events = (Cat(load, shifted[len(load) :]) for load in loads.values())
+        with m.If(moving):
+            for k, bit_of_chain in enumerate(chain):
+                # Two cells of four inputs: the first gives one of two, or which of the two others it is. The bits of
+                # `source` are three, or the one that both cells have would be one signal, which takes three cells.
+                first = Mux(source[0], moment[k], shifted[k])
+                if k < head:
+                    which = Mux(source[1], source[0], first)
+                    first = Mux(source[2], Mux(which, events[k], edge[k]), which)
+                m.d.sync += bit_of_chain.eq(first)
+
+        # What `shift` takes: a cell, the host's value, or a bit of the chain.
+        fetched, given, turning = Signal(), Signal(), Signal()
+        turned = Cat(shift[1:], Mux(fresh, taken, extended & shift[-1]))
+        with m.If(fetched | given | turning):
+            m.d.sync += shift.eq(Mux(turning, turned, Mux(given, host.value, read.data)))
+
         with m.FSM():
             with m.State("BOOT"):
                 m.d.comb += [place.eq(step), area.eq(Area.RESET)]
+                m.next = "BOOT_TAKE"
+            with m.State("BOOT_TAKE"):
+                m.d.comb += fetched.eq(1)
                 m.next = "BOOT_WRITE"
             with m.State("BOOT_WRITE"):
                 m.d.comb += [place.eq(step), write.en.eq(1)]
@@ -220,17 +304,17 @@ class RegisterFile(wiring.Component):
                 with m.If(step.all()):
                     m.next = "IDLE"
             with m.State("IDLE"):
-                m.d.comb += place.eq(below)
-                m.d.sync += bit.eq(0)
+                m.d.comb += [place.eq(below), window.eq(address[14])]
+                m.d.sync += committing.eq(0)
                 with m.If(host.start), m.Switch(host.operation):
                     with m.Case(Operation.CHECK_READ):
                         with m.If(~(in_book | in_map | in_capture) | half):
                             m.d.sync += host.absent.eq(1)
                         m.next = "DONE"
                     with m.Case(Operation.CHECK_WRITE):
-                        m.d.comb += area.eq(Area.LEAST)
-                        word = (below >= design.first_pulse) & (below < design.last_word)
-                        live = (below >= LIVE) & (below < design.last_live)
+                        m.d.comb += [area.eq(Area.LEAST), window.eq(0)]
+                        word = ~less(below, design.first_pulse) & less(below, design.last_word)
+                        live = ~less(below, LIVE) & less(below, design.last_live)
                         with m.If(~in_book | ~(word | live) | half):
                             m.d.sync += host.absent.eq(1)
                         with m.If((wanted & self.refuse).any()):
@@ -240,22 +324,29 @@ class RegisterFile(wiring.Component):
                         m.next = "DONE"
                     with m.Case(Operation.WRITE):
                         m.next = "KEEP"
-                        m.d.sync += [marks.eq(marks | wanted), shift.eq(host.value)]
+                        m.d.comb += given.eq(1)
+                        m.d.sync += marks.eq(marks | wanted)
+                        # The upper half has been written just before, and is still there.
+                        with m.If(below[6:] == LIVE >> 6), m.Switch(below[:6]):
+                            for word in registers.live:
+                                with m.Case(word.address - LIVE + 1):
+                                    m.d.sync += getattr(self, word.name).eq(Cat(host.value, shift))
                     with m.Case(Operation.COUNT):
                         m.next = "COUNT"
                     with m.Case(Operation.FINISH):
-                        m.d.sync += [step.eq(ACTIVE), committing.eq(marks[0])]
+                        m.d.sync += step.eq(registers.active[0].address + 1)
                         m.next = "PULSE"
-                        with m.If(marks[0]):
+                        with m.If(commit | preload):
+                            m.d.sync += committing.eq(1)
                             m.next = "COPY"
                     with m.Case(Operation.SNAPSHOT):
-                        live = Cat(getattr(self, each.name) for each in registers.status)
-                        m.d.sync += [step.eq(TELEMETRY), status.eq(live)]
+                        m.d.sync += step.eq(design.turns[0][1][0].address + 1)
                         m.next = "SWEEP"
             with m.State("LEAST"):
-                m.d.comb += [place.eq(below), area.eq(Area.MOST)]
+                m.d.comb += [place.eq(below), area.eq(Area.MOST), fetched.eq(1)]
                 m.next = "ABOVE"
             with m.State("ABOVE"):
+                m.d.comb += fetched.eq(1)
                 m.d.sync += tied[0].eq((top | tied[0]) & equal)
                 with m.If((top | tied[0]) & ~difference[-1] & ~equal):
                     m.d.sync += host.outside.eq(1)
@@ -266,60 +357,66 @@ class RegisterFile(wiring.Component):
                     m.d.sync += host.outside.eq(1)
                 m.next = "DONE"
             with m.State("KEEP"):
-                m.d.comb += [place.eq(below), storing.eq(1), write.en.eq(~is_pulse)]
-                m.d.sync += high.eq(shift)
-                for word in registers.live:
-                    with m.If(below == word.address + 1):
-                        m.d.sync += getattr(self, word.name).eq(Cat(shift, high))
+                m.d.comb += [place.eq(below), write.en.eq(~is_pulse)]
                 m.next = "DONE"
             with m.State("COUNT"):
+                m.d.comb += fetched.eq(1)
+                m.next = "COUNTED"
+            with m.State("COUNTED"):
                 m.d.comb += [place.eq(below), counting.eq(1), write.en.eq(1)]
                 m.next = "DONE"
             with m.State("PULSE"):
-                m.d.comb += Cat(getattr(self, pulse.name) for pulse in registers.pulses).eq(marks)
+                m.d.comb += Cat(getattr(self, name) for name in names).eq(marks)
                 m.d.sync += marks.eq(0)
                 m.next = "WAIT"
             with m.State("WAIT"), m.If(~self.commit_pending):
                 m.next = "DONE"
 
-            # A register from the snapshot to its cell, or from a written cell to the active one and to its port: bit by
+            # A register from the chain to its cell, or from a written cell to the active one and to its port: bit by
             # bit, and the low half of a value first.
             with m.State("COPY"):
-                m.d.comb += place.eq((step ^ 1) & ~(ACTIVE ^ WRITTEN))
+                m.d.comb += place.eq(step)
+                with m.If(commit):
+                    m.d.comb += place.eq(step & ~(ACTIVE ^ WRITTEN))
                 m.next = "COPIED"
             with m.State("COPIED"):
-                m.d.sync += shift.eq(read.data)
+                m.d.comb += fetched.eq(1)
                 m.next = "SWEEP"
             with m.State("SWEEP"):
-                m.d.comb += [place.eq(step ^ 1), area.eq(Area.LEAST)]
-                m.next = "BITS"
-            with m.State("BITS"):
-                m.d.comb += [place.eq(step ^ 1), storing.eq(1), write.en.eq(committing)]
-                m.d.sync += [left.eq(read.data), extended.eq(read.data[-1])]
+                m.d.comb += [place.eq(step), area.eq(Area.LEAST)]
+                m.next = "LOOK"
+            with m.State("LOOK"):
+                m.d.comb += [place.eq(step), area.eq(Area.LEAST), write.en.eq(committing)]
+                m.d.sync += [left.eq(read.data), source.eq(read.data[SOURCE:]), extended.eq(read.data[-1])]
+                # The block of a cell that follows has no zero address.
+                m.d.sync += last.eq(~read.data[NEXT + 4 : SOURCE].any())
+                with m.If(step[0]):
+                    stamped = read.data[SOURCE : SOURCE + 3] == Source.EDGE
+                    m.d.sync += [borrow.eq(stamped), hidden.eq(stamped & unseen)]
+                m.next = "LOAD"
+            with m.State("LOAD"):
+                m.d.comb += [place.eq(step), area.eq(Area.LEAST), moving.eq(source != Source.NOTHING)]
+                m.d.sync += [source.eq(Source.NOTHING), bit.eq(0)]
                 m.next = "SHIFT"
             with m.State("SHIFT"):
-                fresh = left != 0
-                m.d.sync += [shift.eq(Cat(shift[1:], Mux(fresh, status[0], extended & shift[-1]))), bit.eq(bit + 1)]
+                m.d.comb += [place.eq(step), area.eq(Area.LEAST), moving.eq(fresh)]
+                m.d.comb += turning.eq(1)
+                m.d.sync += bit.eq(bit + 1)
                 with m.If(fresh):
-                    m.d.sync += left.eq(left - 1)
-                    with m.If(committing):
-                        m.d.sync += ports.eq(Cat(ports[1:], shift[0]))
-                    with m.Else():
-                        m.d.sync += status.eq(status[1:])
+                    m.d.sync += [left.eq(left - 1), borrow.eq(borrow & ~chain[0])]
                 with m.If(bit.all()):
                     m.next = "STORE"
             with m.State("STORE"):
-                m.d.comb += [place.eq(step ^ 1), storing.eq(1), write.en.eq(~committing)]
-                m.d.sync += step.eq(step + 1)
+                m.d.comb += [place.eq(step), write.en.eq(~committing)]
+                m.d.sync += step.eq(Cat(~step[0], read.data[NEXT:SOURCE]))
                 m.next = "SWEEP"
-                with m.If(step == design.last_status - 1):
-                    m.next = "DONE"
                 with m.If(committing):
                     m.next = "COPY"
-                    with m.If(step == design.last_active - 1):
-                        m.d.sync += committing.eq(0)
+                with m.If(last):
+                    m.next = "DONE"
+                    with m.If(committing):
                         m.next = "PULSE"
             with m.State("DONE"):
-                m.d.comb += [host.done.eq(1), place.eq(below)]
+                m.d.comb += host.done.eq(1)
                 m.next = "IDLE"
         return m

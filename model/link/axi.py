@@ -6,7 +6,7 @@ one of them.
 
 A write is a frame of its own: it is checked, done, and answered when the axis has it. A read of a status takes a
 snapshot, unless it is of the word behind the one that was read last: so words that are read in the order of their
-addresses are of one clock.
+addresses are of one snapshot.
 """
 
 from enum import IntEnum

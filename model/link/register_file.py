@@ -4,25 +4,46 @@ A book of 16-bit cells has four areas of 256, which one port of a memory reads a
 
 - LIVE is what the host reads, by the address of the register.
 - RESET is what LIVE is set to by a reset: constants, and words as after a reset.
-- LEAST and MOST are the bounds of what may be written. LEAST also says, for a register of a status or of an active
-  word, how many bits of it come from the snapshot or go to the port (bits 0 to 4), and whether the others repeat its
-  sign (`EXTENDED`).
+- LEAST and MOST are the bounds of what may be written. Of a register of a status or of an active word, LEAST says how
+  it comes from the chain of a snapshot, or goes there for its port (`_moves`).
 
 A written word stays in LIVE until a commit copies every one to its active cell and to the port that the axis reads;
 then the pulses of the frame go out, all at one clock, and the axis takes the words at its next sample. A live word is
 at its port as soon as its lower half is written.
 
-A status is read as it was at the last snapshot, all of them at one clock.
+A snapshot takes the status in turns: at the first, all that moves with every clock or sample, at one clock; then what
+only events change. What is taken in one turn is of one clock, and every value is whole. The stamps of edges are
+remembered here, from the axis's pulse at every edge, each 0 until there was one.
 """
 
 from enum import IntEnum
 
-from ..registers import ACTIVE, CAPTURE, COUNTERS, END, LIVE, MAP, PULSES, WRITTEN, RegisterMap
+from ..register import Register
+from ..registers import (
+    ACTIVE,
+    CAPTURE,
+    COUNTERS,
+    COUNTS,
+    EDGE_STAMPS,
+    END,
+    EVENTS,
+    LIVE,
+    MAP,
+    PULSES,
+    WRITTEN,
+    RegisterMap,
+)
 
 CELL_BITS = 16
 CELL = (1 << CELL_BITS) - 1
 EXTENDED = 1 << CELL_BITS - 1
 """In a LEAST cell of a status: the bits beyond those of the snapshot repeat the last one."""
+NEXT, SOURCE = 5, 12
+"""In a LEAST cell of a status or an active word: the lowest bits of half the next cell's address and of
+the source."""
+
+ANSWERS, ANSWER = 4, 32
+"""Identifying answers of a kind that there is room for, and registers for each."""
 
 
 class Area(IntEnum):
@@ -46,34 +67,59 @@ class Operation(IntEnum):
     SNAPSHOT = 6
 
 
+class Source(IntEnum):
+    """What the chain is loaded with before the cell of a status; the chain's lowest bits are taken first.
+
+    The numbers are what the chain's logic needs: the two upper bits are alike, and choose between the lower two sources
+    and the upper two, of which the lowest bit chooses one.
+    """
+
+    NOTHING = 0
+    MOMENT = 1  # what moves with every clock or sample
+    EDGE = 6  # the stamp of a kind of edge, and behind it the counts of the causes
+    EVENTS = 7
+
+
 class Design:
     """What the register file of a map holds.
 
     Attributes:
         registers: the map.
+        turns: what a snapshot takes at one clock each, in its order: the source, and the registers.
         book: the cells of every area at configuration.
         map_cells: the cells of the window to the compressed map, and behind them the answers of the identification.
         answers_at: the address of each of those answers, and how many registers it has, by their keys in the map.
         first_pulse: the address of the first pulse.
-        last_status, last_word, last_active, last_live: the addresses behind the last of each kind.
+        last_word, last_live: the addresses behind the last of each kind.
     """
 
     def __init__(self, registers: RegisterMap):
         if not isinstance(registers, RegisterMap):
             raise TypeError(f"registers must be a RegisterMap, not {registers!r}")
         self.registers = registers
+        self.turns = self._turns()
         self.first_pulse = WRITTEN - len(registers.pulses)
         self.last_word = WRITTEN + 2 * len(registers.words)
         self.last_live = LIVE + 2 * len(registers.live)
-        self.last_active = ACTIVE + 2 * len(registers.words)
-        self.last_status = registers.status[-1].address + 2
         self.book = self._book()
-        text = registers.compressed + bytes(len(registers.compressed) % 2)
+        # An answer begins where its number, and whether it is of one object, are bits of its address.
+        text = registers.compressed + bytes(-len(registers.compressed) % (2 * 2 * ANSWERS * ANSWER))
         self.answers_at: dict[tuple[bool, int], tuple[int, int]] = {}
-        for key, answer in registers.identification.items():
-            self.answers_at[key] = MAP + len(text) // 2, len(answer) // 2
-            text += answer
+        begun = len(text) // 2
+        for (one, number), answer in sorted(registers.identification.items()):
+            at = begun + (one * ANSWERS + number) * ANSWER
+            text += bytes(2 * at - len(text)) + answer
+            self.answers_at[one, number] = MAP + at, len(answer) // 2
         self.map_cells = [int.from_bytes(text[k : k + 2], "big") for k in range(0, len(text), 2)]
+
+    def _turns(self) -> tuple[tuple[Source, tuple[Register, ...]], ...]:
+        status = self.registers.status
+        edges = [each for each in status if each.name in EDGE_STAMPS]
+        events = tuple(each for each in status if each.name in EVENTS)
+        counts = tuple(each for each in status if each.name.startswith(COUNTS))
+        moment = tuple(each for each in status if each not in (*edges, *events, *counts))
+        alone = tuple((Source.EDGE, (edge,)) for edge in edges[:-1])
+        return (Source.MOMENT, moment), *alone, (Source.EDGE, (edges[-1], *counts)), (Source.EVENTS, events)
 
     def _book(self) -> list[int]:
         book = [0] * (END * len(Area))
@@ -83,12 +129,28 @@ class Design:
                 for place in places:
                     shift = CELL_BITS * (places[-1] - place)
                     book[area * END + place] = word >> shift & CELL
-        for moved in (*self.registers.status, *self.registers.active):
-            extended, width = EXTENDED * moved.format.signed, moved.format.width
-            for half, place in enumerate((moved.address + 1, moved.address)):
-                bits = min(max(width - CELL_BITS * half, 0), CELL_BITS)
-                book[Area.LEAST * END + place] = extended | bits
+        status = [(register, source * (not k)) for source, turn in self.turns for k, register in enumerate(turn)]
+        for moved in (status, [(word, Source.NOTHING) for word in self.registers.active]):
+            for place, cell in self._moves(moved).items():
+                book[Area.LEAST * END + place] = cell
         return book
+
+    @staticmethod
+    def _moves(moved: list[tuple[Register, int]]) -> dict[int, int]:
+        """Return the LEAST cells of values that pass through the chain one after the other, with their sources.
+
+        A cell has the bits that its register takes, half the address of the next cell, or 0 behind the last, the source
+        that the chain is loaded with before, and `EXTENDED`. The low half of a value comes first, so that odd and even
+        addresses take turns.
+        """
+        cells, following = {}, 0
+        for register, source in reversed(moved):
+            extended, width = EXTENDED * register.format.signed, register.format.width
+            for half, place in ((1, register.address), (0, register.address + 1)):
+                bits = min(max(width - CELL_BITS * half, 0), CELL_BITS)
+                cells[place] = extended | source * (not half) << SOURCE | following // 2 << NEXT | bits
+                following = place
+        return cells
 
     def wide(self, address: int) -> bool:
         """Return whether a register is half of a value."""
@@ -109,7 +171,8 @@ class RegisterFile:
 
     Attributes:
         live: the cells that the host reads.
-        active: the word at every port to the axis, by name, live words included.
+        active: the word that the axis uses, by name: of a live word the one at its port; of the others the one that is
+            at its port while the pulse `commit` or `preload` is high, and after a commit until the axis has it.
         pulses: names of the pulses that went out at the last FINISH, and `marked`, those that go out at the next.
         status: the word of every status now.
         refusing: names of the pulses that the device refuses now.
@@ -128,6 +191,13 @@ class RegisterFile:
         self.capture = [0] * design.registers.capture_registers
         self._tied = [True, True]
         self.clear()
+
+    @property
+    def ports(self) -> dict[str, int]:
+        """The words that are at their ports with `pulses`, by name: the live ones, and those that a pulse needs."""
+        shifted = {"commit", "preload"} & set(self.pulses)
+        kept = (*self.design.registers.words, *self.design.registers.live) if shifted else self.design.registers.live
+        return {word.name: self.active[word.name] for word in kept}
 
     def clear(self) -> None:
         """Forget what the checks have found."""
@@ -191,7 +261,12 @@ class RegisterFile:
         self.pulses, self.marked = tuple(self.marked), []
 
     def snapshot(self) -> None:
-        """Take the words of every status."""
-        for register in self.design.registers.status:
+        """Take the words of every status, all turns from the words now."""
+        for _, registers in self.design.turns:
+            self.take(registers)
+
+    def take(self, registers: tuple[Register, ...]) -> None:
+        """Take the words of some status: those of one turn."""
+        for register in registers:
             halves = register.to_registers(self.status[register.name])
             self.live[register.address : register.address + 2] = halves

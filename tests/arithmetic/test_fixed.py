@@ -4,7 +4,7 @@ import math
 from fractions import Fraction
 
 import pytest
-from amaranth.hdl import Const, Module, Signal, Value, signed, unsigned
+from amaranth.hdl import Cat, Const, Module, Signal, Value, signed, unsigned
 from amaranth.sim import Simulator
 from hypothesis import given
 from hypothesis import strategies as st
@@ -93,6 +93,12 @@ def test_hardware_narrows_as_the_model_does(value):
         assert evaluate(hdl.shift_round_half_up(word, shift)) == fixed.shift_round_half_up(value, shift)
     for low, high in ((-64, 63), (0, 5), (-128, 127)):
         assert evaluate(hdl.saturate(word, low, high)) == fixed.saturate(value, low, high)
+
+
+@pytest.mark.parametrize("bound", [0, 1, 5, 8, 15, 16, 17])
+def test_less_compares_with_a_constant(bound):
+    values = range(16)
+    assert evaluate(Cat(hdl.less(Const(value, 4), bound) for value in values)) == (1 << min(bound, 16)) - 1
 
 
 def test_shapes_follow_formats():

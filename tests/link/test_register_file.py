@@ -7,8 +7,9 @@ from cocotb.triggers import ClockCycles, RisingEdge
 from hardwall.hdl.link.register_file import RegisterFile
 from hardwall.model.link import register_file as model
 from hardwall.model.link.register_file import Operation
-from hardwall.model.registers import COUNTERS
+from hardwall.model.registers import COUNTERS, EDGE_STAMPS
 from hardwall.testing import Bench, parameters, rng, simulate
+from stimuli.status import edge, show
 from stimuli.supervised import supervised
 
 CLOCKS = {
@@ -16,7 +17,7 @@ CLOCKS = {
     Operation.CHECK_WRITE: 4,
     Operation.READ: 1,
     Operation.WRITE: 2,
-    Operation.COUNT: 2,
+    Operation.COUNT: 3,
 }
 
 
@@ -123,17 +124,19 @@ async def random_operations(dut):
         elif case < 0.9:
             clocks = await host.do(Operation.FINISH)
             host.twin.finish()
-            assert clocks == 3 + host.component.commit_clocks * ("commit" in host.twin.pulses)
+            shifted = "commit" in host.twin.pulses or "preload" in host.twin.pulses
+            assert clocks == 3 + host.component.shift_clocks * shifted
+            ported = {name: host.bench.reader(name)() for name in host.twin.ports}
             await RisingEdge(dut.clk)
             seen = [len(monitor.clocks) for monitor in pulsed]
             assert [now - then for now, then in zip(seen, before, strict=True)] == [
                 host.twin.pulses.count(pulse.name) > 0 for pulse in pulses
             ]
             before = seen
-            assert host.twin.active == {word.name: host.bench.reader(word.name)() for word in words}
+            assert host.twin.ports == ported
         else:
             now = {each.name: int(random.integers(each.format.min, each.format.max + 1)) for each in statuses}
-            host.bench.drive(**now)
+            await show(dut, host.bench, host.registers, now)
             assert await host.do(Operation.SNAPSHOT) == host.component.snapshot_clocks
             host.twin.status = now
             host.twin.snapshot()
@@ -143,6 +146,38 @@ async def random_operations(dut):
             await host.clear()
     for address in (*range(256), 0x4000, 0x4000 + len(host.design.map_cells) - 1):
         assert await host.read(address) == host.twin.read(address)
+
+
+@cocotb.test()
+async def a_snapshot_takes_every_turn_at_its_clock(dut):
+    host, random = Host(dut), rng()
+    await host.bench.reset()
+    await host.do(Operation.SNAPSHOT)
+    statuses, component = host.registers.status, host.component
+    for _ in range(4):
+        await RisingEdge(dut.clk)
+        now, shown = dict.fromkeys(EDGE_STAMPS, 0) | host.twin.status, []
+        host.bench.drive(host__operation=Operation.SNAPSHOT, host__start=1)
+        while not int(dut.host__done.value):
+            now |= {r.name: int(random.integers(r.format.min, r.format.max + 1)) for r in statuses
+                    if r.name not in EDGE_STAMPS}  # fmt: skip
+            host.bench.drive(stepped=0, **{name: word for name, word in now.items() if name not in EDGE_STAMPS})
+            if random.random() < 0.7:
+                kind = str(random.choice(EDGE_STAMPS))
+                stamped = edge(host.registers, kind, int(random.integers(0, host.registers[kind].high + 1)))
+                host.bench.drive(**stamped)
+                now |= {"stamp": stamped["stamp"], kind: (stamped["stamp"] - 1) % (host.registers[kind].high + 1)}
+            shown.append(dict(now))
+            await RisingEdge(dut.clk)
+        host.bench.drive(host__start=0, stepped=0)
+        assert len(shown) - 1 == component.snapshot_clocks
+        host.twin.status = {name: shown[clock][name] for name, clock in component.taken_clocks.items()}
+        host.twin.snapshot()
+        host.twin.status = shown[-1]
+        await RisingEdge(dut.clk)
+        for register in statuses:
+            halves = [await host.read(register.address + k) for k in range(2)]
+            assert halves == host.twin.live[register.address : register.address + 2], register.name
 
 
 @cocotb.test()

@@ -15,6 +15,7 @@ from cocotbext.uart import UartSink, UartSource
 from hardwall.hdl.board import ENCODER, Board
 from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.link.link import Link
+from hardwall.hdl.link.register_file import RegisterFile
 from hardwall.hdl.supervised import LOOPS, SHOWN
 from hardwall.model import output, quadrature, wall
 from hardwall.model.estimators.estimate import estimate
@@ -185,6 +186,7 @@ class Twin:
         inputs = quadrature.Inputs(*channels, self.words["encoder_glitch_clocks"], self.words["encoder_invert"])
         if self.strobe:
             if self.waiting:
+                assert self.waiting.items() <= (asked | self._fixed()).items(), "words moved before the axis had them"
                 self.words, self.waiting = self.waiting, None
             self._sample()
             self.restart = 0
@@ -210,6 +212,7 @@ class Host:
         pulses: the levels of the drive's pins at every edge.
         history: what the twin showed at the last edges, by stamp.
         refused: exceptions that were answered.
+        shifted: what the link asked for at every pulse that words belong to.
     """
 
     def __init__(self, dut, name: str, estimator: str):
@@ -224,6 +227,8 @@ class Host:
         self.server = server.Server(register_file.Design(self.registers))
         self.place = {register.name: register.address for register in self.registers.registers}
         self.refused: list[int] = []
+        self.taken_clocks = RegisterFile(self.server.file.design).taken_clocks
+        self.shifted: list[dict[str, int]] = []
 
     async def reset(self) -> None:
         await self.bench.reset()
@@ -281,6 +286,8 @@ class Host:
             assert not unlike, f"edge {twin.clocks}: the board's and the twin's {unlike}"
             self.pulses.append(pins)
             self.history.append((twin.decoder.stamp, twin.shown()))
+            if asked["commit"] or asked["preload"]:
+                self.shifted.append(asked)
             twin.edge(self.pins, asked, found)
             self._turn()
 
@@ -311,11 +318,15 @@ class Host:
             expected.append(frozenset(("arm",) * (not ready) + ("preload",) * armed))
         self.server.file.refusing = self._refusing(answer, expected)
         self.server.file.status = self._snapshot(pdu, answer)
+        self.server.file.pulses = ()
         assert answer == framed(self.server.take(Verdict.REQUEST, frame))
         if answer[1] & 0x80:
             self.refused.append(answer[2])
-        found = self.component.asked.unpack(int(self.dut.asking.value))
-        assert {name: found[name] for name in self.server.file.active} == self.server.file.active
+        file, found = self.server.file, self.component.asked.unpack(int(self.dut.asking.value))
+        assert {word.name: found[word.name] for word in self.registers.live}.items() <= file.active.items()
+        shifted = {"commit", "preload"} & set(file.pulses)
+        assert [{name: each[name] for name in file.active} for each in self.shifted] == [file.active] * bool(shifted)
+        self.shifted.clear()
         return answer[1:-2]
 
     @staticmethod
@@ -335,13 +346,15 @@ class Host:
         return got
 
     def _snapshot(self, pdu: bytes, answer: bytes) -> dict[str, int]:
-        """Return the status that the board must have shown when it read its own stamp."""
+        """Return the status that the board must have shown when it took each, from when it took its own stamp."""
         first, size = self.place["stamp"] - int.from_bytes(pdu[1:3], "big"), 4
         if pdu[0] != 3 or answer[1] != 3 or not 0 <= first <= answer[2] // 2 - 2:
             return {status.name: 0 for status in self.registers.status}
         stamp = int.from_bytes(answer[3 + 2 * first : 3 + 2 * first + size], "big")
-        (shown,) = [shown for known, shown in self.history if known == stamp]
-        return self.twin.status(shown)
+        (at,) = [at for at, (known, _) in enumerate(self.history) if known == stamp]
+        shown = {clock: self.twin.status(self.history[at + clock - self.taken_clocks["stamp"]][1])
+                 for clock in set(self.taken_clocks.values())}  # fmt: skip
+        return {name: shown[clock][name] for name, clock in self.taken_clocks.items()}
 
     async def look(self, first: str = "drive", last: str = "driven") -> dict[str, int]:
         """Return the status from one register to another, as read from the board in one frame."""
