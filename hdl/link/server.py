@@ -1,14 +1,16 @@
 """The application layer of Modbus: functions and exceptions over a register file."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
+from amaranth.utils import exact_log2
 
 from hardwall.model.link import server as model
 from hardwall.model.link.line import Verdict
-from hardwall.model.link.register_file import CELL_BITS, Design, Operation
+from hardwall.model.link.register_file import ANSWER, ANSWERS, CELL_BITS, Design, Operation
 from hardwall.model.registers import COUNTERS
 
+from ..arithmetic.fixed import less
 from .line import BYTE, Frames
 from .register_file import ADDRESS_BITS, Requests
 
@@ -66,7 +68,7 @@ class Server(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         frames, file, answer = self.frames, self.file, self.frames.answer
-        function = frames.function
+        function, answers = frames.function, self._design.answers_at
         reads, writes, single = Signal(), Signal(), Signal()
         m.d.comb += [
             reads.eq(Cat(function == each for each in model.READS).any()),
@@ -74,16 +76,28 @@ class Server(wiring.Component):
             single.eq(function == model.WRITE_ONE),
         ]
 
-        # Two clocks take a byte of the frame: `index` goes out, and the byte comes. Four take a word.
+        # A byte of the frame comes a clock after its `index`, and is looked at a clock later: a memory is slow.
         index, beat = Signal(BYTE), Signal(2)
-        word, taken = Signal(CELL_BITS), Signal(CELL_BITS)
-        m.d.comb += [frames.index.eq(index), taken.eq(Cat(frames.byte, word[:BYTE]))]
+        word, length = Signal(CELL_BITS), Signal(BYTE)
+        taking, got, ending, excepting = Signal(), Signal(), Signal(), Signal()
+        with m.If(taking | got | ending):
+            taken = Cat(frames.byte, word[:BYTE])
+            m.d.sync += word.eq(Mux(got, file.data, Cat(taken[:BYTE], Mux(ending, length, taken[BYTE:]))))
+        # What `index` becomes is the next place, or one of three.
+        advance, rewind, at_fields, at_written = Signal(), Signal(), Signal(), Signal()
+        m.d.comb += frames.index.eq(index)
+        with m.If(advance | rewind | at_fields | at_written):
+            begin = Mux(at_written, FIELDS_TO_WRITE, Mux(at_fields, FIELDS, 0))
+            m.d.sync += index.eq(Mux(advance, index + 1, begin))
 
-        def take():
-            """Take a byte at every second clock; the word is there at beat 3."""
+        def take(last: int):
+            """Take two bytes, which are in the word at beat 3, or one, which is in its lower half at beat 2."""
+            m.d.comb += taking.eq(beat[0] ^ beat[1])
             m.d.sync += beat.eq(beat + 1)
-            with m.If(beat[0]):
-                m.d.sync += [word.eq(taken), index.eq(index + 1)]
+            with m.If(beat < last - 1):
+                m.d.comb += advance.eq(1)
+            with m.If(beat == last):
+                m.d.sync += beat.eq(0)
 
         phase = Signal(Operation)
         address, left, first = Signal(ADDRESS_BITS), Signal(BYTE), Signal()
@@ -95,11 +109,25 @@ class Server(wiring.Component):
             file.first.eq(first),
             file.last.eq(left == 1),
             file.value.eq(word),
+            length.eq(Mux(code == 0, left << 1, code)),
+            answer.payload.eq(Cat(word[BYTE:-1], word[-1] | excepting)),
         ]
-        most = Mux(writes & phase[0], Mux(reads, model.WRITE_AND_READ_MAX, model.WRITE_MAX), model.READ_MAX)
+        few, fewer, fewest = (
+            less(word, most + 1) for most in (model.READ_MAX, model.WRITE_MAX, model.WRITE_AND_READ_MAX)
+        )
+        bad = ~word.any() | ~Mux(writes & phase[0], Mux(reads, fewest, fewer), few)
 
-        def count(counter: int):
-            m.d.sync += address.eq(COUNTERS + counter)
+        # What `address` and `left` become: those of the next register, of a request, or of this device's own.
+        onward, address_given, left_given, own_address, own_left = Signal(), Signal(), Signal(), Signal(), Signal()
+        counter, place, size = Signal(3), Signal(ADDRESS_BITS), Signal(BYTE)
+        m.d.comb += [place.eq(COUNTERS | counter), size.eq(1)]
+        with m.If(onward | address_given | own_address):
+            m.d.sync += address.eq(Mux(onward, address + 1, Mux(address_given, word, place)))
+        with m.If(onward | left_given | own_left):
+            m.d.sync += left.eq(Mux(onward, left - 1, Mux(left_given, word, size)))
+
+        def count(number: int):
+            m.d.comb += [own_address.eq(1), counter.eq(number)]
             m.next = "COUNT"
 
         def refuse(exception: int):
@@ -108,7 +136,8 @@ class Server(wiring.Component):
 
         def send_head(length: int):
             """Send the first bytes of the frame, and then what belongs behind them."""
-            m.d.sync += [index.eq(0), stop.eq(length)]
+            m.d.comb += rewind.eq(1)
+            m.d.sync += stop.eq(length)
             m.next = "HEAD"
 
         def end_phase():
@@ -127,7 +156,6 @@ class Server(wiring.Component):
                         count(model.MESSAGES)
             with m.State("COUNT"):
                 m.d.comb += [file.start.eq(1), file.clear.eq(1), file.operation.eq(Operation.COUNT)]
-                m.d.sync += index.eq(FIELDS)
                 with m.If(file.done):
                     m.next = "FINISHED"
                     with m.Switch(address[:3]):
@@ -137,6 +165,7 @@ class Server(wiring.Component):
                             with m.Elif(frames.verdict == Verdict.BROADCAST):
                                 count(model.UNANSWERED)
                         with m.Case(model.REQUESTS):
+                            m.d.comb += at_fields.eq(1)
                             m.next = "PHASE"
                             with m.If((function == model.DIAGNOSE) | (function == model.IDENTIFY)):
                                 m.next = "ADDRESS"
@@ -153,12 +182,12 @@ class Server(wiring.Component):
                     with m.If(~reads):
                         end_phase()
                 with m.Case(Operation.CHECK_WRITE):
-                    m.d.sync += index.eq(Mux(reads, FIELDS_TO_WRITE, FIELDS))
+                    m.d.comb += [at_written.eq(reads), at_fields.eq(1)]
                     m.next = "ADDRESS"
                     with m.If(~writes):
                         end_phase()
                 with m.Case(Operation.WRITE):
-                    m.d.sync += index.eq(Mux(reads, FIELDS_TO_WRITE, FIELDS))
+                    m.d.comb += [at_written.eq(reads), at_fields.eq(1)]
                     m.next = "ADDRESS"
                     with m.If(~writes):
                         end_phase()
@@ -175,25 +204,23 @@ class Server(wiring.Component):
                     with m.If(~reads):
                         send_head(ECHOED)
             with m.State("SNAPSHOT"):
-                m.d.comb += [file.start.eq(1), file.operation.eq(Operation.SNAPSHOT)]
-                m.d.sync += index.eq(FIELDS)
+                m.d.comb += [file.start.eq(1), file.operation.eq(Operation.SNAPSHOT), at_fields.eq(1)]
                 with m.If(file.done):
                     m.next = "ADDRESS"
             with m.State("ADDRESS"):
-                take()
+                take(3)
                 m.d.sync += first.eq(1)
                 with m.If(beat == 3):
-                    m.d.sync += [address.eq(taken), left.eq(1)]
+                    m.d.comb += [address_given.eq(1), own_left.eq(1)]
                     m.next = "QUANTITY"
                     with m.If(single):
                         m.next = "VALUE"
                     with m.Elif(function == model.IDENTIFY):
                         m.next = "IDENTIFY"
             with m.State("QUANTITY"):
-                take()
+                take(3)
                 with m.If(beat == 3):
-                    m.d.sync += left.eq(taken)
-                    bad = (taken == 0) | taken[7:].any() | (taken[:7] > most)
+                    m.d.comb += left_given.eq(1)
                     with m.If(function == model.DIAGNOSE):
                         m.next = "DIAGNOSE"
                     with m.Elif(phase[0] == phase[1]):
@@ -208,15 +235,14 @@ class Server(wiring.Component):
                         m.d.sync += malformed.eq(malformed | bad)
                         m.next = "BYTES"
             with m.State("BYTES"):
-                take()
-                with m.If(beat[0]):
-                    m.d.sync += beat.eq(0)
+                take(2)
+                with m.If(beat == 2):
                     m.next = "VALUE"
-                    with m.If(malformed | (frames.byte != left << 1)):
+                    with m.If(malformed | (word[:BYTE] != left << 1)):
                         m.d.sync += malformed.eq(1)
                         end_phase()
             with m.State("VALUE"):
-                take()
+                take(3)
                 with m.If(beat == 3):
                     m.next = "ASK"
 
@@ -226,10 +252,11 @@ class Server(wiring.Component):
                 with m.If(file.done):
                     m.next = "NEXT"
                     with m.If(phase == Operation.READ):
-                        m.d.sync += word.eq(file.data)
+                        m.d.comb += got.eq(1)
                         m.next = "SEND_HIGH"
             with m.State("NEXT"):
-                m.d.sync += [address.eq(address + 1), left.eq(left - 1), first.eq(0)]
+                m.d.comb += onward.eq(1)
+                m.d.sync += first.eq(0)
                 m.next = "ASK"
                 with m.If(left == 1):
                     end_phase()
@@ -250,50 +277,53 @@ class Server(wiring.Component):
                 m.d.sync += phase.eq(Operation.READ)
                 with m.If(sub == model.ECHO):
                     send_head(ECHOED)
-                with m.Elif(sub[5:].any() | (sub[:5] < model.CLEAR) | (sub[:5] > model.LAST_COUNTER)):
+                with m.Elif(less(sub, model.CLEAR) | ~less(sub, model.LAST_COUNTER + 1)):
                     refuse(model.FUNCTION)
                 with m.Elif(word != 0):
                     refuse(model.VALUE)
                 with m.Elif(sub == model.CLEAR):
-                    m.d.sync += [address.eq(COUNTERS), left.eq(COUNTERS_CLEARED), clearing.eq(1)]
-                    m.d.sync += phase.eq(Operation.WRITE)
+                    m.d.comb += [own_address.eq(1), own_left.eq(1), size.eq(COUNTERS_CLEARED)]
+                    m.d.sync += [phase.eq(Operation.WRITE), clearing.eq(1)]
                     m.next = "ASK"
                 with m.Else():
-                    m.d.sync += [address.eq(COUNTERS | sub[:3]), left.eq(1)]
+                    m.d.comb += [own_address.eq(1), counter.eq(sub), own_left.eq(1)]
                     send_head(HEAD_OF_OTHERS)
             with m.State("IDENTIFY"):
-                # The word has the kind, which is 14, and the code; then the number of the object comes.
-                take()
+                # The first word has the kind, which is 14, and the code; then the number of the object comes.
+                take(2)
                 m.d.sync += phase.eq(Operation.READ)
-                with m.If(beat[0]):
-                    m.d.sync += beat.eq(0)
-                    kind, asked = word[BYTE:], word[:BYTE]
-                    named = asked == model.NAMED
+                with m.If(beat == 2):
+                    kind, asked, number_asked = address[BYTE:CELL_BITS], address[:BYTE], word[:BYTE]
+                    named, known = asked == model.NAMED, less(number_asked, len(answers) // 2)
                     with m.If(kind != model.DEVICE_IDENTIFICATION):
                         refuse(model.FUNCTION)
-                    with m.Elif((asked == 0) | (asked > model.NAMED)):
+                    with m.Elif(~asked.any() | ~less(asked, model.NAMED + 1)):
                         refuse(model.VALUE)
+                    with m.Elif(named & ~known):
+                        refuse(model.ABSENT)
                     with m.Else():
                         send_head(HEAD_OF_OTHERS)
-                        # A number that is not known begins a stream at the first object, and is no single object.
-                        for (one, number), (place, size) in self._design.answers_at.items():
-                            with m.If((named == one) & ((frames.byte == number) | (~named & (number == 0)))):
-                                m.d.sync += [address.eq(place), left.eq(size)]
-                        with m.If(named & (frames.byte >= len(self._design.answers_at) // 2)):
-                            refuse(model.ABSENT)
+                        # A number that is not known begins a stream at the first object.
+                        chosen = Cat(Mux(known, number_asked[: exact_log2(ANSWERS)], 0), named)
+                        m.d.comb += [own_address.eq(1), own_left.eq(1)]
+                        m.d.comb += place.eq(answers[False, 0][0] | chosen << exact_log2(ANSWER))
+                        with m.Switch(chosen):
+                            for (one, number), (_, registers) in answers.items():
+                                with m.Case(one * ANSWERS + number):
+                                    m.d.comb += size.eq(registers)
 
             # The answer.
             with m.State("HEAD"):
-                m.d.comb += [
-                    answer.valid.eq(beat[0]),
-                    answer.payload.eq(Cat(frames.byte[:-1], frames.byte[-1] | ((code != 0) & index[0]))),
-                ]
-                with m.If(~beat[0]):
-                    m.d.sync += beat.eq(1)
+                # The byte is taken twice, and so into the upper half.
+                m.d.comb += [taking.eq(beat[0] ^ beat[1]), answer.valid.eq(beat == 3)]
+                m.d.comb += excepting.eq((code != 0) & index[0])
+                with m.If(beat != 3):
+                    m.d.sync += beat.eq(beat + 1)
                 with m.Elif(answer.ready):
-                    m.d.sync += [beat.eq(0), index.eq(index + 1)]
-                    with m.If(index + 1 == stop):
-                        m.d.sync += word.eq(Cat(Const(0, BYTE), Mux(code == 0, left << 1, code)))
+                    m.d.comb += advance.eq(1)
+                    m.d.sync += beat.eq(0)
+                    with m.If((index + 1)[: len(stop)] == stop):
+                        m.d.comb += ending.eq(1)
                         with m.Switch(stop):
                             with m.Case(HEAD):
                                 m.next = "SEND_LAST"
@@ -303,9 +333,9 @@ class Server(wiring.Component):
                                 m.next = "FINISHED"
             for state in ("SEND_LAST", "SEND_HIGH", "SEND_LOW"):
                 with m.State(state):
-                    m.d.comb += [answer.valid.eq(1), answer.payload.eq(word[BYTE:])]
+                    m.d.comb += answer.valid.eq(1)
                     with m.If(answer.ready):
-                        m.d.sync += word.eq(word << BYTE)
+                        m.d.comb += taking.eq(1)
                         m.next = {"SEND_HIGH": "SEND_LOW", "SEND_LOW": "NEXT", "SEND_LAST": "ASK"}[state]
                         if state == "SEND_LAST":
                             with m.If(code != 0):
