@@ -1,6 +1,6 @@
 """An axis for real packages: the pins of an encoder, three loops, a link, and a drive that a filter can take."""
 
-from amaranth.hdl import Cat, ClockDomain, DomainRenamer, Module, Mux, Signal
+from amaranth.hdl import Cat, ClockDomain, DomainRenamer, Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
@@ -127,12 +127,12 @@ class Board(wiring.Component):
     @property
     def latency(self) -> int:
         """Clocks from the sample strobe to the first pulse that the changed drive makes."""
-        return self.axis.latency + 2
+        return self.axis.latency + 1
 
     @property
     def safe_latency(self) -> int:
         """Clocks from a cause that stands to the first clock without a pulse: of the supervisor, and of the pulses."""
-        return 1 + 2
+        return 1 + 1
 
     @property
     def drive_bits(self) -> int:
@@ -176,15 +176,10 @@ class Board(wiring.Component):
             link.commit_pending.eq(axis.commit_pending),
         ]
 
-        # The supervisor limits the drive, so its magnitude needs only the bits of the limit.
         total = Signal(self.drive_bits + 1)
-        magnitude = Signal(self.drive_bits)
-        negative = Signal()
         m.d.sync += [
-            magnitude.eq(Mux(axis.driven < 0, -axis.driven, axis.driven)),
-            negative.eq((axis.driven < 0) ^ axis.drive_inverted),
-            total.eq(total[:-1] + magnitude),
-            self.drive_sign.eq(negative),
+            total.eq(total[:-1] + axis.magnitude),
+            self.drive_sign.eq(axis.negative ^ axis.drive_inverted),
         ]
         m.d.comb += [
             self.drive_pdm.eq(total[-1] & self.drive_enable & self.emergency_stop & running),

@@ -19,16 +19,20 @@ from hardwall.model.supervisor import COUNT
 from .arithmetic.fixed import shape
 from .block import Block
 
+CLOCKS = {"position_range": 2, "runaway": 2, "estimator_saturated": 2, "index_spacing": 3}
+"""Clocks of the causes that are not found in one: limits are compared in turn, or what has been counted before."""
+
 
 class Monitors(Block):
     """One bit for everything that is wrong, as `hardwall.model.monitors` says for each.
 
     Equation: in the model's module, bit by bit.
 
-    Latency: one clock from the inputs to `causes`, and `index_clocks` from an index edge, for its distance is compared
-    in steps. `velocity` and `saturated` are looked at with `valid`, `edge_kind`
-    with `stepped`, and the count's distance to the last index edge with `indexed`: these causes are pulses. The others
-    last for as long as what is wrong does.
+    Latency: `latency` of a cause, from the inputs to `causes`; a new limit of the position acts a clock later.
+    `velocity` and `saturated` are looked at with `valid`, `edge_kind` with `stepped`, and the distance to the last
+    index edge with `indexed`: velocity_limit and index_spacing are pulses. The others last for as long as what is wrong
+    does. Ways are counted edge by edge, the direction by the count's last two bits: a preload is no motion, but the
+    direction of an edge in its very clock is not known.
 
     Rounding and overflow: distances are taken modulo the count's width; counters stop at their limits.
 
@@ -42,12 +46,12 @@ class Monitors(Block):
     count : In(SQ)
         The live count.
     stepped, edge_kind : In
-        The count has changed, and the kind of the edge that changed it.
+        An edge has changed the count, and its kind.
     indexed : In(1)
         Pulse: the index edge was counted.
     valid, velocity, saturated : In
         The estimator's result, and whether it is saturated.
-    driven : In(SQ)
+    magnitude, negative : In
         The drive that is let out, force LSB.
     force_limit : In(UQ)
         The limit that it obeys, force LSB.
@@ -78,7 +82,8 @@ class Monitors(Block):
             "valid": In(1),
             "velocity": In(shape(design.velocity)),
             "saturated": In(1),
-            "driven": In(shape(design.force)),
+            "magnitude": In(shape(design.limit)),
+            "negative": In(1),
             "force_limit": In(shape(design.limit)),
             **dict.fromkeys(("a", "a_n", "b", "b_n"), In(1)),
             **{word.name: In(shape(word.format)) for word in design.words},
@@ -91,79 +96,138 @@ class Monitors(Block):
         """Clocks from an index edge to its cause."""
         return 4
 
+    def latency(self, cause: str) -> int:
+        """Return the most clocks from inputs that are wrong to the cause of a name."""
+        return CLOCKS.get(cause, 1)
+
     def elaborate(self, platform):
         m = Module()
         top = self.count[-3:]
-        fastest = Cat(Const(0, self._design.params.velocity_shift), self.supervisor_velocity_limit)
+        way = self._way(m)
         found = {
-            POSITION_RANGE: (self.count < self.supervisor_position_low) | (self.count > self.supervisor_position_high),
+            POSITION_RANGE: self._out_of_range(m),
             # Beyond three quarters of the range of two's complement, by the first three bits.
             POSITION_WRAP: (top == 0b011) | (top == 0b100),
-            VELOCITY_LIMIT: self.valid & (abs(self.velocity) > fastest),
-            RUNAWAY: self._runaway(m),
-            ESTIMATOR_SATURATED: self._longer(m, "samples", self.saturated, self.supervisor_saturated, self.valid),
-            ENCODER_LOSS: self._longer(m, "lost_a", self.a == self.a_n, self.supervisor_loss)
-            | self._longer(m, "lost_b", self.b == self.b_n, self.supervisor_loss),
-            INDEX_SPACING: self._index_is_wrong(m),
+            VELOCITY_LIMIT: self.valid & self._too_fast(),
+            RUNAWAY: self._runaway(m, way),
+            ESTIMATOR_SATURATED: self._saturated(m),
+            ENCODER_LOSS: self._lost(m, "lost_a", self.a == self.a_n) | self._lost(m, "lost_b", self.b == self.b_n),
+            INDEX_SPACING: self._index_is_wrong(m, way),
         }
         m.d.sync += self.causes.eq(Cat(found.get(bit, Const(0, 1)) for bit in range(COUNT)))
 
         channel, edges = Signal(), Signal(range(IDLE_EDGES + 1))
-        following = Signal.like(edges)
-        m.d.comb += following.eq(edges)
+        idle = edges == IDLE_EDGES
         with m.If(self.stepped):
             m.d.sync += channel.eq(self.edge_kind[0])
             with m.If(channel != self.edge_kind[0]):
-                m.d.comb += following.eq(1)
-            with m.Elif(edges != IDLE_EDGES):
-                m.d.comb += following.eq(edges + 1)
-        m.d.sync += [edges.eq(following), self.a_channel_idle.eq(following == IDLE_EDGES)]
+                m.d.sync += edges.eq(1)
+            with m.Elif(~idle):
+                m.d.sync += edges.eq(edges + 1)
+        m.d.comb += self.a_channel_idle.eq(idle)
         return m
 
-    def _runaway(self, m: Module) -> Value:
-        """Return whether the handle has moved too far against a drive at its limit."""
-        side_before, side = Signal(signed(2)), Signal(signed(2))
-        limit = Signal(signed(len(self.driven)))
-        m.d.comb += limit.eq(self.force_limit)
-        with m.If(self.force_limit.any()):
-            with m.If(self.driven >= limit):
-                m.d.comb += side.eq(1)
-            with m.Elif(self.driven + limit <= 0):
-                m.d.comb += side.eq(-1)
-        held = (side == side_before) & (side != 0)
-        anchor, moved = Signal.like(self.count), Signal.like(self.count)
-        m.d.comb += moved.eq(self.count - anchor)
-        m.d.sync += side_before.eq(side)
-        with m.If(~held):
-            m.d.sync += anchor.eq(self.count)
-        most = Signal(signed(len(self.count) + 1))
-        m.d.comb += most.eq(self.supervisor_runaway)
-        # Both comparisons work in parallel: a negation before one would be a carry chain more.
-        return held & Mux(side > 0, moved + most < 0, moved > most)
+    def _way(self, m: Module) -> Signal:
+        """Return whether the edge of this clock counts upwards, by the count's last two bits before and after it."""
+        before, up = Signal(2), Signal()
+        m.d.sync += before.eq(self.count[:2])
+        m.d.comb += up.eq(~(self.count[1] ^ before[1] ^ before[0]))
+        return up
 
-    def _longer(self, m: Module, name: str, wrong: Value, limit: Value, when: Value | int = 1) -> Value:
-        """Return whether something has been wrong for more than `limit` clocks, counted where `when` is high."""
-        passed, now = Signal(len(limit) + 1, name=name), Signal(len(limit) + 1, name=f"{name}_now")
-        m.d.comb += now.eq(passed)
-        with m.If(when):
-            m.d.comb += now.eq(Mux(wrong, Mux(passed > limit, limit + 1, passed + 1), 0))
-        m.d.sync += passed.eq(now)
-        return now > limit
-
-    def _index_is_wrong(self, m: Module) -> Value:
-        """Return whether an index edge is neither at the last one nor a turn away."""
-        has_index, last_index = Signal(), Signal.like(self.count)
-        with m.If(self.indexed):
-            m.d.sync += [has_index.eq(1), last_index.eq(self.count)]
-        moved, distance = Signal.like(self.count), Signal(len(self.count))
-        beyond = Signal(signed(len(self.count) + 1))
-        measured, judged, near = Signal(), Signal(), Signal(init=1)
+    def _out_of_range(self, m: Module) -> Value:
+        """Return whether the count is beyond a limit: one comparison, of both limits in turn."""
+        at_low, wrong, wrong_before = Signal(init=1), Signal(), Signal()
+        limit = Signal.like(self.count)
+        # The limit waits as its complement, which a subtraction adds: the low one with a carry, so that the difference
+        # is negative below it, and the high one without, so that it is not negative above it.
         m.d.sync += [
-            measured.eq(self.indexed & has_index),
-            moved.eq(self.count - last_index),
-            judged.eq(measured),
-            distance.eq(abs(moved)),
-            near.eq(~judged | (distance <= self.supervisor_index_tolerance)),
-            beyond.eq(distance - self.supervisor_turn),
+            at_low.eq(~at_low),
+            limit.eq(~Mux(at_low, self.supervisor_position_high, self.supervisor_position_low)),
+            wrong_before.eq(wrong),
         ]
-        return ~near & (abs(beyond) > self.supervisor_index_tolerance)
+        difference = (Cat(Const(1, 1), self.count).as_signed() + Cat(at_low, limit).as_signed()) >> 1
+        m.d.comb += wrong.eq((difference < 0) == at_low)
+        return wrong | wrong_before
+
+    def _too_fast(self) -> Value:
+        """Return whether |velocity| is above its limit."""
+        limit = Cat(Const(0, self._design.params.velocity_shift), self.supervisor_velocity_limit)
+        return ~_within(self.velocity, limit)
+
+    def _runaway(self, m: Module, up: Signal) -> Value:
+        """Return whether the handle has moved too far against a drive at its limit."""
+        pressed, pressed_before, negative_before = Signal(), Signal(), Signal()
+        m.d.comb += pressed.eq((self.magnitude == self.force_limit) & self.force_limit.any())
+        m.d.sync += [pressed_before.eq(pressed), negative_before.eq(self.negative)]
+        held = pressed & pressed_before & (self.negative == negative_before)
+        # The way is negative, so that a sum compares it.
+        way = Signal.like(self.count)
+        with m.If(~held):
+            m.d.sync += way.eq(0)
+        with m.Elif(self.stepped):
+            m.d.sync += way.eq(way + _one(way, up == self.negative))
+        return self.supervisor_runaway + way < 0
+
+    def _saturated(self, m: Module) -> Value:
+        """Return whether the estimate has been saturated for too many samples."""
+        # The number is negative, so that a sum compares it.
+        samples = Signal(signed(len(self.supervisor_saturated) + 1))
+        too_many = Signal()
+        m.d.comb += too_many.eq(self.supervisor_saturated + samples < 0)
+        with m.If(self.valid & ~self.saturated):
+            m.d.sync += samples.eq(0)
+        with m.Elif(self.valid & ~too_many):
+            m.d.sync += samples.eq(samples - 1)
+        return too_many
+
+    def _lost(self, m: Module, name: str, wrong: Value) -> Value:
+        """Return whether a channel has equalled its complement for too many clocks."""
+        passed, too_long = Signal.like(self.supervisor_loss, name=name), Signal(name=f"{name}_too_long")
+        m.d.comb += too_long.eq(passed >= self.supervisor_loss)
+        with m.If(~wrong):
+            m.d.sync += passed.eq(0)
+        with m.Elif(~too_long):
+            m.d.sync += passed.eq(passed + 1)
+        return wrong & too_long
+
+    def _index_is_wrong(self, m: Module, up: Signal) -> Value:
+        """Return whether an index edge is neither at the last one nor a turn away."""
+        tolerance = self.supervisor_index_tolerance
+        has_index, indexed, measured = Signal(), Signal(), Signal()
+        m.d.sync += [has_index.eq(has_index | self.indexed), indexed.eq(self.indexed)]
+        m.d.sync += measured.eq(self.indexed & has_index)
+        # The distance from the last index edge, negative, and its side.
+        distance, upwards, grows = Signal.like(self.count), Signal(), Signal()
+        m.d.comb += grows.eq(Mux(indexed, self.stepped, (distance == 0) | (up == upwards)))
+        with m.If(self.stepped & grows):
+            m.d.sync += upwards.eq(up)
+        with m.If(self.stepped | indexed):
+            # At an index edge it begins anew, with the edge of this clock.
+            m.d.sync += distance.eq(Mux(indexed, grows.replicate(len(distance)), distance + _one(distance, grows)))
+
+        low, high = _halves(distance, len(tolerance))
+        near = (distance == 0) | (high.all() & (low + tolerance)[-1])
+        away, beyond = Signal(), Signal(signed(len(self.count) + 1))
+        m.d.sync += [away.eq(measured & ~near), beyond.eq(distance + self.supervisor_turn)]
+        low, high = _halves(beyond, len(tolerance))
+        return away & ~((high == beyond[-1].replicate(len(high))) & _within(Cat(low, beyond[-1]), tolerance))
+
+
+def _one(like: Signal, negative: Value) -> Value:
+    """Return 1, or -1 if `negative`, as wide as `like`: all of its bits but the lowest are the sign."""
+    return Cat(Const(1, 1), negative.replicate(len(like) - 1)).as_signed()
+
+
+def _within(value: Value, limit: Value) -> Value:
+    """Return whether the magnitude of a signed value is at most a limit that has its bits but the sign.
+
+    A subtraction adds the complement of the magnitude and one: of a negative value, the value itself.
+    """
+    sign, bits = value[-1], value[:-1]
+    return (Cat(Const(1, 1), limit) + Cat(~sign, bits ^ ~sign.replicate(len(bits))))[-1]
+
+
+def _halves(value: Signal, bits: int) -> tuple[Value, Value]:
+    """Return so many low bits of a signed value, and the others, of which one at least is its sign."""
+    wide = Cat(value, value[-1].replicate(max(bits + 1 - len(value), 0)))
+    return wide[:bits], wide[bits:]

@@ -19,7 +19,9 @@ LOOPS = ("drive_enable", "external_fault", "emergency_stop")
 COMPLEMENTS = ("encoder_a_n", "encoder_b_n")
 REQUESTS = ("arm", "disarm", "acknowledge", "acknowledged", "heartbeat")
 """Inputs of the supervisor that come from the host."""
-SHOWN = ("driven", "state", "alive", "live", "ready", "latched", "first", "first_stamp", "counts")
+SHOWN = (
+    "driven", "magnitude", "negative", "state", "alive", "live", "ready", "latched", "first", "first_stamp", "counts",
+)  # fmt: skip
 """Outputs of the supervisor."""
 
 
@@ -54,7 +56,7 @@ class SupervisedAxis(wiring.Component):
         Run-time parameters; those of `design.committed` act at the sample after a commit, the others at the next clock.
         One of the latter beyond its range in `design.ranges` is the cause word_range.
     the outputs of `Supervisor` : Out
-        As there; `driven` is the drive that may leave the FPGA.
+        As there; `driven`, or `magnitude` and `negative`, is the drive that may leave the FPGA.
     drive_inverted : Out(1)
         The sign of the drive's pins is to be reversed: `drive_invert`, as it was when the axis was last not ARMED.
     a_channel_idle : Out(1)
@@ -127,7 +129,8 @@ class SupervisedAxis(wiring.Component):
             monitors.valid.eq(axis.estimated),
             monitors.velocity.eq(axis.velocity),
             monitors.saturated.eq(axis.saturated),
-            monitors.driven.eq(supervisor.driven),
+            monitors.magnitude.eq(supervisor.magnitude),
+            monitors.negative.eq(supervisor.negative),
             monitors.force_limit.eq(self.supervisor_force_limit),
             monitors.a.eq(levels["encoder_a"]),
             monitors.a_n.eq(levels["encoder_a_n"]),

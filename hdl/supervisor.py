@@ -1,12 +1,12 @@
 """The supervisor, between the output stage and the pins: it alone lets a drive out."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model import supervisor
-from hardwall.model.supervisor import ALWAYS, ARMED, COUNT, COUNT_BITS, DISARMED, LINK, REQUIRED, TRIPPED, WATCHDOG_MS
+from hardwall.model.supervisor import ALWAYS, ARMED, COUNT, COUNT_BITS, DISARMED, LINK, REQUIRED, TRIPPED
 
-from .arithmetic.fixed import shape
+from .arithmetic.fixed import negated, not_above, shape
 from .block import Block
 
 
@@ -21,11 +21,11 @@ class Supervisor(Block):
                     DISARMED if not TRIPPED, and enable is low or disarm is high
                     ARMED if DISARMED, and arm, live and the reference that is asked for; all but arm is `ready`
         driven   <- drive within +-min(ceiling, supervisor_force_limit) if ARMED stays ARMED, else 0
-        ceiling  <- 0 unless ARMED; supervisor_force_limit if that is lower; else with strobe + supervisor_ramp, at most
-                    the largest force of the axis
+        ceiling  <- 0 unless ARMED; else the lower of ceiling and supervisor_force_limit, with strobe + supervisor_ramp
 
     `link_timeout` is made here: it stands while ARMED and not `live`. The host is live from a change of `heartbeat`
-    until `supervisor_watchdog` ms later, up to 1 ms less because the tick of 1 ms runs freely.
+    until `supervisor_watchdog` ms later, up to 1 ms less because the tick of 1 ms runs freely. The word is taken with
+    the change; whether it is in its range is for the cause word_range.
     `latched` collects the causes until they are acknowledged, and an acknowledgement that does not name exactly these
     has no effect, so a cause that came after the host's last look is not lost. `counts` are the occurrences of every
     cause since reset.
@@ -33,7 +33,8 @@ class Supervisor(Block):
     Latency: one clock from `drive` to `driven`, from a cause or a low enable to zero, and from a lower
     `supervisor_force_limit` to a drive that obeys it. No word is committed here: all act at the next clock.
 
-    Rounding and overflow: the ceiling is rounded down to the force LSB; counts saturate.
+    Rounding and overflow: the ceiling is rounded down to the force LSB, and keeps what is below that when the force
+    limit lowers it; counts saturate. The tick is a whole number of half periods of `alive`, 1 ms or just below.
 
     Parameters
     ----------
@@ -64,10 +65,13 @@ class Supervisor(Block):
         Run-time parameters.
     driven : Out(SQ)
         The drive that is let out, force LSB.
+    magnitude, negative : Out
+        The same as a magnitude and a sign; the latter is that of `drive` also where the limit is zero.
     state : Out(2)
         0: DISARMED, 1: ARMED, 2: TRIPPED.
     alive : Out(1)
-        A square wave while ARMED, for the charge pump of an amplifier's enable; otherwise low.
+        A square wave while ARMED, for the charge pump of an amplifier's enable; otherwise low. Its first edge comes
+        within half a period of ARMED, for the divider runs freely.
     live : Out(1)
         The host's heartbeat is not overdue.
     ready : Out(1)
@@ -103,6 +107,8 @@ class Supervisor(Block):
             "heartbeat": In(supervisor.BEAT_BITS),
             **{word.name: In(shape(word.format)) for word in design.words},
             "driven": Out(shape(design.force)),
+            "magnitude": Out(shape(design.limit)),
+            "negative": Out(1),
             "state": Out(2),
             "alive": Out(1),
             "live": Out(1),
@@ -141,56 +147,57 @@ class Supervisor(Block):
 
         for bit in range(COUNT):
             count = self.counts.word_select(bit, COUNT_BITS)
-            with m.If(standing[bit] & ~before[bit] & ~count.all()):
-                m.d.sync += count.eq(count + 1)
+            with m.If(standing[bit] & ~before[bit]):
+                m.d.sync += count.eq(Cat(count.all() | (count[k] ^ count[:k].all()) for k in range(COUNT_BITS)))
 
         self._limit(m, go)
-        self._watch(m)
-        self._pump(m, go)
+        turns = self._pump(m, go)
+        self._watch(m, turns)
         return m
 
     def _limit(self, m: Module, go: Signal) -> None:
         """Let the drive out within the ceiling and the force limit, and raise the ceiling."""
-        fraction, most, _, _ = self._design.params
-        ceiling, raised = Signal(range(most + 1)), Signal(range(most + (1 << len(self.supervisor_ramp))))
-        m.d.comb += raised.eq(ceiling + self.supervisor_ramp)
-        bound, limit = ceiling[fraction:], Signal(signed(len(self.drive)))
-        lowered = bound > self.supervisor_force_limit
-        with m.If(~go):
-            m.d.sync += ceiling.eq(0)
-        with m.Elif(lowered):
-            m.d.sync += ceiling.eq(Cat(Const(0, fraction), self.supervisor_force_limit))
-        with m.Elif(self.strobe):
-            m.d.sync += ceiling.eq(Mux(raised > most, most, raised))
+        fraction, bits = self._design.params.ramp_fraction, len(self.magnitude)
+        # The part of the ceiling above the force LSB waits as its complement, which a comparison adds. It is set before
+        # it counts, so it needs no reset, which would be a second value to be set to.
+        waiting = Signal(fraction + bits + 1, reset_less=True)
+        complement = ((1 << bits + 1) - 1) << fraction
+        missing, limit, lowered = waiting[fraction:], Signal(bits), Signal()
+        m.d.comb += [
+            lowered.eq(~not_above(missing, self.supervisor_force_limit)),
+            limit.eq(Mux(lowered, self.supervisor_force_limit, ~missing)),
+        ]
+        ceiling = Cat(waiting[:fraction], limit)
+        raised = Mux(self.strobe, ceiling + self.supervisor_ramp, ceiling)
+        m.d.sync += waiting.eq(Mux(go, raised ^ complement, complement))
 
-        m.d.comb += limit.eq(Mux(lowered, self.supervisor_force_limit, bound))
-        held = Mux(self.drive > limit, limit, Mux(self.drive + limit < 0, -limit, self.drive))
-        m.d.sync += self.driven.eq(Mux(go, held, 0))
+        # The complement of the drive's magnitude.
+        less = Signal(len(self.drive))
+        m.d.comb += less.eq(~negated(self.drive, self.drive[-1]))
+        m.d.sync += [
+            self.magnitude.eq(Mux(go, Mux(not_above(less, limit), ~less, limit), 0)),
+            self.negative.eq(go & self.drive[-1]),
+        ]
+        m.d.comb += self.driven.eq(negated(self.magnitude, self.negative))
 
-    def _watch(self, m: Module) -> None:
-        """Count the milliseconds that are left to the host."""
-        clocks = self._design.params.tick_clocks
-        tick, left = Signal(range(max(clocks, 2))), Signal(range(WATCHDOG_MS[1] + 1))
+    def _watch(self, m: Module, turns: Value) -> None:
+        """Count the milliseconds that are left to the host, each of so many turns of the pump."""
+        tick, left = Signal(range(max(self._design.params.tick_turns, 2))), Signal.like(self.supervisor_watchdog)
         last_beat = Signal.like(self.heartbeat)
-        ticks = tick == clocks - 1
-        m.d.sync += tick.eq(Mux(ticks, 0, tick + 1))
-        word = self.supervisor_watchdog
+        ticks = tick == self._design.params.tick_turns - 1
+        with m.If(turns):
+            m.d.sync += tick.eq(Mux(ticks, 0, tick + 1))
         m.d.sync += last_beat.eq(self.heartbeat)
         with m.If(self.heartbeat != last_beat):
-            m.d.sync += left.eq(
-                Mux(word < WATCHDOG_MS[0], WATCHDOG_MS[0], Mux(word > WATCHDOG_MS[1], WATCHDOG_MS[1], word))
-            )
-        with m.Elif(ticks & left.any()):
+            m.d.sync += left.eq(self.supervisor_watchdog)
+        with m.Elif(turns & ticks & left.any()):
             m.d.sync += left.eq(left - 1)
         m.d.comb += self.live.eq(left.any())
 
-    def _pump(self, m: Module, go: Signal) -> None:
-        """Toggle `alive` while ARMED."""
+    def _pump(self, m: Module, go: Signal) -> Value:
+        """Toggle `alive` while ARMED; return whether this is the clock for it."""
         clocks = self._design.params.pump_clocks
         pump = Signal(range(max(clocks, 2)))
-        with m.If(~go):
-            m.d.sync += [pump.eq(0), self.alive.eq(0)]
-        with m.Elif(pump == clocks - 1):
-            m.d.sync += [pump.eq(0), self.alive.eq(~self.alive)]
-        with m.Else():
-            m.d.sync += pump.eq(pump + 1)
+        turns = pump == clocks - 1
+        m.d.sync += [pump.eq(Mux(turns, 0, pump + 1)), self.alive.eq(go & (self.alive ^ turns))]
+        return turns

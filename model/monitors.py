@@ -66,7 +66,8 @@ class Inputs(NamedTuple):
     valid: int = 0
     velocity: int = 0
     saturated: int = 0
-    driven: int = 0
+    magnitude: int = 0
+    negative: int = 0
     force_limit: int = 0
     a: int = 0
     a_n: int = 1
@@ -87,24 +88,28 @@ class State(NamedTuple):
 
     causes: int
     a_channel_idle: int
-    side: int  # of the drive at its limit: 1, -1, or 0 if it is not there
-    anchor: int  # the count when it came there
+    before: int  # the last two bits of the count at the last clock
+    at_low: int  # the limit that the next clock compares is supervisor_position_low
+    limit: int  # that limit
+    wrong: int  # the count was beyond the limit of the last clock
+    pressed: int  # the drive was at its limit
+    negative: int  # it was negative
+    way: int  # counts that the handle has moved since then, against the drive: negative
     samples: int  # successive samples with a saturated estimate
     lost_a: int  # clocks for which a channel has equalled its complement
     lost_b: int
     channel: int  # channel of the last edge, 1: B
     edges: int  # edges in a row of that channel
     has_index: int
-    last_index: int  # the count at the last index edge
-    measured: int  # an index edge has a distance from the last one, `moved`
-    moved: int
-    judged: int  # an index edge was `distance` counts away, to either side
-    distance: int
-    near: int  # an index edge was at the last one, or there was none
-    beyond: int  # its distance, less a turn
+    indexed: int  # there was an index edge
+    measured: int  # it has a distance from the last one, `distance`
+    distance: int  # counts from the last index edge, to either side: negative
+    upwards: int  # the side, 1: the count has grown
+    away: int  # an index edge was not at the last one
+    beyond: int  # a turn, less its distance
 
 
-START = State(*(0 for _ in State._fields))._replace(near=1)
+START = State(*(0 for _ in State._fields))._replace(at_low=1, limit=-1)
 
 
 class Design:
@@ -154,11 +159,41 @@ class Design:
 
 
 @compiled
-def _side(inputs):
-    """Return the side of the drive at its limit: 1, -1, or 0 if it is not there."""
-    if inputs.force_limit and abs(inputs.driven) >= inputs.force_limit:
-        return 1 if inputs.driven > 0 else -1
-    return 0
+def _lost(wrong, passed, limit):
+    """Return for how many clocks a channel has equalled its complement after a clock edge; they stop at a limit."""
+    if not wrong:
+        return 0
+    return passed + 1 if passed < limit else passed
+
+
+@compiled
+def _samples(state, inputs):
+    """Return the successive samples with a saturated estimate after a clock edge; they stop beyond a limit."""
+    if not inputs.valid:
+        return state.samples
+    if not inputs.saturated:
+        return 0
+    return state.samples + 1 if state.samples <= inputs.supervisor_saturated else state.samples
+
+
+@compiled
+def _ways(params, state, inputs):
+    """Return the way against the drive, and the distance and side from the last index edge, after a clock edge."""
+    up = inputs.count >> 1 & 1 ^ state.before >> 1 ^ state.before & 1 ^ 1
+    pressed = inputs.force_limit > 0 and inputs.magnitude == inputs.force_limit
+    way, distance, upwards = state.way, state.distance, state.upwards
+    if not (pressed and state.pressed and inputs.negative == state.negative):
+        way = 0
+    elif inputs.stepped:
+        way = wrap(way - 1 if up == inputs.negative else way + 1, params.count_width)
+    if state.indexed:
+        distance = 0
+    if inputs.stepped:
+        if distance == 0 or up == upwards:
+            distance, upwards = wrap(distance - 1, params.count_width), up
+        else:
+            distance = wrap(distance + 1, params.count_width)
+    return int(pressed), way, distance, upwards
 
 
 @compiled
@@ -171,54 +206,52 @@ def step(params, state, inputs):
         inputs: `Inputs` just before the edge.
     """
     count, last_quarter = inputs.count, 3 << (params.count_width - 3)
-    side = _side(inputs)
-    held = side and side == state.side
-    anchor = state.anchor if held else count
-    against = -side * wrap(count - state.anchor, params.count_width) if held else 0
+    if state.at_low:
+        wrong, limit = count < state.limit, inputs.supervisor_position_high
+    else:
+        wrong, limit = count > state.limit, inputs.supervisor_position_low
+    pressed, way, distance, upwards = _ways(params, state, inputs)
 
-    samples = state.samples
-    if inputs.valid:
-        samples = min(samples + 1, inputs.supervisor_saturated + 1) if inputs.saturated else 0
-    longest = inputs.supervisor_loss + 1
-    lost_a = min(state.lost_a + 1, longest) if inputs.a == inputs.a_n else 0
-    lost_b = min(state.lost_b + 1, longest) if inputs.b == inputs.b_n else 0
+    wrong_a, wrong_b, longest = inputs.a == inputs.a_n, inputs.b == inputs.b_n, inputs.supervisor_loss
+    is_lost = (wrong_a and state.lost_a >= longest) or (wrong_b and state.lost_b >= longest)
 
     channel, edges = state.channel, state.edges
     if inputs.stepped:
         channel = inputs.edge_kind & 1
         edges = min(edges + 1, IDLE_EDGES) if channel == state.channel else 1
 
-    last_index = count if inputs.indexed else state.last_index
     measured = int(inputs.indexed and state.has_index)
-    near = int(not state.judged or state.distance <= inputs.supervisor_index_tolerance)
-
-    out_of_range = count < inputs.supervisor_position_low or count > inputs.supervisor_position_high
+    away = int(state.measured and not -inputs.supervisor_index_tolerance <= state.distance <= 0)
     too_fast = inputs.valid and abs(inputs.velocity) > inputs.supervisor_velocity_limit << params.velocity_shift
     causes = (
-        int(out_of_range) << POSITION_RANGE
+        int(wrong or state.wrong) << POSITION_RANGE
         | int(count >= last_quarter or count < -last_quarter) << POSITION_WRAP
         | int(too_fast) << VELOCITY_LIMIT
-        | int(against > inputs.supervisor_runaway) << RUNAWAY
-        | int(samples > inputs.supervisor_saturated) << ESTIMATOR_SATURATED
-        | int(lost_a > inputs.supervisor_loss or lost_b > inputs.supervisor_loss) << ENCODER_LOSS
-        | int(not state.near and abs(state.beyond) > inputs.supervisor_index_tolerance) << INDEX_SPACING
+        | int(-state.way > inputs.supervisor_runaway) << RUNAWAY
+        | int(state.samples > inputs.supervisor_saturated) << ESTIMATOR_SATURATED
+        | int(is_lost) << ENCODER_LOSS
+        | int(state.away and abs(state.beyond) > inputs.supervisor_index_tolerance) << INDEX_SPACING
     )
     return State(
         causes=causes,
         a_channel_idle=int(edges == IDLE_EDGES),
-        side=side,
-        anchor=anchor,
-        samples=samples,
-        lost_a=lost_a,
-        lost_b=lost_b,
+        before=count & 3,
+        at_low=state.at_low ^ 1,
+        limit=limit,
+        wrong=int(wrong),
+        pressed=pressed,
+        negative=inputs.negative,
+        way=way,
+        samples=_samples(state, inputs),
+        lost_a=_lost(wrong_a, state.lost_a, longest),
+        lost_b=_lost(wrong_b, state.lost_b, longest),
         channel=channel,
         edges=edges,
         has_index=state.has_index | inputs.indexed,
-        last_index=last_index,
+        indexed=inputs.indexed,
         measured=measured,
-        moved=wrap(count - state.last_index, params.count_width),
-        judged=state.measured,
-        distance=abs(state.moved),
-        near=near,
-        beyond=state.distance - inputs.supervisor_turn,
+        distance=distance,
+        upwards=upwards,
+        away=away,
+        beyond=inputs.supervisor_turn + state.distance,
     )

@@ -6,7 +6,7 @@ are latched. One `step` is one clock:
 
     standing   = causes that are present, enabled and watched in this state; link_timeout is made here
     state      <- TRIPPED if standing; else as `State` says
-    ceiling    <- 0 unless ARMED; the force limit if that is lower; else at every strobe + ramp, up to the largest force
+    ceiling    <- 0 unless ARMED; else the lower of ceiling and force limit, and at every strobe + ramp
     drive      <- 0 unless ARMED; else drive within +-min(ceiling, force limit)
 
 so a lower limit acts at the next clock, and under a higher one the drive may grow no faster than after arming. A new
@@ -90,9 +90,8 @@ class Params(NamedTuple):
     """What is fixed for a design."""
 
     ramp_fraction: int  # fraction bits of the ceiling
-    ceiling_max: int  # the largest limit, in units of the ceiling
-    tick_clocks: int  # clocks in a tick of the watchdog, 1 ms
     pump_clocks: int  # clocks for which `alive` keeps a level
+    tick_turns: int  # times so many clocks in a tick of the watchdog, 1 ms
 
 
 class Inputs(NamedTuple):
@@ -120,6 +119,8 @@ class State(NamedTuple):
     """Every register; those up to `counts` are also outputs of the hardware, by the same names."""
 
     driven: int  # the drive that is let out, force LSB
+    magnitude: int  # its magnitude
+    negative: int  # whether it, or the drive before its limit was 0, is negative
     state: int
     alive: int
     live: int  # the host's heartbeat is not overdue
@@ -130,13 +131,13 @@ class State(NamedTuple):
     counts: int  # occurrences of every cause since reset, `COUNT_BITS` each, the first cause lowest
     before: int  # the causes that stood at the last clock
     ceiling: int
-    tick: int
+    tick: int  # turns of the pump
     left: int  # ms until the heartbeat is overdue
     last_beat: int
     pump: int
 
 
-START = State(0, DISARMED, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+START = State(*(0 for _ in State._fields))._replace(state=DISARMED)
 
 
 class Design:
@@ -151,12 +152,8 @@ class Design:
         self.limit = UQ(axis.force.width - 2, 0)
         fraction = max(bits_for(RAMP_S_MAX * axis.sample_hz / most), 0)
         self.ramp = UQ(axis.force.width - 2, fraction)
-        self.params = Params(
-            ramp_fraction=fraction,
-            ceiling_max=most << fraction,
-            tick_clocks=max(axis.clock_hz // 1000, 1),
-            pump_clocks=max(axis.clock_hz // (2 * PUMP_HZ), 1),
-        )
+        pump_clocks = max(axis.clock_hz // (2 * PUMP_HZ), 1)
+        self.params = Params(fraction, pump_clocks, max(axis.clock_hz // 1000 // pump_clocks, 1))
         ramp = most / (RAMP_S * axis.sample_hz) * 2**fraction
         self.words = (
             Word(
@@ -195,6 +192,17 @@ def _counted(counts, raised):
 
 
 @compiled
+def _watch(params, state, inputs, turns):
+    """Return the turns of the pump in this ms, and the ms that are left to the host, after a clock edge."""
+    tick, left = state.tick, state.left
+    if turns and tick == params.tick_turns - 1:
+        tick, left = 0, max(left - 1, 0)
+    elif turns:
+        tick += 1
+    return tick, inputs.supervisor_watchdog if inputs.heartbeat != state.last_beat else left
+
+
+@compiled
 def step(params, state, inputs):
     """Return the state after one clock edge.
 
@@ -220,37 +228,41 @@ def step(params, state, inputs):
         now = DISARMED
     elif inputs.arm and ready:
         now = ARMED
-    trips = standing and state.state != TRIPPED
 
-    bound = state.ceiling >> params.ramp_fraction
-    limit, ceiling = min(bound, inputs.supervisor_force_limit), state.ceiling
-    if bound > inputs.supervisor_force_limit:
-        ceiling = inputs.supervisor_force_limit << params.ramp_fraction
-    elif inputs.strobe:
-        ceiling = min(ceiling + inputs.supervisor_ramp, params.ceiling_max)
+    bound, part = state.ceiling >> params.ramp_fraction, state.ceiling & (1 << params.ramp_fraction) - 1
+    limit = min(bound, inputs.supervisor_force_limit)
+    ceiling = (limit << params.ramp_fraction | part) + (inputs.supervisor_ramp if inputs.strobe else 0)
 
-    beats = inputs.heartbeat != state.last_beat
-    ticks = state.tick == params.tick_clocks - 1
-    left = state.left - 1 if ticks and state.left else state.left
-    if beats:
-        left = saturate(inputs.supervisor_watchdog, WATCHDOG_MS[0], WATCHDOG_MS[1])
-
-    turns = state.pump == params.pump_clocks - 1
     go = armed and now == ARMED
+    turns = state.pump == params.pump_clocks - 1
+    tick, left = _watch(params, state, inputs, turns)
+    first, first_stamp = state.first, state.first_stamp
+    if standing and state.state != TRIPPED:
+        first, first_stamp = standing, inputs.stamp
+    driven, negative, alive, pump = 0, 0, 0, 0
+    if go:
+        driven, negative = saturate(inputs.drive, -limit, limit), int(inputs.drive < 0)
+        alive = state.alive ^ int(turns)
+    else:
+        ceiling = 0
+    if not turns:
+        pump = state.pump + 1
     return State(
-        driven=saturate(inputs.drive, -limit, limit) if go else 0,
+        driven=driven,
+        magnitude=abs(driven),
+        negative=negative,
         state=now,
-        alive=(state.alive ^ 1 if turns else state.alive) if go else 0,
+        alive=alive,
         live=int(left > 0),
         ready=int(ready),
         latched=latched,
-        first=standing if trips else state.first,
-        first_stamp=inputs.stamp if trips else state.first_stamp,
+        first=first,
+        first_stamp=first_stamp,
         counts=_counted(state.counts, standing & ~state.before),
         before=standing,
-        ceiling=ceiling if go else 0,
-        tick=0 if ticks else state.tick + 1,
+        ceiling=ceiling,
+        tick=tick,
         left=left,
         last_beat=inputs.heartbeat,
-        pump=(0 if turns else state.pump + 1) if go else 0,
+        pump=pump,
     )

@@ -39,13 +39,15 @@ def campaign(d: monitors.Design, clocks: int) -> dict[str, np.ndarray]:
 
     half, force = 1 << (d.count_width - 1), d.limit.max
     a, b = bit(0.5, 40), bit(0.5, 40)
+    limit = word(0, force, 200)
+    pushed = np.where(bit(0.7, 60), limit, word(0, force, 60))
     columns = {
         "reset": (random.random(clocks) < 1e-3).astype(np.int64),
         "count": word(-half, half - 1, 30),
         "stepped": bit(0.5, 2), "edge_kind": held(random.integers(0, 4, clocks) & ~1, 60) ^ bit(0.05, 60),
         "indexed": bit(0.2, 2), "valid": bit(0.5, 3), "saturated": bit(0.7, 200),
-        "velocity": word(d.velocity.min, d.velocity.max, 3), "driven": word(-force, force, 60),
-        "force_limit": word(0, force, 200), "a": a, "a_n": a ^ bit(0.7, 30), "b": b, "b_n": b ^ bit(0.7, 30),
+        "velocity": word(d.velocity.min, d.velocity.max, 3), "magnitude": pushed, "negative": bit(0.5, 200),
+        "force_limit": limit, "a": a, "a_n": a ^ bit(0.7, 30), "b": b, "b_n": b ^ bit(0.7, 30),
         **{word_.name: word(word_.format.min, word_.format.max, 300) for word_ in d.words},
     }  # fmt: skip
     columns["reset"][0] = 1
@@ -88,27 +90,65 @@ class Bench:
     def __init__(self, **words: int):
         self.design, self.state = design("mhz"), START
         self.inputs = Inputs(**{word.name: word.reset for word in self.design.words} | words)
+        self.latency = Monitors(self.design).latency
 
     def clock(self, **changed: int) -> list[str]:
         self.state = monitors.step(self.design.params, self.state, self.inputs._replace(**changed))
         return names(self.state.causes)
 
+    def last(self, cause: str, **held: int) -> list[str]:
+        """Return the causes after the clocks that one takes to be found."""
+        return [self.clock(**held) for _ in range(self.latency(cause))][-1]
+
+    def moves(self, count: int) -> None:
+        """Move the handle, an edge a clock."""
+        way = 1 if count > self.inputs.count else -1
+        while self.inputs.count != count:
+            self.inputs = self.inputs._replace(count=self.inputs.count + way)
+            self.clock(stepped=1)
+
 
 def test_an_axis_within_its_specification_is_never_wrong():
     bench, axis = Bench(), spec("mhz")
+    assert bench.last("position_range") == []
     travel = int(axis.travel_m / axis.count_m)
     speed = int(axis.speed_max_counts_per_sample * 2**bench.design.velocity.f)
     for count in range(-travel, travel, 997):
         for way in (-1, 1):
-            assert (
-                bench.clock(count=count, valid=1, velocity=way * speed, driven=way * 39_999, force_limit=40_000) == []
-            )
+            pushed = {"magnitude": 39_999, "negative": int(way < 0), "force_limit": 40_000}
+            assert bench.clock(count=count, valid=1, velocity=way * speed, **pushed) == []
 
 
-def test_the_position_is_held_to_its_range_and_to_the_range_of_the_count():
+def test_the_position_is_held_to_its_range():
     bench = Bench(supervisor_position_low=-10, supervisor_position_high=20)
-    assert [bench.clock(count=count) for count in (-10, 20)] == [[], []]
-    assert [bench.clock(count=count) for count in (-11, 21)] == [["position_range"]] * 2
+    for first_clock in range(2):
+        bench.last("position_range")
+        for count in (-10, 20, 0):
+            assert [bench.clock(count=count) for _ in range(5)] == [[]] * 5
+        for count in (-11, 21):
+            # Found within its clocks, whichever of the limits is compared first, and held without a gap.
+            assert bench.last("position_range", count=count) == ["position_range"]
+            assert [bench.clock(count=count) for _ in range(5)] == [["position_range"]] * 5
+            assert bench.last("position_range") == []
+        # From here on the limits are compared at the other clocks.
+        bench.clock() if first_clock == 0 else None
+
+
+def test_a_new_range_holds_a_clock_later_than_a_new_count():
+    for clocks in range(4):
+        bench = Bench(supervisor_position_low=-10, supervisor_position_high=20)
+        for _ in range(clocks):
+            assert bench.clock() == []
+        for word in ("supervisor_position_low", "supervisor_position_high"):
+            bench.clock(**{word: 5 if word.endswith("low") else -5})
+            later = [
+                bench.clock(**{word: 5 if word.endswith("low") else -5}) for _ in range(bench.latency("position_range"))
+            ]
+            assert later[-1] == ["position_range"]
+            assert [bench.clock() for _ in range(4)][-1] == []
+
+
+def test_the_position_is_held_to_the_range_of_the_count():
     bench = Bench(supervisor_position_low=-(1 << 20), supervisor_position_high=(1 << 20) - 1)
     quarter = 3 << 18
     assert [bench.clock(count=count) for count in (quarter - 1, -quarter)] == [[], []]
@@ -124,23 +164,56 @@ def test_the_speed_is_looked_at_with_every_estimate():
 
 @pytest.mark.parametrize("way", [1, -1])
 def test_a_handle_that_runs_against_the_largest_drive_is_a_runaway(way):
+    def drives(magnitude: int) -> None:
+        pushed = {"magnitude": magnitude, "negative": int(way > 0), "force_limit": 40}
+        bench.inputs = bench.inputs._replace(**pushed)
+        bench.clock()
+
     bench = Bench(supervisor_runaway=50)
-    drive = {"driven": -40 * way, "force_limit": 40}
-    for moved in range(-200, 51):  # coming back with the drive, and then as far as may be
-        bench.clock(count=-200 * way, driven=0) if moved == -200 else None
-        assert bench.clock(count=max(moved, 0) * way, **drive) == []
-    assert bench.clock(count=51 * way, **drive) == ["runaway"]
-    assert bench.clock(count=51 * way, driven=-39 * way, force_limit=40) == []
+    bench.moves(-200 * way)
+    drives(40)
+    bench.moves(-150 * way)
+    assert bench.last("runaway") == []
+    bench.moves(-149 * way)
+    assert bench.clock() == ["runaway"]
+    bench.moves(-150 * way)
+    assert bench.clock() == []
     # From where the drive comes to its limit again, the way begins anew.
-    assert bench.clock(count=51 * way, **drive) == []
-    assert bench.clock(count=101 * way, **drive) == []
-    assert bench.clock(count=102 * way, **drive) == ["runaway"]
+    drives(39)
+    drives(40)
+    bench.moves(-100 * way)
+    assert bench.last("runaway") == []
+    bench.moves(-99 * way)
+    assert bench.clock() == ["runaway"]
 
 
 def test_a_way_with_the_drive_is_no_runaway():
     bench = Bench(supervisor_runaway=50)
+    bench.inputs = bench.inputs._replace(magnitude=40, negative=1, force_limit=40)
     for count in range(0, -1000, -7):
-        assert bench.clock(count=count, driven=-40, force_limit=40) == []
+        bench.moves(count)
+        assert bench.clock() == []
+
+
+def test_no_limit_is_no_runaway():
+    bench = Bench(supervisor_runaway=0)
+    bench.moves(100)
+    assert bench.last("runaway") == []
+
+
+def test_a_preload_is_no_motion():
+    bench = Bench(supervisor_runaway=50, supervisor_turn=1000)
+    bench.inputs = bench.inputs._replace(magnitude=40, negative=1, force_limit=40)
+    bench.clock(indexed=1)
+    bench.moves(50)
+    bench.inputs = bench.inputs._replace(count=7777)
+    assert bench.last("runaway") == []
+    bench.moves(7776)
+    bench.moves(8727)
+    assert bench.clock() == ["runaway"]
+    bench.inputs = bench.inputs._replace(magnitude=0)
+    bench.clock(indexed=1)
+    assert [bench.clock() for _ in range(bench.latency("index_spacing"))][-1] == []
 
 
 def test_an_estimate_may_be_saturated_for_a_while():
@@ -151,7 +224,9 @@ def test_an_estimate_may_be_saturated_for_a_while():
         assert bench.clock(valid=1, saturated=0) == []
     for _ in range(5):
         bench.clock(valid=1, saturated=1)
-    assert bench.clock(valid=1, saturated=1) == ["estimator_saturated"]
+    assert bench.clock(valid=1, saturated=1) == []
+    assert bench.latency("estimator_saturated") == 2
+    assert bench.clock() == ["estimator_saturated"]
 
 
 @pytest.mark.parametrize("channel", "ab")
@@ -165,11 +240,24 @@ def test_a_channel_that_equals_its_complement_is_lost(channel):
 
 def test_index_edges_are_turns_apart():
     bench = Bench(supervisor_turn=1000, supervisor_index_tolerance=2)
-    counts = (17, 19, 1018, 2020, 1019, 17, 17, 1020, 1023)
-    # Edges may come at successive clocks; the cause of each comes `index_clocks` later.
-    found = [bench.clock(indexed=1, count=count) for count in counts]
-    found += [bench.clock(count=500) for _ in range(Monitors(bench.design).index_clocks)]
-    assert found == [[]] * 10 + [["index_spacing"]] * 2 + [[]]
+    # In each pair the count of an index edge, and whether it is out of its place.
+    for count, wrong in (
+        (17, 0), (19, 0), (1018, 0), (2020, 0), (1019, 0), (17, 0), (17, 0), (1020, 1), (1023, 1), (1025, 0),
+        (22, 1), (-979, 0), (-977, 0), (-974, 1), (1027, 1), (3028, 1), (3026, 0), (2028, 0),
+    ):  # fmt: skip
+        bench.moves(count)
+        found = [bench.clock(indexed=1), *(bench.clock() for _ in range(bench.latency("index_spacing")))]
+        assert found == [*([[]] * (len(found) - 2)), ["index_spacing"] * wrong, []], count
+
+
+def test_index_edges_may_come_at_successive_clocks_and_with_edges_of_the_count():
+    bench = Bench(supervisor_turn=4, supervisor_index_tolerance=0)
+    found = []
+    for count in range(1, 30):
+        bench.inputs = bench.inputs._replace(count=count)
+        found += bench.clock(stepped=1, indexed=int(count % 4 == 0 or count in {21, 22}))
+    # At 21 and 22, and at 24, which is no turn from 22.
+    assert found == ["index_spacing"] * 3
 
 
 def test_edges_of_one_channel_alone_are_a_warning():

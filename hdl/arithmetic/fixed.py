@@ -1,6 +1,6 @@
 """Fixed-point formats as Amaranth shapes, and the named ways a value may narrow."""
 
-from amaranth.hdl import Const, Mux, Shape, Value
+from amaranth.hdl import Cat, Const, Mux, Shape, Value
 
 from hardwall.model.arithmetic.fixed import Format
 
@@ -55,3 +55,19 @@ def less(value: Value, bound: int) -> Value:
     for bit, each in enumerate(value):
         below = ~each | below if bound >> bit & 1 else ~each & below
     return below
+
+
+def negated(value: Value, negative: Value) -> Value:
+    """Return the value, or -value where `negative` is high, a bit wider: the complement of one less is one sum."""
+    less = value - negative
+    return less ^ negative.replicate(len(less)).as_signed()
+
+
+def not_above(complement: Value, limit: Value) -> Value:
+    """Return whether a number is at most the limit, both unsigned, from the number's complement.
+
+    A comparison subtracts, which adds a complement and one: given the complement, it needs no inverters.
+    """
+    width = max(len(complement), len(limit))
+    number = Cat(complement, Const(1, 1).replicate(width - len(complement)))
+    return (Cat(Const(1, 1), number) + Cat(Const(1, 1), limit))[width + 1]

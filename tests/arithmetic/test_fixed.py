@@ -104,3 +104,18 @@ def test_less_compares_with_a_constant(bound):
 def test_shapes_follow_formats():
     assert hdl.shape(SQ(3, 5)) == signed(8)
     assert hdl.shape(UQ(-2, 9)) == unsigned(7)
+
+
+def test_a_number_is_negated_or_not():
+    for value in (-128, -1, 0, 1, 127):
+        word = Const(value, signed(8))
+        assert [evaluate(hdl.negated(word, Const(negative, 1))) for negative in (0, 1)] == [value, -value]
+    assert evaluate(hdl.negated(Const(255, 8), Const(1, 1))) == -255
+
+
+@pytest.mark.parametrize(("width", "limit_width"), [(3, 3), (2, 4), (4, 2)])
+def test_a_number_is_compared_by_its_complement(width, limit_width):
+    for number in range(1 << width):
+        for limit in range(1 << limit_width):
+            found = hdl.not_above(Const(~number, width), Const(limit, limit_width))
+            assert evaluate(found) == (number <= limit)

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 from hardwall.model.supervisor import ARMED, DISARMED, ENABLED, TRIPPED
 
-from .scene import CLOCK_HZ, PUSH_N
+from .scene import CLOCK_HZ, PUSH_N, board
 
 STATES = {DISARMED: "DISARMED", ARMED: "ARMED", TRIPPED: "TRIPPED"}
-PULSES = 2
+PULSES = board().safe_latency - 1
 """Clock edges from a drive of zero to the edge that can see its last pulse."""
 TREMOR_N = 0.5
 """How far the force of a contact that no fault disturbs is from the hand's push, at most."""

@@ -7,7 +7,7 @@ from oracles.supervised import BITS
 
 from .fault import Expected, Fault, trips
 from .handle import Wires
-from .of_encoder import HARDER_N, first_edge
+from .of_encoder import HARDER_N, MONITORS, first_edge
 from .rig import Rig
 from .scene import CLOCKS_PER_MS, COUNTED, PUSH_N, REST, SPEC, START, words
 
@@ -15,8 +15,6 @@ RESTING = REST - START
 """The count of the steady contact."""
 MARGIN = 100
 LAST_QUARTER = 3 << SPEC.count_width - 3
-SEEN = COUNTED + 2
-"""Clock edges from a pin of the encoder to the drive at zero, by way of the count and a monitor."""
 OTHERS = {
     "encoder_a": "encoder_b",
     "encoder_b": "encoder_a",
@@ -28,6 +26,11 @@ EASED_N = 5.0
 FASTEST_PACE = 96
 """Counts in a step: 9.6 m/s, beyond the estimator's format."""
 FASTEST_COUNTS = 200_000
+
+
+def seen(cause: str) -> int:
+    """Return the clock edges from a pin of the encoder to the drive at zero: count, monitor, supervisor."""
+    return COUNTED + MONITORS.latency(cause) + 1
 
 
 def passes(count: int, push_n: float = HARDER_N):
@@ -122,14 +125,14 @@ FAULTS = (
     Fault(
         "the hand pushes the handle beyond supervisor_position_high",
         passes(RESTING + MARGIN),
-        trips("position_range", within=SEEN, largest_n=HARDER_N),
+        trips("position_range", within=seen("position_range"), largest_n=HARDER_N),
         turned_back,
         live={"supervisor_position_high": RESTING + MARGIN},
     ),
     Fault(
         "the hand pushes the handle into the last quarter of the count",
         passes(RESTING + MARGIN),
-        trips("position_wrap", within=SEEN, largest_n=HARDER_N),
+        trips("position_wrap", within=seen("position_wrap"), largest_n=HARDER_N),
         live={"supervisor_position_high": (1 << SPEC.count_width - 1) - 1},
         committed={"preload_count": LAST_QUARTER - RESTING - MARGIN - 1},
         offset=LAST_QUARTER - RESTING - MARGIN - 1,

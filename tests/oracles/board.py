@@ -111,7 +111,7 @@ class Twin:
         self.allowed = False
         self.due, self.raised = {}, {}
         self.follower = Follower(board.axis.design, IDLE)
-        self.sum = self.magnitude = self.negative = self.pulse = self.sign = 0
+        self.sum = self.pulse = self.sign = 0
 
     def _fixed(self) -> dict[str, int]:
         return {word.name: word.format.max for word in self.design.words if word.name in FIXED}
@@ -174,10 +174,9 @@ class Twin:
 
     def edge(self, pins: dict[str, int], asked: dict[str, int], seen: dict[str, int]) -> None:
         """Advance by one clock edge, with the pins, what the link asks, and what the axis shows just before it."""
-        driven = self.follower.supervisor.driven
-        self.sum = self.sum % 2**self.drive_bits + self.magnitude
-        self.pulse, self.sign = self.sum >> self.drive_bits, self.negative
-        self.magnitude, self.negative = abs(driven), int(driven < 0) ^ self.follower.inverted
+        supervisor = self.follower.supervisor
+        self.sum = self.sum % 2**self.drive_bits + supervisor.magnitude
+        self.pulse, self.sign = self.sum >> self.drive_bits, supervisor.negative ^ self.follower.inverted
 
         enabled = self.follower.level("drive_enable")
         self.follower.edge({**pins, **asked}, seen)

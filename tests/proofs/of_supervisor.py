@@ -1,5 +1,7 @@
 """What the supervisor promises: the limit, zero in every state but one, and that nothing arms or forgets by itself."""
 
+from amaranth.hdl import Mux
+
 from hardwall.hdl.supervisor import Supervisor
 from hardwall.model.supervisor import ALWAYS, ARMED, LINK, TRIPPED, Design
 from hardwall.model.supervisor import REQUIRED as REQUIRED_CAUSES
@@ -10,7 +12,7 @@ from .bugs import Bug
 from .property import Property
 
 WHERE = "supervisor mhz"
-OUT = "Mux(go, held, 0)"
+OUT = "Mux(go, Mux(not_above(less, limit), ~less, limit), 0)"
 
 
 def supervisor(bench: Bench) -> Supervisor:
@@ -21,6 +23,11 @@ def within_the_limit(bench: Bench) -> None:
     block = supervisor(bench)
     limit = bench.past(block.supervisor_force_limit)
     bench.promise((block.driven <= limit) & (block.driven >= -limit))
+
+
+def magnitude_and_sign(bench: Bench) -> None:
+    block = supervisor(bench)
+    bench.promise(block.driven == Mux(block.negative, -block.magnitude, block.magnitude))
 
 
 def zero_but_armed(bench: Bench) -> None:
@@ -65,7 +72,16 @@ PROPERTIES = [
         WHERE,
         within_the_limit,
         depth=2,
-        bugs=(Bug(Supervisor._limit, "Mux(lowered, self.supervisor_force_limit, bound)", "bound"),),
+        bugs=(Bug(Supervisor._limit, "Mux(lowered, self.supervisor_force_limit, ~missing)", "~missing"),),
+        quick=True,
+        within=12,
+    ),
+    Property(
+        "the drive's magnitude and sign, which make the pulses, are those of the drive",
+        WHERE,
+        magnitude_and_sign,
+        depth=2,
+        bugs=(Bug(Supervisor._limit, "(self.magnitude, self.negative)", "(self.magnitude, self.drive[-1])"),),
         quick=True,
         within=12,
     ),
@@ -74,7 +90,7 @@ PROPERTIES = [
         WHERE,
         zero_but_armed,
         depth=2,
-        bugs=(Bug(Supervisor._limit, OUT, "held"),),
+        bugs=(Bug(Supervisor._limit, OUT, "Mux(not_above(less, limit), ~less, limit)"),),
         within=12,
     ),
     Property(
