@@ -1,11 +1,11 @@
 """The output stage, from the wall's force to the drive."""
 
-from amaranth.hdl import Module, Mux, Signal, signed
+from amaranth.hdl import Module, Mux, Signal
 from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.output import Design
 
-from .arithmetic.fixed import shape
+from .arithmetic.fixed import negated, not_above, shape
 from .block import Block
 
 
@@ -80,54 +80,48 @@ class Output(Block):
         m = Module()
         phase = Signal(range(max(self._design.decimation, 2)))
         allowed = Signal()
-        # The growth is measured from the drive, or from zero if the force has the other sign.
-        target, base = Signal.like(self.force), Signal.like(self.force)
-        before = Mux(self.force[-1] == self.drive[-1], self.drive, 0)
-        change = Signal(signed(len(self.force) + 1))
-        slewed = Signal(signed(len(self.output_slew_limit) + 2))
-        slew, limit = Signal(signed(len(self.output_slew_limit) + 1)), Signal(signed(len(self.force)))
+        # The stage works with magnitudes, and keeps that of the force as its complement, which a comparison adds. The
+        # growth is measured from the drive, or from zero if the force has the other sign.
         most = self._design.force_limit
-        m.d.comb += slew.eq(self.output_slew_limit)
+        limit = Signal(range(most + 1), init=most)
+        less, slewed, limited = Signal(len(self.force)), Signal(len(self.force)), Signal.like(limit)
+        held, reach = Signal.like(limit, init=0), Signal(len(self.output_slew_limit) + 1)
+        negative, held_negative = Signal(), Signal()
         m.d.sync += limit.eq(Mux(self.output_force_limit > most, most, self.output_force_limit))
-
-        def outside(value, bound):
-            """Return whether the value is above bound, and whether it is below -bound."""
-            return value > bound, value + bound < 0
-
-        # The comparisons and the sums work in parallel: either alone is a carry chain.
-        above, below = outside(change, slew)
-        rises, falls = above & ~target[-1], below & target[-1]
-        over, under = outside(slewed, limit)
+        before = Mux(self.force[-1] == held_negative, held, 0)
+        farther, over = ~not_above(less, reach), slewed > limit
+        m.d.comb += limited.eq(Mux(over, limit, slewed))
 
         m.d.sync += self.valid.eq(0)
         with m.FSM():
             with m.State("CHANGE"), m.If(self.strobe):
                 m.d.sync += [
-                    target.eq(self.force),
-                    base.eq(before),
-                    change.eq(self.force - before),
+                    less.eq(~negated(self.force, self.force[-1])),
+                    negative.eq(self.force[-1]),
+                    reach.eq(before + self.output_slew_limit),
                     allowed.eq(self.enable & ~self.fault),
                 ]
                 m.next = "SLEW"
             with m.State("SLEW"):
-                m.d.sync += [
-                    slewed.eq(Mux(rises, base + slew, Mux(falls, base - slew, target))),
-                    self.limited[0].eq(rises | falls),
-                ]
+                m.d.sync += [slewed.eq(Mux(farther, reach, ~less)), self.limited[0].eq(farther)]
                 m.next = "LIMIT"
             with m.State("LIMIT"):
                 actuated = (phase == 0) & allowed
                 with m.If(actuated):
-                    m.d.sync += self.drive.eq(Mux(over, limit, Mux(under, -limit, slewed)))
+                    m.d.sync += [
+                        self.drive.eq(negated(limited, negative)),
+                        held.eq(limited),
+                        held_negative.eq(negative),
+                    ]
                 with m.If(~allowed):
-                    m.d.sync += self.drive.eq(0)
+                    m.d.sync += [self.drive.eq(0), held.eq(0)]
                 m.d.sync += [
                     phase.eq(Mux(phase == self._design.decimation - 1, 0, phase + 1)),
-                    self.limited.eq(Mux(actuated, self.limited[0] | (over | under) << 1, 0)),
+                    self.limited.eq(Mux(actuated, self.limited[0] | over << 1, 0)),
                     self.actuated.eq(phase == 0),
                     self.valid.eq(1),
                 ]
                 m.next = "CHANGE"
         with m.If(~self.enable):
-            m.d.sync += [self.drive.eq(0), allowed.eq(0)]
+            m.d.sync += [self.drive.eq(0), held.eq(0), allowed.eq(0)]
         return m

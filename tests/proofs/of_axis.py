@@ -48,11 +48,12 @@ def zero_before_a_commit(estimator: str, bench: Bench) -> None:
     for word in axis.spec.design.words:
         bench.promise(inner[f"active_{word.name}"] == word.reset)
     half = 1 << (axis.spec.design.wall.push - 1)
-    for name in ("wall.gain", "wall.product", "wall.force", "output_stage.target", "output_stage.change"):
+    for name in ("wall.gain", "wall.product", "wall.force", "output_stage.slewed"):
         bench.promise(inner[name] == 0)
     for name in ("wall.spring", "wall.total"):
         bench.promise((inner[name] == 0) | (inner[name] == half))
-    bench.promise(inner["output_stage.slewed"] == 0)
+    # The complement of the force, in the clock that looks at it.
+    bench.promise(inner["output_stage.less"].all() | (inner["output_stage.fsm_state"] != 1))
     bench.promise(axis.drive == 0)
 
 
@@ -98,7 +99,7 @@ def of(estimator: str, *deep: Bug) -> list[Property]:
 PROPERTIES = [
     *of(
         "fdm",
-        Bug(Output.elaborate, "Mux(over, limit, Mux(under, -limit, slewed))", "Mux(over, limit, slewed)"),
+        Bug(Output.elaborate, "Mux(over, limit, slewed)", "Mux(over & ~negative, limit, slewed)"),
         Bug(Axis.elaborate, "output.enable.eq(self.drive_enable)", "output.enable.eq(1)"),
     ),
     *of("levant"),

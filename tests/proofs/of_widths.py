@@ -160,8 +160,8 @@ CASES = {
     ),
     "output": Case(
         lambda axis: Output(spec(axis).design.output),
-        (),
-        Bug(Output.elaborate, "Signal(signed(len(self.force) + 1))", "Signal(signed(len(self.force)))"),
+        ("less",),
+        Bug(Output.elaborate, "Signal(len(self.output_slew_limit) + 1)", "Signal(len(self.output_slew_limit))"),
         phase,
     ),
     "fdm": Case(
