@@ -1,6 +1,6 @@
 """An axis that may touch a motor: the axis, its monitors, and the supervisor behind both."""
 
-from amaranth.hdl import Cat, Const, Module, Signal, Value
+from amaranth.hdl import Cat, Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
@@ -9,7 +9,7 @@ from hardwall.model.spec import AxisSpec
 from hardwall.model.supervised import FIXED, Design
 from hardwall.model.supervisor import ARMED, CAUSES
 
-from .arithmetic.fixed import shape
+from .arithmetic.fixed import less, shape
 from .axis import Axis
 from .monitors import Monitors
 from .supervisor import Supervisor
@@ -142,7 +142,7 @@ class SupervisedAxis(wiring.Component):
         beyond = []
         for name, (least, most) in self._design.ranges.items():
             word = getattr(self, name)
-            beyond += [~_above(word, least - 1)] * (least > 0) + [_above(word, most)] * (most < (1 << len(word)) - 1)
+            beyond += [less(word, least), ~less(word, most + 1)]
         outside = {
             "encoder_illegal": axis.illegal,
             "encoder_overspeed": axis.overspeed,
@@ -175,11 +175,3 @@ class SupervisedAxis(wiring.Component):
         with m.If(self.state != ARMED):
             m.d.sync += self.drive_inverted.eq(self.drive_invert)
         return m
-
-
-def _above(word: Value, least: int) -> Value:
-    """Return whether an unsigned word is above a constant, from its lowest bit on: a table takes several bits."""
-    above = Const(0, 1)
-    for bit in range(len(word)):
-        above = word[bit] & above if least >> bit & 1 else word[bit] | above
-    return above

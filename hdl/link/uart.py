@@ -1,17 +1,32 @@
 """A UART: 8 data bits, no parity, one stop bit, at a rate that a fractional divider makes from the clock."""
 
-from amaranth.hdl import Cat, Const, Module, Signal
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import stream, wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
-from hardwall.model.link.uart import DATA_BITS, FRAME_BITS, HALF, PHASE_BITS, Design
+from hardwall.model.link.uart import DATA_BITS, FRACTION_BITS, FRAME_BITS, Design
 
 
 def _checked(design: Design) -> Design:
     if not isinstance(design, Design):
         raise TypeError(f"design must be a uart.Design, not {design!r}")
     return design
+
+
+def _bit_ends(m: Module, design: Design, idle: Value, first: tuple[int, int]) -> Value:
+    """Count the clocks of bits, and return whether one ends; the first after `idle` has `first` clocks and parts."""
+    whole, fraction = design.bit
+    left, parts, total = Signal(range(whole + 1)), Signal(FRACTION_BITS), Signal(FRACTION_BITS + 1)
+    ends = left == 0
+    m.d.comb += total.eq(parts + fraction)
+    with m.If(idle):
+        m.d.sync += [left.eq(first[0]), parts.eq(first[1])]
+    with m.Elif(ends):
+        m.d.sync += [left.eq(Mux(total[-1], whole, whole - 1)), parts.eq(total[:-1])]
+    with m.Else():
+        m.d.sync += left.eq(left - 1)
+    return ~idle & ends
 
 
 class Receiver(wiring.Component):
@@ -66,13 +81,9 @@ class Receiver(wiring.Component):
         m.submodules.synchroniser = FFSynchronizer(self.pin, pin, init=1)
         busy = Signal()
         bits = Signal(range(FRAME_BITS + 1))
-        phase, total = Signal(PHASE_BITS), Signal(PHASE_BITS + 1)
-        m.d.comb += total.eq(phase + self._design.step)
-        m.d.sync += [before.eq(pin), phase.eq(total[:-1]), self.arrived.eq(0)]
-        with m.If(~busy):
-            # Half a bit to the middle of the start bit, less the clock at which this is seen.
-            m.d.sync += [busy.eq(before & ~pin), phase.eq((HALF + self._design.step) % (2 * HALF)), bits.eq(0)]
-        with m.Elif(total[-1]):
+        m.d.sync += [before.eq(pin), self.arrived.eq(0)]
+        # Half a bit to the middle of the start bit, less the clock at which this is seen.
+        with m.If(_bit_ends(m, self._design, ~busy, self._design.to_first_sample)):
             m.d.sync += bits.eq(bits + 1)
             with m.If(bits == 0):
                 m.d.sync += busy.eq(~pin)
@@ -80,6 +91,8 @@ class Receiver(wiring.Component):
                 m.d.sync += [busy.eq(0), self.arrived.eq(1), self.spoilt.eq(~pin)]
             with m.Else():
                 m.d.sync += self.byte.eq(Cat(self.byte[1:], pin))
+        with m.If(~busy):
+            m.d.sync += [busy.eq(before & ~pin), bits.eq(0)]
         return m
 
 
@@ -125,18 +138,12 @@ class Transmitter(wiring.Component):
         m = Module()
         shift = Signal(FRAME_BITS, init=1)
         bits = Signal(range(FRAME_BITS + 1))
-        phase, total = Signal(PHASE_BITS), Signal(PHASE_BITS + 1)
         m.d.comb += [
-            total.eq(phase + self._design.step),
             self.bytes.ready.eq(bits == 0),
             self.pin.eq(shift[0]),
         ]
-        with m.If(self.bytes.ready):
-            m.d.sync += phase.eq(0)
-            with m.If(self.bytes.valid):
-                m.d.sync += [shift.eq(Cat(Const(0, 1), self.bytes.payload, Const(1, 1))), bits.eq(FRAME_BITS)]
-        with m.Else():
-            m.d.sync += phase.eq(total[:-1])
-            with m.If(total[-1]):
-                m.d.sync += [shift.eq(Cat(shift[1:], Const(1, 1))), bits.eq(bits - 1)]
+        with m.If(_bit_ends(m, self._design, self.bytes.ready, self._design.to_first_edge)):
+            m.d.sync += [shift.eq(Cat(shift[1:], Const(1, 1))), bits.eq(bits - 1)]
+        with m.If(self.bytes.ready & self.bytes.valid):
+            m.d.sync += [shift.eq(Cat(Const(0, 1), self.bytes.payload, Const(1, 1))), bits.eq(FRAME_BITS)]
         return m

@@ -1,21 +1,21 @@
 """A UART's receiver and transmitter, 8 data bits, no parity, one stop bit, with a fractional divider.
 
-Divider. A phase of `PHASE_BITS` bits advances by `step` at every clock, and each overflow is one bit's time, so that
+Divider. A bit lasts n clocks, which are counted in parts of `FRACTION_BITS` bits,
 
-    step = floor(2**PHASE_BITS baud / clock + 1/2),     rate = clock step / 2**PHASE_BITS
+    period = floor(2**FRACTION_BITS clock / baud + 1/2)
 
-The rate is wrong by at most half a step, that is by at most 1 / (2 step) of itself: 0.01 % at 10 clocks a bit, 0.4 % at
-500, and 1 % at 1310. A pair of clock and rate is refused if its own error exceeds `ERROR_MAX`. No overflow is more than
-a clock late, and lateness does not add up.
+a whole number of clocks, and one more whenever the parts that are left over have become a clock. The rate is wrong by
+at most half a part in a bit, that is by about 1 / (2**(FRACTION_BITS + 1) n) of itself: 0.2 % at 4 clocks a bit. No
+edge is more than a clock late, and lateness does not add up.
 
-Receiver. With n clocks a bit, the clock that first sees the start bit is up to 1 clock late, and so is the overflow at
-which a bit is sampled; the phase starts a clock early, so every sample is taken within 1 clock of the middle of its bit
-as the receiver's rate has it. The middle of the stop bit is 9.5 bits behind the edge. It is still inside the stop bit,
+Receiver. The clock that first sees the start bit is up to 1 clock late, and so is the one at which a bit is sampled;
+the count starts a clock early, so every sample is taken within 1 clock of the middle of its bit as the receiver's rate
+has it. The middle of the stop bit is 9.5 bits behind the edge. It is still inside the stop bit,
 and the last data bit too, if the two ends' rates differ by a fraction e with
 
     9.5 e n + 1 < n / 2         so e < (1/2 - 1/n) / 9.5: 2.6 % at 4 clocks a bit, 4.7 % at 20
 
-With `CLOCKS_PER_BIT_MIN` clocks a bit and an error of 1 % at each end a frame is therefore always read.
+With `CLOCKS_PER_BIT_MIN` clocks a bit, and a sender whose rate is wrong by 2 %, a frame is therefore always read.
 """
 
 from dataclasses import dataclass
@@ -23,10 +23,8 @@ from typing import NamedTuple
 
 from ..checks import FieldError, check_int
 
-PHASE_BITS = 16
-"""Bits of the divider's phase: the fewest that hold the error below 1 % at 115 200 baud up to 150 MHz."""
-ERROR_MAX = 0.01
-"""The largest error of the rate."""
+FRACTION_BITS = 6
+"""Bits of the part of a clock in the length of a bit."""
 BAUD_MIN, BAUD_MAX = 115_200, 3_000_000
 """The rates that USB serial adapters have in common and that are quick enough for a haptic host."""
 BAUD = 921_600
@@ -35,7 +33,7 @@ CLOCKS_PER_BIT_MIN = 4
 DATA_BITS = 8
 FRAME_BITS = DATA_BITS + 2
 """Bits of a byte on the line, with its start bit and its stop bit."""
-HALF = 1 << PHASE_BITS - 1
+LAST_PART = (1 << FRACTION_BITS) - 1
 
 
 def usual_baud(clock_hz: int) -> int:
@@ -54,8 +52,8 @@ class Design:
 
     Raises:
         TypeError: if a field is not an int.
-        ValueError: if the rate is out of its range, a bit is too short for the clock, or the error is too large; the
-            message has the rates that the clock allows.
+        ValueError: if the rate is out of its range, or a bit is too short for the clock; the message has the rates that
+            the clock allows.
     """
 
     clock_hz: int
@@ -68,23 +66,37 @@ class Design:
             least_clock = BAUD_MIN * CLOCKS_PER_BIT_MIN
             raise FieldError("clock_hz", f"must be {least_clock} or more for a UART, not {self.clock_hz}")
         check_int("baud", self.baud, BAUD_MIN, most)
-        if abs(self.error) > ERROR_MAX:
-            least = -(-self.clock_hz * int(1 / (2 * ERROR_MAX)) >> PHASE_BITS)
-            raise FieldError(
-                "baud",
-                f"must be {least} to {most} at clock_hz {self.clock_hz}, where the divider is exact to "
-                f"{ERROR_MAX:.0%}, not {self.baud}",
-            )
 
     @property
-    def step(self) -> int:
-        """The phase's advance at every clock."""
-        return ((self.baud << PHASE_BITS + 1) // self.clock_hz + 1) // 2
+    def period(self) -> int:
+        """The length of a bit in parts of a clock."""
+        return ((self.clock_hz << FRACTION_BITS + 1) // self.baud + 1) // 2
 
     @property
     def error(self) -> float:
         """The rate's error, as a fraction of it."""
-        return self.step * self.clock_hz / (self.baud << PHASE_BITS) - 1
+        return (self.clock_hz << FRACTION_BITS) / (self.baud * self.period) - 1
+
+    @property
+    def bit(self) -> tuple[int, int]:
+        """A bit's whole clocks and the parts beyond them."""
+        return self.period >> FRACTION_BITS, self.period & LAST_PART
+
+    @property
+    def to_first_sample(self) -> tuple[int, int]:
+        """Clocks and parts that a receiver counts to the middle of the start bit."""
+        parts = (self.period >> 1) + LAST_PART
+        return (parts >> FRACTION_BITS) - 2, parts & LAST_PART
+
+    @property
+    def to_first_edge(self) -> tuple[int, int]:
+        """Clocks and parts that a transmitter counts to the end of the start bit."""
+        return self.after(LAST_PART)
+
+    def after(self, parts: int) -> tuple[int, int]:
+        """Return the clocks to count, less one, and the parts that are left over, of a bit that begins with `parts`."""
+        total = self.period + parts
+        return (total >> FRACTION_BITS) - 1, total & LAST_PART
 
 
 class Receiver(NamedTuple):
@@ -94,7 +106,8 @@ class Receiver(NamedTuple):
     pin: int = 1
     before: int = 1
     busy: int = 0
-    phase: int = 0
+    left: int = 0  # clocks to the next sample
+    parts: int = 0
     bits: int = 0
     byte: int = 0
     arrived: int = 0
@@ -103,15 +116,15 @@ class Receiver(NamedTuple):
 
 def receive(design: Design, state: Receiver, pin: int) -> Receiver:
     """Return the state after a clock edge at which the line is `pin`."""
-    mask, low = (1 << PHASE_BITS) - 1, state.pin == 0
+    low = state.pin == 0
     now = state._replace(first=pin, pin=state.first, before=state.pin, arrived=0)
     if not state.busy:
-        begins = int(state.before == 1 and low)
-        return now._replace(busy=begins, phase=(HALF + design.step) & mask, bits=0)
-    total = state.phase + design.step
-    now = now._replace(phase=total & mask)
-    if total <= mask:
-        return now
+        left, parts = design.to_first_sample
+        return now._replace(busy=int(state.before == 1 and low), left=left, parts=parts, bits=0)
+    if state.left:
+        return now._replace(left=state.left - 1)
+    left, parts = design.after(state.parts)
+    now = now._replace(left=left, parts=parts)
     now = now._replace(bits=state.bits + 1)
     if state.bits == 0:
         return now._replace(busy=int(low))
@@ -124,16 +137,16 @@ class Transmitter(NamedTuple):
     """The state of the transmitter before a clock edge; the line is bit 0 of `shift`, and `bits` of 0 is idle."""
 
     shift: int = 1
-    phase: int = 0
+    left: int = 0  # clocks to the next edge
+    parts: int = 0
     bits: int = 0
 
 
 def transmit(design: Design, state: Transmitter, byte: int | None) -> Transmitter:
     """Return the state after a clock edge; an idle transmitter takes `byte`, if there is one."""
     if state.bits == 0:
-        return state if byte is None else Transmitter(1 << DATA_BITS + 1 | byte << 1, 0, FRAME_BITS)
-    total = state.phase + design.step
-    if total >> PHASE_BITS == 0:
-        return state._replace(phase=total)
+        return state if byte is None else Transmitter(1 << DATA_BITS + 1 | byte << 1, *design.to_first_edge, FRAME_BITS)
+    if state.left:
+        return state._replace(left=state.left - 1)
     # What is shifted in is the level of an idle line.
-    return Transmitter(1 << DATA_BITS + 1 | state.shift >> 1, total & (1 << PHASE_BITS) - 1, state.bits - 1)
+    return Transmitter(1 << DATA_BITS + 1 | state.shift >> 1, *design.after(state.parts), state.bits - 1)

@@ -169,16 +169,16 @@ def test_the_rate_of_the_transmitter_is_that_of_the_design(clock_hz, baud):
     assert all(0 <= edge - k * exact < 1 + 1e-9 for k, edge in enumerate(edges))
 
 
-def test_every_rate_that_is_accepted_is_exact_to_1_percent():
+def test_every_rate_that_is_accepted_is_exact_to_half_a_part_in_a_bit():
     for clock_hz in (480_000, 12_000_000, 50_000_000, 133_000_000, 400_000_000):
         for baud in (115_200, 230_400, 460_800, 921_600, 1_000_000, 2_000_000, 3_000_000):
             try:
                 design = uart.Design(clock_hz, baud)
             except ValueError:
-                assert baud > clock_hz // 4 or clock_hz > 100_000_000
+                assert baud > clock_hz // 4
             else:
-                assert abs(design.error) <= 0.01
                 assert clock_hz >= 4 * baud
+                assert abs(design.error) <= 1 / (2 ** (uart.FRACTION_BITS + 1) * clock_hz / baud - 1) < 0.002
 
 
 def test_wrong_rates_are_refused():
@@ -188,8 +188,6 @@ def test_wrong_rates_are_refused():
         uart.Design(1_000_000)
     with pytest.raises(ValueError, match=r"clock_hz must be 460800 or more for a UART, not 100000$"):
         uart.Design(100_000)
-    with pytest.raises(ValueError, match=r"baud must be 329133 to 3000000 at clock_hz 431400000, .* not 115200$"):
-        uart.Design(431_400_000, 115_200)
     with pytest.raises(TypeError, match=r"baud must be an int, not 1000000.0$"):
         uart.Design(12_000_000, 1e6)
     with pytest.raises(TypeError, match=r"not 3$"):
