@@ -175,8 +175,8 @@ def _signal(step: dict) -> str:
 
 def _timing(part: Part, report: dict) -> tuple[float, str]:
     """Return a report's longest delay between registers, in ns, and the two ends of its path."""
-    # The oscillator is a clock too.
-    clock, fmax = next((name, fmax) for name, fmax in report["fmax"].items() if name.startswith("clk"))
+    # The oscillator is a clock too; a net of the pin `clk` has its name.
+    clock, fmax = next((name, fmax) for name, fmax in report["fmax"].items() if re.search(r"(^|\$)clk\$", name))
     longest = 1e3 / fmax["achieved"]
     paths = report["critical_paths"]
     path = next(entry["path"] for entry in paths if entry["from"] == entry["to"] == f"posedge {clock}")
