@@ -27,6 +27,7 @@ NOT_TWINNED = {
     "lead_out": "wires",
     "link/axi_link": "the subordinate of a bus and the register file, joined; each of them has its twin",
     "link/link": "the blocks of the link, joined; each of them has its twin",
+    "link/requests": "wires",
     "ports": "text about the hardware",
 }
 # Tests of more than one source, and what they cover.

@@ -10,7 +10,7 @@ from hardwall.model.link.axi import ADDRESS_BITS, STROBES, Response
 from hardwall.model.link.register_file import CELL_BITS, Operation
 from hardwall.model.registers import COUNTERS, TELEMETRY
 
-from .register_file import Requests
+from .requests import Requests
 
 
 class Subordinate(wiring.Component):

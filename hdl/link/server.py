@@ -12,7 +12,7 @@ from hardwall.model.registers import COUNTERS
 
 from ..arithmetic.fixed import less
 from .line import BYTE, Frames
-from .register_file import ADDRESS_BITS, Requests
+from .requests import ADDRESS_BITS, Requests
 
 FIELDS, FIELDS_TO_WRITE = 2, 6
 """Places in a request: of its first field, and of the first field of the registers to write if it reads as well."""
