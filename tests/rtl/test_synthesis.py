@@ -254,5 +254,5 @@ def test_a_small_axis_on_a_real_part(tmp_path, monkeypatch):
     assert 10 < report["fmax_mhz"] < 200
     assert 0 < report["ff"] < report["lut4"] < report["available"]["lut4"] == 5280
     assert 1 <= report["dsp"] <= 8
-    # The registers and their map.
-    assert report["bram"] == 8
+    # The registers and their map, the stamps of edges, and a frame.
+    assert report["bram"] == 8 + 2 + 1
