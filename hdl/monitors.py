@@ -19,9 +19,6 @@ from hardwall.model.supervisor import COUNT
 from .arithmetic.fixed import shape
 from .block import Block
 
-CLOCKS = {"position_range": 2, "runaway": 2, "estimator_saturated": 2, "index_spacing": 3}
-"""Clocks of the causes that are not found in one: limits are compared in turn, or what has been counted before."""
-
 
 class Monitors(Block):
     """One bit for everything that is wrong, as `hardwall.model.monitors` says for each.
@@ -98,7 +95,7 @@ class Monitors(Block):
 
     def latency(self, cause: str) -> int:
         """Return the most clocks from inputs that are wrong to the cause of a name."""
-        return CLOCKS.get(cause, 1)
+        return monitors.latency(cause)
 
     def elaborate(self, platform):
         m = Module()

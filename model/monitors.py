@@ -40,6 +40,8 @@ MADE = (
     "estimator_saturated",
 )  # fmt: skip
 """The causes that are made here; the others come from the decoder, the axis, the pins and the host."""
+CLOCKS = {"position_range": 2, "runaway": 2, "estimator_saturated": 2, "index_spacing": 3}
+"""Clocks of the causes that are not found in one: limits are compared in turn, or what has been counted before."""
 SATURATED_S = 0.01
 IDLE_EDGES = 100
 """Edges of one channel in a row that raise the warning: so many reversals on one edge are dither, or a dead channel."""
@@ -110,6 +112,11 @@ class State(NamedTuple):
 
 
 START = State(*(0 for _ in State._fields))._replace(at_low=1, limit=-1)
+
+
+def latency(cause: str) -> int:
+    """Return the most clocks from inputs that are wrong to the cause of a name."""
+    return CLOCKS.get(cause, 1)
 
 
 class Design:

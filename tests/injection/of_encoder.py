@@ -3,24 +3,23 @@
 import math
 from collections.abc import Callable
 
-from hardwall.hdl.monitors import Monitors
+from hardwall.model.monitors import latency
 from hardwall.model.quadrature_speed import clocks_to_fault
 from oracles.supervised import BITS
 
 from .fault import UNCHANGED, Expected, Fault, trips
 from .handle import Wires, sound, wires
 from .rig import Rig
-from .scene import CLOCKS_PER_MS, COUNTED, DESIGN, GLITCH, PUSH_N, REST, STEP_CLOCKS, TURN, WORDS
+from .scene import CLOCKS_PER_MS, COUNTED, GLITCH, PUSH_N, REST, STEP_CLOCKS, TURN, WORDS
 
-MONITORS = Monitors(DESIGN.monitors)
 HARDER_N = 20.0
 BURST = 80
 """Counts in a step: 8 m/s, twice what the filter passes."""
 ILLEGAL = COUNTED + 1
 FAST = math.ceil(clocks_to_fault(BURST / STEP_CLOCKS, GLITCH)) + 1
-LOST = 2 + WORDS["supervisor_loss"].reset + MONITORS.latency("encoder_loss") + 1
+LOST = 2 + WORDS["supervisor_loss"].reset + latency("encoder_loss") + 1
 """Clock edges from wires that are equal to the drive at zero: synchroniser, `supervisor_loss`, monitor, supervisor."""
-INDEXED = COUNTED + MONITORS.latency("index_spacing") + 1
+INDEXED = COUNTED + latency("index_spacing") + 1
 """Clock edges from an index edge to the drive at zero: count, monitor, supervisor."""
 PAIRS = {"causes": BITS["encoder_loss"]}
 INDEX = {"causes": BITS["index_spacing"], "live": {"supervisor_turn": TURN}}

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 
+from hardwall.model.monitors import latency
 from hardwall.sim.world.encoder import level
 from oracles.supervised import BITS
 
 from .fault import Expected, Fault, trips
 from .handle import Wires
-from .of_encoder import HARDER_N, MONITORS, first_edge
+from .of_encoder import HARDER_N, first_edge
 from .rig import Rig
 from .scene import CLOCKS_PER_MS, COUNTED, PUSH_N, REST, SPEC, START, words
 
@@ -30,7 +31,7 @@ FASTEST_COUNTS = 200_000
 
 def seen(cause: str) -> int:
     """Return the clock edges from a pin of the encoder to the drive at zero: count, monitor, supervisor."""
-    return COUNTED + MONITORS.latency(cause) + 1
+    return COUNTED + latency(cause) + 1
 
 
 def passes(count: int, push_n: float = HARDER_N):
