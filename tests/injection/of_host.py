@@ -180,7 +180,7 @@ FAULTS = (
     Fault(
         "the host commits encoder_invert",
         writes(commit=1, encoder_invert=1),
-        Expected(state=DISARMED, within=TAKEN + RegisterFile(Design(REGISTERS)).commit_clocks),
+        Expected(state=DISARMED, within=TAKEN + RegisterFile(Design(REGISTERS)).shift_clocks),
         writes(commit=1, encoder_invert=0),
     ),
     Fault("the host arms an ARMED axis", writes(FAILURE, arm=1), UNCHANGED),
