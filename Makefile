@@ -3,7 +3,7 @@
 #   PYTHON=python3.13         another interpreter; .venv is made anew when it changes
 #   ARGS="-k levant"          more options for pytest (test, soak, fuzz)
 #   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests), or of what is checked
-#                             (prove, faults, gate, coverage)
+#                             (prove, faults, gate, coverage, mutate)
 #   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
 #                             the seeds, the samples for every seed, and the samples of endurance (soak)
 #   CALLS=1000 KILLS=16       the hostile calls, and the runs that are ended (fuzz)
@@ -51,7 +51,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate coverage lint bench synth choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage mutate lint bench synth choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -71,6 +71,9 @@ gate: $(VENV)/.test | tools ## netlists of three families of FPGAs beside the RT
 
 coverage: $(VENV)/.test | tools ## lines, branches and toggles of every block that its tests reach (an hour)
 	@$(VENV)/bin/python tests/cover.py $(ONLY)
+
+mutate: $(VENV)/.test | tools ## mutants of every block's netlist, which its own tests must kill (an hour)
+	@$(VENV)/bin/python tests/mutate.py $(ONLY)
 
 lint: $(VENV)/.test | tools ## style and common mistakes
 	@failed=0; $(RUN) ruff check . || failed=1; $(RUN) ruff format --check . || failed=1; exit $$failed
@@ -194,7 +197,7 @@ $(VENV)/.docs: pyproject.toml $(VENV)/.sim | tools
 # ---- system packages, checked before anything starts ----------------------------------------------------------------
 
 # These tasks embed Python in the simulator, by cocotb.
-EMBEDDED := $(filter test faults gate coverage bench soak,$(MAKECMDGOALS))
+EMBEDDED := $(filter test faults gate coverage mutate bench soak,$(MAKECMDGOALS))
 
 define CHECK_PYTHON
 import sys

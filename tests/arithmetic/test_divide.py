@@ -55,6 +55,7 @@ async def follows_model(dut):
     bench = Bench(dut, component)
     await bench.reset()
     operands, results = ("dividend", "divisor"), ("quotient", "saturated")
+    at_next_start = bench.monitor("start", *results)
     starts, quotients = await bench.campaign("start", "done", operands, results, stimulus(*widths, SAMPLES // 10))
     pairs = starts.rows
     expected = {
@@ -63,6 +64,7 @@ async def follows_model(dut):
     }
     assert set(expected["saturated"]) == {False, True}
     check(starts, quotients, expected, component.latency)
+    assert at_next_start.rows[1:] == quotients.rows[:-1], "a quotient must stay until the next start"
 
 
 @cocotb.test()

@@ -35,9 +35,11 @@ async def follows_model(dut):
     bench = Bench(dut, component)
     await bench.reset()
     operands, rows = ("dividend", "divisor"), pairs(component, SAMPLES // 50)
+    at_next_start = bench.monitor("start", "quotient")
     inputs, outputs = await bench.campaign("start", "done", operands, ("quotient",), rows)
     quotients = [divide(dividend, divisor, component.fraction) for dividend, divisor in inputs.rows]
     check(inputs, outputs, {"quotient": quotients}, component.latency)
+    assert at_next_start.rows[1:] == outputs.rows[:-1], "a quotient must stay until the next start"
 
 
 @cocotb.test()

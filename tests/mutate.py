@@ -1,0 +1,60 @@
+"""Mutants of every block: small changes of its netlist, which the block's own tests must notice.
+
+    make mutate                     every block
+    make mutate ONLY=link/          only the blocks whose names begin so
+
+Prints a table, a line for every mutant that is left without a reason, and one last line for a script; exits with 1 if a
+block falls short: 95 % of its mutants must be killed, of those that are not proven equivalent, and each of the others
+must have its reason in `mutation/reasons.toml`. `HARDWALL_SEED` draws other mutants, and `HARDWALL_MUTANTS` says how
+many of a block.
+"""
+
+import os
+import sys
+
+from covering.blocks import BLOCKS
+from targets import conclude
+
+from hardwall.model.build_folder import build_dir
+from hardwall.sim.jobs.result import Table
+from hardwall.testing import SEED
+from mutation.fates import Result
+from mutation.run import run
+
+OURS = 1, 40
+"""The seed and the number of mutants that the reasons are written for."""
+MUTANTS = int(os.environ.get("HARDWALL_MUTANTS", OURS[1]))
+COLUMNS = {
+    "block": "left",
+    "mutants": "right",
+    "killed": "right",
+    "equivalent": "right",
+    "left": "right",
+    "without a reason": "right",
+    "killed of others, %": "right",
+    "result": "left",
+}
+
+
+def tell(result: Result) -> None:
+    """Say how a block went, and keep what came of each of its mutants."""
+    folder = build_dir() / "mutate"
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{result.block.replace('/', '-')}.txt").write_text(result.text, encoding="utf-8")
+    print(f"{result.block}: {result.killed} of {len(result.fates)} killed", file=sys.stderr, flush=True)
+
+
+def main(begins: str, count: int = MUTANTS) -> int:
+    """Draw mutants of the blocks whose names begin so, and test them; return the exit code."""
+    chosen = [block for block in BLOCKS if block.name.startswith(begins)]
+    results = run(chosen, count, (SEED, count) == OURS, tell)
+    table, short = Table(COLUMNS, [result.row for result in results]), (each.explanation for each in results)
+    killed, equivalent = sum(each.killed for each in results), sum(each.equivalent for each in results)
+    every = sum(len(each.fates) for each in results)
+    line = f"mutate: {{}} mutants, {killed} killed, {equivalent} equivalent, {every - killed - equivalent} left"
+    good = sum(len(each.fates) for each in results if each.ok)
+    return conclude(table, short, line, every, good)
+
+
+if __name__ == "__main__":
+    sys.exit(main(" ".join(sys.argv[1:])))

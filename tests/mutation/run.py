@@ -1,0 +1,74 @@
+"""The mutants of blocks drawn, tested, and where they survive, compared with the block."""
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+from covering.blocks import Block
+
+from hardwall.testing import SEED
+
+from .equivalent import proven
+from .fates import Fate, Result, reasons_for
+from .killing import killed
+from .netlist import BLOCK, mutated
+from .sizes import Size, sizes_of
+
+SAMPLES = 1000
+"""The samples of the first campaign, which kills most mutants; what survives goes through a whole one."""
+
+
+def fates_of(size: Size, modules: tuple[str, ...], count: int) -> list[Fate]:
+    """Return what came of some mutants of a block in one size.
+
+    Raises:
+        RuntimeError: if the block's own tests fail without a mutant, or a tool fails.
+    """
+    netlist = mutated(size.component(), modules, count, SEED)
+    outcomes = dict.fromkeys(mutant.number for mutant in netlist.mutants)
+    for samples in (SAMPLES, None):
+        alive = [number for number, by in outcomes.items() if by is None]
+        found = killed(size, netlist, alive, samples) if alive else {0: None}
+        unmutated = found.pop(0)
+        if unmutated and samples is None:
+            raise RuntimeError(f"the tests of {size.test.name} fail without a mutant: {unmutated}")
+        # A short campaign may be too short for what the tests demand of it.
+        outcomes |= {} if unmutated else found
+    known = proven(netlist, [number for number, by in outcomes.items() if by is None])
+    return [
+        Fate(f"{size.name}: {mutant.change}", outcomes[mutant.number], known.get(mutant.number, ""))
+        for mutant in netlist.mutants
+    ]
+
+
+def modules_of(block: Block) -> tuple[str, ...]:
+    """Return the modules of a block, as its netlist names them."""
+    return tuple(module.replace("component", BLOCK, 1) for module in block.modules)
+
+
+def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result], None]) -> list[Result]:
+    """Return what came of `count` mutants of each block; `done` is called with each result as it comes.
+
+    The mutants are drawn from all sizes of a block, from each as many.
+
+    Args:
+        blocks: the blocks.
+        count: the mutants of each.
+        ours: whether these are the mutants that the reasons were written for.
+        done: told every result.
+
+    Raises:
+        RuntimeError: if a block's own tests fail without a mutant, or a tool fails.
+    """
+    results = []
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for block in blocks:
+            sizes = sizes_of(block.test)
+            shares = [count * (n + 1) // len(sizes) - count * n // len(sizes) for n in range(len(sizes))]
+            futures = [
+                pool.submit(fates_of, size, modules_of(block), share) for size, share in zip(sizes, shares, strict=True)
+            ]
+            fates = [fate for future in futures for fate in future.result()]
+            results.append(Result(block.name, fates, reasons_for(block.name), ours))
+            done(results[-1])
+    return results
