@@ -49,6 +49,7 @@ BROAD = {
     "test_killed": "every command that stores results",
     "test_layout": "the tree",
     "test_makefile": "the tasks",
+    "test_mutate": "mutants of hardware, and the means",
     "test_proofs": "what is proven of the hardware, and the means",
     "test_readme": "the README",
     "test_typing": "the model's types",

@@ -1,6 +1,6 @@
 """The sizes in which a block's own tests simulate it: taken from its tests, without a simulation."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -41,9 +41,11 @@ class Taker:
     def __init__(self):
         self.sizes: list[Size] = []
 
-    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        for module in {item.module for item in items}:
-            module.simulate = self._note
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self, item: pytest.Item) -> Generator[None, object, object]:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(item.module, "simulate", self._note)
+            return (yield)
 
     def _note(self, test_file: str, make: Callable[..., wiring.Component], **parameters: Any) -> None:
         self.sizes.append(Size(Path(test_file), make, parameters))

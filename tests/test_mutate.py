@@ -1,0 +1,164 @@
+"""The mutants of a small component, and the means: `make mutate` draws mutants of every block."""
+
+from pathlib import Path
+
+import cocotb
+import mutate
+import pytest
+from amaranth.hdl import Module, Signal
+from amaranth.lib import wiring
+from amaranth.lib.wiring import In, Out
+from cocotb.triggers import RisingEdge
+from covering.blocks import BLOCKS, TESTS
+
+from hardwall.testing import Bench
+from mutation import run
+from mutation.equivalent import cut
+from mutation.fates import REASONS, Fate, Reason, Result, reasons_for
+from mutation.netlist import BLOCK, mutated
+from mutation.run import fates_of, modules_of
+from mutation.sizes import Size, sizes_of
+
+CLOCKS = 3
+"""From a start to its answer."""
+HERE = Path(__file__)
+
+
+class Answer(wiring.Component):
+    """Answers a start; of the time that is left, no test looks at more than the answer."""
+
+    start: In(1)
+    done: Out(1)
+    half: Out(1)
+
+    def elaborate(self, platform):
+        m = Module()
+        left = Signal(2)
+        with m.If(self.start):
+            m.d.sync += left.eq(CLOCKS)
+        with m.Elif(left != 0):
+            m.d.sync += left.eq(left - 1)
+        m.d.comb += [self.done.eq(left == 1), self.half.eq(left == 2)]
+        return m
+
+
+@cocotb.test()
+async def answers(dut):
+    bench = Bench(dut, Answer())
+    await bench.reset()
+    begun = bench.clock_number()
+    bench.drive(start=1)
+    await RisingEdge(dut.clk)
+    bench.drive(start=0)
+    # Nothing ends this but the answer.
+    await RisingEdge(dut.done)
+    assert bench.clock_number() - begun == CLOCKS
+
+
+def test_mutants_are_killed_even_if_they_hang_or_proven_equivalent_or_left():
+    fates = fates_of(Size(HERE, Answer, {}), (BLOCK,), 100)
+    by_hanging = [fate for fate in fates if fate.killed_by and "CancelledError" in fate.killed_by]
+    at_once = [fate for fate in fates if fate.killed_by and "AssertionError" in fate.killed_by]
+    left = [fate for fate in fates if fate.left]
+    assert [fate.mutant for fate in by_hanging if "done" in fate.mutant]
+    assert at_once
+    assert [fate.mutant for fate in left if "half" in fate.mutant]
+    assert all(fate.known.startswith("differs after ") for fate in left)
+    assert [fate for fate in fates if fate.equivalent]
+
+
+def test_tests_that_fail_without_a_mutant_say_nothing(monkeypatch):
+    """A first campaign may be too short for the tests themselves; the whole one may not."""
+    asked, whole = [], "too few samples"
+
+    def answered(size, netlist, numbers, samples):
+        asked.append(samples)
+        return {0: whole if samples is None else "too few samples", **dict.fromkeys(numbers, "a test")}
+
+    monkeypatch.setattr(run, "killed", answered)
+    with pytest.raises(RuntimeError, match=r"^the tests of test_mutate\.py fail without a mutant: too few samples$"):
+        fates_of(Size(HERE, Answer, {}), (BLOCK,), 4)
+    whole = None
+    assert [fate.killed_by for fate in fates_of(Size(HERE, Answer, {}), (BLOCK,), 4)] == ["a test"] * 4
+    assert asked == [run.SAMPLES, None] * 2
+
+
+def test_the_seed_draws_the_mutants_and_the_selector_counts_them():
+    first, again, other = (mutated(Answer(), (BLOCK,), 8, seed) for seed in (1, 1, 2))
+    assert first.mutants == again.mutants != other.mutants
+    assert [mutant.number for mutant in first.mutants] == [*range(1, 9)]
+    assert len({mutant.change for mutant in first.mutants}) == 8
+
+
+def test_the_sizes_of_a_block_are_those_that_its_tests_simulate():
+    sizes = sizes_of(TESTS / "arithmetic/test_sqrt.py")
+    assert [size.parameters for size in sizes] == [{"width": width} for width in (1, 2, 3, 16, 35)]
+    assert sizes[3].name == "width 16"
+    assert sizes[3].component().width == 16
+
+
+def test_a_block_is_mutated_in_its_own_modules():
+    modules = {block.name: modules_of(block) for block in BLOCKS}
+    assert modules["wall"] == (BLOCK,)
+    assert modules["link/uart"] == (f"{BLOCK}.receiver", f"{BLOCK}.transmitter")
+
+
+def test_a_register_of_another_kind_is_refused():
+    connections = {"D": [2], "Q": [3]}
+    module = {"ports": {}, "cells": {"one": {"type": "$dff", "connections": connections}}}
+    cut(module)
+    assert module["cells"] == {}
+    assert sorted(port["direction"] for port in module["ports"].values()) == ["input", "output"]
+    with pytest.raises(ValueError, match=r"not \$adff$"):
+        cut({"ports": {}, "cells": {"one": {"type": "$adff", "connections": connections}}})
+
+
+KILLED = [Fate(f"killed {number}", "a test") for number in range(19)]
+EQUAL = Fate("equal", None, "equivalent")
+LEFT = Fate("a mutant", None, "differs after 3 clocks")
+REASON = Reason("part", "a mut*", "Nothing reads it.")
+
+
+@pytest.mark.parametrize(
+    ("result", "ok", "said"),
+    [
+        (Result("part", [*KILLED, EQUAL], []), True, ""),
+        (Result("part", [*KILLED, LEFT], []), False, "part: left, differs after 3 clocks: a mutant\n"),
+        (Result("part", [*KILLED, EQUAL, LEFT], [REASON]), True, ""),
+        (Result("part", [*KILLED, LEFT, LEFT], [REASON]), False, ""),
+        (Result("part", KILLED, [REASON]), False, "part: not left, so that its reason must go: a mut*\n"),
+        (Result("part", KILLED, [REASON], ours=False), True, ""),
+        (Result("part", [], []), False, ""),
+    ],
+    ids=["killed", "left", "with a reason", "too many left", "stale", "of others", "none"],
+)
+def test_nineteen_of_twenty_must_be_killed_and_what_is_left_needs_a_reason(result, ok, said):
+    assert (result.ok, result.explanation) == (ok, said)
+
+
+def test_every_reason_is_of_a_block():
+    written = sum(len(reasons_for(block.name)) for block in BLOCKS)
+    assert written == REASONS.read_text(encoding="utf-8").count("[[reason]]")
+
+
+@pytest.mark.parametrize(
+    ("fates", "last"),
+    [
+        ([*KILLED, EQUAL], "mutate: 20 mutants, 19 killed, 1 equivalent, 0 left"),
+        ([*KILLED, LEFT], "mutate: 20 mutants, 19 killed, 0 equivalent, 1 left"),
+        ([], "mutate: 0 mutants, 0 killed, 0 equivalent, 0 left"),
+    ],
+    ids=["good", "left", "none"],
+)
+def test_the_command_ends_in_a_line_for_a_script(fates, last, monkeypatch, capsys):
+    given = []
+
+    def came(blocks, *_):
+        given.extend(block.name for block in blocks)
+        return [Result("wall", fates, [])]
+
+    monkeypatch.setattr(mutate, "run", came)
+    code = mutate.main("wal")
+    assert given == ["wall"]
+    assert capsys.readouterr().out.splitlines()[-1] == last
+    assert code == int(EQUAL not in fates)
