@@ -2,12 +2,13 @@
 
 There are two ways, and either is enough:
 
-- **One step.** Every register becomes an output with its next value and an input with its present one, and what is left
-  has no state. If no inputs tell the component from its mutant, both go from equal states to equal states with equal
-  outputs, and they have the same values at power-up. What both have alike is merged first, so that a multiplier that is
-  in both need not be understood.
-- **Induction.** Only the outputs are compared, from power-up on and after some clocks in which they were equal: so a
-  register may differ where nothing reads it, and states that do not last are not searched.
+- **One step.** Registers become outputs with their next values, and inputs with their present ones. If no inputs tell
+  the component from its mutant, both go from equal states to equal states with equal outputs, and they have the same
+  values at power-up. A register that differs after the step is given any value in either; if the outputs are equal all
+  the same, nothing depends on it. What both have alike is merged first, so that a multiplier that
+  is in both need not be understood.
+- **Induction.** Only the outputs are compared, from power-up on, and after some clocks in which they were equal: so
+  states that do not last are not searched.
 
 The search of the induction may instead find inputs at which an output differs: then a test could kill the mutant.
 """
@@ -15,63 +16,127 @@ The search of the induction may instead find inputs at which an output differs: 
 import copy
 import json
 import re
-from collections.abc import Sequence
+import shutil
+import subprocess
+from collections.abc import Iterable
 from pathlib import Path
 
 from hardwall.model.build_folder import build_dir
+from hardwall.sim.jobs import children
 from hardwall.sim.jobs.scratch import scratch
+from hardwall.sim.rtl import synthesis
 
 from .netlist import BLOCK, SELECTOR, SELECTOR_BITS, Netlist, run_yosys
 
-TIMEOUT_S, STEPS = 20, 20
-"""The seconds of the solver for one question, and the most clocks of the induction."""
+CPU_S = 30
+"""The processor's time for a question; one that takes longer is not answered."""
+ROUNDS, STEPS = 12, 20
+"""The most searches of registers that differ, and the most clocks of the induction."""
 FLAT = f"read_verilog mutated.v; hierarchy -top {BLOCK}; proc; flatten; memory; memory_map; dffunmap; opt_clean"
-SOLVE = f"sat -timeout {TIMEOUT_S} -prove trigger 0 -set-def-inputs"
-WAYS = {"step": f"{SOLVE} miter", "flat": f"{SOLVE} -tempinduct -maxsteps {STEPS} miter"}
-"""The questions, by the name of the design that each is asked of."""
+SOLVE = "sat -prove trigger 0 -set-def-inputs"
+_DIFFERS = re.compile(r"^ *\\(gold|gate)_(\S+) .* ([01]+)$", re.MULTILINE)
+
+Bits = set[tuple[str, int]]
+"""Bits of registers, each with the name of its cell and its place in it."""
 
 
-def cut(module: dict) -> None:
-    """Put ports of the module in the place of each of its registers.
+def registers(module: dict) -> Bits:
+    """Return all bits of the registers of a module.
 
     Raises:
         ValueError: if a register is of a kind that this does not know.
     """
-    for number, (name, cell) in enumerate(list(module["cells"].items())):
+    found = set()
+    for name, cell in module["cells"].items():
         if "ff" in cell["type"] or "latch" in cell["type"]:
             if cell["type"] != "$dff":
                 raise ValueError(f"a register must be a $dff, not {cell['type']}")
-            for direction, port in (("output", "D"), ("input", "Q")):
-                module["ports"][f"{port}_{number}"] = {"direction": direction, "bits": cell["connections"][port]}
-            del module["cells"][name]
+            found |= {(name, place) for place in range(len(cell["connections"]["Q"]))}
+    return found
 
 
-def proven(netlist: Netlist, numbers: Sequence[int]) -> dict[int, str]:
+def cut(module: dict, kept: Bits) -> dict[str, list[tuple[str, int]]]:
+    """Put ports of the module in the place of some bits of its registers, and any value in the place of the others.
+
+    Returns:
+        The bits of each port of next values.
+    """
+    ports: dict[str, list[tuple[str, int]]] = {}
+    for number, name in enumerate(sorted({name for name, _ in registers(module)})):
+        pins = module["cells"].pop(name)["connections"]
+        mine, rest = [], []
+        for place in range(len(pins["Q"])):
+            (mine if (name, place) in kept else rest).append(place)
+        if mine:
+            ports[f"D_{number}"] = [(name, place) for place in mine]
+            for port, direction in (("D", "output"), ("Q", "input")):
+                module["ports"][f"{port}_{number}"] = {"direction": direction, "bits": [pins[port][n] for n in mine]}
+        if rest:
+            # The solver takes a cell that it does not know for one with any outputs.
+            free = {"Q": [pins["Q"][n] for n in rest]}
+            module["cells"][name] = {"type": "free", "port_directions": {"Q": "output"}, "connections": free}
+    return ports
+
+
+def known_of(netlist: Netlist, numbers: Iterable[int]) -> dict[int, str]:
     """Return what is known of some mutants: `equivalent`, `differs after N clocks`, or `undecided`.
 
     Raises:
         SynthesisError: if Yosys is missing or fails.
     """
-    if not numbers:
-        return {}
     with scratch(build_dir() / "mutate") as work:
         (work / "mutated.v").write_text(netlist.verilog, encoding="utf-8")
         run_yosys(work, f"{FLAT}; write_json flat.json")
         flat = json.loads((work / "flat.json").read_text(encoding="utf-8"))
+        return {number: _known(work, flat, number) for number in numbers}
+
+
+def _known(work: Path, flat: dict, number: int) -> str:
+    if _is_equal_in_a_step(work, flat, number):
+        return "equivalent"
+    answer = _asked(work, flat, number, f"{SOLVE} -tempinduct -maxsteps {STEPS} miter")
+    if "SUCCESS" in answer:
+        return "equivalent"
+    steps = re.findall(r"\[base case (\d+)\] Solving", answer)
+    return f"differs after {int(steps[-1]) - 1} clocks" if "base case: FAIL" in answer else "undecided"
+
+
+def _is_equal_in_a_step(work: Path, flat: dict, number: int) -> bool:
+    kept = registers(flat["modules"][BLOCK])
+    for _ in range(ROUNDS):
         step = copy.deepcopy(flat)
-        cut(step["modules"][BLOCK])
-        (work / "step.json").write_text(json.dumps(step), encoding="utf-8")
-        script = []
-        for design, question in WAYS.items():
-            script += ["design -reset", f"read_json {design}.json", f"design -save {design}"]
-            for number in numbers:
-                script += [*_side_by_side(design, number), f"tee -q -o {design}-{number} {question}"]
-        (work / "compare.ys").write_text("\n".join(script) + "\n", encoding="utf-8")
-        run_yosys(work, "script compare.ys")
-        return {number: _known(work, number) for number in numbers}
+        ports = cut(step["modules"][BLOCK], kept)
+        answer = _asked(work, step, number, f"{SOLVE} -ignore_unknown_cells -show-outputs miter")
+        if "SUCCESS" in answer:
+            return True
+        values: dict[str, list[str]] = {}
+        for _, name, bits in _DIFFERS.findall(answer):
+            values.setdefault(name, []).append(bits[::-1])
+        unlike = {name: both for name, both in values.items() if both[0] != both[-1]}
+        if not unlike or not set(unlike) <= set(ports):
+            return False
+        for name, (one, other) in unlike.items():
+            kept -= {bit for bit, a, b in zip(ports[name], one, other, strict=True) if a != b}
+    return False
 
 
-def _side_by_side(design: str, number: int) -> list[str]:
+def _asked(work: Path, design: dict, number: int, question: str) -> str:
+    """Return the solver's answer on a design with its mutant beside it; an empty text if it has none in its time."""
+    (work / "design.json").write_text(json.dumps(design), encoding="utf-8")
+    (work / "ask.ys").write_text("\n".join(_side_by_side(number)) + f"\n{question}\n", encoding="utf-8")
+    tool = shutil.which(synthesis.YOSYS, path=synthesis.TOOLS)
+    # This Yosys has no clock to end its solver by.
+    limited = ("/bin/sh", "-c", 'ulimit -t "$0" && exec "$@"', str(CPU_S), tool, "-s", "ask.ys")
+    done = children.run(limited, cwd=work, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if done.returncode > 0:
+        why = next(
+            (line for line in done.stdout.splitlines() if line.startswith("ERROR: ")), f"exit code {done.returncode}"
+        )
+        raise synthesis.SynthesisError(f"Yosys cannot compare a mutant: {why.removeprefix('ERROR: ')}")
+    return done.stdout if done.returncode == 0 else ""
+
+
+def _side_by_side(number: int) -> list[str]:
     """Return the commands that compare the outputs of a mutant with the component's, in a module `miter`."""
     fixed = [
         line
@@ -84,16 +149,5 @@ def _side_by_side(design: str, number: int) -> list[str]:
             "cd ..",
         )
     ]
-    merged = ["miter -equiv -flatten gold gate miter", "hierarchy -top miter", "opt -full", "opt_merge -share_all"]
-    return [f"design -load {design}", *fixed, *merged, "opt_clean"]
-
-
-def _known(work: Path, number: int) -> str:
-    """Return what the answers say of a mutant."""
-    answers = [(work / f"{design}-{number}").read_text(encoding="utf-8") for design in WAYS]
-    if any("SUCCESS" in answer for answer in answers):
-        return "equivalent"
-    if "base case: FAIL" in answers[1]:
-        steps = re.findall(r"\[base case (\d+)\] Solving", answers[1])
-        return f"differs after {int(steps[-1]) - 1} clocks"
-    return "undecided"
+    compared = ["miter -equiv -flatten -make_outputs gold gate miter", "hierarchy -top miter"]
+    return ["read_json design.json", *fixed, *compared, "opt -full", "opt_merge -share_all", "dffunmap", "opt_clean"]

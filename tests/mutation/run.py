@@ -8,7 +8,7 @@ from covering.blocks import Block
 
 from hardwall.testing import SEED
 
-from .equivalent import proven
+from .equivalent import known_of
 from .fates import Fate, Result, reasons_for
 from .killing import killed
 from .netlist import BLOCK, mutated
@@ -34,7 +34,8 @@ def fates_of(size: Size, modules: tuple[str, ...], count: int) -> list[Fate]:
             raise RuntimeError(f"the tests of {size.test.name} fail without a mutant: {unmutated}")
         # A short campaign may be too short for what the tests demand of it.
         outcomes |= {} if unmutated else found
-    known = proven(netlist, [number for number, by in outcomes.items() if by is None])
+    alive = [number for number, by in outcomes.items() if by is None]
+    known = known_of(netlist, alive) if alive else {}
     return [
         Fate(f"{size.name}: {mutant.change}", outcomes[mutant.number], known.get(mutant.number, ""))
         for mutant in netlist.mutants
