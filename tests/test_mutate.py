@@ -11,9 +11,9 @@ from amaranth.lib.wiring import In, Out
 from cocotb.triggers import RisingEdge
 from covering.blocks import BLOCKS, TESTS
 
-from hardwall.testing import Bench
+from hardwall.testing import SEED, Bench
 from mutation import run
-from mutation.equivalent import cut
+from mutation.equivalent import EQUIVALENT, cut, known_of, registers
 from mutation.fates import REASONS, Fate, Reason, Result, reasons_for
 from mutation.netlist import BLOCK, mutated
 from mutation.run import fates_of, modules_of
@@ -21,6 +21,7 @@ from mutation.sizes import Size, sizes_of
 
 CLOCKS = 3
 """From a start to its answer."""
+MANY = 20
 HERE = Path(__file__)
 
 
@@ -56,7 +57,7 @@ async def answers(dut):
 
 
 def test_mutants_are_killed_even_if_they_hang_or_proven_equivalent_or_left():
-    fates = fates_of(Size(HERE, Answer, {}), (BLOCK,), 100)
+    fates = fates_of(Size(HERE, Answer, {}), (BLOCK,), MANY)
     by_hanging = [fate for fate in fates if fate.killed_by and "CancelledError" in fate.killed_by]
     at_once = [fate for fate in fates if fate.killed_by and "AssertionError" in fate.killed_by]
     left = [fate for fate in fates if fate.left]
@@ -65,17 +66,22 @@ def test_mutants_are_killed_even_if_they_hang_or_proven_equivalent_or_left():
     assert [fate.mutant for fate in left if "half" in fate.mutant]
     assert all(fate.known.startswith("differs after ") for fate in left)
     assert [fate for fate in fates if fate.equivalent]
+    # What a test kills is not proven equivalent either.
+    killed = [number for number, fate in enumerate(fates, 1) if fate.killed_by]
+    known = known_of(mutated(Answer(), (BLOCK,), MANY, SEED), killed[:4])
+    assert all(said.startswith("differs after ") for said in known.values())
 
 
 def test_tests_that_fail_without_a_mutant_say_nothing(monkeypatch):
     """A first campaign may be too short for the tests themselves; the whole one may not."""
     asked, whole = [], "too few samples"
 
-    def answered(size, netlist, numbers, samples):
+    def answered(size, netlist, numbers, samples=None):
         asked.append(samples)
         return {0: whole if samples is None else "too few samples", **dict.fromkeys(numbers, "a test")}
 
     monkeypatch.setattr(run, "killed", answered)
+    monkeypatch.setattr(run, "known_of", lambda netlist, numbers: dict.fromkeys(numbers, "undecided"))
     with pytest.raises(RuntimeError, match=r"^the tests of test_mutate\.py fail without a mutant: too few samples$"):
         fates_of(Size(HERE, Answer, {}), (BLOCK,), 4)
     whole = None
@@ -103,18 +109,19 @@ def test_a_block_is_mutated_in_its_own_modules():
     assert modules["link/uart"] == (f"{BLOCK}.receiver", f"{BLOCK}.transmitter")
 
 
-def test_a_register_of_another_kind_is_refused():
-    connections = {"D": [2], "Q": [3]}
-    module = {"ports": {}, "cells": {"one": {"type": "$dff", "connections": connections}}}
-    cut(module)
-    assert module["cells"] == {}
-    assert sorted(port["direction"] for port in module["ports"].values()) == ["input", "output"]
+def test_registers_become_ports_or_any_value():
+    pins = {"D": [2, 3], "Q": [4, 5]}
+    module = {"ports": {}, "cells": {"one": {"type": "$dff", "connections": pins}}}
+    assert registers(module) == {("one", 0), ("one", 1)}
+    assert cut(module, {("one", 1)}) == {"D_0": [("one", 1)]}
+    assert {name: port["bits"] for name, port in module["ports"].items()} == {"D_0": [3], "Q_0": [5]}
+    assert module["cells"]["one"]["connections"] == {"Q": [4]}
     with pytest.raises(ValueError, match=r"not \$adff$"):
-        cut({"ports": {}, "cells": {"one": {"type": "$adff", "connections": connections}}})
+        registers({"cells": {"one": {"type": "$adff"}}})
 
 
 KILLED = [Fate(f"killed {number}", "a test") for number in range(19)]
-EQUAL = Fate("equal", None, "equivalent")
+EQUAL = Fate("equal", None, EQUIVALENT)
 LEFT = Fate("a mutant", None, "differs after 3 clocks")
 REASON = Reason("part", "a mut*", "Nothing reads it.")
 

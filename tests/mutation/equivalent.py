@@ -28,6 +28,7 @@ from hardwall.sim.rtl import synthesis
 
 from .netlist import BLOCK, SELECTOR, SELECTOR_BITS, Netlist, run_yosys
 
+EQUIVALENT = "equivalent"
 CPU_S = 30
 """The processor's time for a question; one that takes longer is not answered."""
 ROUNDS, STEPS = 12, 20
@@ -93,10 +94,10 @@ def known_of(netlist: Netlist, numbers: Iterable[int]) -> dict[int, str]:
 
 def _known(work: Path, flat: dict, number: int) -> str:
     if _is_equal_in_a_step(work, flat, number):
-        return "equivalent"
+        return EQUIVALENT
     answer = _asked(work, flat, number, f"{SOLVE} -tempinduct -maxsteps {STEPS} miter")
     if "SUCCESS" in answer:
-        return "equivalent"
+        return EQUIVALENT
     steps = re.findall(r"\[base case (\d+)\] Solving", answer)
     return f"differs after {int(steps[-1]) - 1} clocks" if "base case: FAIL" in answer else "undecided"
 

@@ -5,6 +5,8 @@ import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from .equivalent import EQUIVALENT
+
 GOAL = 0.95
 """The share of the mutants that must be killed, of those that are not proven equivalent."""
 REASONS = Path(__file__).with_name("reasons.toml")
@@ -26,7 +28,7 @@ class Fate:
 
     @property
     def equivalent(self) -> bool:
-        return self.killed_by is None and self.known == "equivalent"
+        return self.killed_by is None and self.known == EQUIVALENT
 
     @property
     def left(self) -> bool:

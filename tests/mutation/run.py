@@ -8,14 +8,14 @@ from covering.blocks import Block
 
 from hardwall.testing import SEED
 
-from .equivalent import known_of
+from .equivalent import EQUIVALENT, known_of
 from .fates import Fate, Result, reasons_for
 from .killing import killed
 from .netlist import BLOCK, mutated
 from .sizes import Size, sizes_of
 
 SAMPLES = 1000
-"""The samples of the first campaign, which kills most mutants; what survives goes through a whole one."""
+"""The samples of the first campaign, which kills most mutants; what may differ goes through a whole one."""
 
 
 def fates_of(size: Size, modules: tuple[str, ...], count: int) -> list[Fate]:
@@ -25,19 +25,19 @@ def fates_of(size: Size, modules: tuple[str, ...], count: int) -> list[Fate]:
         RuntimeError: if the block's own tests fail without a mutant, or a tool fails.
     """
     netlist = mutated(size.component(), modules, count, SEED)
-    outcomes = dict.fromkeys(mutant.number for mutant in netlist.mutants)
-    for samples in (SAMPLES, None):
-        alive = [number for number, by in outcomes.items() if by is None]
-        found = killed(size, netlist, alive, samples) if alive else {0: None}
-        unmutated = found.pop(0)
-        if unmutated and samples is None:
-            raise RuntimeError(f"the tests of {size.test.name} fail without a mutant: {unmutated}")
+    numbers = [mutant.number for mutant in netlist.mutants]
+    killed_by = killed(size, netlist, numbers, SAMPLES)
+    if killed_by.pop(0):
         # A short campaign may be too short for what the tests demand of it.
-        outcomes |= {} if unmutated else found
-    alive = [number for number, by in outcomes.items() if by is None]
+        killed_by = dict.fromkeys(numbers)
+    alive = [number for number in numbers if killed_by[number] is None]
     known = known_of(netlist, alive) if alive else {}
+    if perhaps := [number for number in alive if known[number] != EQUIVALENT]:
+        killed_by |= killed(size, netlist, perhaps)
+        if unmutated := killed_by.pop(0):
+            raise RuntimeError(f"the tests of {size.test.name} fail without a mutant: {unmutated}")
     return [
-        Fate(f"{size.name}: {mutant.change}", outcomes[mutant.number], known.get(mutant.number, ""))
+        Fate(f"{size.name}: {mutant.change}", killed_by[mutant.number], known.get(mutant.number, ""))
         for mutant in netlist.mutants
     ]
 
