@@ -1,5 +1,6 @@
 """The mutants of a small component, and the means: `make mutate` draws mutants of every block."""
 
+import copy
 from pathlib import Path
 
 import cocotb
@@ -13,7 +14,7 @@ from covering.blocks import BLOCKS, TESTS
 
 from hardwall.testing import SEED, Bench
 from mutation import run
-from mutation.equivalent import EQUIVALENT, cut, known_of, registers
+from mutation.equivalent import EQUIVALENT, cut, known_of, registers, watch
 from mutation.fates import REASONS, Fate, Reason, Result, reasons_for
 from mutation.netlist import BLOCK, mutated
 from mutation.run import fates_of, modules_of
@@ -113,6 +114,7 @@ def test_registers_become_ports_or_any_value():
     pins = {"D": [2, 3], "Q": [4, 5]}
     module = {"ports": {}, "cells": {"one": {"type": "$dff", "connections": pins}}}
     assert registers(module) == {("one", 0), ("one", 1)}
+    assert watch(copy.deepcopy(module), {("one", 0)}) == {"Q_0": [("one", 0)]}
     assert cut(module, {("one", 1)}) == {"D_0": [("one", 1)]}
     assert {name: port["bits"] for name, port in module["ports"].items()} == {"D_0": [3], "Q_0": [5]}
     assert module["cells"]["one"]["connections"] == {"Q": [4]}

@@ -7,10 +7,11 @@ There are two ways, and either is enough:
   values at power-up. A register that differs after the step is given any value in either; if the outputs are equal all
   the same, nothing depends on it. What both have alike is merged first, so that a multiplier that
   is in both need not be understood.
-- **Induction.** Only the outputs are compared, from power-up on, and after some clocks in which they were equal: so
-  states that do not last are not searched.
+- **Induction.** Outputs are compared from power-up on, and after some clocks in which they were equal: so states that
+  do not last are not searched. If that is not enough, registers are compared too, without those bits that the search
+  from power-up finds to differ.
 
-The search of the induction may instead find inputs at which an output differs: then a test could kill the mutant.
+The search from power-up may instead find inputs at which an output differs: then a test could kill the mutant.
 """
 
 import copy
@@ -29,19 +30,20 @@ from hardwall.sim.rtl import synthesis
 from .netlist import BLOCK, SELECTOR, SELECTOR_BITS, Netlist, run_yosys
 
 EQUIVALENT = "equivalent"
-CPU_S = 30
+CPU_S = 15
 """The processor's time for a question; one that takes longer is not answered."""
-ROUNDS, STEPS = 12, 20
-"""The most searches of registers that differ, and the most clocks of the induction."""
+ROUNDS, STEPS, STEPS_OF_REGISTERS = 8, 20, 8
+"""The most searches of registers that differ, and the most clocks of the induction, on outputs and on registers."""
 FLAT = f"read_verilog mutated.v; hierarchy -top {BLOCK}; proc; flatten; memory; memory_map; dffunmap; opt_clean"
-SOLVE = "sat -prove trigger 0 -set-def-inputs"
-_DIFFERS = re.compile(r"^ *\\(gold|gate)_(\S+) .* ([01]+)$", re.MULTILINE)
+SOLVE = "sat -prove trigger 0"
+PROVEN, DIFFERS = "SUCCESS", "base case: FAIL"
+_VALUE = re.compile(r"^ *(\d*) *\\(?:gold|gate)_(\S+) .* ([01]+)$", re.MULTILINE)
 
-Bits = set[tuple[str, int]]
-"""Bits of registers, each with the name of its cell and its place in it."""
+Bit = tuple[str, int]
+"""A bit of a register: the name of its cell, and its place in it."""
 
 
-def registers(module: dict) -> Bits:
+def registers(module: dict) -> set[Bit]:
     """Return all bits of the registers of a module.
 
     Raises:
@@ -56,13 +58,13 @@ def registers(module: dict) -> Bits:
     return found
 
 
-def cut(module: dict, kept: Bits) -> dict[str, list[tuple[str, int]]]:
+def cut(module: dict, kept: set[Bit]) -> dict[str, list[Bit]]:
     """Put ports of the module in the place of some bits of its registers, and any value in the place of the others.
 
     Returns:
         The bits of each port of next values.
     """
-    ports: dict[str, list[tuple[str, int]]] = {}
+    ports: dict[str, list[Bit]] = {}
     for number, name in enumerate(sorted({name for name, _ in registers(module)})):
         pins = module["cells"].pop(name)["connections"]
         mine, rest = [], []
@@ -76,6 +78,17 @@ def cut(module: dict, kept: Bits) -> dict[str, list[tuple[str, int]]]:
             # The solver takes a cell that it does not know for one with any outputs.
             free = {"Q": [pins["Q"][n] for n in rest]}
             module["cells"][name] = {"type": "free", "port_directions": {"Q": "output"}, "connections": free}
+    return ports
+
+
+def watch(module: dict, kept: set[Bit]) -> dict[str, list[Bit]]:
+    """Add outputs with some bits of the registers to a module; return the bits of each of them."""
+    ports: dict[str, list[Bit]] = {}
+    for number, name in enumerate(sorted({name for name, _ in kept})):
+        taken = module["cells"][name]["connections"]["Q"]
+        ports[f"Q_{number}"] = [(name, place) for place in range(len(taken)) if (name, place) in kept]
+        bits = [taken[place] for _, place in ports[f"Q_{number}"]]
+        module["ports"][f"Q_{number}"] = {"direction": "output", "bits": bits}
     return ports
 
 
@@ -93,32 +106,62 @@ def known_of(netlist: Netlist, numbers: Iterable[int]) -> dict[int, str]:
 
 
 def _known(work: Path, flat: dict, number: int) -> str:
-    if _is_equal_in_a_step(work, flat, number):
+    kept = _unequal_in_a_step(work, flat, number)
+    if kept is None:
         return EQUIVALENT
-    answer = _asked(work, flat, number, f"{SOLVE} -tempinduct -maxsteps {STEPS} miter")
-    if "SUCCESS" in answer:
-        return EQUIVALENT
-    steps = re.findall(r"\[base case (\d+)\] Solving", answer)
-    return f"differs after {int(steps[-1]) - 1} clocks" if "base case: FAIL" in answer else "undecided"
+    answer = ""
+    for _ in range(ROUNDS):
+        watched = copy.deepcopy(flat)
+        ports = watch(watched["modules"][BLOCK], kept)
+        answer = _asked(
+            work, watched, number, f"{SOLVE} -tempinduct -maxsteps {STEPS_OF_REGISTERS} -show-outputs miter"
+        )
+        unlike = _unlike(answer, ports) if DIFFERS in answer else set()
+        if not unlike:
+            break
+        kept -= unlike
+    if not any(said in answer for said in (PROVEN, DIFFERS)):
+        answer = _asked(work, flat, number, f"{SOLVE} -tempinduct -maxsteps {STEPS} miter")
+    if DIFFERS in answer:
+        steps = re.findall(r"\[base case (\d+)\] Solving", answer)
+        return f"differs after {int(steps[-1]) - 1} clocks"
+    return EQUIVALENT if PROVEN in answer else "undecided"
 
 
-def _is_equal_in_a_step(work: Path, flat: dict, number: int) -> bool:
+def _unequal_in_a_step(work: Path, flat: dict, number: int) -> set[Bit] | None:
+    """Return None if a mutant is equal in a step, and otherwise the bits that did not differ in the first search."""
     kept = registers(flat["modules"][BLOCK])
+    first = None
     for _ in range(ROUNDS):
         step = copy.deepcopy(flat)
         ports = cut(step["modules"][BLOCK], kept)
         answer = _asked(work, step, number, f"{SOLVE} -ignore_unknown_cells -show-outputs miter")
-        if "SUCCESS" in answer:
-            return True
-        values: dict[str, list[str]] = {}
-        for _, name, bits in _DIFFERS.findall(answer):
-            values.setdefault(name, []).append(bits[::-1])
-        unlike = {name: both for name, both in values.items() if both[0] != both[-1]}
-        if not unlike or not set(unlike) <= set(ports):
-            return False
-        for name, (one, other) in unlike.items():
-            kept -= {bit for bit, a, b in zip(ports[name], one, other, strict=True) if a != b}
-    return False
+        if PROVEN in answer:
+            return None
+        unlike = _unlike(answer, ports)
+        kept = kept - unlike
+        first = kept if first is None else first
+        if not unlike:
+            break
+    return first
+
+
+def _unlike(answer: str, ports: dict[str, list[Bit]]) -> set[Bit]:
+    """Return the bits of registers that differ at the last clock of an answer; none if an output of the block does."""
+    last = answer.rpartition("Signal Name")[2]
+    clocks: dict[int, dict[str, list[str]]] = {}
+    for clock, name, bits in _VALUE.findall(last):
+        clocks.setdefault(int(clock or 0), {}).setdefault(name, []).append(bits[::-1])
+    pairs = clocks[max(clocks)] if clocks else {}
+    unlike = {name: both for name, both in pairs.items() if both[0] != both[-1]}
+    if not set(unlike) <= set(ports):
+        return set()
+    return {
+        bit
+        for name, (one, other) in unlike.items()
+        for bit, a, b in zip(ports[name], one, other, strict=True)
+        if a != b
+    }
 
 
 def _asked(work: Path, design: dict, number: int, question: str) -> str:

@@ -18,8 +18,6 @@ HERE = Path(__file__).parent
 OPTIONS = (
     # A mutant parts one bit from a word. Verilator then takes words for circles that are none, bit by bit.
     "-Wno-UNOPTFLAT",
-    # So Yosys writes a choice by the first of several bits.
-    "-Wno-CASEOVERLAP",
 )
 
 

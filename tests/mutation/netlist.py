@@ -105,7 +105,8 @@ def mutated(component: wiring.Component, modules: tuple[str, ...], count: int, s
             commands.append(line.replace("mutate ", f"mutate -ctrl {SELECTOR} {SELECTOR_BITS} {number} ", 1))
             mutants.append(Mutant(number, _described(line, rtl.splitlines())))
         (work / "changes.ys").write_text("\n".join(commands) + "\n", encoding="utf-8")
-        run_yosys(work, "read_rtlil plain.il; script changes.ys; opt_clean; write_verilog -noattr mutated.v")
+        # A choice of which several apply is then the same to the simulator and to the solver.
+        run_yosys(work, "read_rtlil plain.il; script changes.ys; pmuxtree; opt_clean; write_verilog -noattr mutated.v")
         return Netlist(component, (work / "mutated.v").read_text(encoding="utf-8"), mutants)
 
 
