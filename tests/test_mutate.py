@@ -1,6 +1,5 @@
 """The mutants of a small component, and the means: `make mutate` draws mutants of every block."""
 
-import copy
 from pathlib import Path
 
 import cocotb
@@ -14,7 +13,7 @@ from covering.blocks import BLOCKS, TESTS
 
 from hardwall.testing import SEED, Bench
 from mutation import run
-from mutation.equivalent import EQUIVALENT, cut, known_of, registers, watch
+from mutation.equivalent import EQUIVALENT, cut, joined, known_of, registers
 from mutation.fates import REASONS, Fate, Reason, Result, reasons_for
 from mutation.netlist import BLOCK, mutated
 from mutation.run import fates_of, modules_of
@@ -110,14 +109,18 @@ def test_a_block_is_mutated_in_its_own_modules():
     assert modules["link/uart"] == (f"{BLOCK}.receiver", f"{BLOCK}.transmitter")
 
 
-def test_registers_become_ports_or_any_value():
-    pins = {"D": [2, 3], "Q": [4, 5]}
-    module = {"ports": {}, "cells": {"one": {"type": "$dff", "connections": pins}}}
-    assert registers(module) == {("one", 0), ("one", 1)}
-    assert watch(copy.deepcopy(module), {("one", 0)}) == {"Q_0": [("one", 0)]}
-    assert cut(module, {("one", 1)}) == {"D_0": [("one", 1)]}
-    assert {name: port["bits"] for name, port in module["ports"].items()} == {"D_0": [3], "Q_0": [5]}
-    assert module["cells"]["one"]["connections"] == {"Q": [4]}
+def test_registers_become_ports_or_any_value_or_stay():
+    pins = {"CLK": [1], "D": [2, 3], "Q": [4, 5]}
+    cell = {"type": "$dff", "connections": pins, "parameters": {"WIDTH": f"{2:032b}"}}
+    free, stays = ({"ports": {}, "netnames": {}, "cells": {"one": cell}} for _ in range(2))
+    assert registers(free) == {("one", 0), ("one", 1)}
+    assert cut(free, {("one", 1)}, free=True) == {"D_0": [("one", 1)]}
+    assert {name: port["bits"] for name, port in free["ports"].items()} == {"D_0": [3], "Q_0": [5]}
+    assert free["cells"]["one"]["connections"] == {"Q": [4]}
+    cut(stays, {("one", 1)}, free=False)
+    assert stays["cells"]["one"]["connections"] == {"CLK": [1], "D": [2], "Q": [4]}
+    stays["netnames"]["register"] = {"bits": [4, 5], "attributes": {"init": "10"}}
+    assert "reg [0:0] in_Q_0 = 1'b1;" in joined(stays)
     with pytest.raises(ValueError, match=r"not \$adff$"):
         registers({"cells": {"one": {"type": "$adff"}}})
 

@@ -6,6 +6,7 @@ from fractions import Fraction
 import cocotb
 import numpy as np
 import pytest
+from cocotb.triggers import RisingEdge
 
 from hardwall.hdl.wall import Wall
 from hardwall.model import wall
@@ -72,6 +73,25 @@ async def follows_model(dut):
     top = component.design.force.max
     assert {-top, 0, top} <= set(expected)
     check(inputs, outputs, {"force": np.array(expected)}, component.latency)
+
+
+@cocotb.test()
+async def the_force_is_constant_from_one_valid_to_the_next(dut):
+    component = make(**parameters())
+    d, bench, before = component.design, Bench(dut, component), 0
+    await bench.reset()
+    force = bench.reader("force")
+    words = dict.fromkeys(NAMES, 0) | {"wall_stiffness": d.stiffness.max, "wall_damping": d.damping.max}
+    deepest = (1 << (d.count_width - 1)) - 1
+    for count, velocity, left in ((deepest, d.velocity.max, 0), (-deepest, d.velocity.min, 1), (0, 0, 0), (-1, 0, 1)):
+        row = {"count": count, "velocity": velocity, **words, "wall_left": left}
+        bench.drive(**row, strobe=1)
+        for clock in range(component.latency + 3):
+            await RisingEdge(dut.clk)
+            bench.drive(strobe=0)
+            assert force() == before, f"the force changed {clock} clocks after the strobe"
+            if clock == component.latency - 1:
+                before = wall.render(d.params({name: row[name] for name in NAMES}), count, velocity)
 
 
 @pytest.mark.parametrize(("name", "estimator"), [("paper", "fdm"), ("mhz", "levant"), ("narrow", "levant")])

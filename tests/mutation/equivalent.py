@@ -1,15 +1,14 @@
 """Mutants that no test can kill: those that are proven equal to the component, from power-up on and for any inputs.
 
-There are two ways, and either is enough:
+The component and its mutant are put side by side, with the same inputs. They have most bits of their registers in
+common: that the mutant's next value of such a bit is the component's is proven with the outputs. The other bits, those
+that a search has found to differ, are of each alone. What both have alike is merged, so that a multiplier that is in
+both need not be understood. There are three ways, and any is enough:
 
-- **One step.** Registers become outputs with their next values, and inputs with their present ones. If no inputs tell
-  the component from its mutant, both go from equal states to equal states with equal outputs, and they have the same
-  values at power-up. A register that differs after the step is given any value in either; if the outputs are equal all
-  the same, nothing depends on it. What both have alike is merged first, so that a multiplier that
-  is in both need not be understood.
-- **Induction.** Outputs are compared from power-up on, and after some clocks in which they were equal: so states that
-  do not last are not searched. If that is not enough, registers are compared too, without those bits that the search
-  from power-up finds to differ.
+- **One step**, in which common bits have any value, and the others have any value in either.
+- **Induction** from power-up on, and after some clocks in which all was equal: so states that do not last are not
+  searched.
+- **Induction of the outputs**, with no bit in common, for more clocks.
 
 The search from power-up may instead find inputs at which an output differs: then a test could kill the mutant.
 """
@@ -32,10 +31,9 @@ from .netlist import BLOCK, SELECTOR, SELECTOR_BITS, Netlist, run_yosys
 EQUIVALENT = "equivalent"
 CPU_S = 15
 """The processor's time for a question; one that takes longer is not answered."""
-ROUNDS, STEPS, STEPS_OF_REGISTERS = 8, 20, 8
-"""The most searches of registers that differ, and the most clocks of the induction, on outputs and on registers."""
+ROUNDS, STEPS, STEPS_IN_COMMON = 8, 20, 8
+"""The most searches of bits that differ, and the most clocks of the induction, with no bit and with some in common."""
 FLAT = f"read_verilog mutated.v; hierarchy -top {BLOCK}; proc; flatten; memory; memory_map; dffunmap; opt_clean"
-SOLVE = "sat -prove trigger 0"
 PROVEN, DIFFERS = "SUCCESS", "base case: FAIL"
 _VALUE = re.compile(r"^ *(\d*) *\\(?:gold|gate)_(\S+) .* ([01]+)$", re.MULTILINE)
 
@@ -58,15 +56,15 @@ def registers(module: dict) -> set[Bit]:
     return found
 
 
-def cut(module: dict, kept: set[Bit]) -> dict[str, list[Bit]]:
-    """Put ports of the module in the place of some bits of its registers, and any value in the place of the others.
+def cut(module: dict, kept: set[Bit], free: bool) -> dict[str, list[Bit]]:
+    """Put ports of the module in the place of some bits of its registers; return the bits of each port of next values.
 
-    Returns:
-        The bits of each port of next values.
+    The other bits stay registers, or if `free` is true, have any value at any time.
     """
     ports: dict[str, list[Bit]] = {}
     for number, name in enumerate(sorted({name for name, _ in registers(module)})):
-        pins = module["cells"].pop(name)["connections"]
+        cell = module["cells"].pop(name)
+        pins = cell["connections"]
         mine, rest = [], []
         for place in range(len(pins["Q"])):
             (mine if (name, place) in kept else rest).append(place)
@@ -74,22 +72,40 @@ def cut(module: dict, kept: set[Bit]) -> dict[str, list[Bit]]:
             ports[f"D_{number}"] = [(name, place) for place in mine]
             for port, direction in (("D", "output"), ("Q", "input")):
                 module["ports"][f"{port}_{number}"] = {"direction": direction, "bits": [pins[port][n] for n in mine]}
-        if rest:
+        if rest and free:
             # The solver takes a cell that it does not know for one with any outputs.
-            free = {"Q": [pins["Q"][n] for n in rest]}
-            module["cells"][name] = {"type": "free", "port_directions": {"Q": "output"}, "connections": free}
+            pins = {"Q": [pins["Q"][n] for n in rest]}
+            module["cells"][name] = {"type": "free", "port_directions": {"Q": "output"}, "connections": pins}
+        elif rest:
+            connections = {port: [bits[n] for n in rest] if port in "DQ" else bits for port, bits in pins.items()}
+            parameters = {**cell["parameters"], "WIDTH": f"{len(rest):032b}"}
+            module["cells"][name] = {**cell, "connections": connections, "parameters": parameters}
     return ports
 
 
-def watch(module: dict, kept: set[Bit]) -> dict[str, list[Bit]]:
-    """Add outputs with some bits of the registers to a module; return the bits of each of them."""
-    ports: dict[str, list[Bit]] = {}
-    for number, name in enumerate(sorted({name for name, _ in kept})):
-        taken = module["cells"][name]["connections"]["Q"]
-        ports[f"Q_{number}"] = [(name, place) for place in range(len(taken)) if (name, place) in kept]
-        bits = [taken[place] for _, place in ports[f"Q_{number}"]]
-        module["ports"][f"Q_{number}"] = {"direction": "output", "bits": bits}
-    return ports
+def joined(module: dict) -> str:
+    """Return Verilog of `machine`: the two side by side, with one register for both in the place of their ports."""
+    initial = {}
+    for net in module["netnames"].values():
+        bits = zip(net["bits"], reversed(net["attributes"].get("init", "")), strict=False)
+        initial |= {bit: value for bit, value in bits if value in "01"}
+    heads, inside, pins = ["output trigger"], [], ["trigger"]
+    for name, port in module["ports"].items():
+        width, number = f"[{len(port['bits']) - 1}:0]", name.removeprefix("Q_")
+        if port["direction"] == "output":
+            heads += [f"output {width} {side}_{name}" for side in ("gold", "gate")]
+            pins += [f"{side}_{name}" for side in ("gold", "gate")]
+        elif name.startswith("Q_"):
+            bits = "".join(initial.get(bit, "x") for bit in reversed(port["bits"]))
+            inside.append(f"reg {width} in_{name} = {len(bits)}'b{bits};")
+            inside.append(f"always @(posedge of_both) in_{name} <= gold_D_{number};")
+            pins.append(f"in_{name}")
+        elif name != SELECTOR:
+            heads.append(f"input {width} in_{name}")
+            pins.append(f"in_{name}")
+    connected = ", ".join(f".{name}({name})" for name in pins)
+    lines = ["module machine(input of_both, " + ", ".join(heads) + ");", *inside, f"miter miter({connected});"]
+    return "\n".join([*lines, "endmodule"]) + "\n"
 
 
 def known_of(netlist: Netlist, numbers: Iterable[int]) -> dict[int, str]:
@@ -111,17 +127,15 @@ def _known(work: Path, flat: dict, number: int) -> str:
         return EQUIVALENT
     answer = ""
     for _ in range(ROUNDS):
-        watched = copy.deepcopy(flat)
-        ports = watch(watched["modules"][BLOCK], kept)
-        answer = _asked(
-            work, watched, number, f"{SOLVE} -tempinduct -maxsteps {STEPS_OF_REGISTERS} -show-outputs miter"
-        )
+        design = copy.deepcopy(flat)
+        ports = cut(design["modules"][BLOCK], kept, free=False)
+        answer = _asked(work, design, number, f"-tempinduct -maxsteps {STEPS_IN_COMMON} -show-outputs")
         unlike = _unlike(answer, ports) if DIFFERS in answer else set()
         if not unlike:
             break
         kept -= unlike
     if not any(said in answer for said in (PROVEN, DIFFERS)):
-        answer = _asked(work, flat, number, f"{SOLVE} -tempinduct -maxsteps {STEPS} miter")
+        answer = _asked(work, copy.deepcopy(flat), number, f"-tempinduct -maxsteps {STEPS}")
     if DIFFERS in answer:
         steps = re.findall(r"\[base case (\d+)\] Solving", answer)
         return f"differs after {int(steps[-1]) - 1} clocks"
@@ -134,8 +148,8 @@ def _unequal_in_a_step(work: Path, flat: dict, number: int) -> set[Bit] | None:
     first = None
     for _ in range(ROUNDS):
         step = copy.deepcopy(flat)
-        ports = cut(step["modules"][BLOCK], kept)
-        answer = _asked(work, step, number, f"{SOLVE} -ignore_unknown_cells -show-outputs miter")
+        ports = cut(step["modules"][BLOCK], kept, free=True)
+        answer = _asked(work, step, number, "-ignore_unknown_cells -show-outputs", joint=False)
         if PROVEN in answer:
             return None
         unlike = _unlike(answer, ports)
@@ -164,10 +178,24 @@ def _unlike(answer: str, ports: dict[str, list[Bit]]) -> set[Bit]:
     }
 
 
-def _asked(work: Path, design: dict, number: int, question: str) -> str:
-    """Return the solver's answer on a design with its mutant beside it; an empty text if it has none in its time."""
+def _asked(work: Path, design: dict, number: int, how: str, joint: bool = True) -> str:
+    """Return the solver's answer on a design with its mutant beside it; an empty text if it has none in its time.
+
+    Args:
+        work: a folder for the files.
+        design: the component with its mutants, as Yosys writes it, with ports in the place of registers in common.
+        number: the mutant.
+        how: options of the solver.
+        joint: whether these ports are joined by registers; otherwise they have any value.
+    """
     (work / "design.json").write_text(json.dumps(design), encoding="utf-8")
-    (work / "ask.ys").write_text("\n".join(_side_by_side(number)) + f"\n{question}\n", encoding="utf-8")
+    (work / "joined.v").write_text(joined(design["modules"][BLOCK]), encoding="utf-8")
+    top = "machine" if joint else "miter"
+    whole = ["read_verilog joined.v"] if joint else []
+    # Registers stay as they are: what is made of those with a constant bit loses their values at power-up.
+    whole += [f"hierarchy -top {top}", "proc", "flatten", *("opt_expr -full", "opt_merge -share_all", "opt_clean") * 3]
+    script = [*_side_by_side(number), *whole, f"sat -prove trigger 0 {how} {top}"]
+    (work / "ask.ys").write_text("\n".join(script) + "\n", encoding="utf-8")
     tool = shutil.which(synthesis.YOSYS, path=synthesis.TOOLS)
     # This Yosys has no clock to end its solver by.
     limited = ("/bin/sh", "-c", 'ulimit -t "$0" && exec "$@"', str(CPU_S), tool, "-s", "ask.ys")
@@ -193,5 +221,4 @@ def _side_by_side(number: int) -> list[str]:
             "cd ..",
         )
     ]
-    compared = ["miter -equiv -flatten -make_outputs gold gate miter", "hierarchy -top miter"]
-    return ["read_json design.json", *fixed, *compared, "opt -full", "opt_merge -share_all", "dffunmap", "opt_clean"]
+    return ["read_json design.json", *fixed, "miter -equiv -flatten -make_outputs gold gate miter"]
