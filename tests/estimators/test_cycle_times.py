@@ -41,12 +41,14 @@ async def follows_model(dut):
     await bench.reset()
     turns = [rows(widths, *turn(widths, random, SAMPLES // 3), invert) for invert in (False, True)]
     stimulus = chain(*turns, anything(widths, random, SAMPLES // 3))
+    at_next_strobe = bench.monitor("strobe", *Times._fields)
     inputs, outputs = await bench.campaign("strobe", "valid", INPUTS, Times._fields, stimulus)
     expected = model(widths, component.cycles_max, inputs.rows)
     assert set(expected["cycles"]) == set(range(component.cycles_max + 1))
     for name in ("news", "gap", "age", "cycle_age"):
         assert {False, True} == set(expected[name] > 0), name
     check(inputs, outputs, expected, component.latency)
+    assert at_next_strobe.rows[1:] == outputs.rows[:-1], "the outputs must stay until the next strobe"
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ from .netlist import BLOCK, SELECTOR, SELECTOR_BITS, Netlist, run_yosys
 EQUIVALENT = "equivalent"
 CPU_S = 15
 """The processor's time for a question; one that takes longer is not answered."""
-ROUNDS, STEPS, STEPS_IN_COMMON = 8, 20, 8
+ROUNDS, STEPS, STEPS_IN_COMMON = 8, 20, 16
 """The most searches of bits that differ, and the most clocks of the induction, with no bit and with some in common."""
 FLAT = f"read_verilog mutated.v; hierarchy -top {BLOCK}; proc; flatten; memory; memory_map; dffunmap; opt_clean"
 PROVEN, DIFFERS = "SUCCESS", "base case: FAIL"
