@@ -51,6 +51,18 @@ async def follows_model(dut):
     assert at_next_strobe.rows[1:] == outputs.rows[:-1], "the outputs must stay until the next strobe"
 
 
+@cocotb.test()
+async def a_reset_forgets_every_stamp(dut):
+    component, random = CycleTimes(**parameters()), seeded()
+    widths = Widths(component.count_width, component.stamp_width, 1 << min(component.stamp_width - 2, 6))
+    bench = Bench(dut, component)
+    for _ in range(40):
+        await bench.reset()
+        few = anything(widths, random, 4)
+        inputs, outputs = await bench.campaign("strobe", "valid", INPUTS, Times._fields, few)
+        check(inputs, outputs, model(widths, component.cycles_max, inputs.rows), component.latency)
+
+
 @pytest.mark.parametrize(
     "sizes",
     [
