@@ -154,7 +154,7 @@ class Monitors(Block):
     def _runaway(self, m: Module, up: Signal) -> Value:
         """Return whether the handle has moved too far against a drive at its limit."""
         pressed, pressed_before, negative_before = Signal(), Signal(), Signal()
-        m.d.comb += pressed.eq((self.magnitude == self.force_limit) & self.force_limit.any())
+        m.d.comb += pressed.eq((self.magnitude >= self.force_limit) & self.force_limit.any())
         m.d.sync += [pressed_before.eq(pressed), negative_before.eq(self.negative)]
         held = pressed & pressed_before & (self.negative == negative_before)
         # The way is negative, so that a sum compares it.

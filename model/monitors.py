@@ -187,7 +187,7 @@ def _samples(state, inputs):
 def _ways(params, state, inputs):
     """Return the way against the drive, and the distance and side from the last index edge, after a clock edge."""
     up = inputs.count >> 1 & 1 ^ state.before >> 1 ^ state.before & 1 ^ 1
-    pressed = inputs.force_limit > 0 and inputs.magnitude == inputs.force_limit
+    pressed = 0 < inputs.force_limit <= inputs.magnitude
     way, distance, upwards = state.way, state.distance, state.upwards
     if not (pressed and state.pressed and inputs.negative == state.negative):
         way = 0

@@ -239,18 +239,13 @@ def step(params, state, inputs):
     first, first_stamp = state.first, state.first_stamp
     if standing and state.state != TRIPPED:
         first, first_stamp = standing, inputs.stamp
-    driven, negative, alive, pump = 0, 0, 0, 0
-    if go:
-        driven, negative = saturate(inputs.drive, -limit, limit), int(inputs.drive < 0)
-        alive = state.alive ^ int(turns)
-    else:
-        ceiling = 0
-    if not turns:
-        pump = state.pump + 1
+    driven = saturate(inputs.drive, -limit, limit) if go else 0
+    alive = state.alive ^ int(turns) if go else 0
+    pump = 0 if turns else state.pump + 1
     return State(
         driven=driven,
         magnitude=abs(driven),
-        negative=negative,
+        negative=int(go and inputs.drive < 0),
         state=now,
         alive=alive,
         live=int(left > 0),
@@ -260,7 +255,7 @@ def step(params, state, inputs):
         first_stamp=first_stamp,
         counts=_counted(state.counts, standing & ~state.before),
         before=standing,
-        ceiling=ceiling,
+        ceiling=ceiling * int(go),
         tick=tick,
         left=left,
         last_beat=inputs.heartbeat,

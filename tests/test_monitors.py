@@ -187,6 +187,20 @@ def test_a_handle_that_runs_against_the_largest_drive_is_a_runaway(way):
     assert bench.clock() == ["runaway"]
 
 
+def test_a_limit_that_is_lowered_again_and_again_hides_no_runaway():
+    bench = Bench(supervisor_runaway=50)
+    bench.inputs = bench.inputs._replace(magnitude=60, negative=1, force_limit=60)
+    bench.clock()
+    for count in range(1, 51):
+        # The drive follows the limit a clock later.
+        bench.clock(force_limit=60 - count)
+        bench.inputs = bench.inputs._replace(magnitude=60 - count, force_limit=60 - count)
+        bench.moves(count)
+    assert bench.last("runaway") == []
+    bench.moves(51)
+    assert bench.clock() == ["runaway"]
+
+
 def test_a_way_with_the_drive_is_no_runaway():
     bench = Bench(supervisor_runaway=50)
     bench.inputs = bench.inputs._replace(magnitude=40, negative=1, force_limit=40)
