@@ -245,7 +245,7 @@ def step(params, state, inputs):
     return State(
         driven=driven,
         magnitude=abs(driven),
-        negative=int(go and inputs.drive < 0),
+        negative=int(go) & int(inputs.drive < 0),
         state=now,
         alive=alive,
         live=int(left > 0),
