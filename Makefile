@@ -31,7 +31,7 @@ PICTURES := $(REPORTS:%.json=%.png)
 
 # The iCE40 UltraPlus is too slow for 50 MHz.
 ON_ECP5 := --device ecp5-25k
-ON_ICE40 := --device ice40-up5k --estimator fdm $(addprefix --set controller.,clock_hz=24000000 sample_hz=500000 actuation_hz=500000)
+ON_ICE40 := --device ice40-up5k $(addprefix --set controller.,clock_hz=24000000 sample_hz=500000 actuation_hz=500000)
 
 comma := ,
 # Every estimator on one map; it is larger than the paper's because the best estimators leave that one.

@@ -11,7 +11,8 @@ from hardwall.model.link.server import FAILURE
 from hardwall.model.registers import RegisterMap
 from hardwall.model.supervisor import ALL, ARMED, DISARMED, REQUIRED, TRIPPED
 from hardwall.testing import SAMPLES, parameters, simulate
-from oracles.board import SYNCHRONISER, Host, make
+from oracles.board import SYNCHRONISER, make
+from oracles.board_host import Host
 from stimuli.specs import spec
 
 CLOCKS = max(SAMPLES, 80_000)

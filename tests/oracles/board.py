@@ -1,32 +1,21 @@
-"""The board as its models say it is, clock for clock, and a host that talks to the board under test."""
+"""The board as its models say it is, clock for clock."""
 
 import dataclasses
-import logging
-from collections import deque
 
-import cocotb
 from amaranth.hdl import Cat, Module, Shape
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
-from cocotb.clock import Clock
-from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
-from cocotbext.uart import UartSink, UartSource
 
 from hardwall.hdl.board import ENCODER, Board
 from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.link.link import Link
-from hardwall.hdl.link.register_file import RegisterFile
 from hardwall.hdl.supervised import LOOPS, SHOWN
 from hardwall.model import output, quadrature, wall
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.link import register_file, server
-from hardwall.model.link.line import Verdict, framed
-from hardwall.model.register import VALUE_BITS, Kind
+from hardwall.model.register import VALUE_BITS
 from hardwall.model.registers import RegisterMap
 from hardwall.model.supervised import FIXED
-from hardwall.testing import Bench, rng
 from hardwall.testing.packing import Packing
-from stimuli import frames
 from stimuli.specs import spec
 
 from .supervised import Follower
@@ -34,10 +23,6 @@ from .supervised import Follower
 BAUD = 3_000_000
 """4 clocks a bit at `CLOCK_HZ`."""
 CLOCK_HZ = 12_000_000
-OSCILLATOR_NS = 22
-"""Where the clock's period is 10 ns."""
-STARTING = 100
-"""Clocks in which the oscillator has seen that the clock runs."""
 SYNCHRONISER = 2
 """Clock edges from a change of a pin to the last edge that does not act on it."""
 IDLE = (*LOOPS, "encoder_a_n", "encoder_b_n")
@@ -47,8 +32,6 @@ SEEN = (
     "count", "velocity", "drive", "stamp", "index_latched", *SHOWN, "a_channel_idle", "drive_inverted",
 )  # fmt: skip
 """Ports of the axis inside that the models are fed with or held to."""
-PATIENCE = 60_000
-"""Clocks after which an answer is overdue."""
 
 
 def board_of(name: str, estimator: str) -> Board:
@@ -200,186 +183,3 @@ class Twin:
         if asked["commit"]:
             self.waiting = {name: asked[name] for name in self.words if name in asked} | self._fixed()
         self.clocks += 1
-
-
-class Host:
-    """The world around the board: a host on the line, a turning encoder, loops, and the twin, compared at every edge.
-
-    Attributes:
-        rate, illegal_rate: probabilities, a clock, of an edge and of an illegal one.
-        open_rate: the probability, a clock, that a loop opens.
-        pulses: the levels of the drive's pins at every edge.
-        history: what the twin showed at the last edges, by stamp.
-        refused: exceptions that were answered.
-        shifted: what the link asked for at every pulse that words belong to.
-    """
-
-    def __init__(self, dut, name: str, estimator: str):
-        self.component = make(name, estimator)
-        self.dut, self.board, self.random = dut, self.component.board, rng()
-        self.registers = self.board.registers
-        self.bench, self.twin = Bench(dut, self.component), Twin(self.board)
-        self.pins = {name: int(name in IDLE) for name in (*ENCODER, *LOOPS)}
-        self.phase, self.rate, self.illegal_rate, self.open_rate = 0, 0.0, 0.0, 0.0
-        self.pulses: list[tuple[int, int]] = []
-        self.history: deque[tuple[int, tuple]] = deque(maxlen=PATIENCE)
-        self.server = server.Server(register_file.Design(self.registers))
-        self.place = {register.name: register.address for register in self.registers.registers}
-        self.refused: list[int] = []
-        self.taken_clocks = RegisterFile(self.server.file.design).taken_clocks
-        self.shifted: list[dict[str, int]] = []
-
-    async def reset(self) -> None:
-        await self.bench.reset()
-        self.bench.drive(uart_rx=1, rst=1, **self.pins)
-        Clock(self.dut.oscillator, OSCILLATOR_NS, "ns", impl="gpi").start()
-        await ClockCycles(self.dut.clk, STARTING)
-        assert int(self.dut.outputs_enable.value) == 0
-        self.bench.drive(rst=0)
-        bit_ns = self.bench.period_ns * CLOCK_HZ / BAUD
-        self.source, self.sink = UartSource(self.dut.uart_rx, 1e9 / bit_ns), UartSink(self.dut.uart_tx, 1e9 / bit_ns)
-        for end in (self.source, self.sink):
-            end.log.setLevel(logging.WARNING)
-        # The reset is seen inside for as long as this; the first edge without it is the twin's first.
-        await ClockCycles(self.dut.clk, SYNCHRONISER)
-        self._following = cocotb.start_soon(self._follow())
-
-    def _turn(self) -> None:
-        """Move the encoder at random by one edge, seldom by two at once, and open or close a loop."""
-        random, moved = self.random, {}
-        chance = random.random(2)
-        if chance[0] < self.rate:
-            # The handle wanders about its origin, for an axis of a few counts is nowhere else within its range.
-            self.phase += 1 if random.random() < (0.3 if self.phase > 0 else 0.7) else -1
-            self.phase += int(random.random() < self.illegal_rate)
-            a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[self.phase % 4]
-            z = self.pins["encoder_z"] ^ int(random.random() < 0.1)
-            moved = {"encoder_a": a, "encoder_b": b, "encoder_z": z, "encoder_a_n": 1 - a, "encoder_b_n": 1 - b}
-        if chance[1] < self.open_rate:
-            name = LOOPS[int(random.integers(0, len(LOOPS)))]
-            moved[name] = self.pins[name] ^ 1
-        self.change(**moved)
-
-    def change(self, **pins: int) -> None:
-        """Set pins, on the board and on the twin."""
-        if pins:
-            self.pins |= pins
-            self.bench.drive(**pins)
-
-    async def _follow(self) -> None:
-        """Let the twin see every clock edge, and compare it with the board."""
-        edge, asking, showing = RisingEdge(self.dut.clk), self.dut.asking, self.dut.showing
-        pulse, sign, enable = (self.bench.reader(name) for name in ("drive_pdm", "drive_sign", "outputs_enable"))
-        component, twin, last, asked = self.component, self.twin, -1, {}
-        while True:
-            await edge
-            pins, word = (pulse(), sign()), int(asking.value)
-            assert enable()
-            if word != last:
-                asked, last = component.asked.unpack(word), word
-            found = component.shown.unpack(int(showing.value))
-            gate = self.pins["drive_enable"] & self.pins["emergency_stop"]
-            assert pins == (twin.pulse & gate, twin.sign), f"edge {twin.clocks}"
-            wanted = twin.follower.wanted() | {"drive": twin.drive, "count": twin.decoder.count}
-            unlike = {name: (found[name], value) for name, value in wanted.items() if found[name] != value}
-            assert not unlike, f"edge {twin.clocks}: the board's and the twin's {unlike}"
-            self.pulses.append(pins)
-            self.history.append((twin.decoder.stamp, twin.shown()))
-            if asked["commit"] or asked["preload"]:
-                self.shifted.append(asked)
-            twin.edge(self.pins, asked, found)
-            self._turn()
-
-    @property
-    def settling(self) -> int:
-        """The most clocks until a commit or an arm has taken effect on the pulses, with the steepest ramp."""
-        axis = self.twin.spec
-        return (axis.samples_per_actuation + 2) * axis.clocks_per_sample + self.board.latency + 4
-
-    async def edges(self, count: int) -> None:
-        """Let `count` clock edges pass."""
-        await ClockCycles(self.dut.clk, count)
-        if self._following.done():
-            await self._following
-
-    async def request(self, pdu: bytes) -> bytes:
-        """Return the answer to a request without unit and CRC; it must be the twin's, and the words of the link too."""
-        frame = framed(b"\1" + pdu)
-        await self.source.write(frame)
-        await self.source.wait()
-        begun = len(self.pulses)
-        answer = bytes(await self._answer(frame))
-        await self.edges(1)
-        states = [shown[2] for _, shown in list(self.history)[begun - len(self.pulses) :]]
-        expected = []
-        # What is refused depends on the state while the frame is checked, which may change on the way.
-        for ready, armed in sorted({(state["ready"], state["state"] == 1) for state in states}):
-            expected.append(frozenset(("arm",) * (not ready) + ("preload",) * armed))
-        self.server.file.refusing = self._refusing(answer, expected)
-        self.server.file.status = self._snapshot(pdu, answer)
-        self.server.file.pulses = ()
-        assert answer == framed(self.server.take(Verdict.REQUEST, frame))
-        if answer[1] & 0x80:
-            self.refused.append(answer[2])
-        file, found = self.server.file, self.component.asked.unpack(int(self.dut.asking.value))
-        assert {word.name: found[word.name] for word in self.registers.live}.items() <= file.active.items()
-        shifted = {"commit", "preload"} & set(file.pulses)
-        assert [{name: each[name] for name in file.active} for each in self.shifted] == [file.active] * bool(shifted)
-        self.shifted.clear()
-        return answer[1:-2]
-
-    @staticmethod
-    def _refusing(answer: bytes, possible: list[frozenset[str]]) -> frozenset[str]:
-        """Return what the board refused, if its state changed meanwhile: more, if it answered that it refused."""
-        return max(possible, key=len) if answer[1:3] == bytes([0x90, server.FAILURE]) else min(possible, key=len)
-
-    async def _answer(self, frame: bytes) -> bytes:
-        """Return the bytes that the board sends until it has been silent for two bytes, CRC included."""
-        timeout = Timer(PATIENCE * self.bench.period_ns, "ns")
-        first = cocotb.start_soon(self.sink.wait())
-        assert await First(first.complete, timeout) is not timeout, f"no answer to {frame.hex(' ')}"
-        got = b""
-        while not self.sink.empty():
-            got += bytes(self.sink.read_nowait())
-            await ClockCycles(self.dut.clk, 20 * CLOCK_HZ // BAUD)
-        return got
-
-    def _snapshot(self, pdu: bytes, answer: bytes) -> dict[str, int]:
-        """Return the status that the board must have shown when it took each, from when it took its own stamp."""
-        first, size = self.place["stamp"] - int.from_bytes(pdu[1:3], "big"), 4
-        if pdu[0] != 3 or answer[1] != 3 or not 0 <= first <= answer[2] // 2 - 2:
-            return {status.name: 0 for status in self.registers.status}
-        stamp = int.from_bytes(answer[3 + 2 * first : 3 + 2 * first + size], "big")
-        (at,) = [at for at, (known, _) in enumerate(self.history) if known == stamp]
-        shown = {clock: self.twin.status(self.history[at + clock - self.taken_clocks["stamp"]][1])
-                 for clock in set(self.taken_clocks.values())}  # fmt: skip
-        return {name: shown[clock][name] for name, clock in self.taken_clocks.items()}
-
-    async def look(self, first: str = "drive", last: str = "driven") -> dict[str, int]:
-        """Return the status from one register to another, as read from the board in one frame."""
-        begin, end = self.place[first], self.place[last] + 2
-        data = (await self.request(frames.read(begin, end - begin)))[2:]
-        cells = [int.from_bytes(data[k : k + 2], "big") for k in range(0, len(data), 2)]
-        read = [r for r in self.registers.status if begin <= r.address < end]
-        return {r.name: r.from_registers(tuple(cells[r.address - begin : r.address - begin + 2])) for r in read}
-
-    async def write(self, **values: int) -> bytes:
-        """Write words that lie side by side, or pulses up to `commit` and the words behind it, in one frame."""
-        chosen = sorted((r for r in self.registers.registers if r.name in values), key=lambda r: r.address)
-        assert len(chosen) == len(values)
-        first, last = chosen[0], chosen[-1]
-        cells = []
-        for register in self.registers.registers:
-            if first.address <= register.address <= last.address:
-                given = values.get(register.name)
-                if given is None:
-                    given = 0 if register.kind is Kind.PULSE else self.server.file.active[register.name]
-                cells += register.to_registers(given)
-        return await self.request(frames.write(first.address, cells))
-
-    async def arm(self) -> None:
-        """Beat, acknowledge what is latched, and arm."""
-        await self.write(heartbeat=self.server.file.active["heartbeat"] + 1 & 0xFFFF)
-        await self.write(acknowledged=(await self.look())["latched"])
-        await self.write(acknowledge=1, clear_flags=1)
-        await self.write(arm=1)
