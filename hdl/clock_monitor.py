@@ -16,12 +16,12 @@ class ClockMonitor(Block):
 
     Equation: that of `hardwall.model.clock_monitor`.
 
-    Latency, in clocks of the oscillator: `running` is high `SYNCHRONISER + 1` edges after a change of the beat, the
-    first of which sees it, and low `limit` edges later if there was no other.
+    Latency, in clocks of the oscillator: `running` is high `SYNCHRONISER + 1` edges after the second change of the
+    beat, the first of which sees it, and low `limit` edges after a change is seen so if there was no other.
 
     Rounding and overflow: none; the counter stops at 0.
 
-    Reset: from power-up `running` is low until the beat has changed.
+    Reset: from power-up `running` is low until the beat has changed twice.
 
     Parameters
     ----------
@@ -52,6 +52,8 @@ class ClockMonitor(Block):
         limit = self._design.params.limit
         level, before, left, now = Signal(), Signal(), Signal(range(limit + 1)), Signal(range(limit + 1))
         m.submodules.synchroniser = FFSynchronizer(self.beat, level, stages=clock_monitor.SYNCHRONISER)
-        m.d.comb += now.eq(Mux(level != before, limit, Mux(left == 0, 0, left - 1)))
-        m.d.sync += [before.eq(level), left.eq(now), self.running.eq(now != 0)]
+        changed, began, stands = level ^ before, Signal(), now == 0
+        m.d.comb += now.eq(Mux(changed, limit, Mux(left == 0, 0, left - 1)))
+        m.d.sync += [before.eq(level), left.eq(now), began.eq((began | changed) & ~stands)]
+        m.d.sync += self.running.eq((self.running | (changed & began)) & ~stands)
         return m

@@ -28,8 +28,8 @@ class Monitors(Block):
     Latency: `latency` of a cause, from the inputs to `causes`; a new limit of the position acts a clock later.
     `velocity` and `saturated` are looked at with `valid`, `edge_kind` with `stepped`, and the distance to the last
     index edge with `indexed`: velocity_limit and index_spacing are pulses. The others last for as long as what is wrong
-    does. Ways are counted edge by edge, the direction by the count's last two bits: a preload is no motion, but the
-    direction of an edge in its very clock is not known.
+    does, which for the position must be two clocks. Ways are counted edge by edge, the direction by the count's last
+    two bits: a preload is no motion, but the direction of an edge in its very clock is not known.
 
     Rounding and overflow: distances are taken modulo the count's width; counters stop at their limits.
 
@@ -87,11 +87,6 @@ class Monitors(Block):
             "causes": Out(COUNT),
             "a_channel_idle": Out(1),
         }
-
-    @property
-    def index_clocks(self) -> int:
-        """Clocks from an index edge to its cause."""
-        return 4
 
     def latency(self, cause: str) -> int:
         """Return the most clocks from inputs that are wrong to the cause of a name."""

@@ -30,7 +30,7 @@ class SupervisedAxis(wiring.Component):
 
     The axis itself computes a drive all the time, and no host limits it; the supervisor's force limit comes last. The
     axis's own enable follows the loop of `drive_enable`, so that its slew limit begins at zero too. A commit of another
-    `encoder_invert` is a `disarm`.
+    `encoder_invert` is a `disarm`, which an `arm` in the same clock gives way to.
 
     Latency: `latency` clocks from the sample strobe to the changed `driven`, one more than the axis's. From a pin of
     `LOOPS` that opens to a drive of zero `loop_latency` clock edges, the first of which sees it.

@@ -24,8 +24,8 @@ class Supervisor(Block):
         ceiling  <- 0 unless ARMED; else the lower of ceiling and supervisor_force_limit, with strobe + supervisor_ramp
 
     `link_timeout` is made here: it stands while ARMED and not `live`. The host is live from a change of `heartbeat`
-    until `supervisor_watchdog` ms later, up to 1 ms less because the tick of 1 ms runs freely. The word is taken with
-    the change; whether it is in its range is for the cause word_range.
+    until so many ticks later as `supervisor_watchdog` says, up to one less because they run freely. The word is taken
+    with the change; whether it is in its range is for the cause word_range.
     `latched` collects the causes until they are acknowledged, and an acknowledgement that does not name exactly these
     has no effect, so a cause that came after the host's last look is not lost. `counts` are the occurrences of every
     cause since reset.

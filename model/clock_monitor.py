@@ -4,11 +4,13 @@ The watched clock makes a beat, a level that changes every `beat_clocks` of its 
 oscillator, which is the second:
 
     left    <- limit if the beat has changed since the last clock; else left - 1 until it is 0
-    running <- the beat has changed, or left > 1
+    began   <- the beat has changed since left was 0
+    running <- left > 0, and it was running, or the beat has changed for the second time
 
-Both numbers follow from the rates. A level of the beat lasts two periods of the slowest oscillator, so that none is
-missed; the limit is as many clocks of the fastest oscillator as such a level lasts, and `MARGIN` more, so that a clock
-that runs is never taken for one that stands.
+The numbers follow from the rates. A level of the beat lasts two periods of the slowest oscillator, so that none is
+missed, and `BEAT_MIN` clocks; the limit is as many clocks of the fastest oscillator as such a level lasts, and `MARGIN`
+more, so that a clock that runs is never taken for one that stands. A clock that comes back may change the beat at once;
+until it does so again it has made `BEAT_MIN` edges, at each of which `running` is low.
 """
 
 from typing import NamedTuple
@@ -19,6 +21,8 @@ from .compiled import compiled
 OSCILLATOR_HZ = 1_000_000, 10_000_000
 """The slowest and the fastest oscillator: internal ones of FPGAs are within this once they are divided."""
 SYNCHRONISER = 2
+BEAT_MIN = 4
+"""The fewest clocks of a level of the beat: as many let what hears of a low `running` come to rest."""
 MARGIN = 2
 """Clocks of the oscillator: a change of the beat is seen late by up to one, and the count of them begins in between."""
 
@@ -45,11 +49,13 @@ class State(NamedTuple):
     Attributes:
         running: whether the watched clock runs.
         left: clocks until it is taken to stand.
+        began: whether the beat has changed since the clock was last taken to stand.
         levels: the levels of the beat in the synchroniser and behind it, the newest in bit 0.
     """
 
     running: int = 0
     left: int = 0
+    began: int = 0
     levels: int = 0
 
 
@@ -76,7 +82,7 @@ class Design:
         check_int("clock_hz", clock_hz, 1)
         slowest, fastest = OSCILLATOR_HZ
         self.clock_hz = clock_hz
-        self.beat_clocks = 1 << (-(-2 * clock_hz // slowest) - 1).bit_length()
+        self.beat_clocks = max(1 << (-(-2 * clock_hz // slowest) - 1).bit_length(), BEAT_MIN)
         self.params = Params(limit=-(-self.beat_clocks * fastest // clock_hz) + MARGIN)
 
     def stop_latency_s(self, oscillator_hz: float) -> float:
@@ -98,4 +104,6 @@ def step(params, state, inputs):
     """
     changed = (state.levels >> 1 ^ state.levels >> 2) & 1
     left = params.limit if changed else max(state.left - 1, 0)
-    return State(int(left > 0), left, (state.levels << 1 | inputs.beat) & 7)
+    stands = int(left == 0)
+    running = (state.running | changed & state.began) & ~stands
+    return State(running, left, (state.began | changed) & ~stands, (state.levels << 1 | inputs.beat) & 7)

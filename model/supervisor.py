@@ -167,7 +167,8 @@ class Design:
             ),
             Word(
                 "supervisor_watchdog", UQ(11, 0), 1e-3, "s", WATCHDOG_RESET_MS,
-                f"longest time between beats of the host; {WATCHDOG_MS[0]} to {WATCHDOG_MS[1]} ms, whatever is written",
+                f"longest time between beats of the host; {WATCHDOG_MS[0]} to {WATCHDOG_MS[1]} ms, "
+                "any other word is the cause word_range",
             ),
             Word(
                 "supervisor_causes", UQ(COUNT, 0), 1.0, "", ENABLED,

@@ -8,7 +8,7 @@ import pytest
 
 from hardwall.hdl.clock_monitor import ClockMonitor
 from hardwall.model import clock_monitor
-from hardwall.model.clock_monitor import OSCILLATOR_HZ, START, Design, Inputs
+from hardwall.model.clock_monitor import OSCILLATOR_HZ, START, Design, Inputs, State
 from hardwall.testing import SAMPLES, SEED, Recorded, check, parameters, play, simulate
 
 CLOCKS_HZ = [460_800, 12_000_000, 25_000_000, 50_000_000, 1_000_000_000]
@@ -64,8 +64,8 @@ def test_a_clock_that_runs_is_never_taken_for_one_that_stands_and_one_that_stops
     design, random = Design(clock_hz), plain.Random(SEED)
     level_s = design.beat_clocks / clock_hz
     for oscillator_hz in (*OSCILLATOR_HZ, *(random.uniform(*OSCILLATOR_HZ) for _ in range(8))):
-        # Two levels pass at most until the first change has been seen.
-        started_s, latency_s = 2 * level_s + 4 / oscillator_hz, design.stop_latency_s(oscillator_hz)
+        # Three levels pass at most until the second change has been seen.
+        started_s, latency_s = 3 * level_s + 4 / oscillator_hz, design.stop_latency_s(oscillator_hz)
         stops_s = started_s + 20 * level_s + random.random() * level_s
         times, running = watched(design, oscillator_hz, random.random(), stops_s, stops_s + latency_s + 3 * level_s)
         for now, runs in zip(times, running, strict=True):
@@ -80,7 +80,31 @@ def test_no_level_of_the_beat_is_missed(clock_hz):
     design = Design(clock_hz)
     assert design.beat_clocks / clock_hz >= 2 / OSCILLATOR_HZ[0]
     # It is the shortest such level of a power of two.
-    assert design.beat_clocks / 2 / clock_hz < 2 / OSCILLATOR_HZ[0]
+    assert design.beat_clocks == clock_monitor.BEAT_MIN or design.beat_clocks / 2 / clock_hz < 2 / OSCILLATOR_HZ[0]
+
+
+@pytest.mark.parametrize("clock_hz", CLOCKS_HZ[:4])
+def test_a_clock_that_comes_back_makes_edges_before_it_is_taken_to_run(clock_hz):
+    design, random = Design(clock_hz), plain.Random(SEED)
+    for _ in range(200):
+        oscillator_hz = random.choice((*OSCILLATOR_HZ, random.uniform(*OSCILLATOR_HZ)))
+        ticks, edges = random.random(), random.randrange(10 * design.beat_clocks)
+        # A stop that is just long enough to be found, or longer; and a beat at any of its clocks.
+        stop_s = design.stop_latency_s(oscillator_hz) * random.choice((0.95, 1.0, random.uniform(0.9, 3)))
+        state, found, since = State(running=1, left=design.params.limit, began=1), False, 0
+        before = edges // design.beat_clocks & 1
+        state = state._replace(levels=7 * before)
+        for tick in range(int((stop_s + 8 * design.beat_clocks / clock_hz) * oscillator_hz)):
+            now = (tick + ticks) / oscillator_hz
+            since = max(int((now - stop_s) * clock_hz) + 1, 0) if now > stop_s else 0
+            state = clock_monitor.step(design.params, state, Inputs((edges + since) // design.beat_clocks & 1))
+            if not state.running:
+                found, low = True, since
+            elif found:
+                # These edges of the clock have come while it was taken to stand, the last of them before this tick.
+                assert low >= clock_monitor.BEAT_MIN
+                break
+        assert state.running
 
 
 def test_it_is_found_within_microseconds():
