@@ -30,8 +30,8 @@ POINTS = [
     ("v_toggle/top.part", 1, "sum[0]:0->1"),
     ("v_toggle/top.part", 1, "__0247[0]:0->1"),
 ]
-OF_THE_BENCH = {TESTS / "test_typing.py", TESTS / "testing/test_campaign.py"}
-"""Tests that simulate hardware of their own."""
+OF_THE_BENCH = {TESTS / "test_typing.py", TESTS / "testing/test_campaign.py", TESTS / "link/test_mbpoll.py"}
+"""Tests that simulate hardware of their own, or need a program that may be absent."""
 REACHED = Point("toggle", "part.sum[0]:0->1")
 MISSED = Point("toggle", "part.sum[1]:0->1")
 

@@ -129,8 +129,8 @@ class Design:
                 for place in places:
                     shift = CELL_BITS * (places[-1] - place)
                     book[area * END + place] = word >> shift & CELL
-        status = [(register, source * (not k)) for source, turn in self.turns for k, register in enumerate(turn)]
-        for moved in (status, [(word, Source.NOTHING) for word in self.registers.active]):
+        status = [(register, int(source) * (not k)) for source, turn in self.turns for k, register in enumerate(turn)]
+        for moved in (status, [(word, int(Source.NOTHING)) for word in self.registers.active]):
             for place, cell in self._moves(moved).items():
                 book[Area.LEAST * END + place] = cell
         return book
