@@ -21,7 +21,7 @@ from stimuli.forked import BEGAN, Ended, run
 from stimuli.hostile import ENVIRONS, Call, calls
 from stimuli.reports import check_text
 
-CALLS = int(os.environ.get("HARDWALL_FUZZ", "108"))
+CALLS = int(os.environ.get("HARDWALL_FUZZ", "54"))
 LINE_MAX = 1500
 """The most characters of an error message: what is shown of a value is shortened."""
 BAD, ERROR = 2, re.compile(r"hardwall: error: [^\n]+\n")
