@@ -18,7 +18,8 @@ from pathlib import Path
 
 from covering.blocks import BLOCKS, Block
 from covering.points import merged
-from covering.report import Coverage, reasons_for
+from covering.report import REASONS, Coverage
+from reasons import reasons_for
 from targets import conclude
 
 from hardwall.model.build_folder import build_dir
@@ -47,7 +48,7 @@ def measure(block: Block, folder: Path) -> Coverage | None:
     if done.returncode:
         print(done.stdout, end="", file=sys.stderr)
         return None
-    return Coverage(block.name, merged(sorted(folder.glob("*.dat")), block.modules), reasons_for(block.name))
+    return Coverage(block.name, merged(sorted(folder.glob("*.dat")), block.modules), reasons_for(block.name, REASONS))
 
 
 def main(begins: str) -> int:

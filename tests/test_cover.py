@@ -1,13 +1,13 @@
 """The means of `make coverage`: points are read, merged over sizes of a block, and held against goals and reasons."""
 
 import re
-import sys
 from pathlib import Path
 
 import pytest
 from covering.blocks import BLOCKS, TESTS
 from covering.points import Point, merged
-from covering.report import Coverage, Reason, grouped, reasons_for
+from covering.report import REASONS, Coverage, grouped
+from reasons import Reason, reasons_for
 
 from hardwall.hdl import axis
 
@@ -53,7 +53,7 @@ def test_points_of_two_sizes_are_one_where_the_text_differs_in_numbers(tmp_path)
         simulation(tmp_path, "small", VERILOG, 1, 1, 0, 0, 0, 0, 1, 0),
         simulation(tmp_path, "large", VERILOG.replace("$7", "$11").replace("4'h3", "9'h3"), 1, 0, 2, 0, 0, 0, 1, 0),
     ]
-    counts = {f"{point.kind} {point.name}": count for point, count in merged(files, ("part",)).items()}
+    counts = {point.title: count for point, count in merged(files, ("part",)).items()}
     assert counts == {
         "line part block: sum = 0'h0;": 2,
         r"branch part if: if (\$0 ) begin": 1,
@@ -106,6 +106,6 @@ def test_every_block_has_its_test_and_every_reason_its_block():
     assert {block.test for block in BLOCKS} == tests - OF_THE_BENCH
     hdl = Path(axis.__file__).parent
     assert [block.name for block in BLOCKS if not (hdl / f"{block.name}.py").exists()] == []
-    written = sum(len(reasons_for(block.name)) for block in BLOCKS)
-    text = (Path(sys.modules[Reason.__module__].__file__).parent / "reasons.toml").read_text(encoding="utf-8")
+    written = sum(len(reasons_for(block.name, REASONS)) for block in BLOCKS)
+    text = REASONS.read_text(encoding="utf-8")
     assert written == text.count("[[reason]]")

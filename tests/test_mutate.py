@@ -10,11 +10,12 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 from cocotb.triggers import RisingEdge
 from covering.blocks import BLOCKS, TESTS
+from reasons import Reason, reasons_for
 
 from hardwall.testing import SEED, Bench
 from mutation import run
 from mutation.equivalent import EQUIVALENT, cut, joined, known_of, registers
-from mutation.fates import REASONS, Fate, Reason, Result, reasons_for
+from mutation.fates import REASONS, Fate, Result
 from mutation.netlist import BLOCK, mutated
 from mutation.run import fates_of, modules_of
 from mutation.sizes import Size, sizes_of
@@ -149,7 +150,7 @@ def test_nineteen_of_twenty_must_be_killed_and_what_is_left_needs_a_reason(resul
 
 
 def test_every_reason_is_of_a_block():
-    written = sum(len(reasons_for(block.name)) for block in BLOCKS)
+    written = sum(len(reasons_for(block.name, REASONS)) for block in BLOCKS)
     assert written == REASONS.read_text(encoding="utf-8").count("[[reason]]")
 
 

@@ -39,6 +39,11 @@ class Point:
     name: str
     place: tuple = ()
 
+    @property
+    def title(self) -> str:
+        """Its kind and its name."""
+        return f"{self.kind} {self.name}"
+
 
 @cache
 def _lines(file: str) -> tuple[str, ...]:

@@ -1,11 +1,12 @@
 """What the tests of a block cover of it, held against the goals and the written reasons."""
 
 import re
-import tomllib
 from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+
+from reasons import Reason
 
 from .points import KINDS, Point
 
@@ -14,37 +15,11 @@ _BIT = re.compile(r"(toggle [^\[:]+|.*?)(?:\[(\d+)\])?((?<=.):[01]->[01])?")
 REASONS = Path(__file__).with_name("reasons.toml")
 
 
-@dataclass(frozen=True)
-class Reason:
-    """Why a point of a block cannot be reached, or need not be.
-
-    Attributes:
-        block: the block.
-        point: the name of a point, or of several with `*`.
-        reason: one sentence or more.
-    """
-
-    block: str
-    point: str
-    reason: str
-
-    def is_of(self, point: Point) -> bool:
-        """Return whether it explains a point."""
-        pattern = ".*".join(map(re.escape, self.point.split("*")))
-        return re.fullmatch(pattern, f"{point.kind} {point.name}") is not None
-
-
-def reasons_for(block: str, file: Path = REASONS) -> list[Reason]:
-    """Return the reasons that are written for a block."""
-    listed = tomllib.loads(file.read_text(encoding="utf-8")).get("reason", [])
-    return [reason for each in listed if (reason := Reason(**each)).block == block]
-
-
 def grouped(points: list[Point]) -> list[str]:
     """Return the names of points, with the bits of a signal that miss the same toggle as one."""
     bits: dict[tuple[str, str], list[int]] = {}
     for point in points:
-        signal, bit, way = _BIT.fullmatch(f"{point.kind} {point.name}").groups()
+        signal, bit, way = _BIT.fullmatch(point.title).groups()
         bits.setdefault((signal, way or ""), []).append(int(bit or -1))
     return [
         f"{signal}[{' '.join(map(str, sorted(numbers)))}]{way}" if numbers != [-1] * len(numbers) else f"{signal}{way}"
@@ -74,12 +49,12 @@ class Coverage:
     @cached_property
     def unexplained(self) -> list[Point]:
         """Points that were not reached, for no written reason."""
-        return [point for point in self.missed if not any(reason.is_of(point) for reason in self.reasons)]
+        return [point for point in self.missed if not any(reason.is_of(point.title) for reason in self.reasons)]
 
     @property
     def stale(self) -> list[Reason]:
         """Reasons for what was reached or is not there."""
-        return [reason for reason in self.reasons if not any(reason.is_of(point) for point in self.missed)]
+        return [reason for reason in self.reasons if not any(reason.is_of(point.title) for point in self.missed)]
 
     def share(self, kind: str, missed: list[Point]) -> float:
         """Return the share of the points of a kind that are not among those missed."""
@@ -102,5 +77,5 @@ class Coverage:
     def explanation(self) -> str:
         """What is missed without a reason, and every stale reason; one line for each."""
         missed = [f"{self.block}: missed: {name}" for name in grouped(self.unexplained)]
-        stale = [f"{self.block}: reached, so that its reason must go: {reason.point}" for reason in self.stale]
+        stale = [f"{self.block}: reached, so that its reason must go: {reason.name}" for reason in self.stale]
         return "".join(f"{line}\n" for line in missed + stale)

@@ -1,9 +1,9 @@
 """What came of the mutants of a block: killed, proven equivalent, or left, for a written reason or for none."""
 
-import re
-import tomllib
 from dataclasses import dataclass, field
 from pathlib import Path
+
+from reasons import Reason
 
 from .equivalent import EQUIVALENT
 
@@ -37,31 +37,6 @@ class Fate:
 
 
 @dataclass(frozen=True)
-class Reason:
-    """Why a mutant of a block is left.
-
-    Attributes:
-        block: the block.
-        mutant: the name of a mutant, or of several with `*`.
-        reason: one sentence or more.
-    """
-
-    block: str
-    mutant: str
-    reason: str
-
-    def is_of(self, fate: Fate) -> bool:
-        """Return whether it explains why a mutant is left."""
-        return fate.left and re.fullmatch(".*".join(map(re.escape, self.mutant.split("*"))), fate.mutant) is not None
-
-
-def reasons_for(block: str, file: Path = REASONS) -> list[Reason]:
-    """Return the reasons that are written for a block."""
-    listed = tomllib.loads(file.read_text(encoding="utf-8")).get("reason", [])
-    return [reason for each in listed if (reason := Reason(**each)).block == block]
-
-
-@dataclass(frozen=True)
 class Result:
     """What came of all mutants of a block.
 
@@ -92,12 +67,14 @@ class Result:
     @property
     def unexplained(self) -> list[Fate]:
         """Mutants that are left for no written reason."""
-        return [fate for fate in self.left if not any(reason.is_of(fate) for reason in self.reasons)]
+        return [fate for fate in self.left if not any(reason.is_of(fate.mutant) for reason in self.reasons)]
 
     @property
     def stale(self) -> list[Reason]:
         """Reasons for what is not left."""
-        return [reason for reason in self.reasons if self.ours and not any(reason.is_of(fate) for fate in self.left)]
+        return [
+            reason for reason in self.reasons if self.ours and not any(reason.is_of(fate.mutant) for fate in self.left)
+        ]
 
     @property
     def share(self) -> float:
@@ -120,7 +97,7 @@ class Result:
     def explanation(self) -> str:
         """Every mutant that is left without a reason, and every stale reason; one line for each."""
         left = [f"{self.block}: left, {fate.known}: {fate.mutant}" for fate in self.unexplained]
-        stale = [f"{self.block}: not left, so that its reason must go: {reason.mutant}" for reason in self.stale]
+        stale = [f"{self.block}: not left, so that its reason must go: {reason.name}" for reason in self.stale]
         return "".join(f"{line}\n" for line in left + stale)
 
     @property

@@ -5,11 +5,12 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 from covering.blocks import Block
+from reasons import reasons_for
 
 from hardwall.testing import SEED
 
 from .equivalent import EQUIVALENT, known_of
-from .fates import Fate, Result, reasons_for
+from .fates import REASONS, Fate, Result
 from .killing import killed
 from .netlist import BLOCK, mutated
 from .sizes import Size, sizes_of
@@ -70,6 +71,6 @@ def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result]
                 pool.submit(fates_of, size, modules_of(block), share) for size, share in zip(sizes, shares, strict=True)
             ]
             fates = [fate for future in futures for fate in future.result()]
-            results.append(Result(block.name, fates, reasons_for(block.name), ours))
+            results.append(Result(block.name, fates, reasons_for(block.name, REASONS), ours))
             done(results[-1])
     return results
