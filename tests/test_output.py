@@ -31,6 +31,15 @@ def stimulus(d: output.Design, samples: int):
                 for _ in range(2 * d.decimation):
                     yield force, 0, limit, slew
     random, length = rng(), 50
+    # Forces that a limit just holds, or just lets pass.
+    for limit in (
+        *magnitudes(random, 0, d.force_limit, 50).tolist(),
+        *random.integers(0, d.force_limit + 1, 50).tolist(),
+    ):
+        for beyond in range(-3, 4):
+            force = min(max(limit + beyond, 0), top) * int(random.choice((-1, 1)))
+            for _ in range(d.decimation):
+                yield force, 0, limit, limits[1]
     force = magnitudes(random, d.force.min, top, samples)
     fault = (random.random(samples) < 0.02).astype(np.int64)
     words = (magnitudes(random, 0, most, -(-samples // length)).repeat(length)[:samples] for most in limits)

