@@ -198,7 +198,7 @@ class Axis(wiring.Component):
             output.enable.eq(self.drive_enable),
             self.drive.eq(output.drive),
             self.sampled.eq(output.valid),
-            self.actuated.eq(output.valid & output.actuated),
+            self.actuated.eq(output.actuated),
             self.count.eq(decoder.seen.count),
             self.velocity.eq(estimator.velocity),
             self.wall_force.eq(wall.force),

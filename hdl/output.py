@@ -50,7 +50,7 @@ class Output(Block):
     limited : Out(2)
         With `valid`: bit 0, the slew limit acted; bit 1, the force limit acted.
     actuated : Out(1)
-        With `valid`: this was an actuation.
+        High for one clock, with the `valid` of an actuation.
     valid : Out(1)
         High for one clock.
 
@@ -92,7 +92,7 @@ class Output(Block):
         farther, over = ~not_above(less, reach), slewed > limit
         m.d.comb += limited.eq(Mux(over, limit, slewed))
 
-        m.d.sync += self.valid.eq(0)
+        m.d.sync += [self.valid.eq(0), self.actuated.eq(0)]
         with m.FSM():
             with m.State("CHANGE"), m.If(self.strobe):
                 m.d.sync += [

@@ -63,7 +63,9 @@ async def follows_model(dut):
     await bench.reset()
     bench.drive(enable=1)
     names, rows = ("force", "fault", *NAMES), stimulus(component.design, SAMPLES)
-    inputs, outputs = await bench.campaign("strobe", "valid", names, ("drive", "limited", "actuated"), rows)
+    inputs, outputs = await bench.campaign(
+        "strobe", "valid", names, ("drive", "limited", "actuated"), rows, momentary=("force", "fault")
+    )
     expected = model(component.design, inputs.rows)
     assert set(expected["limited"].tolist()) == {0, 1, 2, 3}
     check(inputs, outputs, expected, component.latency)
@@ -105,6 +107,23 @@ async def enable_low_is_zero_at_the_next_clock(dut):
                 for _ in range(d.decimation - 1):
                     await bench.transact("strobe", "valid", force=5, **words)
                 break
+
+
+@cocotb.test()
+async def actuated_is_high_at_its_valid_alone(dut):
+    bench = Bench(dut, make(**parameters()))
+    d = design(**parameters())
+    pairs = []
+    await bench.reset()
+    for _ in range(2 * d.decimation):
+        bench.drive(strobe=1, enable=1)
+        for _ in range(output.LATENCY + 2):
+            await RisingEdge(dut.clk)
+            bench.drive(strobe=0)
+            pairs.append((int(dut.valid.value), int(dut.actuated.value)))
+    assert pairs.count((1, 1)) == 2
+    assert pairs.count((1, 0)) == 2 * d.decimation - 2
+    assert (0, 1) not in pairs
 
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])

@@ -56,7 +56,9 @@ async def follows_model(dut):
     await bench.reset()
     operands, results = ("dividend", "divisor"), ("quotient", "saturated")
     at_next_start = bench.monitor("start", *results)
-    starts, quotients = await bench.campaign("start", "done", operands, results, stimulus(*widths, SAMPLES // 10))
+    starts, quotients = await bench.campaign(
+        "start", "done", operands, results, stimulus(*widths, SAMPLES // 10), momentary=operands
+    )
     pairs = starts.rows
     expected = {
         "quotient": np.array([divide(a, b, widths[2]) for a, b in pairs]),

@@ -36,7 +36,7 @@ async def follows_model(dut):
     await bench.reset()
     operands, rows = ("dividend", "divisor"), pairs(component, SAMPLES // 50)
     at_next_start = bench.monitor("start", "quotient")
-    inputs, outputs = await bench.campaign("start", "done", operands, ("quotient",), rows)
+    inputs, outputs = await bench.campaign("start", "done", operands, ("quotient",), rows, momentary=operands)
     quotients = [divide(dividend, divisor, component.fraction) for dividend, divisor in inputs.rows]
     check(inputs, outputs, {"quotient": quotients}, component.latency)
     assert at_next_start.rows[1:] == outputs.rows[:-1], "a quotient must stay until the next start"
@@ -48,11 +48,15 @@ async def a_start_while_busy_abandons_the_quotient_in_hand(dut):
     bench = Bench(dut, component)
     await bench.reset()
     outputs = bench.monitor("done", "quotient")
-    bench.drive(start=1, dividend=-1, divisor=1)
-    await cocotb.triggers.RisingEdge(dut.clk)
-    await bench.transact("start", "done", dividend=1, divisor=1)
+    for clocks in range(1, component.latency):
+        bench.drive(start=1, dividend=-1, divisor=1)
+        await cocotb.triggers.RisingEdge(dut.clk)
+        bench.drive(start=0)
+        if clocks > 1:
+            await cocotb.triggers.ClockCycles(dut.clk, clocks - 1)
+        await bench.transact("start", "done", dividend=1, divisor=1)
     await bench.rest()
-    assert outputs.rows == [(1 << component.fraction,)]
+    assert outputs.rows == [(1 << component.fraction,)] * (component.latency - 1)
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ async def follows_model(dut):
     radicands = range(1 << width) if 1 << width <= SAMPLES else rng().integers(0, 1 << width, SAMPLES).tolist()
     rows = [(radicand,) for radicand in [*around_squares(width), *radicands]]
     at_next_start = bench.monitor("start", "root")
-    starts, roots = await bench.campaign("start", "done", ("radicand",), ("root",), rows)
+    starts, roots = await bench.campaign("start", "done", ("radicand",), ("root",), rows, momentary=("radicand",))
     expected = np.array([isqrt(r) for r in starts.column("radicand").tolist()])
     check(starts, roots, {"root": expected}, component.latency)
     assert at_next_start.rows[1:] == roots.rows[:-1], "a root must stay until the next start"

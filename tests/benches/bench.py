@@ -69,7 +69,7 @@ class Bench:
         if not hasattr(self, "_clock"):
             self._clock = Clock(self.dut.clk, PERIOD_NS, "ns")
             self._clock.start()
-        for name in ("campaign", "go", "strobe", "watched"):
+        for name in ("campaign", "go", "strobe", "momentary", "watched"):
             getattr(self.dut, RESERVED + name).value = 0
         self.drive(**dict.fromkeys(self.inputs.shapes, 0))
         self.dut.rst.value = 1
@@ -128,11 +128,12 @@ class Bench:
         rows: Iterable[tuple[int, ...]],
         latency: int | None = None,
         every: int | None = None,
+        momentary: Iterable[str] = (),
     ) -> tuple[Rows, Rows]:
         """Put `rows` of `inputs` through; every strobe comes with the previous answer or a clock later, at random.
 
-        The other inputs stay as they were driven. This is much quicker than `transact` between two monitors, because
-        Python runs only once in thousands of samples.
+        The other inputs stay as they were driven, and a row's until the next. This is much quicker than `transact`
+        between two monitors, because Python runs only once in thousands of samples.
 
         Args:
             strobe: the input that is high for one clock with every row.
@@ -143,6 +144,8 @@ class Bench:
             latency: the most clocks from a strobe to its answer; default: `latency` of the component. With 0 the answer
                 comes in the strobe's own clock.
             every: the fewest clocks between strobes, less than `latency` for a pipeline; default: `latency`, or 1.
+            momentary: the inputs of a row that the component takes with the strobe; at all other clocks they are the
+                complements of what they were.
 
         Returns:
             The values of the ports at every strobe, and at every answer.
@@ -155,6 +158,7 @@ class Bench:
         promised: Any = getattr(self._component, "latency", None) if latency is None else latency
         taken, given = (Rows(names, self.packing, [], []) for names in (inputs, outputs))
         campaign = Campaign(strobe, done, taken, given, promised, max(promised or 1, 1) if every is None else every)
+        self.dut.bench_momentary.value = sum(map(self.inputs.mask, momentary))
         held = self.inputs.pack({**self._held, **dict.fromkeys((strobe, *inputs), 0)})
         self.in_campaign = True
         try:

@@ -13,9 +13,14 @@ from hardwall.model.quadrature import Seen
 from hardwall.testing import Bench, check
 
 
+def momentary(design: EstimatorDesign) -> tuple[str, ...]:
+    """Return the names of the inputs that are taken with the strobe: the decoder's outputs, and the restart."""
+    return (*(f"seen__{name}" for name in design.inputs), "restart")
+
+
 def names(design: EstimatorDesign) -> tuple[str, ...]:
-    """Return the names of a row's values, in order: the decoder's outputs, the restart, the run-time words."""
-    return (*(f"seen__{name}" for name in design.inputs), "restart", *(word.name for word in design.words))
+    """Return the names of a row's values, in order: what is taken with the strobe, then the run-time words."""
+    return (*momentary(design), *(word.name for word in design.words))
 
 
 def reset_words(design: EstimatorDesign) -> list[int]:
@@ -63,7 +68,9 @@ async def follow(
     """Put rows through the RTL, check it against the model exactly, and return the model's outputs."""
     design, bench = component.design, Bench(dut, component)
     await bench.reset()
-    inputs, outputs = await bench.campaign("strobe", "valid", names(design), ("velocity", "saturated"), rows)
+    inputs, outputs = await bench.campaign(
+        "strobe", "valid", names(design), ("velocity", "saturated"), rows, momentary=momentary(design)
+    )
     expected = model(design, inputs.rows, start)
     check(inputs, outputs, expected, component.latency)
     return expected

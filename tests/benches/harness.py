@@ -68,6 +68,7 @@ class Harness(wiring.Component):
             "campaign": In(1),
             "go": In(1),
             "strobe": In(self.inputs.width),
+            "momentary": In(self.inputs.width),
             "watched": In(self.seen.width),
             "seen": Out(self.seen.width),
             "done": Out(1),
@@ -101,7 +102,7 @@ class Harness(wiring.Component):
             i_seen=self.bench_seen,
             o_clk=clocked.clk,
             o_driven=by_sequencer,
-            **{f"i_{name}": getattr(self, RESERVED + name) for name in ("go", "strobe", "watched")},
+            **{f"i_{name}": getattr(self, RESERVED + name) for name in ("go", "strobe", "momentary", "watched")},
             **{f"o_{name}": getattr(self, RESERVED + name) for name in ("done", "clocks")},
         )
         return m

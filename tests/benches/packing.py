@@ -43,6 +43,10 @@ class Packing:
         """Return the word in which a signal of one bit is 1 and all else is 0."""
         return 1 << self._offsets[name]
 
+    def mask(self, name: str) -> int:
+        """Return the word in which every bit of a signal is 1 and all else is 0."""
+        return self._masks[name] << self._offsets[name]
+
     def unpack(self, word: int) -> dict[str, int]:
         """Return the values in a word, by name."""
         return {name: ((word >> offset & mask) ^ sign) - sign for name, offset, mask, sign in self._places}

@@ -1,8 +1,9 @@
 // Puts a batch of rows through a component and keeps what its ports carried: see harness.py and campaign.py.
 //
 // A row is its inputs and, above them, how many clocks later than the next clock the next row comes. Its strobe is one
-// clock long; its inputs stay until the next row's. A clock at which a watched port is high is an event: the values of
-// all ports and, above them, the number of the clock in the batch. The folder +scratch has the rows and gets the events,
+// clock long; its inputs stay until the next row's, but for the momentary ones, which are complements from the second
+// clock on. A clock at which a watched port is high is an event: the values of all ports and, above them, the number of
+// the clock in the batch. The folder +scratch has the rows and gets the events,
 // a hexadecimal word a line.
 //
 // A batch that starts while `bench_clk` is low makes its own clocks, in no time of the simulator: a single evaluation
@@ -18,6 +19,7 @@ module bench_sequencer #(
     input rst,
     input go,                      // its change starts a batch
     input [INPUTS-1:0] strobe,     // the inputs that are high in the first clock of a row
+    input [INPUTS-1:0] momentary,  // the inputs that mean something in the first clock of a row alone
     input [SEEN-1:0] watched,      // the ports that make an event
     input [SEEN-1:0] seen,         // all ports
     output clk,                    // the component's clock
@@ -36,7 +38,7 @@ module bench_sequencer #(
   initial if (!$value$plusargs("scratch=%s", scratch)) $fatal(1, "+scratch is missing");
 
   assign clk = bench_clk | extra;
-  assign driven = inputs | (first ? strobe : {INPUTS{1'b0}});
+  assign driven = first ? inputs | strobe : inputs ^ momentary;
 
   // A change of `go` wakes this process; it is no reset.
   // verilator lint_off SYNCASYNCNET

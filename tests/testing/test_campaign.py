@@ -90,6 +90,19 @@ async def a_campaign_of_batches_and_what_is_done_by_hand_are_one_sequence_of_clo
 
 
 @cocotb.test(**CAMPAIGN)
+async def a_momentary_input_is_itself_with_the_strobe_alone(dut):
+    bench = await echo(dut, 2)
+    # With complements, this is high at all clocks but those of strobes.
+    at_other_clocks = bench.monitor("lost", "strobe", "value")
+    taken, given = await campaign(bench, rows(100), latency=2, every=4, momentary=("value", "lost"))
+    assert taken.column("value").tolist() == given.column("echo").tolist() == list(range(100))
+    seen = at_other_clocks.rows[1:]
+    assert {value for _, value in seen} == set(range(255, 155, -1))
+    assert not any(strobe for strobe, _ in seen)
+    assert len(seen) >= 3 * 100
+
+
+@cocotb.test(**CAMPAIGN)
 async def what_is_wrong_is_named_with_its_sample(dut):
     late = r"^sample 0 waits: no valid within 2 clocks of its strobe, the latency promised; inputs {'value': 0,"
     with pytest.raises(AssertionError, match=late):
