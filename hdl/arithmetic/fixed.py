@@ -59,8 +59,8 @@ def less(value: Value, bound: int) -> Value:
 
 def negated(value: Value, negative: Value) -> Value:
     """Return the value, or -value where `negative` is high, a bit wider: the complement of one less is one sum."""
-    less = value - negative
-    return less ^ negative.replicate(len(less)).as_signed()
+    lowered = value - negative
+    return lowered ^ negative.replicate(len(lowered)).as_signed()
 
 
 def not_above(complement: Value, limit: Value) -> Value:

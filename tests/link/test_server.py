@@ -2,26 +2,19 @@
 
 import cocotb
 import pytest
-from amaranth.hdl import Cat, Module, Signal
-from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out, connect
-from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
+from cocotb.triggers import ClockCycles, RisingEdge
+from server_world import Stack, World
 
-from hardwall.hdl.lead_out import lead_out
-from hardwall.hdl.link import line as hdl_line
 from hardwall.hdl.link.register_file import RegisterFile
 from hardwall.hdl.link.server import Server
 from hardwall.model.link import register_file, server
 from hardwall.model.link.line import Line, Verdict, framed
-from hardwall.model.registers import COUNTERS, MAP, WRITTEN
-from hardwall.testing import Bench, parameters, rng, simulate
+from hardwall.model.registers import COUNTERS, WRITTEN
+from hardwall.testing import simulate
 from stimuli import frames
-from stimuli.status import show
-from stimuli.supervised import captured, supervised
+from stimuli.random_requests import random_request
+from stimuli.supervised import supervised
 
-GAP = 30
-"""Clocks of the line's gap: a few bytes."""
-PATIENCE = 20_000
 EXCEPTIONS = [
     (b"\5\0\0\xff\0", 1),
     (bytes([43, 13, 1, 0]), 1),
@@ -49,209 +42,6 @@ EXCEPTIONS = [
 """A request for every reason of an exception of the server's own, and its code."""
 
 
-class Stack(wiring.Component):
-    """Line, server and register file, with bytes at the ports, a capture memory, and the pulses side by side."""
-
-    def __init__(self, name: str):
-        self.design = register_file.Design(supervised(name))
-        self.file = RegisterFile(self.design)
-        own = dict(self.file.signature.members)
-        for gone in ("host", "capture_address", "capture_data"):
-            del own[gone]
-        for pulse in self.design.registers.pulses:
-            del own[pulse.name]
-        super().__init__(
-            {
-                "byte": In(8),
-                "arrived": In(1),
-                "spoilt": In(1),
-                "sent": Out(8),
-                "sending": Out(1),
-                "idle": Out(1),
-                "pulses": Out(len(self.design.registers.pulses)),
-                "pulsed": Out(1),
-                **own,
-            }
-        )
-
-    def elaborate(self, platform):
-        m = Module()
-        m.submodules.line = line = hdl_line.Line(GAP)
-        m.submodules.server = under_test = Server(self.design)
-        m.submodules.file = file = self.file
-        connect(m, line.frames, under_test.frames)
-        connect(m, under_test.file, file.host)
-        place = Signal.like(file.capture_address)
-        pulses = Cat(getattr(file, pulse.name) for pulse in self.design.registers.pulses)
-        m.d.sync += place.eq(file.capture_address)
-        m.d.comb += [
-            line.byte.eq(self.byte),
-            line.arrived.eq(self.arrived),
-            line.spoilt.eq(self.spoilt),
-            line.sent.ready.eq(1),
-            self.sent.eq(line.sent.payload),
-            self.sending.eq(line.sent.valid),
-            self.idle.eq(~line.frames.ended & ~line.sent.valid),
-            self.pulses.eq(pulses),
-            self.pulsed.eq(pulses.any()),
-            file.capture_data.eq(captured(place)),
-        ]
-        m.d.comb += lead_out(file, self, [name for name in self.signature.members if hasattr(file, name)])
-        return m
-
-
-def make(name: str) -> Stack:
-    return Stack(name)
-
-
-class World:
-    """A host and an axis around the stack, with the twin beside it."""
-
-    def __init__(self, dut):
-        component = make(**parameters())
-        self.dut, self.bench, self.random = dut, Bench(dut, component), rng()
-        self.registers = component.design.registers
-        self.design = component.design
-        self.line, self.server = Line(), server.Server(self.design)
-        self.sent = self.bench.monitor("sending", "sent")
-        self.pulsed = self.bench.monitor("pulsed", "pulses", *self.server.file.active)
-        self.idle = self.bench.reader("idle")
-        self.answers = 0
-        cocotb.start_soon(self._axis())
-
-    async def _axis(self) -> None:
-        """Keep a commit waiting for some clocks, as the axis does until its sample."""
-        commit = self.dut.pulses
-        while True:
-            await RisingEdge(self.dut.pulsed)
-            await RisingEdge(self.dut.clk)
-            if int(commit.value) & 1:
-                self.bench.drive(commit_pending=1)
-                await ClockCycles(self.dut.clk, 50)
-                self.bench.drive(commit_pending=0)
-
-    async def reset(self) -> None:
-        await self.bench.reset()
-        self.line, self.server.file = Line(), register_file.RegisterFile(self.design)
-        self.server.file.capture = [captured(k) for k in range(self.registers.capture_registers)]
-
-    async def live(self) -> None:
-        """Give every status, and the refused pulses, a random value."""
-        self.server.file.status = {
-            each.name: int(self.random.integers(each.format.min, each.format.max + 1)) for each in self.registers.status
-        }
-        refused = [int(self.random.random() < 0.1) for _ in self.registers.pulses]
-        pairs = zip(self.registers.pulses, refused, strict=True)
-        self.server.file.refusing = frozenset(pulse.name for pulse, bit in pairs if bit)
-        self.bench.drive(refuse=sum(bit << k for k, bit in enumerate(refused)))
-        await show(self.dut, self.bench, self.registers, self.server.file.status)
-
-    async def send(self, data: bytes, pace: int = 1, spoilt: int = -1) -> bytes | None:
-        """Send bytes, wait for what they cause, and compare it with the twin's; return the last answer."""
-        answer = None
-        for k, byte in enumerate(data):
-            self.bench.drive(byte=byte, arrived=1, spoilt=k == spoilt)
-            await RisingEdge(self.dut.clk)
-            self.bench.drive(arrived=0)
-            verdict = self.line.receive(byte, k == spoilt)
-            if verdict is None:
-                if pace > 1:
-                    await ClockCycles(self.dut.clk, pace - 1)
-            else:
-                answer = await self.agree(verdict) or answer
-        return answer
-
-    async def gap(self) -> bytes | None:
-        """Be silent for a gap, and compare what it causes."""
-        verdict = self.line.gap()
-        await ClockCycles(self.dut.clk, GAP + 1)
-        return None if verdict is None else await self.agree(verdict)
-
-    async def agree(self, verdict: Verdict) -> bytes | None:
-        """Wait until the line listens again; compare answer, pulses and words with the twin's."""
-        await ClockCycles(self.dut.clk, 3)
-        begun, pulsed = len(self.sent.rows), len(self.pulsed.rows)
-        self.server.file.pulses = ()
-        answer = self.server.take(verdict, bytes(self.line.frame))
-        if not self.idle():
-            came = RisingEdge(self.dut.idle)
-            assert await First(came, Timer(PATIENCE * self.bench.period_ns, "ns")) is came, "the server hangs"
-        await ClockCycles(self.dut.clk, 4)
-        got = bytes(row[0] for row in self.sent.rows[begun:])
-        assert got == (b"" if answer is None else framed(answer)), self.line.frame.hex(" ")
-        pulses = sum(1 << k for k, p in enumerate(self.registers.pulses) if p.name in self.server.file.pulses)
-        rows, file = self.pulsed.rows[pulsed:], self.server.file
-        assert [row[0] for row in rows] == [pulses] * bool(pulses)
-        for row in rows:
-            assert dict(zip(file.active, row[1:], strict=True)).items() >= file.ports.items()
-        self.answers += answer is not None
-        return answer
-
-    async def request(self, pdu: bytes) -> bytes:
-        """Return the answer's function and data to a request to the unit."""
-        answer = await self.send(framed(b"\1" + pdu))
-        assert answer is not None
-        return answer[1:]
-
-    def random_write(self) -> tuple[int, list[int]]:
-        """Return the first address and the values of a write that is mostly right."""
-        random, words, values = self.random, (*self.registers.words, *self.registers.live), []
-        first = int(random.integers(0, len(words)))
-        for word in words[first : first + int(random.integers(1, 6))]:
-            value = int(random.integers(word.low, word.high + 1))
-            edge = random.random()
-            if edge < 0.3:
-                value = int(random.choice((word.low, word.high, 0)))
-            elif edge < 0.36:
-                beyond = word.low - 1, word.high + 1, word.high + (1 << 16), -(1 << 31), (1 << 31) - 1
-                value = int(random.choice(beyond))
-            values += [value >> 16 & 0xFFFF, value & 0xFFFF]
-        address = words[first].address
-        if first == 0 and random.random() < 0.7:
-            # Pulses before the words, in the same frame.
-            pulses = random.integers(0, 2, random.integers(1, len(self.registers.pulses) + 1)).tolist()
-            address, values = address - len(pulses), [*pulses, *values]
-        if random.random() < 0.05:
-            address += int(random.integers(-3, 4))
-        if random.random() < 0.05:
-            values.pop()
-        return address, values or [0]
-
-    def random_read(self) -> tuple[int, int]:
-        """Return the first address and the number of registers of a read that is mostly right."""
-        random, end = self.random, MAP + len(self.design.map_cells)
-        address, count = int(random.choice((0, 0x20, 0x60, 0x80, 0xC0))), int(random.integers(1, 60)) * 2
-        case = random.random()
-        if case < 0.2:
-            address, count = int(random.integers(MAP, end + 2)), int(random.integers(1, 20))
-        elif case < 0.3:
-            address, count = 0x8000 + int(random.integers(0, 310)), int(random.integers(1, 20))
-        elif case < 0.4:
-            address, count = int(random.integers(0, 1 << 16)), int(random.integers(0, 130))
-        elif case < 0.45:
-            count = int(random.choice((0, 125, 126, 65535)))
-        return address, count
-
-    def random_pdu(self) -> bytes:
-        """Return a function and its data."""
-        random = self.random
-        (address, values), (source, count) = self.random_write(), self.random_read()
-        mangled = bytearray(frames.write(address, values))
-        mangled[int(random.integers(3, 6))] ^= 1 << random.integers(0, 8)
-        cases = [
-            frames.read(source, count),
-            frames.read(source, count, 4),
-            frames.write(address, values),
-            frames.write(address, values),
-            frames.write_one(int(random.integers(0x70, 0x82)), int(random.choice((0, 1, 1, 1, 2)))),
-            frames.write_and_read(address, values, source, count),
-            bytes([8]) + frames.words(random.integers(0, 21), random.choice((0, 0, 0, 5))),
-            bytes([43, random.choice((14, 14, 14, 13)), random.integers(0, 6), random.integers(0, 5)]),
-            bytes(mangled),
-        ]
-        return cases[random.integers(0, len(cases))]
-
-
 @cocotb.test()
 async def requests_are_answered_as_the_twin_does(dut):
     world = World(dut)
@@ -260,7 +50,7 @@ async def requests_are_answered_as_the_twin_does(dut):
     for _ in range(200):
         if world.random.random() < 0.3:
             await world.live()
-        answer = await world.send(framed(b"\1" + world.random_pdu()))
+        answer = await world.send(framed(b"\1" + random_request(world.random, world.design)))
         if answer is None:
             await world.gap()
         else:
@@ -377,7 +167,7 @@ async def the_largest_request_is_answered_in_time(dut):
 
 @pytest.mark.parametrize("name", ["mhz"])
 def test_rtl(name):
-    simulate(__file__, make, name=name)
+    simulate(__file__, Stack, name=name)
 
 
 def answers(*pdus: bytes) -> list[bytes]:
