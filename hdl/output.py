@@ -1,6 +1,6 @@
 """The output stage, from the wall's force to the drive."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Const, Module, Mux, Signal
 from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.output import Design
@@ -79,6 +79,7 @@ class Output(Block):
     def elaborate(self, platform):
         m = Module()
         phase = Signal(range(max(self._design.decimation, 2)))
+        turn = phase == 0 if self._design.decimation > 1 else Const(1)
         allowed = Signal()
         # The stage works with magnitudes, and keeps that of the force as its complement, which a comparison adds. The
         # growth is measured from the drive, or from zero if the force has the other sign.
@@ -106,7 +107,7 @@ class Output(Block):
                 m.d.sync += [slewed.eq(Mux(farther, reach, ~less)), self.limited[0].eq(farther)]
                 m.next = "LIMIT"
             with m.State("LIMIT"):
-                actuated = (phase == 0) & allowed
+                actuated = turn & allowed
                 with m.If(actuated):
                     m.d.sync += [
                         self.drive.eq(negated(limited, negative)),
@@ -118,7 +119,7 @@ class Output(Block):
                 m.d.sync += [
                     phase.eq(Mux(phase == self._design.decimation - 1, 0, phase + 1)),
                     self.limited.eq(Mux(actuated, self.limited[0] | over << 1, 0)),
-                    self.actuated.eq(phase == 0),
+                    self.actuated.eq(turn),
                     self.valid.eq(1),
                 ]
                 m.next = "CHANGE"

@@ -30,6 +30,11 @@ def stimulus(d: output.Design, samples: int):
             for force in (d.force.min, top, -1, 0, 1, top, d.force.min):
                 for _ in range(2 * d.decimation):
                     yield force, 0, limit, slew
+    # Stairs, whose steps are only limited in their growth, up to the largest drive.
+    for steps in (7, 29):
+        for force in (d.force.min, top):
+            for _ in range((steps + 1) * d.decimation):
+                yield force, 0, limits[0], d.force_limit // steps
     random, length = rng(), 50
     # Forces that a limit just holds, or just lets pass.
     for limit in (

@@ -47,6 +47,6 @@ BLOCKS = (
     Block("link/server", ("component.server",)),
     Block("link/link", ("component.link",)),
     Block("link/axi", ("component.link.subordinate",)),
-    Block("link/axi_link"),
+    Block("link/axi_link", ("component.link",)),
     Block("board", ("component.board",)),
 )
