@@ -53,7 +53,7 @@ class Rig:
         host: the host.
         swapped: whether the wires of the motor are swapped.
         on_count: called with the count of every edge of the encoder, when its wires change.
-        began: the clock after whose edge the fault is there.
+        began: the clock after whose edge the fault is there; before_n: the drive of that clock.
         turns: clocks and words of every change of the drive that is let out.
         wrong: what the fault itself has found to be wrong.
         stuck_n: the largest force without a clock.
@@ -64,7 +64,7 @@ class Rig:
         self.handle = Grasped()
         self.swapped = False
         self.on_count: Callable[[int], None] = lambda number: None
-        self.began = 0
+        self.began, self.before_n = 0, 0.0
         self.turns: list[tuple[int, int]] = []
         self.wrong: list[str] = []
         self.stuck_n = self._stuck_n_s = self._drive_n = 0.0
@@ -214,7 +214,7 @@ class Rig:
 
     def begin(self) -> None:
         """Take it that the fault is there from now on."""
-        self.began, self._pulses_before = self.now, self.see("pulses")
+        self.began, self.before_n, self._pulses_before = self.now, self.driven_n, self.see("pulses")
 
     @property
     def impulse_n_s(self) -> float:
