@@ -207,7 +207,7 @@ FAULTS = (
         live=limits(15.0, 1e-3),
     ),
     Fault(
-        "the motor's wires are swapped before the axis is armed, with the words after reset",
+        "the motor's wires are swapped before the axis is armed, and the ramp is that after reset",
         reversed_before_arming,
         trips("runaway", within=60 * CLOCKS_PER_MS, largest_n=60e-3 * SPEC.force_max_n / RAMP_S),
         unswapped,
