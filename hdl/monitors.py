@@ -48,10 +48,8 @@ class Monitors(Block):
         Pulse: the index edge was counted.
     valid, velocity, saturated : In
         The estimator's result, and whether it is saturated.
-    magnitude, negative : In
-        The drive that is let out, force LSB.
-    force_limit : In(UQ)
-        The limit that it obeys, force LSB.
+    at_limit, negative : In(1)
+        The drive that is let out is as large as it may be, and is negative.
     a, a_n, b, b_n : In(1)
         Synchronised levels of the channels and of their complements.
     one input for each word of `design.words` : In
@@ -79,9 +77,8 @@ class Monitors(Block):
             "valid": In(1),
             "velocity": In(shape(design.velocity)),
             "saturated": In(1),
-            "magnitude": In(shape(design.limit)),
+            "at_limit": In(1),
             "negative": In(1),
-            "force_limit": In(shape(design.limit)),
             **dict.fromkeys(("a", "a_n", "b", "b_n"), In(1)),
             **{word.name: In(shape(word.format)) for word in design.words},
             "causes": Out(COUNT),
@@ -148,10 +145,9 @@ class Monitors(Block):
 
     def _runaway(self, m: Module, up: Signal) -> Value:
         """Return whether the handle has moved too far against a drive at its limit."""
-        pressed, pressed_before, negative_before = Signal(), Signal(), Signal()
-        m.d.comb += pressed.eq((self.magnitude >= self.force_limit) & self.force_limit.any())
-        m.d.sync += [pressed_before.eq(pressed), negative_before.eq(self.negative)]
-        held = pressed & pressed_before & (self.negative == negative_before)
+        pressed_before, negative_before = Signal(), Signal()
+        m.d.sync += [pressed_before.eq(self.at_limit), negative_before.eq(self.negative)]
+        held = self.at_limit & pressed_before & (self.negative == negative_before)
         # The way is negative, so that a sum compares it.
         way = Signal.like(self.count)
         with m.If(~held):

@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Member, Out
 from hardwall.model import supervisor
 from hardwall.model.supervisor import ALWAYS, ARMED, COUNT, COUNT_BITS, DISARMED, LINK, REQUIRED, TRIPPED
 
-from .arithmetic.fixed import negated, not_above, shape
+from .arithmetic.fixed import below, negated, not_above, shape
 from .block import Block
 
 
@@ -20,7 +20,9 @@ class Supervisor(Block):
                     DISARMED if TRIPPED and acknowledged == latched with acknowledge
                     DISARMED if not TRIPPED, and enable is low or disarm is high
                     ARMED if DISARMED, and arm, live and the reference that is asked for; all but arm is `ready`
-        driven   <- drive within +-min(ceiling, supervisor_force_limit) if ARMED stays ARMED, else 0
+        limit    =  min(ceiling, supervisor_force_limit)
+        driven   <- drive within +-limit if ARMED stays ARMED, else 0
+        at_limit <- 0 < limit <= |drive| if ARMED stays ARMED, else 0
         ceiling  <- 0 unless ARMED; else the lower of ceiling and supervisor_force_limit, with strobe + supervisor_ramp
 
     `link_timeout` is made here: it stands while ARMED and not `live`. The host is live from a change of `heartbeat`
@@ -67,6 +69,8 @@ class Supervisor(Block):
         The drive that is let out, force LSB.
     magnitude, negative : Out
         The same as a magnitude and a sign; the latter is that of `drive` also where the limit is zero.
+    at_limit : Out(1)
+        The drive that is let out is all that may be, and is not zero.
     state : Out(2)
         0: DISARMED, 1: ARMED, 2: TRIPPED.
     alive : Out(1)
@@ -109,6 +113,7 @@ class Supervisor(Block):
             "driven": Out(shape(design.force)),
             "magnitude": Out(shape(design.limit)),
             "negative": Out(1),
+            "at_limit": Out(1),
             "state": Out(2),
             "alive": Out(1),
             "live": Out(1),
@@ -172,11 +177,12 @@ class Supervisor(Block):
         m.d.sync += waiting.eq(Mux(go, raised ^ complement, complement))
 
         # The complement of the drive's magnitude.
-        less = Signal(len(self.drive))
-        m.d.comb += less.eq(~negated(self.drive, self.drive[-1]))
+        less, within = Signal(len(self.drive)), Signal()
+        m.d.comb += [less.eq(~negated(self.drive, self.drive[-1])), within.eq(below(less, limit))]
         m.d.sync += [
-            self.magnitude.eq(Mux(go, Mux(not_above(less, limit), ~less, limit), 0)),
+            self.magnitude.eq(Mux(go, Mux(within, ~less, limit), 0)),
             self.negative.eq(go & self.drive[-1]),
+            self.at_limit.eq(go & ~within & limit.any()),
         ]
         m.d.comb += self.driven.eq(negated(self.magnitude, self.negative))
 

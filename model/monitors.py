@@ -12,7 +12,9 @@ words whose values after reset follow from the axis:
     runaway               the handle has moved against a drive at its limit by more than supervisor_runaway since the
                           drive came to the limit, after reset by a tenth of the travel: a wall that works turns the
                           handle back, and with a reversed polarity it drives the handle in. A hand that pushes
-                          through the wall does the same.
+                          through the wall does the same. The limit is what the supervisor lets out, while it rises
+                          after arming too; a host that raises it does not begin the way anew, unless the drive is then
+                          really below it.
     estimator_saturated   more than supervisor_saturated samples in a row, after reset those of 10 ms
     encoder_loss          a channel equals its complement for more than supervisor_loss clocks, after reset one more
                           than the glitch filter passes over
@@ -68,9 +70,8 @@ class Inputs(NamedTuple):
     valid: int = 0
     velocity: int = 0
     saturated: int = 0
-    magnitude: int = 0
+    at_limit: int = 0
     negative: int = 0
-    force_limit: int = 0
     a: int = 0
     a_n: int = 1
     b: int = 0
@@ -128,8 +129,7 @@ class Design:
     """
 
     def __init__(self, axis: AxisRequirements, velocity: SQ):
-        self.count_width, self.velocity, self.force = axis.count_width, velocity, axis.force
-        self.limit = UQ(axis.force.width - 2, 0)
+        self.count_width, self.velocity = axis.count_width, velocity
         # The word has as many bits as a host's register holds without its sign.
         self.params = Params(axis.count_width, max(velocity.width - 1 - REGISTER_BITS, 0))
         count, distance = SQ(axis.count_width, 0), UQ(axis.count_width - 1, 0)
@@ -187,9 +187,8 @@ def _samples(state, inputs):
 def _ways(params, state, inputs):
     """Return the way against the drive, and the distance and side from the last index edge, after a clock edge."""
     up = inputs.count >> 1 & 1 ^ state.before >> 1 ^ state.before & 1 ^ 1
-    pressed = 0 < inputs.force_limit <= inputs.magnitude
     way, distance, upwards = state.way, state.distance, state.upwards
-    if not (pressed and state.pressed and inputs.negative == state.negative):
+    if not (inputs.at_limit and state.pressed and inputs.negative == state.negative):
         way = 0
     elif inputs.stepped:
         way = wrap(way - 1 if up == inputs.negative else way + 1, params.count_width)
@@ -200,7 +199,7 @@ def _ways(params, state, inputs):
             distance, upwards = wrap(distance - 1, params.count_width), up
         else:
             distance = wrap(distance + 1, params.count_width)
-    return int(pressed), way, distance, upwards
+    return way, distance, upwards
 
 
 @compiled
@@ -217,7 +216,7 @@ def step(params, state, inputs):
         wrong, limit = count < state.limit, inputs.supervisor_position_high
     else:
         wrong, limit = count > state.limit, inputs.supervisor_position_low
-    pressed, way, distance, upwards = _ways(params, state, inputs)
+    way, distance, upwards = _ways(params, state, inputs)
 
     wrong_a, wrong_b, longest = inputs.a == inputs.a_n, inputs.b == inputs.b_n, inputs.supervisor_loss
     is_lost = (wrong_a and state.lost_a >= longest) or (wrong_b and state.lost_b >= longest)
@@ -246,7 +245,7 @@ def step(params, state, inputs):
         at_low=state.at_low ^ 1,
         limit=limit,
         wrong=int(wrong),
-        pressed=pressed,
+        pressed=inputs.at_limit,
         negative=inputs.negative,
         way=way,
         samples=_samples(state, inputs),

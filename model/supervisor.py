@@ -8,6 +8,7 @@ are latched. One `step` is one clock:
     state      <- TRIPPED if standing; else as `State` says
     ceiling    <- 0 unless ARMED; else the lower of ceiling and force limit, and at every strobe + ramp
     drive      <- 0 unless ARMED; else drive within +-min(ceiling, force limit)
+    at_limit   <- 1 where the drive is as large as that, and not 0
 
 so a lower limit acts at the next clock, and under a higher one the drive may grow no faster than after arming. A new
 wall leaves the ceiling alone: a host may move it as often as it likes. The drive is zero after the first clock edge at
@@ -121,6 +122,7 @@ class State(NamedTuple):
     driven: int  # the drive that is let out, force LSB
     magnitude: int  # its magnitude
     negative: int  # whether it, or the drive before its limit was 0, is negative
+    at_limit: int  # whether it is as large as it may be, and not 0
     state: int
     alive: int
     live: int  # the host's heartbeat is not overdue
@@ -241,12 +243,14 @@ def step(params, state, inputs):
     if standing and state.state != TRIPPED:
         first, first_stamp = standing, inputs.stamp
     driven = saturate(inputs.drive, -limit, limit) if go else 0
+    at_limit = int(go and limit > 0 and abs(inputs.drive) >= limit)
     alive = state.alive ^ int(turns) if go else 0
     pump = 0 if turns else state.pump + 1
     return State(
         driven=driven,
         magnitude=abs(driven),
         negative=int(go) & int(inputs.drive < 0),
+        at_limit=at_limit,
         state=now,
         alive=alive,
         live=int(left > 0),

@@ -16,6 +16,7 @@ QUICK = (
     "the loop of external_fault opens",
     "the loop of drive_enable opens",
     "the host acknowledges other causes",
+    "the clock stops while the drive's pin is high",
 )
 MASKED = Bug(
     Supervisor.elaborate,

@@ -101,6 +101,18 @@ def test_only_pulses_longer_than_the_limit_pass(channel, glitch_clocks):
     assert seen["count"][-1] == seen["fault"][-1] == 0
 
 
+@pytest.mark.parametrize("glitch_clocks", range(4))
+def test_a_count_that_turns_back_has_lasted_a_clock_more_than_the_limit(glitch_clocks):
+    random, clocks = rng(), 20_000
+    a, b = (np.repeat(random.integers(0, 2, clocks), random.integers(1, 6, clocks))[:clocks] for _ in range(2))
+    counts = run(Params(16, 8, 8), Inputs(a, b, 0, glitch_clocks)).count
+    steps = np.diff(counts)
+    edges = np.flatnonzero(steps)
+    back = steps[edges[1:]] == -steps[edges[:-1]]
+    # The monitor of the position's range relies on two clocks with a limit of one.
+    assert np.diff(edges)[back].min() == glitch_clocks + 1
+
+
 @pytest.mark.parametrize("way", [1, -1])
 def test_count_and_stamps_wrap(way):
     inputs = turning(way)

@@ -67,6 +67,10 @@ def campaign(name: str, clocks: int) -> dict[str, np.ndarray]:
         elif act < 0.05 and beating:
             inputs = inputs._replace(heartbeat=random.randrange(1 << 16))
         drive = random.randint(d.force.min, d.force.max) >> random.randrange(d.force.width)
+        if random.random() < 0.3:
+            # At the limit, and one beside it.
+            limit = min(state.ceiling >> d.params.ramp_fraction, inputs.supervisor_force_limit)
+            drive = random.choice((-1, 1)) * (limit + random.randint(-1, 1))
         now = inputs._replace(
             strobe=int(random.random() < 0.3), drive=drive, stamp=clock % (1 << d.stamp_width), **pulses
         )
@@ -240,6 +244,34 @@ def test_a_lower_limit_holds_at_the_next_clock_and_a_higher_one_is_reached_like_
     assert drives[0] == 7
     assert np.diff(drives).max() <= 8 == -(-40_000 // int(supervisor.RAMP_S * 10_000))
     assert drives[-1] == 40_000
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_drive_that_is_all_that_may_be_is_at_its_limit(way):
+    bench = Bench("paper", supervisor_ramp=design("paper").ramp.max)
+    bench.arm()
+    bench.clock(strobe=1)
+    for limit in (1, 2, 500):
+        for drive in (limit - 1, limit, limit + 1, bench.design.force.max):
+            bench.clock(supervisor_force_limit=limit, drive=way * drive)
+            assert (bench.state.at_limit, bench.state.magnitude) == (int(drive >= limit), min(drive, limit))
+            bench.clock(strobe=1)
+    assert not bench.clock(supervisor_force_limit=0).at_limit
+    bench.clock(strobe=1)
+    assert bench.clock().at_limit
+    assert not bench.clock(enable=0).at_limit
+
+
+@pytest.mark.parametrize("ramp", [1, 100_000, design("paper").ramp.max])
+def test_a_drive_stays_at_its_limit_while_that_rises_after_arming_and_while_a_host_moves_it_again_and_again(ramp):
+    bench, drives = Bench("paper", supervisor_ramp=ramp), []
+    bench.arm()
+    while len(drives) < 5000:
+        limit = 1 + 7 * len(drives) - 5 * (len(drives) % 3)
+        drives.append(bench.clock(strobe=1, supervisor_force_limit=limit).magnitude)
+        # Before the ceiling has risen by the force LSB there is no drive.
+        assert bench.state.at_limit == (drives[-1] > 0)
+    assert drives[0] == 0 < drives[-1]
 
 
 def test_every_cause_is_counted_once_however_long_it_stands_and_the_counts_saturate():

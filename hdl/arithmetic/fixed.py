@@ -71,3 +71,9 @@ def not_above(complement: Value, limit: Value) -> Value:
     width = max(len(complement), len(limit))
     number = Cat(complement, Const(1, 1).replicate(width - len(complement)))
     return (Cat(Const(1, 1), number) + Cat(Const(1, 1), limit))[width + 1]
+
+
+def below(complement: Value, limit: Value) -> Value:
+    """Return whether a number is less than the limit, as `not_above` does; the difference of equals is one too few."""
+    width = max(len(complement), len(limit))
+    return (Cat(complement, Const(1, 1).replicate(width - len(complement))) + limit)[width]

@@ -117,5 +117,6 @@ def test_a_number_is_negated_or_not():
 def test_a_number_is_compared_by_its_complement(width, limit_width):
     for number in range(1 << width):
         for limit in range(1 << limit_width):
-            found = hdl.not_above(Const(~number, width), Const(limit, limit_width))
-            assert evaluate(found) == (number <= limit)
+            compared = Const(~number, width), Const(limit, limit_width)
+            assert evaluate(hdl.not_above(*compared)) == (number <= limit)
+            assert evaluate(hdl.below(*compared)) == (number < limit)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from hardwall.model.supervisor import ARMED, DISARMED, ENABLED, TRIPPED
 
-from .scene import CLOCK_HZ, PUSH_N, board
+from .scene import CLOCK_HZ, OSCILLATOR_NS, PUSH_N, board
 
 STATES = {DISARMED: "DISARMED", ARMED: "ARMED", TRIPPED: "TRIPPED"}
 PULSES = board().safe_latency - 1
@@ -74,6 +74,7 @@ class Fault:
         causes: causes that are enabled besides those that are after reset; `masked`: causes that are not.
         live, committed: words that the host has written before it arms.
         offset: the count at the mark.
+        oscillator_ns: the period of the oscillator, in the time of the simulation.
         rearms: whether the axis can then be armed again.
     """
 
@@ -87,6 +88,7 @@ class Fault:
     live: dict[str, int] = field(default_factory=dict)
     committed: dict[str, int] = field(default_factory=dict)
     offset: int = 0
+    oscillator_ns: int = OSCILLATOR_NS
     rearms: bool = True
 
     @property

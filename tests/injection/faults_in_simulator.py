@@ -20,7 +20,7 @@ async def every_fault(dut):
     with Path(order["report"]).open("w", encoding="utf-8") as report:
         for name in order["names"]:
             rig = Rig(dut)
-            clocks = await rig.start(clocks)
+            clocks = await rig.start(clocks, chosen[name].oscillator_ns)
             outcome = await judged(rig, chosen[name])
             await rig.start_clocks()
             rig.close()

@@ -23,14 +23,13 @@ async def judged(rig: Rig, fault: Fault) -> Outcome:
         return Outcome(fault.name, fault.expected.text, "", None, 0.0, 0.0, 0.0, (str(error),))
     # The fault comes at any clock of a sample, the same one for the same seed.
     await rig.run(np.random.default_rng([SEED, *fault.name.encode()]).uniform(0, STEP_CLOCKS / CLOCKS_PER_MS))
-    before = rig.driven_n
     rig.begin()
     try:
         await fault.inject(rig)
     except NotSteadyError as error:
         rig.claim(False, str(error))
     await rig.run(fault.observed_ms)
-    drives = _drives(rig, before)
+    drives = _drives(rig)
     outcome = _outcome(rig, fault, drives)
     wrong = _shortcomings(rig, fault.expected, outcome, drives)
     if not fault.expected.stopped:
@@ -67,10 +66,10 @@ async def _way_back(rig: Rig, fault: Fault) -> None:
         rig.claim(rig.sees(ARMED), "the axis cannot be armed again")
 
 
-def _drives(rig: Rig, before: float) -> list[tuple[int, float]]:
+def _drives(rig: Rig) -> list[tuple[int, float]]:
     """Return the clocks after the fault from which the drive was what, in N."""
     after = [(clock, word * SPEC.force_resolution_n) for clock, word in rig.turns if clock > rig.began]
-    return [(rig.began, before), *after]
+    return [(rig.began, rig.before_n), *after]
 
 
 def _outcome(rig: Rig, fault: Fault, drives: list[tuple[int, float]]) -> Outcome:

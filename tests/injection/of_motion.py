@@ -3,14 +3,16 @@
 from collections.abc import Callable
 
 from hardwall.model.monitors import latency
+from hardwall.model.quadrature import latency as decoded
+from hardwall.model.supervisor import RAMP_S
 from hardwall.sim.world.encoder import level
 from oracles.supervised import BITS
 
 from .fault import Expected, Fault, trips
-from .handle import Wires
-from .of_encoder import HARDER_N, first_edge
+from .handle import Wires, wires
+from .of_encoder import HARDER_N, first_edge, wired
 from .rig import Rig
-from .scene import CLOCKS_PER_MS, COUNTED, PUSH_N, REST, SPEC, START, words
+from .scene import CLOCKS_PER_MS, COUNTED, PUSH_N, REST, SPEC, START, WORDS, words
 
 RESTING = REST - START
 """The count of the steady contact."""
@@ -27,6 +29,8 @@ EASED_N = 5.0
 FASTEST_PACE = 96
 """Counts in a step: 9.6 m/s, beyond the estimator's format."""
 FASTEST_COUNTS = 200_000
+RAISES, RAISED = 100, 20
+"""How often the host raises the force limit, and by what, force LSB."""
 
 
 def seen(cause: str) -> int:
@@ -65,6 +69,34 @@ def reversed_motor(milliseconds: float):
         await rig.run(milliseconds)
 
     return inject
+
+
+async def reversed_while_raised(rig: Rig) -> None:
+    """Swap the wires of the motor, while the host raises the limit as fast as it can."""
+    rig.swapped = True
+    limit = rig.host.words["supervisor_force_limit"]
+    for _ in range(RAISES):
+        limit += RAISED
+        await rig.host.write(supervisor_force_limit=limit)
+
+
+async def reversed_before_arming(rig: Rig) -> None:
+    """Arm with the wires of the motor swapped and the ramp of after reset, and let go of the handle."""
+    rig.handle.held, rig.swapped = rig.handle.number, True
+    await rig.host.write(disarm=1)
+    await rig.host.write(supervisor_ramp=WORDS["supervisor_ramp"].reset)
+    rig.claim(await rig.host.arm(), "an arm is refused")
+    rig.begin()
+    rig.handle.held = None
+    await rig.run(60)
+
+
+async def jitters_beyond(rig: Rig) -> None:
+    """Let the count be one beyond its limit for two clocks, the fewest that a filter of one clock passes."""
+    rig.handle.held = number = rig.handle.number
+    await rig.host.write(supervisor_position_high=rig.see("count"))
+    rig.begin()
+    await wired(lambda levels: wires(number + 1), clocks=2)(rig)
 
 
 def turned(number: int) -> Callable[[Wires], Wires]:
@@ -131,6 +163,13 @@ FAULTS = (
         live={"supervisor_position_high": RESTING + MARGIN},
     ),
     Fault(
+        "a pulse of two clocks on a channel is one count beyond supervisor_position_high, the filter a clock long",
+        jitters_beyond,
+        trips("position_range", within=decoded(1) + latency("position_range") + 1),
+        turned_back,
+        committed={"encoder_glitch_clocks": 1},
+    ),
+    Fault(
         "the hand pushes the handle into the last quarter of the count",
         passes(RESTING + MARGIN),
         trips("position_wrap", within=seen("position_wrap"), largest_n=HARDER_N),
@@ -158,6 +197,20 @@ FAULTS = (
         trips("runaway", within=20 * CLOCKS_PER_MS, largest_n=15.0),
         unswapped,
         live=limits(15.0, 1e-3),
+    ),
+    Fault(
+        "the motor's wires are swapped, with a limit of 15 N and 1 mm, and the host raises the limit again and again",
+        reversed_while_raised,
+        # The host goes on raising it for longer.
+        trips("runaway", within=8 * CLOCKS_PER_MS, largest_n=15.0 + RAISES * RAISED * SPEC.force_resolution_n),
+        unswapped,
+        live=limits(15.0, 1e-3),
+    ),
+    Fault(
+        "the motor's wires are swapped before the axis is armed, and the ramp is that after reset",
+        reversed_before_arming,
+        trips("runaway", within=60 * CLOCKS_PER_MS, largest_n=60e-3 * SPEC.force_max_n / RAMP_S),
+        unswapped,
     ),
     Fault(
         "the encoder counts the other way, and the hand eases",

@@ -20,7 +20,6 @@ from .scene import (
     DAMPING_N_S_PER_M,
     DEPTH,
     FULL_SCALE_N,
-    OSCILLATOR_NS,
     PUSH_N,
     REGISTERS,
     REST,
@@ -54,7 +53,7 @@ class Rig:
         host: the host.
         swapped: whether the wires of the motor are swapped.
         on_count: called with the count of every edge of the encoder, when its wires change.
-        began: the clock after whose edge the fault is there.
+        began: the clock after whose edge the fault is there; before_n: the drive of that clock.
         turns: clocks and words of every change of the drive that is let out.
         wrong: what the fault itself has found to be wrong.
         stuck_n: the largest force without a clock.
@@ -65,7 +64,7 @@ class Rig:
         self.handle = Grasped()
         self.swapped = False
         self.on_count: Callable[[int], None] = lambda number: None
-        self.began = 0
+        self.began, self.before_n = 0, 0.0
         self.turns: list[tuple[int, int]] = []
         self.wrong: list[str] = []
         self.stuck_n = self._stuck_n_s = self._drive_n = 0.0
@@ -93,8 +92,13 @@ class Rig:
     def driven_n(self) -> float:
         return self.see("driven") * SPEC.force_resolution_n
 
-    async def start(self, clocks: tuple[Clock, Clock] | None) -> tuple[Clock, Clock]:
-        """Reset the board, with everything else well; return the clock and the oscillator, for the next rig too."""
+    async def start(self, clocks: tuple[Clock, Clock] | None, oscillator_ns: int) -> tuple[Clock, Clock]:
+        """Reset the board, with everything else well; return the clock and the oscillator, for the next rig too.
+
+        Args:
+            clocks: those of the last rig; None for the first one.
+            oscillator_ns: the period of the oscillator, which begins anew.
+        """
         dut = self.dut
         for name in LOOPS:
             getattr(dut, name).value = 1
@@ -103,18 +107,21 @@ class Rig:
         dut.uart_rx.value = dut.rst.value = 1
         self.wire()
         if clocks is None:
-            clocks = Clock(dut.clk, CLOCK_NS, "ns", impl="gpi"), Clock(dut.oscillator, OSCILLATOR_NS, "ns", impl="gpi")
-            for each in clocks:
-                each.start()
+            self.clock = Clock(dut.clk, CLOCK_NS, "ns", impl="gpi")
+            self.clock.start()
             await Timer(CLOCK_NS // 2, "ns")
+        else:
+            self.clock, before = clocks
+            before.stop()
+        self.oscillator = Clock(dut.oscillator, oscillator_ns, "ns", impl="gpi")
+        self.oscillator.start()
         await Timer(RESET_CLOCKS * CLOCK_NS, "ns")
         dut.rst.value = 0
         await Timer(RESET_CLOCKS * CLOCK_NS, "ns")
-        self.clock, self.oscillator = clocks
         self._pulses = self.see("pulses")
         self.host = SerialHost(dut)
         self._tasks = [cocotb.start_soon(each) for each in (self._turn(), self._watch_drive(), self._watch_alive())]
-        return clocks
+        return self.clock, self.oscillator
 
     def close(self) -> None:
         """End the loop."""
@@ -207,7 +214,7 @@ class Rig:
 
     def begin(self) -> None:
         """Take it that the fault is there from now on."""
-        self.began, self._pulses_before = self.now, self.see("pulses")
+        self.began, self.before_n, self._pulses_before = self.now, self.driven_n, self.see("pulses")
 
     @property
     def impulse_n_s(self) -> float:
@@ -228,8 +235,10 @@ class Rig:
         """Let the loop run."""
         await Timer(round(milliseconds * CLOCKS_PER_MS) * CLOCK_NS, "ns")
 
-    async def until(self, reached: Callable[[], bool], milliseconds: float, what: str) -> None:
-        """Let the loop run until something is so.
+    async def until(
+        self, reached: Callable[[], bool], milliseconds: float, what: str, clocks: int = STEP_CLOCKS
+    ) -> None:
+        """Let the loop run until something is so, which is looked at after every so many clocks.
 
         Raises:
             NotSteadyError: if it does not come in time.
@@ -238,7 +247,7 @@ class Rig:
         while not reached():
             if self.now > last:
                 raise NotSteadyError(f"after {milliseconds} ms it is not so that {what}")
-            await Timer(STEP_CLOCKS * CLOCK_NS, "ns")
+            await Timer(clocks * CLOCK_NS, "ns")
 
     async def contact(self, live: dict[str, int], committed: dict[str, int], offset: int = 0) -> None:
         """Arm the axis and let go of the handle, in the wall and at rest; with `offset` the count at the mark.

@@ -203,6 +203,12 @@ def test_rtl(name):
     simulate(__file__, make, name=name)
 
 
+@pytest.mark.parametrize("name", ["mhz", "wide"])
+def test_a_snapshot_is_as_long_as_the_page_promises(name):
+    component = make(name)
+    assert max(component.taken_clocks.values()) < component.snapshot_clocks <= 1000
+
+
 def test_the_book_holds_what_the_map_describes():
     design = model.Design(supervised("mhz"))
     file, registers = model.RegisterFile(design), design.registers

@@ -45,7 +45,7 @@ class Follower:
         own = {name: shown[name] for name in monitors.Inputs._fields if name in shown}
         own |= {word.name: given[word.name] for word in self._design.monitors.words}
         seen = monitors.Inputs(**own | {
-            "valid": shown["estimated"], "force_limit": given["supervisor_force_limit"],
+            "valid": shown["estimated"], "at_limit": self.supervisor.at_limit,
             "a": level["encoder_a"], "a_n": level["encoder_a_n"], "b": level["encoder_b"], "b_n": level["encoder_b_n"],
         })  # fmt: skip
         stands = {"encoder_illegal": shown["illegal"], "encoder_overspeed": shown["overspeed"]}

@@ -12,7 +12,7 @@ from .bugs import Bug
 from .property import Property
 
 WHERE = "supervisor mhz"
-OUT = "Mux(go, Mux(not_above(less, limit), ~less, limit), 0)"
+OUT = "Mux(go, Mux(within, ~less, limit), 0)"
 
 
 def supervisor(bench: Bench) -> Supervisor:
@@ -90,7 +90,7 @@ PROPERTIES = [
         WHERE,
         zero_but_armed,
         depth=2,
-        bugs=(Bug(Supervisor._limit, OUT, "Mux(not_above(less, limit), ~less, limit)"),),
+        bugs=(Bug(Supervisor._limit, OUT, "Mux(within, ~less, limit)"),),
         within=12,
     ),
     Property(
