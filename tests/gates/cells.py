@@ -187,6 +187,27 @@ module SPX9(
   always @* if (RESET || BLKSEL != 0) $fatal(1, "a memory is reset or not selected");
 {_memory("INIT_RAM_", 18)}{_port("A", "B", "BIT_WIDTH", "MODE_A")}
 endmodule
+
+module SDPX9B(
+    input CLKA, CEA, CLKB, CEB, OCE, RESETA, RESETB, input [13:0] ADA, ADB, input [35:0] DI,
+    input [2:0] BLKSELA, BLKSELB, output [35:0] DO
+);
+  parameter READ_MODE = 1'b0, BLK_SEL_0 = 3'b000, BLK_SEL_1 = 3'b000, RESET_MODE = "SYNC";
+  parameter BIT_WIDTH_0 = 36, BIT_WIDTH_1 = 36;
+  initial if (BIT_WIDTH_0 != 36 || BIT_WIDTH_1 != 36) $fatal(1, "a memory's widths");
+  initial if (READ_MODE) $fatal(1, "a memory has an output register");
+  always @* if (RESETA || RESETB || BLKSELA != 0 || BLKSELB != 0) $fatal(1, "a memory is reset or not selected");
+{_memory("INIT_RAM_", 18)}
+  wire [10:0] written = {{ADA[13:5], 2'b0}}, stored = {{ADB[13:5], 2'b0}};
+  reg [35:0] read;
+  assign DO = read;
+  integer part;
+  always @(posedge CLKA) if (CEA)
+    for (part = 0; part < 4; part = part + 1) if (ADA[part]) bytes[written + part] <= DI[9*part +: 9];
+  always @(posedge CLKB) if (CEB)
+    if (CEA && ADA[3:0] != 0 && written == stored) read <= 36'({{$urandom, $urandom}});
+    else read <= {{bytes[stored + 3], bytes[stored + 2], bytes[stored + 1], bytes[stored]}};
+endmodule
 """
 
 
