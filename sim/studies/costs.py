@@ -15,8 +15,13 @@ RATES = {
         "controller.sample_hz": 500_000,
         "controller.actuation_hz": 500_000,
     },
+    "gw1nr-9": {
+        "controller.clock_hz": 27_000_000,
+        "controller.sample_hz": 500_000,
+        "controller.actuation_hz": 500_000,
+    },
 }
-"""Changes of the scene `mhz` by part: it is too fast for the slower part."""
+"""Changes of the scene `mhz` by part: it is too fast for a slower part, and for the oscillator of its board."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +48,7 @@ class Costs:
 
 
 ALONE = ("LUT4", "FF", "DSP", "BRAM", "clocks")
-BOARD = ("LUT4", "FF", "DSP", "fmax (MHz)", "samples/s")
+BOARD = ("LUT4", "FF", "DSP", "BRAM", "fmax (MHz)", "samples/s")
 
 
 def _alone(row: dict[str, Any]) -> list[str]:
@@ -54,8 +59,8 @@ def _board(row: dict[str, Any]) -> list[str]:
     board = row["board"]
     if board is None:
         lacking = (f"{used} of {most} {name.upper()}" for name, (used, most) in row["lacking"].items())
-        return [row["estimator"], "", "", "", "does not fit", ", ".join(lacking)]
-    cells = [str(board[name]) for name in ("lut4", "ff", "dsp")]
+        return [row["estimator"], *[""] * 4, "does not fit", ", ".join(lacking)]
+    cells = [str(board[name]) for name in ("lut4", "ff", "dsp", "bram")]
     return [row["estimator"], *cells, f"{board['fmax_mhz']:.1f}", f"{board['max_sample_hz']:,}"]
 
 
@@ -65,7 +70,7 @@ def jobs(estimators: list[str], device: str, seeds: int) -> list[dict[str, Any]]
 
 
 def cost(estimator: str, device: str, seeds: Iterable[int]) -> dict:
-    """Return the cost of an estimator on a part, at the rates of the scene `mhz` or of the slower part.
+    """Return the cost of an estimator on a part, at the rates of the scene `mhz` or of a slower part.
 
     Returns:
         estimator, device, clock_mhz, sample_hz: what was synthesised.

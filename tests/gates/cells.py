@@ -105,6 +105,20 @@ def _port(port: str, other: str, width: str, mode: str) -> str:
 """
 
 
+def _wide(data: str, read: str) -> str:
+    """Return the ports of a memory of 36 bits: A writes, with an enable for each byte in its address, and B reads."""
+    return f"""
+  wire [3:0] write = {{4{{en_A & we_A}}}} & address_A[3:0];
+  wire [10:0] place = {{address_A[13:5], 2'b0}}, stored = {{address_B[13:5], 2'b0}};
+  integer part;
+  always @(posedge clk_A)
+    for (part = 0; part < 4; part = part + 1) if (write[part]) bytes[place + 11'(part)] <= {data}[9*part +: 9];
+  always @(posedge clk_B) if (en_B)
+    if (write != 0 && place == stored) {read} <= 36'({{$urandom, $urandom}});
+    else {read} <= {{bytes[stored + 3], bytes[stored + 2], bytes[stored + 1], bytes[stored]}};
+"""
+
+
 def _ecp5_memory() -> str:
     def port(p: str) -> str:
         data, address = _bits(f"DI{p}", 18), _bits(f"AD{p}", 14)
@@ -133,9 +147,15 @@ module DP16KD(
 );
   parameter DATA_WIDTH_A = 18, DATA_WIDTH_B = 18, WRITEMODE_A = "NORMAL", WRITEMODE_B = "NORMAL";
   parameter RESETMODE = "SYNC", ASYNC_RESET_RELEASE = "SYNC", GSR = "ENABLED";
-  initial if (DATA_WIDTH_A != DATA_WIDTH_B || (DATA_WIDTH_A != 18 && DATA_WIDTH_A != 9)) $fatal(1, "a memory's widths");
+  initial if (DATA_WIDTH_A != DATA_WIDTH_B || (DATA_WIDTH_A != 36 && DATA_WIDTH_A != 18 && DATA_WIDTH_A != 9))
+    $fatal(1, "a memory's widths");
 {wires("A")}{wires("B")}{_memory("INITVAL_", 20)}
+  wire [35:0] data = {{data_B, data_A}};
+  generate if (DATA_WIDTH_A == 36) begin : wide
+{_wide("data", "{read_B, read_A}")}
+  end else begin : ports
 {_port("A", "B", "DATA_WIDTH_A", "MODE_A")}{_port("B", "A", "DATA_WIDTH_A", "MODE_B")}
+  end endgenerate
 endmodule
 """
 
@@ -186,6 +206,23 @@ module SPX9(
   {_gowin_modes("", "A")}
   always @* if (RESET || BLKSEL != 0) $fatal(1, "a memory is reset or not selected");
 {_memory("INIT_RAM_", 18)}{_port("A", "B", "BIT_WIDTH", "MODE_A")}
+endmodule
+
+module SDPX9B(
+    input CLKA, CEA, CLKB, CEB, OCE, RESETA, RESETB, input [13:0] ADA, ADB, input [35:0] DI,
+    input [2:0] BLKSELA, BLKSELB, output [35:0] DO
+);
+  parameter READ_MODE = 1'b0, BLK_SEL_0 = 3'b000, BLK_SEL_1 = 3'b000, RESET_MODE = "SYNC";
+  parameter BIT_WIDTH_0 = 36, BIT_WIDTH_1 = 36;
+  initial if (BIT_WIDTH_0 != 36 || BIT_WIDTH_1 != 36) $fatal(1, "a memory's widths");
+  initial if (READ_MODE) $fatal(1, "a memory has an output register");
+  always @* if (RESETA || RESETB || BLKSELA != 0 || BLKSELB != 0) $fatal(1, "a memory is reset or not selected");
+{_memory("INIT_RAM_", 18)}
+  wire clk_A = CLKA, en_A = CEA, we_A = 1, clk_B = CLKB, en_B = CEB;
+  wire [13:0] address_A = ADA, address_B = ADB;
+  reg [35:0] read;
+  assign DO = read;
+{_wide("DI", "read")}
 endmodule
 """
 

@@ -55,17 +55,5 @@ class Family:
 FAMILIES = (
     Family.of_part("ECP5", PARTS["ecp5-25k"], ("ecp5/common_sim.vh", "ecp5/ccu2c_sim.vh"), cells.ECP5),
     Family.of_part("iCE40", PARTS["ice40-up5k"], ("ice40/cells_sim.v",)),
-    # No board of this family is known yet. Its multipliers are DSP cells, of which Yosys has no models either.
-    Family(
-        "Gowin",
-        "synth_gowin",
-        ("gowin/cells_sim.v",),
-        cells.GOWIN,
-        "DFF",
-        {
-            "lut4": {"LUT1": 1, "LUT2": 1, "LUT3": 1, "LUT4": 1, "ALU": 1},
-            "dsp": {"MULT9X9": 1, "MULT18X18": 1},
-            "bram": {"SPX9": 1, "DPX9B": 1},
-        },
-    ),
+    Family.of_part("Gowin", PARTS["gw1nr-9"], ("gowin/cells_sim.v",), cells.GOWIN),
 )

@@ -21,6 +21,9 @@ OPTIONS = (
     # Yosys leaves out pins that a mode has no use for. Its models name no generate blocks, few have a time scale, and
     # they have delays and parameters that mean nothing here.
     *(f"-Wno-{name}" for name in ("PINMISSING", "GENUNNAMED", "TIMESCALEMOD", "SPECIFYIGN", "UNUSEDPARAM")),
+    # Parameters of a bit have a whole number as their default there, and bits of one vector may follow from each
+    # other.
+    *("-Wno-WIDTHTRUNC", "-Wno-UNOPTFLAT"),
     # What no initial value and no reset has set is random, and so is what Yosys leaves open.
     *("--x-initial", "unique", "--x-assign", "unique"),
 )

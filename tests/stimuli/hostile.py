@@ -67,7 +67,7 @@ GOOD: dict[str, tuple[str, ...]] = {
     "seeds": ("1", "2"),
     "sines": ("1", "7"),
     "figure": ("1", "2"),
-    "device": ("ecp5-25k", "ice40-up5k"),
+    "device": ("ecp5-25k", "ice40-up5k", "gw1nr-9"),
     "stiffness": ("0", "1e3", "10e3"),
     "damping": ("0", "20"),
     "before": ("0.01", "0"),
