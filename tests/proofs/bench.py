@@ -4,7 +4,7 @@ Everything is free that a proof does not bind: every input at every clock, and t
 proven holds for every sequence of inputs and resets.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 
 from amaranth.asserts import AnyConst, AnySeq
@@ -27,6 +27,7 @@ class Bench(Elaboratable):
         self.m = Module()
         self.reset = Signal()
         self.inner: dict[str, Signal] = {}
+        self._numbers: dict[str, int] = {}
         self.m.d.comb += self.reset.eq(ResetSignal())
         describe(self)
 
@@ -71,19 +72,20 @@ class Bench(Elaboratable):
         """Promise a condition at every clock."""
         self.m.d.comb += Assert(condition, src_loc_at=1)
 
-    def states(self) -> dict[str, int]:
-        """Return the numbers of the states of the block's machine, by name; promise that it is in one of them."""
-        machine, numbers = self.inner["fsm_state"], {}
-        for number in range(1 << len(machine)):
-            with suppress(KeyError):
-                numbers[machine.decoder(number).partition("/")[0]] = number
-        self.promise(machine < len(numbers))
-        return numbers
-
     def state(self, *names: str) -> Value:
-        """Return whether the block's machine is in one of the states of these names."""
-        machine, numbers = self.inner["fsm_state"], self.states()
-        return Cat(machine == numbers[name] for name in names).any()
+        """Return whether the block's machine is in one of the states of these names; promise that it is in any."""
+        machine = self.inner["fsm_state"]
+        if not self._numbers:
+            for number in range(1 << len(machine)):
+                with suppress(KeyError):
+                    self._numbers[machine.decoder(number).partition("/")[0]] = number
+            self.promise(machine < len(self._numbers))
+        return Cat(machine == self._numbers[name] for name in names).any()
+
+    def kept(self, values: Iterable[Value], keeps: Value) -> Value:
+        """Return whether values are those of the last clock, if that was one of those that keep them."""
+        same = Cat(value == self.past(value) for value in values).all()
+        return ~self.past(keeps & ~self.reset) | same
 
     def within(self, **bounds: int | tuple[int, int]) -> None:
         """Promise the ranges of inner signals by name: from the negative of a bound to it, or a lower and an upper."""
