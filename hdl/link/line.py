@@ -57,8 +57,8 @@ class Line(wiring.Component):
     is a frame of 256 bytes without an end, with a bad CRC or with a spoilt byte. The model says why no single flipped
     bit passes.
 
-    After a spoilt frame, bytes are dropped until a gap. Bytes that arrive while a frame is `ended` or its answer under
-    way are dropped, after which the verdict `OVERRUN` is given, and bytes are dropped until a gap.
+    After a spoilt frame, bytes are dropped until a gap. Bytes that arrive while a frame is judged, is `ended`, or its
+    answer is under way are dropped, after which the verdict `OVERRUN` is given, and bytes are dropped until a gap.
 
     The answer to a request passes to `sent`, and its CRC follows `finished`.
 
@@ -131,8 +131,9 @@ class Line(wiring.Component):
             self.sent.payload.eq(frames.answer.payload),
         ]
 
-        listening = Signal()
-        m.d.sync += overrun.eq(overrun | (self.arrived & ~listening & ~draining))
+        listening, lost = Signal(), Signal()
+        m.d.comb += lost.eq(overrun | (self.arrived & ~listening & ~draining))
+        m.d.sync += overrun.eq(lost)
         with m.FSM():
             with m.State("LISTEN"):
                 m.d.comb += listening.eq(1)
@@ -200,7 +201,7 @@ class Line(wiring.Component):
                     m.next = "OVER"
             with m.State("OVER"):
                 m.next = "LISTEN"
-                with m.If(overrun):
+                with m.If(lost):
                     m.d.sync += [overrun.eq(0), draining.eq(1), frames.verdict.eq(Verdict.OVERRUN)]
                     m.next = "ENDED"
         return m

@@ -197,6 +197,25 @@ async def bytes_during_an_answer_are_an_overrun(dut):
     assert wire.seen == [Verdict.REQUEST, Verdict.OVERRUN, Verdict.REQUEST]
 
 
+@cocotb.test()
+async def a_byte_at_any_clock_while_a_frame_is_dealt_with_is_an_overrun(dut):
+    wire = Wire(dut)
+    await wire.bench.reset()
+    foreign = framed(bytes([2, 3, 0, 0, 0, 2]))
+    # The frame is judged at the first clock behind it and ended at the second; the third is the last that is not for
+    # the next frame.
+    wire.bench.drive(finished=1)
+    for clock in range(3):
+        verdicts = []
+        for byte, arrived in [(byte, 1) for byte in foreign] + [(0, k == clock) for k in range(8)]:
+            wire.bench.drive(byte=byte, arrived=int(arrived))
+            await wire.clocks(1)
+            if wire.ended():
+                verdicts.append(wire.verdict())
+        assert verdicts == [Verdict.FOREIGN, Verdict.OVERRUN]
+        await wire.clocks(GAP)
+
+
 def test_rtl():
     simulate(__file__, make, gap_clocks=GAP)
 

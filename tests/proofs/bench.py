@@ -4,10 +4,11 @@ Everything is free that a proof does not bind: every input at every clock, and t
 proven holds for every sequence of inputs and resets.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from contextlib import suppress
 
 from amaranth.asserts import AnyConst, AnySeq
-from amaranth.hdl import Assert, Assume, Elaboratable, Fragment, Module, ResetSignal, Shape, Signal, Value
+from amaranth.hdl import Assert, Assume, Cat, Elaboratable, Fragment, Module, ResetSignal, Shape, Signal, Value
 from amaranth.lib import wiring
 
 from .widths import FreeProducts, signals_of
@@ -26,6 +27,7 @@ class Bench(Elaboratable):
         self.m = Module()
         self.reset = Signal()
         self.inner: dict[str, Signal] = {}
+        self._numbers: dict[str, int] = {}
         self.m.d.comb += self.reset.eq(ResetSignal())
         describe(self)
 
@@ -70,12 +72,45 @@ class Bench(Elaboratable):
         """Promise a condition at every clock."""
         self.m.d.comb += Assert(condition, src_loc_at=1)
 
+    def state(self, *names: str) -> Value:
+        """Return whether the block's machine is in one of the states of these names; promise that it is in any."""
+        machine = self.inner["fsm_state"]
+        if not self._numbers:
+            for number in range(1 << len(machine)):
+                with suppress(KeyError):
+                    self._numbers[machine.decoder(number).partition("/")[0]] = number
+            self.promise(machine < len(self._numbers))
+        return Cat(machine == self._numbers[name] for name in names).any()
+
+    def kept(self, values: Iterable[Value], keeps: Value) -> Value:
+        """Return whether values are those of the last clock, if that was one of those that keep them."""
+        same = Cat(value == self.past(value) for value in values).all()
+        return ~self.past(keeps & ~self.reset) | same
+
     def within(self, **bounds: int | tuple[int, int]) -> None:
         """Promise the ranges of inner signals by name: from the negative of a bound to it, or a lower and an upper."""
         for name, bound in bounds.items():
             low, high = bound if isinstance(bound, tuple) else (-bound, bound)
             signal = self.inner[name]
             self.m.d.comb += Assert((signal >= low) & (signal <= high), src_loc_at=1)
+
+    def falls(self, left: Value, most: int, free: Value, begins: Value, waits: Value | int = 0) -> None:
+        """Promise that a block is free again after at most so many clocks in which nothing begins and it does not wait.
+
+        Args:
+            left: a number that falls at every such clock until it is 0, and does not rise at a clock at which it waits.
+            most: the most that it can be.
+            free: what holds when it is 0.
+            begins: something begins at this clock, so that the number may rise; a reset is such, too.
+            waits: the block waits for another one at this clock.
+        """
+        now = Signal(Value.cast(left).shape())
+        self.m.d.comb += now.eq(left)
+        before, waited = self.past(now), self.past(waits)
+        fell = (now < before) | (before == 0) & (now == 0) | waited & (now <= before)
+        self.promise(now <= most)
+        self.promise(free | (now != 0))
+        self.promise(fell | self.past(begins | self.reset, init=1))
 
     def elaborate(self, platform) -> Module:
         return self.m

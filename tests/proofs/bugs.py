@@ -15,11 +15,13 @@ class Bug:
         function: the function, mostly the `elaborate` of a block.
         right: a part of its source, which occurs once.
         wrong: what stands in its place.
+        sooner: another part that occurs once, and what stands in its place: no bug, but it shows sooner with it.
     """
 
     function: Callable
     right: str
     wrong: str
+    sooner: tuple[str, str] | None = None
 
     def __str__(self) -> str:
         return f"{self.wrong or 'nothing'} for {self.right}"
@@ -29,15 +31,15 @@ class Bug:
         """Let the function have the bug inside the context; its source is not touched.
 
         Raises:
-            ValueError: if the source does not have the right part exactly once.
+            ValueError: if the source does not have a part exactly once.
         """
         source = textwrap.dedent(inspect.getsource(self.function))
-        if source.count(self.right) != 1:
-            raise ValueError(
-                f"{self.function.__qualname__} must have {self.right!r} once, not {source.count(self.right)}"
-            )
+        for right, wrong in ((self.right, self.wrong), *([self.sooner] if self.sooner else [])):
+            if source.count(right) != 1:
+                raise ValueError(f"{self.function.__qualname__} must have {right!r} once, not {source.count(right)}")
+            source = source.replace(right, wrong)
         before = self.function.__code__
-        self.function.__code__ = _code(source.replace(self.right, self.wrong), before)
+        self.function.__code__ = _code(source, before)
         try:
             yield
         finally:

@@ -1,6 +1,6 @@
 """What the supervisor promises: the limit, zero in every state but one, and that nothing arms or forgets by itself."""
 
-from amaranth.hdl import Mux
+from amaranth.hdl import Mux, Signal
 
 from hardwall.hdl.supervisor import Supervisor
 from hardwall.model.supervisor import ALWAYS, ARMED, LINK, TRIPPED, Design
@@ -50,6 +50,31 @@ def zero_after_a_cause(bench: Bench) -> None:
 def zero_when_the_host_is_silent(bench: Bench) -> None:
     block = supervisor(bench)
     bench.promise(bench.past(block.live) | (block.driven == 0) & (block.state != ARMED))
+
+
+def zero_when_the_watchdog_has_run_out(bench: Bench) -> None:
+    block = supervisor(bench)
+    inner, params = bench.inner, block.design.params
+    tick = params.pump_clocks * params.tick_turns
+    # The clock within the supervisor's tick, which runs freely, and the one of the host's last beat with its word.
+    at, after, began = Signal(range(tick)), Signal(range(tick)), Signal(range(tick))
+    before, word = Signal.like(block.heartbeat), Signal.like(block.supervisor_watchdog)
+    # The whole ticks for which the host has been silent, and whether the supervisor's has turned since.
+    silent, turned = Signal(len(word) + 1), Signal()
+    bench.m.d.comb += after.eq(Mux(at == tick - 1, 0, at + 1))
+    bench.m.d.sync += [at.eq(after), before.eq(block.heartbeat)]
+    with bench.m.If(block.heartbeat != before):
+        bench.m.d.sync += [silent.eq(0), turned.eq(0), word.eq(block.supervisor_watchdog), began.eq(after)]
+    with bench.m.Elif(after == began):
+        bench.m.d.sync += [silent.eq(silent + ~silent.all()), turned.eq(0)]
+    with bench.m.Elif(after == 0):
+        bench.m.d.sync += turned.eq(1)
+    bench.within(pump=(0, params.pump_clocks - 1), tick=(0, params.tick_turns - 1), left=(0, word))
+    bench.promise(inner["tick"] * params.pump_clocks + inner["pump"] == at)
+    bench.promise((inner["last_beat"] == before) & (turned == (at < began)))
+    bench.promise((inner["left"] == 0) | (inner["left"] + silent + turned <= word))
+    over = bench.past((silent >= word) | bench.reset)
+    bench.promise(~over | (block.driven == 0) & (block.state != ARMED))
 
 
 def armed_by_the_host_alone(bench: Bench) -> None:
@@ -117,6 +142,17 @@ PROPERTIES = [
         depth=2,
         # A bug in the cause itself shows after the shortest watchdog, 50 ms of clocks: the block's own tests find it.
         bugs=(Bug(Supervisor.elaborate, "self.enable & self.live", "self.enable"),),
+        within=12,
+    ),
+    Property(
+        "the drive is zero one clock after the host has been silent for its watchdog, in ticks of 1 ms or just below",
+        WHERE,
+        zero_when_the_watchdog_has_run_out,
+        depth=2,
+        bugs=(
+            Bug(Supervisor._watch, "left.eq(self.supervisor_watchdog)", "left.eq(self.supervisor_watchdog + 1)"),
+            Bug(Supervisor._watch, "(self.heartbeat != last_beat)", "(self.heartbeat != 0)"),
+        ),
         within=12,
     ),
     Property(

@@ -1,6 +1,18 @@
 """Every property, in the order of the path of data."""
 
-from . import of_arithmetic, of_axis, of_output, of_quadrature, of_supervisor, of_wall, of_widths
+from . import (
+    of_arithmetic,
+    of_axis,
+    of_line,
+    of_output,
+    of_quadrature,
+    of_register_file,
+    of_server,
+    of_supervised,
+    of_supervisor,
+    of_wall,
+    of_widths,
+)
 
 PROPERTIES = [
     *of_quadrature.PROPERTIES,
@@ -9,5 +21,9 @@ PROPERTIES = [
     *of_output.PROPERTIES,
     *of_supervisor.PROPERTIES,
     *of_axis.PROPERTIES,
+    *of_supervised.PROPERTIES,
+    *of_line.PROPERTIES,
+    *of_server.PROPERTIES,
+    *of_register_file.PROPERTIES,
     *of_widths.PROPERTIES,
 ]

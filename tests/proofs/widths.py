@@ -14,6 +14,7 @@ smallest to the largest of the four products of the operands' extremes. So what 
 
 import linecache
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from itertools import product
 
@@ -38,30 +39,39 @@ def text_of(statement: Assign) -> str:
     return linecache.getline(file, line).strip()
 
 
+def driven_on_line(statement: Assign) -> list[str]:
+    """Return the names of what the line of a statement drives, from left to right."""
+    return [name.rpartition(".")[2] for name in re.findall(r"([\w.]+)\.eq\(", text_of(statement))]
+
+
 def names_of(statement: Assign, signal: Signal) -> set[str]:
     """Return the name of a signal that a statement drives; of one without a name, all names that its line drives."""
-    if not signal.name.startswith("$"):
-        return {signal.name}
-    return {name.rpartition(".")[2] for name in re.findall(r"([\w.]+)\.eq\(", text_of(statement))}
+    return set(driven_on_line(statement)) if signal.name.startswith("$") else {signal.name}
 
 
 class Collector(FragmentTransformer, StatementTransformer):
     """Collects the signals that statements drive, by name: the first of each name.
 
+    A signal without a name of its own has that of its place on the line: the statements of a line come in its order.
+
     Attributes:
         named: the signals with a name of their own.
-        unnamed: the others, by every name that could be theirs.
+        unnamed: the others.
     """
 
     def __init__(self):
         self.named: dict[str, Signal] = {}
         self.unnamed: dict[str, Signal] = {}
+        self._seen: Counter = Counter()
 
     def on_Assign(self, stmt: Assign) -> Assign:
+        on_line, place = driven_on_line(stmt), self._seen[stmt.src_loc]
+        self._seen[stmt.src_loc] += 1
         for signal in stmt.lhs._lhs_signals():
-            found = self.unnamed if signal.name.startswith("$") else self.named
-            for name in names_of(stmt, signal):
-                found.setdefault(name, signal)
+            if not signal.name.startswith("$"):
+                self.named.setdefault(signal.name, signal)
+            elif on_line:
+                self.unnamed.setdefault(on_line[place % len(on_line)], signal)
         return stmt
 
 

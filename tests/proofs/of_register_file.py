@@ -1,0 +1,176 @@
+"""What the register file promises: no pulse and no live word without a write to it, and an end to every operation."""
+
+from amaranth.hdl import Mux, Signal
+
+from hardwall.hdl.link.register_file import RegisterFile
+from hardwall.model.link.register_file import CELL_BITS, Area, Design, Operation
+from hardwall.model.registers import END, RegisterMap
+from stimuli.specs import spec
+
+from .bench import Bench
+from .bugs import Bug
+from .property import Property
+
+WHERE = "register file mhz fdm"
+
+
+def register_file(bench: Bench) -> RegisterFile:
+    """Return a register file whose host keeps what it asks for until it is done."""
+    block = bench.block(RegisterFile(Design(RegisterMap(spec("mhz", "fdm")))))
+    host = block.host
+    bench.assume(bench.kept((host.start, host.operation, host.address, host.value), host.start & ~host.done))
+    return block
+
+
+def pulses_are_asked_for(bench: Bench) -> None:
+    block = register_file(bench)
+    host, writes, finishes = block.host, Signal(), Signal()
+    bench.m.d.comb += [
+        writes.eq(host.start & (host.operation == Operation.WRITE)),
+        finishes.eq(host.start & (host.operation == Operation.FINISH)),
+    ]
+    sending = bench.state("PULSE")
+    bench.promise(~sending | finishes)
+    moving = bench.state("SWEEP", "LOOK", "LOAD", "SHIFT", "STORE")
+    bench.promise(~(moving & bench.inner["committing"] | bench.state("COPY", "COPIED")) | finishes)
+    bench.promise(~bench.state("COPY", "COPIED") | bench.inner["committing"])
+    for number, pulse in enumerate(block.design.registers.pulses):
+        asked, sent = Signal(name=f"asked_{pulse.name}"), getattr(block, pulse.name)
+        with bench.m.If(writes & (host.address == pulse.address) & host.value[0]):
+            bench.m.d.sync += asked.eq(1)
+        with bench.m.Elif(sending):
+            bench.m.d.sync += asked.eq(0)
+        bench.promise(~bench.inner["marks"][number] | asked)
+        bench.promise(~sent | asked & finishes)
+        bench.promise(~sent | ~bench.past(sent))
+
+
+def checks_alone_find(bench: Bench) -> None:
+    host = register_file(bench).host
+    checks = (host.operation == Operation.CHECK_READ) | (host.operation == Operation.CHECK_WRITE)
+    found = (host.absent, host.outside, host.refused)
+    bench.promise(bench.kept(found, ~host.clear & ~(host.start & checks)))
+    bench.promise(~bench.state("LEAST", "ABOVE", "BELOW") | host.start & checks)
+
+
+def live_words_are_written(bench: Bench) -> None:
+    block = register_file(bench)
+    host = block.host
+    written = host.start & (host.operation == Operation.WRITE)
+    # Only what was checked is written, which is the server's promise.
+    bench.assume(~written | (host.address < END))
+    for word in block.design.registers.live:
+        port = getattr(block, word.name)
+        told = bench.past(written & (host.address == word.address + 1)) | bench.past(bench.reset)
+        bench.promise(told | (port == bench.past(port, init=word.reset)))
+
+
+def every_operation_ends(bench: Bench) -> None:
+    block = register_file(bench)
+    design, host, inner, m = block.design, block.host, bench.inner, bench.m
+    step, committing, last = inner["step"], inner["committing"], inner["last"]
+
+    # The moves of a snapshot and of a commit, register by register, in cells that nothing writes: the only part of the
+    # book that is written is the first, and what is read of them is what the book has.
+    bench.promise(~inner["write__en"] | (inner["write__addr"] < END))
+    place, read = Signal(range(END)), Signal()
+    m.d.sync += [place.eq(inner["place"]), read.eq((inner["area"] == Area.LEAST) & ~inner["window"])]
+    snapshot = [each.address + half for _, turn in design.turns for each in turn for half in (1, 0)]
+    commit = [each.address + half for each in design.registers.active for half in (1, 0)]
+    to_come, known = Signal(range(END)), Signal()
+    with m.Switch(place):
+        for at in (*snapshot, *commit):
+            with m.Case(at):
+                bench.m.d.comb += known.eq(host.data == design.book[Area.LEAST * END + at])
+    cells = Signal()
+    for one, moves in ((0, snapshot), (1, commit)):
+        for index, at in enumerate(moves):
+            with m.If((committing == one) & (step == at)):
+                m.d.comb += [to_come.eq(len(moves) - index), cells.eq(1)]
+    listed = Signal()
+    with m.Switch(place):
+        for at in (*snapshot, *commit):
+            with m.Case(at):
+                m.d.comb += listed.eq(1)
+    bench.assume(~(read & listed) | known)
+    sweeping = bench.state("SWEEP", "LOOK", "LOAD", "SHIFT", "STORE", "COPY", "COPIED")
+    bench.promise(~sweeping | cells)
+    bench.promise(~bench.state("COPY", "COPIED") | committing)
+    bench.promise(~bench.state("LOAD", "SHIFT", "STORE") | (last == (to_come == 1)))
+    bench.promise(~bench.state("LOOK", "LOAD", "SHIFT", "STORE") | read & (place == step))
+
+    sends = 3
+    per_cell = CELL_BITS + 4 + Mux(committing, 2, 0)
+    others = (to_come - 1)[: len(to_come)] * per_cell + Mux(committing, sends, 1)
+    boot = (END - 1 - step)[: len(step)] * 3
+    left_in = {
+        "BOOT": boot + 3,
+        "BOOT_TAKE": boot + 2,
+        "BOOT_WRITE": boot + 1,
+        "IDLE": 0,
+        "LEAST": 4,
+        "ABOVE": 3,
+        "BELOW": 2,
+        "KEEP": 2,
+        "COUNT": 3,
+        "COUNTED": 2,
+        "PULSE": sends,
+        "WAIT": 2,
+        "DONE": 1,
+        "COPY": others + CELL_BITS + 6,
+        "COPIED": others + CELL_BITS + 5,
+        "SWEEP": others + CELL_BITS + 4,
+        "LOOK": others + CELL_BITS + 3,
+        "LOAD": others + CELL_BITS + 2,
+        "SHIFT": others + CELL_BITS - inner["bit"] + 1,
+        "STORE": others + 1,
+    }
+    left = Signal(16)
+    for name, clocks in left_in.items():
+        with m.If(bench.state(name)):
+            m.d.comb += left.eq(clocks)
+    bench.falls(
+        left,
+        most=max(block.boot_clocks, block.snapshot_clocks, block.shift_clocks + sends),
+        free=bench.state("IDLE"),
+        waits=bench.state("WAIT") & block.commit_pending,
+        begins=bench.state("IDLE") & host.start,
+    )
+
+
+SHORT_BOOT = ("step.all()", "1")
+"""A reset writes only one cell, so that a bug behind it shows in the first clocks."""
+PROPERTIES = [
+    Property(
+        "a pulse goes out for one clock, at the end of a frame that has written 1 to its register",
+        WHERE,
+        pulses_are_asked_for,
+        depth=2,
+        bugs=(
+            Bug(RegisterFile.elaborate, "Signal(len(registers.pulses))", "Signal(len(registers.pulses), init=1)"),
+            Bug(RegisterFile.elaborate, "& host.value[0]", "", SHORT_BOOT),
+        ),
+    ),
+    Property(
+        "what the checks have found changes only with a check or a clear",
+        WHERE,
+        checks_alone_find,
+        depth=2,
+        bugs=(Bug(RegisterFile.elaborate, "step.eq(step + 1)", "[step.eq(step + 1), host.absent.eq(1)]"),),
+        within=12,
+    ),
+    Property(
+        "a live word changes only when its lower half is written",
+        WHERE,
+        live_words_are_written,
+        depth=2,
+        bugs=(Bug(RegisterFile.elaborate, "word.address - LIVE + 1", "word.address - LIVE", SHORT_BOOT),),
+    ),
+    Property(
+        "an operation is done within its latency, but for the wait for a sample",
+        WHERE,
+        every_operation_ends,
+        depth=2,
+        bugs=(Bug(RegisterFile.elaborate, "step.eq(step + 1)", "step.eq(step)"),),
+    ),
+]

@@ -1,0 +1,166 @@
+"""What the supervised axis promises, from its pins to the drive that may leave the FPGA."""
+
+from functools import partial
+
+from amaranth.hdl import Signal
+
+from hardwall.hdl.supervised import SupervisedAxis
+from hardwall.hdl.supervisor import Supervisor
+from hardwall.model.spec import AxisSpec
+from hardwall.model.supervisor import ALWAYS, ARMED, CAUSES, LINK, REQUIRED, TRIPPED
+from stimuli.specs import MHZ, spec
+
+from .bench import Bench
+from .bugs import Bug
+from .property import Property
+from .widths import FreeProducts
+
+BIT = {cause.name: bit for bit, cause in enumerate(CAUSES)}
+
+
+SHOWN_ONES = "getattr(self, name).eq(getattr(supervisor, name))"
+PAST_THE_SUPERVISOR = "getattr(self, name).eq(axis.count if name == 'driven' else getattr(supervisor, name))"
+
+
+def supervised(estimator: str, bench: Bench) -> SupervisedAxis:
+    """Return a supervised axis of 1 MHz with the slowest clock that has time for a sample, its products free."""
+    clock_hz = (spec("mhz", estimator).design.latency_to_drive + 2) * MHZ["sample_hz"]
+    return bench.block(SupervisedAxis(AxisSpec(**{**MHZ, "clock_hz": clock_hz}, estimator=estimator)), FreeProducts())
+
+
+def seen(bench: Bench, axis: SupervisedAxis, pin: str) -> Signal:
+    """Return a pin as the axis sees it, and promise that this is the pin of two clocks ago."""
+    first, level = (bench.inner[f"{pin}_synchroniser.stage{stage}"] for stage in (0, 1))
+    bench.promise(first == bench.past(getattr(axis, pin)))
+    bench.promise(level == bench.past(first))
+    return level
+
+
+def within_the_limit(estimator: str, bench: Bench) -> None:
+    axis = supervised(estimator, bench)
+    limit = bench.past(axis.supervisor_force_limit)
+    bench.promise((axis.driven <= limit) & (axis.driven >= -limit))
+
+
+def zero_when_a_loop_opens(estimator: str, bench: Bench) -> None:
+    axis = supervised(estimator, bench)
+    for pin in ("drive_enable", "emergency_stop", "external_fault"):
+        seen(bench, axis, pin)
+        opened = ~bench.past(getattr(axis, pin), axis.loop_latency)
+        if pin == "external_fault":
+            opened &= bench.past(axis.supervisor_causes[BIT[pin]])
+        bench.promise(~opened | (axis.driven == 0) & (axis.state != ARMED) & ~axis.alive)
+
+
+def trips_at_once(estimator: str, bench: Bench) -> None:
+    axis = supervised(estimator, bench)
+    watched = {
+        "encoder_illegal": axis.illegal,
+        "encoder_overspeed": axis.overspeed,
+        "strobe_busy": axis.strobe_busy,
+        "emergency_stop": ~seen(bench, axis, "emergency_stop"),
+    }
+    for name, wrong in watched.items():
+        stood = bench.past(wrong & ~bench.reset)
+        bench.promise(~stood | (axis.driven == 0) & (axis.state == TRIPPED) & axis.latched[BIT[name]])
+    # What a monitor reports for a single clock is enough.
+    armed = axis.state == ARMED
+    for bit, cause in enumerate(CAUSES):
+        if cause.name in watched or bit == LINK:
+            continue
+        enabled = 1 if REQUIRED >> bit & 1 else axis.supervisor_causes[bit]
+        relevant = 1 if ALWAYS >> bit & 1 else armed
+        stood = bench.past(bench.inner["supervisor.standing"][bit] & ~bench.reset)
+        told = bench.past(bench.inner["monitors.causes"][bit] & enabled & relevant & ~bench.reset)
+        bench.promise(~(told | stood) | (axis.driven == 0) & (axis.state == TRIPPED) & axis.latched[bit])
+
+
+def no_cause_is_lost(estimator: str, bench: Bench) -> None:
+    axis = supervised(estimator, bench)
+    before = bench.past(axis.latched)
+    told = bench.past(axis.acknowledge) & (bench.past(axis.acknowledged) == before)
+    bench.promise(((before & ~axis.latched) == 0) | told | bench.past(bench.reset))
+
+
+def zero_until_an_arm(estimator: str, bench: Bench) -> None:
+    axis = supervised(estimator, bench)
+    # The host's arm since the axis was last not to drive: since a reset, a disarm, an open loop or a trip.
+    asked = Signal()
+    stopped = axis.disarm | ~seen(bench, axis, "drive_enable") | (axis.state == TRIPPED)
+    with bench.m.If(stopped):
+        bench.m.d.sync += asked.eq(0)
+    with bench.m.Elif(axis.arm & axis.live):
+        bench.m.d.sync += asked.eq(1)
+    bench.promise((axis.state != ARMED) | asked)
+    bench.promise((axis.driven == 0) | asked)
+    bench.promise(~axis.alive | asked)
+
+
+def of(estimator: str) -> list[Property]:
+    """Return the properties of the supervised axis with an estimator."""
+    block = f"supervised mhz {estimator}"
+    quick = estimator == "fdm"
+    return [
+        Property(
+            "the drive that leaves is within the force limit's word of one clock ago",
+            block,
+            partial(within_the_limit, estimator),
+            depth=2,
+            bugs=(Bug(SupervisedAxis.elaborate, SHOWN_ONES, PAST_THE_SUPERVISOR),),
+            within=12,
+        ),
+        Property(
+            "drive and alive are zero three clocks after a loop's pin opens",
+            block,
+            partial(zero_when_a_loop_opens, estimator),
+            depth=2,
+            bugs=(
+                Bug(
+                    SupervisedAxis.elaborate, 'supervisor.enable.eq(levels["drive_enable"])', "supervisor.enable.eq(1)"
+                ),
+                Bug(SupervisedAxis.elaborate, '~levels["emergency_stop"]', "0"),
+            ),
+            quick=quick,
+            within=12,
+        ),
+        Property(
+            "one clock with a cause trips: the drive is zero at the next clock and the cause is latched",
+            block,
+            partial(trips_at_once, estimator),
+            depth=2,
+            bugs=(
+                Bug(
+                    SupervisedAxis.elaborate,
+                    '"encoder_illegal": axis.illegal',
+                    '"encoder_illegal": axis.illegal & axis.overspeed',
+                ),
+                Bug(Supervisor.elaborate, "present & watched", "present & watched & ~before"),
+            ),
+            within=12,
+        ),
+        Property(
+            "a latched cause is forgotten only when exactly the latched ones are acknowledged, whatever else happens",
+            block,
+            partial(no_cause_is_lost, estimator),
+            depth=2,
+            bugs=(
+                Bug(Supervisor.elaborate, "(self.acknowledged == self.latched)", "(self.acknowledged != 0)"),
+                Bug(Supervisor.elaborate, "self.latched | standing", "standing"),
+            ),
+            within=12,
+        ),
+        Property(
+            "the drive is zero from power-up, and from every stop on, until the host's arm",
+            block,
+            partial(zero_until_an_arm, estimator),
+            depth=2,
+            bugs=(
+                Bug(Supervisor.elaborate, "self.arm & ready", "ready"),
+                Bug(SupervisedAxis.elaborate, "asked | turned", "turned"),
+            ),
+            within=12,
+        ),
+    ]
+
+
+PROPERTIES = [*of("fdm"), *of("levant")]
