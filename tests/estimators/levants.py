@@ -46,12 +46,12 @@ def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
         for k in range(samples // 50):
             yield (-half, half // 2 - 1, half - 1)[k // period % 3], 0, *top, k & 1
     # Ramps faster than the velocity format, from a start, long enough for alpha alone to carry u1 to its ends, which it
-    # reaches in many ways.
+    # reaches in many ways; with the largest lambda u has done so before, and with none u follows u1.
     steps = d.velocity.max // top[1] + 50
     for ramp in range(max(2, samples // 10 // steps)):
         alpha = random.randint(top[1] * 3 // 4, top[1]) if ramp > 1 else top[1]
         for k in range(d.velocity.max // alpha + 50):
-            yield (-k, k)[ramp % 2] * (fast + 1), int(k == 0), top[0], alpha, 0
+            yield (-k, k)[ramp % 2] * (fast + 1), int(k == 0), (top[0], 0)[ramp // 2 % 2], alpha, k % 2
     # A random walk with jumps, gains anywhere in their range, and restarts.
     count = 0
     for _ in range(samples - samples // 4 - samples // 10):
