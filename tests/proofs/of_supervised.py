@@ -129,11 +129,7 @@ def of(estimator: str) -> list[Property]:
             partial(trips_at_once, estimator),
             depth=2,
             bugs=(
-                Bug(
-                    SupervisedAxis.elaborate,
-                    '"encoder_illegal": axis.illegal',
-                    '"encoder_illegal": axis.illegal & axis.overspeed',
-                ),
+                Bug(SupervisedAxis.elaborate, '~levels["emergency_stop"]', '~levels["external_fault"]'),
                 Bug(Supervisor.elaborate, "present & watched", "present & watched & ~before"),
             ),
             within=12,
