@@ -18,11 +18,13 @@ SLOW = uart.Design(500_000, 115_200)
 """A divider with a little more than 4 clocks a bit, the fewest."""
 
 
-def crc_of(register: Value, byte: Value) -> Value:
+def crc_of(m: Module, register: Value, byte: Value) -> Value:
     """Return the CRC of Modbus behind a byte, bit by bit, as the protocol's own text has it."""
-    register = (register ^ byte)[:16]
+    register = register ^ byte
     for _ in range(8):
-        register = Mux(register[0], register >> 1 ^ 0xA001, register >> 1)
+        # Signals of its own for every bit: one expression of all of them would double with each.
+        before, register = register, Signal(16)
+        m.d.comb += register.eq(before >> 1 ^ Mux(before[0], 0xA001, 0))
     return register
 
 
@@ -44,7 +46,7 @@ class Heard:
         self.length, self.counted = Signal(range(2 * FRAME_MAX)), Signal()
         with m.If(self.taken):
             m.d.sync += [
-                self.crc.eq(crc_of(Mux(self.count == 0, 0xFFFF, self.crc), line.byte)),
+                self.crc.eq(crc_of(m, Mux(self.count == 0, 0xFFFF, self.crc), line.byte)),
                 self.count.eq(self.count + 1),
                 self.spoilt.eq(line.spoilt | self.spoilt),
             ]
