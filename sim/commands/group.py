@@ -18,6 +18,7 @@ COMMANDS = {
     "table": "Print reports of hits side by side.",
     "bench": "Measure the closed loop's speed on every backend and under cocotb, and what optional parts cost.",
     "verilog": "Write the axis of a scene as Verilog, with a table of its ports.",
+    "virtual": "Run the board of a scene, with its plant, behind a serial port that a host opens.",
     "synth": "Size and speed of the axis, as the board with supervisor and link, on a real part.",
     "accuracy": "Hold velocity estimators against the exact derivative of known motions, at any rate.",
     "costs": "What each estimator takes of a device: alone, and the board with it placed and routed "

@@ -2,12 +2,7 @@
 
 import ctypes
 import functools
-import hashlib
-import os
-import shutil
 from dataclasses import dataclass
-from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -16,28 +11,12 @@ from amaranth.lib.wiring import In
 
 from ...hdl.axis import Axis
 from ...hdl.export import to_verilog
-from ...model.build_folder import build_dir, shown_path
 from ...model.spec import AxisSpec
-from ..jobs import children
-from ..jobs.stages import stage
-from ..jobs.whole_folder import keep_log, whole_folder
+from . import shared_library
+from .shared_library import FAST_TO_BUILD, FAST_TO_RUN, Recipe
 from .verilated import Rtl, RtlState
-from .verilator import LINT_OPTIONS, BuildError, check_paths, environment
 
-LIBRARY = "libaxis.so"
-SHIM, RULES = (Path(__file__).with_name(f"library.{suffix}") for suffix in ("cpp", "mk"))
-OPTIONS = [
-    *LINT_OPTIONS,
-    *("--prefix", "Vaxis", "-O3", "--x-assign", "fast", "--x-initial", "fast", "--noassert"),
-    # All clocks of one call are iterations of a single evaluation.
-    *("--converge-limit", str(1 << 30)),
-    # However large the axis, it is one piece of C++.
-    *("--output-split", "0"),
-]
-
-
-# A closed loop runs long enough to be worth the best optimisation; the playback of a recording does not.
-FAST_TO_RUN, FAST_TO_BUILD = "-O3", "-O1"
+SHIM = Path(__file__).with_name("library.cpp")
 
 
 def _ports(spec: AxisSpec) -> str:
@@ -87,14 +66,12 @@ def _sources(spec: AxisSpec, traced: bool) -> dict[str, str]:
     """Return the sources of a library by file name; they take as long to make as a short hit to run."""
     component = Axis(spec)
     files = {"axis.v": to_verilog(component, "axis"), "axis_ports.h": _ports(spec)}
-    files |= {path.name: path.read_text() for path in (SHIM, RULES)}
+    files[SHIM.name] = SHIM.read_text(encoding="utf-8")
     return files if traced else files | {"harness.v": _harness(component)}
 
 
 def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
     """Return the shared library of the axis; build it first if it is missing.
-
-    It is found by the content of the Verilog, the shim and the tools' versions, and checked before it is used.
 
     Args:
         spec: the axis.
@@ -104,47 +81,9 @@ def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
     Raises:
         BuildError: if the build fails.
     """
-    files = _sources(spec, traced)
-    options = [*OPTIONS, *(["--trace-vcd", "--top-module", "axis"] if traced else ["--top-module", "harness"])]
+    options = ("--trace-vcd", "--top-module", "axis") if traced else ("--top-module", "harness")
     optimisation = FAST_TO_BUILD if short else FAST_TO_RUN
-    content = "\0".join([*files.values(), version("verilator"), *options, optimisation])
-    folder = build_dir() / "rtl" / hashlib.sha256(content.encode()).hexdigest()[:16]
-    return whole_folder(folder, partial(_verilate, files, options, optimisation)) / LIBRARY
-
-
-def _verilate(files: dict[str, str], options: list[str], optimisation: str, work: Path) -> None:
-    """Write sources, by file name, into the folder `work`, and build the library beside them.
-
-    Args:
-        files: the sources.
-        options: options of Verilator.
-        optimisation: option of the C++ compiler.
-        work: the folder.
-
-    Raises:
-        BuildError: if the build fails.
-    """
-    check_paths(build_dir())
-    for name, text in files.items():
-        (work / name).write_text(text)
-    verilog = [name for name in files if name.endswith(".v")]
-    jobs, wanted = str(os.cpu_count() or 1), f"OPTIMISATION={optimisation}"
-    commands = [
-        ["verilator", "--cc", *options, "--Mdir", "obj", *verilog],
-        ["make", "-C", "obj", "-j", jobs, "-f", f"../{RULES.name}", LIBRARY, wanted],
-    ]
-    with stage("building the hardware with Verilator, once"):
-        for command in commands:
-            try:
-                done = children.run(command, cwd=work, env=environment(), capture_output=True, text=True)
-            except OSError as error:
-                raise BuildError(f"{command[0]} cannot be run: {error.strerror or error}") from None
-            if done.returncode:
-                text = " ".join(command) + "\n" + done.stdout + done.stderr
-                log = keep_log(build_dir() / "rtl" / "failed.log", text)
-                raise BuildError(f"the Verilated library could not be built: see {shown_path(log)}")
-    shutil.move(work / "obj" / LIBRARY, work / LIBRARY)
-    shutil.rmtree(work / "obj")
+    return shared_library.build(Recipe(_sources(spec, traced), SHIM.name, "Vaxis", options, optimisation))
 
 
 @dataclass

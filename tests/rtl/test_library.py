@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from hardwall.model.build_folder import build_dir
-from hardwall.sim.rtl import library
+from hardwall.sim.rtl import library, shared_library
+from hardwall.sim.rtl.shared_library import LIBRARY, Recipe
 from hardwall.sim.rtl.verilator import BuildError
 from stimuli.processes import HARDWALL, ended, session, started, wait_until
 from stimuli.specs import spec
@@ -20,13 +21,13 @@ def builds(tmp_path, monkeypatch) -> list[Path]:
     """Set up a stand-in for Verilator and an empty build folder; return the list of its calls."""
     calls = []
 
-    def verilate(files: dict[str, str], options: list[str], optimisation: str, work: Path) -> None:
+    def verilate(recipe: Recipe, work: Path) -> None:
         calls.append(work)
-        for name, text in files.items():
+        for name, text in recipe.files.items():
             (work / name).write_text(text)
-        (work / library.LIBRARY).write_bytes(CODE)
+        (work / LIBRARY).write_bytes(CODE)
 
-    monkeypatch.setattr(library, "_verilate", verilate)
+    monkeypatch.setattr(shared_library, "_verilate", verilate)
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path / "build"))
     return calls
 
@@ -58,7 +59,7 @@ def test_the_verilog_of_an_axis_is_made_once(builds, monkeypatch):
 
 def test_a_tool_that_is_not_there_is_named(tmp_path, monkeypatch):
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
-    monkeypatch.setattr(library, "environment", lambda: {"PATH": str(tmp_path)})
+    monkeypatch.setattr(shared_library, "environment", lambda: {"PATH": str(tmp_path)})
     with pytest.raises(BuildError, match=r"^verilator cannot be run: No such file or directory$"):
         library.build(spec("mhz"))
 

@@ -1,0 +1,120 @@
+"""The Verilated board with what is around it, as a shared library: clocks, the other end of its line, an amplifier.
+
+A board has the pins of packages; behind its line is a host of bytes, and behind its pulses an amplifier. Both, and the
+faults of wires, are in `around_board.v` and `board_library.cpp`.
+"""
+
+import ctypes
+import functools
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from ...hdl.board import Board
+from ...hdl.export import to_verilog
+from ...model.spec import AxisSpec
+from . import shared_library
+from .shared_library import Recipe
+from .verilated import Rtl, RtlState
+
+AROUND, SHIM = (Path(__file__).with_name(name) for name in ("around_board.v", "board_library.cpp"))
+OSCILLATOR_HZ = 2.4e6
+"""About the frequency of the oscillator beside the clock; the clock has a whole number of it in every half period."""
+PUMP_S = 200e-6
+"""How long the amplifier's charge pump holds without an edge of `alive`."""
+ROOM = 1024
+"""Bytes from the board that are kept until they are taken."""
+
+Wire = Literal["a", "b", "a_n", "b_n"]
+Level = Literal["sound", "low", "high", "inverted"]
+Switch = Literal["drive_enable", "external_fault", "emergency_stop", "clock"]
+WIRES: tuple[Wire, ...] = ("a", "b", "a_n", "b_n")
+LEVELS: tuple[Level, ...] = ("sound", "low", "high", "inverted")
+SWITCHES: tuple[Switch, ...] = ("drive_enable", "external_fault", "emergency_stop", "clock")
+
+
+@functools.lru_cache(maxsize=1 << 3)
+def _board(spec: AxisSpec) -> tuple[Board, str]:
+    board = Board(spec)
+    return board, to_verilog(board, "board")
+
+
+def build(spec: AxisSpec) -> Path:
+    """Return the shared library of the board; build it first if it is missing.
+
+    Raises:
+        BuildError: if the build fails.
+    """
+    board, verilog = _board(spec)
+    around = {
+        "BIT_PARTS": round(256 * spec.clock_hz / board.link.baud),
+        "OSCILLATOR_CLOCKS": max(round(spec.clock_hz / OSCILLATOR_HZ / 2), 1),
+        "PUMP_CLOCKS": max(round(spec.clock_hz * PUMP_S), 1),
+    }
+    files = {"board.v": verilog, **{path.name: path.read_text(encoding="utf-8") for path in (AROUND, SHIM)}}
+    options = ("--top-module", "around_board", *(f"-G{name}={value}" for name, value in around.items()))
+    return shared_library.build(Recipe(files, SHIM.name, "Vboard", options))
+
+
+class BoardHardware:
+    """A reset board, simulated clock by clock; a context manager that frees it.
+
+    Args:
+        spec: the axis.
+        number: the handle's count at the start.
+        turn_counts: counts between two pulses of the encoder's index.
+
+    Attributes:
+        full_scale: the drive (force LSB) of an amplifier whose pulses never pause.
+    """
+
+    def __init__(self, spec: AxisSpec, number: int, turn_counts: int):
+        board, _ = _board(spec)
+        self._spec, self._board, self._number, self._turn = spec, board, number, turn_counts
+        self.full_scale = 1 << board.drive_bits
+
+    def __enter__(self) -> "BoardHardware":
+        self._library = library = ctypes.CDLL(str(build(self._spec)))
+        library.board_open.restype = ctypes.c_void_p
+        library.board_open.argtypes = [ctypes.c_int64, ctypes.c_int64, ctypes.c_double]
+        library.board_take.restype = ctypes.c_int64
+        for name in ("board_send", "board_take"):
+            getattr(library, name).argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64]
+        for name in ("board_wire", "board_switch"):
+            getattr(library, name).argtypes = [ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64]
+        bit_clocks = self._spec.clock_hz / self._board.link.baud
+        self._context = library.board_open(self._number, self._turn, bit_clocks)
+        self._heard = np.zeros(ROOM, np.uint8)
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._library.board_close(ctypes.c_void_p(self._context))
+
+    def send(self, data: bytes) -> None:
+        """Give the host's bytes to the line, which takes them one after the other at its rate."""
+        self._library.board_send(self._context, data, len(data))
+
+    def take(self) -> bytes:
+        """Return what the board has sent since the last call."""
+        count = self._library.board_take(self._context, self._heard.ctypes.data, ROOM)
+        return self._heard[:count].tobytes()
+
+    def wire(self, name: Wire, level: Level) -> None:
+        """Say what becomes of a wire of the encoder on its way to the board."""
+        self._library.board_wire(self._context, WIRES.index(name), LEVELS.index(level))
+
+    def switch(self, name: Switch, on: bool) -> None:
+        """Close or open a loop, or let the clock go on or stand."""
+        self._library.board_switch(self._context, SWITCHES.index(name), on)
+
+    @property
+    def controller(self) -> Rtl:
+        """The addresses by which the compiled loop calls the hardware; its drive is the pulses of a sample."""
+
+        def address(name: str) -> int:
+            return ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value
+
+        return Rtl(address("board_advance"), address("board_read"), self._context, self._spec.design.latency_to_drive)
+
+    start = RtlState(0, 0, 0)

@@ -1,0 +1,91 @@
+"""Verilated hardware as a shared library: built once, and cached by content."""
+
+import hashlib
+import os
+import shutil
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+
+from ...model.build_folder import build_dir, shown_path
+from ..jobs import children
+from ..jobs.stages import stage
+from ..jobs.whole_folder import keep_log, whole_folder
+from .verilator import LINT_OPTIONS, BuildError, check_paths, environment
+
+LIBRARY = "library.so"
+RULES = Path(__file__).with_name("library.mk")
+OPTIONS = (
+    *LINT_OPTIONS,
+    *("-O3", "--x-assign", "fast", "--x-initial", "fast", "--noassert"),
+    # All clocks of one call are iterations of a single evaluation.
+    *("--converge-limit", str(1 << 30)),
+    # However large the hardware, it is one piece of C++.
+    *("--output-split", "0"),
+)
+# A closed loop runs long enough to be worth the best optimisation; the playback of a recording does not.
+FAST_TO_RUN, FAST_TO_BUILD = "-O3", "-O1"
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What a shared library is made of.
+
+    Attributes:
+        files: the sources by file name; those that end in .v are the hardware.
+        shim: the name of the C++ file with the library's functions.
+        prefix: the name of the class that Verilator makes.
+        options: options of Verilator beside `OPTIONS`.
+        optimisation: option of the C++ compiler.
+    """
+
+    files: dict[str, str]
+    shim: str
+    prefix: str
+    options: tuple[str, ...]
+    optimisation: str = FAST_TO_RUN
+
+
+def build(recipe: Recipe) -> Path:
+    """Return the shared library; build it first if it is missing.
+
+    It is found by the content of the sources, the options and Verilator's version, and checked before it is used.
+
+    Raises:
+        BuildError: if the build fails.
+    """
+    rules, options = RULES.read_text(encoding="utf-8"), (*OPTIONS, "--prefix", recipe.prefix, *recipe.options)
+    content = "\0".join([rules, *recipe.files.values(), version("verilator"), *options, recipe.optimisation])
+    folder = build_dir() / "rtl" / hashlib.sha256(content.encode()).hexdigest()[:16]
+    return whole_folder(folder, partial(_verilate, recipe)) / LIBRARY
+
+
+def _verilate(recipe: Recipe, work: Path) -> None:
+    """Write the sources into the folder `work`, and build the library beside them.
+
+    Raises:
+        BuildError: if the build fails.
+    """
+    check_paths(build_dir())
+    for name, text in (recipe.files | {RULES.name: RULES.read_text(encoding="utf-8")}).items():
+        (work / name).write_text(text, encoding="utf-8")
+    verilog = [name for name in recipe.files if name.endswith(".v")]
+    variables = {"PREFIX": recipe.prefix, "SHIM": recipe.shim, "OPTIMISATION": recipe.optimisation}
+    given = [f"{name}={value}" for name, value in variables.items()]
+    commands = [
+        ["verilator", "--cc", *OPTIONS, "--prefix", recipe.prefix, *recipe.options, "--Mdir", "obj", *verilog],
+        ["make", "-C", "obj", "-j", str(os.cpu_count() or 1), "-f", f"../{RULES.name}", LIBRARY, *given],
+    ]
+    with stage("building the hardware with Verilator, once"):
+        for command in commands:
+            try:
+                done = children.run(command, cwd=work, env=environment(), capture_output=True, text=True)
+            except OSError as error:
+                raise BuildError(f"{command[0]} cannot be run: {error.strerror or error}") from None
+            if done.returncode:
+                text = " ".join(command) + "\n" + done.stdout + done.stderr
+                log = keep_log(build_dir() / "rtl" / "failed.log", text)
+                raise BuildError(f"the Verilated library could not be built: see {shown_path(log)}")
+    shutil.move(work / "obj" / LIBRARY, work / LIBRARY)
+    shutil.rmtree(work / "obj")

@@ -1,0 +1,114 @@
+"""A virtual board: the Verilated `board` with the scene's plant beside it, in simulated time.
+
+The compiled loop closes it as it closes an axis: the handle makes edges, the board takes them through its pins, and the
+amplifier's pulses of a sample are the force on the handle during the next one. What is behind the board's serial line
+are bytes. The wall, and whether there is a drive at all, is for a host to say.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model.stamped import room_for
+from ..loop import loop
+from ..rtl.board_library import BoardHardware
+from ..scene.build import start_of, world_of
+from ..scene.errors import SceneError
+from ..scene.schema import Scene
+
+TURN_M = 4e-3
+"""The distance of two pulses of the encoder's index."""
+HOLD_PER_S = 30.0
+"""How fast a hand brings the handle to where it holds it: the rate of a critically damped spring."""
+GRASP_S = 1e-3
+"""The time for which the hand's force stays as it is; much shorter than 1 / `HOLD_PER_S`."""
+
+
+@dataclass
+class Hand:
+    """What the hand does: hold the handle somewhere, or push it, or both.
+
+    Attributes:
+        held_m: where it holds the handle; None: it does not.
+        push_n: its steady force, positive into the wall.
+    """
+
+    held_m: float | None
+    push_n: float = 0.0
+
+    def force_n(self, mass_kg: float, position_m: float, velocity_m_per_s: float) -> float:
+        """Return the hand's force on a handle of a mass."""
+        if self.held_m is None:
+            return self.push_n
+        spring_n = mass_kg * HOLD_PER_S**2 * (self.held_m - position_m)
+        return self.push_n + spring_n - 2 * mass_kg * HOLD_PER_S * velocity_m_per_s
+
+
+@dataclass(frozen=True)
+class Handle:
+    """What the handle does now: its position, velocity and the force of the amplifier on it."""
+
+    time_s: float
+    position_m: float
+    velocity_m_per_s: float
+    force_n: float
+
+
+class VirtualBoard:
+    """A board and its plant; a context manager that frees it.
+
+    Args:
+        scene: the scene; its wall and gains are the host's to write.
+
+    Attributes:
+        hardware: the board's wires and loops.
+        hand: what the hand does; at first it holds the handle where the scene starts.
+        reversed: whether the motor's wires are swapped.
+
+    Raises:
+        SceneError: if the scene has an output of its own, for the board's are pulses.
+        BuildError: if the hardware cannot be built.
+    """
+
+    def __init__(self, scene: Scene):
+        if scene.output is not None:
+            raise SceneError(f"{scene.name}: output must be absent, for the pulses of the board are its output")
+        self.scene, self._world = scene, world_of(scene)
+        self._progress = start_of(scene, self._world)
+        turn_counts = max(round(TURN_M / scene.encoder.count_m), 4)
+        self.hardware = BoardHardware(scene.spec, self._progress.moment.cell.number, turn_counts)
+        self.hand, self.reversed = Hand(scene.protocol.start_m), False
+        self._pulse_n = scene.spec.force_resolution_n * self.hardware.full_scale / scene.spec.clocks_per_sample
+        self._edges, self._push_n = room_for(loop.EDGE_CAPACITY), 0.0
+
+    def __enter__(self) -> "VirtualBoard":
+        self.hardware.__enter__()
+        self._state = self.hardware.start
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.hardware.__exit__(*error)
+
+    @property
+    def grasp_samples(self) -> int:
+        """The samples during which the hand's force stays as it is."""
+        return max(round(self.scene.spec.sample_hz * GRASP_S), 1)
+
+    def run(self) -> bool:
+        """Let `grasp_samples` pass; return whether the encoder could follow the handle."""
+        samples, motion = self.grasp_samples, self._progress.moment.motion
+        room = np.zeros(samples), np.zeros(samples, np.int64)
+        self._push_n = self.hand.force_n(self.scene.handle.mass_kg, motion[0], motion[1])
+        pulse_n = -self._pulse_n if self.reversed else self._pulse_n
+        world = self._world._replace(push_n=self._push_n, force_lsb_n=pulse_n)
+        memory = loop.Memory(self._edges, None, None, None, *room)
+        until = self._progress.sample + samples
+        controller = self.hardware.controller
+        self._state, self._progress = loop.run(world, controller, self._state, self._progress, memory, until)
+        return self._progress.sample == until
+
+    @property
+    def handle(self) -> Handle:
+        """What the handle does now."""
+        motion, rate = self._progress.moment.motion, self.scene.spec.sample_hz
+        return Handle(self._progress.sample / rate, motion[0], motion[1], self._progress.force_n - self._push_n)

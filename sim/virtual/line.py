@@ -1,0 +1,115 @@
+"""The board's serial line as a host finds it: a pseudo-terminal, and a port of the loopback for one at a time."""
+
+import os
+import pty
+import selectors
+import socket
+import tty
+from contextlib import suppress
+
+CHUNK = 4096
+
+
+class Line:
+    """Where the bytes of hosts come from, and where the board's go to: whoever has spoken last.
+
+    A context manager that closes everything.
+
+    Args:
+        tcp_port: port of 127.0.0.1 to listen at; 0 for any that is free; None for none.
+
+    Attributes:
+        path: the pseudo-terminal's name, which a host opens as a serial port.
+        drops: how many of the next bytes to the board are lost.
+
+    Raises:
+        OSError: if there is no pseudo-terminal, or the port cannot be had.
+    """
+
+    def __init__(self, tcp_port: int | None = None):
+        self.drops = 0
+        self._master, self._slave = pty.openpty()
+        # The slave is kept open, so that the terminal stays when a host closes it.
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.path = os.ttyname(self._slave)
+        self._listener = self._guest = None
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._master, selectors.EVENT_READ, self._from_terminal)
+        if tcp_port is not None:
+            self._listener = socket.create_server(("127.0.0.1", tcp_port), backlog=1)
+            self._selector.register(self._listener, selectors.EVENT_READ, self._welcome)
+        self._answer_to_guest = False
+        self._came = bytearray()
+
+    def __enter__(self) -> "Line":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._leave()
+        self._selector.close()
+        if self._listener:
+            self._listener.close()
+        os.close(self._master)
+        os.close(self._slave)
+
+    @property
+    def tcp_port(self) -> int | None:
+        """The port of 127.0.0.1; None without one."""
+        return self._listener.getsockname()[1] if self._listener else None
+
+    def take(self, wait_s: float = 0.0) -> bytes:
+        """Return the bytes that have come from hosts, and wait for them for some time; what is lost is left out."""
+        self._came.clear()
+        for key, _ in self._selector.select(wait_s):
+            key.data()
+        lost = min(self.drops, len(self._came))
+        self.drops -= lost
+        return bytes(self._came[lost:])
+
+    def give(self, data: bytes) -> None:
+        """Give bytes of the board to the host that has spoken last; without room for them they are lost."""
+        with suppress(BlockingIOError):
+            if self._answer_to_guest and self._guest:
+                try:
+                    self._guest.sendall(data)
+                except OSError:
+                    self._leave()
+            else:
+                os.write(self._master, data)
+
+    def _from_terminal(self) -> None:
+        with suppress(BlockingIOError):
+            data = os.read(self._master, CHUNK)
+            self._came += data
+            self._answer_to_guest = False
+
+    def _welcome(self) -> None:
+        guest, _ = self._listener.accept()
+        if self._guest:
+            # One writer at a time.
+            guest.close()
+            return
+        guest.setblocking(False)
+        guest.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._guest = guest
+        self._selector.register(guest, selectors.EVENT_READ, self._from_guest)
+
+    def _from_guest(self) -> None:
+        try:
+            data = self._guest.recv(CHUNK)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            self._leave()
+            return
+        self._came += data
+        self._answer_to_guest = True
+
+    def _leave(self) -> None:
+        if self._guest:
+            self._selector.unregister(self._guest)
+            self._guest.close()
+            self._guest = None

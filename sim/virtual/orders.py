@@ -1,0 +1,105 @@
+"""What a person may do to a virtual board while it runs: hold and push the handle, cut a wire, stop the clock."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ..rtl.board_library import SWITCHES, WIRES, Level
+from .device import VirtualBoard
+from .line import Line
+
+PUSH_MAX_N = 1000.0
+DROPS_MAX = 1e6
+FREE = "free"
+"""The word for a hand that lets go."""
+
+
+class OrderError(ValueError):
+    """An order that is none: one line that says what is accepted."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """An order.
+
+    Attributes:
+        operand: the name of what follows it.
+        meaning: what it does.
+        obey: does it.
+        accepted: the words that may follow; empty for a number.
+    """
+
+    operand: str
+    meaning: str
+    obey: Callable[[VirtualBoard, Line, str], None]
+    accepted: tuple[str, ...] = ()
+
+
+def _number(text: str, least: float, most: float, unit: str) -> float:
+    """Return the number that a text is; raise OrderError if it is not `least` to `most`."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = float("nan")
+    if not least <= value <= most:
+        raise OrderError(f"must be followed by {least:g} to {most:g} {unit}, not {text!r}")
+    return value
+
+
+def _hold(board: VirtualBoard, line: Line, text: str) -> None:
+    travel_mm = board.scene.spec.travel_m * 1e3
+    board.hand.held_m = None if text == FREE else _number(text, -travel_mm, travel_mm, f"mm, or {FREE}") / 1e3
+
+
+def _push(board: VirtualBoard, line: Line, text: str) -> None:
+    board.hand.push_n = _number(text, -PUSH_MAX_N, PUSH_MAX_N, "N")
+
+
+def _drop(board: VirtualBoard, line: Line, text: str) -> None:
+    line.drops += int(_number(text, 1, DROPS_MAX, "bytes"))
+
+
+def _motor(board: VirtualBoard, line: Line, text: str) -> None:
+    board.reversed = text == "swapped"
+
+
+def _wire(level: Level) -> Callable[[VirtualBoard, Line, str], None]:
+    return lambda board, line, name: board.hardware.wire(name, level)
+
+
+def _switch(on: bool) -> Callable[[VirtualBoard, Line, str], None]:
+    return lambda board, line, name: board.hardware.switch(name, on)
+
+
+ORDERS = {
+    "hold": Order("MM", f"where the hand holds the handle, or `{FREE}`", _hold),
+    "push": Order("N", "the hand's steady force on the handle, positive into the wall", _push),
+    "cut": Order("WIRE", "the encoder's wire is low", _wire("low"), WIRES),
+    "high": Order("WIRE", "the encoder's wire is high", _wire("high"), WIRES),
+    "invert": Order("WIRE", "the encoder's wire is inverted", _wire("inverted"), WIRES),
+    "mend": Order("WIRE", "the encoder's wire is sound again", _wire("sound"), WIRES),
+    "open": Order("LOOP", "the loop opens, or the clock stands", _switch(False), SWITCHES),
+    "close": Order("LOOP", "the loop closes, or the clock goes on", _switch(True), SWITCHES),
+    "drop": Order("BYTES", "so many of the host's next bytes are lost", _drop),
+    "motor": Order("HOW", "the motor's wires", _motor, ("swapped", "right")),
+}
+"""The orders by name."""
+
+
+def obey(board: VirtualBoard, line: Line, text: str) -> None:
+    """Do what a line of text says.
+
+    Raises:
+        OrderError: if it is no order.
+    """
+    name, *operands = text.split() or [""]
+    if name not in ORDERS:
+        raise OrderError(f"the order must be one of {', '.join(ORDERS)}, not {name!r}")
+    order = ORDERS[name]
+    if len(operands) != 1:
+        raise OrderError(f"the order must be `{name} {order.operand}`, not {text.strip()!r}")
+    if order.accepted and operands[0] not in order.accepted:
+        raise OrderError(f"{name} must be followed by one of {', '.join(order.accepted)}, not {operands[0]!r}")
+    try:
+        order.obey(board, line, operands[0])
+    except OrderError as error:
+        raise OrderError(f"{name} {error}") from None

@@ -1,0 +1,115 @@
+"""The command `virtual`: a process with a serial port and a port of the loopback, orders on stdin, and its ends."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+from pymodbus import FramerType
+from pymodbus.client import ModbusTcpClient
+
+from hardwall.model.link.line import framed
+from hardwall.model.registers import RegisterMap
+from hardwall.model.supervisor import TRIPPED, names
+from hardwall.sim.scene.load import load
+from stimuli import frames
+from stimuli.processes import HARDWALL, wait_until
+
+CLOCK = {"controller.clock_hz": 4_000_000}
+PORTS = re.compile(r"serial port: (?P<path>/dev/\S+)\n(?:tcp port: 127\.0\.0\.1:(?P<tcp>\d+)\n)?orders: hold MM, .*\n")
+REGISTERS = RegisterMap(load("seed-2011", CLOCK).spec)
+
+
+def command(*arguments: str) -> list[str]:
+    changes = [word for key, value in CLOCK.items() for word in ("--set", f"{key}={value}")]
+    return [str(HARDWALL), "virtual", "seed-2011", *changes, *arguments]
+
+
+@contextmanager
+def running(*arguments: str) -> Iterator[tuple[subprocess.Popen, re.Match]]:
+    """Start the command; yield its process, and what it says of its ports."""
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    with subprocess.Popen(command(*arguments), **pipes, text=True) as process:
+        try:
+            lines = ""
+            while not (said := PORTS.fullmatch(lines)):
+                line = process.stdout.readline()
+                assert line, process.stderr.read()
+                lines += line
+            yield process, said
+        finally:
+            process.kill()
+
+
+def test_a_client_that_others_wrote_reads_and_writes_and_sees_a_loop_open():
+    with running("--tcp", "0", "--speed", "0") as (process, said):
+        client = ModbusTcpClient("127.0.0.1", port=int(said["tcp"]), framer=FramerType.RTU, timeout=60)
+        assert client.connect()
+
+        def read(name: str) -> int:
+            register = REGISTERS[name]
+            answer = client.read_holding_registers(register.address, count=register.size, device_id=1)
+            return register.from_registers(tuple(answer.registers))
+
+        identity = f"{read('identity_high') & 0xFFFFFFFF:08x}{read('identity_low') & 0xFFFFFFFF:08x}"
+        assert identity == REGISTERS.identity
+        stiffness = REGISTERS["wall_stiffness"]
+        assert not client.write_registers(stiffness.address, list(stiffness.to_registers(77)), device_id=1).isError()
+        assert read("wall_stiffness") == 77
+        assert read("latched") == 0
+        process.stdin.write("leap\nopen emergency_stop\n")
+        process.stdin.flush()
+        wait_until(lambda: read("state") == TRIPPED)
+        assert names(read("latched")) == ["emergency_stop"]
+        client.close()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+        assert process.returncode == 130
+        assert out == ""
+        assert "the order must be one of hold, push, " in err
+        assert err.splitlines()[-1] == "hardwall: error: interrupted"
+
+
+def test_the_serial_port_is_one_for_any_program():
+    with running("--speed", "0") as (_, said):
+        port = os.open(said["path"], os.O_RDWR | os.O_NOCTTY)
+        os.write(port, framed(b"\1" + frames.read(0, 2)))
+        answer = b""
+        while len(answer) < 9:
+            answer += os.read(port, 100)
+        assert answer == framed(b"\1\3\4" + frames.words(0, REGISTERS["layout"].reset))
+        os.close(port)
+
+
+def test_it_ends_after_the_time_that_was_asked_for():
+    done = subprocess.run(
+        command("--seconds", "0.05"), stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"\n0\.05 s in [\d.]+ s: [\d.]+ of real time\n$", done.stdout)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--speed", "-1"], "--speed must be 0 to 1000 s/s, not -1.0"),
+        (["--seconds", "nan"], r"--seconds must be 0 to 1e\+06 s, not nan"),
+        (["--set", "output.dac_bits=12", "--set", "output.full_scale_n=20.0"], "seed-2011: output must be absent, .*"),
+    ],
+)
+def test_what_cannot_be_is_one_line(arguments, message):
+    done = subprocess.run(command(*arguments), capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert re.fullmatch(f"hardwall: error: {message}\n", done.stderr)
+
+
+def test_a_port_that_is_taken_is_one_line():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        done = subprocess.run(command("--tcp", str(port)), capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == f"hardwall: error: --tcp {port} cannot be had: Address already in use\n"

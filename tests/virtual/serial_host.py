@@ -1,0 +1,70 @@
+"""A host of a virtual board in the same process: frames of bytes, and registers by name."""
+
+import numpy as np
+
+from hardwall.model.link.line import framed
+from hardwall.model.registers import RegisterMap
+from hardwall.sim.virtual.device import VirtualBoard
+from stimuli import frames
+
+
+class SerialHost:
+    """A host that lets time pass while it waits.
+
+    Attributes:
+        registers: the board's.
+    """
+
+    def __init__(self, board: VirtualBoard):
+        self.registers = RegisterMap(board.scene.spec)
+        self._board, self._beat = board, 0
+
+    def request(self, pdu: bytes) -> bytes:
+        """Return the answer to a request, without unit and CRC; empty if there is none."""
+        self._board.hardware.send(framed(b"\1" + pdu))
+        answer = bytearray()
+        for _ in range(20):
+            self._board.run()
+            answer += self._board.hardware.take()
+            if len(answer) > 3 and framed(bytes(answer[:-2])) == answer:
+                return bytes(answer[1:-2])
+        assert not answer, answer.hex(" ")
+        return b""
+
+    def read(self, name: str) -> int:
+        register = self.registers[name]
+        data = self.request(frames.read(register.address, register.size))[2:]
+        return register.from_registers(tuple(np.frombuffer(data, ">u2").tolist()))
+
+    def write(self, name: str, word: int) -> bool:
+        """Write a register; return whether it was taken."""
+        register = self.registers[name]
+        return self.request(frames.write(register.address, list(register.to_registers(word))))[0] == 16
+
+    def write_si(self, name: str, value: float) -> None:
+        assert self.write(name, round(value / self.registers[name].lsb)), name
+
+    def beat(self) -> None:
+        self._beat += 1
+        assert self.write("heartbeat", self._beat)
+
+    def live(self, seconds: float) -> None:
+        """Let time pass, and beat."""
+        until_s = self._board.handle.time_s + seconds
+        while self._board.handle.time_s < until_s:
+            self.beat()
+            for _ in range(20):
+                self._board.run()
+
+    def bring_up(self, stiffness_n_per_m: float, damping_n_s_per_m: float, wall_m: float) -> None:
+        """Write a wall, acknowledge what stands, and arm."""
+        self.write_si("wall_stiffness", stiffness_n_per_m)
+        self.write_si("wall_damping", damping_n_s_per_m)
+        self.write_si("wall_position", wall_m)
+        assert self.write("commit", 1)
+        self.beat()
+        self.write("acknowledged", self.read("latched"))
+        self.write("acknowledge", 1)
+        self.write("clear_flags", 1)
+        self.beat()
+        assert self.write("arm", 1)

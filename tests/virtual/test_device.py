@@ -1,0 +1,125 @@
+"""The virtual board: brought up over its line as the page on safety says, held in a wall, and broken."""
+
+import pytest
+from serial_host import SerialHost
+
+from hardwall.model.supervisor import ARMED, DISARMED, TRIPPED, names
+from hardwall.sim.scene.errors import SceneError
+from hardwall.sim.scene.load import load
+from hardwall.sim.virtual.device import Hand, VirtualBoard
+
+SLOW = {"controller.clock_hz": 4_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
+"""As few clocks as the scene's axis needs: a second of it takes a few. Without friction a contact has one position."""
+STIFFNESS_N_PER_M, DAMPING_N_S_PER_M = 2000.0, 5.0
+WALL_M = 1e-3
+"""The wall, behind the count 0, which is where the board is powered up."""
+
+
+@pytest.fixture
+def board():
+    with VirtualBoard(load("seed-2011", SLOW)) as virtual:
+        yield virtual
+
+
+@pytest.fixture
+def host(board) -> SerialHost:
+    """A host in a steady contact: the hand pushes the handle into the wall with 4 N."""
+    host = SerialHost(board)
+    host.bring_up(STIFFNESS_N_PER_M, DAMPING_N_S_PER_M, WALL_M)
+    # The limit rises for half a second; a hand that pushed through it would be a runaway.
+    host.live(0.6)
+    board.hand.held_m, board.hand.push_n = None, 4.0
+    host.live(0.9)
+    assert host.read("state") == ARMED
+    return host
+
+
+def test_nothing_is_driven_until_a_host_arms(board):
+    board.hand.held_m = 4e-3
+    for _ in range(500):
+        board.run()
+    assert board.handle.position_m == pytest.approx(4e-3, abs=1e-4)
+    assert board.handle.force_n == 0
+    assert SerialHost(board).read("state") == DISARMED
+
+
+def test_the_wall_holds_what_pushes(board, host):
+    handle, scene = board.handle, board.scene
+    # The hand's 4 N are the spring's, within a count and the pulses' unevenness.
+    inside_m = 4.0 / STIFFNESS_N_PER_M
+    assert handle.position_m == pytest.approx(scene.protocol.start_m + WALL_M + inside_m, abs=4e-5)
+    driven_n = host.read("driven") * host.registers["driven"].lsb
+    assert driven_n == pytest.approx(-4.0, abs=0.2)
+
+
+def test_a_silent_host_trips_and_the_handle_is_free(board, host):
+    before_m = board.handle.position_m
+    for _ in range(400):
+        board.run()
+    assert board.handle.force_n == 0
+    assert board.handle.position_m > before_m + 0.05
+    assert host.read("state") == TRIPPED
+    assert "link_timeout" in names(host.read("latched"))
+
+
+def test_a_cut_wire_a_loop_and_swapped_wires_do_what_they_say(board, host):
+    board.hardware.switch("emergency_stop", False)
+    host.live(0.05)
+    assert names(host.read("latched")) == ["emergency_stop"]
+    assert board.handle.force_n == 0
+    board.hardware.switch("emergency_stop", True)
+    board.hand.held_m, board.hand.push_n = 5e-3, 0.0
+    host.live(0.6)
+    count = host.read("count")
+    board.hardware.wire("a", "low")
+    board.hardware.wire("b", "low")
+    board.hand.held_m = 8e-3
+    host.live(0.6)
+    assert board.handle.position_m > 7e-3
+    assert abs(host.read("count") - count) <= 2, "no edge comes through cut wires"
+
+
+def test_a_motor_that_is_swapped_runs_away_and_trips(board):
+    board.reversed = True
+    host = SerialHost(board)
+    assert host.write("supervisor_runaway", host.registers["supervisor_runaway"].high // 500)
+    host.bring_up(STIFFNESS_N_PER_M, DAMPING_N_S_PER_M, WALL_M)
+    board.hand.held_m, board.hand.push_n = None, 4.0
+    host.live(0.9)
+    assert host.read("state") == TRIPPED
+    assert "runaway" in names(host.read("latched"))
+
+
+def test_a_clock_that_stands_leaves_no_drive(board, host):
+    board.hardware.switch("clock", False)
+    for _ in range(3):
+        board.run()
+    assert board.handle.force_n == 0
+    board.hardware.switch("clock", True)
+    host.live(0.05)
+    assert host.read("state") == DISARMED
+
+
+def test_the_index_comes_once_a_turn(board):
+    host = SerialHost(board)
+    assert host.write("index_arm", 1)
+    board.hand.held_m = 9e-3
+    host.live(0.5)
+    assert host.read("index_latched") == 1
+
+
+def test_a_hand_settles_where_it_holds():
+    hand, position_m, velocity = Hand(5e-3, push_n=0.5), 0.0, 0.0
+    for _ in range(1000):
+        velocity += hand.force_n(0.35, position_m, velocity) / 0.35 * 1e-3
+        position_m += velocity * 1e-3
+    # The push leans on the spring.
+    assert position_m == pytest.approx(5e-3 + 0.5 / (0.35 * 30**2), abs=1e-5)
+
+
+def test_an_output_of_its_own_is_refused():
+    changes = {"output.dac_bits": 12, "output.full_scale_n": 20.0}
+    with pytest.raises(
+        SceneError, match=r"^seed-2011: output must be absent, for the pulses of the board are its output"
+    ):
+        VirtualBoard(load("seed-2011", changes))

@@ -1,0 +1,81 @@
+"""The virtual board's line: a serial port for a host, a port of the loopback for one at a time, and lost bytes."""
+
+import os
+import socket
+
+import pytest
+
+from hardwall.sim.virtual.line import Line
+
+
+@pytest.fixture
+def line():
+    with Line(0) as opened:
+        yield opened
+
+
+def guest(line: Line) -> socket.socket:
+    return socket.create_connection(("127.0.0.1", line.tcp_port), timeout=10)
+
+
+def test_every_byte_passes_a_terminal_as_it_is(line):
+    port = os.open(line.path, os.O_RDWR | os.O_NOCTTY)
+    data = bytes(range(256))
+    os.write(port, data)
+    assert line.take(1.0) == data
+    line.give(data)
+    assert os.read(port, 300) == data
+    os.close(port)
+    # A host may come back.
+    port = os.open(line.path, os.O_RDWR | os.O_NOCTTY)
+    os.write(port, b"again")
+    assert line.take(1.0) == b"again"
+    os.close(port)
+
+
+def test_one_guest_at_a_time_and_answers_go_to_who_spoke_last(line):
+    with guest(line) as first, guest(line) as second:
+        first.sendall(b"hello")
+        got = b""
+        while got != b"hello":
+            got += line.take(1.0)
+        line.give(b"answer")
+        assert first.recv(10) == b"answer"
+        assert second.recv(10) == b"", "the second guest is sent away"
+    while line.take(0.1) or line._guest:
+        pass
+    with guest(line) as third:
+        third.sendall(b"x")
+        while line.take(1.0) != b"x":
+            pass
+        line.give(b"y")
+        assert third.recv(10) == b"y"
+
+
+def test_a_guest_that_has_gone_is_no_end(line):
+    with guest(line) as first:
+        first.sendall(b"x")
+        while line.take(1.0) != b"x":
+            pass
+    for _ in range(3):
+        line.give(b"nobody hears this")
+        assert line.take(0.05) == b""
+
+
+def test_bytes_are_lost_as_ordered(line):
+    port = os.open(line.path, os.O_RDWR | os.O_NOCTTY)
+    line.drops = 3
+    os.write(port, b"abcdef")
+    assert line.take(1.0) == b"def"
+    assert line.drops == 0
+    os.close(port)
+
+
+def test_without_a_reader_bytes_are_lost_and_nothing_waits(line):
+    for _ in range(100):
+        line.give(b"z" * 4096)
+
+
+def test_a_port_that_is_taken_is_an_error(line):
+    with pytest.raises(OSError, match="in use"):
+        Line(line.tcp_port)
