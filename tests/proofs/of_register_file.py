@@ -57,7 +57,7 @@ def live_words_are_written(bench: Bench) -> None:
     block = register_file(bench)
     host = block.host
     written = host.start & (host.operation == Operation.WRITE)
-    # Only what was checked is written, which is the server's promise.
+    # Only what was checked is written, and a check refuses what is beyond the book.
     bench.assume(~written | (host.address < END))
     for word in block.design.registers.live:
         port = getattr(block, word.name)
