@@ -74,7 +74,7 @@ gate: $(VENV)/.test | tools ## netlists of three families of FPGAs beside the RT
 coverage: $(VENV)/.test | tools ## lines, branches and toggles of every block that its tests reach (an hour)
 	@$(VENV)/bin/python tests/cover.py $(ONLY)
 
-mutate: $(VENV)/.test | tools ## mutants of every block's netlist, which its own tests must kill (an hour)
+mutate: $(VENV)/.test | tools ## mutants of every block's netlist, which its own tests must kill (an hour or two)
 	@$(VENV)/bin/python tests/mutate.py $(ONLY)
 
 lint: $(VENV)/.test | tools ## style and common mistakes
