@@ -1,5 +1,5 @@
-// The Verilated board with what is around it (around_board.v) behind a C interface, which has the form of the axis's: so the
-// same compiled loop closes it. Its drive is what the amplifier takes: pulses, of which a sample has some.
+// The Verilated board with what is around it (around_board.v) behind a C interface, which has the form of the axis's: so
+// the same compiled loop closes it. Its drive is what the amplifier takes: pulses, of which a sample has some.
 //
 // Clocks are numbered from 0, the first after reset.
 
@@ -31,8 +31,8 @@ struct Context {
     int next_bit = 10;
     int64_t began = 0;
 
-    int64_t pulses_read = 0;
-    uint32_t taken = 0;
+    // What was read of the counters of pulses and of the board's bytes, which wrap.
+    uint32_t pulses_read = 0, taken = 0;
 
     static bool through(bool level, Wire wire) {
         return wire == SOUND ? level : wire == INVERTED ? !level : wire == HIGH;
@@ -135,9 +135,9 @@ int64_t board_advance(int64_t address, int64_t clocks_address, int64_t levels_ad
 int64_t board_read(int64_t address, int64_t what, int64_t, int64_t, int64_t) {
     Context& context = at(address);
     if (what != 0) return 0;
-    const int64_t pulses = static_cast<int32_t>(context.bench.pulses) - context.pulses_read;
-    context.pulses_read += pulses;
-    return pulses;
+    const uint32_t before = context.pulses_read;
+    context.pulses_read = context.bench.pulses;
+    return static_cast<int32_t>(context.pulses_read - before);
 }
 
 void board_send(void* address, const uint8_t* bytes, int64_t count) {
