@@ -63,7 +63,7 @@ def test_a_bug_must_be_of_a_part_that_the_source_has_once():
     code = Output.elaborate.__code__
     with pytest.raises(ValueError, match=r"^Output\.elaborate must have 'self\.drive' once, not \d+$"):
         Bug(Output.elaborate, "self.drive", "0").seeded().__enter__()
-    with Bug(Output.elaborate, "phase == 0) & allowed", "phase == 0) & 1").seeded():
+    with Bug(Output.elaborate, "turn & allowed", "turn & 1").seeded():
         assert Output.elaborate.__code__ is not code
     assert Output.elaborate.__code__ is code
     assert "& allowed" in inspect.getsource(Output.elaborate)

@@ -9,9 +9,9 @@ from typing import Annotated
 import typer
 
 from ..scene.load import load
-from ..virtual.device import GRASP_S, VirtualBoard
-from ..virtual.line import Line
 from ..virtual.orders import ORDERS, OrderError, obey
+from ..virtual.serial_port import Line
+from ..virtual.virtual_board import GRASP_S, VirtualBoard
 from .errors import BadInput, one_line
 from .options import EstimatorOption, SceneArgument, SetOption, changes_of, within
 from .terminal import log

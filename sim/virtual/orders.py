@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ..rtl.board_library import SWITCHES, WIRES, Level
-from .device import VirtualBoard
-from .line import Line
+from .serial_port import Line
+from .virtual_board import VirtualBoard
 
 PUSH_MAX_N = 1000.0
 DROPS_MAX = 1e6

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 from hardwall.sim.rtl.board_library import SWITCHES, WIRES
-from hardwall.sim.virtual.device import Hand
 from hardwall.sim.virtual.orders import ORDERS, OrderError, obey
+from hardwall.sim.virtual.virtual_board import Hand
 
 
 class Told:

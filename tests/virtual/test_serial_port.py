@@ -5,7 +5,7 @@ import socket
 
 import pytest
 
-from hardwall.sim.virtual.line import Line
+from hardwall.sim.virtual.serial_port import Line
 
 
 @pytest.fixture

@@ -1,12 +1,12 @@
 """The virtual board: brought up over its line as the page on safety says, held in a wall, and broken."""
 
 import pytest
-from serial_host import SerialHost
+from virtual_host import SerialHost
 
 from hardwall.model.supervisor import ARMED, DISARMED, TRIPPED, names
 from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load
-from hardwall.sim.virtual.device import Hand, VirtualBoard
+from hardwall.sim.virtual.virtual_board import Hand, VirtualBoard
 
 SLOW = {"controller.clock_hz": 4_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
 """As few clocks as the scene's axis needs: a second of it takes a few. Without friction a contact has one position."""

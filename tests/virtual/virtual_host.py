@@ -4,7 +4,7 @@ import numpy as np
 
 from hardwall.model.link.line import framed
 from hardwall.model.registers import RegisterMap
-from hardwall.sim.virtual.device import VirtualBoard
+from hardwall.sim.virtual.virtual_board import VirtualBoard
 from stimuli import frames
 
 
