@@ -35,8 +35,12 @@ def _run() -> tuple[int, str]:
     """Run the command that is called; return the exit code and the message of its failure."""
     try:
         import_module(".group", __package__).run()
-    except (BadInput, SceneError) as error:
-        return 2, str(error)
+    except (BadInput, ValueError) as error:
+        # A scene may be valid and its axis have no board, which is an error of the model; its import is slow.
+        of_board = hasattr(error, "field")
+        if not of_board and not isinstance(error, BadInput | SceneError):
+            raise
+        return 2, f"the scene's {error}" if of_board else str(error)
     except ModuleNotFoundError as error:
         extra = import_module(".extras", __package__).extra_of(error.name)
         if extra is None:

@@ -1,5 +1,6 @@
 """The command `virtual`."""
 
+import math
 import os
 import select
 import time
@@ -12,12 +13,18 @@ from ..scene.load import load
 from ..virtual.orders import ORDERS, OrderError, obey
 from ..virtual.serial_port import Line
 from ..virtual.virtual_board import GRASP_S, VirtualBoard
-from .errors import BadInput, one_line
+from .errors import one_line
 from .options import EstimatorOption, SceneArgument, SetOption, changes_of, within
 from .terminal import log
 
 JUDGED_S = 3.0
 """The time after which the speed is told."""
+LOOK_S = 0.05
+"""The longest wait for bytes of hosts between two looks for orders."""
+LINE_MAX = 1024
+"""The most bytes of an order: what is longer is none."""
+WAITING_MAX = 4096
+"""The host's bytes that may wait for the board's line until no more are taken: a few frames."""
 
 
 def command(
@@ -36,21 +43,14 @@ def command(
     if seconds is not None:
         within(seconds, "--seconds", 0.0, 1e6, "s")
     of = load(scene, changes_of(set_, controller__estimator=estimator))
-    with _line(tcp) as line, VirtualBoard(of) as board:
+    with Line(tcp) as line, VirtualBoard(of) as board:
         # The first call compiles, for which no host would wait.
         board.run()
         print(f"serial port: {line.path}")
         if line.tcp_port is not None:
             print(f"tcp port: 127.0.0.1:{line.tcp_port}")
         print(f"orders: {', '.join(f'{name} {order.operand}' for name, order in ORDERS.items())}", flush=True)
-        _run(board, line, speed, seconds)
-
-
-def _line(tcp: int | None) -> Line:
-    try:
-        return Line(tcp)
-    except OSError as error:
-        raise BadInput(f"--tcp {tcp} cannot be had: {os.strerror(error.errno)}") from None
+        _run(board, line, speed, math.inf if seconds is None else seconds)
 
 
 class _Orders:
@@ -59,38 +59,58 @@ class _Orders:
     def __init__(self) -> None:
         self._open, self._rest = True, b""
 
-    def take(self) -> list[str]:
-        """Return the lines that have come."""
+    def take(self) -> str | None:
+        """Return the next line that has come; None if there is none."""
+        if b"\n" not in self._rest:
+            self._read()
+        line, end, rest = self._rest.partition(b"\n")
+        if not end and len(line) < LINE_MAX:
+            return None
+        self._rest = rest
+        return line.decode(errors="replace")
+
+    def _read(self) -> None:
         with suppress(OSError, ValueError):
-            while self._open and select.select([0], [], [], 0)[0]:
-                data = os.read(0, 4096)
+            if self._open and select.select([0], [], [], 0)[0]:
+                data = os.read(0, LINE_MAX)
                 self._open = bool(data)
                 self._rest += data or b"\n" * bool(self._rest)
-        *lines, self._rest = self._rest.split(b"\n")
-        return [line.decode(errors="replace") for line in lines]
 
 
-def _run(board: VirtualBoard, line: Line, speed: float, seconds: float | None) -> None:
+def _run(board: VirtualBoard, line: Line, speed: float, seconds: float) -> None:
     """Let the board run, and carry bytes and orders to it."""
     orders, told = _Orders(), False
     began, begun_s = time.monotonic(), board.handle.time_s
-    last_s = float("inf") if seconds is None else seconds
-    while board.handle.time_s - begun_s < last_s - GRASP_S / 2:
-        took_s = time.monotonic() - began
-        passed_s = board.handle.time_s - begun_s
-        ahead_s = passed_s / speed - took_s if speed else 0.0
-        board.hardware.send(line.take(max(ahead_s, 0.0)))
-        for text in orders.take():
-            _obey(board, line, text)
+
+    def passed() -> tuple[float, float]:
+        """Return the simulated time and the real time since the beginning."""
+        return board.handle.time_s - begun_s, time.monotonic() - began
+
+    while board.handle.time_s - begun_s < seconds - GRASP_S / 2:
+        while True:
+            simulated_s, real_s = passed()
+            ahead_s = simulated_s / speed - real_s if speed else 0.0
+            _carry(board, line, orders, min(max(ahead_s, 0.0), LOOK_S))
+            if ahead_s <= 0:
+                break
         if not board.run():
-            raise RuntimeError(f"the handle is faster than its encoder: {board.handle.velocity_m_per_s:.3g} m/s")
+            raise RuntimeError(f"the handle is too fast for its encoder: {board.handle.velocity_m_per_s:.3g} m/s")
         line.give(board.hardware.take())
-        if not told and took_s > JUDGED_S:
+        if not told and real_s > JUDGED_S:
             told = True
-            log.print(f"it runs at {passed_s / took_s:.2f} of real time")
-    took_s = time.monotonic() - began
-    passed_s = board.handle.time_s - begun_s
-    print(f"{passed_s:g} s in {took_s:.3g} s: {passed_s / took_s:.2f} of real time")
+            log.print(f"it runs at {simulated_s / real_s:.2f} of real time")
+    simulated_s, real_s = passed()
+    print(f"{simulated_s:g} s in {real_s:.3g} s: {simulated_s / real_s:.2f} of real time")
+
+
+def _carry(board: VirtualBoard, line: Line, orders: _Orders, wait_s: float) -> None:
+    """Wait for a host for some time; carry its bytes to the board, unless many wait there already, and an order."""
+    if board.hardware.waiting < WAITING_MAX:
+        board.hardware.send(line.take(wait_s))
+    else:
+        time.sleep(wait_s)
+    if (text := orders.take()) is not None:
+        _obey(board, line, text)
 
 
 def _obey(board: VirtualBoard, line: Line, text: str) -> None:

@@ -16,9 +16,9 @@ module around_board #(
     input drive_enable, external_fault, emergency_stop,
     input uart_rx,
     input [9:0] heard_index,
-    output reg signed [31:0] pulses,   // clocks of full drive that the amplifier has taken, less those of negative drive
+    output reg signed [31:0] pulses,   // clocks of full drive that the amplifier has taken, less the negative ones
     output reg [31:0] heard,           // bytes from the board, of which the last 1024 are kept
-    output [7:0] heard_byte            // the byte `heard_index`
+    output [7:0] heard_byte            // the byte of that number
 );
   reg tick = 0, gone = 0;
   reg [31:0] left = 0;
@@ -67,12 +67,14 @@ module around_board #(
   reg [7:0] bytes [0:1023];
   reg [8:0] shift = 0;
   reg [3:0] bits = 0;
+  reg rested = 0;                      // the line has been high since the last byte
   reg [31:0] parts = 0;
   initial heard = 0;
   assign heard_byte = bytes[heard_index];
   always @(posedge tick)
     if (bits == 0) begin
-      if (!uart_tx) begin
+      rested <= uart_tx;
+      if (!uart_tx && rested) begin
         bits <= 10;
         parts <= BIT_PARTS / 2;
       end

@@ -122,7 +122,10 @@ int64_t board_advance(int64_t address, int64_t clocks_address, int64_t levels_ad
     int64_t taken = 0;
     while (context.clock < until) {
         const int64_t before = taken;
-        while (taken < count && clocks[taken] <= context.clock) context.number += levels[taken++] == Context::level_of(context.number + 1) ? 1 : -1;
+        for (; taken < count && clocks[taken] <= context.clock; ++taken) {
+            const bool upwards = levels[taken] == Context::level_of(context.number + 1);
+            context.number += upwards ? 1 : -1;
+        }
         if (taken != before) context.show_encoder();
         int64_t next = context.serve_line(until);
         if (taken < count) next = std::min(next, clocks[taken]);
@@ -144,6 +147,9 @@ void board_send(void* address, const uint8_t* bytes, int64_t count) {
     auto& waiting = static_cast<Context*>(address)->to_send;
     waiting.insert(waiting.end(), bytes, bytes + count);
 }
+
+// Return how many bytes of the host wait for the line.
+int64_t board_waiting(void* address) { return static_cast<Context*>(address)->to_send.size(); }
 
 // Take at most `room` bytes that the board has sent; return their number.
 int64_t board_take(void* address, uint8_t* bytes, int64_t room) {

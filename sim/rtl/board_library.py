@@ -78,7 +78,8 @@ class BoardHardware:
         self._library = library = ctypes.CDLL(str(build(self._spec)))
         library.board_open.restype = ctypes.c_void_p
         library.board_open.argtypes = [ctypes.c_int64, ctypes.c_int64, ctypes.c_double]
-        library.board_take.restype = ctypes.c_int64
+        library.board_take.restype = library.board_waiting.restype = ctypes.c_int64
+        library.board_waiting.argtypes = [ctypes.c_void_p]
         for name in ("board_send", "board_take"):
             getattr(library, name).argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64]
         for name in ("board_wire", "board_switch"):
@@ -94,6 +95,11 @@ class BoardHardware:
     def send(self, data: bytes) -> None:
         """Give the host's bytes to the line, which takes them one after the other at its rate."""
         self._library.board_send(self._context, data, len(data))
+
+    @property
+    def waiting(self) -> int:
+        """The host's bytes that the line has not taken yet."""
+        return self._library.board_waiting(self._context)
 
     def take(self) -> bytes:
         """Return what the board has sent since the last call."""

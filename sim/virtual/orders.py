@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from ...model.checks import shown
 from ..rtl.board_library import SWITCHES, WIRES, Level
 from .serial_port import Line
 from .virtual_board import VirtualBoard
@@ -41,7 +42,7 @@ def _number(text: str, least: float, most: float, unit: str) -> float:
     except ValueError:
         value = float("nan")
     if not least <= value <= most:
-        raise OrderError(f"must be followed by {least:g} to {most:g} {unit}, not {text!r}")
+        raise OrderError(f"must be followed by {least:g} to {most:g} {unit}, not {shown(text)}")
     return value
 
 
@@ -93,12 +94,12 @@ def obey(board: VirtualBoard, line: Line, text: str) -> None:
     """
     name, *operands = text.split() or [""]
     if name not in ORDERS:
-        raise OrderError(f"the order must be one of {', '.join(ORDERS)}, not {name!r}")
+        raise OrderError(f"the order must be one of {', '.join(ORDERS)}, not {shown(name)}")
     order = ORDERS[name]
     if len(operands) != 1:
-        raise OrderError(f"the order must be `{name} {order.operand}`, not {text.strip()!r}")
+        raise OrderError(f"the order must be `{name} {order.operand}`, not {shown(text.strip())}")
     if order.accepted and operands[0] not in order.accepted:
-        raise OrderError(f"{name} must be followed by one of {', '.join(order.accepted)}, not {operands[0]!r}")
+        raise OrderError(f"{name} must be followed by one of {', '.join(order.accepted)}, not {shown(operands[0])}")
     try:
         order.obey(board, line, operands[0])
     except OrderError as error:

@@ -10,6 +10,10 @@ from contextlib import suppress
 CHUNK = 4096
 
 
+class PortError(RuntimeError):
+    """There is no port for a host; one line that says why."""
+
+
 class Line:
     """Where the bytes of hosts come from, and where the board's go to: whoever has spoken last.
 
@@ -23,23 +27,29 @@ class Line:
         drops: how many of the next bytes to the board are lost.
 
     Raises:
-        OSError: if there is no pseudo-terminal, or the port cannot be had.
+        PortError: if there is no pseudo-terminal, or the port cannot be had.
     """
 
     def __init__(self, tcp_port: int | None = None):
         self.drops = 0
-        self._master, self._slave = pty.openpty()
+        try:
+            self._listener = None if tcp_port is None else socket.create_server(("127.0.0.1", tcp_port), backlog=1)
+        except OSError as error:
+            raise PortError(f"port {tcp_port} of 127.0.0.1 cannot be had: {os.strerror(error.errno)}") from None
+        try:
+            self._master, self._slave = pty.openpty()
+        except OSError as error:
+            raise PortError(f"there is no pseudo-terminal to be had: {error.strerror or error}") from None
         # The slave is kept open, so that the terminal stays when a host closes it.
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
-        self._listener = self._guest = None
+        self._guest = None
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._master, selectors.EVENT_READ, self._from_terminal)
-        if tcp_port is not None:
-            self._listener = socket.create_server(("127.0.0.1", tcp_port), backlog=1)
+        if self._listener:
             self._selector.register(self._listener, selectors.EVENT_READ, self._welcome)
-        self._answer_to_guest = False
+        self._hearer = self._to_nobody
         self._came = bytearray()
 
     def __enter__(self) -> "Line":
@@ -70,19 +80,28 @@ class Line:
     def give(self, data: bytes) -> None:
         """Give bytes of the board to the host that has spoken last; without room for them they are lost."""
         with suppress(BlockingIOError):
-            if self._answer_to_guest and self._guest:
-                try:
-                    self._guest.sendall(data)
-                except OSError:
-                    self._leave()
-            else:
-                os.write(self._master, data)
+            self._hearer(data)
+
+    def _to_terminal(self, data: bytes) -> None:
+        os.write(self._master, data)
+
+    def _to_guest(self, data: bytes) -> None:
+        """Give bytes to the guest; one that has gone is left."""
+        try:
+            self._guest.send(data)
+        except BlockingIOError:
+            raise
+        except OSError:
+            self._leave()
+
+    def _to_nobody(self, data: bytes) -> None:
+        """Lose the answer to a guest that has gone."""
 
     def _from_terminal(self) -> None:
         with suppress(BlockingIOError):
             data = os.read(self._master, CHUNK)
             self._came += data
-            self._answer_to_guest = False
+            self._hearer = self._to_terminal
 
     def _welcome(self) -> None:
         guest, _ = self._listener.accept()
@@ -106,10 +125,12 @@ class Line:
             self._leave()
             return
         self._came += data
-        self._answer_to_guest = True
+        self._hearer = self._to_guest
 
     def _leave(self) -> None:
         if self._guest:
             self._selector.unregister(self._guest)
             self._guest.close()
             self._guest = None
+            if self._hearer == self._to_guest:
+                self._hearer = self._to_nobody

@@ -5,8 +5,9 @@ import re
 import signal
 import socket
 import subprocess
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import pytest
 from pymodbus import FramerType
@@ -111,5 +112,41 @@ def test_a_port_that_is_taken_is_one_line():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         done = subprocess.run(command("--tcp", str(port)), capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == f"hardwall: error: port {port} of 127.0.0.1 cannot be had: Address already in use\n"
+
+
+@pytest.mark.parametrize("name", ["virtual", "verilog", "synth"])
+def test_an_axis_that_can_have_no_board_is_one_line(name, tmp_path):
+    slow = ["--set", "controller.clock_hz=400000", "--set", "encoder.count_m=20e-6"]
+    words = [str(HARDWALL), name, "seed-2011", *slow]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr == f"hardwall: error: --tcp {port} cannot be had: Address already in use\n"
+    assert done.stderr == "hardwall: error: the scene's clock_hz must be 460800 or more for a UART, not 400000\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("flood", ["/dev/zero", "nonsense"])
+def test_a_flood_of_orders_does_not_hold_it_up(flood, tmp_path):
+    if flood == "nonsense":
+        flood = tmp_path / flood
+        flood.write_text("y\n" * 100_000)
+    with open(flood, "rb") as orders:
+        words = command("--seconds", "0.02")
+        done = subprocess.run(words, stdin=orders, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stderr
+    assert "the order must be one of hold, " in done.stderr
+
+
+def test_it_is_no_faster_than_asked_for_however_much_a_host_says():
+    with running("--tcp", "0", "--speed", "0.2", "--seconds", "0.3") as (process, said):
+        with socket.create_connection(("127.0.0.1", int(said["tcp"])), timeout=60) as host:
+            host.setblocking(False)
+            while process.poll() is None:
+                with suppress(OSError):
+                    host.send(b"x")
+                time.sleep(0.0003)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    simulated_s, real_s = map(float, re.match(r"([\d.]+) s in ([\d.]+) s", out).groups())
+    assert simulated_s <= 0.2 * real_s + 0.002

@@ -1,11 +1,12 @@
 """The virtual board's line: a serial port for a host, a port of the loopback for one at a time, and lost bytes."""
 
 import os
+import pty
 import socket
 
 import pytest
 
-from hardwall.sim.virtual.serial_port import Line
+from hardwall.sim.virtual.serial_port import Line, PortError
 
 
 @pytest.fixture
@@ -60,6 +61,14 @@ def test_a_guest_that_has_gone_is_no_end(line):
     for _ in range(3):
         line.give(b"nobody hears this")
         assert line.take(0.05) == b""
+    with guest(line) as second:
+        assert line.take(1.0) == b""
+        line.give(b"nor this")
+        second.sendall(b"x")
+        while line.take(1.0) != b"x":
+            pass
+        line.give(b"y")
+        assert second.recv(10) == b"y"
 
 
 def test_bytes_are_lost_as_ordered(line):
@@ -77,5 +86,29 @@ def test_without_a_reader_bytes_are_lost_and_nothing_waits(line):
 
 
 def test_a_port_that_is_taken_is_an_error(line):
-    with pytest.raises(OSError, match="in use"):
+    with pytest.raises(
+        PortError, match=rf"^port {line.tcp_port} of 127\.0\.0\.1 cannot be had: Address already in use$"
+    ):
         Line(line.tcp_port)
+
+
+def test_without_a_terminal_it_is_an_error_that_says_so(monkeypatch):
+    def none() -> tuple[int, int]:
+        raise OSError("out of pty devices")
+
+    monkeypatch.setattr(pty, "openpty", none)
+    with pytest.raises(PortError, match=r"^there is no pseudo-terminal to be had: out of pty devices$"):
+        Line()
+
+
+def test_a_guest_that_reads_slowly_loses_bytes_and_stays(line):
+    with guest(line) as slow:
+        slow.sendall(b"x")
+        while line.take(1.0) != b"x":
+            pass
+        for _ in range(2000):
+            line.give(b"z" * 4096)
+        assert slow.recv(4096) == b"z" * 4096
+        slow.sendall(b"y")
+        while line.take(1.0) != b"y":
+            pass
