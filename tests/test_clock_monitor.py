@@ -11,7 +11,7 @@ from hardwall.model import clock_monitor
 from hardwall.model.clock_monitor import OSCILLATOR_HZ, START, Design, Inputs, State
 from hardwall.testing import SAMPLES, SEED, Recorded, check, parameters, play, simulate
 
-SLOW_ECP5_HZ, SLOW_ICE40_HZ = 2.16e6, 5.4e6
+SLOW_ECP5_HZ, SLOW_ICE40_HZ, SLOW_GW1NR_HZ = 2.16e6, 5.4e6, 5.625e6
 """The internal oscillators of `constraints/`, a tenth too slow."""
 CLOCKS_HZ = [460_800, 12_000_000, 25_000_000, 50_000_000, 1_000_000_000]
 
@@ -109,7 +109,9 @@ def test_a_clock_that_comes_back_makes_edges_before_it_is_taken_to_run(clock_hz)
         assert state.running
 
 
-@pytest.mark.parametrize(("oscillator_hz", "promised_s"), [(SLOW_ECP5_HZ, 21e-6), (SLOW_ICE40_HZ, 9e-6)])
+@pytest.mark.parametrize(
+    ("oscillator_hz", "promised_s"), [(SLOW_ECP5_HZ, 21e-6), (SLOW_ICE40_HZ, 9e-6), (SLOW_GW1NR_HZ, 8e-6)]
+)
 def test_a_stop_is_found_in_the_time_that_pages_promise_of_any_clock(oscillator_hz, promised_s):
     random = plain.Random(SEED)
     # The longest level of a beat is that of a clock for which a shorter one just does not last long enough.
@@ -123,7 +125,8 @@ def test_a_stop_is_found_in_the_time_that_pages_promise_of_any_clock(oscillator_
 
 
 @pytest.mark.parametrize(
-    ("clock_hz", "oscillator_hz", "promised_s"), [(25_000_000, SLOW_ECP5_HZ, 15e-6), (12_000_000, SLOW_ICE40_HZ, 6e-6)]
+    ("clock_hz", "oscillator_hz", "promised_s"),
+    [(25_000_000, SLOW_ECP5_HZ, 15e-6), (12_000_000, SLOW_ICE40_HZ, 6e-6), (27_000_000, SLOW_GW1NR_HZ, 6e-6)],
 )
 def test_a_stop_of_a_boards_own_clock_is_found_in_the_time_that_pages_promise(clock_hz, oscillator_hz, promised_s):
     design, random = Design(clock_hz), plain.Random(SEED)

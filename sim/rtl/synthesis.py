@@ -177,9 +177,10 @@ def _timing(part: Part, report: dict) -> tuple[float, str]:
     path = next(entry["path"] for entry in paths if entry["from"] == entry["to"] == f"posedge {clock}")
     ends = f"{_signal(path[0]['from'])} to {_signal(path[-1]['to'])}"
     if part.multiplier_ns is not None:
+        clocked = re.escape(f"posedge {clock}")
         # Blocks without registers have no clock: nextpnr treats them as clocked by a constant.
-        into = _delay_ns(report, r"posedge clk", r"PACKER_GND_NET")
-        out = _delay_ns(report, r"PACKER_GND_NET", r"posedge clk")
+        into = _delay_ns(report, clocked, r"PACKER_GND_NET")
+        out = _delay_ns(report, r"PACKER_GND_NET", clocked)
         if into is not None and out is not None and into + part.multiplier_ns + out > longest:
             longest, ends = into + part.multiplier_ns + out, "through a multiplier"
     return longest, ends
