@@ -3,8 +3,7 @@
 // A row is its inputs and, above them, how many clocks later than the next clock the next row comes. Its strobe is one
 // clock long; its inputs stay until the next row's, but for the momentary ones, which are complements from the second
 // clock on. A clock at which a watched port is high is an event: the values of all ports and, above them, the number of
-// the clock in the batch. The folder +scratch has the rows and gets the events,
-// a hexadecimal word a line.
+// the clock in the batch. The folder +scratch has the rows and gets the events, a hexadecimal word a line.
 //
 // A batch that starts while `bench_clk` is low makes its own clocks, in no time of the simulator: a single evaluation
 // serves them all, and cocotb has no turn between them. A batch that starts while it is high takes the bench's clocks, as
