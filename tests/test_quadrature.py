@@ -20,6 +20,7 @@ from hardwall.testing import SAMPLES, SEED, Recorded, check, parameters, play, r
 from stimuli.pins import (
     INPUTS,
     directed,
+    faulty,
     joined,
     jumping,
     meeting,
@@ -156,6 +157,16 @@ def test_a_jump_of_both_channels_is_illegal_and_not_counted(state):
     assert (seen["illegal"] == (jumps > 0)).all()
     told = {"stamp", "indexed", "illegal", "illegal_count", "fault"}
     assert not any(seen[name].any() for name in OUTPUTS if name not in told)
+
+
+@pytest.mark.parametrize("widths", [WIDE, NARROW])
+@pytest.mark.parametrize("state", range(4))
+def test_the_count_of_illegal_changes_stops_when_it_is_full_until_a_clear(state, widths):
+    params = Quadrature(**widths).params
+    seen = expected(params, faulty(state))
+    changes = np.clip(np.arange(320) - 9 - TO_COUNT, 0, 300)
+    wanted = np.where(np.arange(320) < 315, np.minimum(changes, 2**params.fault_width - 1), 0)
+    assert (seen["illegal_count"] == wanted).all()
 
 
 @pytest.mark.parametrize("glitch_clocks", [0, 1, 15])

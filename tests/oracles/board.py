@@ -6,18 +6,16 @@ from amaranth.hdl import Cat, Module, Shape
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
-from hardwall.hdl.board import ENCODER, Board
+from hardwall.hdl.board import Board
 from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.link.link import Link
 from hardwall.hdl.supervised import LOOPS, SHOWN
-from hardwall.model import output, quadrature, wall
-from hardwall.model.estimators.estimate import estimate
 from hardwall.model.register import VALUE_BITS
 from hardwall.model.registers import RegisterMap
-from hardwall.model.supervised import FIXED
 from hardwall.testing.packing import Packing
 from stimuli.specs import spec
 
+from .axis import AxisTwin
 from .supervised import Follower
 
 BAUD = 3_000_000
@@ -74,34 +72,22 @@ class Watched(wiring.Component):
         return m
 
 
-class Twin:
+class Twin(AxisTwin):
     """The state of the board's axis and its pulses, clock for clock, from the models alone.
 
-    The blocks have their own benches; the twin adds the clock edge at which their results can be seen. When the link
-    asks for something, and what the axis shows to its monitors, is taken from the board.
+    When the link asks for something, and what the axis shows to its monitors, is taken from the board.
     """
 
     def __init__(self, board: Board):
-        self.spec, self.board = board.spec, board
-        self.design = self.spec.design
-        self.period, self.drive_bits = self.spec.clocks_per_sample, self.spec.force.width - 2
-        self.clocks = 0
-        self.words = {word.name: word.reset for word in self.design.words} | self._fixed()
-        self.restart, self.waiting = 0, None
-        self.decoder_params = self.spec.design.decoder
-        self.decoder, self.estimator, self.output = quadrature.START, self.design.start().estimator, output.START
-        self.velocity = self.wall_force = self.drive = self.sticky = 0
-        self.allowed = False
-        self.due, self.raised = {}, {}
+        super().__init__(board.axis.design)
+        self.board, self.drive_bits = board, self.spec.force.width - 2
+        self.asked: dict[str, int] = {}
         self.follower = Follower(board.axis.design, IDLE)
         self.sum = self.pulse = self.sign = 0
 
-    def _fixed(self) -> dict[str, int]:
-        return {word.name: word.format.max for word in self.design.words if word.name in FIXED}
-
     def shown(self) -> tuple:
         """Return what the status registers are made from, as a snapshot at the next edge takes it."""
-        own = self.drive, self.velocity, self.wall_force, self.sticky | self._raised()
+        own = self.drive, self.velocity, self.wall_force, self.flags
         return self.decoder, own, self.follower.wanted()
 
     def status(self, shown: tuple) -> dict[str, int]:
@@ -117,44 +103,6 @@ class Twin:
             status[register.name] = value
         return status
 
-    @property
-    def strobe(self) -> bool:
-        """Whether the next edge takes a sample."""
-        return self.clocks % self.period == self.period - 1
-
-    def _raised(self) -> int:
-        """Return the flags that rise with the next edge; the pin already shows them."""
-        encoder = self.decoder.illegal | self.decoder.overspeed << 1 if self.strobe else 0
-        return self.raised.get(self.clocks, 0) | encoder
-
-    def _sample(self) -> None:
-        d, decoder, now = self.design, self.decoder, self.clocks
-        params = d.params(self.words)
-        self.estimator, velocity, raised = estimate(
-            params.estimator, self.estimator, quadrature.seen(decoder), self.restart
-        )
-        force = wall.render(params.wall, decoder.count, velocity)
-        fault = decoder.illegal | decoder.overspeed
-
-        def allow() -> None:
-            self.allowed = not fault
-
-        def drive() -> None:
-            # The output stage slews from the drive, which a low enable has made zero.
-            begun = self.output._replace(drive=self.drive)
-            self.output, limited = output.step(params.output, begun, force, self.allowed)
-            self.drive = self.output.drive
-            self.raised[self.clocks + 1] = limited << params.output_bit
-
-        # A result is seen `latency` edges after the strobe, so its register is loaded at the edge before.
-        estimated = now + d.estimator.latency
-        walled = estimated + d.wall.latency
-        self.due[estimated - 1] = lambda: setattr(self, "velocity", velocity)
-        self.raised[estimated] = raised << params.estimator_bit
-        self.due[walled - 1] = lambda: setattr(self, "wall_force", force)
-        self.due[walled] = allow
-        self.due[now + d.latency_to_drive - 1] = drive
-
     def edge(self, pins: dict[str, int], asked: dict[str, int], seen: dict[str, int]) -> None:
         """Advance by one clock edge, with the pins, what the link asks, and what the axis shows just before it."""
         supervisor = self.follower.supervisor
@@ -163,23 +111,8 @@ class Twin:
 
         enabled = self.follower.level("drive_enable")
         self.follower.edge({**pins, **asked}, seen)
-        self.sticky = (0 if asked["clear_flags"] else self.sticky) | self._raised()
-        channels = [pins[name] for name in ENCODER[:3]]
-        inputs = quadrature.Inputs(*channels, self.words["encoder_glitch_clocks"], self.words["encoder_invert"])
-        if self.strobe:
-            if self.waiting:
-                assert self.waiting.items() <= (asked | self._fixed()).items(), "words moved before the axis had them"
-                self.words, self.waiting = self.waiting, None
-            self._sample()
-            self.restart = 0
-        pulses = [asked[name] for name in ("preload", "preload_count", "index_arm", "clear_flags")]
-        self.decoder = quadrature.step(self.decoder_params, self.decoder, inputs, quadrature.Strobes(*pulses))
-        if self.clocks in self.due:
-            self.due.pop(self.clocks)()
-        if not enabled:
-            self.drive, self.allowed = 0, False
-        if asked["preload"]:
-            self.restart = 1
+        if self.strobe and self.pending:
+            assert self.asked.items() <= asked.items(), "words moved before the axis had them"
+        self.advance({**pins, **asked}, enabled)
         if asked["commit"]:
-            self.waiting = {name: asked[name] for name in self.words if name in asked} | self._fixed()
-        self.clocks += 1
+            self.asked = {name: asked[name] for name in self.words if name in asked}

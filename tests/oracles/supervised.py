@@ -29,6 +29,12 @@ class Follower:
         self._pins = [{name: int(name in high) for name in PINS}] * (SYNCHRONISER + 1)
         self.inverted = self.reached = self._encoder_inverted = 0
 
+    def restart(self, given: dict[str, int]) -> None:
+        """Advance by a clock edge under reset, which the synchronisers of the pins do not have."""
+        self._pins = [*self._pins[1:], {name: given[name] for name in PINS}]
+        self._monitors, self.supervisor = monitors.START, supervisor.START
+        self.inverted = self._encoder_inverted = 0
+
     def wanted(self) -> dict[str, int]:
         """Return the outputs now, by name."""
         shown = {name: getattr(self.supervisor, name) for name in SHOWN}

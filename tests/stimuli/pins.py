@@ -48,6 +48,12 @@ def jumping(state: int) -> dict[str, np.ndarray]:
     return stimulus(40, **pins(state + 2 * (np.maximum(clock // 5 - 1, 0) % 2)))
 
 
+def faulty(state: int) -> dict[str, np.ndarray]:
+    """Return both pins changing together at 300 clocks in a row, from clock 10 on: more than 8 bits count."""
+    clock = np.arange(320)
+    return stimulus(320, **pins(state + 2 * (np.clip(clock - 9, 0, 300) % 2)), clear=at(320, 315))
+
+
 def starting(levels: int, edge: int, glitch_clocks: int) -> dict[str, np.ndarray]:
     """Return pins at the given levels, and a change of A at the clock `edge` after the reset."""
     a = (np.arange(30) > edge) ^ (levels & 1)
@@ -74,6 +80,7 @@ def directed() -> dict[str, np.ndarray]:
         *(pulses(channel, glitch_clocks) for channel in "abz" for glitch_clocks in range(16)),
         *(turning(way) for way in (1, -1)),
         *(jumping(state) for state in range(4)),
+        *(faulty(state) for state in range(4)),
         *(starting(levels, edge, length) for levels in range(8) for edge in range(6) for length in (0, 1, 15)),
         *(meeting(strobe, when) for strobe in ("preload", "arm", "clear", "reset") for when in range(1, 60)),
     )

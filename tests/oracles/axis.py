@@ -1,0 +1,124 @@
+"""An axis clock for clock from the models of its blocks: decoder, estimator, wall and output stage."""
+
+from collections.abc import Callable
+
+from hardwall.model import output, quadrature, wall
+from hardwall.model.estimators.estimate import estimate
+from hardwall.model.supervised import FIXED, Design
+
+PULSES = ("preload", "preload_count", "index_arm", "clear_flags")
+DECODED = (
+    "count", "stepped", "indexed", "illegal", "overspeed", "illegal_count", "index_count", "index_armed",
+    "index_latched", "stamp", "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall",
+)  # fmt: skip
+"""Outputs of an axis that are its decoder's, by the same names."""
+
+
+class AxisTwin:
+    """The state of a supervised axis, without what supervises it.
+
+    The blocks have their own benches; the twin adds the clock edge at which their results can be seen.
+
+    Args:
+        design: the axis's.
+
+    Attributes:
+        clocks: the edges since the reset.
+        words: the words of the axis that act now.
+        pending: whether words wait for the next sample.
+    """
+
+    def __init__(self, design: Design):
+        self.supervised, self.spec, self.design = design, design.spec, design.spec.design
+        self.period, self.decoder_params = self.spec.clocks_per_sample, self.design.decoder
+        self.restarted()
+
+    def restarted(self) -> None:
+        """Take the state after a reset."""
+        self.clocks = self.restart = 0
+        self.words, self.pending = {word.name: word.reset for word in self.design.words} | self.fixed(), False
+        self.decoder, self.estimator, self.output = quadrature.START, self.design.start().estimator, output.START
+        self.velocity = self.wall_force = self.drive = self.sticky = 0
+        self.allowed = False
+        self.due: dict[int, Callable[[], None]] = {}
+        self.raised: dict[int, int] = {}
+        self.pulses: dict[int, dict[str, int]] = {}
+
+    def fixed(self) -> dict[str, int]:
+        """Return the words that no host writes."""
+        return {word.name: word.format.max for word in self.design.words if word.name in FIXED}
+
+    @property
+    def strobe(self) -> bool:
+        """Whether the next edge takes a sample."""
+        return self.clocks % self.period == self.period - 1
+
+    def _raised(self) -> int:
+        """Return the flags that rise with the next edge; the pins already show them."""
+        encoder = self.decoder.illegal | self.decoder.overspeed << 1 if self.strobe else 0
+        return self.raised.get(self.clocks, 0) | encoder
+
+    @property
+    def flags(self) -> int:
+        """The flags that the pins show."""
+        return self.sticky | self._raised()
+
+    def outputs(self) -> dict[str, int]:
+        """Return every output of the axis now, by name."""
+        own = {name: getattr(self, name) for name in ("drive", "velocity", "wall_force", "flags")}
+        pulses = dict.fromkeys(("sampled", "actuated", "estimated", "saturated", "strobe_busy"), 0)
+        decoded = {name: getattr(self.decoder, name) for name in DECODED} | {"edge_kind": self.decoder.edge}
+        return {**own, **decoded, **pulses, **self.pulses.get(self.clocks, {}), "commit_pending": int(self.pending)}
+
+    def _sample(self) -> None:
+        d, decoder, now = self.design, self.decoder, self.clocks
+        params = d.params(self.words)
+        self.estimator, velocity, raised = estimate(
+            params.estimator, self.estimator, quadrature.seen(decoder), self.restart
+        )
+        force = wall.render(params.wall, decoder.count, velocity)
+        fault = decoder.illegal | decoder.overspeed
+
+        def allow() -> None:
+            self.allowed = not fault
+
+        def drive() -> None:
+            # The output stage slews from the drive, which a low enable has made zero.
+            begun = self.output._replace(drive=self.drive)
+            self.pulses[self.clocks + 1] = {"sampled": 1, "actuated": int(begun.phase == 0)}
+            self.output, limited = output.step(params.output, begun, force, self.allowed)
+            self.drive = self.output.drive
+            self.raised[self.clocks + 1] = limited << params.output_bit
+
+        # A result is seen `latency` edges after the strobe, so its register is loaded at the edge before.
+        estimated = now + d.estimator.latency
+        walled = estimated + d.wall.latency
+        self.due[estimated - 1] = lambda: setattr(self, "velocity", velocity)
+        self.raised[estimated] = raised << params.estimator_bit
+        self.pulses[estimated] = {"estimated": 1, "saturated": int(raised != 0)}
+        self.due[walled - 1] = lambda: setattr(self, "wall_force", force)
+        self.due[walled] = allow
+        self.due[now + d.latency_to_drive - 1] = drive
+
+    def advance(self, given: dict[str, int], enabled: int) -> None:
+        """Advance by one clock edge, with the inputs just before it and the level of `drive_enable` there."""
+        self.sticky = (0 if given["clear_flags"] else self.sticky) | self._raised()
+        channels = [given[name] for name in ("encoder_a", "encoder_b", "encoder_z")]
+        inputs = quadrature.Inputs(*channels, self.words["encoder_glitch_clocks"], self.words["encoder_invert"])
+        if self.strobe:
+            if self.pending:
+                self.words = {name: given[name] for name in self.words if name in given} | self.fixed()
+                self.pending = False
+            self._sample()
+            self.restart = 0
+        pulses = quadrature.Strobes(*(given[name] for name in PULSES))
+        self.decoder = quadrature.step(self.decoder_params, self.decoder, inputs, pulses)
+        if self.clocks in self.due:
+            self.due.pop(self.clocks)()
+        if not enabled:
+            self.drive, self.allowed = 0, False
+        if given["preload"]:
+            self.restart = 1
+        if given["commit"]:
+            self.pending = True
+        self.clocks += 1
