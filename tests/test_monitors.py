@@ -6,7 +6,7 @@ import pytest
 
 from hardwall.hdl.monitors import Monitors
 from hardwall.model import monitors
-from hardwall.model.monitors import IDLE_EDGES, MADE, START, Inputs
+from hardwall.model.monitors import IDLE_EDGES, LOSS_BITS, MADE, START, Inputs
 from hardwall.model.supervisor import CAUSES, names
 from hardwall.sim.scene import load
 from hardwall.testing import SAMPLES, Recorded, check, parameters, play, rng, simulate
@@ -49,6 +49,10 @@ def campaign(d: monitors.Design, clocks: int) -> dict[str, np.ndarray]:
         "a": a, "a_n": a ^ bit(0.7, 30), "b": b, "b_n": b ^ bit(0.7, 30),
         **{word_.name: word(word_.format.min, word_.format.max, 300) for word_ in d.words},
     }  # fmt: skip
+    # At first both channels equal their complements for longer than the largest word lets them.
+    lost = slice(1, (1 << LOSS_BITS) + 10)
+    columns["reset"][lost], columns["supervisor_loss"][lost] = 0, (1 << LOSS_BITS) - 1
+    columns["a_n"][lost], columns["b_n"][lost] = a[lost], b[lost]
     columns["reset"][0] = 1
     return columns
 

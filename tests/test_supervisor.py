@@ -1,7 +1,6 @@
 """The supervisor: RTL against model at every clock, and the model's promises about arming, trips and limits."""
 
 import dataclasses
-import random as plain
 
 import cocotb
 import numpy as np
@@ -10,73 +9,40 @@ import pytest
 from hardwall.hdl.supervisor import Supervisor
 from hardwall.model import supervisor
 from hardwall.model.supervisor import ALL, ARMED, CAUSES, COUNT_BITS, DISARMED, LINK, REQUIRED, START, TRIPPED, Inputs
-from hardwall.testing import SAMPLES, SEED, Recorded, check, parameters, play, simulate
+from hardwall.testing import SAMPLES, Recorded, check, parameters, play, simulate
+from stimuli.hosts import Host, settled
 from stimuli.specs import spec
 
-# A clock at which milliseconds are few clocks: the heartbeat is overdue after 1 000.
-SLOW = {"clock_hz": 20_000, "sample_hz": 500, "actuation_hz": 500}
+# Clocks at which milliseconds are few clocks: 20, for which the divider of `alive` has nothing to count, and 1 000.
+SLOW = {"clock_hz": 20_000, "sample_hz": 500, "actuation_hz": 500, "gains": None, "speed_max_m_per_s": 0.01}
+SLOWER = {
+    "slow": ("paper", SLOW),
+    "narrow": ("narrow", {"clock_hz": 1_000_000, "sample_hz": 10_000, "actuation_hz": 10_000}),
+}
+MOST = (1 << COUNT_BITS) - 1
 OUTPUTS = supervisor.State._fields[: supervisor.State._fields.index("counts") + 1]
 
 
 def design(name: str) -> supervisor.Design:
-    axis = spec("paper" if name == "slow" else name)
-    return supervisor.Design(
-        dataclasses.replace(axis, gains=None, speed_max_m_per_s=0.01, **SLOW) if name == "slow" else axis
-    )
+    of, slower = SLOWER.get(name, (name, {}))
+    return supervisor.Design(dataclasses.replace(spec(of), **slower))
 
 
 def make(name: str) -> Recorded:
     return Recorded(Supervisor(design(name)))
 
 
-def settled(d: supervisor.Design, **changed: int) -> Inputs:
-    """Return inputs with every word as after reset, the loops closed and nothing asked."""
-    return Inputs(enable=1, **{word.name: word.reset for word in d.words})._replace(**changed)
-
-
 def campaign(name: str, clocks: int) -> dict[str, np.ndarray]:
-    """Return inputs at every clock from a host that looks at the model: it arms, beats, errs, and is interrupted."""
-    d, random = design(name), plain.Random(SEED)
-    state, rows, inputs, beating = START, [], settled(d), True
-    largest = {word.name: word.format.max for word in d.words}
-    for clock in range(clocks):
-        reset = int(clock == 0 or random.random() < 1e-4)
-        act, pulses = random.random(), {}
-        if act < 0.02 and state.state == DISARMED:
-            pulses = {"arm": 1}
-        elif act < 0.02 and state.state == TRIPPED:
-            wrong = random.random() < 0.3
-            pulses = {
-                "acknowledge": 1,
-                "acknowledged": state.latched ^ (1 << random.randrange(len(CAUSES)) if wrong else 0),
-            }
-        elif act < 0.03:
-            word = random.choice(d.words).name
-            top = largest[word] >> random.randrange(largest[word].bit_length())
-            inputs = inputs._replace(**{word: random.randint(0, top)})
-        elif act < 0.032:
-            loops = {"enable": int(random.random() < 0.8), "referenced": random.randrange(2)}
-            inputs = settled(d, heartbeat=inputs.heartbeat, **loops)
-            beating = random.random() < 0.7
-        elif act < 0.033:
-            pulses = {random.choice(("arm", "disarm", "acknowledge")): 1}
-        elif act < 0.036:
-            pulses = {
-                "causes": 1 << random.randrange(len(CAUSES)) | (random.randrange(ALL) if random.random() < 0.1 else 0)
-            }
-        elif act < 0.05 and beating:
-            inputs = inputs._replace(heartbeat=random.randrange(1 << 16))
-        drive = random.randint(d.force.min, d.force.max) >> random.randrange(d.force.width)
-        if random.random() < 0.3:
-            # At the limit, and one beside it.
-            limit = min(state.ceiling >> d.params.ramp_fraction, inputs.supervisor_force_limit)
-            drive = random.choice((-1, 1)) * (limit + random.randint(-1, 1))
-        now = inputs._replace(
-            strobe=int(random.random() < 0.3), drive=drive, stamp=clock % (1 << d.stamp_width), **pulses
-        )
-        rows.append((reset, *now))
-        state = START if reset else supervisor.step(d.params, state, now)
-    return dict(zip(("reset", *Inputs._fields), np.array(rows, np.int64).T, strict=True))
+    """Return inputs at every clock: a host that is interrupted at random, and every cause until its count is full."""
+    host = Host(design(name))
+    host.clock(reset=1)
+    host.is_interrupted(clocks)
+    host.clock(reset=1)
+    for bit in range(len(CAUSES)):
+        host.trips(bit, MOST + 2)
+    host.clock()
+    host.clock(reset=1)
+    return dict(zip(("reset", *Inputs._fields), np.array(host.rows, np.int64).T, strict=True))
 
 
 def expected(d: supervisor.Design, columns: dict[str, np.ndarray]) -> dict[str, list[int]]:
@@ -101,6 +67,7 @@ async def follows_model(dut):
     assert any(drive < 0 for drive in after["driven"])
     assert set(after["live"]) == {0, 1}
     assert set(after["alive"]) == {0, 1}
+    assert max(after["counts"]) == (1 << COUNT_BITS * len(CAUSES)) - 1
 
 
 @pytest.mark.parametrize("name", ["slow", "narrow"])
@@ -283,7 +250,7 @@ def test_every_cause_is_counted_once_however_long_it_stands_and_the_counts_satur
                     bench.clock(causes=1 << bit)
                 bench.clock()
                 counts = bench.state.counts
-                assert counts == min(times, (1 << COUNT_BITS) - 1) << COUNT_BITS * bit
+                assert counts == min(times, MOST) << COUNT_BITS * bit
 
 
 def test_alive_is_a_square_wave_of_its_rate_only_while_armed():

@@ -88,8 +88,8 @@ class Wire:
         await self.agree(self.twin.gap())
         await self.clocks(GAP)
 
-    async def agree(self, expected: Verdict | None, answer: bytes = b"\x01\x83\x02") -> None:
-        """Compare the verdict, the bytes kept and the framed answer with the twin's."""
+    async def agree(self, expected: Verdict | None) -> None:
+        """Compare the verdict, the bytes kept and a framed answer of any length with the twin's."""
         await self.clocks(4)
         assert self.ended() == (expected is not None)
         if expected is None:
@@ -104,6 +104,7 @@ class Wire:
                 kept.append(int(self.dut.kept.value))
             assert bytes(kept) == bytes(self.twin.frame)
             assert int(self.dut.function.value) == self.twin.frame[1]
+            answer = self.random.bytes(self.random.integers(1, FRAME_MAX - 1))
             assert await self.answered(answer) == framed(answer)
         else:
             await self.finish()
@@ -117,7 +118,7 @@ class Wire:
     async def answered(self, answer: bytes) -> bytes:
         """Give an answer to the line, to a transmitter that is ready at random; return what the line sends."""
         sent, left = [], list(answer)
-        for _ in range(200):
+        for _ in range(100 * (len(answer) + 2)):
             ready = int(self.random.random() < 0.5)
             self.bench.drive(ready=ready, answering=bool(left), answer=left[0] if left else 0, arrived=self.noise)
             await RisingEdge(self.dut.clk)
@@ -160,6 +161,23 @@ async def frames_end_and_are_judged_as_the_twin_does(dut):
         if wire.twin.draining or random.random() < 0.5 or case < 0.45:
             await wire.gap()
     assert set(wire.seen) == set(Verdict) - {Verdict.OVERRUN}
+
+
+@cocotb.test()
+async def frames_up_to_the_largest_are_kept_whole_and_longer_ones_are_spoilt(dut):
+    wire = Wire(dut)
+    await wire.bench.reset()
+    for function, place in COUNTED.items():
+        most = FRAME_MAX - place - 3
+        for count in (0, most // 3, most - 1, most, most + 1, 255):
+            head = bytes([1, function]) + wire.random.bytes(place - 2) + bytes([count])
+            # What would be longer than a frame may be has a good CRC where it must end.
+            frame = framed(head + wire.random.bytes(min(count, most)))
+            for byte in frame:
+                await wire.send(byte)
+            assert len(wire.twin.frame) == len(frame)
+            assert wire.seen[-1] == (Verdict.REQUEST if count <= most else Verdict.SPOILT)
+            await wire.gap()
 
 
 @cocotb.test()
