@@ -57,8 +57,9 @@ class Line(wiring.Component):
     is a frame of 256 bytes without an end, with a bad CRC or with a spoilt byte. The model says why no single flipped
     bit passes.
 
-    After a spoilt frame, bytes are dropped until a gap. Bytes that arrive while a frame is judged, is `ended`, or its
-    answer is under way are dropped, after which the verdict `OVERRUN` is given, and bytes are dropped until a gap.
+    After a spoilt frame, bytes are dropped until a gap, without another verdict. Others that arrive while a frame is
+    judged, is `ended`, or its answer is under way are dropped, too: then comes the verdict `OVERRUN`, and up to a gap
+    bytes are dropped.
 
     The answer to a request passes to `sent`, and its CRC follows `finished`.
 

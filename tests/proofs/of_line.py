@@ -127,6 +127,12 @@ def no_byte_is_dropped_unseen(bench: Bench) -> None:
     bench.m.d.sync += missed.eq((missed & ~told) | dropped)
     bench.promise(~missed | bench.inner["overrun"] | told)
     bench.promise(~bench.inner["listening"] | ~missed)
+    # What is dropped otherwise follows a frame whose verdict says so, and no good frame since.
+    says_so = (line.frames.verdict == Verdict.SPOILT) | (line.frames.verdict == Verdict.OVERRUN)
+    bench.promise(~bench.inner["draining"] | says_so)
+    judging, hearing = bench.state("JUDGE"), bench.inner["listening"] & ~bench.inner["draining"]
+    bench.promise(~judging | ~bench.inner["draining"])
+    bench.promise(hearing | judging | (bench.inner["position"] == 0))
 
 
 def listens_after_a_gap(bench: Bench) -> None:
@@ -216,11 +222,14 @@ PROPERTIES = [
         bugs=(Bug(Line.elaborate, "m.If(frames.finished)", "m.If(frames.finished | lost)"),),
     ),
     Property(
-        "a byte that comes while a frame is dealt with is dropped only with the verdict OVERRUN",
+        "a byte is dropped only with the verdict OVERRUN, or before the gap behind a frame with it or with SPOILT",
         LINE,
         no_byte_is_dropped_unseen,
         depth=2,
-        bugs=(Bug(Line.elaborate, "m.If(lost)", "m.If(overrun)"),),
+        bugs=(
+            Bug(Line.elaborate, "m.If(lost)", "m.If(overrun)"),
+            Bug(Line.elaborate, "+= frames.verdict.eq(addressed)", "+= [frames.verdict.eq(addressed), draining.eq(1)]"),
+        ),
     ),
     Property(
         "the line listens again within a gap and 8 clocks without a byte in which no one else is waited for",

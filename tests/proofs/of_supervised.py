@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from amaranth.hdl import Signal
+from amaranth.hdl import Cat, Signal
 
 from hardwall.hdl.supervised import SupervisedAxis
 from hardwall.hdl.supervisor import Supervisor
@@ -19,6 +19,10 @@ BIT = {cause.name: bit for bit, cause in enumerate(CAUSES)}
 
 
 SHOWN_ONES = "getattr(self, name).eq(getattr(supervisor, name))"
+WORDS_IN_RANGE = '"word_range": Cat(beyond).any()'
+FAULT_LOOP = '"external_fault": ~levels["external_fault"]'
+EXCHANGED = '"external_fault": Cat(beyond).any(), "word_range": ~levels["external_fault"]'
+"""The last one of a name is what a dict has: the two causes with the source of each other."""
 PAST_THE_SUPERVISOR = "getattr(self, name).eq(axis.count if name == 'driven' else getattr(supervisor, name))"
 
 
@@ -54,24 +58,24 @@ def zero_when_a_loop_opens(estimator: str, bench: Bench) -> None:
 
 def trips_at_once(estimator: str, bench: Bench) -> None:
     axis = supervised(estimator, bench)
-    watched = {
-        "encoder_illegal": axis.illegal,
-        "encoder_overspeed": axis.overspeed,
-        "strobe_busy": axis.strobe_busy,
+    inner = bench.inner
+    words = ((getattr(axis, name), least, most) for name, (least, most) in axis.design.ranges.items())
+    sources = {
+        "encoder_illegal": inner["axis.decoder.illegal"],
+        "encoder_overspeed": inner["axis.decoder.overspeed"],
+        "strobe_busy": inner["axis.strobe_busy"],
+        "word_range": Cat((word < least) | (word > most) for word, least, most in words).any(),
+        "external_fault": ~seen(bench, axis, "external_fault"),
         "emergency_stop": ~seen(bench, axis, "emergency_stop"),
     }
-    for name, wrong in watched.items():
-        stood = bench.past(wrong & ~bench.reset)
-        bench.promise(~stood | (axis.driven == 0) & (axis.state == TRIPPED) & axis.latched[BIT[name]])
-    # What a monitor reports for a single clock is enough.
+    # What a monitor, too, reports for a single clock is enough.
     armed = axis.state == ARMED
     for bit, cause in enumerate(CAUSES):
-        if cause.name in watched or bit == LINK:
-            continue
         enabled = 1 if REQUIRED >> bit & 1 else axis.supervisor_causes[bit]
         relevant = 1 if ALWAYS >> bit & 1 else armed
-        stood = bench.past(bench.inner["supervisor.standing"][bit] & ~bench.reset)
-        told = bench.past(bench.inner["monitors.causes"][bit] & enabled & relevant & ~bench.reset)
+        made = ~axis.live if bit == LINK else inner["monitors.causes"][bit]
+        told = bench.past(sources.get(cause.name, made) & enabled & relevant & ~bench.reset)
+        stood = bench.past(inner["supervisor.standing"][bit] & ~bench.reset)
         bench.promise(~(told | stood) | (axis.driven == 0) & (axis.state == TRIPPED) & axis.latched[bit])
 
 
@@ -130,6 +134,8 @@ def of(estimator: str) -> list[Property]:
             depth=2,
             bugs=(
                 Bug(SupervisedAxis.elaborate, '~levels["emergency_stop"]', '~levels["external_fault"]'),
+                Bug(SupervisedAxis.elaborate, WORDS_IN_RANGE, '"word_range": 0'),
+                Bug(SupervisedAxis.elaborate, FAULT_LOOP, EXCHANGED),
                 Bug(Supervisor.elaborate, "present & watched", "present & watched & ~before"),
             ),
             within=12,
