@@ -17,14 +17,18 @@ from pymodbus.transport import CommParams, CommType
 
 from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.link.link import Link
-from hardwall.model.registers import CAPTURE, MAP
-from hardwall.testing import Bench, parameters, simulate
+from hardwall.model.registers import CAPTURE, MAP, SUPERVISOR, TELEMETRY
+from hardwall.testing import Bench, parameters, rng, simulate
+from stimuli.status import show
 from stimuli.supervised import CAPTURE_REGISTERS, captured, supervised
 
 BAUD = 3_000_000
 """4 clocks a bit at the spec's 12 MHz."""
 SILENCE_NS = 60_000
 """As long a silence of the device, 150 bytes, is no answer, unless a gap must end the request."""
+
+ROUNDS = 4
+"""Values that every port has, one after the other: each and its complement, twice."""
 
 
 class Device(wiring.Component):
@@ -190,6 +194,43 @@ async def exceptions_counters_and_identification(dut):
         assert client.diag_read_bus_message_count(**unit).message == 1
 
     await run()
+
+
+@cocotb.test()
+async def every_port_has_what_a_client_writes_and_reads(dut):
+    client, registers, random = await opened(dut), supervised(**parameters()), rng()
+    bench, unit, drawn = Bench(dut, make(**parameters())), {"device_id": 1}, {}
+    words, live, pulses = registers.words, registers.live, registers.pulses
+    pulsed = [bench.monitor(pulse.name, *(word.name for word in words)) for pulse in pulses]
+
+    def halves(those, of: dict[str, int]) -> list[int]:
+        return [half for each in those for half in each.to_registers(of[each.name])]
+
+    for number in range(ROUNDS):
+        # Every second value is the complement of the one before: every bit rises and falls.
+        for each in (*registers.status, *words, *live):
+            other = each.low + each.high - drawn.get(each.name, 0)
+            drawn[each.name] = other if number % 2 else int(random.integers(each.low, each.high + 1))
+        await show(dut, bench, registers, {each.name: drawn[each.name] for each in registers.status})
+
+        @bridge
+        def run() -> None:
+            assert not client.write_registers(live[0].address, halves(live, drawn), **unit).isError()
+            together = [1] * len(pulses) + halves(words, drawn)
+            bench.drive(refuse=(1 << len(pulses)) - 1)
+            assert client.write_registers(pulses[-1].address, together, **unit).exception_code == 4
+            bench.drive(refuse=0)
+            assert not client.write_registers(pulses[-1].address, together, **unit).isError()
+            for block in (TELEMETRY, SUPERVISOR):
+                shown = halves([each for each in registers.status if block <= each.address < block + 0x20], drawn)
+                assert values(client.read_holding_registers(block, count=len(shown), **unit)) == shown
+            for absent in (0xB000, 0xFFFF):
+                assert client.read_holding_registers(absent, count=2, **unit).exception_code == 2
+
+        await run()
+        assert {word.name: bench.reader(word.name)() for word in live} == {word.name: drawn[word.name] for word in live}
+        assert [len(monitor.rows) for monitor in pulsed] == [number + 1] * len(pulses)
+        assert pulsed[0].rows[-1] == tuple(drawn[word.name] for word in words)
 
 
 def test_rtl():

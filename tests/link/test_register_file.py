@@ -7,7 +7,7 @@ from cocotb.triggers import ClockCycles, RisingEdge
 from hardwall.hdl.link.register_file import RegisterFile
 from hardwall.model.link import register_file as model
 from hardwall.model.link.register_file import Operation
-from hardwall.model.registers import COUNTERS, EDGE_STAMPS
+from hardwall.model.registers import CAPTURE, COUNTERS, EDGE_STAMPS
 from hardwall.testing import Bench, parameters, rng, simulate
 from stimuli.status import edge, show
 from stimuli.supervised import supervised
@@ -146,6 +146,40 @@ async def random_operations(dut):
             await host.clear()
     for address in (*range(256), 0x4000, 0x4000 + len(host.design.map_cells) - 1):
         assert await host.read(address) == host.twin.read(address)
+
+
+@cocotb.test()
+async def every_bit_of_every_word_and_of_the_capture_memory(dut):
+    host, random, drawn = Host(dut), rng(), {}
+    await host.bench.reset()
+    await host.do(Operation.SNAPSHOT)
+    words, live, pulses = host.registers.words, host.registers.live, host.registers.pulses
+    committed = host.bench.monitor("commit", *(word.name for word in words))
+    for number in range(4):
+        # Every second value is the complement of the one before: every bit rises and falls.
+        for word in (*words, *live):
+            other = word.low + word.high - drawn.get(word.name, 0)
+            drawn[word.name] = other if number % 2 else int(random.integers(word.low, word.high + 1))
+            for k, half in enumerate(word.to_registers(drawn[word.name])):
+                await host.do(Operation.WRITE, word.address + k, half)
+        for pulse in pulses:
+            await host.do(Operation.WRITE, pulse.address, 1)
+        await host.do(Operation.FINISH)
+        await RisingEdge(dut.clk)
+        assert committed.rows[number:] == [tuple(drawn[word.name] for word in words)]
+        assert {word.name: host.bench.reader(word.name)() for word in live} == {
+            word.name: drawn[word.name] for word in live
+        }
+        for refuse in ((1 << len(pulses)) - 1, 0):
+            host.bench.drive(refuse=refuse)
+            for pulse in pulses:
+                await host.clear()
+                await host.do(Operation.CHECK_WRITE, pulse.address, 1, 1, 1)
+                await RisingEdge(dut.clk)
+                assert host.found() == (0, 0, int(refuse > 0)), pulse.name
+        for data in (0x5AC3, 0xA53C):
+            host.bench.drive(capture_data=data)
+            assert await host.read(CAPTURE) == data
 
 
 @cocotb.test()
