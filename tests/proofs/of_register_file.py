@@ -1,6 +1,7 @@
 """What the register file promises: no pulse and no live word without a write to it, and an end to every operation."""
 
-from amaranth.hdl import Mux, Signal
+from amaranth.hdl import Cat, Mux, Signal, Value
+from amaranth.lib.wiring import PureInterface
 
 from hardwall.hdl.link.register_file import RegisterFile
 from hardwall.model.link.register_file import CELL_BITS, Area, Design, Operation
@@ -45,11 +46,20 @@ def pulses_are_asked_for(bench: Bench) -> None:
         bench.promise(~sent | ~bench.past(sent))
 
 
+def only_checks_find(bench: Bench, host: PureInterface) -> Value:
+    """Return whether what is found rises only with a check, and falls only with a clear, which leaves nothing."""
+    checks = host.start & ((host.operation == Operation.CHECK_READ) | (host.operation == Operation.CHECK_WRITE))
+    found = Cat(host.absent, host.outside, host.refused)
+    before, checked, cleared = bench.past(found), bench.past(checks), bench.past(host.clear)
+    rises, falls = (found & ~before).any(), (before & ~found).any()
+    forgotten = bench.past(host.clear & ~checks) & found.any()
+    return bench.past(bench.reset) | ~(rises & ~checked | falls & ~cleared | forgotten)
+
+
 def checks_alone_find(bench: Bench) -> None:
     host = register_file(bench).host
     checks = (host.operation == Operation.CHECK_READ) | (host.operation == Operation.CHECK_WRITE)
-    found = (host.absent, host.outside, host.refused)
-    bench.promise(bench.kept(found, ~host.clear & ~(host.start & checks)))
+    bench.promise(only_checks_find(bench, host))
     bench.promise(~bench.state("LEAST", "ABOVE", "BELOW") | host.start & checks)
 
 
@@ -129,17 +139,37 @@ def every_operation_ends(bench: Bench) -> None:
     for name, clocks in left_in.items():
         with m.If(bench.state(name)):
             m.d.comb += left.eq(clocks)
+    idle, boots = bench.state("IDLE"), bench.state("BOOT", "BOOT_TAKE", "BOOT_WRITE")
     bench.falls(
         left,
         most=max(block.boot_clocks, block.snapshot_clocks, block.shift_clocks + sends),
-        free=bench.state("IDLE"),
+        free=idle,
         waits=bench.state("WAIT") & block.commit_pending,
-        begins=bench.state("IDLE") & host.start,
+        begins=idle & host.start,
     )
+    # At the clock behind the beginning of an operation exactly its latency is left, and it is over only with `done`.
+    names = [pulse.name for pulse in design.registers.pulses]
+    shifts = Cat(inner["marks"][names.index(name)] for name in ("commit", "preload")).any()
+    latencies = {
+        Operation.CHECK_READ: 1,
+        Operation.READ: 1,
+        Operation.WRITE: 2,
+        Operation.COUNT: 3,
+        Operation.CHECK_WRITE: 4,
+        Operation.SNAPSHOT: block.snapshot_clocks,
+        Operation.FINISH: Mux(shifts, block.shift_clocks, 0) + sends,
+    }
+    for operation, latency in latencies.items():
+        begun = bench.past(idle & host.start & (host.operation == operation) & ~bench.reset)
+        bench.promise(~begun | (left == bench.past(latency)))
+    bench.promise(~idle | bench.past(idle | boots | host.done | bench.reset))
+    bench.promise(~bench.past(bench.reset, init=1) | boots & (left == block.boot_clocks))
 
 
 SHORT_BOOT = ("step.all()", "1")
 """A reset writes only one cell, so that a bug behind it shows in the first clocks."""
+NO_BOOT = ('m.next = "BOOT_TAKE"', 'm.next = "IDLE"')
+"""A reset writes no cell at all."""
 PROPERTIES = [
     Property(
         "a pulse goes out for one clock, at the end of a frame that has written 1 to its register",
@@ -152,11 +182,14 @@ PROPERTIES = [
         ),
     ),
     Property(
-        "what the checks have found changes only with a check or a clear",
+        "what is found rises only with a check, and falls only with a clear, which leaves nothing",
         WHERE,
         checks_alone_find,
         depth=2,
-        bugs=(Bug(RegisterFile.elaborate, "step.eq(step + 1)", "[step.eq(step + 1), host.absent.eq(1)]"),),
+        bugs=(
+            Bug(RegisterFile.elaborate, "step.eq(step + 1)", "[step.eq(step + 1), host.absent.eq(1)]"),
+            Bug(RegisterFile.elaborate, "host.absent.eq(0), ", "", NO_BOOT),
+        ),
         within=12,
     ),
     Property(
@@ -167,10 +200,14 @@ PROPERTIES = [
         bugs=(Bug(RegisterFile.elaborate, "word.address - LIVE + 1", "word.address - LIVE", SHORT_BOOT),),
     ),
     Property(
-        "an operation is done within its latency, but for the wait for a sample",
+        "each operation takes its own latency and the wait for a sample; one may begin boot_clocks after a reset",
         WHERE,
         every_operation_ends,
         depth=2,
-        bugs=(Bug(RegisterFile.elaborate, "step.eq(step + 1)", "step.eq(step)"),),
+        bugs=(
+            Bug(RegisterFile.elaborate, "step.eq(step + 1)", "step.eq(step)"),
+            Bug(RegisterFile.elaborate, 'm.next = "COUNT"', 'm.next = "LEAST"', NO_BOOT),
+            Bug(RegisterFile.elaborate, "m.If(commit | preload)", "m.If(~commit)", NO_BOOT),
+        ),
     ),
 ]

@@ -11,6 +11,7 @@ from stimuli.specs import spec
 
 from .bench import Bench
 from .bugs import Bug
+from .of_register_file import only_checks_find
 from .property import Property
 
 WHERE = "server mhz fdm"
@@ -42,6 +43,10 @@ BEGINS[Operation.CHECK_READ] = 1 + 2 * WORD + MOST * PER_REGISTER[Operation.CHEC
 DIAGNOSES = 1 + 8 * PER_REGISTER[Operation.WRITE] + FOLLOWS[Operation.WRITE]
 IDENTIFIES = HEAD_OF_OTHERS * CLOCKS_OF_A_BYTE + MOST * PER_REGISTER[Operation.READ] + FINISHED
 ALL = 2 + BEGINS[Operation.CHECK_READ]
+
+CHECKS_WRITES = "with m.Case(Operation.CHECK_WRITE):"
+CLEARS_BEFORE = f"{CHECKS_WRITES}\n{16 * ' '}m.d.comb += file.clear.eq(1)"
+"""What the check of the registers to read has found is forgotten before those to write are checked."""
 
 
 def by_phase(phase: Value, clocks: dict[Operation, int]) -> Value:
@@ -144,17 +149,24 @@ def every_frame_ends(bench: Bench) -> None:
 def writes_what_was_checked(bench: Bench) -> None:
     server = server_at_work(bench)
     inner, frames, file = bench.inner, server.frames, server.file
-    found = Cat(file.absent, file.outside, file.refused)
-    checks = (file.operation == Operation.CHECK_READ) | (file.operation == Operation.CHECK_WRITE)
-    bench.assume(bench.kept((found,), ~file.clear & ~(file.start & checks)))
+    bench.assume(only_checks_find(bench, file))
     writes, clearing, phase = inner["writes"], inner["clearing"], inner["phase"]
     counting, counter = bench.state("COUNT"), inner["address"][:3]
+    # What a check of this frame has found is kept beside the server until the next frame, whatever the server clears.
+    finds, since = Signal(), Signal()
+    bench.m.d.comb += finds.eq(Cat(file.absent, file.outside, file.refused).any() & ~counting)
+    bench.m.d.sync += since.eq((since | finds) & ~bench.state("IDLE"))
+    found, excepts = since | finds, inner["code"] != 0
+    refused = counting & (counter == model.EXCEPTIONS) | bench.state("HEAD", "SEND_LAST") & (inner["stop"] == HEAD)
+    bench.promise(~file.clear | counting)
+    bench.promise(~excepts | refused | bench.state("FINISHED", "IDLE"))
+    bench.promise(~since | finds | excepts | bench.state("FINISHED", "IDLE"))
     requested = counting & ((counter == model.REQUESTS) | (counter == model.EXCEPTIONS))
     heard = counting & ((counter == model.MESSAGES) | (counter == model.REQUESTS))
     bench.promise(~heard | (phase == Operation.CHECK_READ) & ~clearing)
     working = requested | ~(counting | bench.state("IDLE", "FINISHED"))
     asked = (frames.verdict == Verdict.REQUEST) & (writes | clearing)
-    good = ~found.any() & ~inner["malformed"] | clearing
+    good = ~found & ~inner["malformed"] | clearing
     in_phase = bench.state("ADDRESS", "QUANTITY", "BYTES", "VALUE", "ASK", "NEXT") & (phase == Operation.WRITE)
     bench.promise(~working | (frames.verdict == Verdict.REQUEST))
     bench.promise(~clearing | (frames.function == model.DIAGNOSE) | bench.state("IDLE"))
@@ -162,7 +174,7 @@ def writes_what_was_checked(bench: Bench) -> None:
     bench.promise(~clearing | in_phase | echoes | bench.state("FINISH", "FINISHED", "IDLE"))
     cleared = (inner["address"] == COUNTERS + 8 - inner["left"]) & (inner["left"] <= 8) & (inner["left"] != 0)
     bench.promise(~(in_phase & clearing) | cleared & bench.state("ASK", "NEXT"))
-    bench.promise(~in_phase | asked & (~found.any() | clearing))
+    bench.promise(~in_phase | asked & (~found | clearing))
     bench.promise(~in_phase | ~inner["malformed"] | clearing | bench.state("BYTES"))
     writing = file.start & (file.operation == Operation.WRITE)
     bench.promise(~writing | frames.ended & asked & good)
@@ -198,6 +210,7 @@ PROPERTIES = [
         bugs=(
             Bug(Server.elaborate, "m.If(frames.verdict == Verdict.REQUEST)", "m.If(frames.verdict != Verdict.FOREIGN)"),
             Bug(Server.elaborate, "m.If(file.absent)", "m.If(file.absent & file.outside)"),
+            Bug(Server.elaborate, CHECKS_WRITES, CLEARS_BEFORE),
         ),
     ),
 ]
