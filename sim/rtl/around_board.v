@@ -5,8 +5,7 @@
 
 module around_board #(
     parameter BIT_PARTS = 3328,        // the serial line's bit, in parts of a clock, 256 each
-    parameter OSCILLATOR_CLOCKS = 2,   // half a period of the oscillator
-    parameter PUMP_CLOCKS = 2400       // how long the amplifier's charge pump holds without an edge of `alive`
+    parameter OSCILLATOR_CLOCKS = 2    // half a period of the oscillator
 ) (
     input go,
     input [31:0] clocks,
@@ -52,16 +51,10 @@ module around_board #(
     .drive_pdm(drive_pdm), .drive_sign(drive_sign), .alive(alive), .outputs_enable(outputs_enable)
   );
 
-  // The amplifier is enabled by a charge pump, and its inputs are pulled down where the board leaves them.
-  reg was_alive = 0;
-  reg [31:0] pump = 0;
+  // The amplifier's inputs are pulled down where the board leaves them.
   initial pulses = 0;
-  always @(posedge tick) begin
-    was_alive <= alive && outputs_enable;
-    if (was_alive != (alive && outputs_enable)) pump <= PUMP_CLOCKS;
-    else if (pump != 0) pump <= pump - 1;
-    if (drive_pdm && outputs_enable && pump != 0) pulses <= drive_sign ? pulses - 1 : pulses + 1;
-  end
+  always @(posedge tick)
+    if (drive_pdm && outputs_enable) pulses <= drive_sign ? pulses - 1 : pulses + 1;
 
   // The receiver of the host: half a bit after a start bit's edge, and then a bit apart.
   reg [7:0] bytes [0:1023];

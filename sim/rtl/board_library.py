@@ -7,7 +7,7 @@ faults of wires, are in `around_board.v` and `board_library.cpp`.
 import ctypes
 import functools
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -21,17 +21,15 @@ from .verilated import Rtl, RtlState
 AROUND, SHIM = (Path(__file__).with_name(name) for name in ("around_board.v", "board_library.cpp"))
 OSCILLATOR_HZ = 2.4e6
 """About the frequency of the oscillator beside the clock; the clock has a whole number of it in every half period."""
-PUMP_S = 200e-6
-"""How long the amplifier's charge pump holds without an edge of `alive`."""
 ROOM = 1024
 """Bytes from the board that are kept until they are taken."""
 
 Wire = Literal["a", "b", "a_n", "b_n"]
 Level = Literal["sound", "low", "high", "inverted"]
 Switch = Literal["drive_enable", "external_fault", "emergency_stop", "clock"]
-WIRES: tuple[Wire, ...] = ("a", "b", "a_n", "b_n")
-LEVELS: tuple[Level, ...] = ("sound", "low", "high", "inverted")
-SWITCHES: tuple[Switch, ...] = ("drive_enable", "external_fault", "emergency_stop", "clock")
+WIRES: tuple[Wire, ...] = get_args(Wire)
+LEVELS: tuple[Level, ...] = get_args(Level)
+SWITCHES: tuple[Switch, ...] = get_args(Switch)
 
 
 @functools.lru_cache(maxsize=1 << 3)
@@ -50,7 +48,6 @@ def build(spec: AxisSpec) -> Path:
     around = {
         "BIT_PARTS": round(256 * spec.clock_hz / board.link.baud),
         "OSCILLATOR_CLOCKS": max(round(spec.clock_hz / OSCILLATOR_HZ / 2), 1),
-        "PUMP_CLOCKS": max(round(spec.clock_hz * PUMP_S), 1),
     }
     files = {"board.v": verilog, **{path.name: path.read_text(encoding="utf-8") for path in (AROUND, SHIM)}}
     options = ("--top-module", "around_board", *(f"-G{name}={value}" for name, value in around.items()))

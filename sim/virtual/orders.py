@@ -24,13 +24,11 @@ class Order:
 
     Attributes:
         operand: the name of what follows it.
-        meaning: what it does.
         obey: does it.
         accepted: the words that may follow; empty for a number.
     """
 
     operand: str
-    meaning: str
     obey: Callable[[VirtualBoard, Line, str], None]
     accepted: tuple[str, ...] = ()
 
@@ -72,16 +70,16 @@ def _switch(on: bool) -> Callable[[VirtualBoard, Line, str], None]:
 
 
 ORDERS = {
-    "hold": Order("MM", f"where the hand holds the handle, or `{FREE}`", _hold),
-    "push": Order("N", "the hand's steady force on the handle, positive into the wall", _push),
-    "cut": Order("WIRE", "the encoder's wire is low", _wire("low"), WIRES),
-    "high": Order("WIRE", "the encoder's wire is high", _wire("high"), WIRES),
-    "invert": Order("WIRE", "the encoder's wire is inverted", _wire("inverted"), WIRES),
-    "mend": Order("WIRE", "the encoder's wire is sound again", _wire("sound"), WIRES),
-    "open": Order("LOOP", "the loop opens, or the clock stands", _switch(False), SWITCHES),
-    "close": Order("LOOP", "the loop closes, or the clock goes on", _switch(True), SWITCHES),
-    "drop": Order("BYTES", "so many of the host's next bytes are lost", _drop),
-    "motor": Order("HOW", "the motor's wires", _motor, ("swapped", "right")),
+    "hold": Order("MM", _hold),
+    "push": Order("N", _push),
+    "cut": Order("WIRE", _wire("low"), WIRES),
+    "high": Order("WIRE", _wire("high"), WIRES),
+    "invert": Order("WIRE", _wire("inverted"), WIRES),
+    "mend": Order("WIRE", _wire("sound"), WIRES),
+    "open": Order("LOOP", _switch(False), SWITCHES),
+    "close": Order("LOOP", _switch(True), SWITCHES),
+    "drop": Order("BYTES", _drop),
+    "motor": Order("HOW", _motor, ("swapped", "right")),
 }
 """The orders by name."""
 

@@ -39,6 +39,8 @@ class Line:
         try:
             self._master, self._slave = pty.openpty()
         except OSError as error:
+            if self._listener:
+                self._listener.close()
             raise PortError(f"there is no pseudo-terminal to be had: {error.strerror or error}") from None
         # The slave is kept open, so that the terminal stays when a host closes it.
         tty.setraw(self._slave)

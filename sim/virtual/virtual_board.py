@@ -89,14 +89,10 @@ class VirtualBoard:
     def __exit__(self, *error: object) -> None:
         self.hardware.__exit__(*error)
 
-    @property
-    def grasp_samples(self) -> int:
-        """The samples during which the hand's force stays as it is."""
-        return max(round(self.scene.spec.sample_hz * GRASP_S), 1)
-
     def run(self) -> bool:
-        """Let `grasp_samples` pass; return whether the encoder could follow the handle."""
-        samples, motion = self.grasp_samples, self._progress.moment.motion
+        """Let `GRASP_S` pass, or a sample; return whether the encoder could follow the handle."""
+        samples = max(round(self.scene.spec.sample_hz * GRASP_S), 1)
+        motion = self._progress.moment.motion
         room = np.zeros(samples), np.zeros(samples, np.int64)
         self._push_n = self.hand.force_n(self.scene.handle.mass_kg, motion[0], motion[1])
         pulse_n = -self._pulse_n if self.reversed else self._pulse_n

@@ -1,5 +1,6 @@
 """Orders to a virtual board: what each does, and one line for what is none."""
 
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from hardwall.sim.rtl.board_library import SWITCHES, WIRES
 from hardwall.sim.virtual.orders import ORDERS, OrderError, obey
 from hardwall.sim.virtual.virtual_board import Hand
+from stimuli.pages import text_of
 
 
 class Told:
@@ -49,6 +51,11 @@ def test_the_hand_the_motor_and_the_line(told):
     for text in ("hold free", "motor right"):
         obey(told, told, text)
     assert (told.hand.held_m, told.reversed) == (None, False)
+
+
+def test_the_page_has_every_order():
+    rows = re.findall(r"^\| (`.*?) \|", text_of("docs/virtual.md"), re.MULTILINE)
+    assert {words.split()[0] for row in rows for words in re.findall("`(.*?)`", row)} == set(ORDERS)
 
 
 @pytest.mark.parametrize(

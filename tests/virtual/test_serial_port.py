@@ -19,6 +19,14 @@ def guest(line: Line) -> socket.socket:
     return socket.create_connection(("127.0.0.1", line.tcp_port), timeout=10)
 
 
+def say(line: Line, who: socket.socket, word: bytes) -> None:
+    """Let a guest say something, and wait until the line has it."""
+    who.sendall(word)
+    heard = b""
+    while heard != word:
+        heard += line.take(1.0)
+
+
 def test_every_byte_passes_a_terminal_as_it_is(line):
     port = os.open(line.path, os.O_RDWR | os.O_NOCTTY)
     data = bytes(range(256))
@@ -36,37 +44,28 @@ def test_every_byte_passes_a_terminal_as_it_is(line):
 
 def test_one_guest_at_a_time_and_answers_go_to_who_spoke_last(line):
     with guest(line) as first, guest(line) as second:
-        first.sendall(b"hello")
-        got = b""
-        while got != b"hello":
-            got += line.take(1.0)
+        say(line, first, b"hello")
         line.give(b"answer")
         assert first.recv(10) == b"answer"
         assert second.recv(10) == b"", "the second guest is sent away"
     while line.take(0.1) or line._guest:
         pass
     with guest(line) as third:
-        third.sendall(b"x")
-        while line.take(1.0) != b"x":
-            pass
+        say(line, third, b"x")
         line.give(b"y")
         assert third.recv(10) == b"y"
 
 
 def test_a_guest_that_has_gone_is_no_end(line):
     with guest(line) as first:
-        first.sendall(b"x")
-        while line.take(1.0) != b"x":
-            pass
+        say(line, first, b"x")
     for _ in range(3):
         line.give(b"nobody hears this")
         assert line.take(0.05) == b""
     with guest(line) as second:
         assert line.take(1.0) == b""
         line.give(b"nor this")
-        second.sendall(b"x")
-        while line.take(1.0) != b"x":
-            pass
+        say(line, second, b"x")
         line.give(b"y")
         assert second.recv(10) == b"y"
 
@@ -103,12 +102,8 @@ def test_without_a_terminal_it_is_an_error_that_says_so(monkeypatch):
 
 def test_a_guest_that_reads_slowly_loses_bytes_and_stays(line):
     with guest(line) as slow:
-        slow.sendall(b"x")
-        while line.take(1.0) != b"x":
-            pass
+        say(line, slow, b"x")
         for _ in range(2000):
             line.give(b"z" * 4096)
         assert slow.recv(4096) == b"z" * 4096
-        slow.sendall(b"y")
-        while line.take(1.0) != b"y":
-            pass
+        say(line, slow, b"y")
