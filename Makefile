@@ -127,7 +127,7 @@ fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200
 
 clean: ## remove what was built and cached
 	rm -rf build .hypothesis .pytest_cache .ruff_cache
-	find hdl model sim tests -name __pycache__ -prune -exec rm -rf {} +
+	find hdl host model sim tests -name __pycache__ -prune -exec rm -rf {} +
 
 distclean: clean ## remove the tools in .venv too
 	rm -rf $(VENV) hardwall.egg-info
@@ -186,7 +186,7 @@ $(VENV)/.sim: pyproject.toml $(VENV)/.made | tools
 	$(call install,sim,the model and the loop)
 
 $(VENV)/.test: pyproject.toml $(VENV)/.sim | tools
-	$(call install,sim$(comma)test,the tests' tools)
+	$(call install,sim$(comma)host$(comma)test,the tests' tools)
 
 $(VENV)/.prove: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)prove,the solver)

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).absolute().parent.parent
-ROOMS = ("hdl", "model", "sim")
+ROOMS = ("hdl", "host", "model", "sim")
 SOURCES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
 # The folders of sim/: every folder imports only from those before it, and only `rtl` imports hdl.
@@ -122,13 +122,15 @@ def test_imports_go_one_way(path):
     room, *inner = path.relative_to(ROOT).parts
     barred = {"tests", "hardwall.testing", *(test.stem for test in TESTS if test.stem.startswith("test_"))}
     if room == "hdl":
-        barred |= {"hardwall.sim"}
-    elif room == "model":
-        barred |= {"hardwall.hdl", "hardwall.sim", "amaranth"}
+        barred |= {"hardwall.host", "hardwall.sim"}
+    elif room in ("host", "model"):
+        barred |= {"hardwall.hdl", "hardwall.sim", "amaranth"} | ({"hardwall.host"} if room == "model" else set())
     elif len(inner) > 1:
         barred |= {f"hardwall.sim.{above}" for above in FLOORS[FLOORS.index(inner[0]) + 1 :]}
         if inner[0] != "rtl":
             barred |= {"hardwall.hdl", "amaranth"}
+        if inner[0] != "commands":
+            barred |= {"hardwall.host"}
     assert of(set(imports(path)), *barred) == set()
 
 
@@ -170,7 +172,8 @@ def test_a_picture_is_of_a_module_of_its_name():
 
 def test_a_test_has_the_path_of_its_source():
     sources = set().union(*(paths_below(ROOT / room) for room in ROOMS))
-    sources |= {f"testing/{name}" for name in paths_below(ROOT / "tests/benches")}
+    for folder, path in (("testing", "tests/benches"), ("host", "host")):
+        sources |= {f"{folder}/{name}" for name in paths_below(ROOT / path)}
     tested = {str(path.relative_to(ROOT / "tests").with_suffix("")) for path in TESTS if path.stem.startswith("test_")}
     assert {name for name in tested if name.replace("test_", "", 1) not in sources} == set(BROAD)
 
@@ -226,7 +229,8 @@ def test_versions_are_pinned():
 @pytest.mark.parametrize("path", [*SOURCES, *TESTS], ids=identity)
 def test_what_is_imported_is_what_its_extra_installs(path):
     for_tests = path in TESTS or path.stem.startswith("cocotb_")
-    extras = [] if path.is_relative_to(ROOT / "model") else ["sim", "test"] if for_tests else ["sim"]
+    room = path.relative_to(ROOT).parts[0]
+    extras = {"model": [], "host": ["host"]}.get(room, ["sim", "host", "test"] if for_tests else ["sim"])
     pinned = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in extras)]
     installed = {plain(requirement.partition("==")[0]) for one in pinned for requirement in one}
     installed.add("llvmlite")  # a dependency of Numba

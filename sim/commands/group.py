@@ -19,6 +19,12 @@ COMMANDS = {
     "bench": "Measure the closed loop's speed on every backend and under cocotb, and what optional parts cost.",
     "verilog": "Write the axis of a scene as Verilog, with a table of its ports.",
     "virtual": "Run the board of a scene, with its plant, behind a serial port that a host opens.",
+    "connect": "What the board at a port is: its identity, its state, why it tripped, and every register.",
+    "set": "Write words of a board, in SI units, and commit them together.",
+    "arm": "Let a board drive, and keep it so while this command runs.",
+    "disarm": "Make a board's drive 0.",
+    "home": "Find the index of a board's encoder by hand, and make it the origin.",
+    "watch": "Show what a board's axis does.",
     "synth": "Size and speed of the axis, as the board with supervisor and link, on a real part.",
     "accuracy": "Hold velocity estimators against the exact derivative of known motions, at any rate.",
     "costs": "What each estimator takes of a device: alone, and the board with it placed and routed "

@@ -6,8 +6,7 @@ import signal
 import socket
 import subprocess
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 
 import pytest
 from pymodbus import FramerType
@@ -19,36 +18,15 @@ from hardwall.model.supervisor import TRIPPED, names
 from hardwall.sim.scene.load import load
 from stimuli import frames
 from stimuli.processes import HARDWALL, wait_until
+from stimuli.virtual_boards import command, running
 
 CLOCK = {"controller.clock_hz": 4_000_000}
-PORTS = re.compile(r"serial port: (?P<path>/dev/\S+)\n(?:tcp port: 127\.0\.0\.1:(?P<tcp>\d+)\n)?orders: hold MM, .*\n")
 REGISTERS = RegisterMap(load("seed-2011", CLOCK).spec)
 
 
-def command(*arguments: str) -> list[str]:
-    changes = [word for key, value in CLOCK.items() for word in ("--set", f"{key}={value}")]
-    return [str(HARDWALL), "virtual", "seed-2011", *changes, *arguments]
-
-
-@contextmanager
-def running(*arguments: str) -> Iterator[tuple[subprocess.Popen, re.Match]]:
-    """Start the command; yield its process, and what it says of its ports."""
-    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
-    with subprocess.Popen(command(*arguments), **pipes, text=True) as process:
-        try:
-            lines = ""
-            while not (said := PORTS.fullmatch(lines)):
-                line = process.stdout.readline()
-                assert line, process.stderr.read()
-                lines += line
-            yield process, said
-        finally:
-            process.kill()
-
-
 def test_a_client_that_others_wrote_reads_and_writes_and_sees_a_loop_open():
-    with running("--tcp", "0", "--speed", "0") as (process, said):
-        client = ModbusTcpClient("127.0.0.1", port=int(said["tcp"]), framer=FramerType.RTU, timeout=60)
+    with running(CLOCK, "--tcp", "0", "--speed", "0") as board:
+        client = ModbusTcpClient("127.0.0.1", port=int(board.tcp.rpartition(":")[2]), framer=FramerType.RTU, timeout=60)
         assert client.connect()
 
         def read(name: str) -> int:
@@ -62,22 +40,21 @@ def test_a_client_that_others_wrote_reads_and_writes_and_sees_a_loop_open():
         assert not client.write_registers(stiffness.address, list(stiffness.to_registers(77)), device_id=1).isError()
         assert read("wall_stiffness") == 77
         assert read("latched") == 0
-        process.stdin.write("leap\nopen emergency_stop\n")
-        process.stdin.flush()
+        board.order("leap", "open emergency_stop")
         wait_until(lambda: read("state") == TRIPPED)
         assert names(read("latched")) == ["emergency_stop"]
         client.close()
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-        assert process.returncode == 130
+        board.process.send_signal(signal.SIGINT)
+        out, err = board.process.communicate(timeout=60)
+        assert board.process.returncode == 130
         assert out == ""
         assert "the order must be one of hold, push, " in err
         assert err.splitlines()[-1] == "hardwall: error: interrupted"
 
 
 def test_the_serial_port_is_one_for_any_program():
-    with running("--speed", "0") as (_, said):
-        port = os.open(said["path"], os.O_RDWR | os.O_NOCTTY)
+    with running(CLOCK, "--speed", "0") as board:
+        port = os.open(board.path, os.O_RDWR | os.O_NOCTTY)
         os.write(port, framed(b"\1" + frames.read(0, 2)))
         answer = b""
         while len(answer) < 9:
@@ -88,7 +65,7 @@ def test_the_serial_port_is_one_for_any_program():
 
 def test_it_ends_after_the_time_that_was_asked_for():
     done = subprocess.run(
-        command("--seconds", "0.05"), stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
+        command(CLOCK, "--seconds", "0.05"), stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
     assert re.search(r"\n0\.05 s in [\d.]+ s: [\d.]+ of real time\n$", done.stdout)
@@ -103,7 +80,7 @@ def test_it_ends_after_the_time_that_was_asked_for():
     ],
 )
 def test_what_cannot_be_is_one_line(arguments, message):
-    done = subprocess.run(command(*arguments), capture_output=True, text=True, check=False)
+    done = subprocess.run(command(CLOCK, *arguments), capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert re.fullmatch(f"hardwall: error: {message}\n", done.stderr)
 
@@ -111,7 +88,7 @@ def test_what_cannot_be_is_one_line(arguments, message):
 def test_a_port_that_is_taken_is_one_line():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        done = subprocess.run(command("--tcp", str(port)), capture_output=True, text=True, check=False)
+        done = subprocess.run(command(CLOCK, "--tcp", str(port)), capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert done.stderr == f"hardwall: error: port {port} of 127.0.0.1 cannot be had: Address already in use\n"
 
@@ -132,21 +109,21 @@ def test_a_flood_of_orders_does_not_hold_it_up(flood, tmp_path):
         flood = tmp_path / flood
         flood.write_text("y\n" * 100_000)
     with open(flood, "rb") as orders:
-        words = command("--seconds", "0.02")
+        words = command(CLOCK, "--seconds", "0.02")
         done = subprocess.run(words, stdin=orders, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 0, done.stderr
     assert "the order must be one of hold, " in done.stderr
 
 
 def test_it_is_no_faster_than_asked_for_however_much_a_host_says():
-    with running("--tcp", "0", "--speed", "0.2", "--seconds", "0.3") as (process, said):
-        with socket.create_connection(("127.0.0.1", int(said["tcp"])), timeout=60) as host:
+    with running(CLOCK, "--tcp", "0", "--speed", "0.2", "--seconds", "0.3") as board:
+        with socket.create_connection(("127.0.0.1", int(board.tcp.rpartition(":")[2])), timeout=60) as host:
             host.setblocking(False)
-            while process.poll() is None:
+            while board.process.poll() is None:
                 with suppress(OSError):
                     host.send(b"x")
                 time.sleep(0.0003)
-        out, err = process.communicate(timeout=60)
-    assert process.returncode == 0, err
+        out, err = board.process.communicate(timeout=60)
+    assert board.process.returncode == 0, err
     simulated_s, real_s = map(float, re.match(r"([\d.]+) s in ([\d.]+) s", out).groups())
     assert simulated_s <= 0.2 * real_s + 0.002

@@ -1,0 +1,261 @@
+"""An axis on a board: its wall, what it does, and the acts that let it drive."""
+
+import math
+import time
+from collections.abc import Iterator
+
+from ..model.register import Kind
+from ..model.registers import TELEMETRY
+from .device import Device, read_identity
+from .errors import ChangedError, HostError, NotReadyError, RefusedError, TrippedError
+from .groups import Supervisor, Wall
+from .heartbeat import LEASE_S, Heartbeat
+from .port import Port
+from .status import State, Status, Trip, status_of
+from .words import Words
+
+READY_TRIES = 20
+"""Looks at `ready` after the first beat."""
+REST_S, REST_COUNTS = 0.3, 2
+"""The time in which a handle that rests moves by so many counts at most."""
+
+
+class Axis:
+    """An axis on a board, from `hardwall.host.connect`. A context manager that disarms and closes.
+
+    Acts of the application renew its lease: `set` and every attribute of `wall` and `supervisor`, `arm`, `renew`,
+    `sleep` and `watch`. While the lease lasts, half a second, a thread beats; an application that hangs, or only reads,
+    ends in the trip link_timeout.
+
+    Args:
+        port: the line.
+        device: the device there.
+
+    Attributes:
+        device: what the board says of itself.
+        wall: the wall.
+        supervisor: the limits.
+
+    Raises:
+        HostError: if the board does not answer.
+    """
+
+    def __init__(self, port: Port, device: Device):
+        self.device, self._port = device, port
+        self._words = Words(port, device)
+        self.wall, self.supervisor = Wall(self), Supervisor(self)
+        self._status = device.of_kind(Kind.STATUS)
+        # A beat that is what the last host said is none.
+        self._beat_at, self._number = device.registers["heartbeat"], self.read("heartbeat")
+        self._may_drive = False
+        self._heartbeat = Heartbeat(self._beat, self._words.written("supervisor_watchdog"))
+
+    def __enter__(self) -> "Axis":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Disarm, if the board can still be reached, and close the port."""
+        try:
+            if self._may_drive:
+                self.disarm()
+        except HostError:
+            # Without beats the board comes to rest by itself.
+            pass
+        finally:
+            self._heartbeat.close()
+            self._port.close()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of all words that `get` and `set` take."""
+        return self._words.names
+
+    def get(self, name: str) -> float:
+        """Return the SI value of a word as the axis uses it; the errors are those of `Words.get`."""
+        return self._words.get(name)
+
+    def set(self, **values: float) -> None:
+        """Write words in SI units, and commit them all at one sample; the errors are those of `Words.set`."""
+        self._words.set(values)
+        self._heartbeat.watchdog_s = self._words.written("supervisor_watchdog")
+        self.renew()
+
+    def read(self, name: str) -> int:
+        """Return the word of a register; its unit and format are those of `device.registers`.
+
+        Raises:
+            KeyError: if there is no such register.
+            HostError: if the board is not reached.
+        """
+        register = self.device.registers[name]
+        return register.from_registers(self._port.read(register.address, register.size))
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """What the link has counted since the board's reset, by name; they wrap at 65536."""
+        block = self.device.of_kind(Kind.COUNTER)
+        return dict(zip((each.name for each in block), self._port.read(block[0].address, len(block)), strict=True))
+
+    @property
+    def status(self) -> Status:
+        """What the axis does now."""
+        last = self._status[-1]
+        registers = self._port.read(TELEMETRY, last.address + last.size - TELEMETRY)
+        words = {}
+        for each in self._status:
+            at = each.address - TELEMETRY
+            words[each.name] = each.from_registers(registers[at : at + each.size])
+        si = {each.name: words[each.name] * each.lsb for each in self._status}
+        return status_of(words, si, self.device.registers["flags"].format.width)
+
+    @property
+    def trip(self) -> Trip | None:
+        """The causes that are latched; None if none is."""
+        return self.status.trip
+
+    def renew(self) -> None:
+        """Show that the application lives: the heartbeat goes on for another half second.
+
+        Raises:
+            HostError: if the board is not reached.
+        """
+        self._heartbeat.renew()
+        if self._heartbeat.lost:
+            raise self._heartbeat.lost
+
+    def sleep(self, seconds: float) -> None:
+        """Wait, and live meanwhile; the errors are those of `renew`."""
+        until = time.monotonic() + seconds
+        while (left := until - time.monotonic()) > 0:
+            self.renew()
+            time.sleep(min(left, LEASE_S / 4))
+
+    def watch(self, period_s: float = 0.05, seconds: float | None = None) -> Iterator[Status]:
+        """Yield the status again and again, and live meanwhile: for a time, or for ever.
+
+        Raises:
+            HostError: if the board is not reached.
+        """
+        began = time.monotonic()
+        while seconds is None or time.monotonic() - began < seconds:
+            self.renew()
+            yield self.status
+            self.sleep(period_s)
+
+    def arm(self) -> None:
+        """Let the axis drive, within limits that rise from 0. From now on the application must renew its lease.
+
+        Raises:
+            TrippedError: if causes are latched, or come at once.
+            NotReadyError: if the axis cannot be armed for another reason.
+            ChangedError: if the board has other words than those that were written.
+            HostError: if the board is not reached.
+        """
+        if (found := read_identity(self._port)) != self.device.identity:
+            raise ChangedError(
+                f"the board at {self._port.name} is now {found}, not {self.device.identity}: connect again"
+            )
+        self._words.check()
+        self.renew()
+        for _ in range(READY_TRIES):
+            status = self.status
+            if status.ready or status.trip:
+                break
+        if status.trip:
+            raise TrippedError(f"the axis is tripped; acknowledge it first: {status.trip}")
+        if not status.ready:
+            raise NotReadyError(f"the axis cannot be armed: {self._why_not(status)}")
+        self._may_drive = True
+        try:
+            self._pulse("arm")
+        except RefusedError as error:
+            raise NotReadyError(f"the axis cannot be armed: {self._why_not(self.status)}") from error
+        status = self.status
+        if status.state is not State.ARMED:
+            raise TrippedError(f"the axis tripped as it was armed: {status.trip}")
+
+    def disarm(self) -> None:
+        """Make the drive 0, and let the heartbeat rest.
+
+        Raises:
+            HostError: if the board is not reached; the watchdog then does it.
+        """
+        self._heartbeat.rest()
+        self._pulse("disarm")
+        self._may_drive = False
+
+    def acknowledge(self, trip: Trip) -> None:
+        """Acknowledge a trip that was read, and clear the flags: the axis is DISARMED, unless a cause still stands.
+
+        Raises:
+            TrippedError: if a cause stands, or another came since `trip` was read.
+            HostError: if the board is not reached.
+        """
+        word = self.device.registers["acknowledged"]
+        self._port.write(word.address, word.to_registers(trip.latched))
+        # What the encoder says is a cause until the flags are cleared, so that comes first.
+        self._pulse("clear_flags")
+        self._pulse("acknowledge")
+        if now := self.trip:
+            raise TrippedError(f"the axis is still tripped: {now}")
+
+    def preload(self, position_m: float) -> None:
+        """Say where the handle is. The axis must not be ARMED, and the handle should rest.
+
+        Raises:
+            FieldError: if the position is out of range.
+            NotReadyError: if the axis is ARMED.
+            HostError: if the board is not reached.
+        """
+        self.set(preload_count=position_m)
+        try:
+            self._pulse("preload")
+        except RefusedError as error:
+            raise NotReadyError("the axis is ARMED: disarm it before its position is set") from error
+
+    def home(self, index_m: float = 0.0, seconds: float = 60.0) -> float:
+        """Wait until a hand has moved the handle over the index; then make the index the position `index_m`.
+
+        Returns the position of the handle, which must rest at the end: how far the old origin was off is the
+        difference.
+
+        Raises:
+            TimeoutError: if the index, or a handle that rests, does not come in time.
+            NotReadyError: if the axis is ARMED.
+            HostError: if the board is not reached.
+        """
+        until = time.monotonic() + seconds
+        self._pulse("index_arm")
+        while self.read("index_armed"):
+            if time.monotonic() > until:
+                raise TimeoutError(f"the index has not come in {seconds:g} s: move the handle over it")
+            self.sleep(0.01)
+        rest_m = (REST_COUNTS + 0.5) * self.device.registers["count"].lsb
+        before_m = math.inf
+        while abs(self.status.position_m - before_m) > rest_m:
+            if time.monotonic() > until:
+                raise TimeoutError(f"the handle has not come to rest in {seconds:g} s after the index")
+            before_m = self.status.position_m
+            self.sleep(REST_S)
+        offset_m = index_m - self.read("index_count") * self.device.registers["index_count"].lsb
+        self.preload(self.status.position_m + offset_m)
+        return self.status.position_m
+
+    def _why_not(self, status: Status) -> str:
+        if status.state is State.ARMED:
+            return "it is ARMED"
+        if self.supervisor.reference and not status.referenced:
+            return "it needs its reference: home it first"
+        if not status.live:
+            return "no heartbeat has reached it"
+        return "the loop of drive_enable is open"
+
+    def _pulse(self, name: str) -> None:
+        self._port.write(self.device.registers[name].address, (1,))
+
+    def _beat(self) -> None:
+        self._number = self._number % self._beat_at.high + 1
+        self._port.write(self._beat_at.address, self._beat_at.to_registers(self._number))

@@ -1,0 +1,76 @@
+"""The words of a board as attributes, in SI units: of its wall, and of what limits its drive."""
+
+from typing import Protocol
+
+
+class Words(Protocol):
+    """What has words by name."""
+
+    def get(self, name: str) -> float:
+        """Return the SI value that is used."""
+
+    def set(self, **values: float) -> None:
+        """Write SI values."""
+
+
+class Value:
+    """An attribute that is a word of the board: reading it reads what the axis uses, setting it writes and commits.
+
+    Args:
+        meaning: what the word is, with its unit.
+    """
+
+    def __init__(self, meaning: str):
+        self.__doc__ = meaning
+
+    def __set_name__(self, owner: type["Group"], name: str) -> None:
+        self._name = f"{owner.PREFIX}{name}"
+
+    def __get__(self, group: "Group", owner: type["Group"]) -> float:
+        return group.words.get(self._name)
+
+    def __set__(self, group: "Group", value: float) -> None:
+        group.words.set(**{self._name: value})
+
+
+class Group:
+    """Words whose names begin alike.
+
+    Attributes:
+        words: what has all words of the board.
+    """
+
+    PREFIX = ""
+
+    def __init__(self, words: Words):
+        self.words = words
+
+
+class Wall(Group):
+    """The virtual wall. Every attribute is written and committed when it is set; `Axis.set` takes several at once."""
+
+    PREFIX = "wall_"
+    stiffness = Value("The spring, N/m.")
+    damping = Value("The damper, N s/m.")
+    position = Value("Where the wall begins, m.")
+    left = Value("1 if the wall is on the side of lower positions, else 0.")
+    forbid_pull = Value("1 if the wall may not pull the handle in, else 0.")
+
+
+class Supervisor(Group):
+    """What lets a drive out: limits that act at once. Their ranges, and what they are after reset, are the board's."""
+
+    PREFIX = "supervisor_"
+    force_limit = Value("The largest drive either way, N.")
+    ramp = Value("The rise of the limit after arming, N/s.")
+    watchdog = Value("The longest time between two beats of the host, s.")
+    causes = Value("The causes that trip, a bit each.")
+    reference = Value("1 if arming needs a reference, found at the index, else 0.")
+    position_low = Value("The least position, m.")
+    position_high = Value("The largest position, m.")
+    velocity_limit = Value("The largest estimated speed, m/s.")
+    runaway = Value("The longest way against a drive at its limit, m.")
+    saturated = Value("The longest time for which the estimator may be saturated, s.")
+    loss = Value("The longest time for which a channel may equal its complement, s.")
+    turn = Value("The counts of a turn.")
+    index_tolerance = Value("The counts by which an index may be off.")

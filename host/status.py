@@ -1,0 +1,105 @@
+"""What a board shows: the state of its axis, and why it tripped."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from ..model import output, supervisor
+from ..model.design import ENCODER_FLAGS
+from ..model.supervisor import CAUSES, COUNT_BITS
+
+
+class State(IntEnum):
+    """The state of the supervisor."""
+
+    DISARMED = supervisor.DISARMED
+    ARMED = supervisor.ARMED
+    TRIPPED = supervisor.TRIPPED
+
+
+@dataclass(frozen=True)
+class Trip:
+    """The causes that are latched since the last acknowledgement, all of one moment.
+
+    Attributes:
+        latched: the word of the causes.
+        causes: their names; first: the names of those that led to the last trip.
+        counts: how often every cause has come since the board's reset, at most 15, by name.
+    """
+
+    latched: int
+    causes: tuple[str, ...]
+    first: tuple[str, ...]
+    counts: dict[str, int]
+
+    def __str__(self) -> str:
+        said = {cause.name: cause.doc for cause in CAUSES}
+        others = [name for name in self.causes if name not in self.first]
+        began = "; ".join(f"{name}: {said[name]}" for name in self.first or self.causes)
+        return f"{began}{f' (then {chr(44).join(others)})' if self.first and others else ''}"
+
+
+@dataclass(frozen=True)
+class Status:
+    """What an axis does, all values of one clock but the causes, which are of at most 1000 clocks later.
+
+    Attributes:
+        state: the state of the supervisor.
+        position_m, velocity_m_per_s: the handle's, estimated at the last sample.
+        wall_force_n: the wall's force on the handle at the last sample.
+        force_n: the force that is let out.
+        stamp_s: the time of the clock, which wraps at `wrap_s`.
+        live: whether the heartbeat is not overdue; ready: whether the axis can be armed.
+        referenced: whether the index has been found.
+        flags: names of the sticky flags; what estimators say of themselves is `estimator_saturated`.
+        a_channel_idle: the warning that the last edges were all of one channel.
+        trip: the causes that are latched; None if none is.
+    """
+
+    state: State
+    position_m: float
+    velocity_m_per_s: float
+    wall_force_n: float
+    force_n: float
+    stamp_s: float
+    live: bool
+    ready: bool
+    referenced: bool
+    flags: tuple[str, ...]
+    a_channel_idle: bool
+    trip: Trip | None
+
+
+def status_of(words: dict[str, int], si: dict[str, float], flag_bits: int) -> Status:
+    """Return the status of the words of registers and their SI values, both by name; `flag_bits` is that of `flags`."""
+    return Status(
+        State(words["state"]),
+        si["count"],
+        si["velocity"],
+        si["wall_force"],
+        si["driven"],
+        si["stamp"],
+        bool(words["live"]),
+        bool(words["ready"]),
+        bool(words["index_latched"]),
+        _flags(words["flags"], flag_bits),
+        bool(words["a_channel_idle"]),
+        _trip(words) if words["latched"] else None,
+    )
+
+
+def _flags(flags: int, bits: int) -> tuple[str, ...]:
+    """Return the names of the flags that are set: the encoder's come first, and the output's last."""
+    between = bits - len(ENCODER_FLAGS) - len(output.FLAGS)
+    known = (*ENCODER_FLAGS, *["estimator_saturated"] * between, *output.FLAGS)
+    return tuple(dict.fromkeys(name for bit, name in enumerate(known) if flags >> bit & 1))
+
+
+def _trip(words: dict[str, int]) -> Trip:
+    counts = words["counts_0"] | words["counts_1"] << 32
+    most = (1 << COUNT_BITS) - 1
+    return Trip(
+        words["latched"],
+        tuple(supervisor.names(words["latched"])),
+        tuple(supervisor.names(words["first"])),
+        {cause.name: counts >> COUNT_BITS * bit & most for bit, cause in enumerate(CAUSES)},
+    )

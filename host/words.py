@@ -1,0 +1,133 @@
+"""The words of a board in SI units: what was written, and one request for all that takes effect together."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from ..model.checks import FieldError, check_number
+from ..model.register import Kind, Register
+from ..model.registers import ACTIVE, PULSES, WRITTEN
+from .device import Device
+from .errors import ChangedError
+from .port import Port
+
+OF_THE_HEARTBEAT = ("heartbeat", "acknowledged")
+"""Live words that are no settings."""
+
+
+class Words:
+    """The words of a board, and an image of what was written to them, which is read from the board at first.
+
+    Args:
+        port: the line.
+        device: the device there.
+
+    Raises:
+        HostError: if the board does not answer.
+    """
+
+    def __init__(self, port: Port, device: Device):
+        self._port, self._device = port, device
+        kinds = Kind.WORD, Kind.LIVE
+        words = [word for kind in kinds for word in device.of_kind(kind) if word.name not in OF_THE_HEARTBEAT]
+        self._words = {word.name: word for word in words}
+        self._written = self._read()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of all words that can be set."""
+        return tuple(self._words)
+
+    def check(self) -> None:
+        """Compare the board's words with what was written.
+
+        Raises:
+            ChangedError: if one differs: the board was reset, or another host has written.
+        """
+        for name, word in self._read().items():
+            if word != self._written[name]:
+                raise ChangedError(
+                    f"the board at {self._port.name} has {self._si(name, word):g} in {name}, and not "
+                    f"{self._si(name, self._written[name]):g} as it was written: it was reset, or another host "
+                    "writes to it; connect again"
+                )
+
+    def get(self, name: str) -> float:
+        """Return the SI value of a word as the axis uses it.
+
+        Raises:
+            FieldError: if there is no such word.
+            HostError: if the board does not answer.
+        """
+        word = self._word(name)
+        shift = ACTIVE - WRITTEN if word.kind is Kind.WORD else 0
+        return self._si(name, word.from_registers(self._port.read(word.address + shift, word.size)))
+
+    def written(self, name: str) -> float:
+        """Return the SI value of a word as it was written last."""
+        return self._si(name, self._written[name])
+
+    def set(self, values: Mapping[str, Any]) -> None:
+        """Write words in SI units: live ones first, each of which acts at once; then the others, all at one sample.
+
+        A value is rounded to the word's unit. Nothing is written unless every value is within its range.
+
+        Raises:
+            FieldError: if there is no such word, or a value is out of its range.
+            TypeError: if a value is no number.
+            HostError: if the board does not answer, or refuses.
+        """
+        given = {name: self._rounded(self._word(name), value) for name, value in values.items()}
+        committed = [name for name in given if self._words[name].kind is Kind.WORD]
+        for name, value in given.items():
+            word = self._words[name]
+            if word.kind is Kind.LIVE:
+                self._port.write(word.address, word.to_registers(value))
+                self._written[name] = value
+        if committed:
+            self._commit({name: given[name] for name in committed})
+
+    def _commit(self, given: dict[str, int]) -> None:
+        """Write words and their commit in one request, with what lies between as it was written last."""
+        image = self._written | given
+        last = max(self._words[name].address for name in given)
+        registers = [1]
+        for word in self._device.of_kind(Kind.WORD):
+            if word.address <= last:
+                registers += word.to_registers(image[word.name])
+        assert self._device.registers["commit"].address == WRITTEN - 1 >= PULSES
+        self._port.write(WRITTEN - 1, tuple(registers))
+        self._written = image
+
+    def _read(self) -> dict[str, int]:
+        """Return what is written in the board, by name; every block of words in one request."""
+        found = {}
+        for kind in (Kind.WORD, Kind.LIVE):
+            block = [word for word in self._words.values() if word.kind is kind]
+            first = block[0].address
+            registers = self._port.read(first, block[-1].address + block[-1].size - first)
+            for word in block:
+                at = word.address - first
+                found[word.name] = word.from_registers(registers[at : at + word.size])
+        return found
+
+    def _word(self, name: str) -> Register:
+        if name not in self._words:
+            raise FieldError("word", f"must be one of {', '.join(self._words)}, not {name!r}")
+        return self._words[name]
+
+    def _si(self, name: str, word: int) -> float:
+        return word * self._words[name].lsb
+
+    @staticmethod
+    def _rounded(word: Register, value: float | bool) -> int:
+        """Return the word nearest to an SI value that is within its range."""
+        if not isinstance(value, bool):
+            check_number(word.name, value)
+        least, most = word.low * word.lsb, word.high * word.lsb
+        # Half of a unit beyond an end is the end: `least` and `most` are rounded themselves.
+        near = word.lsb / 2
+        if not math.isfinite(value) or not least - near < value < most + near:
+            unit = f" {word.unit}" if word.unit else ""
+            raise FieldError(word.name, f"must be {least:g} to {most:g}{unit}, not {value!r}")
+        return min(max(round(value / word.lsb), word.low), word.high)

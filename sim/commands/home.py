@@ -1,0 +1,27 @@
+"""The command `home`."""
+
+from typing import Annotated
+
+import typer
+
+from ..jobs.result import Values
+from .options import within
+from .port import RATE, BaudOption, IdentityOption, PortArgument, axis_at
+from .study import StudyOptions, study
+from .terminal import log
+
+
+@study()
+def command(
+    options: StudyOptions,
+    port: PortArgument,
+    at: Annotated[float, typer.Option(metavar="M", help="the position of the index, m")] = 0.0,
+    baud: BaudOption = RATE,
+    identity: IdentityOption = None,
+    seconds: Annotated[float, typer.Option(metavar="S", help="the longest wait")] = 60.0,
+) -> None:
+    within(seconds, "--seconds", 0.0, 1e6, "s")
+    with axis_at(port, baud, identity) as axis:
+        log.print("move the handle over its index, and let it rest")
+        position_m = axis.home(at, seconds)
+    options.finish(Values({"position_m": position_m}))

@@ -1,0 +1,44 @@
+"""What the commands that speak to a board share: their options, its axis, and its errors."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated
+
+import typer
+
+from ...host import Axis, Status, connect
+from ...host.port import BAUD
+from ...model.checks import FieldError
+from .errors import BadInput
+
+PortArgument = Annotated[
+    str, typer.Argument(metavar="PORT", help="a serial port, e.g. of /dev/serial/by-id; or tcp://HOST:PORT")
+]
+BaudOption = Annotated[int, typer.Option(min=1, max=4_000_000, help="the board's rate")]
+IdentityOption = Annotated[
+    str | None, typer.Option(metavar="HASH", help="the identity that the board must have", show_default="any")
+]
+SecondsOption = Annotated[
+    float | None, typer.Option(metavar="S", help="time to run", show_default="until it is interrupted")
+]
+RATE = BAUD
+"""The default of `BaudOption`."""
+
+
+@contextmanager
+def axis_at(port: str, baud: int, identity: str | None = None) -> Iterator[Axis]:
+    """Yield the axis at a port, and close it."""
+    try:
+        with connect(port, baud, identity=identity) as axis:
+            yield axis
+    except FieldError as error:
+        raise BadInput(str(error)) from None
+
+
+def line_of(status: Status) -> str:
+    """Return a status as a line for people."""
+    said = f"; {status.trip}" if status.trip else f"; {', '.join(status.flags)}" if status.flags else ""
+    return (
+        f"{status.state.name:8} {1e3 * status.position_m:10.4f} mm {1e3 * status.velocity_m_per_s:9.3f} mm/s "
+        f"{status.force_n:9.4f} N{said}"
+    )

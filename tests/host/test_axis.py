@@ -1,0 +1,156 @@
+"""A host and a board in simulation, from the pins: brought up, held in a wall, tripped and mended."""
+
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from hardwall.host.axis import Axis
+from hardwall.host.connect import connect
+from hardwall.host.errors import NotReadyError, TrippedError
+from hardwall.host.heartbeat import LEASE_S
+from hardwall.host.status import State, Status
+from stimuli.virtual_boards import VirtualBoard, running
+
+SLOW = {"controller.clock_hz": 4_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
+"""As few clocks as the scene's axis needs, on a simulator that shares its machine. Without friction a contact has one
+position."""
+WALL_M, STIFFNESS_N_PER_M = 1e-3, 2000.0
+PATIENCE_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def virtual() -> Iterator[VirtualBoard]:
+    with running(SLOW, "--tcp", "0", "--speed", "0") as board:
+        yield board
+
+
+@pytest.fixture
+def axis(virtual) -> Iterator[Axis]:
+    """An axis with a wall, not armed, whose handle is held in front of the wall."""
+    virtual.order("close drive_enable", "close emergency_stop", "push 0", "hold -1")
+    with connect(virtual.tcp) as found:
+        found.renew()
+        if trip := found.trip:
+            found.acknowledge(trip)
+        found.set(wall_stiffness=STIFFNESS_N_PER_M, wall_damping=5.0, wall_position=WALL_M, supervisor_watchdog=0.2)
+        found.set(supervisor_force_limit=20.0, supervisor_reference=0)
+        settled(found, lambda status: abs(status.velocity_m_per_s) < 0.02)
+        yield found
+
+
+def settled(axis: Axis, so: Callable[[Status], bool]) -> Status:
+    """Watch until the status is as expected."""
+    for status in axis.watch(0.02, PATIENCE_S):
+        if so(status):
+            return status
+    raise AssertionError(f"it is {status}")
+
+
+def rests(axis: Axis) -> Status:
+    """Watch until the handle rests."""
+    before = axis.status
+    for status in axis.watch(0.5, PATIENCE_S):
+        if status.stamp_s != before.stamp_s and abs(status.position_m - before.position_m) < 1.5e-5:
+            return status
+        before = status
+    raise AssertionError(f"it is {before}")
+
+
+def test_a_hand_is_held_by_the_wall_and_let_go_by_disarm(virtual, axis):
+    axis.arm()
+    settled(axis, lambda status: status.state is State.ARMED)
+    # The limit rises for half a second of the board's time.
+    axis.sleep(2.0)
+    virtual.order("hold free", "push 4")
+    assert rests(axis).position_m == pytest.approx(WALL_M + 4.0 / STIFFNESS_N_PER_M, abs=1e-4)
+    assert axis.status.force_n == pytest.approx(-4.0, abs=0.3)
+    # A host may move the wall while it holds.
+    axis.wall.position = WALL_M + 2e-3
+    assert rests(axis).position_m == pytest.approx(WALL_M + 2e-3 + 4.0 / STIFFNESS_N_PER_M, abs=1e-4)
+    axis.disarm()
+    assert axis.status.state is State.DISARMED
+    assert axis.status.force_n == 0
+
+
+def test_an_application_that_hangs_trips_the_board(axis):
+    axis.arm()
+    axis.sleep(2 * LEASE_S)
+    assert axis.status.state is State.ARMED
+    # Whoever only reads does not live.
+    until = time.monotonic() + PATIENCE_S
+    while axis.status.state is State.ARMED:
+        assert time.monotonic() < until
+    assert axis.trip.causes == axis.trip.first == ("link_timeout",)
+    with pytest.raises(TrippedError, match="acknowledge it first: link_timeout: the host's heartbeat has stopped"):
+        axis.arm()
+    axis.acknowledge(axis.trip)
+    axis.arm()
+
+
+def test_leaving_disarms(virtual):
+    with connect(virtual.tcp) as axis:
+        axis.renew()
+        axis.arm()
+    with connect(virtual.tcp) as axis:
+        assert axis.status.state is State.DISARMED
+        assert axis.trip is None
+
+
+def test_a_trip_names_its_causes_and_is_left_by_acknowledging_exactly_these(virtual, axis):
+    axis.arm()
+    virtual.order("open emergency_stop")
+    status = settled(axis, lambda status: status.state is State.TRIPPED)
+    assert status.trip.first == ("emergency_stop",)
+    assert status.trip.counts["emergency_stop"] >= 1
+    assert status.force_n == 0
+    with pytest.raises(TrippedError, match="still tripped: emergency_stop: the loop of the emergency stop is open"):
+        axis.acknowledge(status.trip)
+    virtual.order("close emergency_stop", "open external_fault", "close external_fault")
+    settled(axis, lambda status: "external_fault" in status.trip.causes)
+    with pytest.raises(TrippedError, match=r"emergency_stop: .* \(then external_fault\)"):
+        axis.acknowledge(status.trip)
+    axis.acknowledge(axis.trip)
+    axis.arm()
+    assert axis.status.state is State.ARMED
+
+
+def test_what_cannot_be_armed_says_why(virtual, axis):
+    virtual.order("open drive_enable")
+    axis.sleep(0.5)
+    with pytest.raises(NotReadyError, match="cannot be armed: the loop of drive_enable is open"):
+        axis.arm()
+    virtual.order("close drive_enable")
+    axis.sleep(0.5)
+    axis.supervisor.reference = 1
+    if not axis.status.referenced:
+        with pytest.raises(NotReadyError, match="it needs its reference: home it first"):
+            axis.arm()
+    axis.supervisor.reference = 0
+    axis.arm()
+    with pytest.raises(NotReadyError, match="it is ARMED"):
+        axis.arm()
+    with pytest.raises(NotReadyError, match="disarm it before its position is set"):
+        axis.preload(0.0)
+    axis.disarm()
+    axis.preload(5e-3)
+    assert axis.status.position_m == pytest.approx(5e-3, abs=1e-4)
+    axis.preload(-1e-3)
+
+
+def test_the_index_becomes_the_origin(virtual, axis):
+    with pytest.raises(TimeoutError, match=r"the index has not come in 0.2 s: move the handle over it"):
+        axis.home(seconds=0.2)
+    # The hand holds it at places of the world, and there is an index every 4 mm.
+    virtual.order("hold 7")
+    position_m = axis.home(0.1, PATIENCE_S)
+    assert position_m == pytest.approx(rests(axis).position_m, abs=2e-5)
+    apart_m = (position_m - 0.1) % 4e-3
+    assert 0.1e-3 < apart_m < 3.9e-3
+    assert axis.status.referenced
+    # The same index again is where it is said to be.
+    virtual.order("hold -1")
+    axis.home(0.1, PATIENCE_S)
+    virtual.order("hold 7")
+    axis.sleep(0.5)
+    assert abs((rests(axis).position_m - 0.1) % 4e-3 - apart_m) < 5e-5

@@ -1,0 +1,183 @@
+"""The line to a board: requests and answers that belong together, whatever is lost, late or spoilt."""
+
+import os
+import pty
+import socket
+import threading
+import time
+import tty
+from contextlib import suppress
+
+import pytest
+
+from hardwall.host.errors import ForeignError, PortError, RefusedError, SilentError
+from hardwall.host.port import Port
+from hardwall.model.link.server import WRITE_MAX
+
+
+@pytest.fixture
+def port(board):
+    line = Port(board.name, answer_s=0.2)
+    yield line
+    line.close()
+
+
+def test_a_long_read_is_several_requests_and_a_write_is_one(board, port, registers):
+    words = board.server.file.design.map_cells
+    assert list(port.read(0x4000, 300)) == words[:300]
+    stiffness = registers["wall_stiffness"]
+    port.write(stiffness.address, (0, 77))
+    assert port.read(stiffness.address, 2) == (0, 77)
+    assert port.identify() == {0: b"hardwall", 1: b"axis", 2: registers.identity.encode()}
+
+
+@pytest.mark.parametrize("count", [0, WRITE_MAX + 1])
+def test_a_write_that_is_no_request_is_refused_here(port, count):
+    with pytest.raises(ValueError, match=f"registers must be 1 to {WRITE_MAX}, not {count}"):
+        port.write(0x80, (0,) * count)
+
+
+@pytest.mark.parametrize(
+    ("ask", "code", "message"),
+    [
+        (lambda port: port.read(0x3000, 2), 2, "read 2 registers from 0x3000 on: it has no such register"),
+        (lambda port: port.write(0xC8, (0, 1)), 3, "write 2 registers from 0x00c8 on: a value is out of its range"),
+        (lambda port: port.write(0x7B, (1,)), 4, "0x007b on: it does not do that in its present state"),
+    ],
+)
+def test_a_refusal_says_what_was_refused_and_why(board, port, ask, code, message):
+    board.server.file.refusing = frozenset({"arm"})
+    with pytest.raises(RefusedError, match=message) as raised:
+        ask(port)
+    assert raised.value.code == code
+
+
+def test_an_answer_that_is_late_is_not_taken_for_the_next(board, port, registers):
+    port.read(0, 2)
+    board.late_s = 0.5
+    with pytest.raises(SilentError, match="nothing answers at tcp"):
+        port.read(0x4000, 2)
+    for _ in range(20):
+        assert port.read(0, 2) == (0, registers["layout"].reset)
+
+
+@pytest.mark.parametrize("fault", ["lost", "spoilt"])
+def test_an_answer_that_is_lost_or_spoilt_is_an_error_once(board, port, fault):
+    port.read(0, 2)
+    setattr(board, fault, 1)
+    with pytest.raises(SilentError):
+        port.read(0, 2)
+    assert port.read(2, 2) == tuple(board.server.file.live[2:4])
+
+
+def test_a_host_begins_behind_what_the_last_one_was_told(board, registers):
+    # The last host went away in the middle of a request, whose answer the next one finds on the line.
+    ours, theirs = pty.openpty()
+    tty.setraw(ours)
+    tty.setraw(theirs)
+    os.write(ours, b"\1\3\4\0\0\0\7\x7a\x31")
+    with socket.create_connection(("127.0.0.1", int(board.name.rpartition(":")[2]))) as line:
+        done = threading.Event()
+
+        def carry() -> None:
+            os.set_blocking(ours, False)
+            line.settimeout(0.002)
+            while not done.is_set():
+                for take, give in ((lambda: os.read(ours, 500), line.sendall), (lambda: line.recv(500), _to(ours))):
+                    with suppress(BlockingIOError, TimeoutError):
+                        give(take())
+
+        thread = threading.Thread(target=carry)
+        thread.start()
+        port = Port(os.ttyname(theirs), answer_s=0.5)
+        assert port.read(0, 2) == (0, registers["layout"].reset)
+        with pytest.raises(PortError, match="another program has it, and a board has one host at a time"):
+            Port(os.ttyname(theirs))
+        port.close()
+        done.set()
+        thread.join()
+    os.close(ours)
+    os.close(theirs)
+
+
+def _to(file: int):
+    return lambda data: os.write(file, data)
+
+
+def test_requests_of_several_threads_come_one_after_the_other(board, port, registers):
+    wrong = []
+
+    def ask(address: int) -> None:
+        expected = tuple(board.server.file.live[address : address + 2])
+        wrong.extend(address for _ in range(50) if port.read(address, 2) != expected)
+
+    threads = [threading.Thread(target=ask, args=(address,)) for address in (0, 2, 4, 6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert wrong == []
+
+
+def test_a_board_that_goes_away_is_gone_for_good(board, port):
+    port.read(0, 2)
+    board.hang_up()
+    with pytest.raises(PortError, match="is gone: is the cable in, and the board powered"):
+        port.read(0, 2)
+    with pytest.raises(PortError, match="is closed or gone: connect again"):
+        port.read(0, 2)
+
+
+def test_what_does_not_repeat_is_no_axis():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            guest, _ = server.accept()
+            with guest:
+                while guest.recv(100):
+                    # The answer to a request of two registers.
+                    guest.sendall(b"\1\3\4\0\0\0\7\xbb\xf1")
+
+        thread = threading.Thread(target=answer)
+        thread.start()
+        port = Port(f"tcp://127.0.0.1:{server.getsockname()[1]}", answer_s=0.1)
+        with pytest.raises(ForeignError, match="does not repeat what it is told"):
+            port.read(0, 2)
+        port.close()
+        thread.join()
+
+
+def test_silence_ends():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = Port(f"tcp://127.0.0.1:{server.getsockname()[1]}", answer_s=0.05)
+        began = time.monotonic()
+        with pytest.raises(SilentError, match="at 921600 baud: is the board powered and configured"):
+            port.read(0, 2)
+        assert time.monotonic() - began < 5
+        port.close()
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("/dev/hardwall-absent", "there is none of that name; `ls /dev/serial/by-id` shows those"),
+        ("/dev/null", "it is no serial port"),
+        ("", "cannot be opened"),
+        ("a\0b", "cannot be opened"),
+        ("tcp://127.0.0.1:1", "nothing listens there"),
+        ("tcp://127.0.0.1", "a port of the network must be tcp://HOST:PORT, with a PORT of 1 to 65535"),
+        ("tcp://:5", "a port of the network must be tcp://HOST:PORT"),
+        ("tcp://127.0.0.1:65536", "a port of the network must be tcp://HOST:PORT"),
+        ("tcp://no.such.host.invalid:5", "cannot be opened"),
+    ],
+)
+def test_a_port_that_cannot_be_had_says_why(name, message):
+    with pytest.raises(PortError, match=message):
+        Port(name)
+
+
+def test_a_folder_and_a_pipe_are_no_serial_ports(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for name in (tmp_path, tmp_path / "pipe"):
+        with pytest.raises(PortError, match="cannot be opened"):
+            Port(str(name))

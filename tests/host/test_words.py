@@ -1,0 +1,98 @@
+"""Words in SI units: rounded, in range, committed together in one request, and compared with the board's."""
+
+import pytest
+
+from hardwall.host.connect import connect
+from hardwall.host.errors import ChangedError
+from hardwall.model.checks import FieldError
+
+
+def active(board, registers, name: str) -> int:
+    word = registers[name]
+    return board.server.file.active[word.name]
+
+
+def test_words_of_one_call_are_committed_by_one_request(board, axis, registers):
+    before = len(board.requests)
+    axis.set(wall_stiffness=10e3, wall_damping=20.0, levant_lambda=0.5)
+    # One request, one beat.
+    assert len(board.requests) - before == 2
+    assert board.requests[before][7:9] == b"\0\1"
+    for name, value in (("wall_stiffness", 10e3), ("wall_damping", 20.0), ("levant_lambda", 0.5)):
+        assert active(board, registers, name) == round(value / registers[name].lsb)
+        assert axis.get(name) == pytest.approx(value, abs=registers[name].lsb / 2)
+    untouched = [
+        each for each in registers.words if each.name not in ("wall_stiffness", "wall_damping", "levant_lambda")
+    ]
+    assert all(board.server.file.active[each.name] == each.reset for each in untouched)
+
+
+def test_what_another_call_wrote_is_kept(board, axis, registers):
+    axis.wall.position = -3e-3
+    axis.wall.stiffness = 5e3
+    axis.supervisor.force_limit = 7.5
+    assert active(board, registers, "wall_position") == -3000
+    assert active(board, registers, "wall_stiffness") == round(5e3 / registers["wall_stiffness"].lsb)
+    assert active(board, registers, "supervisor_force_limit") == 7500
+    assert (axis.wall.position, axis.supervisor.force_limit) == (pytest.approx(-3e-3), 7.5)
+
+
+def test_what_a_host_before_has_written_is_kept(board, registers):
+    with connect(board.name) as first:
+        first.set(wall_stiffness=5e3, supervisor_watchdog=0.5)
+    with connect(board.name) as second:
+        second.set(wall_position=1e-3)
+        assert second.wall.stiffness == pytest.approx(5e3, abs=4)
+        assert second.supervisor.watchdog == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"wall_stiffness": -1e4}, r"wall_stiffness must be 0 to 255996 N/m, not -10000.0"),
+        ({"wall_stiffness": float("nan")}, "wall_stiffness must be 0 to 255996 N/m, not nan"),
+        (
+            {"wall_stiffness": 5e3, "wall_position": float("inf")},
+            "wall_position must be -1.04858 to 1.04858 m, not inf",
+        ),
+        ({"wall_left": 2}, "wall_left must be 0 to 1, not 2"),
+        ({"supervisor_watchdog": 0.02}, "supervisor_watchdog must be 0.05 to 2 s, not 0.02"),
+        ({"heartbeat": 3}, "word must be one of preload_count, .*, drive_invert, not 'heartbeat'"),
+        ({"wall_stiffness": 5e3, "wall": 1}, "word must be one of preload_count, .*, not 'wall'"),
+    ],
+)
+def test_what_is_out_of_range_writes_nothing(board, axis, values, message):
+    before = len(board.requests)
+    with pytest.raises(FieldError, match=message):
+        axis.set(**values)
+    assert len(board.requests) == before
+
+
+@pytest.mark.parametrize("value", ["5", None, [1]])
+def test_what_is_no_number_writes_nothing(board, axis, value):
+    before = len(board.requests)
+    with pytest.raises(TypeError, match="wall_stiffness must be a number"):
+        axis.wall.stiffness = value
+    assert len(board.requests) == before
+
+
+def test_the_ends_of_every_range_can_be_written(board, axis, registers):
+    for word in (*registers.words, *registers.live):
+        if word.name in axis.names:
+            for end in (word.low, word.high):
+                axis.set(**{word.name: end * word.lsb})
+                assert board.server.file.active[word.name] == end
+            axis.set(**{word.name: word.reset * word.lsb})
+    assert {"heartbeat", "acknowledged"} & set(axis.names) == set()
+    assert len(axis.names) == len(registers.words) + len(registers.live) - 2
+
+
+def test_a_board_that_was_reset_is_not_armed(board, axis, registers):
+    axis.set(wall_stiffness=5e3)
+    at = registers["wall_stiffness"].address
+    board.server.file.live[at : at + 2] = [0, 0]
+    with pytest.raises(ChangedError, match=r"has 0 in wall_stiffness, and not 5000 as it was written: it was reset"):
+        axis.arm()
+    board.server.file.live[3] ^= 1
+    with pytest.raises(ChangedError, match=r"is now .*: connect again"):
+        axis.arm()
