@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Iterator
 
+from ..model.checks import check_range
 from ..model.register import Kind
 from ..model.registers import TELEMETRY
 from .device import Device, read_identity
@@ -223,24 +224,27 @@ class Axis:
         difference.
 
         Raises:
+            FieldError: if `index_m` is beyond the range of positions.
             TimeoutError: if the index, or a handle that rests, does not come in time.
             NotReadyError: if the axis is ARMED.
             HostError: if the board is not reached.
         """
+        count = self.device.registers["count"]
+        check_range("index_m", index_m, count.low * count.lsb, count.high * count.lsb)
         until = time.monotonic() + seconds
         self._pulse("index_arm")
         while self.read("index_armed"):
             if time.monotonic() > until:
                 raise TimeoutError(f"the index has not come in {seconds:g} s: move the handle over it")
             self.sleep(0.01)
-        rest_m = (REST_COUNTS + 0.5) * self.device.registers["count"].lsb
+        rest_m = (REST_COUNTS + 0.5) * count.lsb
         before_m = math.inf
         while abs(self.status.position_m - before_m) > rest_m:
             if time.monotonic() > until:
                 raise TimeoutError(f"the handle has not come to rest in {seconds:g} s after the index")
             before_m = self.status.position_m
             self.sleep(REST_S)
-        offset_m = index_m - self.read("index_count") * self.device.registers["index_count"].lsb
+        offset_m = index_m - self.read("index_count") * count.lsb
         self.preload(self.status.position_m + offset_m)
         return self.status.position_m
 

@@ -22,6 +22,8 @@ def command(
 ) -> None:
     within(seconds, "--seconds", 0.0, 1e6, "s")
     with axis_at(port, baud, identity) as axis:
+        count = axis.device.registers["count"]
+        within(at, "--at", count.low * count.lsb, count.high * count.lsb, "m")
         log.print("move the handle over its index, and let it rest")
         position_m = axis.home(at, seconds)
     options.finish(Values({"position_m": position_m}))

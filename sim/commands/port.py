@@ -9,6 +9,7 @@ import typer
 from ...host import Axis, Status, connect
 from ...host.port import BAUD
 from ...model.checks import FieldError
+from ..jobs import ending
 from .errors import BadInput
 
 PortArgument = Annotated[
@@ -27,9 +28,9 @@ RATE = BAUD
 
 @contextmanager
 def axis_at(port: str, baud: int, identity: str | None = None) -> Iterator[Axis]:
-    """Yield the axis at a port, and close it."""
+    """Yield the axis at a port, and disarm and close it, also when a signal ends the program."""
     try:
-        with connect(port, baud, identity=identity) as axis:
+        with connect(port, baud, identity=identity) as axis, ending.undone_by_signal(axis.close):
             yield axis
     except FieldError as error:
         raise BadInput(str(error)) from None

@@ -1,0 +1,148 @@
+"""The commands that speak to a board, as they are called, with a board in simulation."""
+
+import json
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from hardwall.host.connect import connect
+from hardwall.host.errors import HostError
+from hardwall.host.status import State
+from hardwall.model.registers import RegisterMap
+from hardwall.sim.scene.load import load
+from stimuli.processes import HARDWALL, ended, started, wait_until
+from stimuli.reports import check_text
+from stimuli.virtual_boards import VirtualBoard, running
+
+SLOW = {"controller.clock_hz": 4_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
+REGISTERS = RegisterMap(load("seed-2011", SLOW).spec)
+
+
+@pytest.fixture(scope="module")
+def virtual() -> Iterator[VirtualBoard]:
+    with running(SLOW, "--tcp", "0", "--speed", "0") as board:
+        yield board
+
+
+def called(*words: object) -> subprocess.CompletedProcess:
+    return subprocess.run([str(HARDWALL), *map(str, words)], capture_output=True, text=True, check=False, timeout=300)
+
+
+def state_of(board: VirtualBoard) -> State | None:
+    """Return the state of a board; None while another host has it."""
+    try:
+        with connect(board.path) as axis:
+            return axis.status.state
+    except HostError:
+        return None
+
+
+def test_connect_says_what_a_board_is(virtual):
+    done = called("connect", virtual.path, "--registers", "--json")
+    assert done.returncode == 0, done.stderr
+    check_text("connect", done.stdout)
+    report = json.loads(done.stdout)
+    assert report["identity"] == REGISTERS.identity
+    assert report["clock_hz"] == 4_000_000
+    assert report["link"]["requests"] > 0
+    values = {row["name"]: row["value"] for row in report["rows"]}
+    assert values["supervisor_watchdog"] == pytest.approx(0.2)
+    assert "commit" not in values
+    shown = called("connect", virtual.tcp)
+    assert f"identity           {REGISTERS.identity}" in shown.stdout
+    assert "0x00c8" in called("connect", virtual.tcp, "--registers").stdout
+
+
+def test_set_writes_and_says_what_is_used(virtual):
+    done = called("set", virtual.path, "wall_position=-2e-3", "wall_stiffness=1000", "--json")
+    assert done.returncode == 0, done.stderr
+    check_text("set", done.stdout)
+    used = json.loads(done.stdout)
+    assert used["wall_position"] == pytest.approx(-2e-3, abs=1e-5)
+    assert used["wall_stiffness"] == pytest.approx(1000, abs=REGISTERS["wall_stiffness"].lsb)
+
+
+def test_arm_lasts_as_long_as_its_command(virtual):
+    with started(HARDWALL, "arm", virtual.path, "--acknowledge") as process:
+        assert process.stdout.readline().startswith("ARMED ")
+        # Another host cannot have the port meanwhile.
+        busy = called("disarm", virtual.path)
+        assert busy.returncode == 1
+        assert "another program has it, and a board has one host at a time" in busy.stderr
+        process.send_signal(signal.SIGINT)
+        code, _, err = ended(process)
+    assert code == 130, err
+    assert state_of(virtual) is State.DISARMED
+
+
+def test_a_host_that_is_killed_leaves_a_board_that_trips(virtual):
+    with started(HARDWALL, "arm", virtual.path, "--acknowledge") as process:
+        assert process.stdout.readline().startswith("ARMED ")
+        process.kill()
+        process.wait()
+    wait_until(lambda: state_of(virtual) is State.TRIPPED)
+    done = called("connect", virtual.path, "--json")
+    assert json.loads(done.stdout)["first_causes"] == ["link_timeout"]
+    done = called("arm", virtual.path, "--seconds", "0.1")
+    assert done.returncode == 1
+    assert "acknowledge it first: link_timeout: the host's heartbeat has stopped" in done.stderr
+    assert called("arm", virtual.path, "--seconds", "0.1", "--acknowledge").returncode == 0
+
+
+def test_a_trip_ends_arm(virtual):
+    with started(HARDWALL, "arm", virtual.path, "supervisor_force_limit=5", "--acknowledge") as process:
+        assert process.stdout.readline().startswith("ARMED ")
+        virtual.order("open emergency_stop")
+        code, _, err = ended(process)
+    virtual.order("close emergency_stop")
+    assert code == 1
+    assert err.splitlines()[-1].startswith("hardwall: error: the axis is TRIPPED: emergency_stop: ")
+
+
+def test_watch_shows_a_line_and_home_finds_the_index(virtual):
+    done = called("watch", virtual.path, "--seconds", "0.2")
+    assert done.returncode == 0, done.stderr
+    assert " mm/s " in done.stdout
+    done = called("home", virtual.path, "--seconds", "0.2")
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == ("hardwall: error: the index has not come in 0.2 s: move the handle over it")
+    with started(HARDWALL, "home", virtual.path, "--at", "0.1", "--json") as process:
+        assert process.stderr.readline() == "move the handle over its index, and let it rest\n"
+        virtual.order("hold 7")
+        code, out, err = ended(process)
+    assert code == 0, err
+    check_text("home", out)
+    assert json.loads(out)["position_m"] == pytest.approx(0.1, abs=9e-3)
+    done = called("disarm", virtual.path, "--json")
+    check_text("disarm", done.stdout)
+    virtual.order("hold -1")
+    time.sleep(0.1)
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["set", "PORT", "wall_stiffness=1e9"], 2, "wall_stiffness must be 0 to 204797 N/m, not "),
+        (["set", "PORT", "wall_stiffness=nan"], 2, "wall_stiffness must be 0 to 204797 N/m, not "),
+        (["set", "PORT", "speed=1"], 2, "word must be one of preload_count, "),
+        (["set", "PORT", "wall_left"], 2, "a word must be NAME=NUMBER, each once, not 'wall_left'"),
+        (["set", "PORT", "wall_left=1", "wall_left=0"], 2, "a word must be NAME=NUMBER, each once, not 'wall_left=0'"),
+        (["set", "PORT", "wall_left=one"], 2, "a word must be NAME=NUMBER, each once, not 'wall_left=one'"),
+        (["home", "PORT", "--at", "1e9"], 2, "--at must be -0.65536 to 0.65535 m, not 1000000000.0"),
+        (["home", "PORT", "--seconds", "-1"], 2, "--seconds must be 0 to 1e+06 s, not -1.0"),
+        (["arm", "PORT", "--seconds", "nan"], 2, "--seconds must be 0 to 1e+06 s, not nan"),
+        (["watch", "PORT", "--seconds", "inf"], 2, "--seconds must be 0 to 1e+06 s, not inf"),
+        (["connect", "PORT", "--identity", "no"], 1, "it has another bitstream"),
+        (["connect", "/dev/hardwall-absent"], 1, "cannot be opened: there is none of that name"),
+    ],
+)
+def test_what_cannot_be_is_one_line(virtual, words, code, message):
+    done = called(*(virtual.path if word == "PORT" else word for word in words))
+    assert done.returncode == code
+    assert done.stdout == ""
+    assert done.stderr.startswith("hardwall: error: ")
+    assert len(done.stderr.splitlines()) == 1
+    assert message in done.stderr
