@@ -126,13 +126,14 @@ def test_every_estimator_is_described_measured_and_sourced(estimator):
 def test_an_example_works_in_a_copy_of_the_project(example, tmp_path):
     """As its page says, the files go into the tree and the patch wires them; then its own test and the gates pass."""
     left_out = shutil.ignore_patterns("__pycache__", "build")
-    for room in ("hdl", "model", "sim", "tests"):
+    for room in ("hdl", "host", "model", "sim", "tests"):
         shutil.copytree(ROOT / room, tmp_path / room, ignore=left_out)
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
     shutil.copytree(ROOT / "docs/examples" / example, tmp_path, dirs_exist_ok=True, ignore=left_out)
     (tmp_path / "path/hardwall").mkdir(parents=True)
-    for name, room in (("hdl", "hdl"), ("model", "model"), ("sim", "sim"), ("testing", "tests/benches")):
-        (tmp_path / "path/hardwall" / name).symlink_to(tmp_path / room)
+    for name in ("hdl", "host", "model", "sim"):
+        (tmp_path / "path/hardwall" / name).symlink_to(tmp_path / name)
+    (tmp_path / "path/hardwall/testing").symlink_to(tmp_path / "tests/benches")
     environ = {
         **os.environ,
         "GIT_CEILING_DIRECTORIES": str(tmp_path.parent),
