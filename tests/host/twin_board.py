@@ -10,6 +10,9 @@ from hardwall.model.link.line import Verdict, framed
 from hardwall.model.link.server import Server
 from hardwall.model.registers import RegisterMap
 
+SILENCE_S = 0.02
+"""The silence that ends a request which was cut short."""
+
 
 class TwinBoard:
     """A board for one host. A context manager.
@@ -31,6 +34,7 @@ class TwinBoard:
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.name = f"tcp://127.0.0.1:{self._listener.getsockname()[1]}"
         self._guest, self._ended = None, threading.Event()
+        self._begun, self._heard_s = b"", 0.0
         self._thread = threading.Thread(target=self._serve)
 
     def __enter__(self) -> "TwinBoard":
@@ -67,11 +71,10 @@ class TwinBoard:
     def _answer_all(self, connection: socket.socket) -> None:
         try:
             while data := connection.recv(1000):
-                # A host sends a request at once, and waits for its answer.
-                self.requests.append(data)
-                if data != framed(data[:-2]):
+                if not (request := self._frame(data)):
                     continue
-                answer = self.server.take(Verdict.REQUEST, data)
+                self.requests.append(request)
+                answer = self.server.take(Verdict.REQUEST, request)
                 self.react(self.server.file.pulses)
                 late_s, self.late_s = self.late_s, 0.0
                 time.sleep(late_s)
@@ -84,6 +87,16 @@ class TwinBoard:
                     connection.sendall(frame)
         except OSError:
             return
+
+    def _frame(self, data: bytes) -> bytes:
+        """Return the request that ends with these bytes, or none; a silence ends what came before."""
+        now = time.monotonic()
+        self._begun = data if now > self._heard_s + SILENCE_S else self._begun + data
+        self._heard_s = now
+        whole = self._begun if self._begun == framed(self._begun[:-2]) else b""
+        if whole:
+            self._begun = b""
+        return whole
 
     def react(self, pulses: tuple[str, ...]) -> None:
         """Do what the axis does at the pulses of a request; nothing, unless a test says so."""
