@@ -6,7 +6,7 @@ from hardwall.model.registers import RegisterMap
 
 from .specs import spec
 
-CAPTURE_REGISTERS = 300
+CAPTURE_REGISTERS = 256
 
 
 @cache
