@@ -148,7 +148,7 @@ class RegisterMap:
         ValueError: if `capture_registers` is none that there can be, or the samples are too close for a capture.
     """
 
-    def __init__(self, spec: AxisSpec, capture_registers: int = 0):
+    def __init__(self, spec: AxisSpec, capture_registers: int = CAPTURE_REGISTERS):
         if not isinstance(spec, AxisSpec):
             raise TypeError(f"spec must be an AxisSpec, not {shown(spec)}")
         check_int("capture_registers", capture_registers, 0, SPACE - CAPTURE)
