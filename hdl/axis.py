@@ -53,8 +53,8 @@ class Axis(wiring.Component):
     sampled, actuated : Out(1)
         High for one clock with the changed drive: `sampled` after every sample, `actuated` after a sample at which the
         drive follows the force.
-    count, velocity, wall_force : Out(signed)
-        The live count; the last sample's velocity and wall force.
+    count, sampled_count, velocity, wall_force : Out(signed)
+        The live count; the last sample's count, velocity and wall force.
     flags : Out
         Sticky flags, bits as in `spec.design.flags`; the encoder's flags as the samples saw them.
     stepped, edge_kind : Out
@@ -104,6 +104,7 @@ class Axis(wiring.Component):
                 "sampled": Out(1),
                 "actuated": Out(1),
                 "count": Out(count),
+                "sampled_count": Out(count),
                 "velocity": Out(shape(design.estimator.velocity)),
                 "wall_force": Out(shape(spec.force)),
                 "flags": Out(len(design.flags)),
@@ -171,10 +172,9 @@ class Axis(wiring.Component):
         working = Signal()
         m.d.sync += working.eq(strobe | (working & ~output.valid))
 
-        sampled_count = Signal.like(self.count)
         sampled_fault = Signal()
         with m.If(strobe):
-            m.d.sync += [sampled_count.eq(decoder.seen.count), sampled_fault.eq(decoder.fault)]
+            m.d.sync += [self.sampled_count.eq(decoder.seen.count), sampled_fault.eq(decoder.fault)]
 
         wiring.connect(m, decoder.seen, estimator.seen)
         m.d.comb += [
@@ -190,7 +190,7 @@ class Axis(wiring.Component):
             estimator.strobe.eq(strobe),
             estimator.restart.eq(restart),
             wall.strobe.eq(estimator.valid),
-            wall.count.eq(sampled_count),
+            wall.count.eq(self.sampled_count),
             wall.velocity.eq(estimator.velocity),
             output.strobe.eq(wall.valid),
             output.force.eq(wall.force),

@@ -12,6 +12,7 @@ from hardwall.model.registers import EDGE_STAMPS, RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervisor import ARMED
 
+from .capture import Capture
 from .clock_monitor import ClockMonitor
 from .lead_out import lead_out
 from .link.axi_link import AxiLink
@@ -20,10 +21,12 @@ from .supervised import COMPLEMENTS, LOOPS, SupervisedAxis
 
 ENCODER = ("encoder_a", "encoder_b", "encoder_z", *COMPLEMENTS)
 """Pins of the encoder."""
+CAPTURED = ("sampled", "wall_force", "driven", "state", "live", "flags", "stamp")
+"""What the capture memory takes as the axis shows it."""
 
 
 class Board(wiring.Component):
-    """A supervised axis behind a dozen pins: `SupervisedAxis` and its link, which say what they do.
+    """A supervised axis behind a dozen pins: `SupervisedAxis`, its link and its capture memory, which say what they do.
 
     A host reads and writes the registers of `registers`; what it asks for in one frame happens at one clock. It is
     refused an `arm` unless the axis is `ready`, and a `preload` while ARMED.
@@ -55,8 +58,9 @@ class Board(wiring.Component):
     spec : hardwall.model.spec.AxisSpec
         The axis.
     link : Link or AxiLink, optional
-        What the host talks to, with the registers of this axis; a serial line of 921 600 baud if it is not given, or
-        what the clock allows of that.
+        What the host talks to, with the registers of this axis, and so with a capture memory of as many registers as
+        these say, or none; a serial line of 921 600 baud if it is not given, or what the clock allows of that, with the
+        registers that `RegisterMap` gives the axis.
 
     Members
     -------
@@ -93,10 +97,12 @@ class Board(wiring.Component):
     """
 
     def __init__(self, spec: AxisSpec, link: Link | AxiLink | None = None):
-        self.axis, registers = SupervisedAxis(spec), RegisterMap(spec)
-        self.link = Link(registers, uart.usual_baud(spec.clock_hz)) if link is None else link
+        self.axis = SupervisedAxis(spec)
+        self.link = Link(RegisterMap(spec), uart.usual_baud(spec.clock_hz)) if link is None else link
+        registers = RegisterMap(spec, self.link.registers.capture_registers)
         if self.link.registers.identity != registers.identity:
             raise ValueError(f"link must have the registers {registers.identity}, not {self.link.registers.identity}")
+        self.capture = Capture(registers.capture) if registers.capture else None
         super().__init__(
             {
                 "clk": In(1),
@@ -155,8 +161,20 @@ class Board(wiring.Component):
         m.d.comb += lead_out(link, self, link.PINS)
 
         registers = self.registers
+        has = {name: getattr(axis, name) for name in axis.signature.members}
+        if self.capture:
+            m.submodules.capture = capture = self.capture
+            m.d.comb += [
+                *(getattr(capture, name).eq(has[name]) for name in CAPTURED),
+                capture.count.eq(axis.sampled_count),
+                capture.velocity.eq(axis.velocity >> len(axis.velocity) - len(capture.velocity)),
+                capture.address.eq(link.capture_address),
+                link.capture_data.eq(capture.data),
+                link.capture_done.eq(capture.done),
+            ]
+            has |= {name: getattr(capture, name) for name in capture.signature.members if name.startswith("capture_")}
         for asked in (*registers.words, *registers.live, *registers.pulses):
-            m.d.comb += getattr(axis, asked.name).eq(getattr(link, asked.name))
+            m.d.comb += has[asked.name].eq(getattr(link, asked.name))
         parts = {
             f"counts_{k}": axis.counts.word_select(k, VALUE_BITS) for k in range(-(-len(axis.counts) // VALUE_BITS))
         }
@@ -165,7 +183,7 @@ class Board(wiring.Component):
             if shown.name in EDGE_STAMPS:
                 continue
             # A value that is wider than its register gives the upper bits.
-            value = parts[shown.name] if shown.name in parts else getattr(axis, shown.name)
+            value = parts[shown.name] if shown.name in parts else has[shown.name]
             m.d.comb += getattr(link, shown.name).eq(value >> max(len(value) - shown.format.width, 0))
         armed = axis.state == ARMED
         refused = {"arm": ~axis.ready, "preload": armed}

@@ -19,6 +19,7 @@ from hardwall.model.whole_file import whole_file
 
 from .axis import Axis
 from .board import Board
+from .capture import NO_FIRST_CONTENTS
 from .link.axi_link import AxiLink
 from .ports import port_table
 
@@ -26,6 +27,9 @@ SYNCHRONISER = {"ASYNC_REG": "TRUE", "keep": "true"}
 """Attributes of every stage of a synchroniser: place the stages side by side, and neither merge nor move them."""
 START = r"\$start "
 """The name of the signal whose only change, at the start of a simulation, lets every `always @*` run once."""
+_CONTENTS = re.compile(
+    rf"^  \(\* {NO_FIRST_CONTENTS} = .* \*\)\n(  reg .*;\n)  initial begin\n(?:    .*\] = .*;\n)*  end\n", re.MULTILINE
+)
 _TRIGGER = re.compile(r"^  reg (\\\$auto\$verilog_backend\S+ ) = 0;$", re.MULTILINE)
 
 
@@ -68,10 +72,11 @@ def to_verilog(component: wiring.Component, name: str) -> str:
     """Return the Verilog of `component` as module `name`, with ports `clk` and `rst` besides its members.
 
     Source attributes are left out, so that the text depends only on the design and can be cached by its content. It is
-    Verilog-2005, and means the same where it is read as SystemVerilog.
+    Verilog-2005, and means the same where it is read as SystemVerilog. A memory with the attribute `NO_FIRST_CONTENTS`
+    has no first contents.
     """
     text = verilog.convert(component, name=name, platform=_AnyPart(), emit_src=False, strip_internal_attrs=True)
-    return _with_start(text)
+    return _with_start(_CONTENTS.sub(r"\1", text))
 
 
 def _facts(spec: AxisSpec) -> list[str]:

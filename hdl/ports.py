@@ -35,6 +35,7 @@ MEANINGS = {
     "sampled": "high for one clock with the drive of a sample",
     "actuated": "high for one clock with a drive that follows the force",
     "count": "position, live",
+    "sampled_count": "position at the last sample",
     "velocity": "estimate of the last sample",
     "wall_force": "the wall's force on the handle at the last sample",
     "flags": "sticky",
@@ -74,7 +75,7 @@ MEANINGS = {
     "axi_arvalid": "bus: there is an address to read from",
     "axi_arready": "bus: the address is taken",
     "axi_rdata": "bus: what was read",
-    "axi_rresp": "bus: 0 read, 3 no such register",
+    "axi_rresp": "bus: 0 read, 2 refused, 3 no such register",
     "axi_rvalid": "bus: the read has ended",
     "axi_rready": "bus: what was read is taken",
     "drive_pdm": "pulses; their density is the magnitude of the drive; safe when low",
@@ -100,7 +101,7 @@ def _quantities(spec: AxisSpec) -> dict[str, Quantity]:
     force = Quantity(spec.force, spec.force_resolution_n, "N")
     stamp = Quantity(UQ(spec.stamp_width, 0), 1 / spec.clock_hz, "s")
     return {
-        **dict.fromkeys(("count", "preload_count", "index_count"), count),
+        **dict.fromkeys(("count", "sampled_count", "preload_count", "index_count"), count),
         **dict.fromkeys(("drive", "wall_force"), force),
         **dict.fromkeys(("stamp", "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall"), stamp),
         "edge_kind": Quantity(UQ(2, 0), 1.0, ""),

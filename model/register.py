@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from .arithmetic.fixed import Format
+from .arithmetic.fixed import SQ, Format
 from .checks import FieldError, check_int
 from .words import Word
 
@@ -13,6 +13,11 @@ COUNTER_BITS = 16
 """Bits of a value in one register."""
 UNPLACED = -1
 """The address of a register before a map has placed it."""
+
+
+def narrowed(signed: SQ) -> SQ:
+    """Return the format of a signed value in its registers, which have its upper bits if it is wider than they are."""
+    return SQ(signed.i, VALUE_BITS - signed.i) if signed.width > VALUE_BITS else signed
 
 
 class Kind(Enum):

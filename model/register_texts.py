@@ -2,6 +2,7 @@
 
 import json
 
+from .capture import DONE
 from .register import Register
 from .registers import ACTIVE, CAPTURE, EVENTS, LAYOUT, MAP, WRITTEN, RegisterMap
 
@@ -24,14 +25,25 @@ def _row(register: Register) -> str:
     return f"| {' | '.join(cells)} |\n"
 
 
+def _window(registers: RegisterMap) -> str:
+    """Return what is said of the window to the capture memory."""
+    flags = ", ".join(f"bit {bit} {name}" for bit, name in enumerate(registers.capture.flags))
+    return (
+        f"The capture memory of {registers.capture_registers} registers begins at 0x{CAPTURE:04X} with the oldest of "
+        f"{registers.capture.records} records. A record has two registers each of count, velocity and driven, as the "
+        f"status of these names, then one of flags ({flags}), and one with the lower bits of the number of the clock "
+        f"{registers.capture.stamp_clocks} clocks behind its sample. It can be read while capture_state is {DONE}; "
+        "before it is refused.\n"
+    )
+
+
 def markdown(registers: RegisterMap) -> str:
     """Return the page `registers.md`: every register in the order of addresses, and the windows."""
     head = f"| {' | '.join(COLUMNS)} |\n|{' --- |' * len(COLUMNS)}\n"
-    capture = registers.capture_registers
     windows = [
         f"The compressed map (zlib, JSON) of {len(registers.compressed)} bytes begins at 0x{MAP:04X}, two bytes a "
         "register, the first one high.\n",
-        f"The capture memory of {capture} registers begins at 0x{CAPTURE:04X}.\n" if capture else "",
+        _window(registers) if registers.capture else "",
     ]
     return (
         f"# Registers\n\nIdentity {registers.identity}, layout {LAYOUT}. Modbus RTU, unit 1. A value of two registers "

@@ -5,7 +5,7 @@ even address; a value that has fewer bits is extended, by its sign if it has one
 
     0x0000 to 0x001F  constants: what the device is
     0x0020 to 0x003F  telemetry of the axis
-    0x0040 to 0x005F  status of the supervisor
+    0x0040 to 0x005F  status of the supervisor, and of the capture memory if there is one
     0x0060 to 0x0067  counters of the link, one register each
     0x0070 to 0x007F  pulses, one register each, assigned downwards from 0x007F
     0x0080 to 0x009F  words as written
@@ -13,7 +13,7 @@ even address; a value that has fewer bits is extended, by its sign if it has one
     0x00C0 to 0x00FF  live words, which act at the next clock
     0x4000 to 0x7FFF  the window to the compressed map, two bytes a register, the first one high; behind the map, the
                       ends of the answers of the identification
-    0x8000 to 0xFFFF  the window to the capture memory
+    0x8000 to 0xFFFF  the window to the capture memory, eight registers a record, the oldest first
 
 The rule is stable: within a block registers follow in the order of their description, so what is added at the end of a
 block moves nothing, and only the words and the active ones move with the estimator. `commit` is the last pulse and
@@ -27,10 +27,11 @@ import hashlib
 import json
 import zlib
 
+from . import capture
 from .arithmetic.fixed import SQ, UQ, Format
 from .checks import check_int, shown
 from .design import ILLEGAL_WIDTH
-from .register import COUNTER_BITS, VALUE_BITS, Kind, Register, word_register
+from .register import COUNTER_BITS, VALUE_BITS, Kind, Register, narrowed, word_register
 from .spec import AxisSpec
 from .supervised import Design
 
@@ -42,6 +43,8 @@ END = 0x100
 """The address behind the last block."""
 MAP, CAPTURE, SPACE = 0x4000, 0x8000, 0x10000
 """The first address of each window, and the address behind the last."""
+CAPTURE_REGISTERS = capture.RECORD_REGISTERS * capture.RECORDS
+"""The registers of the capture memory of a board, unless it is told otherwise."""
 EDGE_STAMPS = ("stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall")
 """The stamps of edges, in the order of the edges' kinds."""
 COUNTS = "counts_"
@@ -58,16 +61,13 @@ def _telemetry(spec: AxisSpec) -> tuple[Register, ...]:
     Some estimators have a velocity of more than 32 bits: its register has the upper ones, rounded down.
     """
     count, force = SQ(spec.count_width, 0), spec.force
-    velocity = spec.design.estimator.velocity
-    if velocity.width > VALUE_BITS:
-        velocity = SQ(velocity.i, VALUE_BITS - velocity.i)
     flags = ", ".join(f"bit {bit} {name}" for bit, name in enumerate(spec.design.flags))
     rows: list[tuple[str, Format, float, str, str]] = [
         ("drive", force, spec.force_resolution_n, "N", "The force on the handle that the axis asks for."),
         ("count", count, spec.count_m, "m", "The position of the encoder."),
         (
             "velocity",
-            velocity,
+            narrowed(spec.design.estimator.velocity),
             spec.velocity_unit_m_per_s,
             "m/s",
             "The velocity estimated at the last sample.",
@@ -132,10 +132,11 @@ class RegisterMap:
 
     Args:
         spec: the axis.
-        capture_registers: registers of the capture memory; 0 for none.
+        capture_registers: registers of the capture memory, 8 for each of its records; 0 for none.
 
     Attributes:
         spec, capture_registers: as given.
+        capture: the design of the capture memory, or None.
         status, pulses, words, active, live: the registers of those kinds in the order of the hardware's ports;
             `pulses` begins with `commit`, whose address is the highest.
         registers: every register, in the order of addresses.
@@ -144,18 +145,26 @@ class RegisterMap:
 
     Raises:
         TypeError: if `spec` is not an AxisSpec.
-        ValueError: if `capture_registers` is out of its range.
+        ValueError: if `capture_registers` is none that there can be, or the samples are too close for a capture.
     """
 
-    def __init__(self, spec: AxisSpec, capture_registers: int = 0):
+    def __init__(self, spec: AxisSpec, capture_registers: int = CAPTURE_REGISTERS):
         if not isinstance(spec, AxisSpec):
             raise TypeError(f"spec must be an AxisSpec, not {shown(spec)}")
         check_int("capture_registers", capture_registers, 0, SPACE - CAPTURE)
+        records, more = divmod(capture_registers, capture.RECORD_REGISTERS)
+        if more or records == 1 or records & (records - 1):
+            raise ValueError(
+                f"capture_registers must be 0, or {capture.RECORD_REGISTERS} times a power of two from 2 on, "
+                f"not {capture_registers}"
+            )
         self.spec, self.capture_registers = spec, capture_registers
+        self.capture = capture.Design(spec, records) if records else None
         design = Design(spec)
+        known = (*design.registers(), *(self.capture.registers() if self.capture else ()))
 
         def own(kind: Kind) -> tuple[Register, ...]:
-            return tuple(register for register in design.registers() if register.kind is kind)
+            return tuple(register for register in known if register.kind is kind)
 
         telemetry = _placed(TELEMETRY, SUPERVISOR - TELEMETRY, _telemetry(spec))
         self.status = telemetry + _placed(SUPERVISOR, COUNTERS - SUPERVISOR, own(Kind.STATUS))

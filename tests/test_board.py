@@ -7,16 +7,20 @@ from cocotb.triggers import Timer
 from hardwall.hdl.board import Board
 from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.hdl.supervised import LOOPS
+from hardwall.model.capture import DONE, RECORD_REGISTERS, TRIGGERED, WAITING
 from hardwall.model.link.server import FAILURE
-from hardwall.model.registers import RegisterMap
+from hardwall.model.registers import CAPTURE, RegisterMap
 from hardwall.model.supervisor import ALL, ARMED, DISARMED, REQUIRED, TRIPPED
 from hardwall.testing import SAMPLES, parameters, simulate
-from oracles.board import SYNCHRONISER, make
+from oracles.board import RECORDS, SYNCHRONISER, make
 from oracles.board_host import Host
+from stimuli import frames
 from stimuli.specs import spec
 
 CLOCKS = max(SAMPLES, 80_000)
 """Fewer clocks do not reach every case."""
+SHOWN = "stamp", "capture_stamp"
+"""The first and the last status that a host of a capture looks at."""
 
 
 def random_words(host: Host) -> dict[str, int]:
@@ -112,6 +116,37 @@ async def an_open_loop_stops_the_pulses(dut):
         host.change(**{loop: 1})
         await host.edges(host.settling)
         assert not any(pulse for pulse, _ in host.pulses)
+
+
+@cocotb.test()
+async def a_capture_around_a_trip_is_read_by_the_line(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    host.rate = 0.02
+    most, words = host.twin.spec.force_limit_word, {"wall_stiffness": host.registers["wall_stiffness"].high}
+    await host.write(supervisor_ramp=host.registers["supervisor_ramp"].high)
+    await host.write(commit=1, wall_position=host.registers["wall_position"].low // 2, **words)
+    await host.arm()
+    await host.edges(host.settling)
+    await host.write(capture_sources=2, capture_level=0, capture_before=RECORDS // 2, capture_decimation=2)
+    assert await host.request(frames.read(CAPTURE, 8)) == bytes([0x83, FAILURE])
+    await host.write(capture_start=1)
+    while (await host.look(*SHOWN))["capture_state"] != WAITING:
+        pass
+    assert await host.request(frames.read(CAPTURE, 8)) == bytes([0x83, FAILURE])
+    host.change(external_fault=0)
+    while (status := await host.look(*SHOWN))["capture_state"] != DONE:
+        assert status["capture_state"] in (WAITING, TRIGGERED)
+    registers = []
+    while len(registers) < RECORD_REGISTERS * RECORDS:
+        answer = await host.request(frames.read(CAPTURE + len(registers), 64))
+        registers += [int.from_bytes(answer[k : k + 2], "big") for k in range(2, len(answer), 2)]
+    records = [host.twin.captures.record(each) for each in zip(*[iter(registers)] * RECORD_REGISTERS, strict=True)]
+    # What the first half shows is the wall at its largest force, and what is behind it nothing.
+    place = status["capture_place"]
+    assert place == RECORDS // 2
+    assert {(record.driven, record.flags & 7) for record in records[:place]} == {(-most, ARMED | 4)}
+    assert {(record.driven, record.flags & 7) for record in records[place + 1 :]} == {(0, TRIPPED | 4)}
 
 
 # A second axis takes as long again: the long runs, of more samples, have it.

@@ -9,7 +9,7 @@ import pytest
 from hardwall.model.arithmetic.fixed import SQ, UQ
 from hardwall.model.estimators import registry
 from hardwall.model.register import Kind, Register
-from hardwall.model.registers import ACTIVE, WRITTEN, RegisterMap
+from hardwall.model.registers import ACTIVE, CAPTURE_REGISTERS, WRITTEN, RegisterMap
 from hardwall.model.supervised import Design
 from stimuli.specs import SPECS, spec
 from stimuli.supervised import supervised
@@ -28,7 +28,8 @@ def test_every_axis_has_a_map(name, estimator):
         assert active.address - word.address == ACTIVE - WRITTEN
     design = Design(registers.spec)
     assert [word.name for word in registers.words] == ["preload_count", *(word.name for word in design.committed)]
-    assert [word.name for word in registers.live] == ["heartbeat", "acknowledged", *(word.name for word in design.live)]
+    live = (*design.live, *registers.capture.words)
+    assert [word.name for word in registers.live] == ["heartbeat", "acknowledged", *(word.name for word in live)]
     assert len({each.name for each in registers.registers}) == len(registers.registers)
 
 
@@ -37,6 +38,7 @@ def test_the_addresses_that_every_host_knows():
     assert [each.address for each in registers.registers if each.kind is Kind.CONSTANT] == [0, 2, 4, 6, 8, 10]
     known = {"drive": 0x20, "stamp": 0x32, "state": 0x40, "link_errors": 0x64, "commit": 0x7F, "clear_flags": 0x7E}
     known |= {"acknowledge": 0x79, "preload_count": 0x80, "encoder_glitch_clocks": 0x82, "active_encoder_invert": 0xA4}
+    known |= {"capture_start": 0x78, "capture_trigger": 0x77, "capture_state": 0x54}
     known |= {"heartbeat": 0xC0, "acknowledged": 0xC2, "supervisor_force_limit": 0xC4}
     assert {name: registers[name].address for name in known} == known
 
@@ -66,7 +68,8 @@ def test_every_change_of_spec_or_map_changes_the_identity():
     base = spec("mhz")
     others = [
         RegisterMap(base),
-        RegisterMap(base, 8),
+        RegisterMap(base, 16),
+        RegisterMap(base, CAPTURE_REGISTERS),
         RegisterMap(dataclasses.replace(base, travel_m=0.2)),
         RegisterMap(dataclasses.replace(base, force_max_n=41.0)),
         RegisterMap(spec("mhz", "fdm")),
@@ -86,6 +89,12 @@ def test_words_go_there_and_back(name):
             register.from_registers((0, 0, 0))
 
 
+def test_a_board_may_have_no_capture_memory():
+    registers = RegisterMap(spec("mhz"), 0)
+    assert registers.capture is None
+    assert not [each.name for each in registers.registers if "capture" in each.name and each.kind is not Kind.CONSTANT]
+
+
 def test_every_meaning_is_a_sentence():
     for register in supervised("mhz").registers:
         assert register.meaning.endswith(".")
@@ -97,6 +106,11 @@ def test_what_cannot_be_is_refused():
         RegisterMap(3)
     with pytest.raises(ValueError, match=r"capture_registers must be 0 to 32768, not 32769$"):
         RegisterMap(spec("mhz"), capture_registers=32769)
+    for wrong in (7, 8, 12, 24, 32760):
+        with pytest.raises(
+            ValueError, match=rf"^capture_registers must be 0, or 8 times a power .* from 2 on, not {wrong}$"
+        ):
+            RegisterMap(spec("mhz"), capture_registers=wrong)
     with pytest.raises(ValueError, match=r"^more must have at most 32 bits, not UQ\(33, 0\)$"):
         Register("more", Kind.STATUS, UQ(33, 0), "More.")
     with pytest.raises(ValueError, match=r"^more must have at most 16 bits, not UQ\(17, 0\)$"):

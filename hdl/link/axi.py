@@ -132,6 +132,9 @@ class Subordinate(wiring.Component):
                     with m.Case(Operation.CHECK_READ):
                         begin(Operation.READ)
                         m.d.sync += self.axi_rresp.eq(Response.OKAY)
+                        with m.If(file.refused):
+                            m.d.sync += [self.axi_rresp.eq(Response.SLVERR), data.eq(0)]
+                            m.next = "READ"
                         with m.If(file.absent):
                             m.d.sync += [self.axi_rresp.eq(Response.DECERR), data.eq(0)]
                             m.next = "READ"

@@ -22,7 +22,7 @@ class RegisterFile(wiring.Component):
     Operations, by `host.operation`:
 
     - CHECK_READ, CHECK_WRITE: raise `absent`, `outside` or `refused` if the register cannot be read, or written with
-      `host.value`. The halves of a value are checked in the order of their addresses, one after the other.
+      `host.value`, or not now. The halves of a value are checked in the order of their addresses, one after the other.
     - READ: give the register.
     - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. A live word is at its port with
       `done` of its lower half, which is written after the upper one. Only what was checked is written.
@@ -70,6 +70,8 @@ class RegisterFile(wiring.Component):
         The register of the capture memory that is read; there is none if the map has no capture memory.
     capture_data : In(16)
         That register, one clock later.
+    capture_done : In(1)
+        The capture memory can be read; otherwise a check that it can is `refused`, and it reads 0.
 
     Raises
     ------
@@ -93,7 +95,11 @@ class RegisterFile(wiring.Component):
                 **{pulse.name: Out(1) for pulse in registers.pulses},
                 "refuse": In(len(registers.pulses)),
                 "commit_pending": In(1),
-                **({"capture_address": Out(15), "capture_data": In(CELL_BITS)} if registers.capture_registers else {}),
+                **(
+                    {"capture_address": Out(15), "capture_data": In(CELL_BITS), "capture_done": In(1)}
+                    if registers.capture
+                    else {}
+                ),
             }
         )
 
@@ -191,11 +197,11 @@ class RegisterFile(wiring.Component):
             write.data.eq(shift + counting),
             host.data.eq(read.data),
         ]
-        if registers.capture_registers:
+        if registers.capture:
             in_capture = (address[15:] == CAPTURE >> 15) & less(address[:15], registers.capture_registers)
             m.d.comb += self.capture_address.eq(address)
             with m.If(address[15]):
-                m.d.comb += host.data.eq(self.capture_data)
+                m.d.comb += host.data.eq(self.capture_data & self.capture_done.replicate(CELL_BITS))
         with m.If(host.clear):
             m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0)]
 
@@ -265,6 +271,9 @@ class RegisterFile(wiring.Component):
                     with m.Case(Operation.CHECK_READ):
                         with m.If(~(in_book | in_map | in_capture) | half):
                             m.d.sync += host.absent.eq(1)
+                        if registers.capture:
+                            with m.If(in_capture & ~self.capture_done):
+                                m.d.sync += host.refused.eq(1)
                         m.next = "DONE"
                     with m.Case(Operation.CHECK_WRITE):
                         m.d.comb += [area.eq(Area.LEAST), window.eq(0)]

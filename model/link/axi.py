@@ -24,7 +24,7 @@ class Response(IntEnum):
     """How a transfer ended."""
 
     OKAY = 0
-    SLVERR = 2  # a value is out of its range, a pulse is refused now, or half of a register was to be written
+    SLVERR = 2  # a value is out of its range, the register is refused now, or half of one was to be written
     DECERR = 3  # there is no such register, it cannot be written, or half of a value was to be written
 
 
@@ -76,4 +76,6 @@ class Subordinate:
         file.check_read(place + 1, False, True)
         if file.absent:
             return Response.DECERR, 0
+        if file.refused:
+            return Response.SLVERR, 0
         return Response.OKAY, file.read(place) << CELL_BITS | file.read(place + 1)

@@ -16,6 +16,7 @@ only events change. What is taken in one turn is of one clock, and every value i
 remembered here, from the axis's pulse at every edge, each 0 until there was one.
 """
 
+from collections.abc import Sequence
 from enum import IntEnum
 
 from ..register import Register
@@ -176,7 +177,7 @@ class RegisterFile:
         pulses: names of the pulses that went out at the last FINISH, and `marked`, those that go out at the next.
         status: the word of every status now.
         refusing: names of the pulses that the device refuses now.
-        capture: the registers of the capture memory.
+        capture: the registers of the capture memory, or None while they cannot be read.
         absent, outside, refused: what the checks have found since `clear`.
     """
 
@@ -188,7 +189,7 @@ class RegisterFile:
         self.marked: list[str] = []
         self.status = {status.name: 0 for status in design.registers.status}
         self.refusing: frozenset[str] = frozenset()
-        self.capture = [0] * design.registers.capture_registers
+        self.capture: Sequence[int] | None = None
         self._tied = [True, True]
         self.clear()
 
@@ -208,7 +209,12 @@ class RegisterFile:
         return self.design.wide(address) and ((first and address % 2 == 1) or (last and address % 2 == 0))
 
     def check_read(self, address: int, first: bool, last: bool) -> None:
-        """Find out whether a register can be read, as the first or the last of a frame or neither."""
+        """Find out whether a register can be read, as the first or the last of a frame or neither.
+
+        That of a capture memory that cannot be read is refused.
+        """
+        captured = CAPTURE <= address < CAPTURE + self.design.registers.capture_registers
+        self.refused |= captured and self.capture is None
         self.absent |= not self.design.readable(address) or self._half(address, first, last)
 
     def check_write(self, address: int, first: bool, last: bool, value: int) -> None:
@@ -229,10 +235,12 @@ class RegisterFile:
             self._tied[k] = tied and word == bound
 
     def read(self, address: int) -> int:
-        """Return the register at an address that can be read."""
+        """Return the register at an address that can be read; of a capture memory that cannot be read now it is 0."""
         if address < END:
             return self.live[address]
-        return self.design.map_cells[address - MAP] if address < CAPTURE else self.capture[address - CAPTURE]
+        if address < CAPTURE:
+            return self.design.map_cells[address - MAP]
+        return 0 if self.capture is None else self.capture[address - CAPTURE]
 
     def write(self, address: int, value: int) -> None:
         """Write a register that can be written, or a counter."""

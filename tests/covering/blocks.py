@@ -39,6 +39,7 @@ BLOCKS = (
     Block("monitors", RECORDED),
     Block("supervisor", RECORDED),
     Block("clock_monitor", RECORDED),
+    Block("capture", RECORDED),
     Block("axis"),
     Block("supervised", RECORDED),
     Block("link/uart", ("component.receiver", "component.transmitter")),

@@ -119,6 +119,20 @@ def _wide(data: str, read: str) -> str:
 """
 
 
+def _narrow(data: str, width: int) -> str:
+    """Return a memory of single bits with one port, A, that reads only where it does not write; it has no content.
+
+    What it reads is the lowest of so many bits as `width` says.
+    """
+    return f"""
+  reg cells [0:16383];
+  always @(posedge clk_A) if (en_A) begin
+    if (we_A) cells[address_A] <= {data};
+    else read_A <= {width}'(cells[address_A]);
+  end
+"""
+
+
 def _ecp5_memory() -> str:
     def port(p: str) -> str:
         data, address = _bits(f"DI{p}", 18), _bits(f"AD{p}", 14)
@@ -147,12 +161,17 @@ module DP16KD(
 );
   parameter DATA_WIDTH_A = 18, DATA_WIDTH_B = 18, WRITEMODE_A = "NORMAL", WRITEMODE_B = "NORMAL";
   parameter RESETMODE = "SYNC", ASYNC_RESET_RELEASE = "SYNC", GSR = "ENABLED";
-  initial if (DATA_WIDTH_A != DATA_WIDTH_B || (DATA_WIDTH_A != 36 && DATA_WIDTH_A != 18 && DATA_WIDTH_A != 9))
+  initial if (DATA_WIDTH_A == 1 ? WRITEMODE_A != "NORMAL" :
+              DATA_WIDTH_A != DATA_WIDTH_B || (DATA_WIDTH_A != 36 && DATA_WIDTH_A != 18 && DATA_WIDTH_A != 9))
     $fatal(1, "a memory's widths");
 {wires("A")}{wires("B")}{_memory("INITVAL_", 20)}
   wire [35:0] data = {{data_B, data_A}};
   generate if (DATA_WIDTH_A == 36) begin : wide
 {_wide("data", "{read_B, read_A}")}
+  end else if (DATA_WIDTH_A == 1) begin : bits
+{_narrow("data_A[0]", 18)}
+  initial read_B = 18'($urandom);
+  always @* if (en_B) $fatal(1, "a memory of bits has a second port");
   end else begin : ports
 {_port("A", "B", "DATA_WIDTH_A", "MODE_A")}{_port("B", "A", "DATA_WIDTH_A", "MODE_B")}
   end endgenerate
@@ -206,6 +225,21 @@ module SPX9(
   {_gowin_modes("", "A")}
   always @* if (RESET || BLKSEL != 0) $fatal(1, "a memory is reset or not selected");
 {_memory("INIT_RAM_", 18)}{_port("A", "B", "BIT_WIDTH", "MODE_A")}
+endmodule
+
+module SP(
+    input CLK, CE, OCE, RESET, WRE, input [13:0] AD, input [31:0] DI, input [2:0] BLKSEL, output [31:0] DO
+);
+  parameter READ_MODE = 1'b0, BLK_SEL = 3'b000, RESET_MODE = "SYNC", BIT_WIDTH = 32, WRITE_MODE = 0;
+  parameter [255:0] {", ".join(f"INIT_RAM_{number:02X} = 0" for number in range(SLICES))};
+  initial if (BIT_WIDTH != 1 || WRITE_MODE != 0) $fatal(1, "a memory's width");
+  initial if (READ_MODE) $fatal(1, "a memory has an output register");
+  wire clk_A = CLK, en_A = CE, we_A = WRE;
+  wire [13:0] address_A = AD;
+  reg [0:0] read_A;
+  assign DO = {{31'b0, read_A}};
+  always @* if (RESET || BLKSEL != 0) $fatal(1, "a memory is reset or not selected");
+{_narrow("DI[0]", 1)}
 endmodule
 
 module SDPX9B(

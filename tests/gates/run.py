@@ -24,6 +24,8 @@ OPTIONS = (
     # Parameters of a bit have a whole number as their default there, and bits of one vector may follow from each
     # other.
     *("-Wno-WIDTHTRUNC", "-Wno-UNOPTFLAT"),
+    # A large memory of theirs loses all that it has in a loop where its power goes off.
+    "-Wno-BLKSEQ",
     # What no initial value and no reset has set is random, and so is what Yosys leaves open.
     *("--x-initial", "unique", "--x-assign", "unique"),
 )

@@ -14,7 +14,7 @@ from hardwall.model.link import register_file, server
 from hardwall.model.link.line import Line, Verdict, framed
 from hardwall.testing import Bench, parameters, rng
 from stimuli.status import show
-from stimuli.supervised import captured, supervised
+from stimuli.supervised import CAPTURE_MEMORY, captured, supervised
 
 GAP = 30
 """Clocks of the line's gap: a few bytes."""
@@ -28,7 +28,7 @@ class Stack(wiring.Component):
         self.design = register_file.Design(supervised(name))
         self.file = RegisterFile(self.design)
         own = dict(self.file.signature.members)
-        for gone in ("host", "capture_address", "capture_data"):
+        for gone in ("host", "capture_address", "capture_data", "capture_done"):
             del own[gone]
         for pulse in self.design.registers.pulses:
             del own[pulse.name]
@@ -42,6 +42,7 @@ class Stack(wiring.Component):
                 "idle": Out(1),
                 "pulses": Out(len(self.design.registers.pulses)),
                 "pulsed": Out(1),
+                "busy": In(1),
                 **own,
             }
         )
@@ -67,6 +68,7 @@ class Stack(wiring.Component):
             self.pulses.eq(pulses),
             self.pulsed.eq(pulses.any()),
             file.capture_data.eq(captured(place)),
+            file.capture_done.eq(~self.busy),
         ]
         m.d.comb += lead_out(file, self, [name for name in self.signature.members if hasattr(file, name)])
         return m
@@ -101,7 +103,7 @@ class World:
     async def reset(self) -> None:
         await self.bench.reset()
         self.line, self.server.file = Line(), register_file.RegisterFile(self.design)
-        self.server.file.capture = [captured(k) for k in range(self.registers.capture_registers)]
+        self.server.file.capture = CAPTURE_MEMORY
 
     async def live(self) -> None:
         """Give every status, and the refused pulses, a random value."""
@@ -111,7 +113,10 @@ class World:
         refused = [int(self.random.random() < 0.1) for _ in self.registers.pulses]
         pairs = zip(self.registers.pulses, refused, strict=True)
         self.server.file.refusing = frozenset(pulse.name for pulse, bit in pairs if bit)
-        self.bench.drive(refuse=sum(bit << k for k, bit in enumerate(refused)))
+        # The capture memory cannot be read at times.
+        busy = int(self.random.random() < 0.3)
+        self.server.file.capture = None if busy else CAPTURE_MEMORY
+        self.bench.drive(busy=busy, refuse=sum(bit << k for k, bit in enumerate(refused)))
         await show(self.dut, self.bench, self.registers, self.server.file.status)
 
     async def send(self, data: bytes, pace: int = 1, spoilt: int = -1) -> bytes | None:

@@ -20,7 +20,7 @@ from hardwall.hdl.link.link import Link
 from hardwall.model.registers import CAPTURE, MAP, SUPERVISOR, TELEMETRY
 from hardwall.testing import Bench, parameters, rng, simulate
 from stimuli.status import show
-from stimuli.supervised import CAPTURE_REGISTERS, captured, supervised
+from stimuli.supervised import CAPTURE_MEMORY, CAPTURE_REGISTERS, captured, supervised
 
 BAUD = 3_000_000
 """4 clocks a bit at the spec's 12 MHz."""
@@ -37,7 +37,7 @@ class Device(wiring.Component):
     def __init__(self, name: str):
         self.link = Link(supervised(name), BAUD)
         ports = dict(self.link.signature.members)
-        del ports["capture_address"], ports["capture_data"]
+        del ports["capture_address"], ports["capture_data"], ports["capture_done"]
         super().__init__(ports)
 
     def elaborate(self, platform):
@@ -45,7 +45,7 @@ class Device(wiring.Component):
         m.submodules.link = link = self.link
         place = Signal.like(link.capture_address)
         m.d.sync += place.eq(link.capture_address)
-        m.d.comb += link.capture_data.eq(captured(place))
+        m.d.comb += [link.capture_data.eq(captured(place)), link.capture_done.eq(1)]
         m.d.comb += lead_out(link, self, self.signature.members)
         return m
 
@@ -127,7 +127,7 @@ async def everything_can_be_read_by_function_3(dut):
         rows = [dict(zip(described["columns"], row, strict=True)) for row in described["registers"]]
         assert [row["address"] for row in rows] == [r.address for r in registers.registers[6:]]
         assert named["capture_registers"] == CAPTURE_REGISTERS
-        assert window(CAPTURE, CAPTURE_REGISTERS) == [captured(k) for k in range(CAPTURE_REGISTERS)]
+        assert window(CAPTURE, CAPTURE_REGISTERS) == CAPTURE_MEMORY
 
     await run()
 

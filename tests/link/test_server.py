@@ -9,7 +9,7 @@ from hardwall.hdl.link.register_file import RegisterFile
 from hardwall.hdl.link.server import Server
 from hardwall.model.link import register_file, server
 from hardwall.model.link.line import Line, Verdict, framed
-from hardwall.model.registers import COUNTERS, WRITTEN
+from hardwall.model.registers import CAPTURE, COUNTERS, WRITTEN
 from hardwall.testing import simulate
 from stimuli import frames
 from stimuli.random_requests import random_request
@@ -66,7 +66,10 @@ async def every_exception(dut):
     for pdu, code in EXCEPTIONS:
         answer = await world.send(framed(b"\1" + pdu)) or await world.gap()
         assert answer == bytes([1, pdu[0] | 0x80, code])
-    world.bench.drive(refuse=-1)
+    world.bench.drive(refuse=-1, busy=1)
+    world.server.file.capture = None
+    assert await world.request(frames.read(CAPTURE, 8)) == b"\x83\4"
+    assert await world.request(frames.read(CAPTURE + world.registers.capture_registers - 2, 4)) == b"\x83\2"
     world.server.file.refusing = frozenset(pulse.name for pulse in world.registers.pulses)
     assert await world.request(frames.write(world.registers["commit"].address, [1, 0, 7])) == b"\x90\4"
     assert (await world.request(frames.read(WRITTEN, 2)))[2:] == frames.words(0, 0)

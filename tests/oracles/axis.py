@@ -38,7 +38,7 @@ class AxisTwin:
         self.clocks = self.restart = 0
         self.words, self.pending = {word.name: word.reset for word in self.design.words} | self.fixed(), False
         self.decoder, self.estimator, self.output = quadrature.START, self.design.start().estimator, output.START
-        self.velocity = self.wall_force = self.drive = self.sticky = 0
+        self.sampled_count = self.velocity = self.wall_force = self.drive = self.sticky = 0
         self.allowed = False
         self.due: dict[int, Callable[[], None]] = {}
         self.raised: dict[int, int] = {}
@@ -65,7 +65,7 @@ class AxisTwin:
 
     def outputs(self) -> dict[str, int]:
         """Return every output of the axis now, by name."""
-        own = {name: getattr(self, name) for name in ("drive", "velocity", "wall_force", "flags")}
+        own = {name: getattr(self, name) for name in ("drive", "sampled_count", "velocity", "wall_force", "flags")}
         pulses = dict.fromkeys(("sampled", "actuated", "estimated", "saturated", "strobe_busy"), 0)
         decoded = {name: getattr(self.decoder, name) for name in DECODED} | {"edge_kind": self.decoder.edge}
         return {**own, **decoded, **pulses, **self.pulses.get(self.clocks, {}), "commit_pending": int(self.pending)}
@@ -73,6 +73,7 @@ class AxisTwin:
     def _sample(self) -> None:
         d, decoder, now = self.design, self.decoder, self.clocks
         params = d.params(self.words)
+        self.sampled_count = decoder.count
         self.estimator, velocity, raised = estimate(
             params.estimator, self.estimator, quadrature.seen(decoder), self.restart
         )

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import numpy as np
 from amaranth.hdl import Cat, Module, Shape
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
@@ -10,6 +11,8 @@ from hardwall.hdl.board import Board
 from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.link.link import Link
 from hardwall.hdl.supervised import LOOPS, SHOWN
+from hardwall.model import capture
+from hardwall.model.capture import RECORD_REGISTERS
 from hardwall.model.register import VALUE_BITS
 from hardwall.model.registers import RegisterMap
 from hardwall.testing.packing import Packing
@@ -32,11 +35,15 @@ SEEN = (
 """Ports of the axis inside that the models are fed with or held to."""
 
 
-def board_of(name: str, estimator: str) -> Board:
+RECORDS = 16
+"""Records of the capture memory: a host reads as many in a few samples."""
+
+
+def board_of(name: str, estimator: str, records: int = RECORDS) -> Board:
     """Return a board with a quick serial line, so that a host gets through a conversation in a few samples."""
     rates = {"clock_hz": CLOCK_HZ, "sample_hz": 200_000, "actuation_hz": 100_000}
     axis = dataclasses.replace(spec(name, estimator), **rates)
-    return Board(axis, Link(RegisterMap(axis), BAUD))
+    return Board(axis, Link(RegisterMap(axis, RECORD_REGISTERS * records), BAUD))
 
 
 def make(name: str, estimator: str) -> "Watched":
@@ -73,7 +80,7 @@ class Watched(wiring.Component):
 
 
 class Twin(AxisTwin):
-    """The state of the board's axis and its pulses, clock for clock, from the models alone.
+    """The state of the board's axis, its pulses and its capture memory, clock for clock, from the models alone.
 
     When the link asks for something, and what the axis shows to its monitors, is taken from the board.
     """
@@ -84,15 +91,20 @@ class Twin(AxisTwin):
         self.asked: dict[str, int] = {}
         self.follower = Follower(board.axis.design, IDLE)
         self.sum = self.pulse = self.sign = 0
+        self.captures = board.registers.capture
+        self.captured, self.memory = capture.START, self.captures.memory()
 
     def shown(self) -> tuple:
         """Return what the status registers are made from, as a snapshot at the next edge takes it."""
         own = self.drive, self.velocity, self.wall_force, self.flags
-        return self.decoder, own, self.follower.wanted()
+        return self.decoder, own, self.follower.wanted(), self.captured
 
     def status(self, shown: tuple) -> dict[str, int]:
         """Return the words of every status register from what `shown` has returned."""
-        decoder, own, wanted = shown
+        decoder, own, wanted, captured = shown
+        wanted = wanted | {
+            name: getattr(captured, name) for name in ("capture_state", "capture_place", "capture_stamp")
+        }
         named = dict(zip(("drive", "velocity", "wall_force", "flags"), own, strict=True)) | wanted
         named |= {f"counts_{k}": wanted["counts"] >> VALUE_BITS * k & 0xFFFFFFFF for k in range(2)}
         status = {}
@@ -106,6 +118,7 @@ class Twin(AxisTwin):
     def edge(self, pins: dict[str, int], asked: dict[str, int], seen: dict[str, int]) -> None:
         """Advance by one clock edge, with the pins, what the link asks, and what the axis shows just before it."""
         supervisor = self.follower.supervisor
+        self._capture(asked, seen["sampled"])
         self.sum = self.sum % 2**self.drive_bits + supervisor.magnitude
         self.pulse, self.sign = self.sum >> self.drive_bits, supervisor.negative ^ self.follower.inverted
 
@@ -116,3 +129,17 @@ class Twin(AxisTwin):
         self.advance({**pins, **asked}, enabled)
         if asked["commit"]:
             self.asked = {name: asked[name] for name in self.words if name in asked}
+
+    def _capture(self, asked: dict[str, int], sampled: int) -> None:
+        """Advance the capture memory by one clock edge."""
+        narrowed = self.design.estimator.velocity.width - self.captures.velocity.width
+        supervisor = self.follower.supervisor
+        taken = {"count": self.sampled_count, "velocity": self.velocity >> narrowed, "wall_force": self.wall_force}
+        taken |= {"sampled": sampled, "flags": self.flags, "stamp": self.decoder.stamp}
+        taken |= {name: getattr(supervisor, name) for name in ("driven", "state", "live")}
+        taken |= {name: asked[name] for name in capture.Inputs._fields if name in asked}
+        self.captured = capture.step(self.captures.params, self.memory, self.captured, capture.Inputs(**taken))
+
+    def window(self) -> list[int]:
+        """Return the registers of the frozen ring, the oldest record first."""
+        return np.roll(self.memory, -self.captured.ring, axis=0).ravel().tolist()

@@ -11,6 +11,7 @@ from cocotbext.uart import UartSink, UartSource
 from hardwall.hdl.board import ENCODER
 from hardwall.hdl.link.register_file import RegisterFile
 from hardwall.hdl.supervised import LOOPS
+from hardwall.model.capture import DONE
 from hardwall.model.link import register_file, server
 from hardwall.model.link.line import Verdict, framed
 from hardwall.model.register import Kind
@@ -135,12 +136,16 @@ class Host:
         begun = len(self.pulses)
         answer = bytes(await self._answer(frame))
         await self.edges(1)
-        states = [shown[2] for _, shown in list(self.history)[begun - len(self.pulses) :]]
+        shown = [each for _, each in list(self.history)[begun - len(self.pulses) :]]
+        states = [each[2] for each in shown]
         expected = []
         # What is refused depends on the state while the frame is checked, which may change on the way.
         for ready, armed in sorted({(state["ready"], state["state"] == 1) for state in states}):
             expected.append(frozenset(("arm",) * (not ready) + ("preload",) * armed))
         self.server.file.refusing = self._refusing(answer, expected)
+        # A capture may be done on the way, and is then until a host starts the next.
+        done = {state[3].capture_state == DONE for state in shown}
+        self.server.file.capture = self.twin.window() if max(done) and (min(done) or answer[1] == 3) else None
         self.server.file.status = self._snapshot(pdu, answer)
         self.server.file.pulses = ()
         assert answer == framed(self.server.take(Verdict.REQUEST, frame))

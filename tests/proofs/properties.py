@@ -3,6 +3,7 @@
 from . import (
     of_arithmetic,
     of_axis,
+    of_capture,
     of_line,
     of_output,
     of_quadrature,
@@ -22,6 +23,7 @@ PROPERTIES = [
     *of_supervisor.PROPERTIES,
     *of_axis.PROPERTIES,
     *of_supervised.PROPERTIES,
+    *of_capture.PROPERTIES,
     *of_line.PROPERTIES,
     *of_server.PROPERTIES,
     *of_register_file.PROPERTIES,

@@ -6,7 +6,7 @@ from hardwall.model.registers import RegisterMap
 
 from .specs import spec
 
-CAPTURE_REGISTERS = 300
+CAPTURE_REGISTERS = 256
 
 
 @cache
@@ -18,3 +18,6 @@ def supervised(name: str, estimator: str = "levant") -> RegisterMap:
 def captured(address: int) -> int:
     """Return the register of the capture memory at a place in it."""
     return address * 40503 % 65536
+
+
+CAPTURE_MEMORY = [captured(address) for address in range(CAPTURE_REGISTERS)]
