@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from ..model.checks import check_range
 from ..model.register import Kind
 from ..model.registers import TELEMETRY
+from .capture import Capture
 from .device import Device, read_identity
 from .errors import ChangedError, HostError, NotReadyError, RefusedError, TrippedError
 from .groups import Supervisor, Wall
@@ -36,6 +37,7 @@ class Axis:
         device: what the board says of itself.
         wall: the wall.
         supervisor: the limits.
+        capture: the capture memory.
 
     Raises:
         HostError: if the board does not answer.
@@ -45,6 +47,7 @@ class Axis:
         self.device, self._port = device, port
         self._words = Words(port, device)
         self.wall, self.supervisor = Wall(self), Supervisor(self)
+        self.capture = Capture(self)
         self._status = device.of_kind(Kind.STATUS)
         # A beat that is what the last host said is none.
         self._beat_at, self._number = device.registers["heartbeat"], self.read("heartbeat")
@@ -93,6 +96,20 @@ class Axis:
         """
         register = self.device.registers[name]
         return register.from_registers(self._port.read(register.address, register.size))
+
+    def read_registers(self, address: int, count: int) -> tuple[int, ...]:
+        """Return successive registers as they are; the errors are those of `Port.read`."""
+        return self._port.read(address, count)
+
+    def pulse(self, name: str) -> None:
+        """Let a pulse go out.
+
+        Raises:
+            KeyError: if there is no such register.
+            RefusedError: if the board refuses it in its present state.
+            HostError: if the board is not reached.
+        """
+        self._port.write(self.device.registers[name].address, (1,))
 
     @property
     def counters(self) -> dict[str, int]:
@@ -171,7 +188,7 @@ class Axis:
             raise NotReadyError(f"the axis cannot be armed: {self._why_not(status)}")
         self._may_drive = True
         try:
-            self._pulse("arm")
+            self.pulse("arm")
         except RefusedError as error:
             raise NotReadyError(f"the axis cannot be armed: {self._why_not(self.status)}") from error
         status = self.status
@@ -185,7 +202,7 @@ class Axis:
             HostError: if the board is not reached; the watchdog then does it.
         """
         self._heartbeat.rest()
-        self._pulse("disarm")
+        self.pulse("disarm")
         self._may_drive = False
 
     def acknowledge(self, trip: Trip) -> None:
@@ -198,8 +215,8 @@ class Axis:
         word = self.device.registers["acknowledged"]
         self._port.write(word.address, word.to_registers(trip.latched))
         # What the encoder says is a cause until the flags are cleared, so that comes first.
-        self._pulse("clear_flags")
-        self._pulse("acknowledge")
+        self.pulse("clear_flags")
+        self.pulse("acknowledge")
         if now := self.trip:
             raise TrippedError(f"the axis is still tripped: {now}")
 
@@ -213,7 +230,7 @@ class Axis:
         """
         self.set(preload_count=position_m)
         try:
-            self._pulse("preload")
+            self.pulse("preload")
         except RefusedError as error:
             raise NotReadyError("the axis is ARMED: disarm it before its position is set") from error
 
@@ -232,7 +249,7 @@ class Axis:
         count = self.device.registers["count"]
         check_range("index_m", index_m, count.low * count.lsb, count.high * count.lsb)
         until = time.monotonic() + seconds
-        self._pulse("index_arm")
+        self.pulse("index_arm")
         while self.read("index_armed"):
             if time.monotonic() > until:
                 raise TimeoutError(f"the index has not come in {seconds:g} s: move the handle over it")
@@ -256,9 +273,6 @@ class Axis:
         if not status.live:
             return "no heartbeat has reached it"
         return "the loop of drive_enable is open"
-
-    def _pulse(self, name: str) -> None:
-        self._port.write(self.device.registers[name].address, (1,))
 
     def _beat(self) -> None:
         self._number = self._number % self._beat_at.high + 1

@@ -16,7 +16,7 @@ TEXT_MAX = 1 << 18
 VENDOR = b"hardwall"
 COLUMNS = ["address", "name", "kind", "signed", "bits", "si_per_lsb", "unit", "least", "most", "reset"]
 """The columns of the map's table."""
-LAYOUT_AT, IDENTITY_AT, CLOCK_AT, MAP_AT, CAPTURE_AT = 0, 2, 6, 8, 10
+LAYOUT_AT, IDENTITY_AT, CLOCK_AT, MAP_AT, CAPTURE_AT, SAMPLE_AT = 0, 2, 6, 8, 10, 12
 """Addresses of the constants, which every version has at the same places."""
 
 
@@ -29,12 +29,14 @@ class Device:
         clock_hz: frequency of its clock, Hz.
         registers: every register but the constants, by name.
         capture_registers: registers of its capture memory; 0 without one.
+        clocks_per_sample: clocks from a sample to the next.
     """
 
     identity: str
     clock_hz: int
     registers: MappingProxyType[str, Register]
     capture_registers: int
+    clocks_per_sample: int
 
     def of_kind(self, kind: Kind) -> tuple[Register, ...]:
         """Return the registers of a kind, in the order of their addresses."""
@@ -78,7 +80,8 @@ def read_device(port: Port) -> Device:
     window = b"".join(each.to_bytes(2, "big") for each in port.read(MAP, (size + 1) // 2))
     identity = f"{constant(IDENTITY_AT):08x}{constant(IDENTITY_AT + 2):08x}"
     registers = _registers(port.name, window[:size], identity)
-    return Device(identity, constant(CLOCK_AT), MappingProxyType(registers), constant(CAPTURE_AT))
+    last = constant(CAPTURE_AT), constant(SAMPLE_AT)
+    return Device(identity, constant(CLOCK_AT), MappingProxyType(registers), *last)
 
 
 def _registers(name: str, compressed: bytes, identity: str) -> dict[str, Register]:

@@ -50,7 +50,7 @@ class Status:
         stamp_s: the time of the clock, which wraps at `wrap_s`.
         live: whether the heartbeat is not overdue; ready: whether the axis can be armed.
         referenced: whether the index has been found.
-        flags: names of the sticky flags; what estimators say of themselves is `estimator_saturated`.
+        flags: names of the sticky flags; the estimator's own are `estimator_0` and so on.
         a_channel_idle: the warning that the last edges were all of one channel.
         trip: the causes that are latched; None if none is.
     """
@@ -81,17 +81,16 @@ def status_of(words: dict[str, int], si: dict[str, float], flag_bits: int) -> St
         bool(words["live"]),
         bool(words["ready"]),
         bool(words["index_latched"]),
-        _flags(words["flags"], flag_bits),
+        tuple(name for bit, name in enumerate(flag_names(flag_bits)) if words["flags"] >> bit & 1),
         bool(words["a_channel_idle"]),
         _trip(words) if words["latched"] else None,
     )
 
 
-def _flags(flags: int, bits: int) -> tuple[str, ...]:
-    """Return the names of the flags that are set: the encoder's come first, and the output's last."""
+def flag_names(bits: int) -> tuple[str, ...]:
+    """Return the names of so many sticky flags, bit 0 first: the encoder's, the estimator's, and the output's."""
     between = bits - len(ENCODER_FLAGS) - len(output.FLAGS)
-    known = (*ENCODER_FLAGS, *["estimator_saturated"] * between, *output.FLAGS)
-    return tuple(dict.fromkeys(name for bit, name in enumerate(known) if flags >> bit & 1))
+    return (*ENCODER_FLAGS, *(f"estimator_{number}" for number in range(between)), *output.FLAGS)
 
 
 def _trip(words: dict[str, int]) -> Trip:

@@ -217,6 +217,7 @@ class RegisterMap:
             ("clock_hz", self.spec.clock_hz, "Hz", "The clock, which numbers the stamps."),
             ("map_bytes", len(self.compressed), "", "The length of the compressed map in its window."),
             ("capture_registers", self.capture_registers, "", "The length of the capture memory in its window."),
+            ("clocks_per_sample", self.spec.clocks_per_sample, "", "The clocks from a sample to the next."),
         )
         registers = (
             Register(name, Kind.CONSTANT, UQ(VALUE_BITS, 0), meaning, 1.0, unit, reset=value)

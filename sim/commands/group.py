@@ -24,6 +24,7 @@ COMMANDS = {
     "arm": "Let a board drive, and keep it so while this command runs.",
     "disarm": "Make a board's drive 0.",
     "home": "Find the index of a board's encoder by hand, and make it the origin.",
+    "capture": "Capture a board's samples at their full rate around an event, into a file and a picture.",
     "watch": "Show what a board's axis does.",
     "synth": "Size and speed of the axis, as the board with supervisor and link, on a real part.",
     "accuracy": "Hold velocity estimators against the exact derivative of known motions, at any rate.",

@@ -6,6 +6,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 
+import numpy as np
 import pytest
 
 from hardwall.host.connect import connect
@@ -135,6 +136,9 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual):
         (["home", "PORT", "--seconds", "-1"], 2, "--seconds must be 0 to 1e+06 s, not -1.0"),
         (["arm", "PORT", "--seconds", "nan"], 2, "--seconds must be 0 to 1e+06 s, not nan"),
         (["watch", "PORT", "--seconds", "inf"], 2, "--seconds must be 0 to 1e+06 s, not inf"),
+        (["capture", "PORT", "--trigger", "contact,noise"], 2, "--trigger must be of contact, trip, rise, fall, hand,"),
+        (["capture", "PORT", "--before", "9999"], 2, "before must be 0 to 2047, not 9999"),
+        (["capture", "PORT", "-o", "hit.csv"], 2, "--out must end in .npz, not 'hit.csv'"),
         (["connect", "PORT", "--identity", "no"], 1, "it has another bitstream"),
         (["connect", "/dev/hardwall-absent"], 1, "cannot be opened: there is none of that name"),
     ],
@@ -146,3 +150,42 @@ def test_what_cannot_be_is_one_line(virtual, words, code, message):
     assert done.stderr.startswith("hardwall: error: ")
     assert len(done.stderr.splitlines()) == 1
     assert message in done.stderr
+
+
+def test_a_contact_is_captured_into_a_file_and_a_picture(virtual, tmp_path):
+    words = "wall_position=1e-3", "wall_stiffness=2000", "wall_damping=5", "supervisor_force_limit=20"
+    files = "-o", tmp_path / "hit.npz", "--plot", tmp_path / "hit.png"
+    with connect(virtual.path) as axis:
+        if trip := axis.trip:
+            axis.acknowledge(trip)
+    with started(HARDWALL, "capture", virtual.path, *words, "--arm", "--before", "100", *files, "--json") as process:
+        assert process.stderr.readline().endswith("records waits for its trigger\n")
+        virtual.order("hold free", "push 4")
+        code, out, err = ended(process)
+    virtual.order("push 0", "hold -1")
+    assert code == 0, err
+    check_text("capture", out)
+    report = json.loads(out)
+    assert report["before"] == 100
+    assert {"armed", "contact", "live"} <= set(report["flags"])
+    assert report["position_most_m"] > 1e-3 > report["position_least_m"]
+    with np.load(tmp_path / "hit.npz") as saved:
+        assert len(saved["time_s"]) == report["records"] == 2048
+        inside = saved["position_m"] > 1e-3
+        assert not inside[:100].any()
+        # The first record at the trigger is the first in the wall, but for a count at its edge.
+        assert 99 < np.argmax(inside) < 200
+        contact = saved["flags"] >> 2 & 1
+        assert not contact[:100].any()
+        assert contact[100]
+    assert (tmp_path / "hit.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    assert state_of(virtual) is State.DISARMED
+
+
+def test_a_capture_by_hand_and_one_that_does_not_come(virtual):
+    done = called("capture", virtual.path, "--trigger", "hand", "--before", "10", "--decimation", "2", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["before"] == 10
+    done = called("capture", virtual.path, "--trigger", "trip", "--before", "0", "--seconds", "2")
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == "hardwall: error: the capture is not DONE in 2 s: it is WAITING"

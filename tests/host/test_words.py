@@ -57,7 +57,7 @@ def test_what_a_host_before_has_written_is_kept(board, registers):
         ),
         ({"wall_left": 2}, "wall_left must be 0 to 1, not 2"),
         ({"supervisor_watchdog": 0.02}, "supervisor_watchdog must be 0.05 to 2 s, not 0.02"),
-        ({"heartbeat": 3}, "word must be one of preload_count, .*, drive_invert, not 'heartbeat'"),
+        ({"heartbeat": 3}, "word must be one of preload_count, .*, drive_invert, .*, not 'heartbeat'"),
         ({"wall_stiffness": 5e3, "wall": 1}, "word must be one of preload_count, .*, not 'wall'"),
     ],
 )

@@ -1,0 +1,223 @@
+"""The capture memory of a board: samples at the full rate around an event, as arrays in SI units."""
+
+import time
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from ..model.capture import DONE, RECORD_REGISTERS, SOURCES, STATE_FLAGS, STATES
+from ..model.checks import FieldError, check_int
+from ..model.registers import CAPTURE
+from ..model.whole_file import whole_file
+from .device import Device
+from .errors import ForeignError, NotReadyError, RefusedError
+from .status import flag_names
+
+PART_RECORDS = 15
+"""Records that are read by one request."""
+VALUES = "count", "velocity", "driven"
+"""The status whose formats the values of a record have, in their order."""
+LOOK_S = 0.02
+"""The time between two looks at the state of a capture."""
+
+
+@dataclass(frozen=True)
+class Captured:
+    """A capture: one element a record in every array, of which `place` are before the trigger.
+
+    Attributes:
+        time_s: time from the first record at the trigger or behind it, s.
+        position_m: the position that the sample took, m.
+        velocity_m_per_s: the velocity estimated from it, m/s.
+        force_n: the force that was let out for it, N.
+        flags: bits as in `flag_names`.
+        flag_names: names of the flags, bit 0 first.
+        place: records before the trigger.
+        identity: the identity of the board.
+    """
+
+    time_s: np.ndarray
+    position_m: np.ndarray
+    velocity_m_per_s: np.ndarray
+    force_n: np.ndarray
+    flags: np.ndarray
+    flag_names: tuple[str, ...]
+    place: int
+    identity: str
+
+    def flag(self, name: str) -> np.ndarray:
+        """Return whether a flag is set, bool.
+
+        Raises:
+            FieldError: if there is no such flag.
+        """
+        if name not in self.flag_names:
+            raise FieldError("flag", f"must be one of {', '.join(self.flag_names)}, not {name!r}")
+        return (self.flags >> self.flag_names.index(name) & 1).astype(bool)
+
+    def save(self, path: Path) -> None:
+        """Write the arrays, with their names and the identity, to an .npz file.
+
+        Raises:
+            OSError: if the file cannot be written.
+        """
+        with whole_file(path) as part, part.open("wb") as file:
+            np.savez_compressed(file, **vars(self))
+
+
+class Board(Protocol):
+    """What a capture needs of an axis: see `hardwall.host.axis.Axis`."""
+
+    device: Device
+
+    def set(self, **values: float) -> None: ...
+
+    def get(self, name: str) -> float: ...
+
+    def read(self, name: str) -> int: ...
+
+    def read_registers(self, address: int, count: int) -> tuple[int, ...]: ...
+
+    def pulse(self, name: str) -> None: ...
+
+    def sleep(self, seconds: float) -> None: ...
+
+
+class Capture:
+    """The capture memory of a board.
+
+    Args:
+        board: the axis.
+
+    Attributes:
+        records: records that it has; 0 for a board without one.
+    """
+
+    def __init__(self, board: Board):
+        self._board = board
+        self.records = board.device.capture_registers // RECORD_REGISTERS
+
+    @property
+    def state(self) -> str:
+        """IDLE, FILLING, WAITING, TRIGGERED or DONE.
+
+        Raises:
+            NotReadyError: if the board has no capture memory.
+            HostError: if the board is not reached.
+        """
+        self._check()
+        return STATES[self._board.read("capture_state")]
+
+    def start(
+        self,
+        sources: Collection[str] = ("contact",),
+        before: int | None = None,
+        decimation: int = 1,
+        level_m: float = 0.0,
+    ) -> None:
+        """Begin a capture, whatever was before.
+
+        Args:
+            sources: what triggers it, besides `trigger`: `contact`, `trip`, and the position that passes `level_m`,
+                `rise` or `fall`.
+            before: records that are wanted before the trigger; a quarter of all if it is not given.
+            decimation: samples from a record to the next.
+            level_m: that level, m.
+
+        Raises:
+            FieldError: if a source is not known, or a number is out of its range.
+            NotReadyError: if the board has no capture memory.
+            HostError: if the board is not reached.
+        """
+        self._check()
+        for source in sources:
+            if source not in SOURCES:
+                raise FieldError("sources", f"must be of {', '.join(SOURCES)}, not {source!r}")
+        wanted = self.records // 4 if before is None else before
+        check_int("before", wanted, 0, self.records - 1)
+        self._board.set(
+            capture_sources=sum(1 << SOURCES.index(source) for source in set(sources)),
+            capture_level=level_m,
+            capture_before=wanted,
+            capture_decimation=decimation,
+        )
+        self._board.pulse("capture_start")
+
+    def trigger(self) -> None:
+        """Trigger a capture by hand.
+
+        Raises:
+            HostError: if the board is not reached, or has no capture memory.
+        """
+        self._check()
+        self._board.pulse("capture_trigger")
+
+    def until(self, wanted: str, seconds: float) -> None:
+        """Wait until the state is one, or one behind it, and live meanwhile: usually `DONE`.
+
+        Raises:
+            TimeoutError: if that does not come in time.
+            HostError: if the board is not reached, or has no capture memory.
+        """
+        end = time.monotonic() + seconds
+        while STATES.index(state := self.state) < STATES.index(wanted):
+            if time.monotonic() > end:
+                raise TimeoutError(f"the capture is not {wanted} in {seconds:g} s: it is {state}")
+            self._board.sleep(LOOK_S)
+
+    def read(self, progress: Callable[[int], object] = lambda done: None) -> Captured:
+        """Return a capture that is done, and live meanwhile.
+
+        Args:
+            progress: called with the number of records that are read.
+
+        Raises:
+            NotReadyError: if it is not done, or the board has no capture memory.
+            ForeignError: if the records do not follow each other.
+            HostError: if the board is not reached.
+        """
+        if (state := self.state) != STATES[DONE]:
+            raise NotReadyError(f"the capture is {state}: wait until it is {STATES[DONE]}")
+        registers: list[int] = []
+        while (done := len(registers) // RECORD_REGISTERS) < self.records:
+            some = min(PART_RECORDS, self.records - done)
+            try:
+                registers += self._board.read_registers(CAPTURE + len(registers), some * RECORD_REGISTERS)
+            except RefusedError:
+                raise NotReadyError("the capture was started again while it was read") from None
+            self._board.sleep(0.0)
+            progress(done + some)
+        return self._captured(np.array(registers, np.uint16).reshape(-1, RECORD_REGISTERS))
+
+    def _captured(self, cells: np.ndarray) -> Captured:
+        """Return the capture of registers of shape (records, 8), uint16."""
+        device, place = self._board.device, self._board.read("capture_place")
+        clocks = round(self._board.get("capture_decimation")) * device.clocks_per_sample
+        steps = np.diff(cells[:, 7])
+        wrong = np.flatnonzero(steps != clocks & 0xFFFF)
+        if len(wrong):
+            raise ForeignError(
+                f"records must be {clocks} clocks apart, and record {wrong[0] + 1} of the capture is not: "
+                f"{steps[wrong[0]]} of 65536"
+            )
+        halves = cells.astype(np.int64)
+        values = (halves[:, 0:6:2] << 16 | halves[:, 1:6:2]).astype(np.uint32).view(np.int32)
+        count, velocity, driven = (values[:, k] * device.registers[name].lsb for k, name in enumerate(VALUES))
+        known = device.registers["flags"].format.width
+        return Captured(
+            time_s=(np.arange(len(cells)) - place) * (clocks / device.clock_hz),
+            position_m=count,
+            velocity_m_per_s=velocity,
+            force_n=driven,
+            flags=halves[:, 6],
+            flag_names=(*STATE_FLAGS, *flag_names(known)),
+            place=place,
+            identity=device.identity,
+        )
+
+    def _check(self) -> None:
+        if not self.records:
+            raise NotReadyError("the board has no capture memory: its bitstream was made without one")

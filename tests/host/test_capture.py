@@ -1,0 +1,136 @@
+"""Captures: what is asked of the board, and what its records become in SI units."""
+
+import numpy as np
+import pytest
+from twin_board import TwinBoard
+
+from hardwall.host.capture import PART_RECORDS
+from hardwall.host.connect import connect
+from hardwall.host.errors import ForeignError, NotReadyError
+from hardwall.model.capture import DONE, STATE_FLAGS, WAITING
+from hardwall.model.checks import FieldError
+from hardwall.model.registers import RegisterMap
+
+PLACE = 100
+
+
+def records(registers: RegisterMap, decimation: int) -> dict[str, np.ndarray]:
+    """Return the words of a capture, its values from end to end of their formats."""
+    count = registers.capture.records
+    rng = np.random.default_rng(1)
+    words = {
+        name: rng.integers(form.min, form.max, count, endpoint=True)
+        for name, form in (
+            ("count", registers.capture.count),
+            ("velocity", registers.capture.velocity),
+            ("driven", registers.capture.force),
+        )
+    }
+    for name, form in (("count", registers.capture.count), ("velocity", registers.capture.velocity)):
+        words[name][:2] = form.min, form.max
+    words["flags"] = rng.integers(0, 1 << len(registers.capture.flags), count)
+    words["stamp"] = 65_000 + np.arange(count) * decimation * registers.spec.clocks_per_sample & 0xFFFF
+    return words
+
+
+def hold(board: TwinBoard, words: dict[str, np.ndarray]) -> None:
+    """Let a board hold records, and show that they are done."""
+    cells = [words[name] >> shift & 0xFFFF for name in ("count", "velocity", "driven") for shift in (16, 0)]
+    cells += [words["flags"], words["stamp"]]
+    board.server.file.capture = np.stack(cells, axis=1).ravel().tolist()
+    board.show(capture_state=DONE, capture_place=PLACE)
+
+
+def test_records_become_arrays_in_si_units(board, axis, registers):
+    decimation, told = 7, []
+    words = records(registers, decimation)
+    hold(board, words)
+    axis.set(capture_decimation=decimation)
+    found = axis.capture.read(told.append)
+    assert axis.capture.records == len(found.time_s) == registers.capture.records > 2 * PART_RECORDS
+    assert told[-1] == axis.capture.records
+    for name, array in (("count", found.position_m), ("velocity", found.velocity_m_per_s), ("driven", found.force_n)):
+        np.testing.assert_array_equal(array, words[name] * registers[name].lsb)
+    np.testing.assert_array_equal(found.flags, words["flags"])
+    period_s = decimation / registers.spec.sample_hz
+    np.testing.assert_allclose(found.time_s, (np.arange(len(found.time_s)) - PLACE) * period_s, rtol=1e-12)
+    assert found.flag_names[: len(STATE_FLAGS)] == STATE_FLAGS
+    assert len(found.flag_names) == len(registers.capture.flags)
+    np.testing.assert_array_equal(found.flag("tripped"), words["flags"] >> 1 & 1)
+    with pytest.raises(FieldError, match=r"flag must be one of armed, tripped, contact, live, .*'x'"):
+        found.flag("x")
+    assert (found.place, found.identity) == (PLACE, registers.identity)
+
+
+def test_a_capture_can_be_saved(board, axis, registers, tmp_path):
+    hold(board, records(registers, 1))
+    found = axis.capture.read()
+    found.save(tmp_path / "capture.npz")
+    with np.load(tmp_path / "capture.npz") as saved:
+        assert set(saved) == set(vars(found))
+        np.testing.assert_array_equal(saved["velocity_m_per_s"], found.velocity_m_per_s)
+        assert saved["identity"] == registers.identity
+
+
+def test_records_that_do_not_follow_each_other_are_refused(board, axis, registers):
+    words = records(registers, 1)
+    words["stamp"][40:] += registers.spec.clocks_per_sample
+    words["stamp"] &= 0xFFFF
+    hold(board, words)
+    with pytest.raises(ForeignError, match="must be 50 clocks apart, and record 40 of the capture is not: 100"):
+        axis.capture.read()
+
+
+def test_what_is_asked_for_is_written_before_the_start(board, axis, registers):
+    started = []
+    board.react = lambda pulses: started.append(dict(board.server.file.active)) if "capture_start" in pulses else None
+    axis.capture.start(("trip", "rise"), before=3, decimation=5, level_m=-2e-3)
+    (active,) = started
+    assert active["capture_sources"] == 0b0110
+    assert (active["capture_before"], active["capture_decimation"]) == (3, 5)
+    assert active["capture_level"] == -2000
+    axis.capture.start()
+    assert started[1]["capture_sources"] == 1
+    assert started[1]["capture_before"] == registers.capture.records // 4
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"sources": ("contact", "noise")}, "sources must be of contact, trip, rise, fall, not 'noise'"),
+        ({"before": -1}, "before must be 0 to 2047, not -1"),
+        ({"before": 2048}, "before must be 0 to 2047, not 2048"),
+        ({"decimation": 0}, "capture_decimation must be 1 to 4095, not 0"),
+        ({"level_m": 7.0}, "capture_level must be -1.04858 to 1.04858 m, not 7.0"),
+    ],
+)
+def test_what_cannot_be_asked_for_starts_nothing(board, axis, asked, message):
+    started = []
+    board.react = started.extend
+    with pytest.raises(FieldError, match=message):
+        axis.capture.start(**asked)
+    assert started == []
+
+
+def test_what_is_not_done_is_not_read(board, axis):
+    board.show(capture_state=WAITING)
+    assert axis.capture.state == "WAITING"
+    with pytest.raises(NotReadyError, match="the capture is WAITING: wait until it is DONE"):
+        axis.capture.read()
+    with pytest.raises(TimeoutError, match=r"the capture is not DONE in 0.05 s: it is WAITING"):
+        axis.capture.until("DONE", 0.05)
+    axis.capture.until("FILLING", 0.0)
+
+
+def test_a_capture_that_is_started_again_meanwhile_is_not_mixed(board, axis, registers):
+    hold(board, records(registers, 1))
+    with pytest.raises(NotReadyError, match="the capture was started again while it was read"):
+        axis.capture.read(lambda done: setattr(board.server.file, "capture", None))
+
+
+def test_a_board_without_a_memory_says_so(registers):
+    with TwinBoard(RegisterMap(registers.spec, 0)) as bare, connect(bare.name) as axis:
+        assert axis.capture.records == 0
+        for act in (axis.capture.start, axis.capture.trigger, axis.capture.read, lambda: axis.capture.state):
+            with pytest.raises(NotReadyError, match="the board has no capture memory"):
+                act()
