@@ -35,6 +35,7 @@ def command(
     tcp: Annotated[
         int | None, typer.Option(min=0, max=65535, metavar="PORT", help="listen at this port of 127.0.0.1, too")
     ] = None,
+    baud: Annotated[int | None, typer.Option(help="rate of the serial line", show_default="the board's")] = None,
     seconds: Annotated[
         float | None, typer.Option(metavar="S", help="simulated time to run", show_default="until it is interrupted")
     ] = None,
@@ -43,7 +44,7 @@ def command(
     if seconds is not None:
         within(seconds, "--seconds", 0.0, 1e6, "s")
     of = load(scene, changes_of(set_, controller__estimator=estimator))
-    with Line(tcp) as line, VirtualBoard(of) as board:
+    with Line(tcp) as line, VirtualBoard(of, baud) as board:
         # The first call compiles, for which no host would wait.
         board.run()
         print(f"serial port: {line.path}")

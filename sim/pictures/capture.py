@@ -50,6 +50,6 @@ def draw(shows: Shows) -> Figure:
 def _title(result: Captured) -> str:
     step_s = result.time_s[1] - result.time_s[0]
     return (
-        f"capture of the board {result.identity}: {len(result.time_s)} records, {1 / step_s / 1e3:g} a ms\n"
+        f"capture of the board {result.identity}: {len(result.time_s)} records at {1e-3 / step_s:g} kHz\n"
         f"{result.place} of them before the trigger"
     )

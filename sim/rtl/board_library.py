@@ -13,6 +13,8 @@ import numpy as np
 
 from ...hdl.board import Board
 from ...hdl.export import to_verilog
+from ...hdl.link.link import Link
+from ...model.registers import RegisterMap
 from ...model.spec import AxisSpec
 from . import shared_library
 from .shared_library import Recipe
@@ -33,18 +35,18 @@ SWITCHES: tuple[Switch, ...] = get_args(Switch)
 
 
 @functools.lru_cache(maxsize=1 << 3)
-def _board(spec: AxisSpec) -> tuple[Board, str]:
-    board = Board(spec)
+def _board(spec: AxisSpec, baud: int | None) -> tuple[Board, str]:
+    board = Board(spec, None if baud is None else Link(RegisterMap(spec), baud))
     return board, to_verilog(board, "board")
 
 
-def build(spec: AxisSpec) -> Path:
-    """Return the shared library of the board; build it first if it is missing.
+def build(spec: AxisSpec, baud: int | None = None) -> Path:
+    """Return the shared library of the board, with a serial line of that rate; build it first if it is missing.
 
     Raises:
         BuildError: if the build fails.
     """
-    board, verilog = _board(spec)
+    board, verilog = _board(spec, baud)
     around = {
         "BIT_PARTS": round(256 * spec.clock_hz / board.link.baud),
         "OSCILLATOR_CLOCKS": max(round(spec.clock_hz / OSCILLATOR_HZ / 2), 1),
@@ -61,18 +63,20 @@ class BoardHardware:
         spec: the axis.
         number: the handle's count at the start.
         turn_counts: counts between two pulses of the encoder's index.
+        baud: the rate of the serial line; None for the board's own.
 
     Attributes:
         full_scale: the drive (force LSB) of an amplifier whose pulses never pause.
     """
 
-    def __init__(self, spec: AxisSpec, number: int, turn_counts: int):
-        board, _ = _board(spec)
+    def __init__(self, spec: AxisSpec, number: int, turn_counts: int, baud: int | None = None):
+        board, _ = _board(spec, baud)
+        self._library_at = functools.partial(build, spec, baud)
         self._spec, self._board, self._number, self._turn = spec, board, number, turn_counts
         self.full_scale = 1 << board.drive_bits
 
     def __enter__(self) -> "BoardHardware":
-        self._library = library = ctypes.CDLL(str(build(self._spec)))
+        self._library = library = ctypes.CDLL(str(self._library_at()))
         library.board_open.restype = ctypes.c_void_p
         library.board_open.argtypes = [ctypes.c_int64, ctypes.c_int64, ctypes.c_double]
         library.board_take.restype = library.board_waiting.restype = ctypes.c_int64

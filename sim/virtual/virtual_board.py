@@ -59,6 +59,7 @@ class VirtualBoard:
 
     Args:
         scene: the scene; its wall and gains are the host's to write.
+        baud: the rate of the serial line; None for the board's own.
 
     Attributes:
         hardware: the board's wires and loops.
@@ -70,13 +71,13 @@ class VirtualBoard:
         BuildError: if the hardware cannot be built.
     """
 
-    def __init__(self, scene: Scene):
+    def __init__(self, scene: Scene, baud: int | None = None):
         if scene.output is not None:
             raise SceneError(f"{scene.name}: output must be absent, for the pulses of the board are its output")
         self.scene, self._world = scene, world_of(scene)
         self._progress = start_of(scene, self._world)
         turn_counts = max(round(TURN_M / scene.encoder.count_m), 4)
-        self.hardware = BoardHardware(scene.spec, self._progress.moment.cell.number, turn_counts)
+        self.hardware = BoardHardware(scene.spec, self._progress.moment.cell.number, turn_counts, baud)
         self.hand, self.reversed = Hand(scene.protocol.start_m), False
         self._pulse_n = scene.spec.force_resolution_n * self.hardware.full_scale / scene.spec.clocks_per_sample
         self._edges, self._push_n = room_for(loop.EDGE_CAPACITY), 0.0

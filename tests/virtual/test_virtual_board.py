@@ -4,15 +4,22 @@ import pytest
 from virtual_host import SerialHost
 
 from hardwall.model.link.line import framed
+from hardwall.model.link.uart import FRAME_BITS
 from hardwall.model.supervisor import ARMED, DISARMED, TRIPPED, names
 from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load
+from hardwall.sim.virtual import virtual_board
 from hardwall.sim.virtual.virtual_board import Hand, VirtualBoard
 from stimuli import frames
 
 SLOW = {"controller.clock_hz": 4_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
 """As few clocks as the scene's axis needs: a second of it takes a few. Without friction a contact has one position."""
 STIFFNESS_N_PER_M, DAMPING_N_S_PER_M = 2000.0, 5.0
+BAUD = 460_800
+DEVICE_CLOCKS = 6000
+"""The most clocks between a request and its answer, which the link promises."""
+STEP_S = 2e-4
+"""The time between two looks."""
 WALL_M = 1e-3
 """The wall, behind the count 0, which is where the board is powered up."""
 
@@ -143,3 +150,20 @@ def test_an_output_of_its_own_is_refused():
         SceneError, match=r"^seed-2011: output must be absent, for the pulses of the board are its output"
     ):
         VirtualBoard(load("seed-2011", changes))
+
+
+@pytest.mark.parametrize(("first", "count"), [(0x20, 52), (0x40, 2)])
+def test_an_answer_comes_after_the_time_of_its_bits_and_the_device(first, count, monkeypatch):
+    monkeypatch.setattr(virtual_board, "GRASP_S", STEP_S)
+    with VirtualBoard(load("seed-2011", SLOW), BAUD) as board:
+        host = SerialHost(board)
+        host.read("state")
+        request, got = framed(b"\1" + frames.read(first, count)), b""
+        began_s = board.handle.time_s
+        board.hardware.send(request)
+        while len(got) < 5 + 2 * count:
+            board.run()
+            got += board.hardware.take()
+        took_s = board.handle.time_s - began_s
+    line_s = (len(request) + len(got)) * FRAME_BITS / BAUD
+    assert line_s - 1 / BAUD < took_s < line_s + DEVICE_CLOCKS / SLOW["controller.clock_hz"] + 2 * STEP_S
