@@ -2,7 +2,7 @@
 
 import json
 
-from .capture import DONE
+from .capture import DONE, RECORD_REGISTERS, Design
 from .register import Register
 from .registers import ACTIVE, CAPTURE, EVENTS, LAYOUT, MAP, WRITTEN, RegisterMap
 
@@ -25,14 +25,14 @@ def _row(register: Register) -> str:
     return f"| {' | '.join(cells)} |\n"
 
 
-def _window(registers: RegisterMap) -> str:
+def _window(capture: Design) -> str:
     """Return what is said of the window to the capture memory."""
-    flags = ", ".join(f"bit {bit} {name}" for bit, name in enumerate(registers.capture.flags))
+    flags = ", ".join(f"bit {bit} {name}" for bit, name in enumerate(capture.flags))
     return (
-        f"The capture memory of {registers.capture_registers} registers begins at 0x{CAPTURE:04X} with the oldest of "
-        f"{registers.capture.records} records. A record has two registers each of count, velocity and driven, as the "
+        f"The capture memory of {RECORD_REGISTERS * capture.records} registers begins at 0x{CAPTURE:04X} with the "
+        f"oldest of {capture.records} records. A record has two registers each of count, velocity and driven, as the "
         f"status of these names, then one of flags ({flags}), and one with the lower bits of the number of the clock "
-        f"{registers.capture.stamp_clocks} clocks behind its sample. It can be read while capture_state is {DONE}; "
+        f"{capture.stamp_clocks} clocks behind its sample. It can be read while capture_state is {DONE}; "
         "before it is refused.\n"
     )
 
@@ -43,7 +43,7 @@ def markdown(registers: RegisterMap) -> str:
     windows = [
         f"The compressed map (zlib, JSON) of {len(registers.compressed)} bytes begins at 0x{MAP:04X}, two bytes a "
         "register, the first one high.\n",
-        _window(registers) if registers.capture else "",
+        _window(registers.capture) if registers.capture else "",
     ]
     return (
         f"# Registers\n\nIdentity {registers.identity}, layout {LAYOUT}. Modbus RTU, unit 1. A value of two registers "

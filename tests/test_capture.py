@@ -29,7 +29,9 @@ from hardwall.model.supervisor import ARMED, DISARMED, TRIPPED
 from hardwall.testing import SAMPLES, SEED, Recorded, check, parameters, play, simulate
 from stimuli.specs import spec
 
-RECORDS = 16
+RECORDS = 8
+CLOCKS = max(SAMPLES // 2, 40_000)
+"""Fewer clocks do not reach every case."""
 CONTACT, TRIP, RISE, FALL = (1 << bit for bit in range(len(SOURCES)))
 
 
@@ -95,19 +97,33 @@ class World:
         if random.random() < (0.01 if state in (IDLE, DONE) else 0.0005):
             self._words()
             pulses["capture_start"] = 1
-        if random.random() < (0.3 if pulses["capture_start"] else 0.0015):
+        if random.random() < (0.4 if pulses["capture_start"] else 0.0015):
             pulses["capture_trigger"] = 1
         if random.random() < 0.0005:
             self._words()
         width = design.spec.stamp_width
         held["stamp"] = random.getrandbits(width) if random.random() < 0.01 else (held["stamp"] + 1) % (1 << width)
         held["address"] = random.randrange(RECORD_REGISTERS * design.records)
-        return {**held, **pulses, "reset": int(random.random() < 0.0001)}
+        return {**held, **pulses, "reset": int(random.random() < 0.0006)}
 
 
-def campaign(design: Design, clocks: int) -> tuple[dict[str, np.ndarray], Counter]:
+WAYS = {
+    *(
+        (IDLE, FILLING, 1),
+        (FILLING, WAITING, 0),
+        (FILLING, TRIGGERED, 0),
+        (WAITING, TRIGGERED, 0),
+        (TRIGGERED, DONE, 0),
+    ),
+    *((IDLE, TRIGGERED, 1), (DONE, FILLING, 1), (DONE, TRIGGERED, 1), (WAITING, FILLING, 1), (TRIGGERED, FILLING, 1)),
+    *("wraps", "early"),
+}
+"""What must happen: changes of the state, each with whether there was a start, and other things."""
+
+
+def campaign(design: Design, clocks: int, seed: int = SEED) -> tuple[dict[str, np.ndarray], Counter]:
     """Return the inputs at every clock, and how often every change of the state and other things happened."""
-    world, state, memory, rows, happened = World(design, SEED), START, design.memory(), [], Counter()
+    world, state, memory, rows, happened = World(design, seed), START, design.memory(), [], Counter()
     for _ in range(clocks):
         given = world.act(state.capture_state)
         rows.append(given)
@@ -128,7 +144,7 @@ OUTPUTS = ("data", "capture_state", "capture_place", "capture_stamp")
 async def follows_model(dut):
     recorded = make(**parameters())
     design = recorded.component.design
-    stimuli, happened = campaign(design, max(SAMPLES, 60_000))
+    stimuli, happened = campaign(design, CLOCKS)
     inputs, outputs = await play(dut, recorded, stimuli)
     state, memory, expected, known = START, design.memory(), [], False
     names = inputs.names
@@ -147,10 +163,7 @@ async def follows_model(dut):
     columns["data"][:first] = outputs.column("data")[:first]
     check(inputs, outputs, columns)
     assert len(expected) - first > len(expected) // 2
-    ways = {(IDLE, FILLING, 1), (FILLING, WAITING, 0), (FILLING, TRIGGERED, 0), (WAITING, TRIGGERED, 0)}
-    ways |= {(TRIGGERED, DONE, 0), (IDLE, TRIGGERED, 1), (DONE, FILLING, 1), (DONE, TRIGGERED, 1)}
-    ways |= {(WAITING, FILLING, 1), (TRIGGERED, FILLING, 1), "wraps", "early"}
-    assert {way for way in ways if not happened[way]} == set()
+    assert {way for way in WAYS if not happened[way]} == set()
 
 
 @pytest.mark.parametrize(("name", "estimator"), [("mhz", "levant"), ("wide", "levant-adaptive"), ("narrow", "fdm")])
@@ -191,7 +204,7 @@ class Axis:
         return [self.design.record(each) for each in grouped]
 
 
-@pytest.mark.parametrize("before", [0, 1, 7, RECORDS - 1])
+@pytest.mark.parametrize("before", [0, 1, 5, RECORDS - 1])
 @pytest.mark.parametrize("decimation", [1, 2, 9])
 def test_records_are_whole_in_order_and_around_the_trigger(before, decimation):
     axis = Axis(capture_before=before, capture_decimation=decimation)

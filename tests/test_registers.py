@@ -9,7 +9,7 @@ import pytest
 from hardwall.model.arithmetic.fixed import SQ, UQ
 from hardwall.model.estimators import registry
 from hardwall.model.register import Kind, Register
-from hardwall.model.registers import ACTIVE, CAPTURE_REGISTERS, WRITTEN, RegisterMap
+from hardwall.model.registers import ACTIVE, WRITTEN, RegisterMap
 from hardwall.model.supervised import Design
 from stimuli.specs import SPECS, spec
 from stimuli.supervised import supervised
@@ -35,7 +35,7 @@ def test_every_axis_has_a_map(name, estimator):
 
 def test_the_addresses_that_every_host_knows():
     registers = supervised("mhz")
-    assert [each.address for each in registers.registers if each.kind is Kind.CONSTANT] == [0, 2, 4, 6, 8, 10]
+    assert [each.address for each in registers.registers if each.kind is Kind.CONSTANT] == [0, 2, 4, 6, 8, 10, 12]
     known = {"drive": 0x20, "stamp": 0x32, "state": 0x40, "link_errors": 0x64, "commit": 0x7F, "clear_flags": 0x7E}
     known |= {"acknowledge": 0x79, "preload_count": 0x80, "encoder_glitch_clocks": 0x82, "active_encoder_invert": 0xA4}
     known |= {"capture_start": 0x78, "capture_trigger": 0x77, "capture_state": 0x54}
@@ -68,8 +68,8 @@ def test_every_change_of_spec_or_map_changes_the_identity():
     base = spec("mhz")
     others = [
         RegisterMap(base),
+        RegisterMap(base, 0),
         RegisterMap(base, 16),
-        RegisterMap(base, CAPTURE_REGISTERS),
         RegisterMap(dataclasses.replace(base, travel_m=0.2)),
         RegisterMap(dataclasses.replace(base, force_max_n=41.0)),
         RegisterMap(spec("mhz", "fdm")),

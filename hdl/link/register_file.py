@@ -191,11 +191,13 @@ class RegisterFile(wiring.Component):
         # The lowest bits of the address, an area, and whether it is in the window.
         step, shift = Signal(range(END)), Signal(CELL_BITS)
         place, area, window, counting = Signal(range(END)), Signal(Area), Signal(), Signal()
+        cell = Signal(CELL_BITS)
         m.d.comb += [
             read.addr.eq(Cat(place, Mux(window, address[len(place) : within], area), window)),
             write.addr.eq(place),
             write.data.eq(shift + counting),
-            host.data.eq(read.data),
+            cell.eq(read.data),
+            host.data.eq(cell),
         ]
         if registers.capture:
             in_capture = (address[15:] == CAPTURE >> 15) & less(address[:15], registers.capture_registers)
