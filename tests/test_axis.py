@@ -148,11 +148,12 @@ async def follows_model(dut):
         found = seen.column(name)[:kept]
         wrong = np.flatnonzero(found != expected[row, :kept])
         assert not len(wrong), f"{name}: {len(wrong)} of {kept} differ, first at sample {wrong[:1]}"
-    # The run must show forces in both directions, both faults of the encoder, and both limits.
+    # The run must show forces in both directions, both faults of the encoder, a saturated estimator, and both limits.
     assert (seen.column("drive") > 0).any()
     assert (seen.column("drive") < 0).any()
     rose = spec.design.flag_names(int(np.bitwise_or.reduce(seen.column("flags"))))
-    assert {"encoder_illegal", "encoder_overspeed", "slew_limited", "force_limited"} <= set(rose)
+    limits = {"error_saturated", "slew_limited", "force_limited"}
+    assert {"encoder_illegal", "encoder_overspeed", *limits} <= set(rose)
     latency = spec.design.latency_to_drive
     assert {(clock - first_clock - latency + 1) % spec.clocks_per_sample for clock in seen.clocks} == {0}
 

@@ -12,7 +12,7 @@ from hardwall.model.supervisor import ALL, ARMED, DISARMED, TRIPPED, WATCHDOG_MS
 STROBES = ("commit", "arm", "disarm", "acknowledge", "index_arm", "preload", "clear_flags")
 QUARTERS = ((0, 0), (1, 0), (1, 1), (0, 1))
 ACTS = ("", "disarm", "commit", "committed", "live", "settle", "index_arm", "preload", "acknowledge")
-CHANCES = (0.9841, 0.0005, 0.002, 0.003, 0.0045, 0.0035, 0.002, 0.0003, 0.0002)
+CHANCES = (0.9831, 0.0005, 0.002, 0.003, 0.0045, 0.0035, 0.002, 0.0013, 0.0002)
 """What a host does beside bringing the axis to ARMED, and the chance of each in a clock."""
 FILTERS = (0, 0, 1, 2, 5, 15, 15)
 
@@ -38,7 +38,7 @@ class World:
         self.wall |= {"wall_stiffness": self.formats["wall_stiffness"].max, "wall_position": -1}
         # Thresholds that the motion comes to, a limit that is there at once, and a host that is soon overdue.
         self.usual |= {"supervisor_causes": ALL, "supervisor_ramp": design.supervisor.ramp.max}
-        self.usual |= {"supervisor_saturated": 2, "supervisor_watchdog": WATCHDOG_MS[0]}
+        self.usual |= {"supervisor_saturated": 1, "supervisor_watchdog": WATCHDOG_MS[0]}
         self.usual |= {"supervisor_turn": 4, "supervisor_index_tolerance": 1, "supervisor_runaway": 0}
         self.inputs = {**self.usual, **self.wall, **dict.fromkeys(LOOPS, 1)}
         self.inputs |= dict.fromkeys(("heartbeat", "preload_count", "acknowledged"), 0)
