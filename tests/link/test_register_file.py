@@ -9,6 +9,7 @@ from hardwall.model.link import register_file as model
 from hardwall.model.link.register_file import Operation
 from hardwall.model.registers import CAPTURE, COUNTERS, EDGE_STAMPS
 from hardwall.testing import Bench, parameters, rng, simulate
+from stimuli.restless import Restless
 from stimuli.status import edge, show
 from stimuli.supervised import supervised
 
@@ -150,16 +151,15 @@ async def random_operations(dut):
 
 @cocotb.test()
 async def every_bit_of_every_word_and_of_the_capture_memory(dut):
-    host, random, drawn = Host(dut), rng(), {}
+    host = Host(dut)
     await host.bench.reset()
     await host.do(Operation.SNAPSHOT)
     words, live, pulses = host.registers.words, host.registers.live, host.registers.pulses
+    values = {word.name: Restless(word, host.random) for word in (*words, *live)}
     committed = host.bench.monitor("commit", *(word.name for word in words))
     for number in range(4):
-        # Every second value is the complement of the one before: every bit rises and falls.
+        drawn = {name: value.next() for name, value in values.items()}
         for word in (*words, *live):
-            other = word.low + word.high - drawn.get(word.name, 0)
-            drawn[word.name] = other if number % 2 else int(random.integers(word.low, word.high + 1))
             for k, half in enumerate(word.to_registers(drawn[word.name])):
                 await host.do(Operation.WRITE, word.address + k, half)
         for pulse in pulses:
