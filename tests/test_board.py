@@ -2,17 +2,19 @@
 
 import cocotb
 import pytest
-from cocotb.triggers import Timer
+from cocotb.triggers import ClockCycles, RisingEdge, Timer
 
 from hardwall.hdl.board import Board
 from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.hdl.supervised import LOOPS
+from hardwall.model import clock_monitor
 from hardwall.model.link.server import FAILURE
 from hardwall.model.registers import RegisterMap
 from hardwall.model.supervisor import ALL, ARMED, DISARMED, REQUIRED, TRIPPED
 from hardwall.testing import SAMPLES, parameters, simulate
 from oracles.board import SYNCHRONISER, make
 from oracles.board_host import Host
+from stimuli.restless import Restless
 from stimuli.specs import spec
 
 CLOCKS = max(SAMPLES, 80_000)
@@ -112,6 +114,42 @@ async def an_open_loop_stops_the_pulses(dut):
         host.change(**{loop: 1})
         await host.edges(host.settling)
         assert not any(pulse for pulse, _ in host.pulses)
+
+
+@cocotb.test()
+async def every_word_reaches_the_axis(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    registers, pulses = host.registers, [pulse.name for pulse in host.registers.pulses if pulse.name != "arm"]
+    restless = {word.name: Restless(word, host.random) for word in (*registers.words, *registers.live)}
+    for _ in range(4):
+        drawn = {name: values.next() for name, values in restless.items()}
+        await host.write(**{word.name: drawn[word.name] for word in registers.live})
+        await host.write(**dict.fromkeys(pulses, 1), **{word.name: drawn[word.name] for word in registers.words})
+    assert not host.refused
+
+
+@cocotb.test()
+async def a_clock_that_stops_makes_the_outputs_low_and_comes_back_disarmed(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    stiffness, position = host.registers["wall_stiffness"], host.registers["wall_position"]
+    await host.write(supervisor_ramp=host.registers["supervisor_ramp"].high)
+    await host.write(commit=1, wall_position=1 + position.low, wall_stiffness=stiffness.high)
+    await host.arm()
+    outputs = [dut.drive_pdm, dut.alive, dut.outputs_enable]
+    while not all(int(output.value) for output in outputs):
+        await host.edges(1)
+    host.leave()
+    host.bench.clock.stop()
+    # The clocks of an oscillator of 1 Hz are its seconds; one more, for an edge sees what was before it.
+    await ClockCycles(dut.oscillator, 1 + int(clock_monitor.Design(host.twin.spec.clock_hz).stop_latency_s(1.0)))
+    assert not any(int(output.value) for output in outputs)
+    assert host.shown()["state"] == ARMED
+    host.bench.clock.start()
+    await RisingEdge(dut.outputs_enable)
+    assert (host.shown()["state"], host.shown()["driven"]) == (DISARMED, 0)
+    assert not any(int(output.value) for output in outputs[:2])
 
 
 # A second axis takes as long again: the long runs, of more samples, have it.
