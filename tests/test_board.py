@@ -60,7 +60,7 @@ async def a_random_host_at_a_random_handle(dut):
     await host.write(supervisor_ramp=ramp.high, supervisor_watchdog=2000, supervisor_causes=REQUIRED)
     while host.twin.clocks < CLOCKS:
         host.rate = float(random.choice((0.0, 0.005, 0.02)))
-        host.illegal_rate = float(random.choice((0.0, 0.01), p=(0.9, 0.1)))
+        host.illegal_rate = float(random.choice((0.0, 0.05), p=(0.8, 0.2)))
         host.open_rate = float(random.choice((0.0, 1e-3), p=(0.8, 0.2)))
         if random.random() < 0.5:
             host.change(drive_enable=1, external_fault=1, emergency_stop=1)
