@@ -40,7 +40,7 @@ class Stack(wiring.Component):
                 "byte": In(8),
                 "arrived": In(1),
                 "spoilt": In(1),
-                "pause": In(2),
+                "pause": In(3),
                 "sent": Out(8),
                 "sending": Out(1),
                 "idle": Out(1),
@@ -157,7 +157,7 @@ class World:
 
     async def agree(self, verdict: Verdict) -> bytes | None:
         """Wait until the line listens again; compare answer, pulses and words with the twin's."""
-        self.bench.drive(pause=self.answers % 4)
+        self.bench.drive(pause=2 * (self.answers % 4))
         await ClockCycles(self.dut.clk, 2)
         begun, pulsed = len(self.sent.rows), len(self.pulsed.rows)
         self.server.file.pulses = ()

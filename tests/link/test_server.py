@@ -74,6 +74,15 @@ async def every_exception(dut):
 
 
 @cocotb.test()
+async def every_identification(dut):
+    world = World(dut)
+    await world.reset()
+    for kind in range(server.NAMED + 2):
+        for number in range(4):
+            await world.request(bytes([server.IDENTIFY, server.DEVICE_IDENTIFICATION, kind, number]))
+
+
+@cocotb.test()
 async def whatever_arrives_is_judged_as_the_twin_does(dut):
     world = World(dut)
     await world.reset()
