@@ -8,11 +8,14 @@ from cocotb.triggers import RisingEdge, Timer, ValueChange
 from hardwall.hdl.axis import Axis
 from hardwall.model import clocked, quadrature, stamped
 from hardwall.model.spec import AxisSpec
+from hardwall.model.supervised import Design
 from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
+from oracles.axis import AxisTwin
 from stimuli import handle
 from stimuli.axes import busy, random_words
 
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
+STROBES = "commit", "preload", "clear_flags", "index_arm"
 
 
 def make(estimator: str) -> Axis:
@@ -148,13 +151,42 @@ async def follows_model(dut):
         found = seen.column(name)[:kept]
         wrong = np.flatnonzero(found != expected[row, :kept])
         assert not len(wrong), f"{name}: {len(wrong)} of {kept} differ, first at sample {wrong[:1]}"
-    # The run must show forces in both directions, both faults of the encoder, and both limits.
+    # The run must show forces in both directions, both faults of the encoder, a saturated estimator, and both limits.
     assert (seen.column("drive") > 0).any()
     assert (seen.column("drive") < 0).any()
     rose = spec.design.flag_names(int(np.bitwise_or.reduce(seen.column("flags"))))
-    assert {"encoder_illegal", "encoder_overspeed", "slew_limited", "force_limited"} <= set(rose)
+    limits = {"error_saturated", "slew_limited", "force_limited"}
+    assert {"encoder_illegal", "encoder_overspeed", *limits} <= set(rose)
     latency = spec.design.latency_to_drive
     assert {(clock - first_clock - latency + 1) % spec.clocks_per_sample for clock in seen.clocks} == {0}
+
+
+@cocotb.test()
+async def every_output_is_the_twins_at_every_clock(dut):
+    spec, random = busy(**parameters()), rng()
+    bench, twin, moves = Bench(dut, Axis(spec)), AxisTwin(Design(spec)), handle.edges(random, handle.Habits(index=0.1))
+    await bench.reset()
+    pins, words, left, half = dict.fromkeys(PINS, 0), random_words(spec.design, random), 0, 1 << spec.count_width - 1
+    for _ in range(300 * spec.clocks_per_sample):
+        if left == 0:
+            changed, left = next(moves)
+            pins |= changed
+        left -= 1
+        act = random.choice(["", "words", "drive_enable", *STROBES], p=(0.97, 0.006, 0.003, *[0.021 / len(STROBES)] * len(STROBES)))
+        if act == "words" and not twin.pending:
+            words = random_words(spec.design, random) | twin.fixed()
+            pins["preload_count"] = int(random.integers(-half, half))
+        elif act == "drive_enable":
+            pins["drive_enable"] ^= 1
+        reset = int(random.random() < 2e-4)
+        given = {**pins, **words, **dict.fromkeys(STROBES, 0)} | ({act: 1} if act in STROBES else {})
+        bench.drive(**given, rst=reset)
+        await RisingEdge(dut.clk)
+        seen = bench.packing.unpack(int(dut.bench_seen.value))
+        wanted = twin.outputs()
+        unlike = {name: (seen[name], word) for name, word in wanted.items() if seen[name] != word}
+        assert not unlike, f"clock {twin.clocks}: the axis's and the twin's {unlike}"
+        twin.restarted() if reset else twin.advance(given, given["drive_enable"])
 
 
 # One estimator on the count and one on the stamps. `test_loop` runs all estimators.

@@ -2,11 +2,12 @@
 
 import cocotb
 import pytest
-from cocotb.triggers import Timer
+from cocotb.triggers import ClockCycles, RisingEdge, Timer
 
 from hardwall.hdl.board import Board
 from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.hdl.supervised import LOOPS
+from hardwall.model import clock_monitor
 from hardwall.model.capture import DONE, RECORD_REGISTERS, TRIGGERED, WAITING
 from hardwall.model.link.server import FAILURE
 from hardwall.model.registers import CAPTURE, RegisterMap
@@ -15,6 +16,7 @@ from hardwall.testing import SAMPLES, parameters, simulate
 from oracles.board import RECORDS, SYNCHRONISER, make
 from oracles.board_host import Host
 from stimuli import frames
+from stimuli.restless import Restless
 from stimuli.specs import spec
 
 CLOCKS = max(SAMPLES, 80_000)
@@ -62,7 +64,7 @@ async def a_random_host_at_a_random_handle(dut):
     await host.write(supervisor_ramp=ramp.high, supervisor_watchdog=2000, supervisor_causes=REQUIRED)
     while host.twin.clocks < CLOCKS:
         host.rate = float(random.choice((0.0, 0.005, 0.02)))
-        host.illegal_rate = float(random.choice((0.0, 0.01), p=(0.9, 0.1)))
+        host.illegal_rate = float(random.choice((0.0, 0.05), p=(0.8, 0.2)))
         host.open_rate = float(random.choice((0.0, 1e-3), p=(0.8, 0.2)))
         if random.random() < 0.5:
             host.change(drive_enable=1, external_fault=1, emergency_stop=1)
@@ -147,6 +149,42 @@ async def a_capture_around_a_trip_is_read_by_the_line(dut):
     assert place == RECORDS // 2
     assert {(record.driven, record.flags & 7) for record in records[:place]} == {(-most, ARMED | 4)}
     assert {(record.driven, record.flags & 7) for record in records[place + 1 :]} == {(0, TRIPPED | 4)}
+
+
+@cocotb.test()
+async def every_word_reaches_the_axis(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    registers, pulses = host.registers, [pulse.name for pulse in host.registers.pulses if pulse.name != "arm"]
+    restless = {word.name: Restless(word, host.random) for word in (*registers.words, *registers.live)}
+    for _ in range(4):
+        drawn = {name: values.next() for name, values in restless.items()}
+        await host.write(**{word.name: drawn[word.name] for word in registers.live})
+        await host.write(**dict.fromkeys(pulses, 1), **{word.name: drawn[word.name] for word in registers.words})
+    assert not host.refused
+
+
+@cocotb.test()
+async def a_clock_that_stops_makes_the_outputs_low_and_comes_back_disarmed(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    stiffness, position = host.registers["wall_stiffness"], host.registers["wall_position"]
+    await host.write(supervisor_ramp=host.registers["supervisor_ramp"].high)
+    await host.write(commit=1, wall_position=1 + position.low, wall_stiffness=stiffness.high)
+    await host.arm()
+    outputs = [dut.drive_pdm, dut.alive, dut.outputs_enable]
+    while not all(int(output.value) for output in outputs):
+        await host.edges(1)
+    host.leave()
+    host.bench.clock.stop()
+    # The clocks of an oscillator of 1 Hz are its seconds; one more, for an edge sees what was before it.
+    await ClockCycles(dut.oscillator, 1 + int(clock_monitor.Design(host.twin.spec.clock_hz).stop_latency_s(1.0)))
+    assert not any(int(output.value) for output in outputs)
+    assert host.shown()["state"] == ARMED
+    host.bench.clock.start()
+    await RisingEdge(dut.outputs_enable)
+    assert (host.shown()["state"], host.shown()["driven"]) == (DISARMED, 0)
+    assert not any(int(output.value) for output in outputs[:2])
 
 
 # A second axis takes as long again: the long runs, of more samples, have it.

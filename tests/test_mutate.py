@@ -44,6 +44,19 @@ class Answer(wiring.Component):
         return m
 
 
+class Around(wiring.Component):
+    """Has an `Answer` inside, and shows the half of it with the whole alone, when there is none."""
+
+    start: In(1)
+    done: Out(1)
+
+    def elaborate(self, platform):
+        m = Module()
+        m.submodules.answer = answer = Answer()
+        m.d.comb += [answer.start.eq(self.start), self.done.eq(answer.done | answer.done & answer.half)]
+        return m
+
+
 @cocotb.test()
 async def answers(dut):
     bench = Bench(dut, Answer())
@@ -71,6 +84,12 @@ def test_mutants_are_killed_even_if_they_hang_or_proven_equivalent_or_left():
     killed = [number for number, fate in enumerate(fates, 1) if fate.killed_by]
     known = known_of(mutated(Answer(), (BLOCK,), MANY, SEED), killed[:4])
     assert all(said.startswith("differs after ") for said in known.values())
+
+
+def test_a_module_is_compared_without_what_is_around_it():
+    netlist = mutated(Around(), (f"{BLOCK}.answer",), MANY, SEED)
+    number = next(mutant.number for mutant in netlist.mutants if "const0" in mutant.change and "half" in mutant.change)
+    assert known_of(netlist, [number])[number].startswith("differs after ")
 
 
 def test_tests_that_fail_without_a_mutant_say_nothing(monkeypatch):

@@ -13,8 +13,9 @@ from hardwall.testing import SAMPLES, Recorded, check, parameters, play, simulat
 from stimuli.hosts import Host, settled
 from stimuli.specs import spec
 
-# Clocks at which milliseconds are few clocks: 20, for which the divider of `alive` has nothing to count, and 1 000.
-SLOW = {"clock_hz": 20_000, "sample_hz": 500, "actuation_hz": 500, "gains": None, "speed_max_m_per_s": 0.01}
+# Clocks at which milliseconds are few clocks: 10, for which the divider of `alive` has nothing to count, and 1 000.
+SLOW = {"clock_hz": 10_000, "sample_hz": 250, "actuation_hz": 250, "gains": None}
+SLOW |= {"speed_max_m_per_s": 0.005, "acceleration_max_m_per_s2": 3.0}
 SLOWER = {
     "slow": ("paper", SLOW),
     "narrow": ("narrow", {"clock_hz": 1_000_000, "sample_hz": 10_000, "actuation_hz": 10_000}),
@@ -33,13 +34,18 @@ def make(name: str) -> Recorded:
 
 
 def campaign(name: str, clocks: int) -> dict[str, np.ndarray]:
-    """Return inputs at every clock: a host that is interrupted at random, and every cause until its count is full."""
+    """Return inputs at every clock: a host that is interrupted at random, and every cause until its count is full.
+
+    Where milliseconds are few clocks, the host is also silent for so many that every bit of what is left to it falls.
+    """
     host = Host(design(name))
     host.clock(reset=1)
     host.is_interrupted(clocks)
     host.clock(reset=1)
     for bit in range(len(CAUSES)):
         host.trips(bit, MOST + 2)
+    if name == "slow":
+        host.is_silent(1026)
     host.clock()
     host.clock(reset=1)
     return dict(zip(("reset", *Inputs._fields), np.array(host.rows, np.int64).T, strict=True))

@@ -51,6 +51,7 @@ class Bench:
         inputs: how its inputs lie in one word.
         monitors: the monitors so far.
         in_campaign: whether the sequencer drives the inputs.
+        clock: what makes the component's clock, from the first reset on.
     """
 
     period_ns = PERIOD_NS
@@ -66,9 +67,9 @@ class Bench:
 
     async def reset(self) -> None:
         """Start the clock, zero every input and hold reset for two clocks."""
-        if not hasattr(self, "_clock"):
-            self._clock = Clock(self.dut.clk, PERIOD_NS, "ns")
-            self._clock.start()
+        if not hasattr(self, "clock"):
+            self.clock = Clock(self.dut.clk, PERIOD_NS, "ns")
+            self.clock.start()
         for name in ("campaign", "go", "strobe", "momentary", "watched"):
             getattr(self.dut, RESERVED + name).value = 0
         self.drive(**dict.fromkeys(self.inputs.shapes, 0))

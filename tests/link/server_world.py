@@ -22,7 +22,10 @@ PATIENCE = 20_000
 
 
 class Stack(wiring.Component):
-    """Line, server and register file, with bytes at the ports, a capture memory, and the pulses side by side."""
+    """Line, server and register file, with bytes at the ports, a capture memory, and the pulses side by side.
+
+    What sends the answers is as slow as a transmitter: for `pause` clocks behind a byte it takes no other.
+    """
 
     def __init__(self, name: str):
         self.design = register_file.Design(supervised(name))
@@ -37,6 +40,7 @@ class Stack(wiring.Component):
                 "byte": In(8),
                 "arrived": In(1),
                 "spoilt": In(1),
+                "pause": In(3),
                 "sent": Out(8),
                 "sending": Out(1),
                 "idle": Out(1),
@@ -54,16 +58,20 @@ class Stack(wiring.Component):
         m.submodules.file = file = self.file
         connect(m, line.frames, under_test.frames)
         connect(m, under_test.file, file.host)
-        place = Signal.like(file.capture_address)
+        place, waiting = Signal.like(file.capture_address), Signal.like(self.pause)
         pulses = Cat(getattr(file, pulse.name) for pulse in self.design.registers.pulses)
         m.d.sync += place.eq(file.capture_address)
+        with m.If(self.sending):
+            m.d.sync += waiting.eq(self.pause)
+        with m.Elif(waiting != 0):
+            m.d.sync += waiting.eq(waiting - 1)
         m.d.comb += [
             line.byte.eq(self.byte),
             line.arrived.eq(self.arrived),
             line.spoilt.eq(self.spoilt),
-            line.sent.ready.eq(1),
+            line.sent.ready.eq(waiting == 0),
             self.sent.eq(line.sent.payload),
-            self.sending.eq(line.sent.valid),
+            self.sending.eq(line.sent.valid & line.sent.ready),
             self.idle.eq(~line.frames.ended & ~line.sent.valid),
             self.pulses.eq(pulses),
             self.pulsed.eq(pulses.any()),
@@ -119,8 +127,15 @@ class World:
         self.bench.drive(busy=busy, refuse=sum(bit << k for k, bit in enumerate(refused)))
         await show(self.dut, self.bench, self.registers, self.server.file.status)
 
-    async def send(self, data: bytes, pace: int = 1, spoilt: int = -1) -> bytes | None:
-        """Send bytes, wait for what they cause, and compare it with the twin's; return the last answer."""
+    async def send(self, data: bytes, pace: int = 1, spoilt: int = -1, more: int = 0) -> bytes | None:
+        """Send bytes, wait for what they cause, and compare it with the twin's; return the last answer.
+
+        Args:
+            data: the bytes.
+            pace: clocks from a byte to the next.
+            spoilt: the place of a byte that is not good.
+            more: whether another byte follows a frame at once, which is an overrun.
+        """
         answer = None
         for k, byte in enumerate(data):
             self.bench.drive(byte=byte, arrived=1, spoilt=k == spoilt)
@@ -131,7 +146,12 @@ class World:
                 if pace > 1:
                     await ClockCycles(self.dut.clk, pace - 1)
             else:
+                self.bench.drive(arrived=more)
+                await RisingEdge(self.dut.clk)
+                self.bench.drive(arrived=0)
                 answer = await self.agree(verdict) or answer
+                if more:
+                    await self.agree(self.line.overrun())
         return answer
 
     async def gap(self) -> bytes | None:
@@ -142,7 +162,8 @@ class World:
 
     async def agree(self, verdict: Verdict) -> bytes | None:
         """Wait until the line listens again; compare answer, pulses and words with the twin's."""
-        await ClockCycles(self.dut.clk, 3)
+        self.bench.drive(pause=2 * (self.answers % 4))
+        await ClockCycles(self.dut.clk, 2)
         begun, pulsed = len(self.sent.rows), len(self.pulsed.rows)
         self.server.file.pulses = ()
         answer = self.server.take(verdict, bytes(self.line.frame))

@@ -181,6 +181,19 @@ async def frames_up_to_the_largest_are_kept_whole_and_longer_ones_are_spoilt(dut
 
 
 @cocotb.test()
+async def a_frame_short_of_its_end_is_spoilt_though_its_crc_is_right(dut):
+    wire = Wire(dut)
+    await wire.bench.reset()
+    functions = *FIXED, *COUNTED, 0x70
+    for function in functions:
+        for byte in framed(bytes([1, function])):
+            await wire.send(byte)
+        await wire.gap()
+    # Only a function without a length may end so.
+    assert wire.seen == [Verdict.SPOILT] * (len(functions) - 1) + [Verdict.REQUEST]
+
+
+@cocotb.test()
 async def a_gap_is_as_long_as_promised(dut):
     wire = Wire(dut)
     await wire.bench.reset()

@@ -7,10 +7,11 @@ from cocotb.triggers import ClockCycles, RisingEdge
 from hardwall.hdl.link.register_file import RegisterFile
 from hardwall.model.link import register_file as model
 from hardwall.model.link.register_file import Operation
-from hardwall.model.registers import CAPTURE, COUNTERS, EDGE_STAMPS
+from hardwall.model.registers import CAPTURE, COUNTERS, EDGE_STAMPS, MAP, SPACE
 from hardwall.testing import Bench, parameters, rng, simulate
+from stimuli.restless import Restless
 from stimuli.status import edge, show
-from stimuli.supervised import supervised
+from stimuli.supervised import CAPTURE_REGISTERS, supervised
 
 CLOCKS = {
     Operation.CHECK_READ: 1,
@@ -19,6 +20,10 @@ CLOCKS = {
     Operation.WRITE: 2,
     Operation.COUNT: 3,
 }
+
+
+PLACES = 0, 0x60, 0xC0, MAP, CAPTURE, CAPTURE + CAPTURE_REGISTERS - 150, SPACE, SPACE + CAPTURE
+"""Where there are registers or their end, and the same beyond the last address."""
 
 
 def make(name: str) -> RegisterFile:
@@ -99,7 +104,8 @@ async def random_operations(dut):
     pulsed, before = [host.bench.monitor(pulse.name) for pulse in pulses], [0] * len(pulses)
     for _ in range(400):
         case, first, last = random.random(), int(random.integers(0, 2)), int(random.integers(0, 2))
-        address = int(random.choice((random.integers(0, 256), random.integers(0, 1 << 17))))
+        near = int(random.choice(PLACES)) + int(random.integers(0, 160))
+        address = int(random.choice((near, random.integers(0, 2 * SPACE)), p=(0.8, 0.2)))
         value = int(random.integers(0, 1 << 16))
         if case < 0.25:
             await host.do(Operation.CHECK_READ, address, 0, first, last)
@@ -150,16 +156,15 @@ async def random_operations(dut):
 
 @cocotb.test()
 async def every_bit_of_every_word_and_of_the_capture_memory(dut):
-    host, random, drawn = Host(dut), rng(), {}
+    host = Host(dut)
     await host.bench.reset()
     await host.do(Operation.SNAPSHOT)
     words, live, pulses = host.registers.words, host.registers.live, host.registers.pulses
+    values = {word.name: Restless(word, host.random) for word in (*words, *live)}
     committed = host.bench.monitor("commit", *(word.name for word in words))
     for number in range(4):
-        # Every second value is the complement of the one before: every bit rises and falls.
+        drawn = {name: value.next() for name, value in values.items()}
         for word in (*words, *live):
-            other = word.low + word.high - drawn.get(word.name, 0)
-            drawn[word.name] = other if number % 2 else int(random.integers(word.low, word.high + 1))
             for k, half in enumerate(word.to_registers(drawn[word.name])):
                 await host.do(Operation.WRITE, word.address + k, half)
         for pulse in pulses:

@@ -10,7 +10,12 @@ both need not be understood. There are three ways, and any is enough:
   searched.
 - **Induction of the outputs**, with no bit in common, for more clocks.
 
-The search from power-up may instead find inputs at which an output differs: then a test could kill the mutant.
+Where one module was changed, it is compared alone, without what is inside it: what it gives to the modules inside is an
+output, and what it gets from them an input. So the question does not grow with what is around and inside. A mutant that
+is equal so is equal in the component, too. Where that module is the component, all of it is compared, too.
+
+The search from power-up may instead find inputs at which an output differs: then a test could kill the mutant, unless
+what is around or inside never gives such inputs.
 """
 
 import copy
@@ -18,7 +23,7 @@ import json
 import re
 import shutil
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Collection
 from pathlib import Path
 
 from hardwall.model.build_folder import build_dir
@@ -33,7 +38,9 @@ CPU_S = 15
 """The processor's time for a question; one that takes longer is not answered."""
 ROUNDS, STEPS, STEPS_IN_COMMON = 8, 20, 16
 """The most searches of bits that differ, and the most clocks of the induction, with no bit and with some in common."""
-FLAT = f"read_verilog mutated.v; hierarchy -top {BLOCK}; proc; flatten; memory; memory_map; dffunmap; opt_clean"
+FLAT = "flatten; memory; memory_map; dffunmap; opt_clean"
+BETWEEN = "___"
+"""What joins the names of a module inside and of its port."""
 PROVEN, DIFFERS = "SUCCESS", "base case: FAIL"
 _VALUE = re.compile(r"^ *(\d*) *\\(?:gold|gate)_(\S+) .* ([01]+)$", re.MULTILINE)
 
@@ -108,17 +115,32 @@ def joined(module: dict) -> str:
     return "\n".join([*lines, "endmodule"]) + "\n"
 
 
-def known_of(netlist: Netlist, numbers: Iterable[int]) -> dict[int, str]:
+def _compared(netlist: Netlist) -> list[str]:
+    """Return the commands that make `BLOCK` of what is compared, which is tried in this order."""
+    whole = f"hierarchy -top {BLOCK}; proc"
+    if len(netlist.modules) > 1:
+        return [whole]
+    (top,) = netlist.modules
+    alone = f"hierarchy -top {top}; proc; expose -evert -sep {BETWEEN} {top}/t:{top}.*; hierarchy -top {top}"
+    if top != BLOCK:
+        return [f"{alone}; rename {top} {BLOCK}"]
+    return [alone, whole] if f"module \\{top}." in netlist.verilog else [whole]
+
+
+def known_of(netlist: Netlist, numbers: Collection[int]) -> dict[int, str]:
     """Return what is known of some mutants: `equivalent`, `differs after N clocks`, or `undecided`.
 
     Raises:
         SynthesisError: if Yosys is missing or fails.
     """
+    known: dict[int, str] = {}
     with scratch(build_dir() / "mutate") as work:
         (work / "mutated.v").write_text(netlist.verilog, encoding="utf-8")
-        run_yosys(work, f"{FLAT}; write_json flat.json")
-        flat = json.loads((work / "flat.json").read_text(encoding="utf-8"))
-        return {number: _known(work, flat, number) for number in numbers}
+        for commands in _compared(netlist):
+            run_yosys(work, f"read_verilog mutated.v; {commands}; {FLAT}; write_json flat.json")
+            flat = json.loads((work / "flat.json").read_text(encoding="utf-8"))
+            known |= {number: _known(work, flat, number) for number in numbers if known.get(number) != EQUIVALENT}
+    return known
 
 
 def _known(work: Path, flat: dict, number: int) -> str:

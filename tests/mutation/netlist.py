@@ -49,11 +49,13 @@ class Netlist:
     Attributes:
         component: the component without them.
         verilog: Verilog of the module `BLOCK` and of those inside it.
+        modules: the modules that were changed.
         mutants: the mutants.
     """
 
     component: wiring.Component
     verilog: str = field(repr=False)
+    modules: tuple[str, ...]
     mutants: list[Mutant]
 
 
@@ -107,7 +109,7 @@ def mutated(component: wiring.Component, modules: tuple[str, ...], count: int, s
         (work / "changes.ys").write_text("\n".join(commands) + "\n", encoding="utf-8")
         # A choice of which several apply is then the same to the simulator and to the solver.
         run_yosys(work, "read_rtlil plain.il; script changes.ys; pmuxtree; opt_clean; write_verilog -noattr mutated.v")
-        return Netlist(component, (work / "mutated.v").read_text(encoding="utf-8"), mutants)
+        return Netlist(component, (work / "mutated.v").read_text(encoding="utf-8"), modules, mutants)
 
 
 def run_yosys(work: Path, script: str) -> None:

@@ -51,18 +51,18 @@ def make(name: str, estimator: str) -> "Watched":
 
 
 class Watched(wiring.Component):
-    """A board with its pins, and in two words what its link asks of the axis and what the axis shows.
+    """A board with its pins, and in two words what its axis is asked by the link and what the axis shows.
 
     Attributes:
         board: the board.
-        asked: how the ports of the link to the axis lie in `asking`.
+        asked: how the inputs of the axis that come from the link lie in `asking`.
         shown: how `SEEN` lies in `showing`.
     """
 
     def __init__(self, board: Board):
         self.board, registers = board, board.registers
         asked = (each.name for each in (*registers.words, *registers.live, *registers.pulses))
-        self._asked = {name: getattr(board.link, name) for name in asked}
+        self._asked = {name: getattr(board.axis, name) for name in asked}
         self._shown = {name: getattr(board.axis, name) for name in SEEN}
         self.asked, self.shown = (
             Packing({name: Shape.cast(port.shape()) for name, port in ports.items()})

@@ -95,7 +95,7 @@ class Host:
     async def _follow(self) -> None:
         """Let the twin see every clock edge, and compare it with the board."""
         edge, asking, showing = RisingEdge(self.dut.clk), self.dut.asking, self.dut.showing
-        pulse, sign, enable = (self.bench.reader(name) for name in ("drive_pdm", "drive_sign", "outputs_enable"))
+        pulse, sign, alive, enable = map(self.bench.reader, ("drive_pdm", "drive_sign", "alive", "outputs_enable"))
         component, twin, last, asked = self.component, self.twin, -1, {}
         while True:
             await edge
@@ -107,6 +107,7 @@ class Host:
             gate = self.pins["drive_enable"] & self.pins["emergency_stop"]
             assert pins == (twin.pulse & gate, twin.sign), f"edge {twin.clocks}"
             wanted = twin.follower.wanted() | {"drive": twin.drive, "count": twin.decoder.count}
+            assert alive() == wanted["alive"]
             unlike = {name: (found[name], value) for name, value in wanted.items() if found[name] != value}
             assert not unlike, f"edge {twin.clocks}: the board's and the twin's {unlike}"
             self.pulses.append(pins)
@@ -115,6 +116,14 @@ class Host:
                 self.shifted.append(asked)
             twin.edge(self.pins, asked, found)
             self._turn()
+
+    def leave(self) -> None:
+        """Compare nothing from now on."""
+        self._following.cancel()
+
+    def shown(self) -> dict[str, int]:
+        """Return what the axis inside shows now."""
+        return self.component.shown.unpack(int(self.dut.showing.value))
 
     @property
     def settling(self) -> int:

@@ -12,11 +12,11 @@ SLACK = 12
 
 
 def busy(estimator: str) -> AxisSpec:
-    """Return an axis that samples nearly as fast as its latency allows."""
+    """Return an axis that samples nearly as fast as its latency allows, and is moved faster than it is made for."""
     latency = spec("mhz", estimator).design.latency_to_drive
     gains = ADJUSTED if estimator == "levant" else None
     rates = {"clock_hz": 100_000 * (latency + SLACK), "sample_hz": 100_000, "actuation_hz": 50_000}
-    return AxisSpec(**{**MHZ, **rates, "speed_max_m_per_s": 0.5, "travel_m": 1e-3}, estimator=estimator, gains=gains)
+    return AxisSpec(**{**MHZ, **rates, "speed_max_m_per_s": 0.05, "travel_m": 1e-3}, estimator=estimator, gains=gains)
 
 
 def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:

@@ -68,6 +68,16 @@ class Host:
             self.inputs = self.inputs._replace(supervisor_watchdog=1)
             self.clock(acknowledge=1, acknowledged=self.state.latched)
             self.clock(arm=1)
-            for _ in range(self.design.params.pump_clocks * self.design.params.tick_turns if bit == LINK else 0):
-                self.clock()
+            self.waits(int(bit == LINK))
             self.clock(causes=1 << bit)
+
+    def is_silent(self, ticks: int) -> None:
+        """Beat once, with so many milliseconds to the next beat, which comes one too late."""
+        self.inputs = settled(self.design, heartbeat=self.inputs.heartbeat ^ 1, supervisor_watchdog=ticks)
+        self.clock()
+        self.waits(ticks + 1)
+
+    def waits(self, ticks: int) -> None:
+        """Do nothing for so many milliseconds."""
+        for _ in range(ticks * self.design.params.pump_clocks * self.design.params.tick_turns):
+            self.clock()

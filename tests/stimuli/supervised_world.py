@@ -12,7 +12,7 @@ from hardwall.model.supervisor import ALL, ARMED, DISARMED, TRIPPED, WATCHDOG_MS
 STROBES = ("commit", "arm", "disarm", "acknowledge", "index_arm", "preload", "clear_flags")
 QUARTERS = ((0, 0), (1, 0), (1, 1), (0, 1))
 ACTS = ("", "disarm", "commit", "committed", "live", "settle", "index_arm", "preload", "acknowledge")
-CHANCES = (0.9841, 0.0005, 0.002, 0.003, 0.0045, 0.0035, 0.002, 0.0003, 0.0002)
+CHANCES = (0.9831, 0.0005, 0.002, 0.003, 0.0045, 0.0035, 0.002, 0.0013, 0.0002)
 """What a host does beside bringing the axis to ARMED, and the chance of each in a clock."""
 FILTERS = (0, 0, 1, 2, 5, 15, 15)
 
@@ -38,7 +38,7 @@ class World:
         self.wall |= {"wall_stiffness": self.formats["wall_stiffness"].max, "wall_position": -1}
         # Thresholds that the motion comes to, a limit that is there at once, and a host that is soon overdue.
         self.usual |= {"supervisor_causes": ALL, "supervisor_ramp": design.supervisor.ramp.max}
-        self.usual |= {"supervisor_saturated": 2, "supervisor_watchdog": WATCHDOG_MS[0]}
+        self.usual |= {"supervisor_saturated": 1, "supervisor_watchdog": WATCHDOG_MS[0]}
         self.usual |= {"supervisor_turn": 4, "supervisor_index_tolerance": 1, "supervisor_runaway": 0}
         self.inputs = {**self.usual, **self.wall, **dict.fromkeys(LOOPS, 1)}
         self.inputs |= dict.fromkeys(("heartbeat", "preload_count", "acknowledged"), 0)
@@ -69,8 +69,8 @@ class World:
             self._settle()
         if random.random() < 0.01:
             self.inputs["heartbeat"] = random.randrange(1 << 16)
-        if random.random() < 0.0005:
-            now |= self._beyond()
+        if random.random() < (0.0005 if state == ARMED else 0.02):
+            now |= self._near_an_end()
         return now | (self._awaited(state, latched) or self._asked())
 
     def _pins(self) -> dict[str, int]:
@@ -137,14 +137,15 @@ class World:
             self.inputs |= {**self.wall, "encoder_glitch_clocks": self.random.choice(FILTERS)}
 
     def _choose(self, name: str) -> None:
-        """Choose any value that a word may have."""
-        kind = self.formats[name]
+        """Choose any value that a word may have, of every size."""
+        random, kind = self.random, self.formats[name]
         least, most = self.design.ranges.get(name, (kind.min, kind.max))
-        word = self.random.randint(least, most)
-        self.inputs[name] = self.random.choice(FILTERS) if name == "encoder_glitch_clocks" else word
+        size = random.choice((0, random.randrange(kind.width)))
+        word = max(random.randint(least, most) >> size, least)
+        self.inputs[name] = random.choice(FILTERS) if name == "encoder_glitch_clocks" else word
 
-    def _beyond(self) -> dict[str, int]:
-        """Return a live word beyond its range, where its format allows one."""
-        name, (least, most) = self.random.choice(list(self.design.ranges.items()))
-        fits = [word for word in (least - 1, most + 1) if 0 <= word <= self.formats[name].max]
-        return {name: self.random.choice(fits)} if fits else {}
+    def _near_an_end(self) -> dict[str, int]:
+        """Return a live word at an end of its range, one beyond it, or with a bit that the end does not have."""
+        name, ends = self.random.choice(list(self.design.ranges.items()))
+        kind, end = self.formats[name], self.random.choice(ends)
+        return {name: self.random.choice((end - 1, end, end + 1, end ^ 1 << self.random.randrange(kind.width))) & kind.max}
