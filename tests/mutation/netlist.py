@@ -74,8 +74,9 @@ def _described(line: str, source: list[str]) -> str:
     first, last = map(int, places[-1]) if places else (1, 0)
     text = " ".join(each.strip() for each in source[first - 1 : min(last, first + 1)])
     said = f"{options['module']}: {mode}: {cell}.{options['port']}[{options['portbit']}]{of_wire}: {text}"
-    # The next value of a register has no name of its own.
-    for register, following in _REGISTER.findall("\n".join(source)):
+    # The next value of a register has no name of its own. Every module numbers its signals anew.
+    begin = max((n for n, each in enumerate(source[:first]) if each.startswith("module ")), default=0)
+    for register, following in _REGISTER.findall("\n".join(source[begin:]).partition("\nendmodule")[0]):
         said = re.sub(rf"{re.escape(following)}(?!\d) ?", f"next({register})", said)
     return said
 
