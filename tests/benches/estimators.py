@@ -65,12 +65,17 @@ def model(design: EstimatorDesign, rows: Iterable[tuple[int, ...]], start: tuple
 async def follow(
     dut: HierarchyObject, component: EstimatorBlock, rows: Iterable[tuple[int, ...]], start: tuple
 ) -> dict[str, np.ndarray]:
-    """Put rows through the RTL, check it against the model exactly, and return the model's outputs."""
+    """Put rows through the RTL, check it against the model exactly, and return the model's outputs.
+
+    The velocity is checked at the next strobe, too: it stays from one answer to the next.
+    """
     design, bench = component.design, Bench(dut, component)
     await bench.reset()
+    later = bench.monitor("strobe", "velocity")
     inputs, outputs = await bench.campaign(
         "strobe", "valid", names(design), ("velocity", "saturated"), rows, momentary=momentary(design)
     )
     expected = model(design, inputs.rows, start)
     check(inputs, outputs, expected, component.latency)
+    check(inputs, later, {"velocity": np.append(0, expected["velocity"][:-1])})
     return expected
