@@ -60,8 +60,7 @@ class Netlist:
 def _taken(line: str) -> bool:
     """Return whether a listed change is none of those left out."""
     options = dict(_OPTION.findall(line))
-    cell, port = options["cell"], options["port"]
-    return not (cell.startswith("$procdff") and port in ("Q", "CLK")) and port != "CLK" and "$meminit" not in cell
+    return options["port"] != "CLK" and not (options["cell"].startswith("$procdff") and options["port"] == "Q")
 
 
 def _described(line: str, source: list[str]) -> str:
@@ -96,7 +95,8 @@ def mutated(component: wiring.Component, modules: tuple[str, ...], count: int, s
     rtl = to_verilog(component, BLOCK)
     with scratch(build_dir() / "mutate") as work:
         (work / "rtl.v").write_text(rtl, encoding="utf-8")
-        listing = f"mutate -list {SPARE * count} -seed {seed} -o listed {' '.join(modules)}"
+        chosen = " ".join([modules[0], *(f"{module} %u" for module in modules[1:]), "t:$meminit* %d"])
+        listing = f"mutate -list {SPARE * count} -seed {seed} -o listed {chosen}"
         run_yosys(work, f"read_verilog rtl.v; hierarchy -top {BLOCK}; proc; opt_clean; {listing}; write_rtlil plain.il")
         lines = (work / "listed").read_text(encoding="utf-8").splitlines()
         fit = [line for line in lines if _taken(line)]
