@@ -30,7 +30,7 @@ class EstimatorBlock(Block):
     velocity : Out(SQ)
         Velocity, counts a sample, in the format `design.velocity`; constant from one `valid` to the next.
     saturated : Out
-        With `valid`: bits as in `design.flags`.
+        From `valid` until the next `strobe`: bits as in `design.flags`.
     valid : Out(1)
         High for one clock. The next `strobe` may come with it.
 

@@ -65,12 +65,17 @@ def model(design: EstimatorDesign, rows: Iterable[tuple[int, ...]], start: tuple
 async def follow(
     dut: HierarchyObject, component: EstimatorBlock, rows: Iterable[tuple[int, ...]], start: tuple
 ) -> dict[str, np.ndarray]:
-    """Put rows through the RTL, check it against the model exactly, and return the model's outputs."""
+    """Put rows through the RTL, check it against the model exactly, and return the model's outputs.
+
+    They are checked at the next strobe, too, until which they stay.
+    """
     design, bench = component.design, Bench(dut, component)
     await bench.reset()
+    later = bench.monitor("strobe", "velocity", "saturated")
     inputs, outputs = await bench.campaign(
         "strobe", "valid", names(design), ("velocity", "saturated"), rows, momentary=momentary(design)
     )
     expected = model(design, inputs.rows, start)
     check(inputs, outputs, expected, component.latency)
+    check(inputs, later, {name: np.append(0, values[:-1]) for name, values in expected.items()})
     return expected

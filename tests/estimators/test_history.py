@@ -1,13 +1,14 @@
 """The positions of the past: RTL against model, and the model against lists of plain integers."""
 
 import cocotb
+import numpy as np
 import pytest
-from cocotb.triggers import ClockCycles
 
 from hardwall.hdl.estimators.history import History
+from hardwall.model.compiled import compiled
 from hardwall.model.estimators import history
 from hardwall.model.estimators.history import change_over, take
-from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, simulate
 from stimuli.seeded import seeded
 from stimuli.specs import spec
 
@@ -39,24 +40,39 @@ def rows(d: history.Design, samples: int):
         yield (count + half) % (2 * half) - half, int(random.random() < 0.001), max(age, 1)
 
 
+@compiled
+def _run(params, state, counts, restarts, ages, stored, limited, change):
+    for k in range(len(counts)):
+        state, stored[k], limited[k] = take(params, state, counts[k], restarts[k])
+        change[k] = change_over(params, state, ages[k])
+
+
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     component = make(**parameters())
     d, bench = component.design, Bench(dut, component)
     await bench.reset()
-    seen = bench.monitor("valid", "stored", "limited")
-    change, params, state = bench.reader("change"), d.params(), d.start()
-    limited_ever = set()
-    for count, restart, age in rows(d, SAMPLES // 25):
-        await bench.transact("strobe", "valid", count=count, restart=restart, age=age)
-        await ClockCycles(dut.clk, 1)
-        state, stored, limited = take(params, state, count, restart)
-        assert seen.rows[-1] == (stored, limited)
-        limited_ever.add(limited)
-        if stored:
-            assert change() == change_over(params, state, age)
-    assert len(seen.rows) == SAMPLES // 25
-    assert limited_ever == {True, False}
+    # The change is ready with the earliest next strobe; one more row strobes for the last.
+    later = bench.monitor("strobe", "change")
+    every = (*rows(d, SAMPLES // 5), (0, 0, 1))
+    inputs, outputs = await bench.campaign(
+        "strobe",
+        "valid",
+        ("count", "restart", "age"),
+        ("stored", "limited"),
+        every,
+        every=component.latency + 1,
+        momentary=("count", "restart"),
+    )
+    stored, limited, change = (np.zeros(len(inputs.clocks), np.int64) for _ in range(3))
+    columns = (inputs.column(name) for name in inputs.names)
+    _run(d.params(), d.start(), *columns, stored, limited, change)
+    check(inputs, outputs, {"stored": stored, "limited": limited}, component.latency)
+    # Where a position is not stored, its change means nothing.
+    compared = np.append(False, stored[:-1] == 1)
+    check(inputs, later, {"change": np.where(compared, np.append(0, change[:-1]), later.column("change"))})
+    assert compared.any()
+    assert set(limited) == {0, 1}
 
 
 @pytest.mark.parametrize("name", ["narrow", "mhz"])

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import levants
 import numpy as np
@@ -24,7 +25,9 @@ COUNT_M = 1e-6
 
 
 def design(name: str) -> levant_adaptive.Design:
-    return spec(name, NAME).design.estimator
+    # Narrow words at times of a few samples: at those of the narrow axis, a campaign ends before the second level.
+    axis = replace(spec("narrow", NAME), acceleration_max_m_per_s2=12e3) if name == "brisk" else spec(name, NAME)
+    return axis.design.estimator
 
 
 def make(name: str) -> Estimator:
@@ -47,10 +50,10 @@ def stimulus(d: levant_adaptive.Design, samples: int):
             yield count, 0, *reset, 0
 
 
-follows_model, reset_mid_stream_starts_afresh = levants.campaign(make, START, stimulus)
+follows_model, reset_mid_stream_starts_afresh = levants.campaign(make, START, stimulus, fewer=("brisk",))
 
 
-@pytest.mark.parametrize("name", ["paper", "narrow"])
+@pytest.mark.parametrize("name", ["paper", "brisk"])
 def test_rtl(name):
     simulate(__file__, make, name=name)
 
@@ -107,7 +110,7 @@ class Law:
         return self.level
 
 
-@pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
+@pytest.mark.parametrize("name", ["paper", "mhz", "narrow", "brisk"])
 def test_model_is_the_exact_equation_rounded_as_documented(name):
     d = design(name)
     scale, one, unit, law = 2**d.root.f, 2**d.velocity.f, 2**d.lambda_.f, Law(d)

@@ -51,6 +51,33 @@ class Scale:
         return ((self.count + half) % (2 * half) - half, self.now & mask, *stamps, self.edge, self.down, self.run)
 
 
+def lurches(d: levant_edge.Design, samples: int):
+    """Yield rows of fast edges and slow ones: in turns, so that places are learnt up to their ends; or seldom slow."""
+    scale, shortest, top = Scale(d), 1 << d.shortest, [word.format.max for word in d.words]
+    for turn in range(16):
+        up, shift, gains = bool(turn & 1), turn >> 1 & 1, (reset_words(d), top)[turn >> 2 & 1]
+        fast, slow, every = ((5, 4 * shortest, 2), (13, (1 << d.mantissa) - 1, 25))[turn >> 3]
+        for k in range(samples // 16):
+            edges, time = (fast, shortest + 9) if (k + shift) % every else (3, slow)
+            scale.now += time
+            for edge in range(scale.pass_all_but_four(up, edges), edges):
+                scale.pass_edge(up, scale.now - 1 - 9 * (edges - edge))
+            yield *scale.row(), int(k == 0), *gains
+
+
+def regular(d: levant_edge.Design, samples: int):
+    """Yield rows of edges at equal times, whose errors come to a few LSB; then the gains are of all sizes."""
+    random, scale, most = seeded(), Scale(d), [word.format.max for word in d.words]
+    for k in range(samples):
+        since = k % 250
+        if since == 0:
+            time, up = random.randrange(1 << d.shortest, 4 << d.shortest), random.random() < 0.5
+        scale.now += time
+        scale.pass_edge(up, scale.now - 1)
+        gains = [random.randint(0, value) >> random.randrange(value.bit_length()) for value in most]
+        yield *scale.row(), int(since == 0), *(reset_words(d) if since < 50 else gains)
+
+
 def stimulus(d: levant_edge.Design, samples: int):
     """Yield rows: motion at every speed, through every wrap; rests, vibration, noise; gains at their ends."""
     random = seeded()
@@ -65,10 +92,14 @@ def stimulus(d: levant_edge.Design, samples: int):
         for edge in range(scale.pass_all_but_four(up, fast), fast):
             scale.pass_edge(up, scale.now - fast + edge)
         yield *scale.row(), 0, *(top if k % 3 else gains)
+    yield from lurches(d, samples // 20)
+    yield from regular(d, samples // 20)
+    samples -= samples // 10
     while samples > 0:
         style, pace, up = random.randrange(8), random.randrange(9), random.random() < 0.5
         draw = random.random()
-        gains = reset_words(d) if draw < 0.6 else [random.randint(0, most) for most in top]
+        gains = [random.randint(0, most) >> (random.randrange(most.bit_length()) if draw > 0.8 else 0) for most in top]
+        gains = reset_words(d) if draw < 0.6 else gains
         gains = [0, 0] if draw > 0.98 else top if draw > 0.9 else gains
         # A rest, at most until the stamps wrap.
         scale.now += int(2.0 ** random.uniform(0, d.stamp_width)) if random.random() < 0.3 else 0
@@ -93,7 +124,7 @@ def stimulus(d: levant_edge.Design, samples: int):
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     name = parameters()["name"]
-    samples = SAMPLES // 10 if name == "narrow" else SAMPLES
+    samples = SAMPLES // 2 if name == "narrow" else SAMPLES
     expected = await follow(dut, make(name), stimulus(design(name), samples), START)
     # The campaign must reach both saturations, and the quiet track too. The narrow count can hardly hold enough edges
     # in the shortest interval for an error beyond the velocity's format.

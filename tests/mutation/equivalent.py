@@ -148,20 +148,31 @@ def _known(work: Path, flat: dict, number: int) -> str:
     if kept is None:
         return EQUIVALENT
     answer = ""
+    # What differs from some state may be the same from all states that the block comes to.
+    for common in (registers(flat["modules"][BLOCK]), kept):
+        answer = _induced(work, flat, number, common)
+        if any(said in answer for said in (PROVEN, DIFFERS)):
+            break
+    else:
+        answer = _asked(work, copy.deepcopy(flat), number, f"-tempinduct -maxsteps {STEPS}")
+    if DIFFERS in answer:
+        steps = re.findall(r"\[base case (\d+)\] Solving", answer)
+        return f"differs after {int(steps[-1]) - 1} clocks"
+    return EQUIVALENT if PROVEN in answer else "undecided"
+
+
+def _induced(work: Path, flat: dict, number: int, kept: set[Bit]) -> str:
+    """Return the answer of the induction with some bits in common, without those that it finds to differ."""
+    answer = ""
     for _ in range(ROUNDS):
         design = copy.deepcopy(flat)
         ports = cut(design["modules"][BLOCK], kept, free=False)
         answer = _asked(work, design, number, f"-tempinduct -maxsteps {STEPS_IN_COMMON} -show-outputs")
         unlike = _unlike(answer, ports) if DIFFERS in answer else set()
         if not unlike:
-            break
-        kept -= unlike
-    if not any(said in answer for said in (PROVEN, DIFFERS)):
-        answer = _asked(work, copy.deepcopy(flat), number, f"-tempinduct -maxsteps {STEPS}")
-    if DIFFERS in answer:
-        steps = re.findall(r"\[base case (\d+)\] Solving", answer)
-        return f"differs after {int(steps[-1]) - 1} clocks"
-    return EQUIVALENT if PROVEN in answer else "undecided"
+            return answer
+        kept = kept - unlike
+    return ""
 
 
 def _unequal_in_a_step(work: Path, flat: dict, number: int) -> set[Bit] | None:

@@ -62,8 +62,7 @@ class Netlist:
 def _taken(line: str) -> bool:
     """Return whether a listed change is none of those left out."""
     options = dict(_OPTION.findall(line))
-    cell, port = options["cell"], options["port"]
-    return not (cell.startswith("$procdff") and port in ("Q", "CLK")) and port != "CLK" and "$meminit" not in cell
+    return options["port"] != "CLK" and not (options["cell"].startswith("$procdff") and options["port"] == "Q")
 
 
 def _described(line: str, source: list[str]) -> str:
@@ -76,8 +75,9 @@ def _described(line: str, source: list[str]) -> str:
     first, last = map(int, places[-1]) if places else (1, 0)
     text = " ".join(each.strip() for each in source[first - 1 : min(last, first + 1)])
     said = f"{options['module']}: {mode}: {cell}.{options['port']}[{options['portbit']}]{of_wire}: {text}"
-    # The next value of a register has no name of its own.
-    for register, following in _REGISTER.findall("\n".join(source)):
+    # The next value of a register has no name of its own. Every module numbers its signals anew.
+    begin = max((n for n, each in enumerate(source[:first]) if each.startswith("module ")), default=0)
+    for register, following in _REGISTER.findall("\n".join(source[begin:]).partition("\nendmodule")[0]):
         said = re.sub(rf"{re.escape(following)}(?!\d) ?", f"next({register})", said)
     return said
 
@@ -97,7 +97,8 @@ def mutated(component: wiring.Component, modules: tuple[str, ...], count: int, s
     rtl = to_verilog(component, BLOCK)
     with scratch(build_dir() / "mutate") as work:
         (work / "rtl.v").write_text(rtl, encoding="utf-8")
-        listing = f"mutate -list {SPARE * count} -seed {seed} -o listed {' '.join(modules)}"
+        chosen = " ".join([modules[0], *(f"{module} %u" for module in modules[1:]), "t:$meminit* %d"])
+        listing = f"mutate -list {SPARE * count} -seed {seed} -o listed {chosen}"
         run_yosys(work, f"read_verilog rtl.v; hierarchy -top {BLOCK}; proc; opt_clean; {listing}; write_rtlil plain.il")
         lines = (work / "listed").read_text(encoding="utf-8").splitlines()
         fit = [line for line in lines if _taken(line)]

@@ -9,14 +9,14 @@ from reasons import reasons_for
 
 from hardwall.testing import SEED
 
-from .equivalent import EQUIVALENT, known_of
+from .equivalent import known_of
 from .fates import REASONS, Fate, Result
 from .killing import killed
 from .netlist import BLOCK, mutated
 from .sizes import Size, sizes_of
 
 SAMPLES = 1000
-"""The samples of the first campaign, which kills most mutants; what may differ goes through a whole one."""
+"""The samples of the first campaign, which kills most mutants; what it leaves goes through a whole one."""
 
 
 def fates_of(size: Size, modules: tuple[str, ...], count: int) -> list[Fate]:
@@ -28,15 +28,15 @@ def fates_of(size: Size, modules: tuple[str, ...], count: int) -> list[Fate]:
     netlist = mutated(size.component(), modules, count, SEED)
     numbers = [mutant.number for mutant in netlist.mutants]
     killed_by = killed(size, netlist, numbers, SAMPLES)
-    if killed_by.pop(0):
-        # A short campaign may be too short for what the tests demand of it.
-        killed_by = dict.fromkeys(numbers)
-    alive = [number for number in numbers if killed_by[number] is None]
-    known = known_of(netlist, alive) if alive else {}
-    if perhaps := [number for number in alive if known[number] != EQUIVALENT]:
-        killed_by |= killed(size, netlist, perhaps)
+    # A short campaign may be too short for what the tests demand of it.
+    left = numbers if killed_by.pop(0) else [number for number in numbers if killed_by[number] is None]
+    if left:
+        killed_by |= killed(size, netlist, left)
         if unmutated := killed_by.pop(0):
             raise RuntimeError(f"the tests of {size.test.name} fail without a mutant: {unmutated}")
+    # A question to the solver takes longer than a campaign.
+    alive = [number for number in numbers if killed_by[number] is None]
+    known = known_of(netlist, alive) if alive else {}
     return [
         Fate(f"{size.name}: {mutant.change}", killed_by[mutant.number], known.get(mutant.number, ""))
         for mutant in netlist.mutants

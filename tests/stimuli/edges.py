@@ -103,7 +103,9 @@ def anything(design, random: Random, samples: int):
         count += random.randrange(-half, half) if random.random() < 0.1 else random.randrange(-9, 10)
         stamp += random.randrange(1, stamps)
         ages = [random.getrandbits(random.randrange(1, design.stamp_width + 1)) for _ in range(4)]
-        ages = [age if random.random() < 0.9 else random.choice([0, 1, stamps // 4 * 3, stamps - 1]) for age in ages]
+        # Ages at the ends of their range, and ages with a single bit, which is all that tells them from 0.
+        special = (*[1 << random.randrange(design.stamp_width)] * 4, 0, 1, stamps // 4 * 3, stamps - 1)
+        ages = [age if random.random() < 0.85 else random.choice(special) for age in ages]
         kinds = [random.randrange(m) for m in (4, 2, 5)]
         yield (
             (count + half) % (2 * half) - half,
