@@ -12,7 +12,7 @@ from hardwall.hdl.board import Board
 from hardwall.model import quadrature
 from hardwall.sim.jobs.whole_folder import LIST
 from hardwall.sim.rtl import synthesis
-from hardwall.sim.rtl.parts import PARTS
+from hardwall.sim.boards.parts import PARTS
 from hardwall.sim.rtl.synthesis import SynthesisError, synthesise
 from hardwall.sim.scene.load import load
 from hardwall.sim.studies import costs
