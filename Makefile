@@ -51,7 +51,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate coverage mutate lint bench synth boards choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -83,10 +83,13 @@ bench: $(VENV)/.test | tools ## how fast the loop runs, beside cocotb
 
 synth: $(VENV)/.synth $(VENV)/.test | tools ## size and fmax on three devices, median of several place-and-route seeds
 	@for device in $(DEVICES); do $(HARDWALL) synth --device $$device --seeds 3; done
-	@$(RUN) pytest -q -n 0 tests/rtl/test_synthesis.py
+	@$(RUN) pytest -q -n 0 tests/rtl/test_synthesis.py tests/rtl/test_bitstream.py
 
 boards: $(VENV)/.synth | tools ## bitstreams for three boards, with their wiring, in build/boards/ (a quarter of an hour)
 	@for board in $(BOARDS); do $(HARDWALL) board $$board -o build/boards/$$board; done
+
+constraints: $(VENV)/.sim | tools ## write the files of constraints/ anew from the descriptions of the boards
+	@$(VENV)/bin/python tests/own_flow.py
 
 choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy, and cost on three devices (hours)
 	@$(HARDWALL) costs

@@ -20,8 +20,8 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any, Literal
 
-from .pll import Setting
 from .parts import PARTS, Part
+from .pll import Setting
 from .signals import SIGNALS
 
 Pull = Literal["up", "down", "none"]

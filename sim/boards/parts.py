@@ -47,7 +47,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Suffixes:
-    """The ends of the names of a part's files: of pins, of what nextpnr writes, of bitstreams, and of what is read back."""
+    """The ends of the names of a part's files: of pins, of what nextpnr writes, of bitstreams, of what is read back."""
 
     pins: str
     routed: str

@@ -1,4 +1,4 @@
-"""The Verilog around `board` on a part: its clock from the board's oscillator, the internal oscillator, and the pads."""
+"""The Verilog around `board` on a part: its clock from the board's oscillator, the internal one, and the pads."""
 
 from .description import Description
 from .signals import SIGNALS

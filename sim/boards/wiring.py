@@ -9,10 +9,10 @@ RECEIVERS = """\
   such as an AM26LV32 (four in a package) or an SN65HVD3x of Texas Instruments (one each), with the encoder's 120 Ω
   across each pair. An encoder of 5 V with single outputs needs a buffer whose inputs stand 5 V at a supply of 3.3 V,
   such as an SN74LVC14A.
-- **A complement is a wire of its own.** `encoder_a_n` and `encoder_b_n` come from receivers of their own, or a cut wire is
-  not seen. Without them leave both open and the cause `encoder_loss` off.
-- **Pull-downs of 1 kΩ outside**, beside the board, at every pin that the table marks: they hold it low before the FPGA is
-  configured, while it is loaded, and when the board has lost its supply.
+- **A complement is a wire of its own.** `encoder_a_n` and `encoder_b_n` come from receivers of their own, or a cut wire
+  is not seen. Without them leave both open and the cause `encoder_loss` off.
+- **Pull-downs of 1 kΩ outside**, beside the board, at every pin that the table marks: they hold it low before the FPGA
+  is configured, while it is loaded, and when the board has lost its supply.
 - **Loops** close to the board's 3.3 V. What opens them (a button, a relay of the amplifier) stands in series.
 - The ground of encoder, receivers and amplifier is the board's, joined beside the header.
 """
@@ -25,8 +25,8 @@ def wiring(board: Description, picture: str) -> str:
     return f"""\
 # Wiring of `{board.name}`: {board.title}
 
-Generated from the description of the board. **It was not tried on real hardware**: before anything is connected, hold it
-against the board's own papers, and follow the checklist of the page *Boards*.
+Generated from the description of the board. **It was not tried on real hardware**: before anything is connected, hold
+it against the board's own papers, and follow the checklist of the page *Boards*.
 
 ![The headers with the signals and the FPGA's pins]({picture})
 
@@ -73,7 +73,9 @@ def serial(board: Description) -> str:
     if port.ports == 1:
         which = "the only port of its USB bridge"
     else:
-        which = f"port {port.port} of the {port.ports} of its USB bridge, counted from 0; the other one loads bitstreams"
+        which = (
+            f"port {port.port} of the {port.ports} of its USB bridge, counted from 0; the other one loads bitstreams"
+        )
     timer = (
         "The bridge keeps bytes for up to 16 ms: set its latency timer to 1 ms."
         if port.latency

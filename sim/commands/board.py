@@ -77,7 +77,6 @@ def _free(folder: str) -> Path:
     except OSError as error:
         raise BadInput(f"-o {shown(folder)} cannot be written: {error.strerror}") from None
     if found is not None:
-        raise BadInput(
-            f"-o must be a folder that is new, empty, or as this command wrote it, and {shown(folder)} has {shown(found)}"
-        )
+        accepted = "a folder that is new, empty, or as this command wrote it"
+        raise BadInput(f"-o must be {accepted}, and {shown(folder)} has {shown(found)}")
     return path

@@ -11,8 +11,8 @@ import typer
 
 from ...model.checks import shown
 from ...model.estimators import registry
-from ..estimates.accuracy import RATES_HZ, outputs
 from ..boards.parts import PARTS
+from ..estimates.accuracy import RATES_HZ, outputs
 from ..scene.load import names, toml_of
 from ..walls.methods import Curve, label
 from .errors import BadInput

@@ -1,4 +1,4 @@
-"""From an axis to a bitstream on a board, with what its user needs beside it: one folder, written whole or not at all."""
+"""From an axis to a bitstream on a board, with what its user needs beside it: one folder, whole or not at all."""
 
 import hashlib
 import json
@@ -55,8 +55,8 @@ def build(order: Order, folder: Path) -> dict:
 
     Returns:
         What `summary` returns of the seed that is packed, and:
-        board, scene: as ordered; part: the part as nextpnr is told.
-        seeds, fmax_mhz_seeds: the seeds that were tried, and the highest clock with each; seed: the last, which is packed.
+        board, scene: as ordered.
+        seeds, fmax_mhz_seeds: the seeds that were tried, and the highest clock with each; seed: the last, the packed one.
         oscillator_mhz, pll: the board's oscillator, and the dividers that make the clock of it; none without a PLL.
         baud, identity: the rate of the serial line, and the identity of the registers, which a host reads.
         bitstream, sha256: the name of the bitstream's file, and its digest.
@@ -73,8 +73,8 @@ def build(order: Order, folder: Path) -> dict:
     if not _meets(design, runs[-1]):
         best = max(runs, key=lambda run: run.fmax_mhz)
         raise TimingError(
-            f"{order.board.name} misses the clock of {order.spec.clock_hz / 1e6:g} MHz: the highest of {len(runs)} seeds "
-            f"is {best.fmax_mhz:.2f} MHz ({best.path}, {best.longest:.1f} ns)"
+            f"{order.board.name} misses the clock of {order.spec.clock_hz / 1e6:g} MHz: the highest of {len(runs)} "
+            f"seeds is {best.fmax_mhz:.2f} MHz ({best.path}, {best.longest:.1f} ns)"
         )
     report: dict = {}
     write_folder(folder, partial(_fill, order, design, runs, report))

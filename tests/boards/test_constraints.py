@@ -14,7 +14,10 @@ PLACED = {
     ".cst": r'^IO_LOC "(\w+)" (\w+);$',
 }
 """A signal and its pin, by the kind of file that says so."""
-PULLED = {".lpf": r'^IOBUF PORT "{}" IO_TYPE=LVCMOS33(?: PULLMODE=(\w+))?', ".cst": r'^IO_PORT "{}" IO_TYPE=LVCMOS33(?: PULL_MODE=(\w+))?'}
+PULLED = {
+    ".lpf": r'^IOBUF PORT "{}" IO_TYPE=LVCMOS33(?: PULLMODE=(\w+))?',
+    ".cst": r'^IO_PORT "{}" IO_TYPE=LVCMOS33(?: PULL_MODE=(\w+))?',
+}
 """The pull of a signal, and its level."""
 
 

@@ -1,4 +1,4 @@
-"""The descriptions of boards: pins are those of amaranth-boards, every signal has one, and each on a header is there."""
+"""The descriptions of boards: pins are those of amaranth-boards, every signal has one, on a header that is there."""
 
 import re
 
@@ -98,7 +98,7 @@ def test_parts_and_buttons_are_those_of_amaranth_boards():
 
 
 def test_a_bank_of_1_8_volts_is_not_used():
-    """Buttons and LEDs of the Tang Nano 9K, the pins of bank 3, and those of the far header that it shares them with."""
+    """Those are the buttons and LEDs of the Tang Nano 9K, and pins of its far header."""
     pins = {int(pin.site) for pin in BOARDS["tangnano9k"].pins.values()}
     assert not pins & {*range(3, 17), *range(79, 89)}
 

@@ -7,8 +7,8 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
+from own_flow import CLOCKS_HZ
 
-from boards import CLOCKS_HZ
 from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.boards.generated import CORE
 from hardwall.sim.boards.generated import files as generated
@@ -26,7 +26,15 @@ def test_fusesoc_takes_the_core_and_calls_the_placer_as_this_project_does(board,
     core = tmp_path / "core"
     shutil.copytree(FOLDER, core)
     (core / "board.v").write_text("module board; endmodule\n")
-    words = ["--cores-root", str(core), "run", "--setup", "--work-root", str(tmp_path / "work"), f"--target={board.name}"]
+    words = [
+        "--cores-root",
+        str(core),
+        "run",
+        "--setup",
+        "--work-root",
+        str(tmp_path / "work"),
+        f"--target={board.name}",
+    ]
     done = subprocess.run(
         [sys.executable, "-m", "fusesoc.main", *words, "hardwall:haptics:board"],
         cwd=tmp_path,

@@ -76,7 +76,9 @@ def drawn(draw, device: str) -> tuple[int, dict[str, int]]:
     oscillator_hz = draw(st.sampled_from([10, 12, 16, 20, 25, 27, 48, 50])) * MHZ
     by = draw(st.integers(1, 5))
     # Times the frequency at the phase detector, this is near the middle of the VCO's range.
-    times = round(draw(st.floats(0.7, 1.3)) * {"ecp5-25k": 600, "ice40-up5k": 700}.get(device, 0) * MHZ * by / oscillator_hz)
+    times = round(
+        draw(st.floats(0.7, 1.3)) * {"ecp5-25k": 600, "ice40-up5k": 700}.get(device, 0) * MHZ * by / oscillator_hz
+    )
     if device == "ecp5-25k":
         numbers = {"CLKI_DIV": by, "CLKFB_DIV": 1, "CLKOP_DIV": min(times, 128), "CLKOS_DIV": draw(st.integers(1, 128))}
     elif device == "ice40-up5k":

@@ -7,9 +7,9 @@ import sys
 
 import pytest
 
+from hardwall.sim.boards.parts import PARTS
 from hardwall.sim.commands import options
 from hardwall.sim.commands.errors import BadInput, one_line
-from hardwall.sim.boards.parts import PARTS
 from stimuli.command_line import call
 
 LONG = "x" * 5000
