@@ -56,7 +56,8 @@ def build(order: Order, folder: Path) -> dict:
     Returns:
         What `summary` returns of the seed that is packed, and:
         board, scene: as ordered.
-        seeds, fmax_mhz_seeds: the seeds that were tried, and the highest clock with each; seed: the last, the packed one.
+        seeds, fmax_mhz_seeds: the seeds that were tried, and the highest clock with each; seed: the last, which is
+            packed.
         oscillator_mhz, pll: the board's oscillator, and the dividers that make the clock of it; none without a PLL.
         baud, identity: the rate of the serial line, and the identity of the registers, which a host reads.
         bitstream, sha256: the name of the bitstream's file, and its digest.

@@ -46,7 +46,7 @@ def check(board: Description, routed: Path, unpacked: Path, bitstream: Path) -> 
 
 
 def _blocks(path: Path) -> Iterator[tuple[str, list[str]]]:
-    """Yield the heading of every block of a text, and the lines below it but for empty ones; a heading begins with `.`."""
+    """Yield the heading of every block of a text, a line that begins with `.`, and the lines below but empty ones."""
     heading, lines = "", []
     for line in path.read_text(encoding="utf-8").splitlines():
         if line.startswith("."):
