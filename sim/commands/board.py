@@ -42,8 +42,6 @@ def command(
     if program and program not in on.loads:
         raise BadInput(f"--program must be one of {', '.join(on.loads)} for {on.name}, not {program!r}")
     of = scene_on(on, options, scene, estimator)
-    # A clock that cannot be made is told before minutes of work, as is a folder.
-    on.setting(of.spec.clock_hz)
     path = _free(folder)
     order = Order(on, of.name, of.spec, of.glitch_clocks, seeds)
     with log.status(f"{on.name}: Yosys, then nextpnr until a seed reaches {of.spec.clock_hz / 1e6:g} MHz"):

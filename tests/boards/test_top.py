@@ -64,14 +64,14 @@ module bench;
     always @(dut.driven) $display("driven %b locked %b reset %b", dut.driven, dut.locked, dut.board.rst);
 
     initial begin
-        #1 $display("start driven %b pdm %b alive %b", dut.driven, drive_pdm, alive);
+        #1 $display("start driven %b pdm %b alive %b reset %b", dut.driven, drive_pdm, alive, dut.board.rst);
         #60000000 $display("later driven %b pdm %b alive %b", dut.driven, drive_pdm, alive);
         rst = 1;
         #5000000 $display("reset driven %b", dut.driven);
         rst = 0;
         #20000000 $display("again driven %b", dut.driven);
         force dut.locked = 0;
-        #1 $display("unlocked driven %b pdm %b", dut.driven, drive_pdm);
+        #1 $display("unlocked driven %b pdm %b reset %b", dut.driven, drive_pdm, dut.board.rst);
         $finish;
     end
 endmodule
@@ -127,11 +127,11 @@ def test_the_clock_is_the_one_asked_for_and_outputs_wait_for_its_lock(name, cloc
     # The simulator rounds every half of the 400 periods to a picosecond.
     (periods,) = [int(line.split()[1]) for line in said if line.startswith("periods_ps")]
     assert abs(periods - 400e12 / clock_hz) <= 400
-    assert "start driven 0 pdm 0 alive 0" in said
+    assert f"start driven 0 pdm 0 alive 0 reset {int(clock_hz != board.oscillator_hz)}" in said
     assert "later driven 1 pdm 0 alive 0" in said
     assert "reset driven 0" in said
     assert "again driven 1" in said
-    assert said[-1] == "unlocked driven 0 pdm 0"
+    assert said[-1] == "unlocked driven 0 pdm 0 reset 1"
     driven = [line for line in said if line.startswith("driven 1")]
     assert driven == ["driven 1 locked 1 reset 0"] * 2
 
