@@ -29,11 +29,9 @@ ESTIMATORS := levant fdm
 REPORTS := $(ESTIMATORS:%=build/hit-%.json) $(ESTIMATORS:%=build/mhz-%.json)
 PICTURES := $(REPORTS:%.json=%.png)
 
-# The iCE40 UltraPlus is too slow for 50 MHz, and the Tang Nano 9K has an oscillator of 27 MHz.
-HALF_MHZ := sample_hz=500000 actuation_hz=500000
-ON_ECP5 := --device ecp5-25k
-ON_ICE40 := --device ice40-up5k $(addprefix --set controller.,clock_hz=24000000 $(HALF_MHZ))
-ON_GOWIN := --device gw1nr-9 $(addprefix --set controller.,clock_hz=27000000 $(HALF_MHZ))
+# What `make synth` compares, one part of each kind, and the boards that `make boards` builds for.
+DEVICES := ecp5-25k ice40-up5k gw1nr-9
+BOARDS := ulx3s-25f icebreaker tangnano9k
 
 comma := ,
 # Every estimator on one map; it is larger than the paper's because the best estimators leave that one.
@@ -53,7 +51,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate coverage mutate lint bench synth choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -84,10 +82,14 @@ bench: $(VENV)/.test | tools ## how fast the loop runs, beside cocotb
 	@$(HARDWALL) bench
 
 synth: $(VENV)/.synth $(VENV)/.test | tools ## size and fmax on three devices, median of several place-and-route seeds
-	@$(HARDWALL) synth mhz $(ON_ECP5) --seeds 3
-	@$(HARDWALL) synth mhz $(ON_ICE40) --seeds 3
-	@$(HARDWALL) synth mhz $(ON_GOWIN) --seeds 3
-	@$(RUN) pytest -q -n 0 tests/rtl/test_synthesis.py
+	@for device in $(DEVICES); do $(HARDWALL) synth --device $$device --seeds 3; done
+	@$(RUN) pytest -q -n 0 tests/rtl/test_synthesis.py tests/rtl/test_bitstream.py
+
+boards: $(VENV)/.synth | tools ## bitstreams for three boards, with their wiring, in build/boards/ (a quarter of an hour)
+	@for board in $(BOARDS); do $(HARDWALL) board $$board -o build/boards/$$board; done
+
+constraints: $(VENV)/.sim | tools ## write the files of constraints/ anew from the descriptions of the boards
+	@$(VENV)/bin/python tests/own_flow.py
 
 choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy, and cost on three devices (hours)
 	@$(HARDWALL) costs

@@ -172,7 +172,9 @@ async def every_output_is_the_twins_at_every_clock(dut):
             changed, left = next(moves)
             pins |= changed
         left -= 1
-        act = random.choice(["", "words", "drive_enable", *STROBES], p=(0.97, 0.006, 0.003, *[0.021 / len(STROBES)] * len(STROBES)))
+        act = random.choice(
+            ["", "words", "drive_enable", *STROBES], p=(0.97, 0.006, 0.003, *[0.021 / len(STROBES)] * len(STROBES))
+        )
         if act == "words" and not twin.pending:
             words = random_words(spec.design, random) | twin.fixed()
             pins["preload_count"] = int(random.integers(-half, half))

@@ -11,7 +11,7 @@ from gates.families import FAMILIES
 from gates.netlist import Netlist, mapped
 from gates.run import Case, Outcome, compared
 from gates.tops import SMALL, TOPS
-from hardwall.sim.rtl.parts import PARTS
+from hardwall.sim.boards.parts import PARTS
 
 ECP5 = FAMILIES[0]
 CELLS, AXIS, SMALLEST = (Case(ECP5, top) for top in (TOPS[0], TOPS[1], SMALL))

@@ -17,7 +17,20 @@ ROOMS = ("hdl", "host", "model", "sim")
 SOURCES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
 # The folders of sim/: every folder imports only from those before it, and only `rtl` imports hdl.
-FLOORS = ("world", "jobs", "rtl", "loop", "scene", "virtual", "walls", "estimates", "studies", "pictures", "commands")
+FLOORS = (
+    "world",
+    "jobs",
+    "boards",
+    "rtl",
+    "loop",
+    "scene",
+    "virtual",
+    "walls",
+    "estimates",
+    "studies",
+    "pictures",
+    "commands",
+)
 # Modules of hdl that are no blocks of the data path and have no arithmetic of their own to model.
 NOT_TWINNED = {
     "block": "the base class of blocks",

@@ -21,7 +21,7 @@ def command(
     seeds: SeedsOption = 3,
 ) -> None:
     names = list(dict.fromkeys(curve.estimator for curve in curves_of(wanted)))
-    rows = [row for part in ([device] if device else costs.RATES) for row in costs_of(options, names, part, seeds)]
+    rows = [row for part in ([device] if device else costs.DEVICES) for row in costs_of(options, names, part, seeds)]
     options.finish(costs.Costs(rows))
 
 

@@ -26,6 +26,7 @@ COMMANDS = {
     "home": "Find the index of a board's encoder by hand, and make it the origin.",
     "capture": "Capture a board's samples at their full rate around an event, into a file and a picture.",
     "watch": "Show what a board's axis does.",
+    "board": "From a scene to a bitstream for a board, with its wiring; and into the board, if it is connected.",
     "synth": "Size and speed of the axis, as the board with supervisor and link, on a real part.",
     "accuracy": "Hold velocity estimators against the exact derivative of known motions, at any rate.",
     "costs": "What each estimator takes of a device: alone, and the board with it placed and routed "

@@ -11,8 +11,8 @@ import typer
 
 from ...model.checks import shown
 from ...model.estimators import registry
+from ..boards.parts import PARTS
 from ..estimates.accuracy import RATES_HZ, outputs
-from ..rtl.parts import PARTS
 from ..scene.load import names, toml_of
 from ..walls.methods import Curve, label
 from .errors import BadInput
@@ -30,6 +30,15 @@ def _scenes(incomplete: str) -> list[str]:
 SceneArgument = Annotated[
     str,
     typer.Argument(metavar="SCENE", help=f"{', '.join(names())}, or a .toml file", autocompletion=_scenes),
+]
+SceneOfBoardArgument = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="SCENE",
+        help=f"{', '.join(names())}, or a .toml file",
+        autocompletion=_scenes,
+        show_default="the board's own, at a clock that it makes",
+    ),
 ]
 EstimatorOption = Annotated[
     Estimator | None,

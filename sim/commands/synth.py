@@ -1,9 +1,10 @@
 """The command `synth`."""
 
+from ..boards.description import board_of
 from ..jobs.result import Values
 from ..rtl.synthesis import synthesise
-from ..scene.load import load
-from .options import DeviceOption, EstimatorOption, SceneArgument, SeedsOption
+from .board import scene_on
+from .options import DeviceOption, EstimatorOption, SceneOfBoardArgument, SeedsOption
 from .study import StudyOptions, study
 from .terminal import log
 
@@ -11,12 +12,12 @@ from .terminal import log
 @study("set_")
 def command(
     options: StudyOptions,
-    scene: SceneArgument = "mhz",
+    scene: SceneOfBoardArgument = None,
     device: DeviceOption = "ecp5-25k",
     seeds: SeedsOption = 3,
     estimator: EstimatorOption = None,
 ) -> None:
-    of = load(scene, options.changes(controller__estimator=estimator))
+    of = scene_on(board_of(device), options, scene, estimator)
     with log.status(f"{device}: Yosys, then nextpnr with {seeds} seeds"):
         report = synthesise(of.spec, device, range(1, seeds + 1), of.glitch_clocks)
     options.finish(Values({"scene": of.name} | report))

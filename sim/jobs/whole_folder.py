@@ -49,7 +49,7 @@ def whole_folder(folder: Path, make: Callable[[Path], None]) -> Path:
         made = work / folder.name
         made.mkdir()
         make(made)
-        _seal(made)
+        seal(made)
         with _locked(folder.parent):
             # Another process may have been first, and may use what it made.
             if not _is_whole(folder):
@@ -80,7 +80,7 @@ def _own_folder() -> Path:
     return path
 
 
-def _seal(folder: Path) -> None:
+def seal(folder: Path) -> None:
     """Write the list of a folder's files."""
     listed = [f"{_digest(path)}  {path.relative_to(folder)}\n" for path in sorted(folder.rglob("*")) if path.is_file()]
     (folder / LIST).write_text("".join(listed), encoding="utf-8")
@@ -88,10 +88,23 @@ def _seal(folder: Path) -> None:
 
 def _is_whole(folder: Path) -> bool:
     """Return whether a folder has a list, and the files of the list are what it says."""
+    listed = listed_in(folder)
+    return bool(listed) and all(is_as_listed(folder / name, digest) for name, digest in listed.items())
+
+
+def listed_in(folder: Path) -> dict[str, str]:
+    """Return the digests of a folder's list by the names of its files; nothing where there is no list."""
     try:
         lines = (folder / LIST).read_text(encoding="utf-8").splitlines()
-        listed = [line.split("  ", 1) for line in lines]
-        return bool(listed) and all(_digest(folder / name) == digest for digest, name in listed)
+        return {name: digest for digest, name in (line.split("  ", 1) for line in lines)}
+    except (OSError, ValueError):
+        return {}
+
+
+def is_as_listed(path: Path, digest: str) -> bool:
+    """Return whether a file can be read and has a digest."""
+    try:
+        return _digest(path) == digest
     except (OSError, ValueError):
         return False
 

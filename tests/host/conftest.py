@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 
 import pytest
-from twin_board import TwinBoard
 
 from hardwall.host.axis import Axis
 from hardwall.host.connect import connect
 from hardwall.model.registers import RegisterMap
 from hardwall.sim.scene.load import load
+from host.twin_board import TwinBoard
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from twin_board import TwinBoard
 
 from hardwall.host.capture import PART_RECORDS
 from hardwall.host.connect import connect
@@ -10,6 +9,7 @@ from hardwall.host.errors import ForeignError, NotReadyError
 from hardwall.model.capture import DONE, STATE_FLAGS, WAITING
 from hardwall.model.checks import FieldError
 from hardwall.model.registers import RegisterMap
+from host.twin_board import TwinBoard
 
 PLACE = 100
 

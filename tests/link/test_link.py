@@ -240,7 +240,9 @@ async def what_is_no_request_of_registers_that_there_are_is_counted(dut):
     assert bytes(client.sink.read_nowait()) == framed(b"\1\xe1\1")
     await asks_for_too_much()
     more = {server.MESSAGES: 4, server.EXCEPTIONS: 2, server.REQUESTS: 3, server.UNANSWERED: 1}
-    assert [now - then for now, then in zip(await counters(), before, strict=True)] == [more.get(k, 0) for k in range(8)]
+    assert [now - then for now, then in zip(await counters(), before, strict=True)] == [
+        more.get(k, 0) for k in range(8)
+    ]
 
 
 @cocotb.test()

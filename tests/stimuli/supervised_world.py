@@ -148,4 +148,6 @@ class World:
         """Return a live word at an end of its range, one beyond it, or with a bit that the end does not have."""
         name, ends = self.random.choice(list(self.design.ranges.items()))
         kind, end = self.formats[name], self.random.choice(ends)
-        return {name: self.random.choice((end - 1, end, end + 1, end ^ 1 << self.random.randrange(kind.width))) & kind.max}
+        return {
+            name: self.random.choice((end - 1, end, end + 1, end ^ 1 << self.random.randrange(kind.width))) & kind.max
+        }

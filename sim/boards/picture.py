@@ -1,0 +1,63 @@
+"""A picture of a board's headers, with the signals at their pins, as SVG."""
+
+from html import escape
+
+from .description import Description, Header
+from .signals import SIGNALS
+
+WIDE, HIGH, GAP, HEAD = 34, 160, 10, 24
+"""A position's width and height, the gap between rows, and the height of a line of text; px."""
+LEAST_WIDE = 620
+"""The width of the legend, px."""
+COLOURS = {"in": "#cfe3f7", "out": "#fbd9b5", "GND": "#d0d0d0", "3V3": "#f3c4c4", "": "#ffffff"}
+"""The fill of a position by what it is: driven from outside, driven by the FPGA, supply, or not used."""
+LEGEND = {"in": "input of the FPGA", "out": "output of the FPGA", "3V3": "3.3 V", "GND": "ground", "": "not used"}
+
+
+def picture(board: Description) -> str:
+    """Return the SVG of all headers of a board, side by side."""
+    drawn, left, low = [], GAP, 0
+    for header in board.headers:
+        top = GAP + HEAD
+        drawn.append(_text(left, top - GAP, header.title, 14, "bold"))
+        for row in header.rows:
+            drawn += [_position(board, header, name, left + WIDE * place, top) for place, name in enumerate(row)]
+            top += HIGH + GAP
+        left, low = left + WIDE * max(map(len, header.rows)) + 2 * GAP, max(low, top)
+    drawn += _legend(low)
+    size = f"{max(left, LEAST_WIDE)} {low + HEAD}"
+    head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size}" font-family="sans-serif">'
+    return "\n".join([head, '<rect width="100%" height="100%" fill="#ffffff"/>', *drawn, "</svg>"]) + "\n"
+
+
+def _position(board: Description, header: Header, name: str, left: int, top: int) -> str:
+    """Return the SVG of a position: its name above, and below it, upright, the signal and the FPGA's pin."""
+    at = f"{header.name} {name}"
+    signal = next((each for each in SIGNALS if board.pins[each.name].at == at), None)
+    kind = name if signal is None else "out" if signal.out else "in"
+    box = (
+        f'<rect x="{left}" y="{top}" width="{WIDE}" height="{HIGH}" fill="{COLOURS.get(kind, COLOURS[""])}" '
+        'stroke="#505050"/>'
+    )
+    label = _text(left + WIDE // 2, top + 17, name, 12, "bold", "middle")
+    if signal is None:
+        return box + label
+    text = f"{signal.name} ({board.pins[signal.name].site})"
+    across, low = left + WIDE // 2 + 5, top + HIGH - 8
+    return box + label + f'<g transform="rotate(-90 {across} {low})">{_text(across, low, text, 13)}</g>'
+
+
+def _legend(top: int) -> list[str]:
+    drawn, left = [], GAP
+    for kind, meaning in LEGEND.items():
+        drawn.append(f'<rect x="{left}" y="{top}" width="14" height="14" fill="{COLOURS[kind]}" stroke="#505050"/>')
+        drawn.append(_text(left + 20, top + 12, meaning, 12))
+        left += 40 + 7 * len(meaning)
+    return drawn
+
+
+def _text(left: int, base: int, text: str, size: int, weight: str = "normal", anchor: str = "start") -> str:
+    return (
+        f'<text x="{left}" y="{base}" font-size="{size}" font-weight="{weight}" text-anchor="{anchor}">'
+        f"{escape(text)}</text>"
+    )

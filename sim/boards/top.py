@@ -1,0 +1,68 @@
+"""The Verilog around `board` on a part: its clock from the board's oscillator, the internal one, and the pads."""
+
+from .description import Description
+from .signals import SIGNALS
+
+MODULE = "top"
+INSIDE = {"oscillator", "outputs_enable"}
+"""Ports of `board` that are no pins."""
+PADS = {"drive_pdm": "pdm", "drive_sign": "sign", "alive": "pump"}
+"""The pins of the drive, and the wires behind their buffers."""
+WITHOUT_PLL = """\
+    assign clk = pin;
+    assign locked = 1'b1;
+"""
+
+
+def top_verilog(board: Description, clock_hz: int) -> str:
+    """Return the Verilog of `top` and of the two modules that make its clocks.
+
+    Raises:
+        ClockError: if the board cannot make the clock.
+    """
+    setting = board.setting(clock_hz)
+    made = f"{board.title}: the clock of `board` is {clock_hz} Hz"
+    if setting is None:
+        how, cell = f"{made}, the oscillator's own.", WITHOUT_PLL
+    else:
+        dividers = ", ".join(f"{name} {number}" for name, number in setting.dividers)
+        how = f"{made}, from {board.oscillator_hz} Hz by {dividers}; VCO {setting.vco / 1_000_000} MHz."
+        cell = board.part.pll.cell(board.oscillator_hz, setting)
+    connected = {"clk": "clock", "rst": "rst | ~locked", "oscillator": "oscillator", "outputs_enable": "outputs_enable"}
+    connected = {signal.name: signal.name for signal in SIGNALS} | PADS | connected
+    return f"""\
+// {how}
+// Generated; the pins are in the file of constraints beside it, and what to connect to them in WIRING.md.
+
+module top (
+{_ports()}
+);
+    wire clock, locked, oscillator, outputs_enable, {", ".join(PADS.values())};
+
+    board_clock board_clock (.pin(clk), .clk(clock), .locked(locked));
+    internal_oscillator internal_oscillator (.oscillator(oscillator));
+
+    // A clock that is not locked is a reset.
+    board board (
+{_connections(connected)}
+    );
+
+    // Until the PLL has locked, both clocks run and the reset has ended, the pull-downs outside hold these.
+    wire driven = outputs_enable & locked;
+{"".join(f"    assign {pin} = driven ? {wire} : 1'bz;{chr(10)}" for pin, wire in PADS.items())}\
+endmodule
+
+module board_clock (input pin, output clk, output locked);
+{cell}endmodule
+
+module internal_oscillator (output oscillator);
+{board.part.oscillator}endmodule
+"""
+
+
+def _ports() -> str:
+    return ",\n".join(f"    {'output' if signal.out else 'input'} {signal.name}" for signal in SIGNALS)
+
+
+def _connections(connected: dict[str, str]) -> str:
+    return ",\n".join(f"        .{port}({wire})" for port, wire in connected.items())

@@ -1,0 +1,84 @@
+"""What to connect to a board, as a page of Markdown: every signal, its pins, its level, and what to see of it."""
+
+from .description import Description
+from .signals import SIGNALS, Signal
+
+PULLS = {"up": "up", "down": "down", "none": ""}
+RECEIVERS = """\
+- **No pin takes 5 V, and none takes RS-422.** An encoder with differential outputs needs receivers that run from 3.3 V,
+  such as an AM26LV32 (four in a package) or an SN65HVD3x of Texas Instruments (one each), with the encoder's 120 Ω
+  across each pair. An encoder of 5 V with single outputs needs a buffer whose inputs stand 5 V at a supply of 3.3 V,
+  such as an SN74LVC14A.
+- **A complement is a wire of its own.** `encoder_a_n` and `encoder_b_n` come from receivers of their own, or a cut wire
+  is not seen. Without them leave both open and the cause `encoder_loss` off.
+- **Pull-downs of 1 kΩ outside**, beside the board, at every pin that the table marks: they hold it low before the FPGA
+  is configured, while it is loaded, and when the board has lost its supply.
+- **Loops** close to the board's 3.3 V. What opens them (a button, a relay of the amplifier) stands in series.
+- The ground of encoder, receivers and amplifier is the board's, joined beside the header.
+"""
+
+
+def wiring(board: Description, picture: str) -> str:
+    """Return the page; `picture` is the name of the picture's file beside it."""
+    notes = "\n".join(f"- {note}" for note in (f"At power-up {board.power_up}.", *board.notes))
+    sources = "\n".join(f"- {source}" for source in board.sources)
+    return f"""\
+# Wiring of `{board.name}`: {board.title}
+
+Generated from the description of the board. **It was not tried on real hardware**: before anything is connected, hold
+it against the board's own papers, and follow the checklist of the page *Boards*.
+
+![The headers with the signals and the FPGA's pins]({picture})
+
+All levels are LVCMOS of 3.3 V. "Pull" is the resistor inside the part, tens of kΩ, which comes with the configuration.
+
+{table(board)}
+## Before anything is connected
+
+{notes}
+{RECEIVERS}
+## The serial line
+
+{serial(board)}
+## Where the pins are from
+
+{sources}
+"""
+
+
+def table(board: Description) -> str:
+    """Return the table of every signal."""
+    lines = [
+        "| signal | direction | where | FPGA pin | pull | outside | what it is | at rest |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for signal in SIGNALS:
+        pin = board.pins[signal.name]
+        cells = (f"`{signal.name}`", _direction(signal), pin.at, pin.site, PULLS[pin.pull], _outside(signal))
+        lines.append(f"| {' | '.join((*cells, signal.what, signal.rest))} |")
+    return "\n".join(lines) + "\n"
+
+
+def _direction(signal: Signal) -> str:
+    return "out" if signal.out else "in"
+
+
+def _outside(signal: Signal) -> str:
+    return "1 kΩ to ground" if signal.pulled_down else ""
+
+
+def serial(board: Description) -> str:
+    """Return which serial port of a PC is the board's line."""
+    port = board.serial
+    if port.ports == 1:
+        which = "the only port of its USB bridge"
+    else:
+        which = (
+            f"port {port.port} of the {port.ports} of its USB bridge, counted from 0; the other one loads bitstreams"
+        )
+    timer = (
+        "The bridge keeps bytes for up to 16 ms: set its latency timer to 1 ms."
+        if port.latency
+        else "The bridge only behaves like one of FTDI; whether it has their latency timer is not known."
+    )
+    return f"It is {which}: `/dev/serial/by-id/{port.by_id}`, with the USB ids {port.vendor}:{port.product}. {timer}\n"

