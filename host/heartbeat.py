@@ -25,7 +25,7 @@ class Heartbeat:
 
     def __init__(self, beat: Callable[[], None], watchdog_s: float):
         self._beat, self._until_s, self.watchdog_s = beat, 0.0, watchdog_s
-        self._ended, self._thread = threading.Event(), None
+        self._ended, self._thread = threading.Event(), threading.Thread(target=self._run, daemon=True)
         self.lost: HostError | None = None
 
     def renew(self) -> None:
@@ -38,8 +38,7 @@ class Heartbeat:
             self._beat()
             self.lost = None
         self._until_s = time.monotonic() + LEASE_S
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._run, name="hardwall-heartbeat", daemon=True)
+        if not self._thread.ident:
             self._thread.start()
 
     @property
@@ -55,7 +54,7 @@ class Heartbeat:
         """End the thread."""
         self.rest()
         self._ended.set()
-        if self._thread is not None:
+        if self._thread.ident:
             self._thread.join()
 
     def _run(self) -> None:

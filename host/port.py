@@ -54,10 +54,7 @@ class _SerialClient(ModbusSerialClient):
 
     def recv(self, size: int | None) -> bytes:
         """Return the bytes that have come, after a wait for the first."""
-        try:
-            return _received(self.socket, self.socket.read, self.comm_params.timeout_connect)
-        except (OSError, TypeError, AttributeError):
-            raise ConnectionException("the port is gone") from None
+        return _received(self.socket, self.socket.read if self.socket else None, self.comm_params.timeout_connect)
 
 
 class _NetworkClient(ModbusTcpClient):
@@ -77,22 +74,21 @@ class _NetworkClient(ModbusTcpClient):
 
     def recv(self, size: int | None) -> bytes:
         """Return the bytes that have come, after a wait for the first."""
-        try:
-            data = _received(self.socket, self.socket.recv, self.comm_params.timeout_connect)
-        except (OSError, TypeError, AttributeError):
-            raise ConnectionException("the port is gone") from None
-        return data
+        return _received(self.socket, self.socket.recv if self.socket else None, self.comm_params.timeout_connect)
 
 
-def _received(source: Any, read: Callable[[int], bytes], wait_s: float | None) -> bytes:
+def _received(source: Any, read: Callable[[int], bytes] | None, wait_s: float | None) -> bytes:
     """Return the bytes that a source has, after a wait for the first; empty if none came.
 
     Raises:
         ConnectionException: if the other end has gone.
     """
-    if not select.select([source], [], [], wait_s)[0]:
-        return b""
-    data = read(4096)
+    try:
+        if read and not select.select([source], [], [], wait_s)[0]:
+            return b""
+        data = read(4096) if read else b""
+    except OSError:
+        data = b""
     if not data:
         raise ConnectionException("the port is gone")
     return data
@@ -108,7 +104,7 @@ def _client(name: str, baud: int, answer_s: float) -> ModbusSerialClient | Modbu
     return _NetworkClient(host, port=int(number), framer=FramerType.RTU, timeout=answer_s, retries=0)
 
 
-def _reason(error: OSError | ValueError) -> str:
+def _reason(error: Exception) -> str:
     """Return why a port cannot be had, and what helps."""
     number = getattr(error, "errno", None)
     if number == errno.ENOENT:

@@ -133,15 +133,58 @@ async def client(dut: HierarchyObject, component: wiring.Component) -> None:
     check(taken, given, {"sum": 3})  # dict-item
     simulate(__file__, 3)  # arg-type
 """
-# Whoever installs hardwall has amaranth, and rooms of ours, without types. Every function of the bench has them.
+HOST_RIGHT = """
+import numpy as np
+
+from hardwall.host import Axis, State, Status, Trip, connect
+
+def run(axis: Axis) -> None:
+    axis.set(wall_stiffness=10e3)
+    axis.wall.stiffness = 10e3
+    stiffness: float = axis.wall.stiffness
+    axis.arm()
+    for status in axis.watch(seconds=1.0):
+        assert status.state is State.ARMED
+    trip: Trip | None = axis.trip
+    if trip:
+        axis.acknowledge(trip)
+    axis.capture.start(["contact"], before=3)
+    reveal_type(axis.capture.read().force_n)
+    reveal_type(axis.status)
+    reveal_type(axis.supervisor.force_limit)
+
+with connect("/dev/ttyUSB0", identity=None) as found:
+    run(found)
+"""
+HOST_SHOWN = [r"numpy\.ndarray\[.*\]", r"hardwall\.host\.status\.Status", r"float"]
+HOST_WRONG = """
+from hardwall.host import Axis, connect
+
+def client(axis: Axis) -> None:
+    connect(3)  # arg-type
+    axis.set(wall_stiffness="stiff")  # arg-type
+    axis.wall.stiffness = "stiff"  # assignment
+    axis.wall.hardness  # attr-defined
+    axis.acknowledge(3)  # arg-type
+    axis.status.force  # attr-defined
+    axis.capture.start(before="3")  # arg-type
+"""
+# Whoever installs hardwall has amaranth and pyserial, and rooms of ours, without types. Every function of the bench has them.
 SETTINGS = """
 [mypy]
-[mypy-amaranth.*,hardwall.hdl.*,hardwall.sim.*]
+[mypy-amaranth.*,hardwall.hdl.*,hardwall.sim.*,serial.*]
 ignore_missing_imports = true
 [mypy-hardwall.testing.*]
 disallow_untyped_defs = true
 """
-SNIPPETS = {"right": RIGHT, "wrong": WRONG, "bench_right": BENCH_RIGHT, "bench_wrong": BENCH_WRONG}
+SNIPPETS = {
+    "right": RIGHT,
+    "wrong": WRONG,
+    "bench_right": BENCH_RIGHT,
+    "bench_wrong": BENCH_WRONG,
+    "host_right": HOST_RIGHT,
+    "host_wrong": HOST_WRONG,
+}
 
 
 @pytest.fixture(scope="module")
@@ -150,13 +193,14 @@ def said(tmp_path_factory) -> dict[str, list[tuple[int, str, str]]]:
     folder = tmp_path_factory.mktemp("typing")
     (folder / "hardwall").mkdir()
     (folder / "hardwall" / "model").symlink_to(ROOT / "model", target_is_directory=True)
+    (folder / "hardwall" / "host").symlink_to(ROOT / "host", target_is_directory=True)
     (folder / "hardwall" / "testing").symlink_to(ROOT / "tests" / "benches", target_is_directory=True)
     (folder / "settings.ini").write_text(SETTINGS)
     for name, text in SNIPPETS.items():
         (folder / f"{name}.py").write_text(text)
     command = [sys.executable, "-m", "mypy", "--no-error-summary", "--config-file=settings.ini"]
     command += ["--explicit-package-bases", "--cache-dir", str(build_dir() / "mypy")]
-    command += [*(f"{name}.py" for name in SNIPPETS), "hardwall/model", "hardwall/testing"]
+    command += [*(f"{name}.py" for name in SNIPPETS), "hardwall/host", "hardwall/model", "hardwall/testing"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert not done.stderr
     found: dict[str, list[tuple[int, str, str]]] = {}
@@ -166,11 +210,13 @@ def said(tmp_path_factory) -> dict[str, list[tuple[int, str, str]]]:
     return found
 
 
-def test_the_model_and_the_bench_themselves_pass(said):
+def test_the_typed_packages_themselves_pass(said):
     assert {file: lines for file, lines in said.items() if file.startswith("hardwall")} == {}
 
 
-@pytest.mark.parametrize(("name", "types"), [("right", SHOWN), ("bench_right", BENCH_SHOWN)])
+@pytest.mark.parametrize(
+    ("name", "types"), [("right", SHOWN), ("bench_right", BENCH_SHOWN), ("host_right", HOST_SHOWN)]
+)
 def test_what_is_right_passes_and_has_types(said, name, types):
     assert [line for line in said[f"{name}.py"] if line[1] == "error"] == []
     shown = [rest for _, _, rest in said[f"{name}.py"]]
@@ -179,14 +225,14 @@ def test_what_is_right_passes_and_has_types(said, name, types):
         assert re.fullmatch(rf'Revealed type is "{wanted}"', rest), rest
 
 
-@pytest.mark.parametrize("name", ["wrong", "bench_wrong"])
+@pytest.mark.parametrize("name", ["wrong", "bench_wrong", "host_wrong"])
 def test_what_is_wrong_is_told_where_it_is(said, name):
     wanted = [(n, line.split("# ")[1]) for n, line in enumerate(SNIPPETS[name].splitlines(), 1) if "# " in line]
     errors = [(n, re.search(r"\[([a-z-]+)\]$", rest)[1]) for n, kind, rest in said[f"{name}.py"] if kind == "error"]
     assert errors == wanted
 
 
-@pytest.mark.parametrize(("name", "folder"), [("model", "model"), ("testing", "tests/benches")])
+@pytest.mark.parametrize(("name", "folder"), [("host", "host"), ("model", "model"), ("testing", "tests/benches")])
 def test_whoever_installs_a_typed_package_gets_its_types(name, folder):
     data = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]["package-data"]
     assert "py.typed" in data[f"hardwall.{name}"]
