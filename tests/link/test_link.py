@@ -258,7 +258,7 @@ async def every_port_has_what_a_client_writes_and_reads(dut):
         return [half for each in those for half in each.to_registers(of[each.name])]
 
     for number in range(ROUNDS):
-        drawn |= {name: values_of.next() for name, values_of in restless.items()}
+        drawn.update({name: values_of.next() for name, values_of in restless.items()})
         await show(dut, bench, registers, {each.name: drawn[each.name] for each in registers.status})
 
         @bridge
