@@ -16,6 +16,8 @@ from stimuli.axes import busy, random_words
 
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
 STROBES = "commit", "preload", "clear_flags", "index_arm"
+ACTS, CHANCES = ("", "words", "drive_enable", *STROBES), (0.968, 0.006, 0.006, *[0.005] * len(STROBES))
+"""What a host does at a clock, and the chance of each."""
 
 
 def make(estimator: str) -> Axis:
@@ -172,9 +174,7 @@ async def every_output_is_the_twins_at_every_clock(dut):
             changed, left = next(moves)
             pins |= changed
         left -= 1
-        act = random.choice(
-            ["", "words", "drive_enable", *STROBES], p=(0.97, 0.006, 0.003, *[0.021 / len(STROBES)] * len(STROBES))
-        )
+        act = random.choice(ACTS, p=CHANCES)
         if act == "words" and not twin.pending:
             words = random_words(spec.design, random) | twin.fixed()
             pins["preload_count"] = int(random.integers(-half, half))

@@ -1,6 +1,7 @@
 """The register file: every operation of RTL and twin alike, at the clocks promised, and every bound of every word."""
 
 import cocotb
+import numpy as np
 import pytest
 from cocotb.triggers import ClockCycles, RisingEdge
 
@@ -24,6 +25,12 @@ CLOCKS = {
 
 PLACES = 0, 0x60, 0xC0, MAP, CAPTURE, CAPTURE + CAPTURE_REGISTERS - 150, SPACE, SPACE + CAPTURE
 """Where there are registers or their end, and the same beyond the last address."""
+
+
+def place(random: np.random.Generator) -> int:
+    """Return an address, mostly near these."""
+    near = random.choice(PLACES) + random.integers(0, 160)
+    return int(random.choice((near, random.integers(0, 2 * SPACE)), p=(0.8, 0.2)))
 
 
 def make(name: str) -> RegisterFile:
@@ -104,8 +111,7 @@ async def random_operations(dut):
     pulsed, before = [host.bench.monitor(pulse.name) for pulse in pulses], [0] * len(pulses)
     for _ in range(400):
         case, first, last = random.random(), int(random.integers(0, 2)), int(random.integers(0, 2))
-        near = int(random.choice(PLACES)) + int(random.integers(0, 160))
-        address = int(random.choice((near, random.integers(0, 2 * SPACE)), p=(0.8, 0.2)))
+        address = place(random)
         value = int(random.integers(0, 1 << 16))
         if case < 0.25:
             await host.do(Operation.CHECK_READ, address, 0, first, last)

@@ -69,7 +69,7 @@ class World:
             self._settle()
         if random.random() < 0.01:
             self.inputs["heartbeat"] = random.randrange(1 << 16)
-        if random.random() < (0.0005 if state == ARMED else 0.02):
+        if random.random() < (0.1 if state == TRIPPED else 0.0005):
             now |= self._near_an_end()
         return now | (self._awaited(state, latched) or self._asked())
 
@@ -132,7 +132,7 @@ class World:
 
     def _settle(self) -> None:
         """Take the usual words, and mostly the usual wall."""
-        self.inputs |= self.usual
+        self.inputs |= {**self.usual, "supervisor_runaway": self.random.choice((0, 0, 0, 8))}
         if self.random.random() < 0.8:
             self.inputs |= {**self.wall, "encoder_glitch_clocks": self.random.choice(FILTERS)}
 
@@ -145,9 +145,7 @@ class World:
         self.inputs[name] = random.choice(FILTERS) if name == "encoder_glitch_clocks" else word
 
     def _near_an_end(self) -> dict[str, int]:
-        """Return a live word at an end of its range, one beyond it, or with a bit that the end does not have."""
-        name, ends = self.random.choice(list(self.design.ranges.items()))
-        kind, end = self.formats[name], self.random.choice(ends)
-        return {
-            name: self.random.choice((end - 1, end, end + 1, end ^ 1 << self.random.randrange(kind.width))) & kind.max
-        }
+        """Return a live word at an end of its range, beside it, or unlike these in one bit."""
+        random, (name, ends) = self.random, self.random.choice(list(self.design.ranges.items()))
+        kind, end = self.formats[name], random.choice(ends) + random.randint(-1, 1)
+        return {name: (end ^ random.choice((0, 1, 1, 1)) << random.randrange(kind.width)) & kind.max}
