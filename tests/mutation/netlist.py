@@ -59,12 +59,6 @@ class Netlist:
     mutants: list[Mutant]
 
 
-def _cell(line: str) -> str:
-    """Return the cell of a listed change, with its module, as Yosys lists a selection."""
-    options = dict(_OPTION.findall(line))
-    return f"{options['module']}/{options['cell']}"
-
-
 def _taken(line: str) -> bool:
     """Return whether a listed change is none of those left out."""
     options = dict(_OPTION.findall(line))
@@ -89,7 +83,7 @@ def _described(line: str, source: list[str]) -> str:
 
 
 def mutated(component: wiring.Component, modules: tuple[str, ...], count: int, seed: int) -> Netlist:
-    """Return a component with mutants, evenly drawn; fewer than asked for if it has no more, or less a ROM's contents.
+    """Return a component with mutants, evenly drawn; fewer than asked for if it has no more.
 
     Args:
         component: the component.
@@ -103,15 +97,12 @@ def mutated(component: wiring.Component, modules: tuple[str, ...], count: int, s
     rtl = to_verilog(component, BLOCK)
     with scratch(build_dir() / "mutate") as work:
         (work / "rtl.v").write_text(rtl, encoding="utf-8")
-        chosen = " ".join([modules[0], *(f"{module} %u" for module in modules[1:]), "c:$meminit* %d"])
+        chosen = " ".join([modules[0], *(f"{module} %u" for module in modules[1:]), "t:$meminit* %d"])
         listing = f"mutate -list {SPARE * count} -seed {seed} -o listed {chosen}"
-        listing += "; tee -q -o contents select -list t:$meminit*; write_rtlil plain.il"
-        run_yosys(work, f"read_verilog rtl.v; hierarchy -top {BLOCK}; proc; opt_clean; {listing}")
-        lines, contents = ((work / file).read_text(encoding="utf-8").splitlines() for file in ("listed", "contents"))
+        run_yosys(work, f"read_verilog rtl.v; hierarchy -top {BLOCK}; proc; opt_clean; {listing}; write_rtlil plain.il")
+        lines = (work / "listed").read_text(encoding="utf-8").splitlines()
         fit = [line for line in lines if _taken(line)]
         drawn = random.Random(seed).sample(fit, min(count, len(fit)))
-        # A ROM that Yosys makes of a choice has contents under any name; without them the others stay as drawn.
-        drawn = [line for line in drawn if _cell(line) not in contents]
         commands, mutants = [], []
         for number, line in enumerate(drawn, 1):
             commands.append(line.replace("mutate ", f"mutate -ctrl {SELECTOR} {SELECTOR_BITS} {number} ", 1))
