@@ -3,7 +3,8 @@
 The component and its mutant are put side by side, with the same inputs. They have most bits of their registers in
 common: that the mutant's next value of such a bit is the component's is proven with the outputs. The other bits, those
 that a search has found to differ, are of each alone. What both have alike is merged, so that a multiplier that is in
-both need not be understood. There are three ways, and any is enough:
+both need not be understood. A memory that is written is outside of both: what goes there is proven, and what comes from
+there is the same for both. There are three ways, and any is enough:
 
 - **One step**, in which common bits have any value, and the others have any value in either.
 - **Induction** from power-up on, and after some clocks in which all was equal: so states that do not last are not
@@ -38,7 +39,8 @@ CPU_S = 15
 """The processor's time for a question; one that takes longer is not answered."""
 ROUNDS, STEPS, STEPS_IN_COMMON = 8, 20, 16
 """The most searches of bits that differ, and the most clocks of the induction, with no bit and with some in common."""
-FLAT = "flatten; memory; memory_map; dffunmap; opt_clean"
+FLAT = "flatten; memory_collect; memory_map -rom-only; dffunmap; opt_clean"
+TO_MEMORY = ("RD_ADDR", "RD_EN", "WR_ADDR", "WR_DATA", "WR_EN")
 BETWEEN = "___"
 """What joins the names of a module inside and of its port."""
 PROVEN, DIFFERS = "SUCCESS", "base case: FAIL"
@@ -90,6 +92,16 @@ def cut(module: dict, kept: set[Bit], free: bool) -> dict[str, list[Bit]]:
     return ports
 
 
+def part_from_memories(module: dict) -> None:
+    """Put ports of the module in the place of its memories: their contents are equal while equal writes go there."""
+    memories = [name for name, cell in module["cells"].items() if cell["type"] == "$mem_v2"]
+    for number, name in enumerate(memories):
+        pins = module["cells"].pop(name)["connections"]
+        for port in (*TO_MEMORY, "RD_DATA"):
+            direction = "output" if port in TO_MEMORY else "input"
+            module["ports"][f"M_{number}_{port}"] = {"direction": direction, "bits": pins[port]}
+
+
 def joined(module: dict) -> str:
     """Return Verilog of `machine`: the two side by side, with one register for both in the place of their ports."""
     initial = {}
@@ -139,6 +151,7 @@ def known_of(netlist: Netlist, numbers: Collection[int]) -> dict[int, str]:
         for commands in _compared(netlist):
             run_yosys(work, f"read_verilog mutated.v; {commands}; {FLAT}; write_json flat.json")
             flat = json.loads((work / "flat.json").read_text(encoding="utf-8"))
+            part_from_memories(flat["modules"][BLOCK])
             known |= {number: _known(work, flat, number) for number in numbers if known.get(number) != EQUIVALENT}
     return known
 
