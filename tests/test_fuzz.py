@@ -79,7 +79,9 @@ def ended_in(folder: Path, *arguments: str, **environ: str) -> Ended:
     return run(arguments, folder, environ)
 
 
-@pytest.mark.parametrize("words", ["bench seed-2011", "synth seed-2011", "zwidth", "hit --backend rtl"])
+@pytest.mark.parametrize(
+    "words", ["bench seed-2011", "synth seed-2011", "board ulx3s-12f seed-2011 -o new", "zwidth", "hit --backend rtl"]
+)
 def test_what_takes_long_is_only_begun(tmp_path, words):
     assert ended_in(tmp_path, *words.split()).code == BEGAN
 

@@ -16,6 +16,7 @@ from hypothesis.strategies import SearchStrategy
 from pydantic import BaseModel
 
 from hardwall.model.estimators import registry
+from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.commands import group
 from hardwall.sim.scene.load import names, read
 from hardwall.sim.scene.schema import Scene
@@ -75,6 +76,8 @@ GOOD: dict[str, tuple[str, ...]] = {
     "baud": ("921600", "115200"),
     "identity": ("0123456789abcdef",),
     "at": ("0", "1e-3"),
+    "board": tuple(BOARDS),
+    "program": ("sram", "flash"),
     "device": ("ecp5-25k", "ice40-up5k", "gw1nr-9"),
     "stiffness": ("0", "1e3", "10e3"),
     "damping": ("0", "20"),
