@@ -169,7 +169,7 @@ def client(axis: Axis) -> None:
     axis.status.force  # attr-defined
     axis.capture.start(before="3")  # arg-type
 """
-# Whoever installs hardwall has amaranth, pyserial and rooms of ours without types. Every function of the bench has them.
+# Whoever installs hardwall has amaranth, pyserial and rooms of ours without types. Functions of the bench have them.
 SETTINGS = """
 [mypy]
 [mypy-amaranth.*,hardwall.hdl.*,hardwall.sim.*,serial.*]

@@ -30,7 +30,8 @@ from pathlib import Path
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs import children
 from hardwall.sim.jobs.scratch import scratch
-from hardwall.sim.rtl import synthesis
+from hardwall.sim.rtl import tools
+from hardwall.sim.rtl.flow import YOSYS
 
 from .netlist import BLOCK, SELECTOR, SELECTOR_BITS, Netlist, run_yosys
 
@@ -242,7 +243,7 @@ def _asked(work: Path, design: dict, number: int, how: str, joint: bool = True) 
     whole += [f"hierarchy -top {top}", "proc", "flatten", *("opt_expr -full", "opt_merge -share_all", "opt_clean") * 3]
     script = [*_side_by_side(number), *whole, f"sat -prove trigger 0 {how} {top}"]
     (work / "ask.ys").write_text("\n".join(script) + "\n", encoding="utf-8")
-    tool = shutil.which(synthesis.YOSYS, path=synthesis.TOOLS)
+    tool = shutil.which(YOSYS, path=tools.TOOLS)
     # This Yosys has no clock to end its solver by.
     limited = ("/bin/sh", "-c", 'ulimit -t "$0" && exec "$@"', str(CPU_S), tool, "-s", "ask.ys")
     done = children.run(limited, cwd=work, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
@@ -250,7 +251,7 @@ def _asked(work: Path, design: dict, number: int, how: str, joint: bool = True) 
         why = next(
             (line for line in done.stdout.splitlines() if line.startswith("ERROR: ")), f"exit code {done.returncode}"
         )
-        raise synthesis.SynthesisError(f"Yosys cannot compare a mutant: {why.removeprefix('ERROR: ')}")
+        raise tools.SynthesisError(f"Yosys cannot compare a mutant: {why.removeprefix('ERROR: ')}")
     return done.stdout if done.returncode == 0 else ""
 
 

@@ -18,7 +18,8 @@ from amaranth.lib import wiring
 from hardwall.hdl.export import to_verilog
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs.scratch import scratch
-from hardwall.sim.rtl import synthesis
+from hardwall.sim.rtl import tools
+from hardwall.sim.rtl.flow import YOSYS
 
 BLOCK, SELECTOR = "block", "mutant"
 """The names of the module and of the input that chooses."""
@@ -119,4 +120,4 @@ def run_yosys(work: Path, script: str) -> None:
     Raises:
         SynthesisError: if Yosys is missing or fails.
     """
-    synthesis._run(work, work / "yosys.log", (synthesis.YOSYS, "-p", script), "mutation")
+    tools.run(work, work / "yosys.log", (YOSYS, "-p", script), "mutation")
