@@ -11,7 +11,8 @@ from amaranth.lib import wiring
 from hardwall.hdl.export import to_verilog
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs.whole_folder import whole_folder
-from hardwall.sim.rtl import synthesis
+from hardwall.sim.rtl import tools
+from hardwall.sim.rtl.flow import YOSYS
 
 from .families import Family
 
@@ -54,13 +55,13 @@ def mapped(component: wiring.Component, family: Family) -> Netlist:
         f"read_verilog rtl.v; {family.synth} -top {RTL} -json netlist.json; "
         f"delete t:$scopeinfo; rename {RTL} {GATES}; write_verilog -noattr gates.v"
     )
-    content = "\0".join([rtl, script, version(synthesis.YOSYS)])
+    content = "\0".join([rtl, script, version(YOSYS)])
     folder = build_dir() / "gate" / f"{family.name}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
 
     def map_into(work: Path) -> None:
         (work / "rtl.v").write_text(rtl, encoding="utf-8")
-        command = (synthesis.YOSYS, "-p", script)
-        synthesis._run(work, work / "yosys.log", command, f"synthesis for {family.name}")
+        command = (YOSYS, "-p", script)
+        tools.run(work, work / "yosys.log", command, f"synthesis for {family.name}")
 
     folder = whole_folder(folder, map_into)
     module = json.loads((folder / "netlist.json").read_text(encoding="utf-8"))["modules"][RTL]
