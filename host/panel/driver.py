@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..axis import Axis
 from ..errors import ChangedError, ForeignError, HostError, NotReadyError, PortError
@@ -56,7 +56,8 @@ class Driver:
         self._wanted: dict[str, tuple[str, float]] = {}
         self._lock, self._ended = threading.Lock(), threading.Event()
         self._samples: deque[Sample] = deque(maxlen=KEPT)
-        self._taken, self._pings, self._renewed_s = 0, {}, 0.0
+        self._pings: dict[str, float] = {}
+        self._taken, self._renewed_s = 0, 0.0
         self._axis: Axis | None = None
         self._open()
         self._thread = threading.Thread(target=self._run, name="hardwall-panel", daemon=True)
@@ -132,7 +133,7 @@ class Driver:
                 self._lose(HostError(f"the panel failed: {error!r}"))
             self._ended.wait(max(began + LOOK_S - time.monotonic(), 0.001))
 
-    def _see(self, **changes: object) -> None:
+    def _see(self, **changes: Any) -> None:
         self.view = replace(self.view, **changes)
 
     def _obey(self) -> None:

@@ -25,7 +25,8 @@ class _Lane:
         self._names = {word.name for word in spec.design.words}
 
     def set(self, values: Mapping[str, float]) -> None:
-        self._params = model.Axis(self.spec, **{name: values[name] for name in self._names & values.keys()}).params
+        words = {name: values[name] for name in self._names & values.keys()}
+        self._params = model.Axis(self.spec, False, **words).params
 
     def run(self, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the velocities (m/s) and the wall's forces (N) of successive counts."""

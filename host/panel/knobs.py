@@ -9,7 +9,8 @@ from ..device import Device
 from ..words import OF_THE_HEARTBEAT
 
 HIDDEN = ("preload_count", "supervisor_causes", *OF_THE_HEARTBEAT)
-"""Words that are no settings of a person at a page."""
+CAPTURE = "capture_"
+"""Words that are no settings of a person at a page, and how the names of those of a capture begin."""
 UNITS = {
     **{"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "s": ("ms", 1e3)},
     **{"m/s^2": ("m/s\u00b2", 1.0), "m^(1/2)/s": ("\u221am/s", 1.0)},
@@ -131,7 +132,7 @@ def knob_of(word: Register) -> Knob:
 def knobs_of(device: Device) -> tuple[Knob, ...]:
     """Return all settings of a board, in the order of its map."""
     words = (*device.of_kind(Kind.WORD), *device.of_kind(Kind.LIVE))
-    return tuple(knob_of(word) for word in words if word.name not in HIDDEN)
+    return tuple(knob_of(word) for word in words if word.name not in HIDDEN and not word.name.startswith(CAPTURE))
 
 
 def _group(name: str) -> Group:

@@ -54,7 +54,7 @@ class Live:
             self._acts |= {
                 "hold": lambda tab, message: self._hold(tab, hand, float(message["m"])),
                 "free": lambda tab, _: self._free(tab, hand),
-                "turn": lambda tab, message: self._may(tab) and hand.turn(str(message["fault"])),
+                "turn": lambda tab, message: self._turn(tab, hand, str(message["fault"])),
             }
 
     async def serve(self, socket: WebSocket, tab: str) -> None:
@@ -86,6 +86,10 @@ class Live:
         if status and self._may(tab) and self._dragging in ("", tab):
             self._dragging = tab
             hand.hold(wanted_m, status.position_m)
+
+    def _turn(self, tab: str, hand: Hand, fault: str) -> None:
+        if self._may(tab):
+            hand.turn(fault)
 
     def _free(self, tab: str, hand: Hand) -> None:
         if self._dragging == tab:

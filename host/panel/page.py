@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from nicegui import events, ui
@@ -141,7 +142,7 @@ def _knobs(driver: Driver, tab: str) -> list[_Row]:
         with ui.expansion(group.value, value=group is not Group.WIRING).classes("card group").props("dense"):
             for knob in knobs:
                 if knob.group is group:
-                    rows.append(_Row(knob, lambda value, name=knob.name: driver.set(tab, name, value)))
+                    rows.append(_Row(knob, partial(driver.set, tab, knob.name)))
     return rows
 
 

@@ -76,7 +76,7 @@ class PanelServer:
             self._socket = socket.create_server((host, port), family=family)
         except OSError as error:
             # Of a name that is none, the number is not the system's.
-            said = os.strerror(error.errno) if (error.errno or 0) > 0 else error.strerror
+            said = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror
             raise ServerError(f"port {port} of {host} cannot be had: {said or error}") from None
         shown = socket.gethostname() if host in EVERYWHERE else f"[{host}]" if ":" in host else host
         self.url = f"http://{shown}:{self._socket.getsockname()[1]}/{token}/"

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 import pytest
-from twin_board import TwinBoard
+from host.twin_board import TwinBoard
 
 from hardwall.host.connect import connect
 from hardwall.host.panel.driver import Driver
