@@ -51,7 +51,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures verilog docs digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures screenshots verilog docs digests soak fuzz clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -103,6 +103,9 @@ figures: $(VENV)/.synth | tools ## the founding paper's figures and every study 
 	@for study in $(STUDIES); do $(HARDWALL) $$study --resume --plot build/$$study.png; done
 	@$(HARDWALL) bits --plot build/bits.png
 
+screenshots: $(VENV)/.test | tools ## the pictures of the panel's page, anew, by a browser
+	@$(VENV)/bin/python tests/screenshots.py
+
 verilog: $(VENV)/.sim | tools ## the axis of the scene as Verilog, in build/verilog/
 	@$(HARDWALL) verilog $(SCENE) --output-folder build/verilog
 
@@ -136,7 +139,7 @@ distclean: clean ## remove the tools in .venv too
 
 help: ## this list
 	@sed -n 's/^\([a-z]*\):.* ## \(.*\)/\1:\2/p' Makefile | while IFS=: read -r task what; do \
-	  printf '  make %-10s %s\n' "$$task" "$$what"; done
+	  printf '  make %-11s %s\n' "$$task" "$$what"; done
 
 # ---- the main job: a report and a picture for every estimator -------------------------------------------------------
 
@@ -188,7 +191,7 @@ $(VENV)/.sim: pyproject.toml $(VENV)/.made | tools
 	$(call install,sim,the model and the loop)
 
 $(VENV)/.test: pyproject.toml $(VENV)/.sim | tools
-	$(call install,sim$(comma)host$(comma)test,the tests' tools)
+	$(call install,sim$(comma)host$(comma)panel$(comma)test,the tests' tools)
 
 $(VENV)/.prove: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)prove,the solver)

@@ -244,7 +244,9 @@ def test_versions_are_pinned():
 def test_what_is_imported_is_what_its_extra_installs(path):
     for_tests = path in TESTS or path.stem.startswith("cocotb_")
     room = path.relative_to(ROOT).parts[0]
-    extras = {"model": [], "host": ["host"]}.get(room, ["sim", "host", "test"] if for_tests else ["sim"])
+    extras = {"model": [], "host": ["host", "panel"]}.get(
+        room, ["sim", "host", "panel", "test"] if for_tests else ["sim"]
+    )
     pinned = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in extras)]
     installed = {plain(requirement.partition("==")[0]) for one in pinned for requirement in one}
     installed.add("llvmlite")  # a dependency of Numba

@@ -26,6 +26,8 @@ COMMANDS = {
     "home": "Find the index of a board's encoder by hand, and make it the origin.",
     "capture": "Capture a board's samples at their full rate around an event, into a file and a picture.",
     "watch": "Show what a board's axis does.",
+    "panel": "A page in the browser to see a board, set it and arm it; with `virtual`, to feel the wall of one "
+    "in simulation.",
     "board": "From a scene to a bitstream for a board, with its wiring; and into the board, if it is connected.",
     "synth": "Size and speed of the axis, as the board with supervisor and link, on a real part.",
     "accuracy": "Hold velocity estimators against the exact derivative of known motions, at any rate.",

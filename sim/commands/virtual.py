@@ -5,6 +5,7 @@ import os
 import select
 import time
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
@@ -23,6 +24,10 @@ LOOK_S = 0.05
 """The longest wait for bytes of hosts between two looks for orders."""
 LINE_MAX = 1024
 """The most bytes of an order: what is longer is none."""
+COUNTS = "counts:"
+"""How a line of counts begins."""
+COUNTED_RUNS = 20
+"""The runs of the board whose counts are in a line."""
 WAITING_MAX = 4096
 """The host's bytes that may wait for the board's line until no more are taken: a few frames."""
 
@@ -39,6 +44,7 @@ def command(
     seconds: Annotated[
         float | None, typer.Option(metavar="S", help="simulated time to run", show_default="until it is interrupted")
     ] = None,
+    counts: Annotated[bool, typer.Option("--counts", help="print the encoder's count at every sample, too")] = False,
 ) -> None:
     within(speed, "--speed", 0.0, 1000.0, "s/s")
     if seconds is not None:
@@ -51,7 +57,31 @@ def command(
         if line.tcp_port is not None:
             print(f"tcp port: 127.0.0.1:{line.tcp_port}")
         print(f"orders: {', '.join(f'{name} {order.operand}' for name, order in ORDERS.items())}", flush=True)
-        _run(board, line, speed, math.inf if seconds is None else seconds)
+        _run(board, line, _Pace(speed, math.inf if seconds is None else seconds), _Counts() if counts else None)
+
+
+@dataclass(frozen=True)
+class _Pace:
+    """The most simulated seconds in a second, 0 for no limit; and the simulated time to run."""
+
+    speed: float
+    seconds: float
+
+
+class _Counts:
+    """Prints the counts of the encoder, many samples in a line."""
+
+    def __init__(self) -> None:
+        self._counts: list[str] = []
+        self._runs = 0
+
+    def take(self, board: VirtualBoard) -> None:
+        """Take the counts of a run of the board, and print them with those before when there are enough."""
+        self._counts += map(str, board.counts.tolist())
+        self._runs += 1
+        if self._runs == COUNTED_RUNS:
+            print(COUNTS, *self._counts, flush=True)
+            self._counts, self._runs = [], 0
 
 
 class _Orders:
@@ -78,7 +108,7 @@ class _Orders:
                 self._rest += data or b"\n" * bool(self._rest)
 
 
-def _run(board: VirtualBoard, line: Line, speed: float, seconds: float) -> None:
+def _run(board: VirtualBoard, line: Line, pace: _Pace, counts: _Counts | None) -> None:
     """Let the board run, and carry bytes and orders to it."""
     orders, told = _Orders(), False
     began, begun_s = time.monotonic(), board.handle.time_s
@@ -87,16 +117,18 @@ def _run(board: VirtualBoard, line: Line, speed: float, seconds: float) -> None:
         """Return the simulated time and the real time since the beginning."""
         return board.handle.time_s - begun_s, time.monotonic() - began
 
-    while board.handle.time_s - begun_s < seconds - GRASP_S / 2:
+    while board.handle.time_s - begun_s < pace.seconds - GRASP_S / 2:
         while True:
             simulated_s, real_s = passed()
-            ahead_s = simulated_s / speed - real_s if speed else 0.0
+            ahead_s = simulated_s / pace.speed - real_s if pace.speed else 0.0
             _carry(board, line, orders, min(max(ahead_s, 0.0), LOOK_S))
             if ahead_s <= 0:
                 break
         if not board.run():
             raise RuntimeError(f"the handle is too fast for its encoder: {board.handle.velocity_m_per_s:.3g} m/s")
         line.give(board.hardware.take())
+        if counts:
+            counts.take(board)
         if not told and real_s > JUDGED_S:
             told = True
             log.print(f"it runs at {simulated_s / real_s:.2f} of real time")

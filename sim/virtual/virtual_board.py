@@ -15,6 +15,7 @@ from ..rtl.board_library import BoardHardware
 from ..scene.build import start_of, world_of
 from ..scene.errors import SceneError
 from ..scene.schema import Scene
+from ..world.encoder import number_at
 
 TURN_M = 4e-3
 """The distance of two pulses of the encoder's index."""
@@ -65,6 +66,7 @@ class VirtualBoard:
         hardware: the board's wires and loops.
         hand: what the hand does; at first it holds the handle where the scene starts.
         reversed: whether the motor's wires are swapped.
+        positions_m: where the handle was at the strobes of the last `run`.
 
     Raises:
         SceneError: if the scene has an output of its own, for the board's are pulses.
@@ -81,6 +83,7 @@ class VirtualBoard:
         self.hand, self.reversed = Hand(scene.protocol.start_m), False
         self._pulse_n = scene.spec.force_resolution_n * self.hardware.full_scale / scene.spec.clocks_per_sample
         self._edges, self._push_n = room_for(loop.EDGE_CAPACITY), 0.0
+        self._number, self.positions_m = self._progress.moment.cell.number, np.zeros(0)
 
     def __enter__(self) -> "VirtualBoard":
         self.hardware.__enter__()
@@ -102,7 +105,13 @@ class VirtualBoard:
         until = self._progress.sample + samples
         controller = self.hardware.controller
         self._state, self._progress = loop.run(world, controller, self._state, self._progress, memory, until)
+        self.positions_m = memory.positions
         return self._progress.sample == until
+
+    @property
+    def counts(self) -> np.ndarray:
+        """The counts of the encoder at the strobes of the last `run`; the board has each a few clocks later."""
+        return number_at(self._world.encoder, self.positions_m) - self._number
 
     @property
     def handle(self) -> Handle:

@@ -13,6 +13,8 @@ downwards floor(t clock_hz) + 1: at the very edge the position belongs to the up
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from ...model.compiled import compiled
 
 # The least distance (counts) from one edge to the next: a closer pair is a glitch rather than quadrature.
@@ -78,6 +80,15 @@ def locate(encoder, position_m):
     while position_m >= edge(encoder, number + 1):
         number += 1
     return Cell(number, edge(encoder, number), edge(encoder, number + 1))
+
+
+@compiled
+def number_at(encoder, positions):
+    """Return the numbers of the cells that hold an array of positions (m): the counts that an encoder has there."""
+    numbers = np.zeros(len(positions), np.int64)
+    for k in range(len(positions)):
+        numbers[k] = locate(encoder, positions[k]).number
+    return numbers
 
 
 @compiled

@@ -134,6 +134,8 @@ def test_a_current_folder_that_was_removed_is_said_in_a_line(tmp_path):
         ("pydantic", ("hit",), "pydantic", "sim"),
         ("scipy", ("lipschitz",), "scipy", "sim"),
         ("cocotb", ("bench",), "cocotb", "test"),
+        ("pymodbus", ("panel", "virtual"), "pymodbus", "host"),
+        ("nicegui", ("panel", "virtual"), "nicegui", "panel"),
     ],
 )
 def test_an_extra_that_is_not_installed_is_named_in_a_line(absent, arguments, named, extra):

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, NoReturn
 import scipy
 
 from hardwall.sim import pictures
-from hardwall.sim.commands import app, board, synth
+from hardwall.sim.commands import app, board, panel, synth
 from hardwall.sim.commands.group import COMMANDS
 from hardwall.sim.estimates.accuracy import measure
 from hardwall.sim.jobs import cluster, parallel, store
@@ -78,6 +78,7 @@ def _shorten(folder: Path) -> None:
     checks.SAMPLES_MAX, checks.STEPS_MAX, cluster.TIMEOUT_S = SAMPLES_MAX, STEPS_MAX, TIMEOUT_S
     parallel.run = _short(parallel.run)
     bench.study = zwidth.run = shared_library.build = synth.synthesise = board.build = board.load_into = _begin
+    panel.VirtualBench.connect = _begin
     store.build_dir = lambda: folder / "build"
     connected = cluster.client
     cluster.client = lambda jobs, workers=None, scheduler=None: (

@@ -1,0 +1,254 @@
+"""What polls a board for all tabs: one thread has its axis, does what they ask for, and keeps what they see."""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from ..axis import Axis
+from ..errors import ChangedError, ForeignError, HostError, NotReadyError, PortError
+from ..heartbeat import LEASE_S
+from ..status import State
+from .knobs import knobs_of
+from .pace import Pace
+from .view import View
+
+LOOK_S = 1 / 60
+"""The time between two looks at the board."""
+KEPT = 4096
+"""Samples that are kept for tabs."""
+STALE_S = 0.5
+"""The age at which what a tab asked for is not done any more: the board was silent meanwhile, and the person waited."""
+
+
+class Sample(NamedTuple):
+    """A look at the board: the time of this computer, and what the axis did, in SI units."""
+
+    time_s: float
+    position_m: float
+    velocity_m_per_s: float
+    wall_force_n: float
+    force_n: float
+
+
+class Driver:
+    """The one user of an axis. Tabs ask, and see; nothing that they call waits for the board.
+
+    The tab that armed renews the lease, by `ping`. When it is silent for `LEASE_S`, the board is disarmed; and if this
+    thread cannot do that, it cannot renew either, so that the board trips.
+
+    Args:
+        connect: returns an axis; called at the beginning, and again when a tab asks for it.
+
+    Attributes:
+        view: what is known of the board.
+
+    Raises:
+        HostError: if the board cannot be had at the beginning.
+    """
+
+    def __init__(self, connect: Callable[[], Axis]):
+        self._connect, self.view = connect, View()
+        self._asked: deque[tuple[float, Callable[[], None]]] = deque()
+        self._wanted: dict[str, tuple[str, float]] = {}
+        self._lock, self._ended = threading.Lock(), threading.Event()
+        self._samples: deque[Sample] = deque(maxlen=KEPT)
+        self._pings: dict[str, float] = {}
+        self._taken, self._renewed_s = 0, 0.0
+        self._axis: Axis | None = None
+        self._open()
+        self._thread = threading.Thread(target=self._run, name="hardwall-panel", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Disarm, and leave the board."""
+        self._ended.set()
+        self._thread.join()
+        if self._axis:
+            self._axis.close()
+            self._axis = None
+
+    # ---- what tabs call ---------------------------------------------------------------------------------------------
+
+    def samples_since(self, number: int) -> tuple[int, list[Sample]]:
+        """Return the number of the next sample, and those from `number` on that are kept."""
+        with self._lock:
+            new = min(self._taken - number, len(self._samples))
+            return self._taken, [self._samples[-place] for place in range(new, 0, -1)]
+
+    def ping(self, tab: str) -> None:
+        """Hear that a tab lives."""
+        self._pings[tab] = time.monotonic()
+
+    def leave(self, tab: str) -> None:
+        """Hear that a tab has gone; if it armed, the board is disarmed."""
+        self._pings.pop(tab, None)
+        if self.view.holder == tab:
+            self._ask(self._disarm)
+
+    def arm(self, tab: str) -> None:
+        """Arm, for a tab that lives."""
+        self._ask(lambda: self._arm(tab))
+
+    def disarm(self) -> None:
+        """Disarm; any tab may."""
+        self._ask(self._disarm)
+
+    def acknowledge(self, latched: int) -> None:
+        """Acknowledge the causes that a tab shows, and no others."""
+        self._ask(lambda: self._acknowledge(latched))
+
+    def connect(self) -> None:
+        """Open the port again, if the board was lost."""
+        self._ask(self._open_again)
+
+    def set(self, tab: str, name: str, value: float) -> None:
+        """Write a word, in SI units; of several values that come before they are written the last counts."""
+        with self._lock:
+            self._wanted[name] = tab, value
+
+    # ---- the thread -------------------------------------------------------------------------------------------------
+
+    def _ask(self, do: Callable[[], None]) -> None:
+        self._asked.append((time.monotonic(), do))
+
+    def _run(self) -> None:
+        while not self._ended.is_set():
+            began = time.monotonic()
+            try:
+                self._obey()
+                if self._axis:
+                    self._write(self._axis)
+                    self._live(self._axis)
+                    self._look(self._axis)
+            except (PortError, ForeignError, ChangedError) as error:
+                self._lose(error)
+            except HostError as error:
+                self._see(status=None, lost=f"{error}")
+            except Exception as error:
+                # Whatever it is: a page never shows an old state as if it were of now.
+                self._lose(HostError(f"the panel failed: {error!r}"))
+            self._ended.wait(max(began + LOOK_S - time.monotonic(), 0.001))
+
+    def _see(self, **changes: Any) -> None:
+        self.view = replace(self.view, **changes)
+
+    def _obey(self) -> None:
+        """Do what was asked for; what is refused is said."""
+        while self._asked:
+            asked_s, do = self._asked.popleft()
+            if do != self._disarm and time.monotonic() - asked_s > STALE_S:
+                self._see(said="the board did not answer in time: nothing was done")
+                continue
+            self._try(do)
+
+    def _try(self, do: Callable[[], None]) -> None:
+        self._see(said="")
+        try:
+            do()
+        except PortError:
+            raise
+        except (HostError, ValueError, TypeError) as error:
+            self._see(said=f"{error}")
+            if isinstance(error, ForeignError | ChangedError):
+                raise
+
+    def _open(self) -> None:
+        """Connect, and read what the board uses."""
+        self._axis = axis = self._connect()
+        names = [knob.name for knob in knobs_of(axis.device)]
+        values = {name: axis.get(name) for name in names}
+        stamp = axis.device.registers["stamp"]
+        self._pace = Pace((stamp.high + 1) * stamp.lsb)
+        self._see(device=axis.device, status=axis.status, connected=True, lost="", holder=None, pace=None)
+        self._keep(values)
+
+    def _open_again(self) -> None:
+        if self._axis is None:
+            try:
+                self._open()
+            except (HostError, OSError) as error:
+                self._see(lost=f"{error}")
+
+    def _lose(self, error: HostError) -> None:
+        """Leave a board that is gone, or is another one."""
+        if self._axis:
+            self._axis.close()
+            self._axis = None
+        self._see(status=None, connected=False, lost=f"{error}", holder=None)
+
+    def _arm(self, tab: str) -> None:
+        if self._axis is None:
+            return
+        if not self._lives(tab):
+            raise NotReadyError("the tab that asks to arm is not heard")
+        self._axis.arm()
+        self._see(holder=tab)
+
+    def _disarm(self) -> None:
+        if self._axis:
+            self._axis.disarm()
+            self._see(holder=None)
+
+    def _acknowledge(self, latched: int) -> None:
+        if self._axis is None:
+            return
+        trip = self._axis.trip
+        if trip is None:
+            return
+        if trip.latched != latched:
+            raise HostError(f"other causes stand than those that were shown: {trip}")
+        self._axis.acknowledge(trip)
+
+    def _write(self, axis: Axis) -> None:
+        """Write what tabs want, all at one sample; while a tab holds the board, only what that one wants."""
+        with self._lock:
+            wanted, self._wanted = self._wanted, {}
+        values = {name: value for name, (tab, value) in wanted.items() if self.view.holder in (None, tab)}
+        if len(values) < len(wanted):
+            self._see(said="another tab armed the board, and alone may set its words")
+        if values:
+            self._try(lambda: self._set(axis, values))
+
+    def _set(self, axis: Axis, values: dict[str, float]) -> None:
+        try:
+            axis.set(**values)
+        finally:
+            # What was refused is not left as it is shown.
+            self._keep({name: axis.get(name) for name in values if name in self.view.values})
+
+    def _keep(self, values: dict[str, float]) -> None:
+        kept = {**self.view.values, **values}
+        self._see(values=MappingProxyType(kept), revision=self.view.revision + 1)
+
+    def _lives(self, tab: str) -> bool:
+        return time.monotonic() - self._pings.get(tab, -LEASE_S) < LEASE_S
+
+    def _live(self, axis: Axis) -> None:
+        """Renew the lease for a ping that is new; disarm when the tab that armed is silent."""
+        holder = self.view.holder
+        if holder is None:
+            return
+        if not self._lives(holder):
+            self._disarm()
+            self._see(said=f"the tab that armed was silent for {LEASE_S:g} s, so the board is disarmed")
+        elif (pinged_s := self._pings[holder]) > self._renewed_s:
+            self._renewed_s = pinged_s
+            axis.renew()
+
+    def _look(self, axis: Axis) -> None:
+        """Read the board."""
+        status = axis.status
+        now_s = time.monotonic()
+        with self._lock:
+            self._taken += 1
+            self._samples.append(
+                Sample(now_s, status.position_m, status.velocity_m_per_s, status.wall_force_n, status.force_n)
+            )
+        holder = self.view.holder if status.state is State.ARMED else None
+        self._pace.take(now_s, status.stamp_s)
+        measured = {"pace": self._pace.pace, "looks_hz": self._pace.looks_hz}
+        self._see(status=status, lost="", holder=holder, **measured)

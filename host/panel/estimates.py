@@ -1,0 +1,91 @@
+"""What two velocity estimators make of the same counts, at every sample: bit-accurate models beside the board."""
+
+import threading
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ...model import axis as model
+from ...model.spec import AxisSpec
+
+PLAIN = "fdm"
+"""The estimator beside the board's own: the difference of two counts, as the founding paper calls it."""
+KEPT = 256
+"""Records that are kept for tabs."""
+
+
+class _Lane:
+    """An axis that goes on from record to record, with words that may change between two."""
+
+    def __init__(self, spec: AxisSpec):
+        self.spec = spec
+        self._params, self._state = model.Axis(spec).params, spec.design.start(False)
+        self._names = {word.name for word in spec.design.words}
+
+    def set(self, values: Mapping[str, float]) -> None:
+        words = {name: values[name] for name in self._names & values.keys()}
+        self._params = model.Axis(self.spec, False, **words).params
+
+    def run(self, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the velocities (m/s) and the wall's forces (N) of successive counts."""
+        words = [np.zeros(len(counts), np.int64) for _ in range(4)]
+        self._state = model.run(self._params, self._state, counts, *words)
+        record = model.Record(self.spec.design, *words)
+        return record.velocity_m_per_s, record.force_n
+
+
+class Estimates:
+    """The board's estimator and the plain difference, side by side, fed with the same counts.
+
+    Args:
+        spec: the axis, whose estimator needs counts only.
+
+    Attributes:
+        names: the estimators, the board's first.
+        sample_hz: samples of the axis in a second of the board.
+
+    Raises:
+        ValueError: if the estimator needs the stamps of edges, too.
+    """
+
+    def __init__(self, spec: AxisSpec):
+        if spec.design.estimator.uses_stamps():
+            raise ValueError(f"estimator must be one that needs only counts, not {spec.estimator!r}")
+        self.names, self.sample_hz = (spec.estimator, PLAIN), spec.sample_hz
+        self._lanes = [_Lane(spec), _Lane(replace(spec, estimator=PLAIN, gains=None))]
+        self._values: Mapping[str, float] | None = None
+        self._records: deque[bytes] = deque(maxlen=KEPT)
+        self._taken, self._lock = 0, threading.Lock()
+        # The first call compiles, for which no tab would wait.
+        for lane in self._lanes:
+            lane.run(np.zeros(1, np.int64))
+
+    def use(self, values: Mapping[str, float]) -> None:
+        """Take the words that the board uses, in SI units, from the next record on."""
+        self._values = values
+
+    def feed(self, counts: list[int]) -> None:
+        """Take the next counts."""
+        values, self._values = self._values, None
+        if values is not None:
+            for lane in self._lanes:
+                lane.set(values)
+        half = 1 << self._lanes[0].spec.count_width - 1
+        taken = (np.array(counts, np.int64) + half) % (2 * half) - half
+        both = [lane.run(taken) for lane in self._lanes]
+        rows = np.concatenate([both[lane][kind] for kind in (0, 1) for lane in (0, 1)])
+        with self._lock:
+            self._taken += 1
+            self._records.append(rows.astype("<f4").tobytes())
+
+    def since(self, number: int) -> tuple[int, list[bytes]]:
+        """Return the number of the next record, and those from `number` on that are kept.
+
+        A record is four successive rows of float32, of one length: the velocities (m/s) of both estimators, then the
+        forces (N).
+        """
+        with self._lock:
+            new = min(self._taken - number, len(self._records))
+            return self._taken, [self._records[-place] for place in range(new, 0, -1)]

@@ -1,0 +1,131 @@
+"""The socket between a tab and the board: what must not wait for a page goes by it, the sign that the tab lives first.
+
+A tab sends objects of JSON with a key `do`: ping, arm, disarm, acknowledge (`latched`), connect, and at a virtual board
+hold (`m`), free and turn (`fault`). It gets objects with `told`, see `view.told`, when that changed, and `samples`,
+each a list of what a `Sample` has; and, as bytes, the records of `Estimates`.
+"""
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from fastapi import WebSocket, WebSocketDisconnect
+
+from .driver import LOOK_S, Driver
+from .estimates import Estimates
+from .hand import Hand
+from .view import told
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What is beside a virtual board.
+
+    Attributes:
+        hand: the hand at its handle.
+        estimates: two estimators beside it; None if its own needs more than counts.
+    """
+
+    hand: Hand
+    estimates: Estimates | None
+
+
+class Live:
+    """The sockets of all tabs.
+
+    Args:
+        driver: the board.
+        bench: what is beside a virtual board; None at a real one.
+    """
+
+    def __init__(self, driver: Driver, bench: Bench | None):
+        self._driver, self._bench, self._dragging = driver, bench, ""
+        self._acts: dict[str, Callable[[str, dict[str, Any]], object]] = {
+            "ping": lambda tab, _: driver.ping(tab),
+            "arm": lambda tab, _: driver.arm(tab),
+            "disarm": lambda tab, _: driver.disarm(),
+            "acknowledge": lambda tab, message: driver.acknowledge(int(message["latched"])),
+            "connect": lambda tab, _: driver.connect(),
+        }
+        if bench:
+            hand = bench.hand
+            self._acts |= {
+                "hold": lambda tab, message: self._hold(tab, hand, float(message["m"])),
+                "free": lambda tab, _: self._free(tab, hand),
+                "turn": lambda tab, message: self._turn(tab, hand, str(message["fault"])),
+            }
+
+    async def serve(self, socket: WebSocket, tab: str) -> None:
+        """Serve a tab until its socket is closed; then its board is disarmed, and its hand lets go."""
+        await socket.accept()
+        sending = asyncio.create_task(self._send(socket, tab))
+        try:
+            while True:
+                message = await socket.receive_json()
+                self._acts[message["do"]](tab, message)
+        except (KeyError, TypeError, ValueError):
+            # What is no message of a page of ours is not answered.
+            with suppress(RuntimeError):
+                await socket.close(1003)
+        except (WebSocketDisconnect, RuntimeError):
+            pass
+        finally:
+            sending.cancel()
+            self._driver.leave(tab)
+            if self._bench:
+                self._free(tab, self._bench.hand)
+
+    def _may(self, tab: str) -> bool:
+        """Return whether a tab may do more than to disarm: no other one holds the board."""
+        return self._driver.view.holder in (None, tab)
+
+    def _hold(self, tab: str, hand: Hand, wanted_m: float) -> None:
+        status = self._driver.view.status
+        if status and self._may(tab) and self._dragging in ("", tab):
+            self._dragging = tab
+            hand.hold(wanted_m, status.position_m)
+
+    def _turn(self, tab: str, hand: Hand, fault: str) -> None:
+        if self._may(tab):
+            hand.turn(fault)
+
+    def _free(self, tab: str, hand: Hand) -> None:
+        if self._dragging == tab:
+            self._dragging = ""
+            hand.free()
+
+    async def _send(self, socket: WebSocket, tab: str) -> None:
+        """Send what is new, until the socket is closed."""
+        estimates = self._bench.estimates if self._bench else None
+        number, _ = self._driver.samples_since(0)
+        record, _ = estimates.since(0) if estimates else (0, [])
+        before: dict[str, Any] = {}
+        revision = -1
+        with suppress(WebSocketDisconnect, RuntimeError):
+            while True:
+                message: dict[str, Any] = {}
+                now = self._told(tab)
+                if now != before:
+                    message["told"] = before = now
+                number, samples = self._driver.samples_since(number)
+                if samples:
+                    message["samples"] = samples
+                if message:
+                    await socket.send_json(message)
+                if estimates:
+                    if revision != (view := self._driver.view).revision:
+                        revision = view.revision
+                        estimates.use(view.values)
+                    record, records = estimates.since(record)
+                    for each in records:
+                        await socket.send_bytes(each)
+                await asyncio.sleep(LOOK_S)
+
+    def _told(self, tab: str) -> dict[str, Any]:
+        now = told(self._driver.view, tab)
+        if self._bench:
+            hand = self._bench.hand
+            now |= {"hand_m": hand.held_m, "broken": sorted(hand.broken)}
+        return now

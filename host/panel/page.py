@@ -1,0 +1,161 @@
+"""What the page is made of: its head, which the socket writes, the drawings, and a knob for every word."""
+
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from nicegui import events, ui
+
+from .driver import Driver
+from .hand import FAULTS
+from .knobs import Group, Knob, Way, knobs_of
+from .live import Bench
+
+STEPS = 1000
+"""Places of a slider."""
+TOUCH_S = 0.4
+"""The time after which a knob that was touched is at rest."""
+REFRESH_S = 0.15
+"""The time between two looks at what the board uses."""
+HEAD = Path(__file__).with_name("static").joinpath("head.html").read_text(encoding="utf-8")
+
+
+def add_page(driver: Driver, bench: Bench | None, title: str) -> None:
+    """Add the page of a board, which every tab builds for itself.
+
+    Args:
+        driver: the board.
+        bench: what is beside a virtual board; None at a real one.
+        title: what the board is called.
+    """
+
+    @ui.page("/")
+    def _() -> None:
+        tab = ui.context.client.id
+        ui.add_head_html('<link rel="stylesheet" href="static/panel.css">')
+        ui.add_head_html(f'<script>window.hardwallTab = "{tab}"</script>')
+        ui.add_body_html('<script type="module" src="static/panel.js"></script>')
+        ui.html(HEAD, sanitize=False).classes("head")
+        with ui.element("div").classes("body"):
+            with ui.element("div").classes("drawings"):
+                if bench:
+                    _hand()
+                _drawing(
+                    "traces", "What the board shows", "Its position, velocity and force, as they are read from it."
+                )
+                if bench and bench.estimates:
+                    _estimates(*bench.estimates.names, bench.estimates.sample_hz)
+            with ui.element("aside"):
+                knobs = _knobs(driver, tab)
+        ui.timer(REFRESH_S, _refresher(driver, knobs))
+
+
+def _hand() -> None:
+    faults = "".join(
+        f'<button class="fault" data-fault="{name}" data-mending="{fault.mending}">{fault.breaking}</button>'
+        for name, fault in FAULTS.items()
+    )
+    _drawing("hand", "The hand", "Drag the handle into the wall, with mouse or finger.", faults)
+
+
+def _estimates(own: str, plain: str, sample_hz: int) -> None:
+    about = (
+        f"The same counts of the encoder, at all {sample_hz} samples a second, through the bit-accurate models of both "
+        "estimators, with the words that the board uses; and the force that the wall would make of each."
+    )
+    sound = (
+        '<label class="sound">Sound of the force <select id="sound"><option value="">off</option>'
+        f'<option value="0">{own}</option><option value="1">plain difference</option></select></label>'
+    )
+    _drawing("estimates", f"{own.capitalize()} and the plain difference ({plain})", about, sound, own, sample_hz)
+
+
+def _drawing(name: str, heading: str, about: str, more: str = "", own: str = "", sample_hz: int = 0) -> None:
+    data = f'data-own="{own}" data-rate="{sample_hz}"' if own else ""
+    title = f'<div class="title"><h2>{heading}</h2><div class="more">{more}</div><p>{about}</p></div>'
+    ui.html(f'{title}<canvas id="{name}" {data}></canvas>', sanitize=False).classes("card")
+
+
+class _Row:
+    """A knob on the page: a slider with a field of numbers, or a switch; and what the board uses.
+
+    Args:
+        knob: the word.
+        give: takes its new SI value.
+    """
+
+    def __init__(self, knob: Knob, give: Callable[[float], None]):
+        self.knob, self._give_value, self._touched_s = knob, give, 0.0
+        self._slider = self._number = self._switch = None
+        with ui.element("div").classes("knob").props(f'data-word="{knob.name}"'):
+            ui.label(knob.label).classes("name")
+            if knob.way is Way.SWITCH:
+                self._switch = ui.switch().props("dense").on("update:model-value", self._switched)
+            else:
+                self._slider = ui.slider(min=0, max=STEPS, step=1).props("dense")
+                self._slider.on("update:model-value", self._slid, throttle=0.05)
+                least, most = knob.shown(knob.least), knob.shown(knob.most)
+                self._number = ui.number(min=least, max=most, suffix=knob.unit, format="%.7g")
+                self._number.props("dense outlined hide-bottom-space").on("blur", self._typed)
+                self._number.on("keydown.enter", self._typed)
+            self._used = ui.label().classes("used")
+
+    @property
+    def rests(self) -> bool:
+        """Whether nobody has touched it for a while: a knob does not move under a hand."""
+        return time.monotonic() - self._touched_s > TOUCH_S
+
+    def show(self, value: float) -> None:
+        """Show what the board uses, an SI value."""
+        knob = self.knob
+        if self._switch:
+            self._switch.set_value(value > 0)
+            self._used.set_text("on" if value > 0 else "off")
+        elif self._slider and self._number:
+            self._slider.set_value(round(STEPS * knob.to_slider(value)))
+            self._number.set_value(knob.shown(value))
+            self._used.set_text(f"{knob.shown(value):.7g} {knob.unit}")
+
+    def _give(self, value: float) -> None:
+        self._touched_s = time.monotonic()
+        self._give_value(value)
+
+    def _switched(self, event: events.GenericEventArguments) -> None:
+        self._give(float(bool(event.args if not isinstance(event.args, list) else event.args[0])))
+
+    def _slid(self, event: events.GenericEventArguments) -> None:
+        place = event.args[0] if isinstance(event.args, list) else event.args
+        self._give(self.knob.from_slider(float(place) / STEPS))
+
+    def _typed(self) -> None:
+        if self._number and self._number.value is not None:
+            self._give(self.knob.in_si(self._number.value))
+
+
+def _knobs(driver: Driver, tab: str) -> list[_Row]:
+    """Add a card for every group of words."""
+    device = driver.view.device
+    knobs = knobs_of(device) if device else ()
+    rows = []
+    for group in Group:
+        with ui.expansion(group.value, value=group is not Group.WIRING).classes("card group").props("dense"):
+            for knob in knobs:
+                if knob.group is group:
+                    rows.append(_Row(knob, partial(driver.set, tab, knob.name)))
+    return rows
+
+
+def _refresher(driver: Driver, rows: list[_Row]) -> Callable[[], None]:
+    """Return what shows the values of the board where they are new, and where they are not what a hand wanted."""
+    shown: dict[str, int] = {}
+
+    def refresh() -> None:
+        view = driver.view
+        for row in rows:
+            name = row.knob.name
+            if shown.get(name) != view.revision and row.rests and name in view.values:
+                shown[name] = view.revision
+                row.show(view.values[name])
+
+    return refresh

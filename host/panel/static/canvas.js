@@ -1,0 +1,58 @@
+// What the drawings share: a canvas in the pixels of the screen, colours, and round numbers for axes.
+
+export const INK = "#1d2733", PALE = "#8894a3", GRID = "#e3e8ee";
+export const BLUE = "#0072B2", GREEN = "#009E73", RED = "#D55E00", GREY = "#444444";
+export const FONT = "12px Roboto, sans-serif", SMALL = "11px Roboto, sans-serif";
+
+// Returns the context of a canvas, cleared, with the unit of one pixel of the page; and its size.
+export function cleared(canvas) {
+  const ratio = window.devicePixelRatio || 1;
+  const width = canvas.clientWidth, height = canvas.clientHeight;
+  if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+    canvas.width = Math.round(width * ratio);
+    canvas.height = Math.round(height * ratio);
+  }
+  const context = canvas.getContext("2d");
+  context.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context.clearRect(0, 0, width, height);
+  context.font = FONT;
+  context.textBaseline = "middle";
+  return { context, width, height };
+}
+
+// Returns about `count` round numbers from `low` to `high`, and how many decimals they need.
+export function ticks(low, high, count) {
+  const raw = (high - low) / count;
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((each) => each * power).find((each) => each >= raw * 0.999);
+  const values = [];
+  for (let k = Math.ceil(low / step); k * step <= high; k++) values.push(k * step);
+  return { values, decimals: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
+}
+
+export function number(value, decimals) {
+  return value.toFixed(decimals).replace(/^-(0(\.0*)?)$/, "$1").replace("-", "\u2212");
+}
+
+// The height above a strip in which its name stands.
+export const NAME = 20;
+
+// Draws the frame of a strip, with its numbers and its name above it; returns the height at which a value is drawn.
+export function strip(context, box, low, high, name) {
+  const { left, top, width, height } = box;
+  const at = (value) => top + height * (1 - (value - low) / (high - low));
+  const marks = ticks(low, high, Math.max(2, Math.round(height / 32)));
+  context.textAlign = "right";
+  for (const value of marks.values) {
+    context.fillStyle = GRID;
+    context.fillRect(left, Math.round(at(value)), width, 1);
+    context.fillStyle = PALE;
+    context.font = SMALL;
+    context.fillText(number(value, marks.decimals), left - 6, at(value));
+  }
+  context.textAlign = "left";
+  context.fillStyle = INK;
+  context.font = FONT;
+  context.fillText(name, left, top - 9);
+  return at;
+}

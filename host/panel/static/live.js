@@ -1,0 +1,68 @@
+// The socket to the board. What is sent here is never kept for later: without a connection it is not sent at all.
+
+export const ALIVE_MS = 100; // the time between two signs of life; the board's lease lasts five of them
+const AGAIN_MS = 1000; // the time until a lost socket is opened again
+const QUIET_MS = 1500; // the time without a sample after which what is shown is old
+
+export const board = { told: null };
+let heard = 0, truth = null, old = false; // `truth` is what was told last
+const hearers = { told: [], samples: [], records: [] };
+let socket = null;
+
+export function hear(what, hearer) {
+  hearers[what].push(hearer);
+}
+
+export function send(message) {
+  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+}
+
+function tell(what, value) {
+  for (const hearer of hearers[what]) hearer(value);
+}
+
+function lose() {
+  const why = "This page has lost the program behind it.";
+  board.told = { state: "NO PANEL", why, do: "The board is disarmed, or trips.", may: [], said: "", broken: [] };
+  tell("told", board.told);
+}
+
+export function open() {
+  const url = new URL(`live?tab=${window.hardwallTab}`, window.location.href);
+  url.protocol = url.protocol.replace("http", "ws");
+  socket = new WebSocket(url);
+  socket.binaryType = "arraybuffer";
+  socket.onmessage = (event) => {
+    if (event.data instanceof ArrayBuffer) return tell("records", new Float32Array(event.data));
+    const message = JSON.parse(event.data);
+    if (message.told) truth = message.told;
+    if (message.samples || !old) heard = performance.now();
+    if (message.told || (message.samples && old)) {
+      old = false;
+      tell("told", (board.told = truth));
+    }
+    if (message.samples) {
+      tell("samples", message.samples);
+    }
+  };
+  socket.onclose = () => {
+    lose();
+    setTimeout(open, AGAIN_MS);
+  };
+}
+
+// Says so when what is shown is old, although nobody has said why.
+export function look() {
+  const told = board.told;
+  if (!told || !["DISARMED", "ARMED", "TRIPPED"].includes(told.state) || performance.now() - heard < QUIET_MS) return;
+  const why = "Nothing has come from the board for a while.";
+  old = true;
+  tell("told", (board.told = { ...told, state: "SILENT", why, do: "What is shown is old." }));
+}
+
+// A tab that nobody sees does not hold a board: browsers slow it down anyway.
+function hide() {
+  if (board.told && board.told.holds) send({ do: "disarm" });
+}
+document.addEventListener("visibilitychange", () => document.hidden && hide());
+window.addEventListener("pagehide", hide);

@@ -1,0 +1,77 @@
+// The page: its head, its buttons, and the loop that draws and shows that the tab lives.
+
+import { ALIVE_MS, board, hear, look, open, send } from "./live.js";
+import { drawTraces, takeFresh } from "./traces.js";
+import { drawHand, listen } from "./hand.js";
+import { begin, drawEstimates, keepPace, listenTo } from "./estimates.js";
+
+const find = (id) => document.getElementById(id);
+const ACTS = ["arm", "disarm", "acknowledge", "connect"];
+const drawn = []; // the times of the frames that had something new
+let identity = "", pinged = 0;
+
+function act(name) {
+  if (name === "acknowledge") send({ do: name, latched: board.told.latched });
+  else send({ do: name });
+}
+
+hear("told", (told) => {
+  find("head").dataset.state = told.state;
+  for (const name of ["state", "why", "do", "said"]) find(name).textContent = told[name];
+  for (const name of ACTS) find(name).disabled = !told.may.includes(name);
+  find("connect").hidden = !told.may.includes("connect");
+  document.body.classList.toggle("locked", Boolean(told.locked));
+  document.title = `${told.state} – hardwall`;
+  keepPace(told.pace);
+  if (told.identity) {
+    // Another board has other words: the page is built anew.
+    if (identity && identity !== told.identity) window.location.reload();
+    identity = told.identity;
+    find("identity").textContent = `board ${identity}`;
+  }
+  for (const button of document.querySelectorAll(".fault")) {
+    button.classList.toggle("broken", told.broken ? told.broken.includes(button.dataset.fault) : false);
+  }
+});
+
+function pace(now) {
+  while (drawn.length && drawn[0] < now - 1000) drawn.shift();
+  const told = board.told;
+  if (!told || !told.pace) return (find("pace").textContent = "");
+  const flags = told.flags.length ? ` · ${told.flags.join(", ").replaceAll("_", " ")}` : "";
+  const looks = `read ${told.looks_hz.toFixed(0)} times a second, drawn ${drawn.length} times`;
+  find("pace").textContent = `${told.pace.toFixed(2)} of real time · ${looks}${flags}`;
+}
+
+function frame(now) {
+  // The tab lives as long as it draws: one that hangs, or is hidden, does not renew the lease.
+  if (now - pinged >= ALIVE_MS) {
+    pinged = now;
+    send({ do: "ping" });
+    pace(now);
+    look();
+  }
+  if (takeFresh()) drawn.push(now);
+  if (find("traces")) drawTraces(find("traces"));
+  if (find("hand")) drawHand(find("hand"));
+  if (find("estimates")) drawEstimates(find("estimates"));
+  window.requestAnimationFrame(frame);
+}
+
+// The page's elements are there a moment after its scripts.
+function start() {
+  if (!find("head") || !find("traces")) return window.requestAnimationFrame(start);
+  for (const name of ACTS) find(name).addEventListener("click", () => act(name));
+  document.addEventListener("keydown", (event) => event.key === "Escape" && act("disarm"));
+  for (const button of document.querySelectorAll(".fault")) {
+    button.addEventListener("click", () => send({ do: "turn", fault: button.dataset.fault }));
+  }
+  if (find("hand")) listen(find("hand"));
+  if (find("estimates")) {
+    begin(find("estimates"));
+    listenTo(find("sound"));
+  }
+  open();
+  window.requestAnimationFrame(frame);
+}
+start();

@@ -1,0 +1,195 @@
+"""The driver of a board for tabs: who may do what, the lease that follows the tab that armed, and what is shown."""
+
+import time
+from collections.abc import Callable
+
+import pytest
+
+from hardwall.host.errors import HostError
+from hardwall.host.heartbeat import LEASE_S
+from hardwall.host.panel.driver import STALE_S, Driver
+from hardwall.host.panel.view import View
+from hardwall.host.status import State
+from hardwall.model.supervisor import TRIPPED
+from stimuli.processes import wait_until
+
+TAB, OTHER = "tab", "other"
+STOP = 1 << 13
+"""The cause emergency_stop."""
+
+
+def seen(driver: Driver, so: Callable[[View], object], tab: str = TAB) -> View:
+    """Wait until the view is as expected, while a tab lives."""
+
+    def happens() -> object:
+        driver.ping(tab)
+        return so(driver.view)
+
+    wait_until(happens)
+    return driver.view
+
+
+def armed(driver: Driver, tab: str = TAB) -> None:
+    driver.ping(tab)
+    driver.arm(tab)
+    seen(driver, lambda view: view.holder == tab and view.status.state is State.ARMED, tab)
+
+
+def test_it_shows_what_the_board_does(driver, board):
+    board.show(count=3, driven=-5)
+    view = seen(driver, lambda view: view.status.force_n < 0)
+    assert view.status.force_n == pytest.approx(-5e-3)
+    assert view.connected
+    assert not view.lost
+    number, samples = driver.samples_since(0)
+    assert number == len(samples) > 0
+    wait_until(lambda: driver.samples_since(number)[1])
+    assert driver.samples_since(number)[1][0].position_m == pytest.approx(3 * board_count_m(driver))
+    assert driver.samples_since(driver.samples_since(0)[0] + 5)[1] == []
+
+
+def board_count_m(driver: Driver) -> float:
+    return driver.view.device.registers["count"].lsb
+
+
+def test_the_tab_that_armed_keeps_it_armed_and_its_silence_disarms(driver, board):
+    armed(driver)
+    until = time.monotonic() + 2 * LEASE_S
+    seen(driver, lambda _: time.monotonic() > until)
+    assert driver.view.holder == TAB
+    assert driver.view.status.state is State.ARMED
+    # Others that live do not keep it.
+    seen(driver, lambda view: view.status.state is State.DISARMED, OTHER)
+    assert driver.view.holder is None
+    assert "silent for 0.5 s" in driver.view.said
+    # And no beat follows.
+    time.sleep(LEASE_S)
+    before = beats(board)
+    later = time.monotonic() + LEASE_S
+    seen(driver, lambda _: time.monotonic() > later)
+    assert beats(board) == before
+
+
+def beats(board) -> int:
+    return sum(each[1] == 16 and each[2:4] == b"\0\xc0" for each in list(board.requests))
+
+
+def test_a_tab_that_goes_disarms_what_it_armed_and_nothing_else(driver):
+    armed(driver)
+    driver.leave(OTHER)
+    driver.ping(TAB)
+    time.sleep(0.1)
+    assert driver.view.holder == TAB
+    driver.leave(TAB)
+    wait_until(lambda: driver.view.status.state is State.DISARMED)
+
+
+def test_a_tab_that_is_not_heard_cannot_arm(driver, board):
+    driver.arm(TAB)
+    wait_until(lambda: driver.view.said)
+    assert driver.view.said == "the tab that asks to arm is not heard"
+    assert driver.view.status.state is State.DISARMED
+
+
+def test_another_tab_sets_nothing_while_one_holds_but_it_disarms(driver):
+    armed(driver)
+    driver.set(OTHER, "wall_stiffness", 500.0)
+    seen(driver, lambda view: "another tab armed the board" in view.said)
+    assert driver.view.values["wall_stiffness"] == 0
+    driver.set(TAB, "wall_stiffness", 500.0)
+    seen(driver, lambda view: view.values["wall_stiffness"] > 0)
+    driver.disarm()
+    wait_until(lambda: driver.view.status.state is State.DISARMED)
+    driver.set(OTHER, "wall_stiffness", 900.0)
+    wait_until(lambda: driver.view.values["wall_stiffness"] == pytest.approx(900, abs=4))
+
+
+def test_what_the_board_does_not_take_is_said_and_shown_as_it_is(driver):
+    before = driver.view
+    driver.set(TAB, "wall_stiffness", 1e9)
+    wait_until(lambda: driver.view.said)
+    assert driver.view.said.startswith("wall_stiffness must be 0 to ")
+    assert driver.view.values["wall_stiffness"] == before.values["wall_stiffness"]
+    assert driver.view.revision > before.revision
+    driver.set(TAB, "wall_stiffness", 800.0)
+    wait_until(lambda: driver.view.values["wall_stiffness"] == pytest.approx(800, abs=4))
+    assert not driver.view.said
+
+
+def test_only_the_causes_that_a_tab_shows_are_acknowledged(driver, board):
+    board.show(state=TRIPPED, latched=STOP | 1, first=STOP)
+    wait_until(lambda: driver.view.status.trip)
+    driver.acknowledge(STOP)
+    wait_until(lambda: "other causes stand" in driver.view.said)
+    assert driver.view.status.state is State.TRIPPED
+    driver.acknowledge(STOP | 1)
+    wait_until(lambda: driver.view.status.state is State.DISARMED)
+    assert not driver.view.said
+    driver.acknowledge(STOP)
+    assert driver.view.status.state is State.DISARMED
+
+
+def test_a_trip_ends_the_hold_of_the_tab(driver, board):
+    armed(driver)
+    board.show(state=TRIPPED, latched=STOP, first=STOP)
+    view = seen(driver, lambda view: view.status.trip)
+    assert view.holder is None
+
+
+def test_what_was_asked_of_a_silent_board_is_not_done_late_but_a_disarm_is(driver, board):
+    board.late_s = STALE_S + 0.4
+    time.sleep(0.1)
+    driver.arm(TAB)
+    seen(driver, lambda view: "nothing was done" in view.said)
+    assert driver.view.status.state is State.DISARMED
+    armed(driver)
+    board.late_s = STALE_S + 0.4
+    time.sleep(0.1)
+    driver.disarm()
+    wait_until(lambda: driver.view.status.state is State.DISARMED)
+
+
+def test_a_board_that_is_gone_is_said_and_had_again(driver, board):
+    armed(driver)
+    board.hang_up()
+    wait_until(lambda: not driver.view.connected)
+    assert driver.view.status is None
+    assert driver.view.holder is None
+    assert "is gone" in driver.view.lost
+    driver.connect()
+    wait_until(lambda: driver.view.connected)
+    assert driver.view.status
+    assert not driver.view.lost
+    driver.disarm()
+
+
+def test_a_silent_board_is_asked_again(driver, board):
+    board.lost = 1
+    wait_until(lambda: driver.view.status is None)
+    assert driver.view.connected
+    assert "nothing answers" in driver.view.lost
+    wait_until(lambda: driver.view.status)
+    assert not driver.view.lost
+
+
+def test_a_fault_of_its_own_is_no_old_state(driver, monkeypatch):
+    def fails(*_: object) -> None:
+        raise ZeroDivisionError("oops")
+
+    monkeypatch.setattr(driver, "_look", fails)
+    wait_until(lambda: driver.view.status is None)
+    assert driver.view.lost == "the panel failed: ZeroDivisionError('oops')"
+
+
+def test_its_end_disarms(driver, board):
+    armed(driver)
+    driver.close()
+    assert board.server.file.status["state"] == State.DISARMED
+
+
+def test_a_board_that_is_not_there_is_an_error_at_the_beginning():
+    def fails():
+        raise HostError("no")
+
+    with pytest.raises(HostError, match="no"):
+        Driver(fails)

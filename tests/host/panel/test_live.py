@@ -1,0 +1,136 @@
+"""The socket of a tab: what it may ask for, what it is told, and what its end does."""
+
+import asyncio
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from fastapi import WebSocketDisconnect
+
+from hardwall.host.panel.driver import Driver
+from hardwall.host.panel.estimates import Estimates
+from hardwall.host.panel.hand import Hand
+from hardwall.host.panel.live import Bench, Live
+from hardwall.sim.scene.load import load
+from stimuli.processes import wait_until
+
+TAB, OTHER = "tab", "other"
+
+
+class Socket:
+    """A socket whose browser says some messages, the next when something was so; then it goes."""
+
+    def __init__(self, *messages: object):
+        self._messages, self.sent, self.bytes, self.code = list(messages), [], [], None
+
+    async def accept(self) -> None:
+        pass
+
+    async def receive_json(self) -> object:
+        while self._messages and callable(self._messages[0]):
+            so = self._messages[0]
+            while not so():
+                await asyncio.sleep(0.01)
+            self._messages.pop(0)
+        if not self._messages:
+            raise WebSocketDisconnect
+        return self._messages.pop(0)
+
+    async def send_json(self, message: dict) -> None:
+        self.sent.append(message)
+
+    async def send_bytes(self, data: bytes) -> None:
+        self.bytes.append(data)
+
+    async def close(self, code: int) -> None:
+        self.code = code
+
+
+def serve(live: Live, socket: Socket, tab: str = TAB) -> Socket:
+    asyncio.run(live.serve(socket, tab))
+    return socket
+
+
+@pytest.fixture(scope="module")
+def estimates() -> Estimates:
+    return Estimates(load("mhz").spec)
+
+
+@pytest.fixture
+def orders() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def live(driver, orders, estimates) -> Live:
+    return Live(driver, Bench(Hand(orders.append, 0.0, 0.15), estimates))
+
+
+def state(driver: Driver) -> str:
+    return driver.view.status.state.name
+
+
+def test_a_tab_arms_and_its_end_disarms(driver, live):
+    ping = {"do": "ping"}
+    socket = Socket(ping, {"do": "arm"}, lambda: driver.ping(TAB) or driver.view.holder == TAB, ping)
+    serve(live, socket)
+    wait_until(lambda: driver.view.holder is None and state(driver) == "DISARMED")
+
+
+def test_what_is_told_is_told_when_it_changes_and_samples_always(driver, live, board):
+    socket = Socket(lambda: len(socket.sent) > 5, lambda: board.show(a_channel_idle=1) or socket.sent[-1].get("told"))
+    serve(live, socket)
+    told = [message["told"] for message in socket.sent if "told" in message]
+    assert all(before != after for before, after in pairwise(told))
+    assert "a_channel_idle" in told[-1]["flags"]
+    times = [sample[0] for message in socket.sent for sample in message.get("samples", [])]
+    assert len(times) >= 5
+    assert times == sorted(set(times))
+
+
+@pytest.mark.parametrize(
+    "message", [{}, {"do": "leap"}, {"do": "acknowledge"}, {"do": "hold", "m": "x"}, [], "arm", {"do": "turn"}, 3]
+)
+def test_what_is_no_message_ends_the_socket(live, orders, message):
+    assert serve(live, Socket(message)).code == 1003
+    assert orders == []
+
+
+@pytest.mark.parametrize("fault", ["motor swapped", "clock\nhold 100"])
+def test_only_the_faults_that_there_are_reach_the_board(live, orders, fault):
+    assert serve(live, Socket({"do": "turn", "fault": fault})).code == 1003
+    assert orders == []
+
+
+def test_a_hand_holds_and_lets_go_when_its_tab_goes(live, orders):
+    serve(live, Socket({"do": "hold", "m": 1e-3}))
+    assert orders[0].startswith("hold ")
+    assert orders[-1] == "hold free"
+
+
+def test_at_a_real_board_there_is_no_hand(driver):
+    assert serve(Live(driver, None), Socket({"do": "hold", "m": 1e-3})).code == 1003
+
+
+def test_while_another_tab_holds_the_board_a_tab_may_only_disarm(driver, live, orders):
+    driver.ping(OTHER)
+    driver.arm(OTHER)
+    wait_until(lambda: driver.ping(OTHER) or driver.view.holder == OTHER)
+    serve(live, Socket({"do": "hold", "m": 1e-3}, {"do": "turn", "fault": "stop"}))
+    assert orders == []
+    driver.ping(OTHER)
+    assert driver.view.holder == OTHER
+    serve(live, Socket({"do": "disarm"}))
+    wait_until(lambda: state(driver) == "DISARMED")
+
+
+def test_records_of_the_estimators_are_sent_with_the_words_of_the_board(driver, live, estimates):
+    driver.set(TAB, "wall_stiffness", 2000.0)
+    driver.set(TAB, "wall_position", -1e-3)
+    wait_until(lambda: driver.view.values["wall_stiffness"] > 0 and driver.view.values["wall_position"] < 0)
+    socket = Socket(lambda: estimates.feed([0]) or len(socket.bytes) > 3)
+    serve(live, socket)
+    assert socket.code is None
+    assert {len(each) for each in socket.bytes} == {16}
+    # 1 mm deep in the wall that was written.
+    assert np.frombuffer(socket.bytes[-1], "<f4")[2:] == pytest.approx([-2.0, -2.0], rel=0.01)

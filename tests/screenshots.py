@@ -1,0 +1,59 @@
+"""Draw anew the pictures of the page of a panel, in docs/pictures: a real browser at a real panel of a virtual board.
+
+`make screenshots` runs it. What it shows is a run of its own each time: a picture is looked at before it is committed.
+"""
+
+import sys
+from pathlib import Path
+
+from hardwall.sim.pictures.style import DPI, PAGE_IN
+from stimuli.browsers import ABSENT, CHROMIUM, Tab, browser
+from stimuli.processes import HARDWALL, line, started, wait_until
+
+PICTURES = Path(__file__).absolute().parent.parent / "docs" / "pictures"
+WIDTH = round(PAGE_IN * DPI)
+STROKES, STEP_MS = 2, 120
+
+
+def push(tab: Tab) -> None:
+    """Push the handle into the wall, out and in again, and draw it there."""
+    with tab.dragged(11):
+        tab.until(lambda: tab.sample[4] < -2)
+        for stroke in range(2 * STROKES):
+            tab.page.mouse.move(*tab.beside(-4 if stroke % 2 == 0 else 11))
+            tab.until(lambda out=stroke % 2 == 0: (tab.sample[4] == 0) == out)
+        # A slow stroke is in what the estimators show.
+        for way_mm in (*range(11, -5, -1), *range(-4, 12)):
+            tab.page.mouse.move(*tab.beside(way_mm))
+            tab.page.wait_for_timeout(STEP_MS)
+        tab.until(lambda: tab.state == "ARMED" and tab.sample[4] < -2)
+        tab.page.screenshot(path=PICTURES / "panel.png")
+
+
+def trip(tab: Tab) -> None:
+    """Cut a wire of the encoder while the axis drives, and draw the head and the hand."""
+    tab.arm()
+    tab.fault("wire")
+    wait_until(lambda: tab.state == "TRIPPED")
+    tab.page.wait_for_timeout(500)
+    hand = tab.page.locator("#hand").bounding_box()
+    clip = {"x": 0, "y": 0, "width": WIDTH, "height": round(hand["y"] + hand["height"] + 16)}
+    tab.page.screenshot(path=PICTURES / "panel-tripped.png", clip=clip)
+
+
+def main() -> int:
+    if not CHROMIUM.exists():
+        print(ABSENT, file=sys.stderr)
+        return 1
+    with started(HARDWALL, "panel", "virtual") as process, browser() as chromium:
+        tab = Tab(chromium, line(process).removeprefix("page: "), WIDTH, 1250)
+        tab.arm()
+        push(tab)
+        trip(tab)
+    for name in ("panel.png", "panel-tripped.png"):
+        print(PICTURES / name)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
