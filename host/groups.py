@@ -40,6 +40,8 @@ class Group:
         words: what has all words of the board.
     """
 
+    # An attribute that is no word is refused: a slip of the pen would leave the board as it is.
+    __slots__ = ("words",)
     PREFIX = ""
 
     def __init__(self, words: Words):
@@ -49,6 +51,7 @@ class Group:
 class Wall(Group):
     """The virtual wall. Every attribute is written and committed when it is set; `Axis.set` takes several at once."""
 
+    __slots__ = ()
     PREFIX = "wall_"
     stiffness = Value("The spring, N/m.")
     damping = Value("The damper, N s/m.")
@@ -60,6 +63,7 @@ class Wall(Group):
 class Supervisor(Group):
     """What lets a drive out: limits that act at once. Their ranges, and what they are after reset, are the board's."""
 
+    __slots__ = ()
     PREFIX = "supervisor_"
     force_limit = Value("The largest drive either way, N.")
     ramp = Value("The rise of the limit after arming, N/s.")
