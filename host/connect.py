@@ -16,6 +16,7 @@ def connect(name: str, baud: int = BAUD, answer_s: float = ANSWER_S, identity: s
         identity: the identity that the board must have; None for any.
 
     Raises:
+        FieldError: if a number is out of its range.
         PortError: if the port cannot be had.
         SilentError: if nothing answers there.
         ForeignError: if what answers is no axis that this version knows.

@@ -17,13 +17,16 @@ from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusException
 from pymodbus.pdu import ModbusPDU
 
+from ..model.checks import check_int, check_range
 from ..model.link.server import FAILURE, READ_MAX, VALUE, WRITE_MAX
 from .errors import ForeignError, PortError, RefusedError, SilentError
 
-BAUD = 921_600
-"""The board's rate unless its clock is slow."""
+BAUD, BAUD_MAX = 921_600, 4_000_000
+"""The board's rate unless its clock is slow, and the highest of a serial port."""
 ANSWER_S = 1.0
 """How long an answer is waited for: it takes some ms on a board, and longer where a simulation is slower than it."""
+ANSWER_S_LEAST, ANSWER_S_MOST = 1e-3, 3600.0
+"""The limits of that."""
 TRIES = 5
 """Attempts to find the beginning of an answer again."""
 PAUSE_S = 0.025
@@ -135,10 +138,13 @@ class Port:
         name: as given.
 
     Raises:
+        FieldError: if a number is out of its range.
         PortError: if the port cannot be had.
     """
 
     def __init__(self, name: str, baud: int = BAUD, answer_s: float = ANSWER_S):
+        check_int("baud", baud, 1, BAUD_MAX)
+        check_range("answer_s", answer_s, ANSWER_S_LEAST, ANSWER_S_MOST)
         self.name, self._baud = name, baud
         self._client, self._in_step, self._gone = _client(name, baud, answer_s), False, False
         try:
@@ -184,7 +190,12 @@ class Port:
     def _ask(self, request: "_Request") -> Any:
         if self._gone:
             raise PortError(f"{self.name} is closed or gone: connect again")
-        return self._turns.submit(self._turn, request).result()
+        try:
+            turn = self._turns.submit(self._turn, request)
+        except RuntimeError:
+            # Another thread has closed it just now, or the program ends.
+            raise PortError(f"{self.name} is closed: connect again") from None
+        return turn.result()
 
     def _turn(self, request: "_Request") -> ModbusPDU:
         if not self._in_step:
@@ -206,7 +217,12 @@ class Port:
             self._gone = True
             raise PortError(f"{self.name} is gone: is the cable in, and the board powered?") from None
         except ModbusException:
-            self._in_step = False
+            if self._in_step:
+                self._in_step = False
+                raise SilentError(
+                    f"nothing answers any more at {self.name}, to the request to {request.what}, which may have been "
+                    "carried out: is the cable in, and the board powered?"
+                ) from None
             raise SilentError(
                 f"nothing answers at {self.name} at {self._baud} baud: is the board powered and configured, "
                 "and is it this port and this rate?"

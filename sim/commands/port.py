@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ...host import Axis, Status, connect
-from ...host.port import BAUD
+from ...host.port import BAUD, BAUD_MAX
 from ...model.checks import FieldError
 from ..jobs import ending
 from .errors import BadInput
@@ -15,7 +15,7 @@ from .errors import BadInput
 PortArgument = Annotated[
     str, typer.Argument(metavar="PORT", help="a serial port, e.g. of /dev/serial/by-id; or tcp://HOST:PORT")
 ]
-BaudOption = Annotated[int, typer.Option(min=1, max=4_000_000, help="the board's rate")]
+BaudOption = Annotated[int, typer.Option(min=1, max=BAUD_MAX, help="the board's rate")]
 IdentityOption = Annotated[
     str | None, typer.Option(metavar="HASH", help="the identity that the board must have", show_default="any")
 ]

@@ -14,6 +14,7 @@ import pytest
 
 from hardwall.host.errors import ForeignError, PortError, RefusedError, SilentError
 from hardwall.host.port import Port
+from hardwall.model.checks import FieldError
 from hardwall.model.link.server import WRITE_MAX
 
 
@@ -57,7 +58,7 @@ def test_a_refusal_says_what_was_refused_and_why(board, port, ask, code, message
 def test_an_answer_that_is_late_is_not_taken_for_the_next(board, port, registers):
     port.read(0, 2)
     board.late_s = 0.5
-    with pytest.raises(SilentError, match="nothing answers at tcp"):
+    with pytest.raises(SilentError, match="any more at tcp.* to read 2 registers from 0x4000 on, which may have been"):
         port.read(0x4000, 2)
     for _ in range(20):
         assert port.read(0, 2) == (0, registers["layout"].reset)
@@ -170,6 +171,28 @@ def test_silence_ends():
             port.read(0, 2)
         assert time.monotonic() - began < 5
         port.close()
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ({"baud": 0}, "baud must be 1 to 4000000, not 0"),
+        ({"baud": 5_000_000}, "baud must be 1 to 4000000, not 5000000"),
+        ({"answer_s": float("nan")}, "answer_s must be .*, not nan"),
+        ({"answer_s": -1.0}, "answer_s must be .*, not -1.0"),
+    ],
+)
+def test_a_number_out_of_range_is_an_error(numbers, message):
+    with pytest.raises(FieldError, match=message):
+        Port("/dev/hardwall-absent", **numbers)
+
+
+def test_a_request_behind_the_close_is_an_error_of_the_port(port):
+    # As if another thread had closed it behind the first look.
+    port.close()
+    port._gone = False
+    with pytest.raises(PortError, match="is closed: connect again"):
+        port.read(0, 2)
 
 
 @pytest.mark.parametrize(
