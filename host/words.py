@@ -8,7 +8,7 @@ from ..model.checks import FieldError, check_number
 from ..model.register import Kind, Register
 from ..model.registers import ACTIVE, PULSES, WRITTEN
 from .device import Device
-from .errors import ChangedError
+from .errors import ChangedError, RefusedError
 from .port import Port
 
 OF_THE_HEARTBEAT = ("heartbeat", "acknowledged")
@@ -32,6 +32,8 @@ class Words:
         words = [word for kind in kinds for word in device.of_kind(kind) if word.name not in OF_THE_HEARTBEAT]
         self._words = {word.name: word for word in words}
         self._written = self._read()
+        # The words of a request without an answer: it may have been carried out.
+        self._tried: dict[str, int] = {}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -44,13 +46,15 @@ class Words:
         Raises:
             ChangedError: if one differs: the board was reset, or another host has written.
         """
-        for name, word in self._read().items():
-            if word != self._written[name]:
+        found = self._read()
+        for name, word in found.items():
+            if word not in (self._written[name], self._tried.get(name, self._written[name])):
                 raise ChangedError(
                     f"the board at {self._port.name} has {self._si(name, word):g} in {name}, and not "
                     f"{self._si(name, self._written[name]):g} as it was written: it was reset, or another host "
                     "writes to it; connect again"
                 )
+        self._written, self._tried = found, {}
 
     def get(self, name: str) -> float:
         """Return the SI value of a word as the axis uses it.
@@ -75,15 +79,19 @@ class Words:
         Raises:
             FieldError: if there is no such word, or a value is out of its range.
             TypeError: if a value is no number.
-            HostError: if the board does not answer, or refuses.
+            ChangedError: if a request before had no answer, and the board has neither the words of before it nor those
+                of after it.
+            HostError: if the board does not answer, or refuses. What had no answer may have been carried out: `get`
+                says what is used.
         """
         given = {name: self._rounded(self._word(name), value) for name, value in values.items()}
         committed = [name for name in given if self._words[name].kind is Kind.WORD]
+        if self._tried:
+            self.check()
         for name, value in given.items():
             word = self._words[name]
             if word.kind is Kind.LIVE:
-                self._port.write(word.address, word.to_registers(value))
-                self._written[name] = value
+                self._write(word.address, word.to_registers(value), {name: value})
         if committed:
             self._commit({name: given[name] for name in committed})
 
@@ -96,8 +104,17 @@ class Words:
             if word.address <= last:
                 registers += word.to_registers(image[word.name])
         assert self._device.registers["commit"].address == WRITTEN - 1 >= PULSES
-        self._port.write(WRITTEN - 1, tuple(registers))
-        self._written = image
+        self._write(WRITTEN - 1, tuple(registers), given)
+
+    def _write(self, address: int, registers: tuple[int, ...], given: dict[str, int]) -> None:
+        """Write registers by which some words are given."""
+        self._tried = given
+        try:
+            self._port.write(address, registers)
+        except RefusedError:
+            self._tried = {}
+            raise
+        self._written, self._tried = self._written | given, {}
 
     def _read(self) -> dict[str, int]:
         """Return what is written in the board, by name; every block of words in one request."""

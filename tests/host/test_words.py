@@ -3,8 +3,10 @@
 import pytest
 
 from hardwall.host.connect import connect
-from hardwall.host.errors import ChangedError
+from hardwall.host.errors import ChangedError, RefusedError, SilentError
 from hardwall.model.checks import FieldError
+from hardwall.model.link.register_file import Area
+from hardwall.model.registers import END
 
 
 def active(board, registers, name: str) -> int:
@@ -85,6 +87,45 @@ def test_the_ends_of_every_range_can_be_written(board, axis, registers):
             axis.set(**{word.name: word.reset * word.lsb})
     assert {"heartbeat", "acknowledged"} & set(axis.names) == set()
     assert len(axis.names) == len(registers.words) + len(registers.live) - 2
+
+
+@pytest.mark.parametrize("name", ["wall_stiffness", "supervisor_force_limit"])
+def test_a_write_whose_answer_was_lost_is_not_taken_back_by_the_next(board, axis, registers, name):
+    wanted = 5.0
+    board.lost = 1
+    with pytest.raises(SilentError, match="which may have been carried out"):
+        axis.set(**{name: wanted})
+    axis.set(wall_position=1e-3)
+    assert active(board, registers, name) == round(wanted / registers[name].lsb)
+    axis._words.check()
+
+
+def test_a_board_that_was_reset_behind_a_lost_answer_is_found_out(board, axis, registers):
+    axis.set(wall_position=1e-3)
+    board.lost = 1
+    with pytest.raises(SilentError):
+        axis.set(wall_stiffness=5e3)
+    at = registers["wall_position"].address
+    board.server.file.live[at : at + 2] = [0, 0]
+    with pytest.raises(ChangedError, match="has 0 in wall_position"):
+        axis.set(wall_damping=1.0)
+
+
+def test_what_was_refused_is_not_taken_for_written(board, axis, registers):
+    # A board of another range than its map says.
+    board.server.file.design.book[Area.MOST * END + registers["wall_stiffness"].address + 1] = 7
+    with pytest.raises(RefusedError, match="a value is out of its range"):
+        axis.set(wall_stiffness=5e3)
+    at = registers["wall_stiffness"].address
+    board.server.file.live[at : at + 2] = registers["wall_stiffness"].to_registers(1280)
+    with pytest.raises(ChangedError):
+        axis.arm()
+
+
+@pytest.mark.parametrize("group", ["wall", "supervisor"])
+def test_an_attribute_that_is_no_word_is_refused(axis, group):
+    with pytest.raises(AttributeError, match="stifness"):
+        getattr(axis, group).stifness = 5e3
 
 
 def test_a_board_that_was_reset_is_not_armed(board, axis, registers):
