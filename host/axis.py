@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 
 from ..model.checks import check_range
 from ..model.register import Kind
@@ -51,7 +52,9 @@ class Axis:
         self._status = device.of_kind(Kind.STATUS)
         # A beat that is what the last host said is none.
         self._beat_at, self._number = device.registers["heartbeat"], self.read("heartbeat")
-        self._may_drive = False
+        # Whether it may be ARMED by this program; and whether it may be, though this program does not want it: a host
+        # that has gone left it so, or an answer was lost. It is disarmed before the heartbeat goes on.
+        self._may_drive, self._unwanted = False, self.status.state is State.ARMED
         self._heartbeat = Heartbeat(self._beat, self._words.written("supervisor_watchdog"))
 
     def __enter__(self) -> "Axis":
@@ -83,8 +86,8 @@ class Axis:
 
     def set(self, **values: float) -> None:
         """Write words in SI units, and commit them all at one sample; the errors are those of `Words.set`."""
+        self._let_go()
         self._words.set(values)
-        self._heartbeat.watchdog_s = self._words.written("supervisor_watchdog")
         self.renew()
 
     def read(self, name: str) -> int:
@@ -140,6 +143,8 @@ class Axis:
         Raises:
             HostError: if the board is not reached.
         """
+        self._let_go()
+        self._heartbeat.watchdog_s = self._words.written("supervisor_watchdog")
         self._heartbeat.renew()
         if self._heartbeat.lost:
             raise self._heartbeat.lost
@@ -147,9 +152,10 @@ class Axis:
     def sleep(self, seconds: float) -> None:
         """Wait, and live meanwhile; the errors are those of `renew`."""
         until = time.monotonic() + seconds
+        self.renew()
         while (left := until - time.monotonic()) > 0:
-            self.renew()
             time.sleep(min(left, LEASE_S / 4))
+            self.renew()
 
     def watch(self, period_s: float = 0.05, seconds: float | None = None) -> Iterator[Status]:
         """Yield the status again and again, and live meanwhile: for a time, or for ever.
@@ -189,34 +195,50 @@ class Axis:
         self._may_drive = True
         try:
             self.pulse("arm")
+            status = self.status
         except RefusedError as error:
-            raise NotReadyError(f"the axis cannot be armed: {self._why_not(self.status)}") from error
-        status = self.status
-        if status.state is not State.ARMED:
+            status = self.status
+            if status.trip:
+                raise TrippedError(f"the axis tripped before it was armed: {status.trip}") from error
+            raise NotReadyError(f"the axis cannot be armed: {self._why_not(status)}") from error
+        except BaseException:
+            # Whether it is ARMED is not known, and who sees this error takes it for not armed.
+            with suppress(HostError):
+                self.disarm()
+            raise
+        if status.trip:
             raise TrippedError(f"the axis tripped as it was armed: {status.trip}")
+        if status.state is not State.ARMED:
+            raise NotReadyError("the axis was armed, and disarmed at once: the loop of drive_enable opened")
 
     def disarm(self) -> None:
         """Make the drive 0, and let the heartbeat rest.
 
         Raises:
-            HostError: if the board is not reached; the watchdog then does it.
+            HostError: if the board is not reached. Its watchdog then makes the drive 0, or the next act of this
+                program that would let the heartbeat go on disarms it first.
         """
         self._heartbeat.rest()
+        self._unwanted = True
         self.pulse("disarm")
-        self._may_drive = False
+        self._may_drive = self._unwanted = False
 
-    def acknowledge(self, trip: Trip) -> None:
+    def acknowledge(self, trip: Trip | None) -> None:
         """Acknowledge a trip that was read, and clear the flags: the axis is DISARMED, unless a cause still stands.
+
+        Args:
+            trip: what `trip` was; None, of an axis that was not tripped, acknowledges nothing.
 
         Raises:
             TrippedError: if a cause stands, or another came since `trip` was read.
             HostError: if the board is not reached.
         """
-        word = self.device.registers["acknowledged"]
-        self._port.write(word.address, word.to_registers(trip.latched))
-        # What the encoder says is a cause until the flags are cleared, so that comes first.
-        self.pulse("clear_flags")
-        self.pulse("acknowledge")
+        if trip:
+            word = self.device.registers["acknowledged"]
+            self._port.write(word.address, word.to_registers(trip.latched))
+            # What the encoder says is a cause until the flags are cleared, so that comes first.
+            self.pulse("clear_flags")
+            self.pulse("acknowledge")
         if now := self.trip:
             raise TrippedError(f"the axis is still tripped: {now}")
 
@@ -273,6 +295,10 @@ class Axis:
         if not status.live:
             return "no heartbeat has reached it"
         return "the loop of drive_enable is open"
+
+    def _let_go(self) -> None:
+        if self._unwanted:
+            self.disarm()
 
     def _beat(self) -> None:
         self._number = self._number % self._beat_at.high + 1

@@ -62,6 +62,15 @@ def test_records_become_arrays_in_si_units(board, axis, registers):
     assert (found.place, found.identity) == (PLACE, registers.identity)
 
 
+def test_who_reads_a_capture_lives(board, axis, registers, monkeypatch):
+    hold(board, records(registers, 1))
+    renewed = []
+    monkeypatch.setattr(axis, "renew", lambda: renewed.append(len(board.requests)))
+    axis.capture.read()
+    # Behind every request for records; a slow line takes longer for all of them than a lease lasts.
+    assert len(set(renewed)) == -(-registers.capture.records // PART_RECORDS)
+
+
 def test_a_capture_can_be_saved(board, axis, registers, tmp_path):
     hold(board, records(registers, 1))
     found = axis.capture.read()

@@ -1,0 +1,148 @@
+"""No drive that nobody asked for: what a host does with a board of which it does not know whether it is ARMED."""
+
+import pytest
+
+from hardwall.host.axis import Axis
+from hardwall.host.connect import connect
+from hardwall.host.errors import NotReadyError, SilentError, TrippedError
+from hardwall.host.status import State
+from hardwall.model.supervisor import CAUSES
+from host.twin_board import TwinBoard
+
+
+class Supervised:
+    """What a board's supervisor does at pulses.
+
+    Attributes:
+        board: the board.
+        heard: the pulses.
+        lost_at: the pulse whose answer is lost; its next only.
+        deaf: whether it hears none.
+    """
+
+    def __init__(self, board: TwinBoard):
+        self.board, self.heard, self.lost_at, self.deaf = board, [], "", False
+        board.show(ready=1, live=1, state=State.DISARMED)
+        board.react = self._react
+
+    def _react(self, pulses: tuple[str, ...]) -> None:
+        self.board.server.file.pulses = ()
+        if self.deaf:
+            return
+        for pulse in pulses:
+            self.heard.append(pulse)
+            if pulse == self.lost_at:
+                self.lost_at, self.board.lost = "", 1
+            if pulse in ("arm", "disarm"):
+                self.board.show(state=State.ARMED if pulse == "arm" else State.DISARMED)
+
+    @property
+    def state(self) -> int:
+        return self.board.server.file.status["state"]
+
+
+@pytest.fixture
+def supervised(board) -> Supervised:
+    return Supervised(board)
+
+
+def beats(board: TwinBoard) -> int:
+    """Return the word of the last beat that a board has heard."""
+    return board.server.file.active["heartbeat"]
+
+
+@pytest.fixture
+def armed(board, supervised, axis) -> Axis:
+    axis.arm()
+    assert supervised.state == State.ARMED
+    return axis
+
+
+def test_a_board_that_another_host_left_armed_is_disarmed_before_the_first_beat(board, supervised):
+    board.show(state=State.ARMED)
+    with connect(board.name, answer_s=0.2) as axis:
+        # Who only looks changes nothing, and lets the watchdog end it.
+        assert axis.status.state is State.ARMED
+        assert supervised.heard == []
+        before = beats(board)
+        disarmed = []
+        board.react = lambda pulses: disarmed.append(beats(board)) if "disarm" in pulses else None
+        axis.renew()
+        assert disarmed[0] == before != beats(board)
+
+
+def test_words_are_not_written_to_a_board_that_another_host_left_armed(board, supervised):
+    board.show(state=State.ARMED)
+    with connect(board.name, answer_s=0.2) as axis:
+        axis.set(wall_stiffness=5e3)
+        assert supervised.heard == ["disarm", "commit"]
+
+
+def test_an_arming_whose_answer_is_lost_ends_disarmed(supervised, axis):
+    supervised.lost_at = "arm"
+    with pytest.raises(SilentError, match="which may have been carried out"):
+        axis.arm()
+    assert supervised.heard[-2:] == ["arm", "disarm"]
+    assert supervised.state == State.DISARMED
+    axis.arm()
+    assert supervised.state == State.ARMED
+
+
+def test_an_arming_that_is_interrupted_ends_disarmed(supervised, axis, monkeypatch):
+    pulse = axis.pulse
+
+    def interrupted(name: str) -> None:
+        pulse(name)
+        if name == "arm":
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(axis, "pulse", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        axis.arm()
+    assert supervised.heard[-2:] == ["arm", "disarm"]
+
+
+def test_the_heartbeat_does_not_go_on_before_a_lost_disarm_has_come(board, supervised, armed):
+    supervised.deaf, board.lost = True, 1
+    with pytest.raises(SilentError):
+        armed.disarm()
+    assert supervised.state == State.ARMED
+    supervised.deaf = False
+    supervised.heard.clear()
+    armed.renew()
+    assert supervised.heard[0] == "disarm"
+    assert supervised.state == State.DISARMED
+    armed.renew()
+    assert supervised.heard == ["disarm"]
+
+
+def test_leaving_disarms_though_the_application_failed(supervised, board):
+    with pytest.raises(ZeroDivisionError), connect(board.name, answer_s=0.2) as axis:
+        axis.arm()
+        _ = 1 / 0
+    assert supervised.state == State.DISARMED
+
+
+def test_a_trip_between_the_look_and_the_arming_is_named(board, supervised, axis):
+    emergency = next(bit for bit, cause in enumerate(CAUSES) if cause.name == "emergency_stop")
+    board.server.file.refusing = frozenset({"arm"})
+    pulse = axis.pulse
+
+    def late(name: str) -> None:
+        board.show(state=State.TRIPPED, ready=0, latched=1 << emergency, first=1 << emergency)
+        pulse(name)
+
+    axis.pulse = late
+    with pytest.raises(TrippedError, match="tripped before it was armed: emergency_stop"):
+        axis.arm()
+
+
+def test_a_loop_that_opens_as_the_axis_is_armed_is_named(board, supervised, axis):
+    board.react = lambda pulses: None
+    with pytest.raises(NotReadyError, match="disarmed at once: the loop of drive_enable opened"):
+        axis.arm()
+
+
+def test_what_is_not_tripped_is_acknowledged_without_an_error(supervised, axis):
+    axis.acknowledge(axis.trip)
+    assert supervised.heard == []
