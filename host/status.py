@@ -33,9 +33,9 @@ class Trip:
 
     def __str__(self) -> str:
         said = {cause.name: cause.doc for cause in CAUSES}
-        others = [name for name in self.causes if name not in self.first]
+        others = ", ".join(name for name in self.causes if name not in self.first)
         began = "; ".join(f"{name}: {said[name]}" for name in self.first or self.causes)
-        return f"{began}{f' (then {chr(44).join(others)})' if self.first and others else ''}"
+        return f"{began} (then {others})" if self.first and others else began
 
 
 @dataclass(frozen=True)
