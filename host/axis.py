@@ -12,7 +12,7 @@ from .capture import Capture
 from .device import Device, read_identity
 from .errors import ChangedError, HostError, NotReadyError, RefusedError, TrippedError
 from .groups import Supervisor, Wall
-from .heartbeat import LEASE_S, Heartbeat
+from .heartbeat import LEASE_S, Beat, Heartbeat
 from .port import Port
 from .status import State, Status, Trip, status_of
 from .words import Words
@@ -50,12 +50,11 @@ class Axis:
         self.wall, self.supervisor = Wall(self), Supervisor(self)
         self.capture = Capture(self)
         self._status = device.of_kind(Kind.STATUS)
-        # A beat that is what the last host said is none.
-        self._beat_at, self._number = device.registers["heartbeat"], self.read("heartbeat")
         # Whether it may be ARMED by this program; and whether it may be, though this program does not want it: a host
         # that has gone left it so, or an answer was lost. It is disarmed before the heartbeat goes on.
         self._may_drive, self._unwanted = False, self.status.state is State.ARMED
-        self._heartbeat = Heartbeat(self._beat, self._words.written("supervisor_watchdog"))
+        beat = Beat(port, device.registers["heartbeat"])
+        self._heartbeat = Heartbeat(beat, self._words.written("supervisor_watchdog"))
 
     def __enter__(self) -> "Axis":
         return self
@@ -141,6 +140,7 @@ class Axis:
         """Show that the application lives: the heartbeat goes on for another half second.
 
         Raises:
+            ChangedError: if the board was reset, or another host writes to it.
             HostError: if the board is not reached.
         """
         self._let_go()
@@ -175,7 +175,7 @@ class Axis:
         Raises:
             TrippedError: if causes are latched, or come at once.
             NotReadyError: if the axis cannot be armed for another reason.
-            ChangedError: if the board has other words than those that were written.
+            ChangedError: if the board was reset, or another host has written to it.
             HostError: if the board is not reached.
         """
         if (found := read_identity(self._port)) != self.device.identity:
@@ -271,6 +271,9 @@ class Axis:
         count = self.device.registers["count"]
         check_range("index_m", index_m, count.low * count.lsb, count.high * count.lsb)
         until = time.monotonic() + seconds
+        self.renew()
+        if self.status.state is State.ARMED:
+            raise NotReadyError("the axis is ARMED: disarm it before it is homed")
         self.pulse("index_arm")
         while self.read("index_armed"):
             if time.monotonic() > until:
@@ -299,7 +302,3 @@ class Axis:
     def _let_go(self) -> None:
         if self._unwanted:
             self.disarm()
-
-    def _beat(self) -> None:
-        self._number = self._number % self._beat_at.high + 1
-        self._port.write(self._beat_at.address, self._beat_at.to_registers(self._number))

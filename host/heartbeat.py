@@ -4,12 +4,56 @@ import threading
 import time
 from collections.abc import Callable
 
-from .errors import HostError
+from ..model.register import Register
+from .errors import ChangedError, HostError
+from .port import Port
 
 LEASE_S = 0.5
 """How long the heartbeat goes on after the application has renewed its lease."""
 BEATS = 4
 """Beats in the time of the board's watchdog."""
+
+
+class Beat:
+    """One beat: the word of the heartbeat is read, must be that of the last beat, and is written with the next number.
+
+    So a reset of the board ends the heartbeat, though the words may have been written again since.
+
+    Args:
+        port: the line.
+        register: the word of the heartbeat.
+
+    Raises:
+        HostError: if the board does not answer.
+    """
+
+    def __init__(self, port: Port, register: Register):
+        self._port, self._register = port, register
+        # Two after a beat without an answer: it may have arrived.
+        self._numbers: tuple[int, ...] = (self._read(),)
+        self._turn = threading.Lock()
+
+    def __call__(self) -> None:
+        """Send one.
+
+        Raises:
+            ChangedError: if the board has another number.
+            HostError: if it is not reached.
+        """
+        with self._turn:
+            last = self._read()
+            if last not in self._numbers:
+                raise ChangedError(
+                    f"the board at {self._port.name} has not the last beat of this program: it was reset, or another "
+                    "host writes to it; connect again"
+                )
+            following = last % self._register.high + 1
+            self._numbers = last, following
+            self._port.write(self._register.address, self._register.to_registers(following))
+            self._numbers = (following,)
+
+    def _read(self) -> int:
+        return self._register.from_registers(self._port.read(self._register.address, self._register.size))
 
 
 class Heartbeat:

@@ -58,7 +58,7 @@ def test_a_refusal_says_what_was_refused_and_why(board, port, ask, code, message
 def test_an_answer_that_is_late_is_not_taken_for_the_next(board, port, registers):
     port.read(0, 2)
     board.late_s = 0.5
-    with pytest.raises(SilentError, match="any more at tcp.* to read 2 registers from 0x4000 on, which may have been"):
+    with pytest.raises(SilentError, match=r"any more at tcp.* to read 2 registers from 0x4000 on, which may have been"):
         port.read(0x4000, 2)
     for _ in range(20):
         assert port.read(0, 2) == (0, registers["layout"].reset)

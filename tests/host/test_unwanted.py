@@ -4,10 +4,12 @@ import pytest
 
 from hardwall.host.axis import Axis
 from hardwall.host.connect import connect
-from hardwall.host.errors import NotReadyError, SilentError, TrippedError
+from hardwall.host.errors import ChangedError, NotReadyError, SilentError, TrippedError
 from hardwall.host.status import State
 from hardwall.model.supervisor import CAUSES
 from host.twin_board import TwinBoard
+
+PATIENCE_S = 60.0
 
 
 class Supervised:
@@ -116,10 +118,67 @@ def test_the_heartbeat_does_not_go_on_before_a_lost_disarm_has_come(board, super
     assert supervised.heard == ["disarm"]
 
 
-def test_leaving_disarms_though_the_application_failed(supervised, board):
-    with pytest.raises(ZeroDivisionError), connect(board.name, answer_s=0.2) as axis:
+def test_an_axis_that_drives_is_not_homed(supervised, armed):
+    with pytest.raises(NotReadyError, match="is ARMED: disarm it before it is homed"):
+        armed.home(seconds=0.1)
+    assert supervised.heard == ["arm"]
+
+
+def reset(board: TwinBoard) -> None:
+    """Reset a board, which is ready again at once."""
+    board.server.file.__init__(board.server.file.design)
+    board.show(ready=1, live=1)
+
+
+def test_a_reset_is_found_out_though_all_words_were_written_again(board, supervised, axis):
+    axis.preload(5e-3)
+    axis.disarm()
+    reset(board)
+    supervised.heard.clear()
+    with pytest.raises(ChangedError, match="has not the last beat of this program: it was reset"):
+        axis.set(wall_stiffness=2e3)
+    with pytest.raises(ChangedError):
         axis.arm()
-        _ = 1 / 0
+    assert "arm" not in supervised.heard
+    assert beats(board) == 0
+
+
+def test_a_reset_ends_the_heartbeat(board, axis):
+    axis.renew()
+    reset(board)
+    with pytest.raises(ChangedError, match="has not the last beat"):
+        axis.sleep(PATIENCE_S)
+    assert beats(board) == 0
+
+
+def test_a_beat_whose_answer_was_lost_is_no_reset(board, axis):
+    axis.renew()
+    for _ in range(3):
+        axis._heartbeat.rest()
+        before = beats(board)
+        lose_the_answer_of_a_beat(board)
+        with pytest.raises(SilentError):
+            axis.renew()
+        board.react = lambda pulses: None
+        axis.renew()
+        assert beats(board) == before + 2
+
+
+def lose_the_answer_of_a_beat(board: TwinBoard) -> None:
+    """Let the answer of the next beat be lost, and no other."""
+    before = beats(board)
+    board.react = lambda pulses: setattr(board, "lost", int(beats(board) == before + 1))
+
+
+def test_leaving_disarms_though_the_application_failed(supervised, board):
+    def fail() -> None:
+        with connect(board.name, answer_s=0.2) as axis:
+            axis.arm()
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail()
+    assert supervised.heard[-1] == "disarm"
     assert supervised.state == State.DISARMED
 
 
