@@ -47,7 +47,7 @@ class Status:
         position_m, velocity_m_per_s: the handle's, estimated at the last sample.
         wall_force_n: the wall's force on the handle at the last sample.
         force_n: the force that is let out.
-        stamp_s: the time of the clock, which wraps at `wrap_s`.
+        stamp_s: the time of the clock, which wraps behind the largest value of the register `stamp`.
         live: whether the heartbeat is not overdue; ready: whether the axis can be armed.
         referenced: whether the index has been found.
         flags: names of the sticky flags; the estimator's own are `estimator_0` and so on.
