@@ -120,6 +120,15 @@ def test_what_the_board_does_not_take_is_said_and_shown_as_it_is(driver):
     assert not driver.view.said
 
 
+def test_what_is_said_is_said_for_a_while(driver, monkeypatch):
+    driver.arm(TAB)
+    wait_until(lambda: driver.view.said)
+    time.sleep(0.1)
+    assert driver.view.said
+    monkeypatch.setattr("hardwall.host.panel.driver.SAID_S", 0.0)
+    wait_until(lambda: not driver.view.said)
+
+
 def test_only_the_causes_that_a_tab_shows_are_acknowledged(driver, board):
     board.show(state=TRIPPED, latched=STOP | 1, first=STOP)
     wait_until(lambda: driver.view.status.trip)
