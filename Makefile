@@ -200,7 +200,7 @@ $(VENV)/.synth: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)synth,place and route)
 
 $(VENV)/.docs: pyproject.toml $(VENV)/.sim | tools
-	$(call install,sim$(comma)docs,the tools of the pages)
+	$(call install,sim$(comma)host$(comma)panel$(comma)docs,the tools of the pages)
 
 # ---- system packages, checked before anything starts ----------------------------------------------------------------
 

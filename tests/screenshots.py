@@ -12,7 +12,8 @@ from stimuli.processes import HARDWALL, line, started, wait_until
 
 PICTURES = Path(__file__).absolute().parent.parent / "docs" / "pictures"
 WIDTH = round(PAGE_IN * DPI)
-STROKES, STEP_MS = 2, 120
+STROKES, SPEED_MM_PER_S = 2, 50.0
+"""Quick strokes into the wall, and the speed of the slow one behind them, in the board's time."""
 
 
 def push(tab: Tab) -> None:
@@ -23,9 +24,10 @@ def push(tab: Tab) -> None:
             tab.page.mouse.move(*tab.beside(-4 if stroke % 2 == 0 else 11))
             tab.until(lambda out=stroke % 2 == 0: (tab.sample[4] == 0) == out)
         # A slow stroke is in what the estimators show.
+        step_ms = 1e3 / (SPEED_MM_PER_S * tab.of("live", "board.told.pace"))
         for way_mm in (*range(11, -5, -1), *range(-4, 12)):
             tab.page.mouse.move(*tab.beside(way_mm))
-            tab.page.wait_for_timeout(STEP_MS)
+            tab.page.wait_for_timeout(step_ms)
         tab.until(lambda: tab.state == "ARMED" and tab.sample[4] < -2)
         tab.page.screenshot(path=PICTURES / "panel.png")
 
@@ -33,6 +35,7 @@ def push(tab: Tab) -> None:
 def trip(tab: Tab) -> None:
     """Cut a wire of the encoder while the axis drives, and draw the head and the hand."""
     tab.arm()
+    tab.page.mouse.move(*tab.beside(-5))
     tab.fault("wire")
     wait_until(lambda: tab.state == "TRIPPED")
     tab.page.wait_for_timeout(500)

@@ -22,6 +22,8 @@ KEPT = 4096
 """Samples that are kept for tabs."""
 STALE_S = 0.5
 """The age at which what a tab asked for is not done any more: the board was silent meanwhile, and the person waited."""
+SAID_S = 8.0
+"""How long it is said why an act had no effect."""
 
 
 class Sample(NamedTuple):
@@ -57,7 +59,7 @@ class Driver:
         self._lock, self._ended = threading.Lock(), threading.Event()
         self._samples: deque[Sample] = deque(maxlen=KEPT)
         self._pings: dict[str, float] = {}
-        self._taken, self._renewed_s = 0, 0.0
+        self._taken, self._renewed_s, self._said_s = 0, 0.0, 0.0
         self._axis: Axis | None = None
         self._open()
         self._thread = threading.Thread(target=self._run, name="hardwall-panel", daemon=True)
@@ -136,23 +138,29 @@ class Driver:
     def _see(self, **changes: Any) -> None:
         self.view = replace(self.view, **changes)
 
+    def _say(self, said: str) -> None:
+        self._said_s = time.monotonic()
+        self._see(said=said)
+
     def _obey(self) -> None:
-        """Do what was asked for; what is refused is said."""
+        """Do what was asked for; what is refused is said for a while."""
+        if self.view.said and time.monotonic() - self._said_s > SAID_S:
+            self._say("")
         while self._asked:
             asked_s, do = self._asked.popleft()
             if do != self._disarm and time.monotonic() - asked_s > STALE_S:
-                self._see(said="the board did not answer in time: nothing was done")
+                self._say("the board did not answer in time: nothing was done")
                 continue
             self._try(do)
 
     def _try(self, do: Callable[[], None]) -> None:
-        self._see(said="")
+        self._say("")
         try:
             do()
         except PortError:
             raise
         except (HostError, ValueError, TypeError) as error:
-            self._see(said=f"{error}")
+            self._say(f"{error}")
             if isinstance(error, ForeignError | ChangedError):
                 raise
 
@@ -178,7 +186,7 @@ class Driver:
         if self._axis:
             self._axis.close()
             self._axis = None
-        self._see(status=None, connected=False, lost=f"{error}", holder=None)
+        self._see(status=None, connected=False, lost=f"{error}", holder=None, pace=None, looks_hz=0.0)
 
     def _arm(self, tab: str) -> None:
         if self._axis is None:
@@ -209,7 +217,7 @@ class Driver:
             wanted, self._wanted = self._wanted, {}
         values = {name: value for name, (tab, value) in wanted.items() if self.view.holder in (None, tab)}
         if len(values) < len(wanted):
-            self._see(said="another tab armed the board, and alone may set its words")
+            self._say("another tab armed the board, and alone may set its words")
         if values:
             self._try(lambda: self._set(axis, values))
 
@@ -234,7 +242,7 @@ class Driver:
             return
         if not self._lives(holder):
             self._disarm()
-            self._see(said=f"the tab that armed was silent for {LEASE_S:g} s, so the board is disarmed")
+            self._say(f"the tab that armed was silent for {LEASE_S:g} s, so the board is disarmed")
         elif (pinged_s := self._pings[holder]) > self._renewed_s:
             self._renewed_s = pinged_s
             axis.renew()

@@ -67,13 +67,12 @@ class Estimates:
         self._values = values
 
     def feed(self, counts: list[int]) -> None:
-        """Take the next counts."""
+        """Take the next counts, which wrap as the hardware's do."""
         values, self._values = self._values, None
         if values is not None:
             for lane in self._lanes:
                 lane.set(values)
-        half = 1 << self._lanes[0].spec.count_width - 1
-        taken = (np.array(counts, np.int64) + half) % (2 * half) - half
+        taken = np.array(counts, np.int64)
         both = [lane.run(taken) for lane in self._lanes]
         rows = np.concatenate([both[lane][kind] for kind in (0, 1) for lane in (0, 1)])
         with self._lock:

@@ -71,6 +71,16 @@ def test_it_ends_after_the_time_that_was_asked_for():
     assert re.search(r"\n0\.05 s in [\d.]+ s: [\d.]+ of real time\n$", done.stdout)
 
 
+def test_it_prints_the_count_of_every_sample():
+    words = command(CLOCK, "--seconds", "0.04", "--counts")
+    done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    lines = [line.split() for line in done.stdout.splitlines() if line.startswith("counts:")]
+    assert [len(line) - 1 for line in lines] == [200, 200]
+    # The hand holds the handle where it is, at an edge.
+    assert {count for line in lines for count in line[1:]} <= {"-1", "0", "1"}
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

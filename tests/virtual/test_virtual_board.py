@@ -61,6 +61,18 @@ def test_the_wall_holds_what_pushes(board, host):
     assert driven_n == pytest.approx(-4.0, abs=0.2)
 
 
+def test_the_counts_of_the_encoder_are_those_that_the_board_has(board):
+    host = SerialHost(board)
+    for place in (300, 120):
+        board.hand.held_m = board.scene.protocol.start_m + place * board.scene.encoder.count_m
+        for _ in range(600):
+            board.run()
+        assert len(board.counts) == board.scene.spec.sample_hz // 1000
+        count = host.read("count")
+        assert abs(count - place) <= 1
+        assert board.counts[-1] == count
+
+
 def test_a_silent_host_trips_and_the_handle_is_free(board, host):
     before_m = board.handle.position_m
     for _ in range(400):

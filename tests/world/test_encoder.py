@@ -10,7 +10,7 @@ import pytest
 
 from hardwall.model.stamped import Edges
 from hardwall.sim.world.advance import Interval, Moment, advance, advance_quietly
-from hardwall.sim.world.encoder import MARGIN, Cell, Encoder, edge, level, locate, offsets
+from hardwall.sim.world.encoder import MARGIN, Cell, Encoder, edge, level, locate, number_at, offsets
 from hardwall.sim.world.rigid import Coulomb, Handle, Motion, Rigid, span
 from stimuli.moves import after
 
@@ -157,6 +157,14 @@ def test_edges_stand_where_the_errors_put_them():
     assert [edge(encoder, n) for n in range(-4, 0)] == pytest.approx(expected - 8)
     assert offsets((0.0, 0.1, 0.0, 0.1), 0.2) == offsets(0.1, 0.2)
     assert offsets() == Encoder(1.0, 1.0).offsets == (0, 0, 0, 0)
+
+
+def test_the_counts_of_positions_are_the_numbers_of_their_cells():
+    """An edge belongs to the cell above; just below it is the cell below."""
+    encoder = Encoder(0.25, CLOCK_HZ, offsets((0.0, 0.3, -0.2, 0.1)))
+    edges = np.array([edge(encoder, number) for number in range(-9, 10)])
+    assert number_at(encoder, edges).tolist() == list(range(-9, 10))
+    assert number_at(encoder, np.nextafter(edges, -1e9)).tolist() == list(range(-10, 9))
 
 
 def test_locate_agrees_with_counting_edges():

@@ -41,7 +41,7 @@ export const NAME = 20;
 export function strip(context, box, low, high, name) {
   const { left, top, width, height } = box;
   const at = (value) => top + height * (1 - (value - low) / (high - low));
-  const marks = ticks(low, high, Math.max(2, Math.round(height / 32)));
+  const marks = ticks(low, high, Math.max(2, Math.round(height / 22)));
   context.textAlign = "right";
   for (const value of marks.values) {
     context.fillStyle = GRID;

@@ -93,7 +93,7 @@ export function drawHand(canvas) {
   context.fillRect(0, ground, width, 2);
   context.textAlign = "center";
   context.fillStyle = PALE;
-  for (const mm of ticks(from, from + SHOWN_MM, 10).values) {
+  for (const mm of ticks(from, from + SHOWN_MM, Math.min(10, width / 60)).values) {
     context.fillStyle = GRID;
     context.fillRect(across(mm), ground + 2, 1, 6);
     context.fillStyle = PALE;

@@ -1,6 +1,7 @@
 // The socket to the board. What is sent here is never kept for later: without a connection it is not sent at all.
 
 export const ALIVE_MS = 100; // the time between two signs of life; the board's lease lasts five of them
+export const LIVE = ["DISARMED", "ARMED", "TRIPPED"]; // the states of a board that is reached
 const AGAIN_MS = 1000; // the time until a lost socket is opened again
 const QUIET_MS = 1500; // the time without a sample after which what is shown is old
 
@@ -54,7 +55,7 @@ export function open() {
 // Says so when what is shown is old, although nobody has said why.
 export function look() {
   const told = board.told;
-  if (!told || !["DISARMED", "ARMED", "TRIPPED"].includes(told.state) || performance.now() - heard < QUIET_MS) return;
+  if (!told || !LIVE.includes(told.state) || performance.now() - heard < QUIET_MS) return;
   const why = "Nothing has come from the board for a while.";
   old = true;
   tell("told", (board.told = { ...told, state: "SILENT", why, do: "What is shown is old." }));

@@ -1,6 +1,6 @@
 // The page: its head, its buttons, and the loop that draws and shows that the tab lives.
 
-import { ALIVE_MS, board, hear, look, open, send } from "./live.js";
+import { ALIVE_MS, LIVE, board, hear, look, open, send } from "./live.js";
 import { drawTraces, takeFresh } from "./traces.js";
 import { drawHand, listen } from "./hand.js";
 import { begin, drawEstimates, keepPace, listenTo } from "./estimates.js";
@@ -21,6 +21,7 @@ hear("told", (told) => {
   for (const name of ACTS) find(name).disabled = !told.may.includes(name);
   find("connect").hidden = !told.may.includes("connect");
   document.body.classList.toggle("locked", Boolean(told.locked));
+  document.body.classList.toggle("old", !LIVE.includes(told.state));
   document.title = `${told.state} – hardwall`;
   keepPace(told.pace);
   if (told.identity) {

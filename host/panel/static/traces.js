@@ -69,5 +69,5 @@ export function drawTraces(canvas) {
   context.textAlign = "center";
   context.fillStyle = PALE;
   context.font = FONT;
-  for (const value of ticks(-SHOWN_S, 0, 5).values) context.fillText(`${number(value, 0)} s`, across(now + value), height - 9);
+  for (const value of ticks(-SHOWN_S, 0, Math.min(5, box.width / 60)).values) context.fillText(`${number(value, 0)} s`, across(now + value), height - 9);
 }

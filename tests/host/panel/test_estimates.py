@@ -55,7 +55,7 @@ def test_records_that_were_seen_are_not_given_again_and_old_ones_are_left():
     assert len(estimates.since(number)[1]) == 1
 
 
-def test_a_count_that_wraps_is_one_that_wraps():
+def test_a_count_beyond_its_width_wraps_as_the_hardware_s():
     estimates = Estimates(SPEC)
     half = 1 << SPEC.count_width - 1
     estimates.feed([half - 2, half - 1, half, half + 1])

@@ -75,6 +75,8 @@ def test_a_tab_arms_and_its_end_disarms(driver, live):
     socket = Socket(ping, {"do": "arm"}, lambda: driver.ping(TAB) or driver.view.holder == TAB, ping)
     serve(live, socket)
     wait_until(lambda: driver.view.holder is None and state(driver) == "DISARMED")
+    # It is no silence.
+    assert not driver.view.said
 
 
 def test_what_is_told_is_told_when_it_changes_and_samples_always(driver, live, board):
