@@ -121,7 +121,7 @@ class Capture:
         """Begin a capture, whatever was before.
 
         Args:
-            sources: what triggers it, besides `trigger`: `contact`, `trip`, and the position that passes `level_m`,
+            sources: what triggers it, one or several, besides `trigger`: `contact`, `trip`, and the position that passes `level_m`,
                 `rise` or `fall`.
             before: records that are wanted before the trigger; a quarter of all if it is not given.
             decimation: samples from a record to the next.
@@ -133,6 +133,7 @@ class Capture:
             HostError: if the board is not reached.
         """
         self._check()
+        sources = [sources] if isinstance(sources, str) else sources
         for source in sources:
             if source not in SOURCES:
                 raise FieldError("sources", f"must be of {', '.join(SOURCES)}, not {source!r}")

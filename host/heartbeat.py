@@ -57,7 +57,7 @@ class Beat:
 
 
 class Heartbeat:
-    """A thread that beats while a lease lasts. It begins when it is renewed for the first time.
+    """A thread that beats while a lease lasts: first from the first renewal on.
 
     Args:
         beat: sends one beat; what it raises is kept in `lost` until a beat succeeds.
@@ -71,6 +71,7 @@ class Heartbeat:
         self._beat, self._until_s, self.watchdog_s = beat, 0.0, watchdog_s
         self._ended, self._thread = threading.Event(), threading.Thread(target=self._run, daemon=True)
         self.lost: HostError | None = None
+        self._thread.start()
 
     def renew(self) -> None:
         """Let the heartbeat go on for another `LEASE_S`; if it had ended, a beat is sent before this returns.
@@ -82,8 +83,6 @@ class Heartbeat:
             self._beat()
             self.lost = None
         self._until_s = time.monotonic() + LEASE_S
-        if not self._thread.ident:
-            self._thread.start()
 
     @property
     def beats(self) -> bool:
@@ -98,8 +97,7 @@ class Heartbeat:
         """End the thread."""
         self.rest()
         self._ended.set()
-        if self._thread.ident:
-            self._thread.join()
+        self._thread.join()
 
     def _run(self) -> None:
         while not self._ended.wait(self.watchdog_s / BEATS):

@@ -100,6 +100,8 @@ def test_what_is_asked_for_is_written_before_the_start(board, axis, registers):
     assert active["capture_level"] == -2000
     axis.capture.start()
     assert started[1]["capture_sources"] == 1
+    axis.capture.start("fall")
+    assert started[2]["capture_sources"] == 0b1000
     assert started[1]["capture_before"] == registers.capture.records // 4
 
 
