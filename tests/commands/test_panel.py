@@ -1,6 +1,7 @@
 """The page of a panel in a real browser, with a virtual board behind it: seen, set, armed, pushed, broken and left."""
 
 import re
+import signal
 import subprocess
 import time
 import urllib.error
@@ -11,12 +12,13 @@ import psutil
 import pytest
 
 from stimuli.processes import HARDWALL, ended, line, started, wait_until
+from stimuli.virtual_boards import running
 
 browsers = pytest.importorskip("stimuli.browsers", reason="playwright is not installed")
 if not browsers.CHROMIUM.exists():
     pytest.skip(browsers.ABSENT, allow_module_level=True)
 
-SLOW = ("controller.clock_hz=4000000", "encoder.count_m=10e-6", "protocol.start_m=-1e-3", "handle.coulomb_n=0.0")
+SLOW = {"controller.clock_hz": 4_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
 """As few clocks as the scene's axis needs, on a simulator that shares its machine."""
 
 
@@ -24,7 +26,7 @@ def changes(*assignments: str) -> list[str]:
     return [word for each in assignments for word in ("--set", each)]
 
 
-WORDS = [str(HARDWALL), "panel", "virtual", *changes(*SLOW)]
+WORDS = [str(HARDWALL), "panel", "virtual", *changes(*(f"{key}={value}" for key, value in SLOW.items()))]
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +113,18 @@ def test_a_hand_is_pushed_back_by_the_wall_while_it_is_armed(tab):
         assert tab.sample[1] > 5e-3
     tab.press("disarm")
     wait_until(lambda: tab.state == "DISARMED")
+
+
+def test_what_the_estimators_make_is_sent_and_played(tab):
+    assert tab.of("estimates", "sound.next") == 0
+    tab.page.select_option("#sound", "1")
+    wait_until(lambda: tab.of("estimates", "sound.next") > 0)
+    assert tab.of("estimates", "sound.entry.context.state") == "running"
+    tab.page.select_option("#sound", "")
+    tab.page.wait_for_timeout(300)
+    before = tab.of("estimates", "sound.next")
+    tab.page.wait_for_timeout(300)
+    assert tab.of("estimates", "sound.next") == before
 
 
 @pytest.mark.parametrize(("fault", "cause"), [("stop", "emergency_stop: "), ("wire", "encoder_loss: ")])
@@ -207,6 +221,21 @@ def test_three_traces_are_drawn_thirty_times_a_second(tab):
     }""")
     print(f"a frame takes {cost_ms:.2f} ms")
     assert cost_ms < 1e3 / 30
+
+
+def test_a_board_at_a_port_is_armed_and_has_no_hand(chromium):
+    with running(SLOW, "--speed", "0") as board, started(HARDWALL, "panel", board.path) as process:
+        tab = browsers.Tab(chromium, line(process).removeprefix("page: "))
+        assert tab.page.locator("canvas").count() == 1
+        assert tab.page.locator(".fault").count() == 0
+        tab.arm()
+        board.order("open emergency_stop")
+        wait_until(lambda: tab.state == "TRIPPED")
+        process.send_signal(signal.SIGINT)
+        assert ended(process)[0] == 130
+        wait_until(lambda: tab.state == "NO PANEL")
+        assert tab.errors == []
+        tab.page.context.close()
 
 
 def test_its_end_leaves_no_process_and_a_board_is_not_asked_for_twice():

@@ -94,7 +94,7 @@ export function drawEstimates(canvas) {
 // ---- sound ----------------------------------------------------------------------------------------------------------
 
 const LEAST_HZ = 8000, MOST_HZ = 96000, AHEAD_S = 0.15;
-const sound = { context: null, entry: null, lane: "", next: 0, pace: 1 };
+export const sound = { context: null, entry: null, lane: "", next: 0, pace: 1 };
 
 export function listenTo(select) {
   if (rate < LEAST_HZ || rate > MOST_HZ) {
