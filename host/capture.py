@@ -121,8 +121,8 @@ class Capture:
         """Begin a capture, whatever was before.
 
         Args:
-            sources: what triggers it, one or several, besides `trigger`: `contact`, `trip`, and the position that passes `level_m`,
-                `rise` or `fall`.
+            sources: what triggers it, one or several, besides `trigger`: `contact`, `trip`, and the position that
+                passes `level_m`, `rise` or `fall`.
             before: records that are wanted before the trigger; a quarter of all if it is not given.
             decimation: samples from a record to the next.
             level_m: that level, m.
