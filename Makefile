@@ -51,7 +51,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures screenshots verilog docs digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures browser screenshots verilog docs digests soak fuzz clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -102,6 +102,9 @@ figures: $(VENV)/.synth | tools ## the founding paper's figures and every study 
 	@$(HARDWALL) zwidth --resume --plot build/estimators.png $(ALL_ON_THE_MAP)
 	@for study in $(STUDIES); do $(HARDWALL) $$study --resume --plot build/$$study.png; done
 	@$(HARDWALL) bits --plot build/bits.png
+
+browser: $(VENV)/.test | tools ## the panel's page in a real browser, beside a board in simulation (some minutes, alone on the machine)
+	@HARDWALL_BROWSER=1 $(RUN) pytest -n 0 tests/host/panel/test_page.py $(ARGS)
 
 screenshots: $(VENV)/.test | tools ## the pictures of the panel's page, anew, by a browser
 	@$(VENV)/bin/python tests/screenshots.py

@@ -1,0 +1,243 @@
+"""The page of a panel in a real browser, with a virtual board behind it: seen, set, armed, pushed, broken and left."""
+
+import os
+import re
+import signal
+import subprocess
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+
+import psutil
+import pytest
+
+from stimuli.processes import HARDWALL, ended, line, started, wait_until
+from stimuli.virtual_boards import running
+
+if "HARDWALL_BROWSER" not in os.environ:
+    pytest.skip(
+        "a browser and a board in simulation want the machine for themselves: make browser", allow_module_level=True
+    )
+browsers = pytest.importorskip("stimuli.browsers", reason="playwright is not installed")
+if not browsers.CHROMIUM.exists():
+    pytest.skip(browsers.ABSENT, allow_module_level=True)
+
+SLOW = {"controller.clock_hz": 4_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
+"""As few clocks as the scene's axis needs, on a simulator that shares its machine."""
+
+
+def changes(*assignments: str) -> list[str]:
+    return [word for each in assignments for word in ("--set", each)]
+
+
+WORDS = [str(HARDWALL), "panel", "virtual", *changes(*(f"{key}={value}" for key, value in SLOW.items()))]
+
+
+@pytest.fixture(scope="module")
+def panel() -> Iterator[subprocess.Popen]:
+    with started(*WORDS) as process:
+        process.url = line(process).removeprefix("page: ")
+        yield process
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[object]:
+    with browsers.browser() as found:
+        yield found
+
+
+@pytest.fixture
+def tab(panel, chromium) -> Iterator[object]:
+    """A tab whose board is whole and disarmed, with a soft wall at 5 mm, in front of which the handle is."""
+    found = browsers.Tab(chromium, panel.url)
+    rests(found)
+    yield found
+    assert found.errors == []
+    found.page.context.close()
+
+
+def rests(tab) -> None:
+    """Mend what is broken, acknowledge what stands, disarm, and bring the handle in front of the wall."""
+    while (broken := tab.page.locator(".fault.broken")).count():
+        broken.first.click()
+        tab.page.wait_for_timeout(200)
+    wait_until(lambda: tab.press("disarm") or tab.press("acknowledge") or tab.state == "DISARMED")
+    if abs(tab.sample[1]) > 2e-3:
+        with tab.dragged(-5):
+            wait_until(lambda: abs(tab.sample[1]) < 1e-3)
+
+
+def refused(url: str) -> int:
+    with pytest.raises(urllib.error.HTTPError) as error:
+        urllib.request.urlopen(url, timeout=60)
+    return error.value.code
+
+
+def test_nothing_is_served_without_the_token(panel, tab):
+    root, token = re.fullmatch(r"(http://127\.0\.0\.1:\d+/)([\w-]{22})/", panel.url).groups()
+    assert refused(root) == refused(f"{root}live") == refused(f"{root}{token[:-1]}/") == 403
+    assert refused(f"{root}_nicegui_ws/socket.io/?EIO=4&transport=polling") == 403
+    open_ = """(url) => new Promise((done) => {
+      const socket = new WebSocket(url);
+      socket.onopen = () => done("open");
+      socket.onerror = () => done("refused");
+    })"""
+    socket = root.replace("http", "ws")
+    assert tab.page.evaluate(open_, f"{socket}live?tab=a") == "refused"
+    assert tab.page.evaluate(open_, f"{socket}{'x' * 22}/live?tab=a") == "refused"
+    assert tab.page.evaluate(open_, f"{socket}{token}/live?tab=a") == "open"
+
+
+def test_everything_comes_from_the_panel_itself(panel, tab):
+    assert len(tab.asked) > 10
+    assert [url for url in tab.asked if not url.startswith((panel.url, panel.url.replace("http", "ws"), "data:"))] == []
+    # The system's browser shows the fonts of the page, too.
+    assert tab.page.evaluate("document.fonts.ready.then((fonts) => fonts.check('16px Roboto'))")
+
+
+def test_a_stiffness_arrives_at_the_board(tab):
+    tab.type("wall_stiffness", 3000)
+    wait_until(lambda: tab.used("wall_stiffness") == pytest.approx(3000, abs=4))
+    slider = tab.page.locator("[data-word=wall_stiffness] .q-slider")
+    box = slider.bounding_box()
+    tab.page.mouse.click(box["x"] + box["width"] * 0.75, box["y"] + box["height"] / 2)
+    wait_until(lambda: tab.used("wall_stiffness") > 10_000)
+    tab.type("wall_stiffness", 2000)
+    wait_until(lambda: tab.used("wall_stiffness") == pytest.approx(2000, abs=4))
+
+
+def test_a_hand_is_pushed_back_by_the_wall_while_it_is_armed(tab):
+    with tab.dragged(4):
+        wait_until(lambda: tab.sample[1] > 7e-3)
+        assert tab.sample[4] == 0
+    rests(tab)
+    tab.arm()
+    with tab.dragged(4):
+        tab.until(lambda: tab.sample[4] < -0.5 and tab.state == "ARMED")
+        assert tab.sample[1] > 5e-3
+    tab.press("disarm")
+    wait_until(lambda: tab.state == "DISARMED")
+
+
+def test_what_the_estimators_make_is_sent_and_played(tab):
+    assert tab.of("estimates", "sound.next") == 0
+    tab.page.select_option("#sound", "1")
+    wait_until(lambda: tab.of("estimates", "sound.next") > 0)
+    assert tab.of("estimates", "sound.entry.context.state") == "running"
+    tab.page.select_option("#sound", "")
+    tab.page.wait_for_timeout(300)
+    before = tab.of("estimates", "sound.next")
+    tab.page.wait_for_timeout(300)
+    assert tab.of("estimates", "sound.next") == before
+
+
+@pytest.mark.parametrize(("fault", "cause"), [("stop", "emergency_stop: "), ("wire", "encoder_loss: ")])
+def test_what_breaks_trips_and_is_acknowledged_when_it_is_mended(tab, fault, cause):
+    tab.arm()
+    tab.fault(fault)
+    wait_until(lambda: tab.state == "TRIPPED" and cause in tab.text("why"))
+    assert "Then acknowledge" in tab.text("do")
+    tab.press("acknowledge")
+    wait_until(lambda: "still tripped" in tab.text("said"))
+    assert tab.state == "TRIPPED"
+    tab.fault(fault)
+    wait_until(lambda: not tab.page.locator(".fault.broken").count())
+    wait_until(lambda: tab.press("acknowledge") or tab.state == "DISARMED")
+    tab.arm()
+
+
+def test_a_clock_that_stands_is_a_board_that_is_silent(tab):
+    tab.fault("clock")
+    wait_until(lambda: tab.state == "SILENT")
+    tab.fault("clock")
+    wait_until(lambda: tab.state in ("DISARMED", "TRIPPED"))
+
+
+def test_two_tabs_see_the_same_and_only_the_one_that_armed_does_more_than_disarm(panel, chromium, tab):
+    other = browsers.Tab(chromium, panel.url)
+    tab.until(lambda: tab.state == other.state == "ARMED" and "Another tab armed it" in other.text("do"))
+    assert other.page.locator("body.locked").count() == 1
+    assert tab.page.locator("body.locked").count() == 0
+    before = other.used("wall_damping")
+    other.page.evaluate("document.body.classList.remove('locked')")
+    tab.until(lambda: other.type("wall_damping", 33) or "another tab armed" in other.text("said"))
+    assert other.used("wall_damping") == before
+    other.page.keyboard.press("Escape")
+    wait_until(lambda: tab.state == other.state == "DISARMED")
+    other.page.context.close()
+
+
+WAYS = {
+    "closed": lambda page: page.close(),
+    "reloaded": lambda page: page.reload(),
+    "hung": lambda page: page.evaluate(
+        "setTimeout(() => { for (const end = Date.now() + 3000; Date.now() < end; ); })"
+    ),
+    "not drawn": lambda page: page.evaluate("window.requestAnimationFrame = () => {}"),
+    "hidden": lambda page: page.evaluate(
+        "Object.defineProperty(document, 'hidden', { get: () => true });"
+        "document.dispatchEvent(new Event('visibilitychange'))"
+    ),
+}
+"""What may become of a tab that armed."""
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_tab_that_is_gone_leaves_a_board_that_is_not_armed(panel, chromium, tab, way):
+    armed = browsers.Tab(chromium, panel.url)
+    armed.arm()
+    wait_until(lambda: tab.state == "ARMED")
+    began = time.monotonic()
+    WAYS[way](armed.page)
+    wait_until(lambda: tab.state in ("DISARMED", "TRIPPED"))
+    print(f"{way}: {tab.state} seen after {time.monotonic() - began:.2f} s")
+    armed.page.context.close()
+
+
+def test_a_board_that_is_gone_is_said_and_had_again(panel, tab):
+    tab.arm()
+    board = next(child for child in psutil.Process(panel.pid).children() if "virtual" in child.cmdline())
+    board.kill()
+    wait_until(lambda: tab.state == "NO BOARD")
+    assert "is gone" in tab.text("why")
+    tab.press("connect")
+    wait_until(lambda: tab.state == "DISARMED")
+    wait_until(lambda: tab.used("wall_stiffness") == pytest.approx(2000, abs=4))
+
+
+def test_three_traces_are_drawn_thirty_times_a_second(tab):
+    """Full traces, and everything beside them: what a frame takes of a processor, which here is shared."""
+    cost_ms = tab.page.evaluate("""async () => {
+      const load = (name) => import(new URL(`static/${name}.js`, location.href));
+      const [traces, hand, estimates] = await Promise.all(["traces", "hand", "estimates"].map(load));
+      const last = traces.latest();
+      traces.samples.splice(0);
+      for (let k = 0; k < 600; k++) {
+        traces.samples.push([last[0] - 10 + k / 60, Math.sin(k) / 100, Math.cos(k), 0, k % 7]);
+      }
+      const began = performance.now();
+      for (let k = 0; k < 50; k++) {
+        traces.drawTraces(document.getElementById("traces"));
+        hand.drawHand(document.getElementById("hand"));
+        estimates.drawEstimates(document.getElementById("estimates"));
+      }
+      return (performance.now() - began) / 50;
+    }""")
+    print(f"a frame takes {cost_ms:.2f} ms")
+    assert cost_ms < 1e3 / 30
+
+
+def test_a_board_at_a_port_is_armed_and_has_no_hand(chromium):
+    with running(SLOW, "--speed", "0") as board, started(HARDWALL, "panel", board.path) as process:
+        tab = browsers.Tab(chromium, line(process).removeprefix("page: "))
+        assert tab.page.locator("canvas").count() == 1
+        assert tab.page.locator(".fault").count() == 0
+        tab.arm()
+        board.order("open emergency_stop")
+        wait_until(lambda: tab.state == "TRIPPED")
+        process.send_signal(signal.SIGINT)
+        assert ended(process)[0] == 130
+        wait_until(lambda: tab.state == "NO PANEL")
+        assert tab.errors == []
+        tab.page.context.close()
