@@ -19,6 +19,7 @@ from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.link.link import Link
 from hardwall.model.link import server
 from hardwall.model.link.line import framed
+from hardwall.model.register import Kind
 from hardwall.model.registers import CAPTURE, COUNTERS, MAP, SUPERVISOR, TELEMETRY
 from hardwall.testing import Bench, parameters, rng, simulate
 from stimuli import frames
@@ -41,7 +42,7 @@ class Device(wiring.Component):
     def __init__(self, name: str):
         self.link = Link(supervised(name), BAUD)
         ports = dict(self.link.signature.members)
-        del ports["capture_address"], ports["capture_data"]
+        del ports["capture_address"], ports["capture_data"], ports["capture_done"]
         super().__init__(ports)
 
     def elaborate(self, platform):
@@ -49,7 +50,7 @@ class Device(wiring.Component):
         m.submodules.link = link = self.link
         place = Signal.like(link.capture_address)
         m.d.sync += place.eq(link.capture_address)
-        m.d.comb += link.capture_data.eq(captured(place))
+        m.d.comb += [link.capture_data.eq(captured(place)), link.capture_done.eq(1)]
         m.d.comb += lead_out(link, self, self.signature.members)
         return m
 
@@ -132,15 +133,16 @@ async def everything_can_be_read_by_function_3(dut):
 
     @bridge
     def run() -> None:
-        constants = values(client.read_holding_registers(0, count=12, device_id=1))
-        named = {r.name: r.from_registers(tuple(constants[r.address : r.address + 2])) for r in registers.registers[:6]}
+        fixed = [each for each in registers.registers if each.kind is Kind.CONSTANT]
+        constants = values(client.read_holding_registers(0, count=2 * len(fixed), device_id=1))
+        named = {r.name: r.from_registers(tuple(constants[r.address : r.address + 2])) for r in fixed}
         assert f"{named['identity_high']:08x}{named['identity_low']:08x}" == registers.identity
         size = named["map_bytes"]
         packed = b"".join(each.to_bytes(2, "big") for each in window(MAP, (size + 1) // 2))[:size]
         described = json.loads(zlib.decompress(packed))
         assert described["identity"] == registers.identity
         rows = [dict(zip(described["columns"], row, strict=True)) for row in described["registers"]]
-        assert [row["address"] for row in rows] == [r.address for r in registers.registers[6:]]
+        assert [row["address"] for row in rows] == [r.address for r in registers.registers[len(fixed) :]]
         assert named["capture_registers"] == CAPTURE_REGISTERS
         assert window(CAPTURE, CAPTURE_REGISTERS) == [captured(k) for k in range(CAPTURE_REGISTERS)]
 

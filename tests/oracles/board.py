@@ -55,14 +55,15 @@ class Watched(wiring.Component):
 
     Attributes:
         board: the board.
-        asked: how the inputs of the axis that come from the link lie in `asking`.
+        asked: how the inputs of the axis and the capture memory that come from the link lie in `asking`.
         shown: how `SEEN` lies in `showing`.
     """
 
     def __init__(self, board: Board):
         self.board, registers = board, board.registers
         asked = (each.name for each in (*registers.words, *registers.live, *registers.pulses))
-        self._asked = {name: getattr(board.axis, name) for name in asked}
+        theirs = {name: board.axis if name in board.axis.signature.members else board.capture for name in asked}
+        self._asked = {name: getattr(block, name) for name, block in theirs.items()}
         self._shown = {name: getattr(board.axis, name) for name in SEEN}
         self.asked, self.shown = (
             Packing({name: Shape.cast(port.shape()) for name, port in ports.items()})
