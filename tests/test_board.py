@@ -86,6 +86,9 @@ async def a_random_host_at_a_random_handle(dut):
             await random_live_word(host)
         else:
             await host.write(disarm=1)
+    # An axis without a heartbeat, or one that is armed, is not armed.
+    for _ in range(2):
+        await host.write(arm=1)
     # The campaign must reach every case.
     assert {row["state"] for row in seen} == {DISARMED, ARMED, TRIPPED}
     assert {row["index_latched"] for row in seen} == {0, 1}
