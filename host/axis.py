@@ -1,11 +1,9 @@
 """An axis on a board: its wall, what it does, and the acts that let it drive."""
 
-import math
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import suppress
 
-from ..model.checks import check_range
 from ..model.register import Kind
 from ..model.registers import TELEMETRY
 from .capture import Capture
@@ -13,14 +11,15 @@ from .device import Device, read_identity
 from .errors import ChangedError, HostError, NotReadyError, RefusedError, TrippedError
 from .groups import Supervisor, Wall
 from .heartbeat import LEASE_S, Beat, Heartbeat
+from .homing import Homed, homing
 from .port import Port
 from .status import State, Status, Trip, status_of
 from .words import Words
 
 READY_TRIES = 20
 """Looks at `ready` after the first beat."""
-REST_S, REST_COUNTS = 0.3, 2
-"""The time in which a handle that rests moves by so many counts at most."""
+HOMING_S = 0.01
+"""The time between two looks at a handle that is homed."""
 
 
 class Axis:
@@ -256,6 +255,10 @@ class Axis:
         except RefusedError as error:
             raise NotReadyError("the axis is ARMED: disarm it before its position is set") from error
 
+    def homing(self, index_m: float = 0.0) -> Generator[str, None, Homed]:
+        """Home as `home` does, a look at a step: see `hardwall.host.homing.homing`."""
+        return homing(self, index_m)
+
     def home(self, index_m: float = 0.0, seconds: float = 60.0) -> float:
         """Wait until a hand has moved the handle over the index; then make the index the position `index_m`.
 
@@ -268,27 +271,15 @@ class Axis:
             NotReadyError: if the axis is ARMED.
             HostError: if the board is not reached.
         """
-        count = self.device.registers["count"]
-        check_range("index_m", index_m, count.low * count.lsb, count.high * count.lsb)
-        until = time.monotonic() + seconds
-        self.renew()
-        if self.status.state is State.ARMED:
-            raise NotReadyError("the axis is ARMED: disarm it before it is homed")
-        self.pulse("index_arm")
-        while self.read("index_armed"):
+        until, steps = time.monotonic() + seconds, self.homing(index_m)
+        while True:
+            try:
+                waits_for = next(steps)
+            except StopIteration as end:
+                return end.value.position_m
             if time.monotonic() > until:
-                raise TimeoutError(f"the index has not come in {seconds:g} s: move the handle over it")
-            self.sleep(0.01)
-        rest_m = (REST_COUNTS + 0.5) * count.lsb
-        before_m = math.inf
-        while abs(self.status.position_m - before_m) > rest_m:
-            if time.monotonic() > until:
-                raise TimeoutError(f"the handle has not come to rest in {seconds:g} s after the index")
-            before_m = self.status.position_m
-            self.sleep(REST_S)
-        offset_m = index_m - self.read("index_count") * count.lsb
-        self.preload(self.status.position_m + offset_m)
-        return self.status.position_m
+                raise TimeoutError(f"in {seconds:g} s there was not {waits_for}")
+            self.sleep(HOMING_S)
 
     def _why_not(self, status: Status) -> str:
         if status.state is State.ARMED:

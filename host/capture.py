@@ -1,7 +1,8 @@
 """The capture memory of a board: samples at the full rate around an event, as arrays in SI units."""
 
+import io
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Generator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -58,14 +59,21 @@ class Captured:
             raise FieldError("flag", f"must be one of {', '.join(self.flag_names)}, not {name!r}")
         return (self.flags >> self.flag_names.index(name) & 1).astype(bool)
 
+    @property
+    def npz(self) -> bytes:
+        """The content of an .npz file with the arrays, their names, and the identity."""
+        file = io.BytesIO()
+        np.savez_compressed(file, **vars(self))
+        return file.getvalue()
+
     def save(self, path: Path) -> None:
-        """Write the arrays, with their names and the identity, to an .npz file.
+        """Write `npz` to a file.
 
         Raises:
             OSError: if the file cannot be written.
         """
-        with whole_file(path) as part, part.open("wb") as file:
-            np.savez_compressed(file, **vars(self))
+        with whole_file(path) as part:
+            part.write_bytes(self.npz)
 
 
 class Board(Protocol):
@@ -170,10 +178,24 @@ class Capture:
             self._board.sleep(LOOK_S)
 
     def read(self, progress: Callable[[int], object] = lambda done: None) -> Captured:
-        """Return a capture that is done, and live meanwhile.
+        """Return a capture that is done, and live meanwhile; the errors are those of `reading`.
 
         Args:
             progress: called with the number of records that are read.
+        """
+        reading = self.reading()
+        while True:
+            try:
+                done = next(reading)
+            except StopIteration as end:
+                return end.value
+            self._board.sleep(0.0)
+            progress(done)
+
+    def reading(self) -> Generator[int, None, Captured]:
+        """Read a capture that is done, a request at a step, for who has more to do between two.
+
+        Yields the number of records that are read, and returns the capture.
 
         Raises:
             NotReadyError: if it is not done, or the board has no capture memory.
@@ -189,8 +211,7 @@ class Capture:
                 registers += self._board.read_registers(CAPTURE + len(registers), some * RECORD_REGISTERS)
             except RefusedError:
                 raise NotReadyError("the capture was started again while it was read") from None
-            self._board.sleep(0.0)
-            progress(done + some)
+            yield done + some
         return self._captured(np.array(registers, np.uint16).reshape(-1, RECORD_REGISTERS))
 
     def _captured(self, cells: np.ndarray) -> Captured:

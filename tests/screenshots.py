@@ -16,6 +16,21 @@ STROKES, SPEED_MM_PER_S = 2, 50.0
 """Quick strokes into the wall, and the speed of the slow one behind them, in the board's time."""
 
 
+FRAMES = 50
+FRAME_MS = """async (frames) => {
+  const load = (name) => import(new URL(`static/${name}.js`, location.href));
+  const [traces, hand, estimates] = await Promise.all(["traces", "hand", "estimates"].map(load));
+  const began = performance.now();
+  for (let k = 0; k < frames; k++) {
+    traces.drawTraces(document.getElementById("traces"));
+    hand.drawHand(document.getElementById("hand"));
+    estimates.drawEstimates(document.getElementById("estimates"));
+  }
+  return (performance.now() - began) / frames;
+}"""
+"""What a frame of the page takes of the browser's processor, ms."""
+
+
 def push(tab: Tab) -> None:
     """Push the handle into the wall, out and in again, and draw it there."""
     with tab.dragged(11):
@@ -30,6 +45,7 @@ def push(tab: Tab) -> None:
             tab.page.wait_for_timeout(step_ms)
         tab.until(lambda: tab.state == "ARMED" and tab.sample[4] < -2)
         tab.page.screenshot(path=PICTURES / "panel.png")
+        print(f"{tab.text('pace')}; a frame takes {tab.page.evaluate(FRAME_MS, FRAMES):.1f} ms")
 
 
 def trip(tab: Tab) -> None:

@@ -3,7 +3,7 @@
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -11,9 +11,11 @@ from typing import Any, NamedTuple
 from ..axis import Axis
 from ..errors import ChangedError, ForeignError, HostError, NotReadyError, PortError
 from ..heartbeat import LEASE_S
+from ..homing import Homed
 from ..status import State
 from .knobs import knobs_of
 from .pace import Pace
+from .recorder import Recorder, Wish
 from .view import View
 
 LOOK_S = 1 / 60
@@ -60,6 +62,8 @@ class Driver:
         self._samples: deque[Sample] = deque(maxlen=KEPT)
         self._pings: dict[str, float] = {}
         self._taken, self._renewed_s, self._said_s = 0, 0.0, 0.0
+        self._recorder = Recorder()
+        self._homing: Generator[str, None, Homed] | None = None
         self._axis: Axis | None = None
         self._open()
         self._thread = threading.Thread(target=self._run, name="hardwall-panel", daemon=True)
@@ -107,6 +111,18 @@ class Driver:
         """Open the port again, if the board was lost."""
         self._ask(self._open_again)
 
+    def home(self, tab: str, index_m: float) -> None:
+        """Begin to home, until it is done, left, or something else is wanted."""
+        self._ask(lambda: self._home(tab, index_m))
+
+    def leave_home(self) -> None:
+        """Do not home any more."""
+        self._ask(self._leave_home)
+
+    def record(self, tab: str, wish: Wish) -> None:
+        """Begin a capture, whatever was before."""
+        self._ask(lambda: self._record(tab, wish))
+
     def set(self, tab: str, name: str, value: float) -> None:
         """Write a word, in SI units; of several values that come before they are written the last counts."""
         with self._lock:
@@ -126,6 +142,8 @@ class Driver:
                     self._write(self._axis)
                     self._live(self._axis)
                     self._look(self._axis)
+                    self._record_on(self._axis)
+                    self._home_on()
             except (PortError, ForeignError, ChangedError) as error:
                 self._lose(error)
             except HostError as error:
@@ -171,7 +189,10 @@ class Driver:
         values = {name: axis.get(name) for name in names}
         stamp = axis.device.registers["stamp"]
         self._pace = Pace((stamp.high + 1) * stamp.lsb)
-        self._see(device=axis.device, status=axis.status, connected=True, lost="", holder=None, pace=None)
+        span_s = self._recorder.spans_s(axis)
+        self._see(
+            device=axis.device, status=axis.status, connected=True, lost="", holder=None, pace=None, span_s=span_s
+        )
         self._keep(values)
 
     def _open_again(self) -> None:
@@ -186,13 +207,17 @@ class Driver:
         if self._axis:
             self._axis.close()
             self._axis = None
-        self._see(status=None, connected=False, lost=f"{error}", holder=None, pace=None, looks_hz=0.0)
+            self._recorder.leave()
+            self._leave_home()
+        gone = {"status": None, "connected": False, "holder": None, "pace": None, "looks_hz": 0.0}
+        self._see(**gone, lost=f"{error}", recording=self._recorder.recording)
 
     def _arm(self, tab: str) -> None:
         if self._axis is None:
             return
         if not self._lives(tab):
             raise NotReadyError("the tab that asks to arm is not heard")
+        self._leave_home()
         self._axis.arm()
         self._see(holder=tab)
 
@@ -210,6 +235,46 @@ class Driver:
         if trip.latched != latched:
             raise HostError(f"other causes stand than those that were shown: {trip}")
         self._axis.acknowledge(trip)
+
+    def _home(self, tab: str, index_m: float) -> None:
+        self._check_holder(tab)
+        if self._axis:
+            self._homing = self._axis.homing(index_m)
+
+    def _leave_home(self) -> None:
+        self._homing = None
+        self._see(homing="")
+
+    def _home_on(self) -> None:
+        """Go on with homing, if it was begun."""
+        if self._homing is None:
+            return
+        try:
+            self._see(homing=next(self._homing))
+        except StopIteration as end:
+            self._leave_home()
+            self._see(moved_m=self.view.moved_m + end.value.moved_m)
+            self._say(f"it is homed: the handle is at {1e3 * end.value.position_m:.6g} mm")
+        except (NotReadyError, ValueError) as error:
+            self._leave_home()
+            self._say(f"{error}")
+
+    def _check_holder(self, tab: str) -> None:
+        if self.view.holder not in (None, tab):
+            raise NotReadyError("another tab armed the board, and alone may do that")
+
+    def _record(self, tab: str, wish: Wish) -> None:
+        self._check_holder(tab)
+        if self._axis:
+            self._recorder.begin(self._axis, wish)
+
+    def _record_on(self, axis: Axis) -> None:
+        """Go on with a capture, if there is one."""
+        try:
+            self._recorder.step(axis)
+        except NotReadyError as error:
+            self._say(f"{error}")
+        self._see(recording=self._recorder.recording)
 
     def _write(self, axis: Axis) -> None:
         """Write what tabs want, all at one sample; while a tab holds the board, only what that one wants."""

@@ -21,8 +21,13 @@ class _Lane:
 
     def __init__(self, spec: AxisSpec):
         self.spec = spec
-        self._params, self._state = model.Axis(spec).params, spec.design.start(False)
+        self._params = model.Axis(spec).params
+        self.start()
         self._names = {word.name for word in spec.design.words}
+
+    def start(self) -> None:
+        """Start afresh, from the next count."""
+        self._state = self.spec.design.start(False)
 
     def set(self, values: Mapping[str, float]) -> None:
         words = {name: values[name] for name in self._names & values.keys()}
@@ -55,24 +60,29 @@ class Estimates:
             raise ValueError(f"estimator must be one that needs only counts, not {spec.estimator!r}")
         self.names, self.sample_hz = (spec.estimator, PLAIN), spec.sample_hz
         self._lanes = [_Lane(spec), _Lane(replace(spec, estimator=PLAIN, gains=None))]
-        self._values: Mapping[str, float] | None = None
+        self._used: tuple[Mapping[str, float], float] | None = None
+        self._count_m, self._moved_m = spec.count_m, 0.0
         self._records: deque[bytes] = deque(maxlen=KEPT)
         self._taken, self._lock = 0, threading.Lock()
         # The first call compiles, for which no tab would wait.
         for lane in self._lanes:
             lane.run(np.zeros(1, np.int64))
 
-    def use(self, values: Mapping[str, float]) -> None:
-        """Take the words that the board uses, in SI units, from the next record on."""
-        self._values = values
+    def use(self, values: Mapping[str, float], moved_m: float = 0.0) -> None:
+        """Take the words that the board uses, in SI units, and how far its positions have moved, from now on."""
+        self._used = values, moved_m
 
     def feed(self, counts: list[int]) -> None:
         """Take the next counts, which wrap as the hardware's do."""
-        values, self._values = self._values, None
-        if values is not None:
+        used, self._used = self._used, None
+        if used is not None:
+            values, moved_m = used
             for lane in self._lanes:
                 lane.set(values)
-        taken = np.array(counts, np.int64)
+                if moved_m != self._moved_m:
+                    lane.start()
+            self._moved_m = moved_m
+        taken = np.array(counts, np.int64) + round(self._moved_m / self._count_m)
         both = [lane.run(taken) for lane in self._lanes]
         rows = np.concatenate([both[lane][kind] for kind in (0, 1) for lane in (0, 1)])
         with self._lock:

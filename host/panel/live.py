@@ -82,10 +82,10 @@ class Live:
         return self._driver.view.holder in (None, tab)
 
     def _hold(self, tab: str, hand: Hand, wanted_m: float) -> None:
-        status = self._driver.view.status
-        if status and self._may(tab) and self._dragging in ("", tab):
+        view = self._driver.view
+        if view.status and self._may(tab) and self._dragging in ("", tab):
             self._dragging = tab
-            hand.hold(wanted_m, status.position_m)
+            hand.hold(wanted_m - view.moved_m, view.status.position_m - view.moved_m)
 
     def _turn(self, tab: str, hand: Hand, fault: str) -> None:
         if self._may(tab):
@@ -102,7 +102,7 @@ class Live:
         number, _ = self._driver.samples_since(0)
         record, _ = estimates.since(0) if estimates else (0, [])
         before: dict[str, Any] = {}
-        revision = -1
+        used = None
         with suppress(WebSocketDisconnect, RuntimeError):
             while True:
                 message: dict[str, Any] = {}
@@ -115,17 +115,19 @@ class Live:
                 if message:
                     await socket.send_json(message)
                 if estimates:
-                    if revision != (view := self._driver.view).revision:
-                        revision = view.revision
-                        estimates.use(view.values)
+                    view = self._driver.view
+                    if used != (view.revision, view.moved_m):
+                        used = view.revision, view.moved_m
+                        estimates.use(view.values, view.moved_m)
                     record, records = estimates.since(record)
                     for each in records:
                         await socket.send_bytes(each)
                 await asyncio.sleep(LOOK_S)
 
     def _told(self, tab: str) -> dict[str, Any]:
-        now = told(self._driver.view, tab)
+        now = told(view := self._driver.view, tab)
         if self._bench:
             hand = self._bench.hand
-            now |= {"hand_m": hand.held_m, "broken": sorted(hand.broken)}
+            held_m = None if hand.held_m is None else hand.held_m + view.moved_m
+            now |= {"hand_m": held_m, "broken": sorted(hand.broken)}
         return now

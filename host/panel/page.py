@@ -7,8 +7,10 @@ from pathlib import Path
 
 from nicegui import events, ui
 
+from .captures import CaptureCard
 from .driver import Driver
 from .hand import FAULTS
+from .home import HomeCard
 from .knobs import Group, Knob, Way, knobs_of
 from .live import Bench
 
@@ -46,9 +48,14 @@ def add_page(driver: Driver, bench: Bench | None, title: str) -> None:
                 )
                 if bench and bench.estimates:
                     _estimates(*bench.estimates.names, bench.estimates.sample_hz)
+                capture = CaptureCard(driver, tab) if driver.view.span_s[1] else None
             with ui.element("aside"):
                 knobs = _knobs(driver, tab)
+                home = HomeCard(driver, tab)
         ui.timer(REFRESH_S, _refresher(driver, knobs))
+        ui.timer(REFRESH_S, home.refresh)
+        if capture:
+            ui.timer(REFRESH_S, capture.refresh)
 
 
 def _hand() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..device import Device
 from ..status import State, Status
+from .recorder import Recording
 
 ADVICE = {
     "encoder_illegal": "Look at the encoder's cable and its shield",
@@ -40,6 +41,10 @@ class View:
         pace: seconds of the board in a second; None while it is not known.
         looks_hz: how often the board is read.
         values: what the board uses, in SI units, by the names of its words; `revision` changes with them.
+        span_s: the shortest and the longest time that a capture spans; zeros for a board without a memory for it.
+        recording: what is known of the capture.
+        homing: what homing waits for; empty while nobody homes.
+        moved_m: how far all positions have moved since the board began to count, m.
     """
 
     device: Device | None = None
@@ -52,6 +57,10 @@ class View:
     looks_hz: float = 0.0
     values: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     revision: int = 0
+    span_s: tuple[float, float] = (0.0, 0.0)
+    recording: Recording = field(default_factory=Recording)
+    homing: str = ""
+    moved_m: float = 0.0
 
 
 def told(view: View, tab: str) -> dict[str, Any]:

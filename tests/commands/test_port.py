@@ -109,7 +109,9 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual):
     assert " mm/s " in done.stdout
     done = called("home", virtual.path, "--seconds", "0.2")
     assert done.returncode == 1
-    assert done.stderr.splitlines()[-1] == ("hardwall: error: the index has not come in 0.2 s: move the handle over it")
+    assert done.stderr.splitlines()[-1] == (
+        "hardwall: error: in 0.2 s there was not the index: move the handle over it"
+    )
     with started(HARDWALL, "home", virtual.path, "--at", "0.1", "--json") as process:
         assert process.stderr.readline() == "move the handle over its index, and let it rest\n"
         virtual.order("hold 7")

@@ -155,7 +155,7 @@ def test_what_cannot_be_armed_says_why(virtual, axis):
 
 
 def test_the_index_becomes_the_origin(virtual, axis):
-    with pytest.raises(TimeoutError, match=r"the index has not come in 0.2 s: move the handle over it"):
+    with pytest.raises(TimeoutError, match=r"in 0.2 s there was not the index: move the handle over it"):
         axis.home(seconds=0.2)
     # The hand holds it at places of the world, and there is an index every 4 mm.
     virtual.order("hold 7")

@@ -74,6 +74,7 @@ class TwinBoard:
                 if not (request := self._frame(data)):
                     continue
                 self.requests.append(request)
+                self.server.file.pulses = ()
                 answer = self.server.take(Verdict.REQUEST, request)
                 self.react(self.server.file.pulses)
                 late_s, self.late_s = self.late_s, 0.0

@@ -121,6 +121,7 @@ class Tab:
     @contextmanager
     def dragged(self, way_mm: float) -> Iterator[None]:
         """Drag the handle to some way from the wall, hold it there, and let it go."""
+        self.page.evaluate("window.scrollTo(0, 0)")
         self.page.mouse.move(*self.beside(1e3 * (self.sample[1] - self.wall_m)))
         self.page.mouse.down()
         self.page.mouse.move(*self.beside(way_mm), steps=5)

@@ -44,6 +44,16 @@ def test_new_words_count_from_the_next_record_on():
     assert found[2:, [9, 19]].ravel() == pytest.approx([-1.0, -4.0, -1.0, -4.0], rel=0.01)
 
 
+def test_positions_that_moved_start_both_afresh():
+    estimates = Estimates(SPEC)
+    for moved in (0, 4000):
+        estimates.use(WORDS | {"wall_damping": 0.0}, moved * SPEC.count_m)
+        estimates.feed([2000] * 10)
+    found = rows(estimates.since(0)[1])
+    assert np.all(found[:2, 10:] == 0)
+    assert found[2:, [9, 19]].ravel() == pytest.approx([-2.0, -10.0, -2.0, -10.0], rel=0.01)
+
+
 def test_records_that_were_seen_are_not_given_again_and_old_ones_are_left():
     estimates = Estimates(SPEC)
     for _ in range(KEPT + 3):

@@ -9,6 +9,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator
 
+import numpy as np
 import psutil
 import pytest
 
@@ -206,26 +207,58 @@ def test_a_board_that_is_gone_is_said_and_had_again(panel, tab):
     wait_until(lambda: tab.used("wall_stiffness") == pytest.approx(2000, abs=4))
 
 
-def test_three_traces_are_drawn_thirty_times_a_second(tab):
-    """Full traces, and everything beside them: what a frame takes of a processor, which here is shared."""
-    cost_ms = tab.page.evaluate("""async () => {
-      const load = (name) => import(new URL(`static/${name}.js`, location.href));
-      const [traces, hand, estimates] = await Promise.all(["traces", "hand", "estimates"].map(load));
-      const last = traces.latest();
-      traces.samples.splice(0);
-      for (let k = 0; k < 600; k++) {
-        traces.samples.push([last[0] - 10 + k / 60, Math.sin(k) / 100, Math.cos(k), 0, k % 7]);
-      }
-      const began = performance.now();
-      for (let k = 0; k < 50; k++) {
-        traces.drawTraces(document.getElementById("traces"));
-        hand.drawHand(document.getElementById("hand"));
-        estimates.drawEstimates(document.getElementById("estimates"));
-      }
-      return (performance.now() - began) / 50;
-    }""")
-    print(f"a frame takes {cost_ms:.2f} ms")
-    assert cost_ms < 1e3 / 30
+def test_a_contact_is_captured_zoomed_and_saved(tab, tmp_path):
+    card = tab.page.locator(".capture")
+    assert not card.locator(".nicegui-echart").is_visible()
+    card.get_by_label("Time").fill("40")
+    tab.arm()
+    card.get_by_text("Capture", exact=True).last.click()
+    wait_until(lambda: "trigger" in card.locator(".state").inner_text())
+    with tab.dragged(4):
+        tab.until(lambda: tab.sample[4] < -0.5)
+    tab.press("disarm")
+    wait_until(lambda: "records at" in card.locator(".state").inner_text())
+    chart = card.locator(".nicegui-echart")
+    wait_until(chart.is_visible)
+    shown = """(chart) => {
+      const options = getElement(Number(chart.id.slice(1))).chart.getOption();
+      return [options.dataZoom[0].end - options.dataZoom[0].start, options.series.map((each) => each.data.length)];
+    }"""
+    wait_until(lambda: chart.evaluate(shown)[1] == [2048] * 3)
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    assert chart.evaluate(shown)[0] == 100
+    tab.page.mouse.move(box["x"] + box["width"] / 3, box["y"] + box["height"] / 2)
+    tab.page.mouse.wheel(0, -500)
+    wait_until(lambda: chart.evaluate(shown)[0] < 95)
+    with tab.page.expect_download() as download:
+        card.get_by_text("Save .npz").click()
+    download.value.save_as(tmp_path / "capture.npz")
+    with np.load(tmp_path / "capture.npz") as saved:
+        assert len(saved["position_m"]) == 2048
+        place = int(saved["place"])
+        # The wall is at 5 mm, and pushes from there on.
+        assert saved["force_n"][place:].min() < 0
+        assert np.all(saved["force_n"][: place - 1] == 0)
+        assert saved["position_m"][place] == pytest.approx(5e-3, abs=2e-4)
+
+
+def test_the_index_becomes_the_origin_and_the_first_one_again(tab):
+    card = tab.page.locator(".home")
+    card.get_by_text("Home", exact=True).click()
+    wait_until(lambda: "move the handle over it" in card.inner_text())
+    card.get_by_text("Leave it").click()
+    wait_until(lambda: card.get_by_text("Home", exact=True).count())
+    card.get_by_text("Home", exact=True).click()
+    wait_until(lambda: "move the handle over it" in card.inner_text())
+    with tab.dragged(4):
+        wait_until(lambda: "it is homed: the handle is at" in tab.text("said"))
+    wait_until(lambda: "The index was found." in card.inner_text())
+    at_mm = float(re.search(r"at (-?[\d.e-]+) mm", tab.text("said"))[1])
+    assert abs(at_mm) < 9
+    # What the hand holds is in the board's positions, which have moved.
+    with tab.dragged(-3):
+        wait_until(lambda: abs(tab.sample[1] - 2e-3) < 0.5e-3)
 
 
 def test_a_board_at_a_port_is_armed_and_has_no_hand(chromium):

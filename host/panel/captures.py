@@ -1,0 +1,177 @@
+"""The card of a capture: what triggers it, how far it has come, and its records at the full rate, to be zoomed."""
+
+from typing import Any
+
+import numpy as np
+from nicegui import ui
+
+from ..capture import Captured
+from .driver import Driver
+from .recorder import IDLE, READING, TRIGGERS, Recording, Wish
+
+ABOUT = "Every sample around an event, from the board's own memory. Turn the wheel over the picture, and drag it."
+CALLED = {
+    "contact": "contact",
+    "trip": "trip",
+    "rise": "upwards past a level",
+    "fall": "downwards past a level",
+    "now": "now",
+}
+"""What the triggers are called."""
+STATES = {
+    "IDLE": "",
+    "FILLING": "keeps what comes before the trigger",
+    "WAITING": "waits for its trigger",
+    "TRIGGERED": "takes what comes behind the trigger",
+    "READING": "is read",
+}
+TRACES = (
+    ("position", "mm", "position_m", 1e3, "#1d2733"),
+    ("velocity", "mm/s", "velocity_m_per_s", 1e3, "#2f7d32"),
+    ("force", "N", "force_n", 1.0, "#b25500"),
+)
+"""What is drawn: a name, its unit, the array, how many of the unit the SI unit has, and a colour."""
+HEIGHT, GAP, TOP = 25, 6, 3
+"""The height of a drawing, the gap between two and above the first, percent of the card."""
+
+
+class CaptureCard:
+    """The card, for one tab.
+
+    Args:
+        driver: the board.
+        tab: the tab.
+    """
+
+    def __init__(self, driver: Driver, tab: str):
+        self._driver, self._tab, self._shown = driver, tab, 0
+        least_ms, most_ms = (1e3 * span_s for span_s in driver.view.span_s)
+        with ui.element("div").classes("card capture"):
+            ui.html(f'<div class="title"><h2>Capture</h2><p>{ABOUT}</p></div>', sanitize=False)
+            with ui.element("div").classes("asks"):
+                self._trigger = ui.select({name: CALLED[name] for name in TRIGGERS}, value=TRIGGERS[0], label="Trigger")
+                self._span = ui.number("Time", value=least_ms, min=least_ms, max=most_ms, suffix="ms", format="%.6g")
+                self._before = ui.number("Before it", value=25, min=0, max=100, suffix="%", format="%.3g")
+                self._level = ui.number("Level", value=0, suffix="mm", format="%.7g")
+                rises_or_falls = lambda name: name in ("rise", "fall")  # noqa: E731
+                self._level.bind_visibility_from(self._trigger, "value", backward=rises_or_falls)
+                for field in (self._trigger, self._span, self._before, self._level):
+                    field.props("dense outlined hide-bottom-space")
+                ui.button("Capture", on_click=self._begin).props("dense no-caps").mark("capture")
+                self._save = ui.button("Save .npz", on_click=self._download).props("dense flat no-caps")
+                self._state = ui.label().classes("state")
+            self._chart = ui.echart(_options(None))
+        self._chart.set_visibility(False)
+        self._save.set_visibility(False)
+
+    def refresh(self) -> None:
+        """Show what is known of the capture, where it is new."""
+        recording = self._driver.view.recording
+        self._state.set_text(_said(recording))
+        if recording.number != self._shown and recording.captured:
+            self._shown = recording.number
+            self._chart.set_visibility(True)
+            self._save.set_visibility(True)
+            self._chart.options.clear()
+            self._chart.options.update(_options(recording.captured))
+            self._chart.update()
+
+    def _begin(self) -> None:
+        numbers = (self._span.value, self._before.value, self._level.value)
+        if None in numbers:
+            ui.notify("a capture needs its numbers", type="warning")
+            return
+        span_ms, before_percent, level_mm = numbers
+        try:
+            wish = Wish(self._trigger.value, 1e-3 * span_ms, 1e-2 * before_percent, 1e-3 * level_mm)
+        except ValueError as error:
+            ui.notify(f"{error}", type="warning")
+            return
+        self._driver.record(self._tab, wish)
+
+    def _download(self) -> None:
+        captured = self._driver.view.recording.captured
+        if captured:
+            ui.download.content(captured.npz, f"capture-{captured.identity}.npz")
+
+
+def _said(recording: Recording) -> str:
+    if recording.state == READING:
+        return f"It is read: {recording.read:.0%}"
+    if recording.state != IDLE:
+        return f"It {STATES[recording.state]}"
+    captured = recording.captured
+    if captured is None:
+        return ""
+    rate_khz = 1e-3 / (captured.time_s[1] - captured.time_s[0])
+    return f"{len(captured.time_s)} records at {rate_khz:g} kHz, {captured.place} before the trigger"
+
+
+def _options(captured: Captured | None) -> dict[str, Any]:
+    """Return the options of a chart: a drawing below another over one time, all zoomed together."""
+    places = range(len(TRACES))
+    unit, scale, time = "ms", 1e3, np.zeros(0)
+    if captured:
+        time = captured.time_s
+        if time[-1] - time[0] < 1e-3:
+            unit, scale = "\u00b5s", 1e6
+    series = [
+        {
+            "type": "line",
+            "name": name,
+            "xAxisIndex": place,
+            "yAxisIndex": place,
+            "step": "end",
+            "showSymbol": False,
+            "lineStyle": {"width": 1.2, "color": colour},
+            "itemStyle": {"color": colour},
+            "data": _points(scale * time, factor * getattr(captured, array)) if captured else [],
+            "markLine": {
+                "silent": True,
+                "symbol": "none",
+                "label": {"show": False},
+                "lineStyle": {"color": "#b00020", "type": "dashed"},
+                "data": [{"xAxis": 0}],
+            },
+        }
+        for place, (name, _, array, factor, colour) in enumerate(TRACES)
+    ]
+    below = {"name": f"time after the trigger ({unit})", "nameLocation": "middle", "nameGap": 24}
+    return {
+        "animation": False,
+        "grid": [
+            {"left": 78, "right": 18, "top": f"{TOP + place * (HEIGHT + GAP)}%", "height": f"{HEIGHT}%"}
+            for place in places
+        ],
+        "xAxis": [
+            {
+                "type": "value",
+                "gridIndex": place,
+                "min": "dataMin",
+                "max": "dataMax",
+                "axisLabel": {"show": place == places[-1], "hideOverlap": True},
+                **(below if place == places[-1] else {}),
+            }
+            for place in places
+        ],
+        "yAxis": [
+            {
+                "type": "value",
+                "gridIndex": place,
+                "scale": True,
+                "name": f"{name} ({unit_of})",
+                "nameLocation": "middle",
+                "nameGap": 58,
+            }
+            for place, (name, unit_of, *_) in enumerate(TRACES)
+        ],
+        "tooltip": {"trigger": "axis"},
+        "axisPointer": {"link": [{"xAxisIndex": "all"}]},
+        "dataZoom": [{"type": "inside", "xAxisIndex": list(places), "filterMode": "filter"}],
+        "series": series,
+    }
+
+
+def _points(time: np.ndarray, values: np.ndarray) -> list[list[float]]:
+    """Return points of six digits, which are more than a screen shows."""
+    return [[float(f"{at:.6g}"), float(f"{value:.6g}")] for at, value in zip(time, values, strict=True)]

@@ -1,0 +1,42 @@
+"""The card of homing: the position that the index becomes, and what is waited for."""
+
+from nicegui import ui
+
+from .driver import Driver
+
+BEGIN, LEAVE = "Home", "Leave it"
+
+
+class HomeCard:
+    """The card, for one tab.
+
+    Args:
+        driver: the board.
+        tab: the tab.
+    """
+
+    def __init__(self, driver: Driver, tab: str):
+        self._driver, self._tab = driver, tab
+        with ui.element("div").classes("card home"):
+            ui.html('<div class="title"><h2>Origin</h2></div>', sanitize=False)
+            with ui.element("div").classes("asks"):
+                self._at = ui.number("Index is at", value=0, suffix="mm", format="%.7g")
+                self._at.props("dense outlined hide-bottom-space")
+                self._button = ui.button(BEGIN, on_click=self._press).props("dense no-caps")
+            self._said = ui.label().classes("said")
+
+    def refresh(self) -> None:
+        """Show whether the axis is homed, and what homing waits for."""
+        view = self._driver.view
+        self._button.set_text(LEAVE if view.homing else BEGIN)
+        if view.homing:
+            self._said.set_text(f"It waits for {view.homing}.")
+        else:
+            homed = view.status and view.status.referenced
+            self._said.set_text("The index was found." if homed else "The index was not found yet.")
+
+    def _press(self) -> None:
+        if self._driver.view.homing:
+            self._driver.leave_home()
+        elif self._at.value is not None:
+            self._driver.home(self._tab, 1e-3 * self._at.value)

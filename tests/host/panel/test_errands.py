@@ -1,0 +1,176 @@
+"""What a driver does between its looks at a board: a capture and homing, as tabs ask for them, and what ends them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from host.twin_board import TwinBoard
+
+from hardwall.host.connect import connect
+from hardwall.host.homing import INDEX, REST
+from hardwall.host.panel.driver import Driver
+from hardwall.host.panel.recorder import IDLE, READING, Wish
+from hardwall.host.status import State
+from hardwall.model.capture import DONE, RECORD_REGISTERS, STATES, WAITING
+from hardwall.model.checks import FieldError
+from hardwall.model.registers import RegisterMap
+from stimuli.processes import wait_until
+
+TAB, OTHER = "tab", "other"
+
+
+@pytest.fixture
+def started(board) -> list[dict[str, int]]:
+    """The words of every capture that was started; each is FILLING."""
+    found, react = [], board.react
+
+    def follow(pulses: tuple[str, ...]) -> None:
+        react(pulses)
+        if "capture_start" in pulses:
+            found.append(dict(board.server.file.active))
+            board.show(capture_state=STATES.index("FILLING"))
+        if "capture_trigger" in pulses:
+            found.append({"by_hand": 1})
+
+    board.react = follow
+    return found
+
+
+def done(board, registers, clocks: int) -> np.ndarray:
+    """Let a capture be done, of records so many clocks apart; return their counts."""
+    count = registers.capture.records
+    cells = np.zeros((count, RECORD_REGISTERS), np.int64)
+    cells[:, 1], cells[:, 7] = np.arange(count) % 1000, np.arange(count) * clocks & 0xFFFF
+    board.server.file.capture = cells.ravel().tolist()
+    board.show(capture_state=DONE, capture_place=7)
+    return cells[:, 1]
+
+
+def test_a_capture_is_begun_and_read_in_parts_between_looks(driver, board, registers, started):
+    least_s, most_s = driver.view.span_s
+    assert least_s == pytest.approx(registers.capture.records / registers.spec.sample_hz)
+    assert most_s == 4095 * least_s
+    driver.record(TAB, Wish("rise", 2.5 * least_s, 0.5, 3e-3))
+    wait_until(lambda: driver.view.recording.state == "FILLING")
+    (words,) = started
+    assert words["capture_sources"] == 0b100
+    assert (words["capture_decimation"], words["capture_before"]) == (3, registers.capture.records // 2)
+    assert words["capture_level"] == 3000
+    board.show(capture_state=WAITING)
+    wait_until(lambda: driver.view.recording.state == "WAITING")
+    counts = done(board, registers, 3 * registers.spec.clocks_per_sample)
+    wait_until(lambda: driver.view.recording.state == READING)
+    number, _ = driver.samples_since(0)
+    wait_until(lambda: driver.view.recording.number == 1)
+    # The board was looked at meanwhile.
+    assert driver.samples_since(0)[0] > number + 20
+    recording = driver.view.recording
+    assert (recording.state, recording.captured.place) == (IDLE, 7)
+    np.testing.assert_array_equal(recording.captured.position_m, counts * registers["count"].lsb)
+
+
+def test_a_capture_now_is_triggered_as_soon_as_it_waits(driver, board, started):
+    driver.record(TAB, Wish("now"))
+    wait_until(lambda: driver.view.recording.state == "FILLING")
+    assert len(started) == 1
+    assert started[0]["capture_sources"] == 0
+    board.show(capture_state=WAITING)
+    wait_until(lambda: {"by_hand": 1} in started)
+
+
+def test_a_capture_that_fails_is_said_and_the_next_one_is_taken(driver, board, registers, started):
+    driver.record(TAB, Wish())
+    wait_until(lambda: started)
+    done(board, registers, registers.spec.clocks_per_sample)
+    wait_until(lambda: driver.view.recording.state == READING)
+    board.server.file.capture = None
+    wait_until(lambda: "was started again" in driver.view.said)
+    assert driver.view.recording.state == IDLE
+    # A board that was reset has forgotten it.
+    driver.record(TAB, Wish())
+    wait_until(lambda: driver.view.recording.state == "FILLING")
+    board.show(capture_state=0)
+    wait_until(lambda: driver.view.recording.state == IDLE)
+    driver.record(TAB, Wish(span_s=1e9))
+    wait_until(lambda: driver.view.said.startswith("span_s must be 0 to "))
+    board.hang_up()
+    wait_until(lambda: not driver.view.connected)
+    assert driver.view.recording.state == IDLE
+
+
+def test_another_tab_begins_nothing_while_one_holds_the_board(driver, board, started):
+    driver.ping(TAB)
+    driver.arm(TAB)
+    wait_until(lambda: driver.ping(TAB) or driver.view.holder == TAB)
+    for ask in (lambda: driver.record(OTHER, Wish()), lambda: driver.home(OTHER, 0.0)):
+        ask()
+        wait_until(lambda: driver.ping(TAB) or "another tab armed" in driver.view.said)
+        driver.set(TAB, "wall_damping", 1.0)
+        wait_until(lambda: driver.ping(TAB) or not driver.view.said)
+    assert started == []
+    driver.record(TAB, Wish())
+    wait_until(lambda: driver.ping(TAB) or started)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"trigger": "noise"}, "trigger must be one of contact, trip, rise, fall, now, not 'noise'"),
+        ({"before": 1.5}, "before must be 0 to 1, not 1.5"),
+        ({"before": float("nan")}, "before must be 0 to 1, not nan"),
+    ],
+)
+def test_a_wish_that_cannot_be_is_refused(changes, message):
+    with pytest.raises(FieldError, match=message):
+        dataclasses.replace(Wish(), **changes)
+
+
+def test_homing_waits_for_the_index_and_for_rest_while_the_board_is_shown(driver, board, registers):
+    said = []
+
+    def follow(pulses: tuple[str, ...]) -> None:
+        said.extend(pulses)
+        if "index_arm" in pulses:
+            board.show(index_armed=1, index_latched=0)
+
+    board.react = follow
+    driver.home(TAB, 0.02)
+    wait_until(lambda: driver.view.homing == INDEX)
+    number, _ = driver.samples_since(0)
+    wait_until(lambda: driver.samples_since(0)[0] > number + 5)
+    board.show(index_armed=0, index_latched=1, index_count=100, count=250)
+    wait_until(lambda: driver.view.homing == REST)
+    wait_until(lambda: driver.view.said.startswith("it is homed"))
+    assert not driver.view.homing
+    assert driver.view.moved_m == pytest.approx(0.02 - 100e-6)
+    assert said == ["index_arm", "commit", "preload"]
+    assert board.server.file.active["preload_count"] * registers["count"].lsb == pytest.approx(0.02 + 150e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("way", ["left", "armed", "gone", "out of range"])
+def test_homing_ends(driver, board, way):
+    board.react, react = (
+        lambda pulses: (react(pulses), "index_arm" in pulses and board.show(index_armed=1)),
+        board.react,
+    )
+    driver.home(TAB, 1e3 if way == "out of range" else 0.0)
+    if way == "out of range":
+        wait_until(lambda: driver.view.said.startswith("index_m must be "))
+    else:
+        wait_until(lambda: driver.view.homing == INDEX)
+    if way == "left":
+        driver.leave_home()
+    if way == "armed":
+        driver.ping(TAB)
+        driver.arm(TAB)
+        wait_until(lambda: driver.ping(TAB) or driver.view.status.state is State.ARMED)
+    if way == "gone":
+        board.hang_up()
+    wait_until(lambda: not driver.view.homing)
+
+
+def test_a_board_without_a_memory_spans_nothing(registers):
+    with TwinBoard(RegisterMap(registers.spec, 0)) as bare:
+        driver = Driver(lambda: connect(bare.name))
+        assert driver.view.span_s == (0.0, 0.0)
+        driver.close()
