@@ -2,14 +2,12 @@
 
 import time
 from collections.abc import Generator
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 from ..model.checks import check_range
+from .device import Device
 from .errors import NotReadyError
-from .status import State
-
-if TYPE_CHECKING:
-    from .axis import Axis
+from .status import State, Status
 
 REST_S, REST_COUNTS = 0.3, 2
 """The time in which a handle that rests moves by so many counts at most."""
@@ -24,7 +22,24 @@ class Homed(NamedTuple):
     moved_m: float
 
 
-def homing(axis: "Axis", index_m: float = 0.0) -> Generator[str, None, Homed]:
+class Board(Protocol):
+    """What homing needs of an axis: see `hardwall.host.axis.Axis`."""
+
+    device: Device
+
+    @property
+    def status(self) -> Status: ...
+
+    def renew(self) -> None: ...
+
+    def read(self, name: str) -> int: ...
+
+    def pulse(self, name: str) -> None: ...
+
+    def preload(self, position_m: float) -> None: ...
+
+
+def homing(axis: Board, index_m: float = 0.0) -> Generator[str, None, Homed]:
     """Home an axis, a look at it at a step, for who has more to do between two.
 
     Yields what is waited for, `INDEX` or `REST`.

@@ -1,11 +1,8 @@
 """The card of a capture: what triggers it, how far it has come, and its records at the full rate, to be zoomed."""
 
-from typing import Any
-
-import numpy as np
 from nicegui import ui
 
-from ..capture import Captured
+from .chart import chart_of, empty
 from .driver import Driver
 from .recorder import IDLE, READING, TRIGGERS, Recording, Wish
 
@@ -25,14 +22,6 @@ STATES = {
     "TRIGGERED": "takes what comes behind the trigger",
     "READING": "is read",
 }
-TRACES = (
-    ("position", "mm", "position_m", 1e3, "#1d2733"),
-    ("velocity", "mm/s", "velocity_m_per_s", 1e3, "#2f7d32"),
-    ("force", "N", "force_n", 1.0, "#b25500"),
-)
-"""What is drawn: a name, its unit, the array, how many of the unit the SI unit has, and a colour."""
-HEIGHT, GAP, TOP = 25, 6, 3
-"""The height of a drawing, the gap between two and above the first, percent of the card."""
 
 
 class CaptureCard:
@@ -60,7 +49,7 @@ class CaptureCard:
                 ui.button("Capture", on_click=self._begin).props("dense no-caps").mark("capture")
                 self._save = ui.button("Save .npz", on_click=self._download).props("dense flat no-caps")
                 self._state = ui.label().classes("state")
-            self._chart = ui.echart(_options(None))
+            self._chart = ui.echart(empty())
         self._chart.set_visibility(False)
         self._save.set_visibility(False)
 
@@ -73,7 +62,7 @@ class CaptureCard:
             self._chart.set_visibility(True)
             self._save.set_visibility(True)
             self._chart.options.clear()
-            self._chart.options.update(_options(recording.captured))
+            self._chart.options.update(chart_of(recording.captured))
             self._chart.update()
 
     def _begin(self) -> None:
@@ -105,73 +94,3 @@ def _said(recording: Recording) -> str:
         return ""
     rate_khz = 1e-3 / (captured.time_s[1] - captured.time_s[0])
     return f"{len(captured.time_s)} records at {rate_khz:g} kHz, {captured.place} before the trigger"
-
-
-def _options(captured: Captured | None) -> dict[str, Any]:
-    """Return the options of a chart: a drawing below another over one time, all zoomed together."""
-    places = range(len(TRACES))
-    unit, scale, time = "ms", 1e3, np.zeros(0)
-    if captured:
-        time = captured.time_s
-        if time[-1] - time[0] < 1e-3:
-            unit, scale = "\u00b5s", 1e6
-    series = [
-        {
-            "type": "line",
-            "name": name,
-            "xAxisIndex": place,
-            "yAxisIndex": place,
-            "step": "end",
-            "showSymbol": False,
-            "lineStyle": {"width": 1.2, "color": colour},
-            "itemStyle": {"color": colour},
-            "data": _points(scale * time, factor * getattr(captured, array)) if captured else [],
-            "markLine": {
-                "silent": True,
-                "symbol": "none",
-                "label": {"show": False},
-                "lineStyle": {"color": "#b00020", "type": "dashed"},
-                "data": [{"xAxis": 0}],
-            },
-        }
-        for place, (name, _, array, factor, colour) in enumerate(TRACES)
-    ]
-    below = {"name": f"time after the trigger ({unit})", "nameLocation": "middle", "nameGap": 24}
-    return {
-        "animation": False,
-        "grid": [
-            {"left": 78, "right": 18, "top": f"{TOP + place * (HEIGHT + GAP)}%", "height": f"{HEIGHT}%"}
-            for place in places
-        ],
-        "xAxis": [
-            {
-                "type": "value",
-                "gridIndex": place,
-                "min": "dataMin",
-                "max": "dataMax",
-                "axisLabel": {"show": place == places[-1], "hideOverlap": True},
-                **(below if place == places[-1] else {}),
-            }
-            for place in places
-        ],
-        "yAxis": [
-            {
-                "type": "value",
-                "gridIndex": place,
-                "scale": True,
-                "name": f"{name} ({unit_of})",
-                "nameLocation": "middle",
-                "nameGap": 58,
-            }
-            for place, (name, unit_of, *_) in enumerate(TRACES)
-        ],
-        "tooltip": {"trigger": "axis"},
-        "axisPointer": {"link": [{"xAxisIndex": "all"}]},
-        "dataZoom": [{"type": "inside", "xAxisIndex": list(places), "filterMode": "filter"}],
-        "series": series,
-    }
-
-
-def _points(time: np.ndarray, values: np.ndarray) -> list[list[float]]:
-    """Return points of six digits, which are more than a screen shows."""
-    return [[float(f"{at:.6g}"), float(f"{value:.6g}")] for at, value in zip(time, values, strict=True)]

@@ -1,8 +1,10 @@
 """A capture as a page asks for it: begun, watched, and read in parts between the looks at the board."""
 
+import math
 import time
 from collections.abc import Generator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from ...model.capture import DONE, SOURCES, STATES
 from ...model.checks import FieldError, check_range
@@ -37,7 +39,7 @@ class Wish:
     before: float = 0.25
     level_m: float = 0.0
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         if self.trigger not in TRIGGERS:
             raise FieldError("trigger", f"must be one of {', '.join(TRIGGERS)}, not {self.trigger!r}")
         check_range("before", self.before, 0.0, 1.0)
@@ -66,7 +68,7 @@ class Recorder:
         recording: what is known of it.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.recording = Recording()
         self._reading: Generator[int, None, Captured] | None = None
         self._by_hand, self._looked_s = False, 0.0
@@ -88,7 +90,7 @@ class Recorder:
         axis.capture.start(
             () if self._by_hand else (wish.trigger,),
             before=min(round(wish.before * records), records - 1),
-            decimation=max(-(-wish.span_s // least_s), 1),
+            decimation=max(math.ceil(wish.span_s / least_s), 1),
             level_m=wish.level_m,
         )
         self._say(state="FILLING", read=0.0)
@@ -134,5 +136,5 @@ class Recorder:
         # A board that was reset has forgotten what was begun.
         self._say(state=state)
 
-    def _say(self, **changes) -> None:
+    def _say(self, **changes: Any) -> None:
         self.recording = replace(self.recording, **changes)
