@@ -98,7 +98,7 @@ class World:
             held["driven"] = self._value(design.force)
         # One act in the time of some records, and reads where there is something to read.
         pulses = {"capture_start": 0, "capture_trigger": 0}
-        if random.random() < (0.01 if state in (IDLE, DONE) else 0.0005):
+        if random.random() < {IDLE: 0.01, DONE: 0.01, WAITING: 0.002}.get(state, 0.0005):
             self._words()
             pulses["capture_start"] = 1
         if random.random() < (0.4 if pulses["capture_start"] else 0.0015):

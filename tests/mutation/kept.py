@@ -1,7 +1,7 @@
-"""What came of a block's mutants, kept: a run that was ended goes on where it was, and one that has nothing new is quick.
+"""What came of a block's mutants, kept: a run that was ended goes on where it was.
 
-It is of no use any more where something that it came from has changed: the block's Verilog in a size, its own tests, what
-all tests share, the model, the seed, or the number of mutants.
+It is of no use any more where something that it came from has changed: the block's Verilog in a size, its own tests,
+what all tests share, the model, the seed, or the number of mutants.
 """
 
 import hashlib
