@@ -239,16 +239,17 @@ def _recorded(params, memory, state, inputs):
 
     The data change where the capture is done, with every clock.
     """
-    running = FILLING <= state.capture_state <= TRIGGERED
-    taken, ring = state.step, state.ring
-    if taken or (inputs.sampled and running and state.left <= 1 and not inputs.capture_start):
-        high, low = _value(inputs, taken >> 1)
-        memory[ring, taken ^ 1] = state.upper if taken & 1 else low
-        return taken + 1, state.upper if taken & 1 else high, state.data
-    if state.capture_state == DONE:
+    running, done = FILLING <= state.capture_state <= TRIGGERED, state.capture_state == DONE
+    taken, ring, data = state.step, state.ring, state.data
+    if done:
         record = (inputs.address // RECORD_REGISTERS + ring) % params.records
-        return 0, state.upper, memory[record, inputs.address % RECORD_REGISTERS]
-    return 0, state.upper, state.data
+        data = memory[record, inputs.address % RECORD_REGISTERS]
+    if not taken and not (inputs.sampled and running and state.left <= 1 and not inputs.capture_start):
+        return 0, state.upper, data
+    high, low = _value(inputs, taken >> 1)
+    if not done:
+        memory[ring, taken ^ 1] = state.upper if taken & 1 else low
+    return taken + 1, state.upper if taken & 1 else high, data
 
 
 @compiled

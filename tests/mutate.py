@@ -15,7 +15,6 @@ import sys
 from covering.blocks import BLOCKS
 from targets import conclude
 
-from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs.result import Table
 from hardwall.testing import SEED
 from mutation.fates import Result
@@ -37,10 +36,7 @@ COLUMNS = {
 
 
 def tell(result: Result) -> None:
-    """Say how a block went, and keep what came of each of its mutants."""
-    folder = build_dir() / "mutate"
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{result.block.replace('/', '-')}.txt").write_text(result.text, encoding="utf-8")
+    """Say how a block went."""
     print(f"{result.block}: {result.killed} of {len(result.fates)} killed", file=sys.stderr, flush=True)
 
 

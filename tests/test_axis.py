@@ -3,7 +3,7 @@
 import cocotb
 import numpy as np
 import pytest
-from cocotb.triggers import RisingEdge, Timer, ValueChange
+from cocotb.triggers import ClockCycles, RisingEdge, Timer, ValueChange
 
 from hardwall.hdl.axis import Axis
 from hardwall.model import clocked, quadrature, stamped
@@ -15,6 +15,8 @@ from stimuli import handle
 from stimuli.axes import busy, random_words
 
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
+LATE = 1 << 20
+"""A clock whose number has a bit that the others' numbers have not."""
 STROBES = "commit", "preload", "clear_flags", "index_arm"
 ACTS, CHANCES = ("", "words", "drive_enable", *STROBES), (0.968, 0.006, 0.006, *[0.005] * len(STROBES))
 """What a host does at a clock, and the chance of each."""
@@ -189,6 +191,18 @@ async def every_output_is_the_twins_at_every_clock(dut):
         unlike = {name: (seen[name], word) for name, word in wanted.items() if seen[name] != word}
         assert not unlike, f"clock {twin.clocks}: the axis's and the twin's {unlike}"
         twin.restarted() if reset else twin.advance(given, given["drive_enable"])
+
+
+@cocotb.test()
+async def late_edges_have_late_stamps(dut):
+    bench, passed = Bench(dut, Axis(busy(**parameters()))), 40
+    await bench.reset()
+    await Timer((LATE + passed) * bench.period_ns, "ns")
+    for (a, b), kind in zip(((1, 0), (1, 1), (0, 1), (0, 0)), ("a_rise", "b_rise", "a_fall", "b_fall"), strict=True):
+        bench.drive(encoder_a=a, encoder_b=b)
+        await ClockCycles(dut.clk, passed)
+        now, of_edge = (bench.reader(name)() for name in ("stamp", f"stamp_{kind}"))
+        assert LATE < now - passed < of_edge < now
 
 
 # One estimator on the count and one on the stamps. `test_loop` runs all estimators.

@@ -23,6 +23,8 @@ CLOCKS = max(SAMPLES, 80_000)
 """Fewer clocks do not reach every case."""
 SHOWN = "stamp", "capture_stamp"
 """The first and the last status that a host of a capture looks at."""
+LOOKS = ("drive", "capture_stamp"), ("index_latched", "first")
+"""The first and the last status that a random host looks at: all of them, or those that it needs."""
 
 
 def random_words(host: Host) -> dict[str, int]:
@@ -55,6 +57,19 @@ async def random_live_word(host: Host) -> None:
     await host.write(**{name: words[name]})
 
 
+async def random_capture(host: Host) -> None:
+    """Begin a capture that a level near the handle triggers, or anything else."""
+    random, count = host.random, host.twin.decoder.count
+    level = host.registers["capture_level"]
+    await host.write(
+        capture_sources=int(random.integers(0, 16)),
+        capture_level=min(max(count + int(random.integers(-2, 3)), level.low), level.high),
+        capture_before=int(random.integers(0, RECORDS)),
+        capture_decimation=1,
+    )
+    await host.write(capture_start=1)
+
+
 @cocotb.test()
 async def a_random_host_at_a_random_handle(dut):
     host = Host(dut, **parameters())
@@ -68,7 +83,7 @@ async def a_random_host_at_a_random_handle(dut):
         host.open_rate = float(random.choice((0.0, 1e-3), p=(0.8, 0.2)))
         if random.random() < 0.5:
             host.change(drive_enable=1, external_fault=1, emergency_stop=1)
-        status = await host.look(*(() if random.random() < 0.3 else ("index_latched", "latched")))
+        status = await host.look(*LOOKS[random.random() > 0.3])
         seen.append(status)
         if status["state"] == TRIPPED:
             await host.write(acknowledged=status["latched"])
@@ -82,8 +97,10 @@ async def a_random_host_at_a_random_handle(dut):
             words = random_words(host) | ({"wall_stiffness": stiffness.high} if random.random() < 0.7 else {})
             index_arm, preload = (int(random.random() < chance) for chance in (0.8, 0.2))
             await host.write(commit=1, index_arm=index_arm, preload=preload, **words)
-        elif act < 0.9:
+        elif act < 0.8:
             await random_live_word(host)
+        elif act < 0.9:
+            await random_capture(host)
         else:
             await host.write(disarm=1)
     # An axis without a heartbeat, or one that is armed, is not armed.
@@ -92,6 +109,7 @@ async def a_random_host_at_a_random_handle(dut):
     # The campaign must reach every case.
     assert {row["state"] for row in seen} == {DISARMED, ARMED, TRIPPED}
     assert {row["index_latched"] for row in seen} == {0, 1}
+    assert {WAITING, DONE} <= {row.get("capture_state") for row in seen}
     assert host.refused
     assert set(host.refused) == {FAILURE}
     assert set(host.pulses) == {(pulse, sign) for pulse in (0, 1) for sign in (0, 1)}

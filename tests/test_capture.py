@@ -44,7 +44,9 @@ def make(name: str, estimator: str) -> Recorded:
 
 
 class World:
-    """What is at the inputs of a capture memory at every clock: an axis of 11 clocks or more a sample, and a host.
+    """What is at the inputs of a capture memory at every clock: an axis and a host.
+
+    An axis has 11 clocks or more a sample. Some samples come sooner, for the memory to do what its twin does even then.
 
     Args:
         design: the memory's.
@@ -81,6 +83,8 @@ class World:
         held["sampled"] = int(self.until <= 0)
         if held["sampled"]:
             self.until = random.choice((11, 11, 12, random.randint(11, 60)))
+            if random.random() < 0.2:
+                self.until = random.choice((RECORD_REGISTERS, random.randint(1, RECORD_REGISTERS)))
             count = held["count"] + random.choice((-1, 0, 1))
             held["count"] = count if random.random() < 0.9 else self._value(design.count)
             held["count"] = min(max(held["count"], design.count.min), design.count.max)
@@ -94,7 +98,7 @@ class World:
             held["driven"] = self._value(design.force)
         # One act in the time of some records, and reads where there is something to read.
         pulses = {"capture_start": 0, "capture_trigger": 0}
-        if random.random() < (0.01 if state in (IDLE, DONE) else 0.0005):
+        if random.random() < {IDLE: 0.01, DONE: 0.01, WAITING: 0.002}.get(state, 0.0005):
             self._words()
             pulses["capture_start"] = 1
         if random.random() < (0.4 if pulses["capture_start"] else 0.0015):

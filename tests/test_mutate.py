@@ -9,7 +9,7 @@ from amaranth.hdl import Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 from cocotb.triggers import RisingEdge
-from covering.blocks import BLOCKS, TESTS
+from covering.blocks import BLOCKS, TESTS, Block
 from reasons import Reason, reasons_for
 
 from hardwall.testing import SEED, Bench
@@ -107,6 +107,27 @@ def test_tests_that_fail_without_a_mutant_say_nothing(monkeypatch):
     whole = None
     assert [fate.killed_by for fate in fates_of(Size(HERE, Answer, {}), (BLOCK,), 4)] == ["a test"] * 4
     assert asked == [run.SAMPLES, None] * 2
+
+
+def test_what_came_of_a_block_is_kept_until_something_changes_that_it_came_from(monkeypatch, tmp_path):
+    monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
+    sizes, asked = [Size(HERE, Answer, {})], []
+    block = Block("part", tested_with="arithmetic/sqrt")
+
+    def fates(size, modules, count):
+        asked.append(count)
+        return [LEFT, EQUAL][:count]
+
+    monkeypatch.setattr(run, "sizes_of", lambda test: sizes)
+    monkeypatch.setattr(run, "fates_of", fates)
+    results = [run.run([block], count, True, lambda result: None)[0] for count in (2, 2, 1, 2, 2)]
+    assert [result.fates for result in results] == [[LEFT, EQUAL]] * 2 + [[LEFT]] + [[LEFT, EQUAL]] * 2
+    assert asked == [2, 1, 2]
+    sizes[0] = Size(HERE, Around, {})
+    run.run([block], 2, True, lambda result: None)
+    monkeypatch.setattr(Block, "test", HERE)
+    run.run([block], 2, True, lambda result: None)
+    assert asked == [2, 1, 2, 2, 2]
 
 
 def test_the_seed_draws_the_mutants_and_the_selector_counts_them():

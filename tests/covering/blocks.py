@@ -15,15 +15,17 @@ class Block:
     Attributes:
         name: its path below `hdl`.
         modules: its modules below the top of its test. Blocks inside it have tests of their own.
+        tested_with: the block whose tests are its own, too, if any.
     """
 
     name: str
     modules: tuple[str, ...] = ("component",)
+    tested_with: str = ""
 
     @property
     def test(self) -> Path:
         """The file of its tests."""
-        folder, _, stem = self.name.rpartition("/")
+        folder, _, stem = (self.tested_with or self.name).rpartition("/")
         return TESTS / folder / f"test_{stem}.py"
 
 
@@ -48,6 +50,6 @@ BLOCKS = (
     Block("link/server", ("component.server",)),
     Block("link/link", ("component.link",)),
     Block("link/axi", ("component.link.subordinate",)),
-    Block("link/axi_link", ("component.link",)),
+    Block("link/axi_link", ("component.link",), tested_with="link/axi"),
     Block("board", ("component.board",)),
 )

@@ -17,11 +17,13 @@ from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.model.link import axi, register_file
 from hardwall.model.link.axi import Response
 from hardwall.model.registers import ACTIVE, CAPTURE, COUNTERS, LIVE, MAP, PULSES, SPACE, SUPERVISOR, TELEMETRY, WRITTEN
-from hardwall.testing import Bench, parameters, rng, simulate
+from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from stimuli.status import show
 from stimuli.supervised import CAPTURE_MEMORY, captured, supervised
 
-TRANSFERS = 1500
+TRANSFERS = 300 + SAMPLES // 80
+IN_A_WHILE = 20
+"""Clocks in which the subordinate would have answered."""
 
 
 class Device(wiring.Component):
@@ -68,6 +70,7 @@ class World:
         self.twin = axi.Subordinate(register_file.Design(self.registers))
         self.twin.file.capture = CAPTURE_MEMORY
         self.pulsed = self.bench.monitor("pulsed", "pulses", *self.twin.file.active)
+        self.taken = [self.bench.monitor(f"axi_{way}ready", f"axi_{way}valid") for way in ("aw", "w", "ar")]
         self.seen = set()
 
     async def reset(self) -> None:
@@ -103,6 +106,21 @@ class World:
         self.twin.file.capture = None if busy else CAPTURE_MEMORY
         self.bench.drive(busy=busy, refuse=sum(bit << k for k, bit in enumerate(refused)))
         await show(self.dut, self.bench, self.registers, status)
+
+    async def stamp(self, stamp: int) -> None:
+        """Give the stamps another value."""
+        self.twin.file.status = self.twin.file.status | {"stamp": stamp, "stamp_a_rise": stamp + 1}
+        await show(self.dut, self.bench, self.registers, self.twin.file.status)
+
+    async def restart(self) -> None:
+        """Reset the link; the bus has no transfer."""
+        self.bench.drive(rst=1)
+        await ClockCycles(self.dut.clk, 2)
+        self.bench.drive(rst=0)
+        status, capture = self.twin.file.status, self.twin.file.capture
+        self.twin = axi.Subordinate(register_file.Design(self.registers))
+        self.twin.file.status, self.twin.file.capture = status, capture
+        await self.live()
 
     async def write(self, address: int, data: bytes) -> Response:
         """Write bytes within a word at a byte address, and compare what it causes with the twin's."""
@@ -166,6 +184,8 @@ async def random_transfers(dut):
                     await world.live()
                 await world.read((begin + 2 * word) % SPACE)
     assert world.seen == {(way, end) for way in ("read", "write") for end in Response}
+    # What is taken was there.
+    assert [{row for (row,) in taken.rows} for taken in world.taken] == [{1}] * len(world.taken)
 
 
 @cocotb.test()
@@ -183,18 +203,53 @@ async def a_write_of_no_byte_does_nothing(dut):
 
 
 @cocotb.test()
+async def a_write_waits_for_its_other_half(dut):
+    world = World(dut)
+    await world.reset()
+    channels, place = world.master.write_if, 2 * world.registers["supervisor_force_limit"].address
+    for value, first in ((5, "address"), (7, "data")):
+        halves = {
+            "address": (channels.aw_channel, AxiLiteAWTransaction(awaddr=place)),
+            "data": (channels.w_channel, AxiLiteWTransaction(wdata=value, wstrb=0b1111)),
+        }
+        channel, half = halves.pop(first)
+        await channel.send(half)
+        await ClockCycles(dut.clk, IN_A_WHILE)
+        assert channels.b_channel.empty()
+        for channel, half in halves.values():
+            await channel.send(half)
+        assert Response(int((await channels.b_channel.recv()).bresp)) == world.twin.write(place, value, 0b1111)
+        assert await world.read(place // 2) == value
+
+
+@cocotb.test()
 async def words_read_in_order_are_of_one_snapshot(dut):
     world = World(dut)
     await world.reset()
-    stamp = world.registers["stamp"]
+    place = world.registers["stamp"].address
     for seen in (5, 7):
-        status = world.twin.file.status | {"stamp": seen, "stamp_a_rise": seen + 1}
-        await show(dut, world.bench, world.registers, status)
-        world.twin.file.status = status
+        await world.stamp(seen)
         if seen == 5:
-            assert await world.read(stamp.address) == 5
-    assert await world.read(stamp.address + 2) == 6
-    assert await world.read(stamp.address) == 7
+            assert await world.read(place) == 5
+    assert await world.read(place + 2) == 6
+    assert await world.read(place) == 7
+    # A word that a single bit tells from the one before it is not the one before it.
+    for bit in range(1, SPACE.bit_length() - 1):
+        await world.stamp(10 + bit)
+        await world.read(place - 2 ^ 1 << bit)
+        assert await world.read(place) == 10 + bit
+
+
+@cocotb.test()
+async def no_word_is_the_next_after_a_reset(dut):
+    world = World(dut)
+    await world.reset()
+    await world.live()
+    for place in range(TELEMETRY, COUNTERS, 2):
+        await world.read(place - 2)
+        await world.restart()
+        await world.read(place)
+        await world.read(place)
 
 
 @pytest.mark.parametrize("name", ["mhz"])

@@ -86,6 +86,19 @@ async def every_identification(dut):
 
 
 @cocotb.test()
+async def every_diagnosis(dut):
+    world = World(dut)
+    await world.reset()
+    for sub in range(server.CLEAR + 12):
+        for data in (0, 5):
+            await world.request(bytes([server.DIAGNOSE]) + frames.words(sub, data))
+    counters = [COUNTERS + k for k in range(server.LAST_COUNTER - server.FIRST_COUNTER + 1)]
+    assert any(world.server.file.live[counter] for counter in counters)
+    await world.request(bytes([server.DIAGNOSE]) + frames.words(server.CLEAR, 0))
+    assert not any(world.server.file.live[counter] for counter in counters)
+
+
+@cocotb.test()
 async def whatever_arrives_is_judged_as_the_twin_does(dut):
     world = World(dut)
     await world.reset()

@@ -99,9 +99,3 @@ class Result:
         left = [f"{self.block}: left, {fate.known}: {fate.mutant}" for fate in self.unexplained]
         stale = [f"{self.block}: not left, so that its reason must go: {reason.name}" for reason in self.stale]
         return "".join(f"{line}\n" for line in left + stale)
-
-    @property
-    def text(self) -> str:
-        """Every mutant and what came of it; one line for each."""
-        lines = (f"{fate.killed_by or fate.known} | {fate.mutant}\n" for fate in self.fates)
-        return "".join(lines)

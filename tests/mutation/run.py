@@ -11,6 +11,7 @@ from hardwall.testing import SEED
 
 from .equivalent import known_of
 from .fates import REASONS, Fate, Result
+from .kept import digest_of, keep, kept_of
 from .killing import killed
 from .netlist import BLOCK, mutated
 from .sizes import Size, sizes_of
@@ -51,7 +52,7 @@ def modules_of(block: Block) -> tuple[str, ...]:
 def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result], None]) -> list[Result]:
     """Return what came of `count` mutants of each block; `done` is called with each result as it comes.
 
-    The mutants are drawn from all sizes of a block, from each as many.
+    The mutants are drawn from all sizes of a block, from each as many. What is kept of a block is not tested again.
 
     Args:
         blocks: the blocks.
@@ -67,10 +68,15 @@ def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result]
         for block in blocks:
             sizes = sizes_of(block.test)
             shares = [count * (n + 1) // len(sizes) - count * n // len(sizes) for n in range(len(sizes))]
-            futures = [
-                pool.submit(fates_of, size, modules_of(block), share) for size, share in zip(sizes, shares, strict=True)
-            ]
-            fates = [fate for future in futures for fate in future.result()]
+            digest = digest_of(block, sizes, count)
+            fates = kept_of(block, digest)
+            if fates is None:
+                futures = [
+                    pool.submit(fates_of, size, modules_of(block), share)
+                    for size, share in zip(sizes, shares, strict=True)
+                ]
+                fates = [fate for future in futures for fate in future.result()]
+                keep(block, digest, fates)
             results.append(Result(block.name, fates, reasons_for(block.name, REASONS), ours))
             done(results[-1])
     return results

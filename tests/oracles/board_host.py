@@ -106,9 +106,9 @@ class Host:
             found = component.shown.unpack(int(showing.value))
             gate = self.pins["drive_enable"] & self.pins["emergency_stop"]
             assert pins == (twin.pulse & gate, twin.sign), f"edge {twin.clocks}"
-            wanted = twin.follower.wanted() | {"drive": twin.drive, "count": twin.decoder.count}
+            wanted = twin.outputs() | twin.follower.wanted()
             assert alive() == wanted["alive"]
-            unlike = {name: (found[name], value) for name, value in wanted.items() if found[name] != value}
+            unlike = {name: (value, wanted[name]) for name, value in found.items() if value != wanted[name]}
             assert not unlike, f"edge {twin.clocks}: the board's and the twin's {unlike}"
             self.pulses.append(pins)
             self.history.append((twin.decoder.stamp, twin.shown()))
