@@ -51,7 +51,7 @@ PYTEST = $(RUN) pytest -n $(if $(filter 1 2 3 4 5 6 7,$(CORES)),$$(($(CORES) + 1
 
 # ---- the tasks ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures browser screenshots verilog docs digests soak fuzz clean distclean help tools FORCE
+.PHONY: all test prove faults gate coverage mutate lint bench synth boards constraints choose figures panel browser screenshots verilog docs digests soak fuzz clean distclean help tools FORCE
 
 all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the loop: a table, and pictures in build/
 	@$(HARDWALL) table $(REPORTS)
@@ -102,6 +102,9 @@ figures: $(VENV)/.synth | tools ## the founding paper's figures and every study 
 	@$(HARDWALL) zwidth --resume --plot build/estimators.png $(ALL_ON_THE_MAP)
 	@for study in $(STUDIES); do $(HARDWALL) $$study --resume --plot build/$$study.png; done
 	@$(HARDWALL) bits --plot build/bits.png
+
+panel: $(VENV)/.panel | tools ## feel a wall: a board in simulation, behind a page in the browser
+	@$(HARDWALL) panel virtual
 
 browser: $(VENV)/.test | tools ## the panel's page in a real browser, beside a board in simulation (some minutes, alone on the machine)
 	@HARDWALL_BROWSER=1 $(RUN) pytest -n 0 tests/host/panel/test_page.py $(ARGS)
@@ -195,6 +198,9 @@ $(VENV)/.sim: pyproject.toml $(VENV)/.made | tools
 
 $(VENV)/.test: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)host$(comma)panel$(comma)test,the tests' tools)
+
+$(VENV)/.panel: pyproject.toml $(VENV)/.sim | tools
+	$(call install,sim$(comma)host$(comma)panel,the page)
 
 $(VENV)/.prove: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)prove,the solver)
