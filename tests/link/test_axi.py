@@ -124,10 +124,15 @@ class World:
 
     async def write(self, address: int, data: bytes) -> Response:
         """Write bytes within a word at a byte address, and compare what it causes with the twin's."""
-        begun, first = len(self.pulsed.rows), address % 4
-        word, strobes = int.from_bytes(data, "little") << 8 * first, ((1 << len(data)) - 1) << first
+        begun, channels, place = len(self.pulsed.rows), self.master.write_if, 8 * (address % 4)
+        mask = (1 << 8 * len(data)) - 1 << place
+        # What is not written is anything.
+        word = int(self.random.integers(0, 1 << 32)) & ~mask | int.from_bytes(data, "little") << place
+        strobes = ((1 << len(data)) - 1) << address % 4
         expected = self.twin.write(address, word, strobes)
-        got = Response((await self.master.write(address, data)).resp)
+        await channels.aw_channel.send(AxiLiteAWTransaction(awaddr=address))
+        await channels.w_channel.send(AxiLiteWTransaction(wdata=word, wstrb=strobes))
+        got = Response(int((await channels.b_channel.recv()).bresp))
         assert got == expected, f"{address:#x} {data.hex()}"
         pulses = sum(1 << k for k, p in enumerate(self.registers.pulses) if p.name in self.twin.pulses)
         await ClockCycles(self.dut.clk, 2)
