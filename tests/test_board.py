@@ -8,10 +8,10 @@ from hardwall.hdl.board import Board
 from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.hdl.supervised import LOOPS
 from hardwall.model import clock_monitor
-from hardwall.model.capture import DONE, RECORD_REGISTERS, TRIGGERED, WAITING
+from hardwall.model.capture import DONE, RECORD_REGISTERS, SOURCES, TRIGGERED, WAITING
 from hardwall.model.link.server import FAILURE
 from hardwall.model.registers import CAPTURE, RegisterMap
-from hardwall.model.supervisor import ALL, ARMED, DISARMED, REQUIRED, TRIPPED
+from hardwall.model.supervisor import ALL, ARMED, CAUSES, DISARMED, REQUIRED, TRIPPED
 from hardwall.testing import SAMPLES, parameters, simulate
 from oracles.board import RECORDS, SYNCHRONISER, make
 from oracles.board_host import Host
@@ -170,6 +170,37 @@ async def a_capture_around_a_trip_is_read_by_the_line(dut):
     assert place == RECORDS // 2
     assert {(record.driven, record.flags & 7) for record in records[:place]} == {(-most, ARMED | 4)}
     assert {(record.driven, record.flags & 7) for record in records[place + 1 :]} == {(0, TRIPPED | 4)}
+
+
+@cocotb.test()
+async def a_capture_begins_with_the_count_that_passes_its_level(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    await host.write(capture_sources=1 << SOURCES.index("fall"), capture_level=-1, capture_before=0)
+    await host.write(capture_start=1)
+    # A count that is the level has not passed it.
+    for states in ({WAITING}, {WAITING}, {TRIGGERED, DONE}):
+        await host.edges(host.settling)
+        assert (await host.look(*SHOWN))["capture_state"] in states
+        await host.turn(-1)
+
+
+@cocotb.test()
+async def what_trips_first_is_shown(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    registers, causes = host.registers, [cause.name for cause in CAUSES]
+    await host.write(supervisor_ramp=registers["supervisor_ramp"].high, supervisor_watchdog=2000)
+    await host.write(commit=1, wall_position=1 + registers["wall_position"].low, wall_stiffness=0xFFFF)
+    # The handle is driven at the largest force, and moves against it; and then it is too fast for the host.
+    for cause, limits in (("runaway", (0xFFFF, 0)), ("velocity_limit", (0, 0xFFFF))):
+        await host.write(**dict(zip(("supervisor_velocity_limit", "supervisor_runaway"), limits, strict=True)))
+        await host.edges(host.settling)
+        await host.arm()
+        await host.edges(host.settling)
+        await host.turn(4)
+        status = await host.look("stamp", "first_stamp")
+        assert (status["state"], status["first"]) == (TRIPPED, 1 << causes.index(cause))
 
 
 @cocotb.test()

@@ -24,6 +24,8 @@ OSCILLATOR_NS = 22
 """Where the clock's period is 10 ns."""
 STARTING = 100
 """Clocks in which the oscillator has seen that the clock runs."""
+COUNT_CLOCKS = 20
+"""Clocks from one edge of a turning encoder to the next."""
 PATIENCE = 60_000
 """Clocks after which an answer is overdue."""
 
@@ -78,13 +80,23 @@ class Host:
             # The handle wanders about its origin, for an axis of a few counts is nowhere else within its range.
             self.phase += 1 if random.random() < (0.3 if self.phase > 0 else 0.7) else -1
             self.phase += int(random.random() < self.illegal_rate)
-            a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[self.phase % 4]
-            z = self.pins["encoder_z"] ^ int(random.random() < 0.1)
-            moved = {"encoder_a": a, "encoder_b": b, "encoder_z": z, "encoder_a_n": 1 - a, "encoder_b_n": 1 - b}
+            moved = {**self._channels(), "encoder_z": self.pins["encoder_z"] ^ int(random.random() < 0.1)}
         if chance[1] < self.open_rate:
             name = LOOPS[int(random.integers(0, len(LOOPS)))]
             moved[name] = self.pins[name] ^ 1
         self.change(**moved)
+
+    def _channels(self) -> dict[str, int]:
+        """Return the levels of the encoder's channels where the handle is."""
+        a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[self.phase % 4]
+        return {"encoder_a": a, "encoder_b": b, "encoder_a_n": 1 - a, "encoder_b_n": 1 - b}
+
+    async def turn(self, counts: int) -> None:
+        """Turn the handle by counts, as slowly as a decoder follows whose filter is as it is after a reset."""
+        for _ in range(abs(counts)):
+            self.phase += 1 if counts > 0 else -1
+            self.change(**self._channels())
+            await self.edges(COUNT_CLOCKS)
 
     def change(self, **pins: int) -> None:
         """Set pins, on the board and on the twin."""
