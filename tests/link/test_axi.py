@@ -18,10 +18,13 @@ from hardwall.model.link import axi, register_file
 from hardwall.model.link.axi import Response
 from hardwall.model.registers import ACTIVE, CAPTURE, COUNTERS, LIVE, MAP, PULSES, SPACE, SUPERVISOR, TELEMETRY, WRITTEN
 from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
+from stimuli.restless import Restless
 from stimuli.status import show
 from stimuli.supervised import CAPTURE_MEMORY, captured, supervised
 
 TRANSFERS = 300 + SAMPLES // 80
+PENDING = 50
+"""Clocks that a commit waits for its sample."""
 IN_A_WHILE = 20
 """Clocks in which the subordinate would have answered."""
 
@@ -91,7 +94,7 @@ class World:
             await RisingEdge(self.dut.clk)
             if int(self.dut.pulses.value) & 1:
                 self.bench.drive(commit_pending=1)
-                await ClockCycles(self.dut.clk, 50)
+                await ClockCycles(self.dut.clk, PENDING)
                 self.bench.drive(commit_pending=0)
 
     async def live(self) -> None:
@@ -225,6 +228,27 @@ async def a_write_waits_for_its_other_half(dut):
             await channel.send(half)
         assert Response(int((await channels.b_channel.recv()).bresp)) == world.twin.write(place, value, 0b1111)
         assert await world.read(place // 2) == value
+
+
+@cocotb.test()
+async def a_commit_is_answered_when_the_axis_has_it(dut):
+    world = World(dut)
+    await world.reset()
+    await world.write(2 * (world.registers["commit"].address ^ 1), b"\1\0")
+    (pulsed,) = world.pulsed.clocks
+    assert world.bench.clock_number() - pulsed > PENDING
+
+
+@cocotb.test()
+async def every_bit_of_every_status_is_read(dut):
+    world = World(dut)
+    await world.reset()
+    restless = {status.name: Restless(status, world.random) for status in world.registers.status}
+    for _ in range(6):
+        world.twin.file.status = {name: values.next() for name, values in restless.items()}
+        await show(dut, world.bench, world.registers, world.twin.file.status)
+        for status in world.registers.status:
+            await world.read(status.address)
 
 
 @cocotb.test()
