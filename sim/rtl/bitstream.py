@@ -107,8 +107,8 @@ def _fill(order: Order, design: Design, runs: list[Placed], report: dict, work: 
         "registers.md": register_texts.markdown(registers),
         "registers.h": register_texts.c_header(registers),
         "registers.json": register_texts.as_json(registers),
-        "WIRING.md": wiring(board, PICTURE),
-        PICTURE: picture(board),
+        "WIRING.md": wiring(board, order.spec, PICTURE),
+        PICTURE: picture(board, order.spec.stage.name),
         "report.json": json.dumps(report, indent=2) + "\n",
         "report.txt": "".join(f"{key}: {text_of(value)}\n" for key, value in report.items()),
     }
