@@ -7,7 +7,8 @@ from typing import Any
 
 from .checks import FieldError, shown
 from .design import Design
-from .drive import pdm, registry
+from .drive import registry
+from .drive.pdm import USUAL
 from .drive.stage import Stage, StageDesign
 from .estimators.estimate import EstimatorGains
 from .requirements import AxisRequirements
@@ -27,7 +28,7 @@ class AxisSpec(AxisRequirements):
 
     estimator: str = "levant"
     gains: EstimatorGains | None = None
-    stage: Stage = pdm.Stage()
+    stage: Stage = USUAL
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -57,6 +58,6 @@ class AxisSpec(AxisRequirements):
         """Every field by name, with the gains that are in use; without the stage if that is the usual one."""
         facts = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         facts["gains"] = self.design.gains
-        if self.stage == pdm.Stage():
+        if self.stage == USUAL:
             del facts["stage"]
         return facts

@@ -15,9 +15,9 @@ class Pdm(Block):
 
     Equation: that of `hardwall.model.drive.pdm`: 2**N clocks of a steady amount have exactly `amount` pulses.
 
-    Safe is `drive_pdm` low: at once, through a gate alone, where `permitted` is low, and one clock after the axis is not
-    ARMED, for its drive is zero then. With an amplifier in the stage the drive passes a scaling, behind which `armed` is
-    looked at, so that this is one clock, too.
+    Safe is `drive_pdm` low: at once, through a gate alone, where `permitted` is low, and one clock after the axis is
+    not ARMED, for its drive is zero then. With an amplifier in the stage the drive passes a scaling, behind which
+    `armed` is looked at, so that this is one clock, too.
 
     Latency: `latency` clocks from a drive to the first pulse that it makes.
 

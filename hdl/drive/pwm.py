@@ -73,15 +73,20 @@ class Pwm(Block):
         with m.If(~self.armed):
             m.d.sync += width.eq(0)
         m.d.comb += on.eq(width.any() & (phase < width + dead))
-        self._leg(m, on & ~negative, self.gate_high_a, self.gate_low_a)
-        self._leg(m, on & negative, self.gate_high_b, self.gate_low_b)
+        self._leg(m, "a", on & ~negative)
+        self._leg(m, "b", on & negative)
         return m
 
-    def _leg(self, m: Module, wanted: Value, high_pin: Signal, low_pin: Signal) -> None:
+    def _leg(self, m: Module, name: str, wanted: Value) -> None:
         """Describe a leg, whose high gate is wanted on, or else its low one."""
-        dead = self._design.dead
+        dead, high_pin, low_pin = (
+            self._design.dead,
+            getattr(self, f"gate_high_{name}"),
+            getattr(self, f"gate_low_{name}"),
+        )
         # A reset, too, is followed by a dead time.
-        side, left, high, low = Signal(), Signal(range(dead + 1), init=dead), Signal(), Signal()
+        side, left = Signal(name=f"{name}_side"), Signal(range(dead + 1), init=dead, name=f"{name}_left")
+        high, low = Signal(name=f"{name}_high"), Signal(name=f"{name}_low")
         m.d.sync += [high.eq(0), low.eq(0)]
         with m.If(~self.armed):
             m.d.sync += [side.eq(0), left.eq(dead)]

@@ -26,6 +26,10 @@ class Stage(stage.Stage):
     amplifier: Amplifier | None = None
 
 
+USUAL = Stage()
+"""The stage of an axis for which nothing else is said."""
+
+
 class Params(NamedTuple):
     """The bits N; the scaling, and whether there is one."""
 
@@ -73,7 +77,9 @@ class Design(StageDesign):
             self.full_scale_n = amplifier.full_scale_n
             self.check_deliverable(axis, self.full_scale_n)
             self.scale = scale.for_stage(bits, axis.force_resolution_n, self.step_n, self.most)
-        self.params = Params(bits, int(self.scale is not None), self.scale.params if self.scale else scale.Params(1, 1, 1))
+        self.params = Params(
+            bits, int(self.scale is not None), self.scale.params if self.scale else scale.Params(1, 1, 1)
+        )
 
     @property
     def latency(self) -> int:

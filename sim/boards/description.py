@@ -10,8 +10,8 @@ A file describes a board and its variants, which differ in the part alone:
     [parts]: the part of every variant, by the variant's name, which `hardwall board` takes.
     [scene]: the scene that the board runs if none is given, and the changes of its keys.
     [serial]: which of the USB bridge's serial ports is the line; its name in /dev/serial/by-id; the bridge's USB ids.
-    [pins.SIGNAL]: for each of `signals.EVERY` the FPGA's pin (`site`), where that is (`at`: the header and the position, or
-        words), and the pull inside the part. The drive stages share pins, for a board has one of them.
+    [pins.SIGNAL]: for each of `EVERY` the FPGA's pin (`site`), where that is (`at`: the header and the position, or
+        words), and the pull inside the part. Drive stages share pins, for a board has one of them.
     [[headers]]: the headers that are drawn: name, title, and rows of positions as they lie side by side.
 """
 

@@ -1,6 +1,7 @@
 """What to know of a board's drive stage before an amplifier is connected: its newtons, its safe pins, what to see."""
 
 from collections.abc import Callable
+from typing import cast
 
 from ...model.drive import dac, pwm
 from ...model.drive.stage import Amplifier, StageDesign
@@ -13,8 +14,9 @@ def drive(spec: AxisSpec) -> str:
     clocks = f"{design.safe_latency} clock{'s' * (design.safe_latency > 1)}"
     lines = [
         WHAT[spec.stage.name](spec),
-        f"**Safe** is: {design.safe}. An open `drive_enable` or `emergency_stop` reaches it through a gate alone, without "
-        f"a clock; a clock that stops, when the oscillator has found that out; and an axis that is not ARMED after {clocks}.",
+        f"**Safe** is: {design.safe}. An open `drive_enable` or `emergency_stop` reaches it through a gate alone, "
+        "without a clock; so does a clock that stops, when the oscillator has found that out; and an axis that is not "
+        f"ARMED after {clocks}.",
         f"**Newtons**: {newtons(design)} A step is {design.step_n:.4g} N.",
     ]
     if spec.stage.amplifier is not None:
@@ -24,14 +26,19 @@ def drive(spec: AxisSpec) -> str:
 
 def newtons(design: StageDesign) -> str:
     """Return a sentence on the force of the full scale."""
-    end = {"pdm": "pulses without a pause are", "pwm": "a bridge that is on all the time is", "dac": "the full scale is"}
+    end = {
+        "pdm": "pulses without a pause are",
+        "pwm": "a bridge that is on all the time is",
+        "dac": "the full scale is",
+    }
     most = f", of which at most {design.most * design.step_n:.6g} N are made" if design.stage.name == "pwm" else ""
     return f"{end[design.stage.name]} {design.full_scale_n:.6g} N{most}."
 
 
 def _amplifier(amplifier: Amplifier) -> str:
     unit, offset = amplifier.unit, amplifier.offset
-    said = f"one of {amplifier.newtons_per_unit:g} N/{unit} at the handle and {amplifier.full_scale:g} {unit} at the full scale"
+    scale = f"{amplifier.newtons_per_unit:g} N/{unit} at the handle and {amplifier.full_scale:g} {unit}"
+    said = f"one of {scale} at the full scale"
     if amplifier.inverted:
         said += ", inverted: `drive_invert` is 1 after a reset"
     if offset:
@@ -45,34 +52,32 @@ def _amplifier(amplifier: Amplifier) -> str:
 
 def _pdm(_: AxisSpec) -> str:
     return (
-        "Pulses at `drive_pdm` and a sign at `drive_sign`. On a scope `drive_pdm` is low at rest; while ARMED in the wall, "
-        "pulses of one clock come the denser the larger the force."
+        "Pulses at `drive_pdm` and a sign at `drive_sign`. On a scope `drive_pdm` is low at rest; while ARMED in the "
+        "wall, pulses of one clock come the denser the larger the force."
     )
 
 
 def _pwm(spec: AxisSpec) -> str:
-    design = spec.drive
-    assert isinstance(design, pwm.Design)
+    design = cast(pwm.Design, spec.drive)
     dead_ns = 1e9 * design.dead / spec.clock_hz
     return (
-        f"Four gates of an H-bridge at {spec.clock_hz / design.period:g} Hz. All four are low at rest, and both low gates "
-        "high while ARMED without a force, which brakes. On a scope look at the two gates of a leg: between them both "
-        f"are low for {design.dead} clocks, {dead_ns:g} ns, at every change; the driver must not take more from it than "
-        "the transistors leave. For a positive force leg A pulses."
+        f"Four gates of an H-bridge at {spec.clock_hz / design.period:g} Hz. All four are low at rest, and both low "
+        "gates high while ARMED without a force, which brakes. On a scope look at the two gates of a leg: between them "
+        f"both are low for {design.dead} clocks, {dead_ns:g} ns, at every change; the driver must not take more from it "
+        "than the transistors leave. For a positive force leg A pulses."
     )
 
 
 def _dac(spec: AxisSpec) -> str:
-    design = spec.drive
-    assert isinstance(design, dac.Design)
+    design = cast(dac.Design, spec.drive)
     stage = design.stage
     setup = f" Behind every arming {len(stage.setup)} frames of setup go first." if stage.setup else ""
     serial_hz = spec.clock_hz / (2 * design.params.half)
     return (
-        f"A DAC of {stage.bits} bits, frames of {stage.frame_bits} bits at {serial_hz / 1e6:.4g} MHz in mode {stage.mode}, "
-        f"{design.frame_clocks} clocks each, one at an actuation.{setup} At rest `dac_clear_n` is low and the chip select "
-        "high; the DAC's clear must be set to its middle code, and a load pin tied to act at once. On a scope the "
-        "output goes to the middle when `dac_clear_n` falls, in the middle of a frame, too."
+        f"A DAC of {stage.bits} bits, frames of {stage.frame_bits} bits at {serial_hz / 1e6:.4g} MHz in mode "
+        f"{stage.mode}, {design.frame_clocks} clocks each, one at an actuation.{setup} At rest `dac_clear_n` is low and "
+        "the chip select high; the DAC's clear must be set to its middle code, and a load pin tied to act at once. On a "
+        "scope the output goes to the middle when `dac_clear_n` falls, in the middle of a frame, too."
     )
 
 

@@ -31,6 +31,7 @@ def top_verilog(board: Description, clock_hz: int, stage: str = USUAL) -> str:
         dividers = ", ".join(f"{name} {number}" for name, number in setting.dividers)
         how = f"{made}, from {board.oscillator_hz} Hz by {dividers}; VCO {setting.vco / 1_000_000} MHz."
         cell = board.part.pll.cell(board.oscillator_hz, setting)
+    held = "pull-downs" if stage == USUAL else "resistors"
     connected = {"clk": "clock", "rst": "rst | ~locked", "oscillator": "oscillator", "outputs_enable": "outputs_enable"}
     connected = {name: name for name in names} | pads | connected
     return f"""\
@@ -50,7 +51,7 @@ module top (
 {_connections(connected)}
     );
 
-    // Until the PLL has locked, both clocks run and the reset has ended, the {"pull-downs" if stage == USUAL else "resistors"} outside hold these.
+    // Until the PLL has locked, both clocks run and the reset has ended, the {held} outside hold these.
     wire driven = outputs_enable & locked;
 {"".join(f"    assign {pin} = driven ? {wire} : 1'bz;{chr(10)}" for pin, wire in pads.items())}\
 endmodule

@@ -68,7 +68,7 @@ class DriveSection(Section):
     def check(self) -> None:
         """Raise ValueError if a key lacks, or is of another stage or unit; the message begins with the key."""
         given = self.model_dump(exclude_none=True).keys()
-        ours, others = ({keys[UNITS.index(unit)] for keys in AMPLIFIER.values()} for unit in (self.unit, *self._others))
+        others = {keys[1 - UNITS.index(self.unit)] for keys in AMPLIFIER.values()}
         if not {self.key_of("newtons_per_unit"), self.key_of("full_scale")} <= given or given & others:
             pairs = ", or ".join(" and ".join(keys) for keys in zip(*list(AMPLIFIER.values())[:2], strict=True))
             raise ValueError(f"drive must have {pairs}, and not both")
@@ -79,10 +79,6 @@ class DriveSection(Section):
         for key in NEEDED[self.stage]:
             if key not in given:
                 raise ValueError(f"drive.{key} is missing")
-
-    @property
-    def _others(self) -> tuple[Unit, ...]:
-        return tuple(unit for unit in UNITS if unit != self.unit)
 
     @property
     def made(self) -> Stage:

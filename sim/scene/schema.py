@@ -214,7 +214,7 @@ class Scene(Section):
         gains = getattr(self.controller.gains, self.controller.estimator)
         if gains is not None:
             gains = registry.design_of(self.controller.estimator).gains_class(**gains.model_dump())
-        stage = pdm.Stage() if self.drive is None else self.drive.made
+        stage = pdm.USUAL if self.drive is None else self.drive.made
         return AxisSpec(count_m=self.encoder.count_m, gains=gains, stage=stage, **fields)
 
     @property

@@ -47,7 +47,10 @@ def test_the_banks_of_1_8_volts_are_named():
     [
         ("pdm", ["drive_pdm is low", "without a pause are 65.536 N.", "A step is 0.001 N."]),
         ("pdm scaled", ["without a pause are 64 N.", "6.4 N/V at the handle and 10 V"]),
-        ("pwm", ["all four gates are low", "at 200000 Hz", "5 clocks, 100 ns", "48 N, of which at most 45.12 N are made"]),
+        (
+            "pwm",
+            ["all four gates are low", "at 200000 Hz", "5 clocks, 100 ns", "48 N, of which at most 45.12 N are made"],
+        ),
         ("pwm narrow", ["inverted: `drive_invert` is 1 after a reset", "1 N/A at the handle"]),
         ("dac", ["dac_clear_n is low", "24 bits at 25 MHz in mode 1, 50 clocks each", "2 frames of setup", "is 40 N."]),
         ("dac bare", ["no force at 0.3 A: at safe pins -2.7 N are left", "45 N"]),

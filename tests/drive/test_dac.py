@@ -22,7 +22,7 @@ def make(name: str) -> Recorded:
 
 
 def campaign(name: str, clocks: int) -> dict:
-    """Return columns of inputs: drives of every kind, and strobes as close as they may be, closer, and farther apart."""
+    """Return columns of inputs: every kind of drive, and strobes as close as they may be, closer, and farther."""
     d, random = design(name), rng()
     columns = drives(d.magnitude.width, axis(name).force_limit_word, clocks, 4 * d.frame_clocks)
     columns["strobe"], at = 0 * columns["reset"], 0

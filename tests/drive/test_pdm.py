@@ -1,7 +1,6 @@
 """Pulses and a sign: RTL against model at every clock, and what their density promises."""
 
 import cocotb
-import numpy as np
 import pytest
 
 from hardwall.hdl.drive.pdm import Pdm
@@ -89,5 +88,7 @@ def test_wrong_designs_are_refused():
         Design(axis("pdm"), 3)
     with pytest.raises(ValueError, match=r"^stage.offset must be 0 with pulses, not 0.1$"):
         Design(axis("pdm"), pdm.Stage(amplifier=Amplifier(unit="V", newtons_per_unit=9.0, full_scale=9.0, offset=0.1)))
-    with pytest.raises(ValueError, match=r"^force_max_n must be at most 9 N, all that the drive stage gives, not 40.0$"):
+    with pytest.raises(
+        ValueError, match=r"^force_max_n must be at most 9 N, all that the drive stage gives, not 40.0$"
+    ):
         Design(axis("pdm"), pdm.Stage(amplifier=Amplifier(unit="V", newtons_per_unit=1.0, full_scale=9.0)))

@@ -131,9 +131,15 @@ def wrong(**fields) -> pwm.Stage:
 @pytest.mark.parametrize(
     ("stage", "message"),
     [
-        (wrong(pwm_hz=300_000), r"^stage.pwm_hz must be clock_hz 50000000 divided by a whole number from 8, not 300000$"),
+        (
+            wrong(pwm_hz=300_000),
+            r"^stage.pwm_hz must be clock_hz 50000000 divided by a whole number from 8, not 300000$",
+        ),
         (wrong(pwm_hz=10_000_000), r"^stage.pwm_hz must be .*, not 10000000$"),
-        (wrong(dead_time_s=2e-6), r"^stage.dead_time_s must be less than a third of the 250 clocks .*, not 100 clocks$"),
+        (
+            wrong(dead_time_s=2e-6),
+            r"^stage.dead_time_s must be less than a third of the 250 clocks .*, not 100 clocks$",
+        ),
         (wrong(dead_time_s=0.0), r"^stage.dead_time_s must be 1e-09 to 0.001, not 0.0$"),
         (wrong(dead_time_s=1e-6), r"^force_max_n must be at most 19.2 N, all that the drive stage gives, not 40.0$"),
         (

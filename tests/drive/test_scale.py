@@ -25,7 +25,7 @@ async def follows_model(dut):
     design, random = Design(**{"steps_per_lsb": given["ratio"], "bits": given["bits"], "most": given["most"]}), rng()
     count = SAMPLES // 4
     magnitude = random.integers(0, 1 << given["bits"], count) >> random.integers(0, given["bits"], count)
-    magnitude[: 4] = (1 << given["bits"]) - 1, 0, 1, 1 << given["bits"] - 1
+    magnitude[:4] = (1 << given["bits"]) - 1, 0, 1, 1 << given["bits"] - 1
     columns = {"magnitude": magnitude, "negative": random.integers(0, 2, count), "reset": random.random(count) < 0.01}
     inputs, outputs = await play(dut, make(**given), {k: np.asarray(v, np.int64) for k, v in columns.items()})
     state, rows = START, []
@@ -72,7 +72,9 @@ def test_wrong_sizes_are_refused():
         Design(4, 1.0, 0)
     with pytest.raises(ValueError, match=r"^steps_per_lsb must be 0.015625 to 1.34218e\+08, not 0.01$"):
         Design(4, 0.01, 9)
-    with pytest.raises(ValueError, match=r"^stage.full_scale must make a step of the stage .* to 0.064 N at .*not 0.1 N$"):
+    with pytest.raises(
+        ValueError, match=r"^stage.full_scale must make a step of the stage .* to 0.064 N at .*not 0.1 N$"
+    ):
         scale.for_stage(4, 1e-3, 0.1, 9)
     with pytest.raises(TypeError, match=r"not 3$"):
         Scale(3)
