@@ -58,7 +58,7 @@ START = State()
 
 
 class Design(StageDesign):
-    """Numbers of the pulses for an axis; `scale` is None without an amplifier."""
+    """Numbers of the pulses for an axis; `scale` is None without an amplifier; `params` and `start` are for `step`."""
 
     stage_class = Stage
     pins = "drive_pdm", "drive_sign"
@@ -67,7 +67,7 @@ class Design(StageDesign):
     def __init__(self, axis: AxisRequirements, stage: Stage):
         super().__init__(axis, stage)
         bits, amplifier = self.magnitude.width, stage.amplifier
-        self.steps, self.most = 1 << bits, (1 << bits) - 1
+        self.steps, self.most, self.start = 1 << bits, (1 << bits) - 1, START
         self.scale: scale.Design | None = None
         if amplifier is None:
             self.full_scale_n = axis.force_resolution_n * self.steps

@@ -63,8 +63,8 @@ def _pwm(spec: AxisSpec) -> str:
     return (
         f"Four gates of an H-bridge at {spec.clock_hz / design.period:g} Hz. All four are low at rest, and both low "
         "gates high while ARMED without a force, which brakes. On a scope look at the two gates of a leg: between them "
-        f"both are low for {design.dead} clocks, {dead_ns:g} ns, at every change; the driver must not take more from it "
-        "than the transistors leave. For a positive force leg A pulses."
+        f"both are low for {design.dead} clocks, {dead_ns:g} ns, at every change; the driver must not take more from "
+        "it than the transistors leave. For a positive force leg A pulses."
     )
 
 
@@ -75,9 +75,9 @@ def _dac(spec: AxisSpec) -> str:
     serial_hz = spec.clock_hz / (2 * design.params.half)
     return (
         f"A DAC of {stage.bits} bits, frames of {stage.frame_bits} bits at {serial_hz / 1e6:.4g} MHz in mode "
-        f"{stage.mode}, {design.frame_clocks} clocks each, one at an actuation.{setup} At rest `dac_clear_n` is low and "
-        "the chip select high; the DAC's clear must be set to its middle code, and a load pin tied to act at once. On a "
-        "scope the output goes to the middle when `dac_clear_n` falls, in the middle of a frame, too."
+        f"{stage.mode}, {design.frame_clocks} clocks each, one at an actuation.{setup} At rest `dac_clear_n` is low "
+        "and the chip select high; the DAC's clear must be set to its middle code, and a load pin tied to act at once. "
+        "On a scope the output goes to the middle when `dac_clear_n` falls, in the middle of a frame, too."
     )
 
 
