@@ -5,7 +5,7 @@ from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.drive import dac
 
-from ..arithmetic.fixed import saturate, shape
+from ..arithmetic.fixed import shape
 from ..block import Block
 from .scale import Scale
 
@@ -22,7 +22,7 @@ class Dac(Block):
     Latency: `latency` clocks from the strobe of a drive to the rise of the chip select. A strobe while a frame is under
     way is not heard; `design.frame_clocks` after the last one it is.
 
-    Rounding and overflow: those of `Scale`; the code saturates at its ends.
+    Rounding and overflow: those of `Scale`; the code saturates at its upper end, a step below the full scale.
 
     Parameters
     ----------
@@ -109,10 +109,12 @@ class Dac(Block):
         """Return the frame that is to go out: of the drive, or behind an arming one of the setup."""
         params = self._design.params
         half = 1 << params.bits - 1
-        code, frame = Signal(signed(params.bits)), Signal(params.frame_bits)
-        steps = Mux(scale.below, -scale.steps, scale.steps)
-        m.d.comb += code.eq(saturate(params.offset + steps, -half, half - 1))
-        m.d.comb += frame.eq(params.header | (code.as_unsigned() << params.trailing_bits) ^ params.flip)
+        code, wanted = Signal(signed(params.bits)), Signal(signed(params.bits + 1))
+        m.d.comb += [
+            wanted.eq(params.offset + Mux(scale.below, -scale.steps, scale.steps)),
+            code.eq(Mux(wanted > half - 1, half - 1, wanted)),
+        ]
+        frame = params.header | (code.as_unsigned() << params.trailing_bits) ^ params.flip
         if not params.frames:
             return frame
         told = Signal(range(params.frames + 1))

@@ -55,7 +55,7 @@ class Scale(Block):
         m = Module()
         gain, shift, most = self._design.params
         product, below = Signal(shape(self._design.product)), Signal()
-        rounded = Signal(len(product) + 1 - shift)
+        rounded = Signal(shape(self._design.rounded))
         m.d.comb += rounded.eq(shift_round_half_up(product, shift))
         m.d.sync += [
             product.eq(self.magnitude * Const(gain)),

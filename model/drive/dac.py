@@ -2,7 +2,9 @@
 
 With b bits the output has 2**b codes from minus to plus the full scale, the middle one at zero:
 
-    code = saturate(offset + steps, or offset - steps of a negative drive)        to -2**(b-1) .. 2**(b-1) - 1
+    code = min(offset + steps, 2**(b-1) - 1)        or offset - steps for a negative drive
+
+where `steps` is at most 2**(b-1) - |offset|, so that a code is never beyond the lowest.
 
 The frame is, from its first bit on, a header, the code in b bits (offset binary or two's complement), and trailing
 zeros. Half a period of the serial clock has H clocks; with F bits a frame is under way for 2 F + 1 halves, from the
@@ -197,8 +199,7 @@ def frame(design: Design, code: int) -> int:
 def _code(params, scaled):
     """Return the code for the scaled drive."""
     steps = -scaled.steps if scaled.negative else scaled.steps
-    half = 1 << (params.bits - 1)
-    return min(max(params.offset + steps, -half), half - 1)
+    return min(params.offset + steps, (1 << (params.bits - 1)) - 1)
 
 
 @compiled

@@ -53,7 +53,7 @@ class Design:
         most: the most steps.
 
     Attributes:
-        magnitude, product, steps: formats.
+        magnitude, product, rounded, steps: formats.
         params: for `step`.
 
     Raises:
@@ -72,6 +72,8 @@ class Design:
         gain = round(steps_per_lsb * (1 << shift))
         self.magnitude, self.steps = UQ(bits, 0), UQ(most.bit_length(), 0)
         self.product = UQ(bits + gain.bit_length(), 0)
+        largest = self.magnitude.max * gain + (1 << shift - 1) >> shift
+        self.rounded = UQ(max(largest.bit_length(), 1), 0)
         self.params = Params(gain, shift, most)
 
 

@@ -53,7 +53,7 @@ def test_the_banks_of_1_8_volts_are_named():
         ),
         ("pwm narrow", ["inverted: `drive_invert` is 1 after a reset", "1 N/A at the handle"]),
         ("dac", ["dac_clear_n is low", "24 bits at 25 MHz in mode 1, 50 clocks each", "2 frames of setup", "is 40 N."]),
-        ("dac bare", ["no force at 0.3 A: at safe pins -2.7 N are left", "45 N"]),
+        ("dac bare", ["no force at -0.3 A: at safe pins 2.7 N are left", "45 N"]),
     ],
 )
 def test_the_page_says_what_the_drive_is(name, said):

@@ -11,7 +11,7 @@ from hardwall.model.drive import scale
 from hardwall.model.drive.scale import START, Design
 from hardwall.testing import SAMPLES, Recorded, check, parameters, play, rng, simulate
 
-SIZES = [(16, 0.8192, 1 << 15), (16, 0.00520833, 235), (4, 3.1, 40), (24, 1.999, (1 << 25) - 1), (1, 0.5, 1)]
+SIZES = [(16, 0.8192, 1 << 15), (16, 0.00520833, 235), (4, 3.1, 40), (24, 1.999, 33_000_000), (1, 2.5, 2)]
 """Bits of the magnitude, steps for an LSB, and the most steps."""
 
 

@@ -56,7 +56,7 @@ STAGES: dict[str, tuple[str, Stage]] = {
     "dac bare": (
         "paper",
         dac.Stage(
-            amplifier=Amplifier(unit="A", newtons_per_unit=9.0, full_scale=5.0, offset=0.3),
+            amplifier=Amplifier(unit="A", newtons_per_unit=9.0, full_scale=5.0, offset=-0.3),
             bits=16,
             serial_hz=3_000_000,
         ),
@@ -64,7 +64,7 @@ STAGES: dict[str, tuple[str, Stage]] = {
     "dac narrow": (
         "narrow",
         dac.Stage(
-            amplifier=Amplifier(unit="V", newtons_per_unit=1.0, full_scale=1.05, offset=-0.04),
+            amplifier=Amplifier(unit="V", newtons_per_unit=1.0, full_scale=1.05, offset=0.04),
             bits=6,
             serial_hz=10_000_000,
             coding="twos-complement",
