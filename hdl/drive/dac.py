@@ -73,7 +73,7 @@ class Dac(Block):
         m.submodules.scale = scale = Scale(self._design.scale)
         m.d.comb += [scale.magnitude.eq(self.magnitude), scale.negative.eq(self.negative)]
         ready, waiting = Signal(), Signal(scale.latency)
-        m.d.sync += [ready.eq(self.armed), waiting.eq(Cat(self.strobe, waiting))]
+        m.d.sync += [ready.eq(self.armed), waiting.eq(Cat(self.strobe, waiting[:-1]))]
 
         # A place is a half of the serial clock's period; the last one is that of the pause behind the frame.
         bits, last = params.frame_bits, 2 * params.frame_bits + 1

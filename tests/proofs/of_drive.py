@@ -7,11 +7,14 @@ from amaranth.hdl import Mux, Signal
 from hardwall.hdl.drive.dac import Dac
 from hardwall.hdl.drive.pdm import Pdm
 from hardwall.hdl.drive.pwm import Pwm
+from hardwall.hdl.drive.registry import block_of
+from hardwall.hdl.drive.scale import Scale
 from stimuli.stages import axis
 
 from .bench import Bench
 from .bugs import Bug
 from .property import Property
+from .widths import Widths
 
 
 def bridge(name: str, bench: Bench) -> Pwm:
@@ -57,6 +60,21 @@ def no_pulse(name: str, bench: Bench) -> None:
     zero = ~stage.armed if stage.design.scale else stage.magnitude == 0
     bench.promise(stage.permitted | ~stage.drive_pdm)
     bench.promise(~bench.past(zero | bench.reset, init=1) | ~stage.drive_pdm)
+
+
+def no_arithmetic_wraps(name: str, bench: Bench) -> None:
+    """The ranges of the registers, too; the bits of a frame leave its word at its upper end, as they are meant to."""
+    design = axis(name).drive
+    bench.block(block_of(design), Widths(("word",)))
+    if design.scale:
+        most, largest = design.scale.params.most, design.magnitude.max * design.scale.params.gain
+        bench.within(**{"scale.product": (0, largest), "scale.steps": (0, most)})
+    if name.startswith("pwm"):
+        bench.within(phase=(0, design.period - 1), width=(0, design.most))
+    if name.startswith("dac"):
+        bench.within(place=(0, 2 * design.params.frame_bits + 2), left=(0, design.params.half - 1))
+        if design.params.frames:
+            bench.within(told=(0, design.params.frames))
 
 
 PROPERTIES = [
@@ -122,6 +140,23 @@ PROPERTIES = [
         for name, bug in (
             ("pdm", Bug(Pdm.elaborate, "total[:-1] + amount", "total[:-1] + amount + 1")),
             ("pdm scaled", Bug(Pdm.elaborate, "Mux(self.armed, scale.steps, 0)", "scale.steps")),
+        )
+    ),
+    *(
+        Property(
+            "no arithmetic wraps but where it is meant to",
+            f"drive {name}",
+            partial(no_arithmetic_wraps, name),
+            depth=2,
+            bugs=(bug,),
+        )
+        for name, bug in (
+            ("pdm", Bug(Pdm.elaborate, "Signal(self._design.params.bits + 1)", "Signal(self._design.params.bits)")),
+            ("pdm scaled", Bug(Scale.elaborate, "Mux(rounded > most, most, rounded)", "rounded")),
+            ("pwm", Bug(Pwm.elaborate, "Mux(ends, 0, phase + 1)", "phase - 1")),
+            ("pwm narrow", Bug(Scale.elaborate, "Mux(rounded > most, most, rounded)", "rounded")),
+            ("dac", Bug(Dac._frame, "signed(params.bits + 1)", "signed(params.bits)")),
+            ("dac high", Bug(Dac.elaborate, "Mux(place == last + 1, 0, place + 1)", "place + 1")),
         )
     ),
 ]
