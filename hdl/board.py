@@ -1,6 +1,6 @@
-"""An axis for real packages: the pins of an encoder, three loops, a link, and a drive that a filter can take."""
+"""An axis for real packages: the pins of an encoder, three loops, a link, and a drive that an amplifier can take."""
 
-from amaranth.hdl import Cat, ClockDomain, DomainRenamer, Module, Signal
+from amaranth.hdl import Cat, ClockDomain, DomainRenamer, Module, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
@@ -14,6 +14,7 @@ from hardwall.model.supervisor import ARMED
 
 from .capture import Capture
 from .clock_monitor import ClockMonitor
+from .drive.registry import block_of
 from .lead_out import lead_out
 from .link.axi_link import AxiLink
 from .link.link import Link
@@ -31,24 +32,20 @@ class Board(wiring.Component):
     A host reads and writes the registers of `registers`; what it asks for in one frame happens at one clock. It is
     refused an `arm` unless the axis is `ready`, and a `preload` while ARMED.
 
-    Drive: first-order sigma-delta modulation of `driven`, as sign and magnitude. With N = `drive_bits`, per clock
+    Drive: the drive stage of `spec.stage`, a block of `hdl/drive/`, makes pins of `driven`. The word `drive_invert`
+    reverses the sign; it is taken in every state but ARMED.
 
-        sum <- sum mod 2**N + |driven|        drive_pdm = (sum >= 2**N)
+    Safe are the pins of the drive as the stage says, and `alive` low; they are so from power-up on. A clock that stops
+    would keep them as they were: the oscillator, a second clock, finds that out, at most
+    `clock_monitor.Design.stop_latency_s` later, makes them safe, and acts as the loop of `drive_enable` does, so that
+    the axis is DISARMED when the clock comes back. Until both clocks run and the reset has ended, `outputs_enable` is
+    low: the outputs may be left to their pulls.
 
-    so the density of ones is exactly |driven| / 2**N: 2**N clocks of a steady drive have |driven| ones. The word
-    `drive_invert` reverses the sign; it is taken in every state but ARMED.
+    Latency: at most `latency` clocks from the sample strobe to pins that follow the changed drive. `drive_enable` or
+    `emergency_stop` low makes the pins of the drive safe at once, through a gate that needs no clock; any cause makes
+    them safe `safe_latency` clocks after it stands.
 
-    Safe is `drive_pdm` and `alive` low, which they are from power-up on. A clock that stops would keep them as they
-    were: the oscillator, a second clock, finds that out, at most `clock_monitor.Design.stop_latency_s` later, makes
-    them low, and acts as the loop of `drive_enable` does, so that the axis is DISARMED when the clock comes back. Until
-    both clocks run and the reset has ended, `outputs_enable` is low: the outputs may be left to their pull-downs.
-
-    Latency: `latency` clocks from the sample strobe to the first pulse that the changed drive makes. `drive_enable` or
-    `emergency_stop` low makes `drive_pdm` low at once, through a gate that needs no clock; any cause makes it low
-    `safe_latency` clocks after it stands.
-
-    Rounding and overflow: none; the remainder that no pulse has carried yet, less than one pulse, stays in the sum,
-    also when the sign changes. The axis limits the drive to less than 2**N.
+    Rounding and overflow: those of the stage.
 
     Reset: `rst` resets everything but the synchronisers and the clock's monitor, 2 to 3 clocks later; power-up does the
     same.
@@ -79,14 +76,12 @@ class Board(wiring.Component):
         Loops: high is closed; asynchronous pins, which must read low when nothing is connected.
     the pins of the link : In and Out
         `uart_rx`, an asynchronous pin that must read high when nothing is connected, and `uart_tx`; or an AXI bus.
-    drive_pdm : Out(1)
-        Pulses of density |driven| / 2**N.
-    drive_sign : Out(1)
-        1: the drive is negative, or positive if it is inverted.
+    the pins of the drive stage : Out(1)
+        As in its block; 1 is negative for the drive, or positive if it is inverted.
     alive : Out(1)
         A square wave while ARMED, for the charge pump of an amplifier's enable.
     outputs_enable : Out(1)
-        Enable of the output buffers of the three above: the clock runs, and the reset has ended.
+        Enable of the output buffers of the drive's pins and `alive`: the clock runs, and the reset has ended.
 
     Raises
     ------
@@ -98,6 +93,7 @@ class Board(wiring.Component):
 
     def __init__(self, spec: AxisSpec, link: Link | AxiLink | None = None):
         self.axis = SupervisedAxis(spec)
+        self.stage = block_of(spec.drive)
         self.link = Link(RegisterMap(spec), uart.usual_baud(spec.clock_hz)) if link is None else link
         registers = RegisterMap(spec, self.link.registers.capture_registers)
         if self.link.registers.identity != registers.identity:
@@ -110,8 +106,7 @@ class Board(wiring.Component):
                 "oscillator": In(1),
                 **dict.fromkeys((*ENCODER, *LOOPS), In(1)),
                 **self.link.PINS,
-                "drive_pdm": Out(1),
-                "drive_sign": Out(1),
+                **dict.fromkeys(spec.drive.pins, Out(1)),
                 "alive": Out(1),
                 "outputs_enable": Out(1),
             }
@@ -132,18 +127,13 @@ class Board(wiring.Component):
 
     @property
     def latency(self) -> int:
-        """Clocks from the sample strobe to the first pulse that the changed drive makes."""
-        return self.axis.latency + 1
+        """The most clocks from the sample strobe to pins that follow the changed drive."""
+        return self.axis.latency + self.stage.latency
 
     @property
     def safe_latency(self) -> int:
-        """Clocks from a cause that stands to the first clock without a pulse: of the supervisor, and of the pulses."""
-        return 1 + 1
-
-    @property
-    def drive_bits(self) -> int:
-        """Bits of the drive's magnitude (N above), which are the bits of its largest limit."""
-        return self.spec.force.width - 2
+        """Clocks from a cause that stands to the first clock with safe pins: of the supervisor, and of the stage."""
+        return 1 + self.stage.design.safe_latency
 
     def elaborate(self, platform):
         m = Module()
@@ -194,16 +184,27 @@ class Board(wiring.Component):
             link.commit_pending.eq(axis.commit_pending),
         ]
 
-        total = Signal(self.drive_bits + 1)
-        m.d.sync += [
-            total.eq(total[:-1] + axis.magnitude),
-            self.drive_sign.eq(axis.negative ^ axis.drive_inverted),
-        ]
-        m.d.comb += [
-            self.drive_pdm.eq(total[-1] & self.drive_enable & self.emergency_stop & running),
-            self.alive.eq(axis.alive & running),
-        ]
+        self._drive(m, armed, running)
+        m.d.comb += self.alive.eq(axis.alive & running)
         return m
+
+    def _drive(self, m: Module, armed: Value, running: Signal) -> None:
+        """Give the drive that is let out to the stage, and its pins to the outside."""
+        axis, stage = self.axis, self.stage
+        m.submodules.stage = stage
+        # The strobe comes with the drive that the supervisor has let out, a clock after the axis's.
+        actuated = Signal()
+        given = {
+            "strobe": actuated,
+            "magnitude": axis.magnitude,
+            "negative": axis.negative ^ axis.drive_inverted,
+            "armed": armed,
+            "permitted": self.drive_enable & self.emergency_stop & running,
+        }
+        if "strobe" in stage.signature.members:
+            m.d.sync += actuated.eq(axis.actuated)
+        m.d.comb += [getattr(stage, name).eq(value) for name, value in given.items() if name in stage.signature.members]
+        m.d.comb += lead_out(stage, self, stage.design.pins)
 
     def _watch_clock(self, m: Module) -> Signal:
         """Return whether the clock runs, as the oscillator has found."""

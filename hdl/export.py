@@ -1,6 +1,5 @@
 """Readable Verilog of a component, and the files that a user needs to instantiate an axis."""
 
-import dataclasses
 import os
 import re
 from pathlib import Path
@@ -81,9 +80,7 @@ def to_verilog(component: wiring.Component, name: str) -> str:
 
 def _facts(spec: AxisSpec) -> list[str]:
     """Return the fields of the spec, one line each, with the gains that are in use."""
-    fields = {field.name: getattr(spec, field.name) for field in dataclasses.fields(spec)}
-    fields["gains"] = spec.design.gains
-    return [f"{name} = {value!r}" for name, value in fields.items()]
+    return [f"{name} = {value!r}" for name, value in spec.facts.items()]
 
 
 def _source(component: Axis | Board, name: str, what: str) -> str:

@@ -80,8 +80,16 @@ MEANINGS = {
     "axi_rready": "bus: what was read is taken",
     "drive_pdm": "pulses; their density is the magnitude of the drive; safe when low",
     "drive_sign": "1: the drive is negative, or positive if it is inverted",
+    "gate_high_a": "high gate of the bridge's leg A, which pulses for a positive drive; safe when low",
+    "gate_low_a": "low gate of leg A; safe when low",
+    "gate_high_b": "high gate of leg B, which pulses for a negative drive; safe when low",
+    "gate_low_b": "low gate of leg B; safe when low",
+    "dac_cs_n": "chip select of the DAC, low during a frame",
+    "dac_sclk": "serial clock of the DAC",
+    "dac_mosi": "serial data of the DAC, the uppermost bit first",
+    "dac_clear_n": "clear of the DAC: low makes it go to its middle code; safe when low",
     "alive": "square wave while ARMED, for the charge pump of an amplifier's enable; safe when low",
-    "outputs_enable": "enable of the buffers of drive_pdm, drive_sign and alive: both clocks run, the reset has ended",
+    "outputs_enable": "enable of the buffers of the drive's pins and alive: both clocks run, the reset has ended",
 }
 """The meaning of every port; a run-time word has its own text."""
 

@@ -193,9 +193,7 @@ class RegisterMap:
 
     def _hash(self, rest: tuple[Register, ...]) -> str:
         """Return the identity: 16 hexadecimal digits of the SHA-256 of the specification and of all that is placed."""
-        facts = {field.name: getattr(self.spec, field.name) for field in dataclasses.fields(self.spec)}
-        facts["gains"] = self.spec.design.gains
-        described = repr((LAYOUT, self.capture_registers, facts, rest))
+        described = repr((LAYOUT, self.capture_registers, self.spec.facts, rest))
         return hashlib.sha256(described.encode()).hexdigest()[:16]
 
     def _compressed(self, rest: tuple[Register, ...]) -> bytes:

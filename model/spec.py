@@ -1,10 +1,15 @@
 """One axis, specified: its requirements, the estimator that it has, and the design that follows from both."""
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
-from .checks import FieldError
+from .checks import FieldError, shown
 from .design import Design
+from .drive import registry
+from .drive.pdm import USUAL
+from .drive.stage import Stage, StageDesign
 from .estimators.estimate import EstimatorGains
 from .requirements import AxisRequirements
 
@@ -16,15 +21,19 @@ class AxisSpec(AxisRequirements):
     Attributes:
         estimator: name of the velocity estimator.
         gains: that estimator's `Gains`, or None for its default ones.
+        stage: what makes pins of the drive, a `Stage` of one of `drive.registry`.
 
     The other attributes, and the errors, are those of `requirements.AxisRequirements`.
     """
 
     estimator: str = "levant"
     gains: EstimatorGains | None = None
+    stage: Stage = USUAL
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not isinstance(self.stage, Stage):
+            raise TypeError(f"stage must be a drive stage, not {shown(self.stage)}")
         if self.design.latency_to_drive > self.clocks_per_sample:
             fastest = self.clock_hz // self.design.latency_to_drive
             raise FieldError(
@@ -32,8 +41,23 @@ class AxisSpec(AxisRequirements):
                 f"must leave {self.design.latency_to_drive} clocks for the force path, so at most {fastest} "
                 f"at clock_hz {self.clock_hz}, not {self.sample_hz!r}",
             )
+        _ = self.drive
 
     @cached_property
     def design(self) -> Design:
         """Every derived format, word and latency."""
         return Design(self, self.estimator, self.gains)
+
+    @cached_property
+    def drive(self) -> StageDesign:
+        """The design of the drive stage."""
+        return registry.design_of(self, self.stage)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Every field by name, with the gains that are in use; without the stage if that is the usual one."""
+        facts = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        facts["gains"] = self.design.gains
+        if self.stage == USUAL:
+            del facts["stage"]
+        return facts

@@ -31,7 +31,8 @@ class Design:
         self.supervisor = supervisor.Design(spec)
         self.committed = tuple(word for word in spec.design.words if word.name not in FIXED)
         doc = "1: the sign of the drive's pins is reversed; taken in every state but ARMED"
-        self.live = (*self.supervisor.words, *self.monitors.words, Word("drive_invert", UQ(1, 0), 1.0, "", 0, doc))
+        invert = Word("drive_invert", UQ(1, 0), 1.0, "", int(spec.stage.inverted), doc)
+        self.live = (*self.supervisor.words, *self.monitors.words, invert)
         self.ranges = {
             "supervisor_force_limit": (0, spec.force_limit_word),
             "supervisor_ramp": (1, self.supervisor.ramp.max),

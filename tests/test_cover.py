@@ -31,7 +31,14 @@ POINTS = [
     ("v_toggle/top.part", 1, "__0247[0]:0->1"),
 ]
 OF_THE_BENCH = {
-    TESTS / f"{name}.py" for name in ("test_typing", "testing/test_campaign", "link/test_mbpoll", "link/test_axi_link")
+    TESTS / f"{name}.py"
+    for name in (
+        "test_typing",
+        "test_board_stages",
+        "testing/test_campaign",
+        "link/test_mbpoll",
+        "link/test_axi_link",
+    )
 }
 """Tests that simulate hardware of their own, need a program that may be absent, or see a block in a board alone."""
 REACHED = Point("toggle", "part.sum[0]:0->1")

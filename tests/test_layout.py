@@ -53,6 +53,7 @@ BROAD = {
     "link/test_mbpoll": "the link, spoken to by a program",
     "pictures/test_draw": "every picture",
     "rtl/test_simulators": "the written Verilog, in another simulator",
+    "test_board_stages": "the board with each of its drive stages",
     "test_cover": "the means of the coverage",
     "test_digests": "whatever the program computes",
     "test_docs": "the pages",

@@ -1,14 +1,14 @@
 """Files of pins for the placers, written from a description: .lpf for the ECP5, .pcf for the iCE40, .cst for Gowin."""
 
 from .description import Description, Pin
-from .signals import SIGNALS, Signal
+from .signals import USUAL, Signal, signals_of
 
 DRIVE_MA = 4
 """The strength of outputs that are not a serial line's: enough for a receiver, and slow enough for a wire."""
 
 
-def constraints(board: Description) -> str:
-    """Return the text of the file of pins of a board."""
+def constraints(board: Description, stage: str = USUAL) -> str:
+    """Return the text of the file of pins of a board with a drive stage."""
     write = WRITERS[board.part.suffixes.pins]
     head, line, mark = write["head"], write["line"], write["comment"]
     about = [
@@ -17,7 +17,7 @@ def constraints(board: Description) -> str:
         *board.sources,
     ]
     lines = [*(f"{mark} {each}" for each in about), "", *head]
-    for signal in SIGNALS:
+    for signal in signals_of(stage):
         pin = board.pins[signal.name]
         lines += [f"{mark} {signal.name}: {pin.at}", *line(signal, pin)]
     return "\n".join(lines) + "\n"

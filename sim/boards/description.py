@@ -10,8 +10,8 @@ A file describes a board and its variants, which differ in the part alone:
     [parts]: the part of every variant, by the variant's name, which `hardwall board` takes.
     [scene]: the scene that the board runs if none is given, and the changes of its keys.
     [serial]: which of the USB bridge's serial ports is the line; its name in /dev/serial/by-id; the bridge's USB ids.
-    [pins.SIGNAL]: for each of `SIGNALS` the FPGA's pin (`site`), where that is (`at`: the header and the position, or
-        words), and the pull inside the part.
+    [pins.SIGNAL]: for each of `EVERY` the FPGA's pin (`site`), where that is (`at`: the header and the position, or
+        words), and the pull inside the part. Drive stages share pins, for a board has one of them.
     [[headers]]: the headers that are drawn: name, title, and rows of positions as they lie side by side.
 """
 
@@ -22,7 +22,7 @@ from typing import Any, Literal
 
 from .parts import PARTS, Part
 from .pll import Setting
-from .signals import SIGNALS
+from .signals import EVERY
 
 Pull = Literal["up", "down", "none"]
 Memory = Literal["sram", "flash"]
@@ -110,13 +110,13 @@ def _read(family: str, text: str) -> dict[str, Description]:
         "scene": scene["name"],
         "changes": scene["changes"],
         "serial": Serial(**table["serial"]),
-        "pins": {signal.name: Pin(**table["pins"].pop(signal.name)) for signal in SIGNALS},
+        "pins": {signal.name: Pin(**table["pins"].pop(signal.name)) for signal in EVERY},
         "headers": tuple(
             Header(each["name"], each["title"], tuple(map(tuple, each["rows"]))) for each in table["headers"]
         ),
     }
     if table["pins"]:
-        raise ValueError(f"{family}: pins must be of {', '.join(each.name for each in SIGNALS)}, not {table['pins']}")
+        raise ValueError(f"{family}: pins must be of {', '.join(each.name for each in EVERY)}, not {table['pins']}")
     return {name: Description(name=name, family=family, device=device, **common) for name, device in parts.items()}
 
 

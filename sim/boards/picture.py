@@ -2,8 +2,8 @@
 
 from html import escape
 
-from .description import Description, Header
-from .signals import SIGNALS
+from .description import Description
+from .signals import USUAL, Signal, signals_of
 
 WIDE, HIGH, GAP, HEAD = 34, 160, 10, 24
 """A position's width and height, the gap between rows, and the height of a line of text; px."""
@@ -14,14 +14,18 @@ COLOURS = {"in": "#cfe3f7", "out": "#fbd9b5", "GND": "#d0d0d0", "3V3": "#f3c4c4"
 LEGEND = {"in": "input of the FPGA", "out": "output of the FPGA", "3V3": "3.3 V", "GND": "ground", "": "not used"}
 
 
-def picture(board: Description) -> str:
-    """Return the SVG of all headers of a board, side by side."""
+def picture(board: Description, stage: str = USUAL) -> str:
+    """Return the SVG of all headers of a board with a drive stage, side by side."""
     drawn, left, low = [], GAP, 0
     for header in board.headers:
         top = GAP + HEAD
         drawn.append(_text(left, top - GAP, header.title, 14, "bold"))
         for row in header.rows:
-            drawn += [_position(board, header, name, left + WIDE * place, top) for place, name in enumerate(row)]
+            for place, name in enumerate(row):
+                at = f"{header.name} {name}"
+                signal = next((each for each in signals_of(stage) if board.pins[each.name].at == at), None)
+                site = board.pins[signal.name].site if signal else ""
+                drawn.append(_position(name, signal, site, left + WIDE * place, top))
             top += HIGH + GAP
         left, low = left + WIDE * max(map(len, header.rows)) + 2 * GAP, max(low, top)
     drawn += _legend(low)
@@ -30,10 +34,8 @@ def picture(board: Description) -> str:
     return "\n".join([head, '<rect width="100%" height="100%" fill="#ffffff"/>', *drawn, "</svg>"]) + "\n"
 
 
-def _position(board: Description, header: Header, name: str, left: int, top: int) -> str:
+def _position(name: str, signal: Signal | None, site: str, left: int, top: int) -> str:
     """Return the SVG of a position: its name above, and below it, upright, the signal and the FPGA's pin."""
-    at = f"{header.name} {name}"
-    signal = next((each for each in SIGNALS if board.pins[each.name].at == at), None)
     kind = name if signal is None else "out" if signal.out else "in"
     box = (
         f'<rect x="{left}" y="{top}" width="{WIDE}" height="{HIGH}" fill="{COLOURS.get(kind, COLOURS[""])}" '
@@ -42,7 +44,7 @@ def _position(board: Description, header: Header, name: str, left: int, top: int
     label = _text(left + WIDE // 2, top + 17, name, 12, "bold", "middle")
     if signal is None:
         return box + label
-    text = f"{signal.name} ({board.pins[signal.name].site})"
+    text = f"{signal.name} ({site})"
     across, low = left + WIDE // 2 + 5, top + HIGH - 8
     return box + label + f'<g transform="rotate(-90 {across} {low})">{_text(across, low, text, 13)}</g>'
 

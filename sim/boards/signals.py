@@ -1,6 +1,11 @@
 """The signals of `top`, the same on every board: what each is, and what it is to be connected to."""
 
 from dataclasses import dataclass
+from typing import Literal
+
+Outside = Literal["", "1 kΩ to ground", "10 kΩ to 3.3 V"]
+DOWN: Outside = "1 kΩ to ground"
+UP: Outside = "10 kΩ to 3.3 V"
 
 
 @dataclass(frozen=True)
@@ -11,38 +16,62 @@ class Signal:
         name: its name in the Verilog, and in the constraints.
         out: whether the FPGA drives it.
         what: what it is, and what to connect it to.
-        pulled_down: whether it must have a pull-down outside the FPGA.
+        outside: the resistor that it must have outside the FPGA.
         rest: what a scope shows while nothing but the supply is connected and the axis is DISARMED.
     """
 
     name: str
     out: bool
     what: str
-    pulled_down: bool = False
+    outside: Outside = ""
     rest: str = ""
 
 
 _CHANNEL = "of the encoder, from a receiver of 3.3 V"
 _LOOP = "closed to 3.3 V while all is well; open means stop"
 
-SIGNALS = tuple(
-    Signal(*each)
-    for each in (
-        ("clk", False, "the board's oscillator", False, "the oscillator's frequency"),
-        ("rst", False, "resets while high", False, "low; high while the button is pressed"),
-        ("encoder_a", False, f"channel A {_CHANNEL}", False, "high while nothing is connected"),
-        ("encoder_a_n", False, f"complement of channel A {_CHANNEL}", False, "high while nothing is connected"),
-        ("encoder_b", False, f"channel B {_CHANNEL}", False, "high while nothing is connected"),
-        ("encoder_b_n", False, f"complement of channel B {_CHANNEL}", False, "high while nothing is connected"),
-        ("encoder_z", False, f"index {_CHANNEL}", False, "the level of its pull"),
-        ("drive_enable", False, f"loop of the drive's enable, {_LOOP}", True, "low: open"),
-        ("external_fault", False, f"loop of the amplifier's fault, {_LOOP}", True, "low: open"),
-        ("emergency_stop", False, f"loop of the emergency stop, {_LOOP}", True, "low: open"),
-        ("drive_pdm", True, "pulses whose density is the magnitude of the force, to the amplifier", True, "low"),
-        ("drive_sign", True, "sign of the force, to the amplifier", True, "low"),
-        ("alive", True, "square wave while ARMED, to the charge pump of the amplifier's enable", True, "low"),
-        ("uart_rx", False, "from the board's own USB bridge", False, "high, and bytes of a host"),
-        ("uart_tx", True, "to the board's own USB bridge", False, "high, and the answers"),
-    )
+_BEFORE = (
+    Signal("clk", False, "the board's oscillator", "", "the oscillator's frequency"),
+    Signal("rst", False, "resets while high", "", "low; high while the button is pressed"),
+    Signal("encoder_a", False, f"channel A {_CHANNEL}", "", "high while nothing is connected"),
+    Signal("encoder_a_n", False, f"complement of channel A {_CHANNEL}", "", "high while nothing is connected"),
+    Signal("encoder_b", False, f"channel B {_CHANNEL}", "", "high while nothing is connected"),
+    Signal("encoder_b_n", False, f"complement of channel B {_CHANNEL}", "", "high while nothing is connected"),
+    Signal("encoder_z", False, f"index {_CHANNEL}", "", "the level of its pull"),
+    Signal("drive_enable", False, f"loop of the drive's enable, {_LOOP}", DOWN, "low: open"),
+    Signal("external_fault", False, f"loop of the amplifier's fault, {_LOOP}", DOWN, "low: open"),
+    Signal("emergency_stop", False, f"loop of the emergency stop, {_LOOP}", DOWN, "low: open"),
 )
-"""All pins, in the order of the tables."""
+_BEHIND = (
+    Signal("alive", True, "square wave while ARMED, to the charge pump of the amplifier's enable", DOWN, "low"),
+    Signal("uart_rx", False, "from the board's own USB bridge", "", "high, and bytes of a host"),
+    Signal("uart_tx", True, "to the board's own USB bridge", "", "high, and the answers"),
+)
+OF_STAGE = {
+    "pdm": (
+        Signal("drive_pdm", True, "pulses whose density is the magnitude of the force, to the amplifier", DOWN, "low"),
+        Signal("drive_sign", True, "sign of the force, to the amplifier", DOWN, "low"),
+    ),
+    "pwm": (
+        Signal("gate_high_a", True, "high gate of the bridge's leg A, to its driver", DOWN, "low"),
+        Signal("gate_low_a", True, "low gate of leg A, to its driver", DOWN, "low"),
+        Signal("gate_high_b", True, "high gate of leg B, to its driver", DOWN, "low"),
+        Signal("gate_low_b", True, "low gate of leg B, to its driver", DOWN, "low"),
+    ),
+    "dac": (
+        Signal("dac_clear_n", True, "clear of the DAC, which low makes go to its middle code", DOWN, "low"),
+        Signal("dac_cs_n", True, "chip select of the DAC", UP, "high"),
+        Signal("dac_sclk", True, "serial clock of the DAC", DOWN, "the level of its mode"),
+        Signal("dac_mosi", True, "serial data of the DAC", DOWN, "low"),
+    ),
+}
+"""The pins of each drive stage, the one that is safe first."""
+USUAL = "pdm"
+"""The stage of a scene that has none."""
+EVERY = (*_BEFORE, *(signal for signals in OF_STAGE.values() for signal in signals), *_BEHIND)
+"""All signals that any board of ours has."""
+
+
+def signals_of(stage: str) -> tuple[Signal, ...]:
+    """Return the signals of a board with a drive stage, in the order of the tables."""
+    return (*_BEFORE, *OF_STAGE[stage], *_BEHIND)

@@ -1,7 +1,9 @@
 """What to connect to a board, as a page of Markdown: every signal, its pins, its level, and what to see of it."""
 
+from ...model.spec import AxisSpec
 from .description import Description
-from .signals import SIGNALS, Signal
+from .drive import drive
+from .signals import Signal, signals_of
 
 PULLS = {"up": "up", "down": "down", "none": ""}
 RECEIVERS = """\
@@ -11,15 +13,15 @@ RECEIVERS = """\
   such as an SN74LVC14A.
 - **A complement is a wire of its own.** `encoder_a_n` and `encoder_b_n` come from receivers of their own, or a cut wire
   is not seen. Without them leave both open and the cause `encoder_loss` off.
-- **Pull-downs of 1 kΩ outside**, beside the board, at every pin that the table marks: they hold it low before the FPGA
+- **Resistors outside**, beside the board, at every pin that the table marks: they hold it low, or high, before the FPGA
   is configured, while it is loaded, and when the board has lost its supply.
 - **Loops** close to the board's 3.3 V. What opens them (a button, a relay of the amplifier) stands in series.
 - The ground of encoder, receivers and amplifier is the board's, joined beside the header.
 """
 
 
-def wiring(board: Description, picture: str) -> str:
-    """Return the page; `picture` is the name of the picture's file beside it."""
+def wiring(board: Description, spec: AxisSpec, picture: str) -> str:
+    """Return the page for an axis on a board; `picture` is the name of the picture's file beside it."""
     notes = "\n".join(f"- {note}" for note in (f"At power-up {board.power_up}.", *board.notes))
     sources = "\n".join(f"- {source}" for source in board.sources)
     return f"""\
@@ -32,7 +34,10 @@ it against the board's own papers, and follow the checklist of the page *Boards*
 
 All levels are LVCMOS of 3.3 V. "Pull" is the resistor inside the part, tens of kΩ, which comes with the configuration.
 
-{table(board)}
+{table(board, spec.stage.name)}
+## The drive
+
+{drive(spec)}
 ## Before anything is connected
 
 {notes}
@@ -46,25 +51,21 @@ All levels are LVCMOS of 3.3 V. "Pull" is the resistor inside the part, tens of 
 """
 
 
-def table(board: Description) -> str:
-    """Return the table of every signal."""
+def table(board: Description, stage: str) -> str:
+    """Return the table of every signal of a board with a drive stage."""
     lines = [
         "| signal | direction | where | FPGA pin | pull | outside | what it is | at rest |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for signal in SIGNALS:
+    for signal in signals_of(stage):
         pin = board.pins[signal.name]
-        cells = (f"`{signal.name}`", _direction(signal), pin.at, pin.site, PULLS[pin.pull], _outside(signal))
+        cells = (f"`{signal.name}`", _direction(signal), pin.at, pin.site, PULLS[pin.pull], signal.outside)
         lines.append(f"| {' | '.join((*cells, signal.what, signal.rest))} |")
     return "\n".join(lines) + "\n"
 
 
 def _direction(signal: Signal) -> str:
     return "out" if signal.out else "in"
-
-
-def _outside(signal: Signal) -> str:
-    return "1 kΩ to ground" if signal.pulled_down else ""
 
 
 def serial(board: Description) -> str:

@@ -59,6 +59,7 @@ def build(order: Order, folder: Path) -> dict:
         seeds, fmax_mhz_seeds: the seeds that were tried, and the highest clock with each; seed: the last, which is
             packed.
         oscillator_mhz, pll: the board's oscillator, and the dividers that make the clock of it; none without a PLL.
+        stage, full_scale_n: the drive stage, and the force of its full scale, of pulses that never pause for example.
         baud, identity: the rate of the serial line, and the identity of the registers, which a host reads.
         bitstream, sha256: the name of the bitstream's file, and its digest.
 
@@ -107,8 +108,8 @@ def _fill(order: Order, design: Design, runs: list[Placed], report: dict, work: 
         "registers.md": register_texts.markdown(registers),
         "registers.h": register_texts.c_header(registers),
         "registers.json": register_texts.as_json(registers),
-        "WIRING.md": wiring(board, PICTURE),
-        PICTURE: picture(board),
+        "WIRING.md": wiring(board, order.spec, PICTURE),
+        PICTURE: picture(board, order.spec.stage.name),
         "report.json": json.dumps(report, indent=2) + "\n",
         "report.txt": "".join(f"{key}: {text_of(value)}\n" for key, value in report.items()),
     }
@@ -147,6 +148,8 @@ def _report(order: Order, design: Design, runs: list[Placed], bitstream: bytes) 
         "seed": runs[-1].seed,
         "oscillator_mhz": board.oscillator_hz / 1e6,
         "pll": dict(setting.dividers) if setting else {},
+        "stage": order.spec.stage.name,
+        "full_scale_n": order.spec.drive.full_scale_n,
         "baud": top.link.baud,
         "identity": top.registers.identity,
         "bitstream": Files.of(board).bitstream,

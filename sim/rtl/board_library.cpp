@@ -1,5 +1,5 @@
 // The Verilated board with what is around it (around_board.v) behind a C interface, which has the form of the axis's: so
-// the same compiled loop closes it. Its drive is what the amplifier takes: pulses, of which a sample has some.
+// the same compiled loop closes it. Its drive is what the amplifier makes of its pins: steps, the sum of a sample's clocks.
 //
 // Clocks are numbered from 0, the first after reset.
 
@@ -31,8 +31,9 @@ struct Context {
     int next_bit = 10;
     int64_t began = 0;
 
-    // What was read of the counters of pulses and of the board's bytes, which wrap.
-    uint32_t pulses_read = 0, taken = 0;
+    // What was read of the amplifier's sum, and of the counter of the board's bytes, which wraps.
+    uint64_t given_read = 0;
+    uint32_t taken = 0;
 
     static bool through(bool level, Wire wire) {
         return wire == SOUND ? level : wire == INVERTED ? !level : wire == HIGH;
@@ -134,14 +135,17 @@ int64_t board_advance(int64_t address, int64_t clocks_address, int64_t levels_ad
     return taken;
 }
 
-// The pulses that the amplifier took since the last call; nothing else is read through this interface.
+// The sum of the amplifier's steps since the last call; nothing else is read through this interface.
 int64_t board_read(int64_t address, int64_t what, int64_t, int64_t, int64_t) {
     Context& context = at(address);
     if (what != 0) return 0;
-    const uint32_t before = context.pulses_read;
-    context.pulses_read = context.bench.pulses;
-    return static_cast<int32_t>(context.pulses_read - before);
+    const uint64_t before = context.given_read;
+    context.given_read = context.bench.given;
+    return static_cast<int64_t>(context.given_read - before);
 }
+
+// Return whether both gates of a leg of the bridge have been on together.
+int64_t board_shot(void* address) { return static_cast<Context*>(address)->bench.shot; }
 
 void board_send(void* address, const uint8_t* bytes, int64_t count) {
     auto& waiting = static_cast<Context*>(address)->to_send;

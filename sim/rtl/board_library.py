@@ -1,7 +1,7 @@
 """The Verilated board with what is around it, as a shared library: clocks, the other end of its line, an amplifier.
 
-A board has the pins of packages; behind its line is a host of bytes, and behind its pulses an amplifier. Both, and the
-faults of wires, are in `around_board.v` and `board_library.cpp`.
+A board has the pins of packages; behind its line is a host of bytes, and behind its drive an amplifier for its stage.
+They, and the faults of wires, are in `around_board.v`, `amplifiers.v` and `board_library.cpp`.
 """
 
 import ctypes
@@ -14,13 +14,16 @@ import numpy as np
 from ...hdl.board import Board
 from ...hdl.export import to_verilog
 from ...hdl.link.link import Link
+from ...model.drive import dac
 from ...model.registers import RegisterMap
 from ...model.spec import AxisSpec
 from . import shared_library
 from .shared_library import Recipe
 from .verilated import Rtl, RtlState
 
-AROUND, SHIM = (Path(__file__).with_name(name) for name in ("around_board.v", "board_library.cpp"))
+AROUND, AMPLIFIERS, SHIM = (
+    Path(__file__).with_name(name) for name in ("around_board.v", "amplifiers.v", "board_library.cpp")
+)
 OSCILLATOR_HZ = 2.4e6
 """About the frequency of the oscillator beside the clock; the clock has a whole number of it in every half period."""
 ROOM = 1024
@@ -51,9 +54,28 @@ def build(spec: AxisSpec, baud: int | None = None) -> Path:
         "BIT_PARTS": round(256 * spec.clock_hz / board.link.baud),
         "OSCILLATOR_CLOCKS": max(round(spec.clock_hz / OSCILLATOR_HZ / 2), 1),
     }
-    files = {"board.v": verilog, **{path.name: path.read_text(encoding="utf-8") for path in (AROUND, SHIM)}}
+    around |= _dac(spec)
+    ours = {path.name: path.read_text(encoding="utf-8") for path in (AROUND, AMPLIFIERS, SHIM)}
     options = ("--top-module", "around_board", *(f"-G{name}={value}" for name, value in around.items()))
+    options += (f"-DSTAGE_{spec.stage.name.upper()}",)
+    files = {"board.v": verilog, **ours}
     return shared_library.build(Recipe(files, SHIM.name, "Vboard", options))
+
+
+def _dac(spec: AxisSpec) -> dict[str, int]:
+    """Return what the simulated DAC is to know of its frames; nothing without one."""
+    stage, design = spec.stage, spec.drive
+    if not isinstance(stage, dac.Stage) or not isinstance(design, dac.Design):
+        return {}
+    return {
+        "DAC_BITS": stage.bits,
+        "DAC_HEADER_BITS": stage.header_bits,
+        "DAC_HEADER": stage.header,
+        "DAC_TRAILING_BITS": stage.trailing_bits,
+        "DAC_FLIP": int(stage.coding == "offset-binary"),
+        "DAC_TAKES": int(stage.mode in (0, 3)),
+        "DAC_OFFSET": design.offset,
+    }
 
 
 class BoardHardware:
@@ -66,14 +88,17 @@ class BoardHardware:
         baud: the rate of the serial line; None for the board's own.
 
     Attributes:
-        full_scale: the drive (force LSB) of an amplifier whose pulses never pause.
+        given_n: the mean force over a sample, N, of the amplifier's drive 1.
     """
 
     def __init__(self, spec: AxisSpec, number: int, turn_counts: int, baud: int | None = None):
         board, _ = _board(spec, baud)
         self._library_at = functools.partial(build, spec, baud)
         self._spec, self._board, self._number, self._turn = spec, board, number, turn_counts
-        self.full_scale = 1 << board.drive_bits
+        # A bridge, or pulses, have one step; and the amplifier behind an inverted stage turns the sign back.
+        codes = spec.drive.steps if isinstance(spec.drive, dac.Design) else 1
+        sign = -1 if spec.stage.inverted else 1
+        self.given_n = sign * spec.drive.full_scale_n / codes / spec.clocks_per_sample
 
     def __enter__(self) -> "BoardHardware":
         self._library = library = ctypes.CDLL(str(self._library_at()))
@@ -107,6 +132,11 @@ class BoardHardware:
         count = self._library.board_take(self._context, self._heard.ctypes.data, ROOM)
         return self._heard[:count].tobytes()
 
+    @property
+    def shot(self) -> bool:
+        """Whether both gates of a leg of the bridge have been on together."""
+        return bool(self._library.board_shot(ctypes.c_void_p(self._context)))
+
     def wire(self, name: Wire, level: Level) -> None:
         """Say what becomes of a wire of the encoder on its way to the board."""
         self._library.board_wire(self._context, WIRES.index(name), LEVELS.index(level))
@@ -117,7 +147,7 @@ class BoardHardware:
 
     @property
     def controller(self) -> Rtl:
-        """The addresses by which the compiled loop calls the hardware; its drive is the pulses of a sample."""
+        """The addresses by which the compiled loop calls the hardware; its drive is the sum of a sample's steps."""
 
         def address(name: str) -> int:
             return ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value

@@ -69,8 +69,8 @@ def sources(board: Description, top: Board) -> dict[str, str]:
     """
     return {
         "board.v": to_verilog(top, "board"),
-        "top.v": top_verilog(board, top.spec.clock_hz),
-        Files.of(board).pins: constraints(board),
+        "top.v": top_verilog(board, top.spec.clock_hz, top.spec.stage.name),
+        Files.of(board).pins: constraints(board, top.spec.stage.name),
     }
 
 

@@ -41,7 +41,10 @@ def _pulse(scene: Scene) -> Pulse:
 
 
 def _converter(scene: Scene) -> Converter | None:
-    output = scene.output
+    output, drive = scene.output, scene.spec.drive
+    if scene.drive is not None:
+        # The mean force of pulses has steps, too.
+        return Converter(drive.step_n, -drive.most, drive.highest)
     if output is None or output.dac_bits is None:
         return None
     codes = 1 << output.dac_bits
@@ -49,8 +52,10 @@ def _converter(scene: Scene) -> Converter | None:
 
 
 def output_step_n(scene: Scene) -> float:
-    """Return the change of a command (N) that surely changes the output; 0 without a section `output`."""
+    """Return the change of a command (N) that surely changes the output; 0 without a section that has steps."""
     output = scene.output
+    if scene.drive is not None:
+        return scene.spec.drive.step_n
     if output is None:
         return 0.0
     return 2 * output.full_scale_n / (output.pwm_steps or 1 << output.dac_bits)

@@ -27,12 +27,16 @@ KEYS = {
     "output_slew_limit": "controller.slew_limit_n_per_s",
     "count_m": "encoder.count_m",
 }
+OF_THE_STAGE = "stage."
+"""How the names of the fields of a drive stage begin in messages."""
 WALL_MAX = {"wall_stiffness": "stiffness_max_n_per_m", "wall_damping": "damping_max_n_s_per_m"}
 """The field of the axis that limits each word of the wall, more narrowly than the word itself."""
 
 
 def _key_of(field: str, scene: Scene) -> str:
-    """Return the scene key of a word of the axis, or of a field of the axis or its gains."""
+    """Return the scene key of a word of the axis, or of a field of the axis, its gains or its drive stage."""
+    if scene.drive is not None and field.startswith(OF_THE_STAGE):
+        return f"drive.{scene.drive.key_of(field.removeprefix(OF_THE_STAGE))}"
     if field in KEYS:
         return KEYS[field]
     controller = scene.controller
@@ -43,6 +47,8 @@ def _key_of(field: str, scene: Scene) -> str:
 def check(scene: Scene) -> None:
     """Raise ValueError for errors that the sections of a `Scene` cannot see alone; the message begins with the key."""
     _check_encoder(scene)
+    if scene.drive is not None:
+        scene.drive.check()
     _check_axis(scene)
     _check_protocol(scene)
     if scene.amplifier is not None:
@@ -168,6 +174,8 @@ def _check_amplifier(scene: Scene) -> None:
 
 def _check_output(scene: Scene) -> None:
     output, clock_hz = scene.output, scene.spec.clock_hz
+    if scene.drive is not None:
+        raise ValueError("output must be absent beside a section drive, whose stage says the steps of the force")
     pulses = output.pwm_carrier_hz is not None, output.pwm_steps is not None
     if (output.dac_bits is not None) + any(pulses) != 1 or pulses[0] != pulses[1]:
         raise ValueError("output must have dac_bits, or pwm_carrier_hz and pwm_steps, and not both")

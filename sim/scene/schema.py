@@ -7,12 +7,14 @@ import dataclasses
 from functools import cached_property
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import Field, create_model
 
+from ...model.drive import pdm
 from ...model.estimators import registry
 from ...model.quadrature_speed import GLITCH_CLOCKS_MAX, glitch_clocks_for
 from ...model.spec import AxisSpec
 from ..world.encoder import offsets
+from .drive import DriveSection
 from .quantities import (
     Acceleration,
     Bandwidth,
@@ -38,10 +40,7 @@ from .quantities import (
     Voltage,
     or_none,
 )
-
-
-class Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+from .section import Section
 
 
 class HandleSection(Section):
@@ -201,6 +200,7 @@ class Scene(Section):
     transmission: TransmissionSection | None = None
     hand: HandSection | None = None
     output: OutputSection | None = None
+    drive: DriveSection | None = None
     solver: SolverSection | None = None
     protocol: ProtocolSection
     zwidth: ZWidthSection | None = None
@@ -208,13 +208,14 @@ class Scene(Section):
     @cached_property
     def spec(self) -> AxisSpec:
         """The axis."""
-        of_the_spec = {field.name for field in dataclasses.fields(AxisSpec)} - {"count_m", "gains"}
+        of_the_spec = {field.name for field in dataclasses.fields(AxisSpec)} - {"count_m", "gains", "stage"}
         fields = self.controller.model_dump(include=of_the_spec, exclude_unset=False)
         fields["glitch_clocks"] = self.glitch_clocks
         gains = getattr(self.controller.gains, self.controller.estimator)
         if gains is not None:
             gains = registry.design_of(self.controller.estimator).gains_class(**gains.model_dump())
-        return AxisSpec(count_m=self.encoder.count_m, gains=gains, **fields)
+        stage = pdm.USUAL if self.drive is None else self.drive.made
+        return AxisSpec(count_m=self.encoder.count_m, gains=gains, stage=stage, **fields)
 
     @property
     def glitch_clocks(self) -> int:

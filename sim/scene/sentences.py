@@ -21,7 +21,8 @@ def accepted(kind: Any, marks: tuple = ()) -> str:
     if origin is typing.Literal:
         return f"one of {', '.join(map(str, inner))}"
     if origin is list:
-        return f"a list of {_limits(marks)['min_length']}, each {accepted(inner[0])}"
+        least, most = (_limits(marks)[name] for name in ("min_length", "max_length"))
+        return f"a list of {least if least == most else f'{least} to {most}'}, each {accepted(inner[0])}"
     if kind in (int, float):
         noun, limits = "a whole number" if kind is int else "a number", _limits(marks)
         return f"{noun} of {plain(limits['ge'])} to {plain(limits['le'])}" if limits else noun
@@ -36,7 +37,7 @@ def plain(number: float) -> str:
 def _limits(marks: tuple) -> dict[str, Any]:
     """Return the limits among what a type is annotated with, the last and narrowest of each kind."""
     several = [mark for data in marks for mark in (getattr(data, "metadata", None) or [data])]
-    names = ("ge", "le", "min_length")
+    names = ("ge", "le", "min_length", "max_length")
     return {name: getattr(mark, name) for mark in several for name in names if hasattr(mark, name)}
 
 

@@ -1,7 +1,7 @@
 """A virtual board: the Verilated `board` with the scene's plant beside it, in simulated time.
 
 The compiled loop closes it as it closes an axis: the handle makes edges, the board takes them through its pins, and the
-amplifier's pulses of a sample are the force on the handle during the next one. What is behind the board's serial line
+amplifier's mean of a sample is the force on the handle during the next one. What is behind the board's serial line
 are bytes. The wall, and whether there is a drive at all, is for a host to say.
 """
 
@@ -69,19 +69,19 @@ class VirtualBoard:
         positions_m: where the handle was at the strobes of the last `run`.
 
     Raises:
-        SceneError: if the scene has an output of its own, for the board's are pulses.
+        SceneError: if the scene has an output of its own, for the board's is that of its drive stage.
         BuildError: if the hardware cannot be built.
     """
 
     def __init__(self, scene: Scene, baud: int | None = None):
         if scene.output is not None:
-            raise SceneError(f"{scene.name}: output must be absent, for the pulses of the board are its output")
-        self.scene, self._world = scene, world_of(scene)
+            raise SceneError(f"{scene.name}: output must be absent, for the drive stage of the board is its output")
+        # The board's own stage makes the steps of its force.
+        self.scene, self._world = scene, world_of(scene)._replace(converter=None)
         self._progress = start_of(scene, self._world)
         turn_counts = max(round(TURN_M / scene.encoder.count_m), 4)
         self.hardware = BoardHardware(scene.spec, self._progress.moment.cell.number, turn_counts, baud)
         self.hand, self.reversed = Hand(scene.protocol.start_m), False
-        self._pulse_n = scene.spec.force_resolution_n * self.hardware.full_scale / scene.spec.clocks_per_sample
         self._edges, self._push_n = room_for(loop.EDGE_CAPACITY), 0.0
         self._number, self.positions_m = self._progress.moment.cell.number, np.zeros(0)
 
@@ -99,8 +99,8 @@ class VirtualBoard:
         motion = self._progress.moment.motion
         room = np.zeros(samples), np.zeros(samples, np.int64)
         self._push_n = self.hand.force_n(self.scene.handle.mass_kg, motion[0], motion[1])
-        pulse_n = -self._pulse_n if self.reversed else self._pulse_n
-        world = self._world._replace(push_n=self._push_n, force_lsb_n=pulse_n)
+        given_n = -self.hardware.given_n if self.reversed else self.hardware.given_n
+        world = self._world._replace(push_n=self._push_n, force_lsb_n=given_n)
         memory = loop.Memory(self._edges, None, None, None, *room)
         until = self._progress.sample + samples
         controller = self.hardware.controller

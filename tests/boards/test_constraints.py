@@ -6,7 +6,7 @@ import pytest
 
 from hardwall.sim.boards.constraints import constraints
 from hardwall.sim.boards.description import BOARDS
-from hardwall.sim.boards.signals import SIGNALS
+from hardwall.sim.boards.signals import OF_STAGE, signals_of
 
 PLACED = {
     ".lpf": r'^LOCATE COMP "(\w+)" SITE "(\w+)";$',
@@ -21,12 +21,13 @@ PULLED = {
 """The pull of a signal, and its level."""
 
 
+@pytest.mark.parametrize("stage", OF_STAGE)
 @pytest.mark.parametrize("board", BOARDS.values(), ids=BOARDS)
-def test_every_signal_is_placed_once_with_its_pull(board):
-    text, suffix = constraints(board), board.part.suffixes.pins
+def test_every_signal_is_placed_once_with_its_pull(board, stage):
+    text, suffix = constraints(board, stage), board.part.suffixes.pins
     placed = re.findall(PLACED[suffix], text, re.MULTILINE)
-    assert placed == [(signal.name, board.pins[signal.name].site) for signal in SIGNALS]
-    for signal in SIGNALS:
+    assert placed == [(signal.name, board.pins[signal.name].site) for signal in signals_of(stage)]
+    for signal in signals_of(stage):
         pull = board.pins[signal.name].pull
         if suffix == ".pcf":
             assert (f"set_io -pullup yes {signal.name} " in text) == (pull == "up")
@@ -36,8 +37,9 @@ def test_every_signal_is_placed_once_with_its_pull(board):
             assert (said or "NONE").lower() == pull
 
 
+@pytest.mark.parametrize("stage", OF_STAGE)
 @pytest.mark.parametrize("name", ["ulx3s-25f", "tangnano9k"])
-def test_outputs_are_weak(name):
-    lines = constraints(BOARDS[name]).splitlines()
+def test_outputs_are_weak(name, stage):
+    lines = constraints(BOARDS[name], stage).splitlines()
     strong = {line.split('"')[1] for line in lines if "DRIVE=4" in line}
-    assert strong == {signal.name for signal in SIGNALS if signal.out}
+    assert strong == {signal.name for signal in signals_of(stage) if signal.out}

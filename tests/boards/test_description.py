@@ -11,11 +11,12 @@ from hardwall.hdl.board import Board
 from hardwall.sim.boards import description
 from hardwall.sim.boards.description import BOARDS, board_of
 from hardwall.sim.boards.parts import PARTS
-from hardwall.sim.boards.signals import SIGNALS
+from hardwall.sim.boards.signals import EVERY, OF_STAGE, signals_of
 from hardwall.sim.boards.top import INSIDE
 from hardwall.sim.scene.load import load
-from stimuli.specs import spec
+from stimuli.stages import axis
 
+every_stage = pytest.mark.parametrize("stage", OF_STAGE)
 every_board = pytest.mark.parametrize("board", BOARDS.values(), ids=BOARDS)
 THEIRS = {
     "ulx3s-12f": ULX3S_12F_Platform,
@@ -41,24 +42,29 @@ def pins_of(platform, name, sub=None, number=0) -> list[str]:
     return next(each.ios for each in ios if each.name == sub)[0].names if sub else ios[0].names
 
 
-def test_every_signal_is_a_port_of_the_board_and_every_port_has_one():
-    assert {signal.name for signal in SIGNALS} == set(Board(spec("mhz")).signature.members) - INSIDE
-    outputs = {name for name, member in Board(spec("mhz")).signature.members.items() if member.flow.name == "Out"}
-    assert {signal.name for signal in SIGNALS if signal.out} == outputs - INSIDE
+@every_stage
+def test_every_signal_is_a_port_of_the_board_and_every_port_has_one(stage):
+    members = Board(axis(stage)).signature.members
+    assert {signal.name for signal in signals_of(stage)} == set(members) - INSIDE
+    outputs = {name for name, member in members.items() if member.flow.name == "Out"}
+    assert {signal.name for signal in signals_of(stage) if signal.out} == outputs - INSIDE
 
 
 @every_board
-def test_every_signal_has_a_pin_of_its_own(board):
-    assert list(board.pins) == [signal.name for signal in SIGNALS]
-    assert len({pin.site for pin in board.pins.values()}) == len(SIGNALS)
+@every_stage
+def test_every_signal_has_a_pin_of_its_own(board, stage):
+    assert list(board.pins) == [signal.name for signal in EVERY]
+    assert len({board.pins[signal.name].site for signal in signals_of(stage)}) == len(signals_of(stage))
     assert {pin.pull for pin in board.pins.values()} <= {"up", "down", "none"}
 
 
 @every_board
-def test_a_pin_on_a_header_is_there_once(board):
+@every_stage
+def test_a_pin_on_a_header_is_there_once(board, stage):
     positions = [f"{header.name} {name}" for header in board.headers for row in header.rows for name in row]
-    on_headers = [pin.at for pin in board.pins.values() if pin.at.split()[0] in {each.name for each in board.headers}]
-    assert len(on_headers) >= len(SIGNALS) - 4, "all but the clock, the reset and the serial line"
+    pins = [board.pins[signal.name] for signal in signals_of(stage)]
+    on_headers = [pin.at for pin in pins if pin.at.split()[0] in {each.name for each in board.headers}]
+    assert len(on_headers) >= len(pins) - 4, "all but the clock, the reset and the serial line"
     assert [positions.count(at) for at in on_headers] == [1] * len(on_headers)
 
 
@@ -105,9 +111,13 @@ def test_a_bank_of_1_8_volts_is_not_used():
 
 @every_board
 def test_the_drive_and_the_loops_are_low_while_nothing_is_connected(board):
-    for signal in SIGNALS:
-        if signal.name in ("drive_enable", "external_fault", "emergency_stop", "drive_pdm", "drive_sign", "alive"):
-            assert signal.pulled_down
+    drive = {signal.name for signals in OF_STAGE.values() for signal in signals}
+    for signal in EVERY:
+        if signal.name == "dac_cs_n":
+            assert signal.outside == "10 kΩ to 3.3 V"
+            assert board.pins[signal.name].pull != "down"
+        elif signal.name in {"drive_enable", "external_fault", "emergency_stop", "alive"} | drive:
+            assert signal.outside == "1 kΩ to ground"
             assert board.pins[signal.name].pull != "up"
 
 

@@ -7,17 +7,20 @@ import pytest
 
 from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.boards.picture import HIGH, WIDE, picture
+from hardwall.sim.boards.signals import OF_STAGE, signals_of
 
 SVG = "{http://www.w3.org/2000/svg}"
 
 
+@pytest.mark.parametrize("stage", OF_STAGE)
 @pytest.mark.parametrize("board", BOARDS.values(), ids=BOARDS)
-def test_every_signal_on_a_header_stands_once_below_its_position(board):
-    root = ElementTree.fromstring(picture(board))
+def test_every_signal_on_a_header_stands_once_below_its_position(board, stage):
+    root = ElementTree.fromstring(picture(board, stage))
     labels = [(float(each.get("x")), float(each.get("y")), each.text) for each in root.findall(f"{SVG}text")]
     signals = [(float(each.get("x")), float(each.get("y")), each.text) for each in root.iterfind(f"{SVG}g/{SVG}text")]
     names = {header.name for header in board.headers}
-    expected = {f"{name} ({pin.site})": pin for name, pin in board.pins.items() if pin.at.split()[0] in names}
+    pins = {signal.name: board.pins[signal.name] for signal in signals_of(stage)}
+    expected = {f"{name} ({pin.site})": pin for name, pin in pins.items() if pin.at.split()[0] in names}
     assert Counter(text for *_, text in signals) == Counter(list(expected))
     for x, y, text in signals:
         over = {label for left, top, label in labels if abs(left - x) < WIDE / 2 and 0 < y - top < HIGH}

@@ -15,11 +15,12 @@ from hardwall.hdl.export import to_verilog
 from hardwall.model.spec import AxisSpec
 from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.boards.pll import ClockError
-from hardwall.sim.boards.signals import SIGNALS
-from hardwall.sim.boards.top import PADS, top_verilog
+from hardwall.sim.boards.signals import OF_STAGE, signals_of
+from hardwall.sim.boards.top import pads_of, top_verilog
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from stimuli.clock_cells import MODELS
 from stimuli.specs import SPECS
+from stimuli.stages import STAGES
 
 CLOCKS = [
     ("ulx3s-25f", 50_000_000),
@@ -79,21 +80,24 @@ endmodule
 
 
 @cache
-def board_verilog(clock_hz: int) -> str:
-    """Return the Verilog of a small axis."""
+def board_verilog(clock_hz: int, stage: str = "pdm") -> str:
+    """Return the Verilog of a small axis with a drive stage."""
     rates = {"clock_hz": clock_hz, "sample_hz": clock_hz // 50, "actuation_hz": clock_hz // 50}
     given = {key: value for key, value in SPECS["mhz"].items() if key != "gains"}
-    return to_verilog(Board(AxisSpec(**given | rates, estimator="fdm")), "board")
+    return to_verilog(Board(AxisSpec(**given | rates, estimator="fdm", stage=STAGES[stage][1])), "board")
 
 
-def verilog(name: str, clock_hz: int) -> str:
-    """Return the Verilog of a small axis on a board."""
-    return top_verilog(BOARDS[name], clock_hz) + board_verilog(clock_hz)
+def verilog(name: str, clock_hz: int, stage: str = "pdm") -> str:
+    """Return the Verilog of a small axis with a drive stage on a board."""
+    return top_verilog(BOARDS[name], clock_hz, stage) + board_verilog(clock_hz, stage)
 
 
-@pytest.mark.parametrize(("name", "clock_hz"), CLOCKS)
-def test_no_warning_of_verilator(name, clock_hz, tmp_path):
-    (tmp_path / "top.v").write_text(verilog(name, clock_hz))
+STAGED = [*((*each, "pdm") for each in CLOCKS), ("ulx3s-25f", 50_000_000, "pwm"), ("ulx3s-25f", 50_000_000, "dac")]
+
+
+@pytest.mark.parametrize(("name", "clock_hz", "stage"), STAGED)
+def test_no_warning_of_verilator(name, clock_hz, stage, tmp_path):
+    (tmp_path / "top.v").write_text(verilog(name, clock_hz, stage))
     (tmp_path / "cells.v").write_text(BODY.sub(r"\1 endmodule", MODELS.replace("`OSCILLATOR_MHZ", "1")))
     # Of the cells only the ports are read; and outputs of a PLL that nothing needs are left open.
     waived = '`verilator_config\nlint_off -file "*/cells.v"\nlint_off -rule PINCONNECTEMPTY\n'
@@ -136,10 +140,12 @@ def test_the_clock_is_the_one_asked_for_and_outputs_wait_for_its_lock(name, cloc
     assert driven == ["driven 1 locked 1 reset 0"] * 2
 
 
-def test_the_pads_are_those_of_the_drive():
-    assert set(PADS) == {signal.name for signal in SIGNALS if signal.out} - {"uart_tx"}
-    text = top_verilog(BOARDS["icebreaker"], 24_000_000)
-    assert re.findall(r"assign (\w+) = driven \?", text) == list(PADS)
+@pytest.mark.parametrize("stage", OF_STAGE)
+def test_the_pads_are_those_of_the_drive(stage):
+    pads = pads_of(stage)
+    assert set(pads) == {signal.name for signal in signals_of(stage) if signal.out} - {"uart_tx"}
+    text = top_verilog(BOARDS["icebreaker"], 24_000_000, stage)
+    assert re.findall(r"assign (\w+) = driven \?", text) == list(pads)
 
 
 def test_a_clock_that_cannot_be_made_has_no_text():

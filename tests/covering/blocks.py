@@ -41,6 +41,7 @@ BLOCKS = (
     Block("monitors", RECORDED),
     Block("supervisor", RECORDED),
     Block("clock_monitor", RECORDED),
+    *(Block(f"drive/{name}", RECORDED) for name in ("scale", "pdm", "pwm", "dac")),
     Block("capture", RECORDED),
     Block("axis"),
     Block("supervised", RECORDED),

@@ -13,8 +13,11 @@ from hardwall.hdl.link.link import Link
 from hardwall.hdl.supervised import LOOPS, SHOWN
 from hardwall.model import capture
 from hardwall.model.capture import RECORD_REGISTERS
+from hardwall.model.drive import dac, pdm, pwm
+from hardwall.model.drive.stage import Amplifier, Stage
 from hardwall.model.register import VALUE_BITS
 from hardwall.model.registers import RegisterMap
+from hardwall.model.supervisor import ARMED
 from hardwall.testing.packing import Packing
 from stimuli.specs import spec
 
@@ -29,25 +32,37 @@ SYNCHRONISER = 2
 IDLE = (*LOOPS, "encoder_a_n", "encoder_b_n")
 """Pins that are high while the handle rests at its origin and all is well."""
 SEEN = (
-    "sampled", "stepped", "edge_kind", "indexed", "estimated", "saturated", "strobe_busy", "illegal", "overspeed",
-    "count", "velocity", "drive", "stamp", "index_latched", *SHOWN, "a_channel_idle", "drive_inverted",
+    "sampled", "actuated", "stepped", "edge_kind", "indexed", "estimated", "saturated", "strobe_busy", "illegal",
+    "overspeed", "count", "velocity", "drive", "stamp", "index_latched", *SHOWN,
+    "a_channel_idle", "drive_inverted",
 )  # fmt: skip
 """Ports of the axis inside that the models are fed with or held to."""
 
 
 RECORDS = 16
 """Records of the capture memory: a host reads as many in a few samples."""
+AMPLIFIER = Amplifier(unit="V", newtons_per_unit=2.0, full_scale=24.0)
+STAGES: dict[str, Stage] = {
+    "pdm": pdm.USUAL,
+    "pdm scaled": pdm.Stage(amplifier=AMPLIFIER),
+    "pwm": pwm.Stage(amplifier=AMPLIFIER, pwm_hz=100_000, dead_time_s=200e-9),
+    "dac": dac.Stage(
+        amplifier=AMPLIFIER, bits=16, serial_hz=6_000_000, header_bits=8, header=3, mode=1, setup=(0x040168,)
+    ),
+}
+"""Drive stages that the axes with 40 N may have at this clock."""
+KERNELS = {"pdm": pdm, "pwm": pwm, "dac": dac}
 
 
-def board_of(name: str, estimator: str, records: int = RECORDS) -> Board:
+def board_of(name: str, estimator: str, records: int = RECORDS, stage: str = "pdm") -> Board:
     """Return a board with a quick serial line, so that a host gets through a conversation in a few samples."""
     rates = {"clock_hz": CLOCK_HZ, "sample_hz": 200_000, "actuation_hz": 100_000}
-    axis = dataclasses.replace(spec(name, estimator), **rates)
+    axis = dataclasses.replace(spec(name, estimator), **rates, stage=STAGES[stage])
     return Board(axis, Link(RegisterMap(axis, RECORD_REGISTERS * records), BAUD))
 
 
-def make(name: str, estimator: str) -> "Watched":
-    return Watched(board_of(name, estimator))
+def make(name: str, estimator: str, stage: str = "pdm") -> "Watched":
+    return Watched(board_of(name, estimator, stage=stage))
 
 
 class Watched(wiring.Component):
@@ -81,17 +96,17 @@ class Watched(wiring.Component):
 
 
 class Twin(AxisTwin):
-    """The state of the board's axis, its pulses and its capture memory, clock for clock, from the models alone.
+    """The state of the board's axis, its drive stage and its capture memory, clock for clock, from the models alone.
 
     When the link asks for something, and what the axis shows to its monitors, is taken from the board.
     """
 
     def __init__(self, board: Board):
         super().__init__(board.axis.design)
-        self.board, self.drive_bits = board, self.spec.force.width - 2
+        self.board, self.stage = board, KERNELS[self.spec.stage.name]
         self.asked: dict[str, int] = {}
         self.follower = Follower(board.axis.design, IDLE)
-        self.sum = self.pulse = self.sign = 0
+        self.staged, self.actuated = self.spec.drive.start, 0
         self.captures = board.registers.capture
         self.captured, self.memory = capture.START, self.captures.memory()
 
@@ -120,8 +135,16 @@ class Twin(AxisTwin):
         """Advance by one clock edge, with the pins, what the link asks, and what the axis shows just before it."""
         supervisor = self.follower.supervisor
         self._capture(asked, seen["sampled"])
-        self.sum = self.sum % 2**self.drive_bits + supervisor.magnitude
-        self.pulse, self.sign = self.sum >> self.drive_bits, supervisor.negative ^ self.follower.inverted
+        given = {
+            "strobe": self.actuated,
+            "magnitude": supervisor.magnitude,
+            "negative": supervisor.negative ^ self.follower.inverted,
+            "armed": int(supervisor.state == ARMED),
+        }
+        kinds = self.stage.Inputs
+        inputs = kinds(**{name: value for name, value in given.items() if name in kinds._fields})
+        self.staged = self.stage.step(self.spec.drive.params, self.staged, inputs)
+        self.actuated = seen["actuated"]
 
         enabled = self.follower.level("drive_enable")
         self.follower.edge({**pins, **asked}, seen)
@@ -130,6 +153,10 @@ class Twin(AxisTwin):
         self.advance({**pins, **asked}, enabled)
         if asked["commit"]:
             self.asked = {name: asked[name] for name in self.words if name in asked}
+
+    def levels(self, permitted: int) -> tuple[int, ...]:
+        """Return the levels of the stage's pins."""
+        return tuple(self.stage.pins(self.spec.drive, self.staged, permitted).values())
 
     def _capture(self, asked: dict[str, int], sampled: int) -> None:
         """Advance the capture memory by one clock edge."""

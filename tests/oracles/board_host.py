@@ -42,14 +42,14 @@ class Host:
         shifted: what the link asked for at every pulse that words belong to.
     """
 
-    def __init__(self, dut, name: str, estimator: str):
-        self.component = make(name, estimator)
+    def __init__(self, dut, name: str, estimator: str, stage: str = "pdm"):
+        self.component = make(name, estimator, stage)
         self.dut, self.board, self.random = dut, self.component.board, rng()
         self.registers = self.board.registers
         self.bench, self.twin = Bench(dut, self.component), Twin(self.board)
         self.pins = {name: int(name in IDLE) for name in (*ENCODER, *LOOPS)}
         self.phase, self.rate, self.illegal_rate, self.open_rate = 0, 0.0, 0.0, 0.0
-        self.pulses: list[tuple[int, int]] = []
+        self.pulses: list[tuple[int, ...]] = []
         self.history: deque[tuple[int, tuple]] = deque(maxlen=PATIENCE)
         self.server = server.Server(register_file.Design(self.registers))
         self.place = {register.name: register.address for register in self.registers.registers}
@@ -107,17 +107,18 @@ class Host:
     async def _follow(self) -> None:
         """Let the twin see every clock edge, and compare it with the board."""
         edge, asking, showing = RisingEdge(self.dut.clk), self.dut.asking, self.dut.showing
-        pulse, sign, alive, enable = map(self.bench.reader, ("drive_pdm", "drive_sign", "alive", "outputs_enable"))
+        drive = [self.bench.reader(name) for name in self.board.spec.drive.pins]
+        alive, enable = map(self.bench.reader, ("alive", "outputs_enable"))
         component, twin, last, asked = self.component, self.twin, -1, {}
         while True:
             await edge
-            pins, word = (pulse(), sign()), int(asking.value)
+            pins, word = tuple(pin() for pin in drive), int(asking.value)
             assert enable()
             if word != last:
                 asked, last = component.asked.unpack(word), word
             found = component.shown.unpack(int(showing.value))
             gate = self.pins["drive_enable"] & self.pins["emergency_stop"]
-            assert pins == (twin.pulse & gate, twin.sign), f"edge {twin.clocks}"
+            assert pins == twin.levels(gate), f"edge {twin.clocks}"
             wanted = twin.outputs() | twin.follower.wanted()
             assert alive() == wanted["alive"]
             unlike = {name: (value, wanted[name]) for name, value in found.items() if value != wanted[name]}

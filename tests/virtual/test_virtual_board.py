@@ -20,6 +20,16 @@ DEVICE_CLOCKS = 6000
 """The most clocks between a request and its answer, which the link promises."""
 STEP_S = 2e-4
 """The time between two looks."""
+VOLTS = {"drive.newtons_per_volt": 4.0, "drive.full_scale_v": 12.0}
+STAGES = {
+    "pdm": {},
+    "pdm of volts": VOLTS | {"drive.stage": "pdm"},
+    "pwm": VOLTS | {"drive.stage": "pwm", "drive.pwm_hz": 20_000, "drive.dead_time_s": 1e-6, "drive.inverted": True},
+    "dac": VOLTS
+    | {"drive.stage": "dac", "drive.dac_bits": 16, "drive.dac_serial_hz": 2_000_000, "drive.offset_v": 0.01}
+    | {"drive.dac_header_bits": 8, "drive.dac_header": 3, "drive.dac_mode": 1, "drive.dac_setup": [0x040168]},
+}
+"""The drive stages: at a clock of 4 MHz a sample has two periods of the bridge."""
 WALL_M = 1e-3
 """The wall, behind the count 0, which is where the board is powered up."""
 
@@ -123,6 +133,47 @@ def test_a_clock_that_stands_leaves_no_drive(board, host):
     assert host.read("state") == DISARMED
 
 
+@pytest.fixture(params=STAGES)
+def staged(request):
+    with VirtualBoard(load("seed-2011", SLOW | STAGES[request.param])) as virtual:
+        yield virtual
+
+
+def test_the_force_at_the_pins_is_the_drive_until_a_loop_opens_or_the_clock_stands(staged):
+    """A hand holds the handle in the wall; whatever the stage, newtons are newtons."""
+    board, spec, host = staged, staged.scene.spec, SerialHost(staged)
+    # A sample of pulses is up to a pulse from the drive; the other stages hold it.
+    step_n = abs(board.hardware.given_n) if spec.stage.name == "pdm" else spec.drive.step_n * 9 / 8
+    host.bring_up(STIFFNESS_N_PER_M, DAMPING_N_S_PER_M, WALL_M)
+    host.live(0.6)
+    start_m = board.scene.protocol.start_m
+    board.hand.held_m, found = start_m + 10e-3, []
+    host.live(1.0)
+    for _ in range(20):
+        before, force_n, after = host.read("driven"), board.handle.force_n, host.read("driven")
+        if before == after:
+            found.append((before * spec.force_resolution_n, force_n))
+    assert len(found) > 10, "the handle rests"
+    for driven_n, force_n in found:
+        assert driven_n < -2
+        assert abs(force_n - driven_n) <= step_n
+    # Without a force the handle moves, and edges are lost while the clock stands: that may be a fault, too.
+    for stop, states in (("emergency_stop", {TRIPPED}), ("clock", {DISARMED, TRIPPED})):
+        assert board.handle.force_n < -2
+        board.hardware.switch(stop, False)
+        for _ in range(3):
+            board.run()
+        assert board.handle.force_n == 0
+        board.hardware.switch(stop, True)
+        host.live(0.05)
+        assert host.read("state") in states
+        assert board.handle.force_n == 0
+        if stop != "clock":
+            host.bring_up(STIFFNESS_N_PER_M, DAMPING_N_S_PER_M, WALL_M)
+            host.live(0.6)
+    assert not board.hardware.shot
+
+
 def test_a_clock_that_stands_in_an_answer_says_nothing(board):
     # The line is high or low when the clock stops, by chance.
     for count in range(60, 126, 6):
@@ -159,7 +210,7 @@ def test_a_hand_settles_where_it_holds():
 def test_an_output_of_its_own_is_refused():
     changes = {"output.dac_bits": 12, "output.full_scale_n": 20.0}
     with pytest.raises(
-        SceneError, match=r"^seed-2011: output must be absent, for the pulses of the board are its output"
+        SceneError, match=r"^seed-2011: output must be absent, for the drive stage of the board is its output"
     ):
         VirtualBoard(load("seed-2011", changes))
 
