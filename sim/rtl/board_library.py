@@ -1,7 +1,8 @@
 """The Verilated board with what is around it, as a shared library: clocks, the other end of its line, an amplifier.
 
 A board has the pins of packages; behind its line is a host of bytes, and behind its pulses an amplifier. Both, and the
-faults of wires, are in `around_board.v` and `board_library.cpp`.
+faults of wires, are in `around_board.v` and `board_library.cpp`. The board is its Verilog, or the netlist that Yosys
+maps it to, with models of the cells of a family of FPGAs.
 """
 
 import ctypes
@@ -16,7 +17,8 @@ from ...hdl.export import to_verilog
 from ...hdl.link.link import Link
 from ...model.registers import RegisterMap
 from ...model.spec import AxisSpec
-from . import shared_library
+from . import netlist, shared_library
+from .families import FAMILIES
 from .shared_library import Recipe
 from .verilated import Rtl, RtlState
 
@@ -40,19 +42,28 @@ def _board(spec: AxisSpec, baud: int | None) -> tuple[Board, str]:
     return board, to_verilog(board, "board")
 
 
-def build(spec: AxisSpec, baud: int | None = None) -> Path:
+def build(spec: AxisSpec, baud: int | None = None, family: str | None = None) -> Path:
     """Return the shared library of the board, with a serial line of that rate; build it first if it is missing.
+
+    Args:
+        spec: the axis.
+        baud: the rate of the serial line; None for the board's own.
+        family: the family of FPGAs whose netlist is the board, one of `FAMILIES`; None for the board's Verilog.
 
     Raises:
         BuildError: if the build fails.
+        SynthesisError: if Yosys is missing or fails.
     """
     board, verilog = _board(spec, baud)
     around = {
         "BIT_PARTS": round(256 * spec.clock_hz / board.link.baud),
         "OSCILLATOR_CLOCKS": max(round(spec.clock_hz / OSCILLATOR_HZ / 2), 1),
     }
-    files = {"board.v": verilog, **{path.name: path.read_text(encoding="utf-8") for path in (AROUND, SHIM)}}
     options = ("--top-module", "around_board", *(f"-G{name}={value}" for name, value in around.items()))
+    if family is not None:
+        mapped = netlist.mapped(board, FAMILIES[family], "board")
+        verilog, options = f"{mapped.gates}\n{mapped.models}", (*options, *netlist.OPTIONS)
+    files = {"board.v": verilog, **{path.name: path.read_text(encoding="utf-8") for path in (AROUND, SHIM)}}
     return shared_library.build(Recipe(files, SHIM.name, "Vboard", options))
 
 
@@ -64,14 +75,17 @@ class BoardHardware:
         number: the handle's count at the start.
         turn_counts: counts between two pulses of the encoder's index.
         baud: the rate of the serial line; None for the board's own.
+        family: the family of FPGAs whose netlist is the board, one of `FAMILIES`; None for the board's Verilog.
 
     Attributes:
         full_scale: the drive (force LSB) of an amplifier whose pulses never pause.
     """
 
-    def __init__(self, spec: AxisSpec, number: int, turn_counts: int, baud: int | None = None):
+    def __init__(
+        self, spec: AxisSpec, number: int, turn_counts: int, baud: int | None = None, family: str | None = None
+    ):
         board, _ = _board(spec, baud)
-        self._library_at = functools.partial(build, spec, baud)
+        self._library_at = functools.partial(build, spec, baud, family)
         self._spec, self._board, self._number, self._turn = spec, board, number, turn_counts
         self.full_scale = 1 << board.drive_bits
 
