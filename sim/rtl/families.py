@@ -60,4 +60,4 @@ FAMILIES = {
     "ice40": Family.of_part("iCE40", PARTS["ice40-up5k"], ("ice40/cells_sim.v",)),
     "gw1nr": Family.of_part("Gowin", PARTS["gw1nr-9"], ("gowin/cells_sim.v",), cells.GOWIN),
 }
-"""The families by the names that `hardwall virtual --netlist` takes."""
+"""The families by name."""
