@@ -9,10 +9,11 @@ from ..model.registers import TELEMETRY
 from .capture import Capture
 from .device import Device, read_identity
 from .errors import ChangedError, HostError, NotReadyError, RefusedError, TrippedError
-from .groups import Supervisor, Wall
+from .groups import Named, Supervisor, Wall
 from .heartbeat import LEASE_S, Beat, Heartbeat
-from .homing import Homed, homing
+from .homing import REST_S, Homed, homing
 from .port import Port
+from .seconds import check_seconds
 from .status import State, Status, Trip, status_of
 from .words import Words
 
@@ -20,14 +21,20 @@ READY_TRIES = 20
 """Looks at `ready` after the first beat."""
 HOMING_S = 0.01
 """The time between two looks at a handle that is homed."""
+TWICE = "disarm", "acknowledge"
+"""Pulses that may come twice: without an answer they are asked for again."""
+LATCHED = Trip(0, (), (), {})
+"""Stands for the trip that the board has when it is asked to acknowledge it."""
 
 
-class Axis:
+class Axis(Named):
     """An axis on a board, from `hardwall.host.connect`. A context manager that disarms and closes.
 
     Acts of the application renew its lease: `set` and every attribute of `wall` and `supervisor`, `arm`, `renew`,
-    `sleep` and `watch`. While the lease lasts, half a second, a thread beats; an application that hangs, or only reads,
-    ends in the trip link_timeout.
+    `sleep` and `watch`. While the lease lasts, half a second of the board, a thread beats; an application that hangs,
+    or only reads, ends in the trip link_timeout.
+
+    Several threads may use it: where one arms while another disarms or closes, the axis ends disarmed.
 
     Args:
         port: the line.
@@ -43,6 +50,11 @@ class Axis:
         HostError: if the board does not answer.
     """
 
+    device: Device
+    wall: Wall
+    supervisor: Supervisor
+    capture: Capture
+
     def __init__(self, port: Port, device: Device):
         self.device, self._port = device, port
         self._words = Words(port, device)
@@ -52,8 +64,14 @@ class Axis:
         # Whether it may be ARMED by this program; and whether it may be, though this program does not want it: a host
         # that has gone left it so, or an answer was lost. It is disarmed before the heartbeat goes on.
         self._may_drive, self._unwanted = False, self.status.state is State.ARMED
+        # Whether a disarming has begun since the last arming did. There is no lock, for one who ends this program must
+        # not wait for a thread that is held up in `arm`.
+        self._called_off = False
+        # Whether the board was told to wait for its index, and no origin has been made of it.
+        self._without_origin = False
         beat = Beat(port, device.registers["heartbeat"])
-        self._heartbeat = Heartbeat(beat, self._words.written("supervisor_watchdog"))
+        self._lease_s = LEASE_S / port.pace
+        self._heartbeat = Heartbeat(beat, self._words.written("supervisor_watchdog"), self._lease_s)
 
     def __enter__(self) -> "Axis":
         return self
@@ -63,6 +81,7 @@ class Axis:
 
     def close(self) -> None:
         """Disarm, if the board can still be reached, and close the port."""
+        self._called_off = True
         try:
             if self._may_drive:
                 self.disarm()
@@ -110,7 +129,13 @@ class Axis:
             RefusedError: if the board refuses it in its present state.
             HostError: if the board is not reached.
         """
-        self._port.write(self.device.registers[name].address, (1,))
+        check = self._check_wanted if name == "arm" else None
+        self._without_origin |= name == "index_arm"
+        self._port.write(self.device.registers[name].address, (1,), once=name not in TWICE, check=check)
+
+    def _check_wanted(self) -> None:
+        if self._called_off:
+            raise NotReadyError("the axis is not armed: it was disarmed or closed meanwhile")
 
     @property
     def counters(self) -> dict[str, int]:
@@ -136,11 +161,11 @@ class Axis:
         return self.status.trip
 
     def renew(self) -> None:
-        """Show that the application lives: the heartbeat goes on for another half second.
+        """Show that the application lives: the heartbeat goes on for another half second of the board.
 
         Raises:
             ChangedError: if the board was reset, or another host writes to it.
-            HostError: if the board is not reached.
+            HostError: if the board is not reached, or the heartbeat fails for another reason.
         """
         self._let_go()
         self._heartbeat.watchdog_s = self._words.written("supervisor_watchdog")
@@ -149,19 +174,32 @@ class Axis:
             raise self._heartbeat.lost
 
     def sleep(self, seconds: float) -> None:
-        """Wait, and live meanwhile; the errors are those of `renew`."""
+        """Wait, and live meanwhile.
+
+        Raises:
+            FieldError: if the time is not finite, or negative.
+            HostError: as `renew` does.
+        """
+        check_seconds("seconds", seconds)
         until = time.monotonic() + seconds
         self.renew()
         while (left := until - time.monotonic()) > 0:
-            time.sleep(min(left, LEASE_S / 4))
+            time.sleep(min(left, self._lease_s / 4))
             self.renew()
 
     def watch(self, period_s: float = 0.05, seconds: float | None = None) -> Iterator[Status]:
         """Yield the status again and again, and live meanwhile: for a time, or for ever.
 
         Raises:
+            FieldError: if a time is not finite, or negative.
             HostError: if the board is not reached.
         """
+        check_seconds("period_s", period_s)
+        if seconds is not None:
+            check_seconds("seconds", seconds)
+        return self._watch(period_s, seconds)
+
+    def _watch(self, period_s: float, seconds: float | None) -> Iterator[Status]:
         began = time.monotonic()
         while seconds is None or time.monotonic() - began < seconds:
             self.renew()
@@ -177,20 +215,8 @@ class Axis:
             ChangedError: if the board was reset, or another host has written to it.
             HostError: if the board is not reached.
         """
-        if (found := read_identity(self._port)) != self.device.identity:
-            raise ChangedError(
-                f"the board at {self._port.name} is now {found}, not {self.device.identity}: connect again"
-            )
-        self._words.check()
-        self.renew()
-        for _ in range(READY_TRIES):
-            status = self.status
-            if status.ready or status.trip:
-                break
-        if status.trip:
-            raise TrippedError(f"the axis is tripped; acknowledge it first: {status.trip}")
-        if not status.ready:
-            raise NotReadyError(f"the axis cannot be armed: {self._why_not(status)}")
+        self._called_off = False
+        self._check_ready()
         self._may_drive = True
         try:
             self.pulse("arm")
@@ -210,6 +236,23 @@ class Axis:
         if status.state is not State.ARMED:
             raise NotReadyError("the axis was armed, and disarmed at once: the loop of drive_enable opened")
 
+    def _check_ready(self) -> None:
+        """Live, and check that the board is the one that was read, and can be armed; the errors are those of `arm`."""
+        if (found := read_identity(self._port)) != self.device.identity:
+            raise ChangedError(
+                f"the board at {self._port.name} is now {found}, not {self.device.identity}: connect again"
+            )
+        self._words.check()
+        self.renew()
+        for _ in range(READY_TRIES):
+            status = self.status
+            if status.ready or status.trip:
+                break
+        if status.trip:
+            raise TrippedError(f"the axis is tripped; acknowledge it first: {status.trip}")
+        if not status.ready or self._lacks_reference(status):
+            raise NotReadyError(f"the axis cannot be armed: {self._why_not(status)}")
+
     def disarm(self) -> None:
         """Make the drive 0, and let the heartbeat rest.
 
@@ -217,21 +260,27 @@ class Axis:
             HostError: if the board is not reached. Its watchdog then makes the drive 0, or the next act of this
                 program that would let the heartbeat go on disarms it first.
         """
+        self._called_off = True
         self._heartbeat.rest()
         self._unwanted = True
         self.pulse("disarm")
         self._may_drive = self._unwanted = False
 
-    def acknowledge(self, trip: Trip | None) -> None:
-        """Acknowledge a trip that was read, and clear the flags: the axis is DISARMED, unless a cause still stands.
+    def acknowledge(self, trip: Trip | None = LATCHED) -> None:
+        """Acknowledge a trip, exactly as it was read, and clear the flags: the axis is DISARMED, unless a cause stands.
+
+        It arms nothing.
 
         Args:
-            trip: what `trip` was; None, of an axis that was not tripped, acknowledges nothing.
+            trip: what `trip` was; None, of an axis that was not tripped, acknowledges nothing. Without it what is
+                latched now is read, and acknowledged.
 
         Raises:
             TrippedError: if a cause stands, or another came since `trip` was read.
             HostError: if the board is not reached.
         """
+        if trip is LATCHED:
+            trip = self.trip
         if trip:
             word = self.device.registers["acknowledged"]
             self._port.write(word.address, word.to_registers(trip.latched))
@@ -254,10 +303,11 @@ class Axis:
             self.pulse("preload")
         except RefusedError as error:
             raise NotReadyError("the axis is ARMED: disarm it before its position is set") from error
+        self._without_origin = False
 
     def homing(self, index_m: float = 0.0) -> Generator[str, None, Homed]:
         """Home as `home` does, a look at a step: see `hardwall.host.homing.homing`."""
-        return homing(self, index_m)
+        return homing(self, index_m, REST_S / self._port.pace)
 
     def home(self, index_m: float = 0.0, seconds: float = 60.0) -> float:
         """Wait until a hand has moved the handle over the index; then make the index the position `index_m`.
@@ -265,12 +315,16 @@ class Axis:
         Returns the position of the handle, which must rest at the end: how far the old origin was off is the
         difference.
 
+        A homing that does not end leaves the board waiting for its index, for which it has no way back. This program
+        then arms no axis that needs its reference, though the index may come, before another homing or a preload.
+
         Raises:
-            FieldError: if `index_m` is beyond the range of positions.
+            FieldError: if `index_m` is beyond the range of positions, or the time is not finite, or negative.
             TimeoutError: if the index, or a handle that rests, does not come in time.
             NotReadyError: if the axis is ARMED.
             HostError: if the board is not reached.
         """
+        check_seconds("seconds", seconds)
         until, steps = time.monotonic() + seconds, self.homing(index_m)
         while True:
             try:
@@ -284,11 +338,14 @@ class Axis:
     def _why_not(self, status: Status) -> str:
         if status.state is State.ARMED:
             return "it is ARMED"
-        if self.supervisor.reference and not status.referenced:
+        if self._lacks_reference(status):
             return "it needs its reference: home it first"
         if not status.live:
             return "no heartbeat has reached it"
         return "the loop of drive_enable is open"
+
+    def _lacks_reference(self, status: Status) -> bool:
+        return (self._without_origin or not status.referenced) and bool(self.supervisor.reference)
 
     def _let_go(self) -> None:
         if self._unwanted:

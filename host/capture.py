@@ -15,6 +15,7 @@ from ..model.registers import CAPTURE
 from ..model.whole_file import whole_file
 from .device import Device
 from .errors import ForeignError, NotReadyError, RefusedError
+from .seconds import check_seconds
 from .status import flag_names
 
 PART_RECORDS = 15
@@ -168,9 +169,11 @@ class Capture:
         """Wait until the state is one, or one behind it, and live meanwhile: usually `DONE`.
 
         Raises:
+            FieldError: if the time is not finite, or negative.
             TimeoutError: if that does not come in time.
             HostError: if the board is not reached, or has no capture memory.
         """
+        check_seconds("seconds", seconds)
         end = time.monotonic() + seconds
         while STATES.index(state := self.state) < STATES.index(wanted):
             if time.monotonic() > end:

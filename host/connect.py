@@ -6,14 +6,18 @@ from .errors import ChangedError
 from .port import ANSWER_S, BAUD, Port
 
 
-def connect(name: str, baud: int = BAUD, answer_s: float = ANSWER_S, identity: str | None = None) -> Axis:
+def connect(
+    name: str, baud: int = BAUD, answer_s: float = ANSWER_S, identity: str | None = None, pace: float = 1.0
+) -> Axis:
     """Return the axis of the board at a port, which no other program can use meanwhile. Nothing moves.
 
     Args:
         name: a serial port's path, for instance of `/dev/serial/by-id`; or tcp://HOST:PORT.
         baud: the board's rate.
-        answer_s: how long an answer is waited for; more than the default for simulations that are very slow.
+        answer_s: the time behind which a board without an answer is silent, in the board's time.
         identity: the identity that the board must have; None for any.
+        pace: of a simulation that is slower than a board, its seconds in a second, or fewer: every wait for it, and the
+            lease of the application, is longer by that.
 
     Raises:
         FieldError: if a number is out of its range.
@@ -22,7 +26,7 @@ def connect(name: str, baud: int = BAUD, answer_s: float = ANSWER_S, identity: s
         ForeignError: if what answers is no axis that this version knows.
         ChangedError: if it has another identity.
     """
-    port = Port(name, baud, answer_s)
+    port = Port(name, baud, answer_s, pace)
     try:
         device = read_device(port)
         if identity not in (None, device.identity):

@@ -1,5 +1,6 @@
 """The words of a board as attributes, in SI units: of its wall, and of what limits its drive."""
 
+import difflib
 from typing import Protocol
 
 
@@ -33,14 +34,36 @@ class Value:
         group.words.set(**{self._name: value})
 
 
-class Group:
+class Named:
+    """What takes no value for an attribute that it has not: a slip of the pen would leave the board as it is.
+
+    It has what its class has or annotates, and whatever begins with an underscore.
+    """
+
+    __slots__ = ()
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Set an attribute.
+
+        Raises:
+            AttributeError: if there is none of that name; the message has the name that is near it.
+        """
+        kind = type(self)
+        known = {*dir(kind), *kind.__annotations__}
+        if name not in known and not name.startswith("_"):
+            near = difflib.get_close_matches(name, [each for each in known if not each.startswith("_")], 1)
+            meant = f"; did you mean {near[0]}?" if near else ""
+            raise AttributeError(f"{kind.__name__} has no attribute {name}{meant}")
+        object.__setattr__(self, name, value)
+
+
+class Group(Named):
     """Words whose names begin alike.
 
     Attributes:
         words: what has all words of the board.
     """
 
-    # An attribute that is no word is refused: a slip of the pen would leave the board as it is.
     __slots__ = ("words",)
     PREFIX = ""
 

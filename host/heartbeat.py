@@ -3,21 +3,25 @@
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 from ..model.register import Register
-from .errors import ChangedError, HostError
+from .errors import ChangedError, HostError, SilentError
 from .port import Port
 
 LEASE_S = 0.5
 """How long the heartbeat goes on after the application has renewed its lease."""
 BEATS = 4
 """Beats in the time of the board's watchdog."""
+TRIES = 3
+"""How often a beat is tried whose answer is lost."""
 
 
 class Beat:
     """One beat: the word of the heartbeat is read, must be that of the last beat, and is written with the next number.
 
-    So a reset of the board ends the heartbeat, though the words may have been written again since.
+    So a reset of the board ends the heartbeat, though the words may have been written again since. A beat whose answer
+    is lost is tried again as a whole, so that a reset behind it is found out too.
 
     Args:
         port: the line.
@@ -41,16 +45,19 @@ class Beat:
             HostError: if it is not reached.
         """
         with self._turn:
-            last = self._read()
-            if last not in self._numbers:
-                raise ChangedError(
-                    f"the board at {self._port.name} has not the last beat of this program: it was reset, or another "
-                    "host writes to it; connect again"
-                )
-            following = last % self._register.high + 1
-            self._numbers = last, following
-            self._port.write(self._register.address, self._register.to_registers(following))
-            self._numbers = (following,)
+            for tries_left in reversed(range(TRIES)):
+                last = self._read()
+                if last not in self._numbers:
+                    raise ChangedError(
+                        f"the board at {self._port.name} has not the last beat of this program: it was reset, or "
+                        "another host writes to it; connect again"
+                    )
+                following = last % self._register.high + 1
+                self._numbers = last, following
+                with suppress(*([SilentError] if tries_left else [])):
+                    self._port.write(self._register.address, self._register.to_registers(following), once=True)
+                    self._numbers = (following,)
+                    return
 
     def _read(self) -> int:
         return self._register.from_registers(self._port.read(self._register.address, self._register.size))
@@ -61,20 +68,22 @@ class Heartbeat:
 
     Args:
         beat: sends one beat; what it raises is kept in `lost` until a beat succeeds.
+        watchdog_s: as below.
+        lease_s: how long it goes on after a renewal.
 
     Attributes:
         watchdog_s: the board's watchdog; `BEATS` beats are sent in it.
         lost: why the last beat did not reach the board; None if it did.
     """
 
-    def __init__(self, beat: Callable[[], None], watchdog_s: float):
-        self._beat, self._until_s, self.watchdog_s = beat, 0.0, watchdog_s
+    def __init__(self, beat: Callable[[], None], watchdog_s: float, lease_s: float = LEASE_S):
+        self._beat, self._until_s, self.watchdog_s, self._lease_s = beat, 0.0, watchdog_s, lease_s
         self._ended, self._thread = threading.Event(), threading.Thread(target=self._run, daemon=True)
         self.lost: HostError | None = None
         self._thread.start()
 
     def renew(self) -> None:
-        """Let the heartbeat go on for another `LEASE_S`; if it had ended, a beat is sent before this returns.
+        """Let the heartbeat go on for another lease; if it had ended, a beat is sent before this returns.
 
         Raises:
             HostError: if the beat cannot be sent.
@@ -82,7 +91,7 @@ class Heartbeat:
         if not self.beats:
             self._beat()
             self.lost = None
-        self._until_s = time.monotonic() + LEASE_S
+        self._until_s = time.monotonic() + self._lease_s
 
     @property
     def beats(self) -> bool:
@@ -107,3 +116,6 @@ class Heartbeat:
                     self.lost = None
                 except HostError as error:
                     self.lost = error
+                except Exception as error:
+                    # Whatever it is, the application must learn why the board trips.
+                    self.lost = HostError(f"the heartbeat fails: {error!r}")

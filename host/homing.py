@@ -39,10 +39,15 @@ class Board(Protocol):
     def preload(self, position_m: float) -> None: ...
 
 
-def homing(axis: Board, index_m: float = 0.0) -> Generator[str, None, Homed]:
+def homing(axis: Board, index_m: float, rest_s: float) -> Generator[str, None, Homed]:
     """Home an axis, a look at it at a step, for who has more to do between two.
 
     Yields what is waited for, `INDEX` or `REST`.
+
+    Args:
+        axis: the axis.
+        index_m: the position that the index becomes.
+        rest_s: the time in which a handle that rests moves by `REST_COUNTS` at most.
 
     Raises:
         FieldError: if `index_m` is beyond the range of positions.
@@ -59,7 +64,7 @@ def homing(axis: Board, index_m: float = 0.0) -> Generator[str, None, Homed]:
         yield INDEX
     rest_m = (REST_COUNTS + 0.5) * count.lsb
     at_m, since_s = axis.status.position_m, time.monotonic()
-    while time.monotonic() - since_s < REST_S:
+    while time.monotonic() - since_s < rest_s:
         yield REST
         if abs((now_m := axis.status.position_m) - at_m) > rest_m:
             at_m, since_s = now_m, time.monotonic()

@@ -1,126 +1,41 @@
 """The line to a board: requests of Modbus RTU, one after the other, on a serial port or a port of the network."""
 
-import errno
-import logging
 import secrets
-import select
-import socket
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import Any
 
-import serial
-from pymodbus import FramerType
-from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException, ModbusException
 from pymodbus.pdu import ModbusPDU
 
 from ..model.checks import check_int, check_range
+from ..model.link.line import FRAME_MAX
 from ..model.link.server import FAILURE, READ_MAX, VALUE, WRITE_MAX
+from .clients import client_of, reason
 from .errors import ForeignError, PortError, RefusedError, SilentError
 
 BAUD, BAUD_MAX = 921_600, 4_000_000
 """The board's rate unless its clock is slow, and the highest of a serial port."""
 ANSWER_S = 1.0
-"""How long an answer is waited for: it takes some ms on a board, and longer where a simulation is slower than it."""
+"""The time behind which a board without an answer is silent; until then, what may be asked twice is asked again."""
 ANSWER_S_LEAST, ANSWER_S_MOST = 1e-3, 3600.0
 """The limits of that."""
+BYTE_BITS, DEVICE_BITS = 10, 1500
+"""Bits of a byte on the line; and the most bits for which a board thinks: 6000 clocks, and a bit has 4 or more."""
+BRIDGE_S = 0.016
+"""The time for which a USB bridge keeps what it has received, unless its driver is told otherwise."""
+MACHINE_S = 0.02
+"""The time for which this machine may keep an answer, or a request, while it does something else."""
+PACE_LEAST = 1e-3
+"""The slowest board, in its seconds in a second."""
 TRIES = 5
 """Attempts to find the beginning of an answer again."""
 PAUSE_S = 0.025
 """The silence behind which the board takes the next byte for the beginning of a request."""
-NETWORK = "tcp://"
-"""How the name of a port of the network begins."""
 EXCEPTIONS = {1: "it does not know the function", 2: "it has no such register", VALUE: "a value is out of its range"}
 """What an exception of Modbus says of a request, but `FAILURE`."""
-
-# Every failure is an exception here: what the library says of it besides is said twice.
-logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)
-
-
-class _SerialClient(ModbusSerialClient):
-    """The library's client, without its pauses of whole ms, and with the reason why a port cannot be had."""
-
-    def connect(self) -> bool:
-        """Open the port, unless it is open.
-
-        Raises:
-            OSError: if it cannot be had.
-        """
-        if not self.socket:
-            to = self.comm_params
-            # Without a time-out a read returns what is there.
-            self.socket = serial.Serial(to.host, to.baudrate, timeout=0, write_timeout=ANSWER_S, exclusive=True)
-        return True
-
-    def recv(self, size: int | None) -> bytes:
-        """Return the bytes that have come, after a wait for the first."""
-        return _received(self.socket, self.socket.read if self.socket else None, self.comm_params.timeout_connect)
-
-
-class _NetworkClient(ModbusTcpClient):
-    """The library's client, which says why a port cannot be had."""
-
-    def connect(self) -> bool:
-        """Connect, unless it is connected.
-
-        Raises:
-            OSError: if nothing listens there.
-        """
-        if not self.socket:
-            to = self.comm_params
-            self.socket = socket.create_connection((to.host, to.port), timeout=to.timeout_connect)
-            self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        return True
-
-    def recv(self, size: int | None) -> bytes:
-        """Return the bytes that have come, after a wait for the first."""
-        return _received(self.socket, self.socket.recv if self.socket else None, self.comm_params.timeout_connect)
-
-
-def _received(source: Any, read: Callable[[int], bytes] | None, wait_s: float | None) -> bytes:
-    """Return the bytes that a source has, after a wait for the first; empty if none came.
-
-    Raises:
-        ConnectionException: if the other end has gone.
-    """
-    try:
-        if read and not select.select([source], [], [], wait_s)[0]:
-            return b""
-        data = read(4096) if read else b""
-    except OSError:
-        data = b""
-    if not data:
-        raise ConnectionException("the port is gone")
-    return data
-
-
-def _client(name: str, baud: int, answer_s: float) -> ModbusSerialClient | ModbusTcpClient:
-    """Return the client of a port, not yet connected."""
-    if not name.startswith(NETWORK):
-        return _SerialClient(name, baudrate=baud, timeout=answer_s, retries=0)
-    host, _, number = name.removeprefix(NETWORK).rpartition(":")
-    if not host or not number.isdecimal() or not 0 < int(number) < 1 << 16:
-        raise PortError(f"a port of the network must be {NETWORK}HOST:PORT, with a PORT of 1 to 65535, not {name}")
-    return _NetworkClient(host, port=int(number), framer=FramerType.RTU, timeout=answer_s, retries=0)
-
-
-def _reason(error: Exception) -> str:
-    """Return why a port cannot be had, and what helps."""
-    number = getattr(error, "errno", None)
-    if number == errno.ENOENT:
-        return "there is none of that name; `ls /dev/serial/by-id` shows those of boards that are plugged in"
-    if number in (errno.EACCES, errno.EPERM):
-        return "it is not yours to open; on most systems it is, once you are in the group dialout"
-    if number in (errno.EAGAIN, errno.EBUSY):
-        return "another program has it, and a board has one host at a time"
-    if number in (errno.ECONNREFUSED, errno.ETIMEDOUT):
-        return "nothing listens there"
-    if "configure" in str(error):
-        return "it is no serial port"
-    return str(error).rpartition(": ")[2] or str(error)
 
 
 class Port:
@@ -129,28 +44,36 @@ class Port:
     An answer of Modbus RTU does not say which request it belongs to. So after a request without an answer, and at the
     beginning, the board is asked to repeat a random word until it does: what it had left to say is then over.
 
+    Once it has, an answer is waited for as long as it can take, and no longer, for meanwhile no beat can be sent: the
+    bits of request and answer, `DEVICE_BITS`, `BRIDGE_S` and `MACHINE_S`, which is some 40 ms at 921 600 baud. What may
+    be asked twice is then asked again, until `answer_s` is over.
+
     Args:
         name: a serial port's path, or tcp://HOST:PORT.
         baud: the rate of a serial port.
-        answer_s: how long an answer is waited for.
+        answer_s: how long an answer is waited for in all, in the board's time.
+        pace: seconds of the board in a second, or fewer; 1 but for simulations.
 
     Attributes:
-        name: as given.
+        name, pace: as given.
 
     Raises:
         FieldError: if a number is out of its range.
         PortError: if the port cannot be had.
     """
 
-    def __init__(self, name: str, baud: int = BAUD, answer_s: float = ANSWER_S):
+    def __init__(self, name: str, baud: int = BAUD, answer_s: float = ANSWER_S, pace: float = 1.0):
         check_int("baud", baud, 1, BAUD_MAX)
         check_range("answer_s", answer_s, ANSWER_S_LEAST, ANSWER_S_MOST)
-        self.name, self._baud = name, baud
-        self._client, self._in_step, self._gone = _client(name, baud, answer_s), False, False
+        check_range("pace", pace, PACE_LEAST, 1.0)
+        self.name, self.pace, self._baud, self._answer_s = name, pace, baud, answer_s / pace
+        self._client, self._in_step, self._gone = client_of(name, baud, self._answer_s), False, False
+        # Whether it has ever been in step; and when something was last sent, of which the board may await the rest.
+        self._known, self._sent_s = False, time.monotonic()
         try:
             self._client.connect()
         except (OSError, ValueError, OverflowError) as error:
-            raise PortError(f"{name} cannot be opened: {_reason(error)}") from None
+            raise PortError(f"{name} cannot be opened: {reason(error)}") from None
         # A request that waits in a thread of its own is not torn by an interrupt, and none overtakes another.
         self._turns = ThreadPoolExecutor(1, "hardwall-port")
 
@@ -172,8 +95,17 @@ class Port:
             registers += self._ask(_Request.reading(address + len(registers), some)).registers
         return tuple(registers)
 
-    def write(self, address: int, registers: tuple[int, ...]) -> None:
+    def write(
+        self, address: int, registers: tuple[int, ...], once: bool = False, check: Callable[[], None] | None = None
+    ) -> None:
         """Write successive registers, all in one request.
+
+        Args:
+            address: that of the first.
+            registers: their words.
+            once: whether it makes a difference that they are written twice. Without an answer they are then not
+                written again.
+            check: called in the turn of the request; what it raises is raised, and nothing is written.
 
         Raises:
             ValueError: if they are more than a request takes.
@@ -181,25 +113,35 @@ class Port:
         """
         if not 1 <= len(registers) <= WRITE_MAX:
             raise ValueError(f"registers must be 1 to {WRITE_MAX}, not {len(registers)}")
-        self._ask(_Request.writing(address, registers))
+        self._ask(_Request.writing(address, registers), once, check)
 
     def identify(self) -> dict[int, bytes]:
         """Return the objects by which the device identifies itself: 0 its vendor, 1 its product, 2 its revision."""
         return dict(self._ask(_Request.identifying()).information)
 
-    def _ask(self, request: "_Request") -> Any:
-        if self._gone:
-            raise PortError(f"{self.name} is closed or gone: connect again")
-        try:
-            turn = self._turns.submit(self._turn, request)
-        except RuntimeError:
-            # Another thread has closed it just now, or the program ends.
-            raise PortError(f"{self.name} is closed: connect again") from None
-        return turn.result()
+    def _ask(self, request: "_Request", once: bool = False, check: Callable[[], None] | None = None) -> Any:
+        """Return the answer to a request, which is asked again without one, in a turn of its own each time."""
+        until_s, silent = time.monotonic() + self._answer_s, None
+        while True:
+            if self._gone:
+                raise PortError(f"{self.name} is closed or gone: connect again")
+            try:
+                turn = self._turns.submit(self._turn, request, check)
+            except RuntimeError:
+                # Another thread has closed it just now, or the program ends.
+                raise PortError(f"{self.name} is closed: connect again") from None
+            try:
+                return turn.result()
+            except SilentError as error:
+                silent = silent or error
+                if once or time.monotonic() >= until_s:
+                    raise silent from None
 
-    def _turn(self, request: "_Request") -> ModbusPDU:
+    def _turn(self, request: "_Request", check: Callable[[], None] | None) -> ModbusPDU:
         if not self._in_step:
             self._find_step()
+        if check:
+            check()
         answer = self._answer(request)
         if answer.isError():
             code = getattr(answer, "exception_code", 0)
@@ -211,6 +153,12 @@ class Port:
         return answer
 
     def _answer(self, request: "_Request") -> Any:
+        wait_s = self._answer_s
+        if self._known:
+            bits = BYTE_BITS * request.size + DEVICE_BITS
+            wait_s = min(wait_s, (bits / self._baud + BRIDGE_S + MACHINE_S) / self.pace)
+        self._sent_s = time.monotonic()
+        self._client.until_s = self._sent_s + wait_s
         try:
             return request.send(self._client)
         except ConnectionException:
@@ -230,39 +178,45 @@ class Port:
 
     def _find_step(self) -> None:
         """Let the board repeat random words until it says the last one."""
+        pause_s = PAUSE_S / self.pace
+        silent_s = self._sent_s + pause_s - time.monotonic()
         for tries_left in reversed(range(TRIES)):
-            time.sleep(PAUSE_S)
-            self._drain()
+            self._drain(silent_s)
+            silent_s = pause_s
             request = _Request.echoing(secrets.token_bytes(2))
             with suppress(*([SilentError] if tries_left else [])):
                 if request.fits(self._answer(request)):
-                    self._in_step = True
+                    self._in_step = self._known = True
                     return
+        if self._known:
+            # What came may have been late, of requests before.
+            raise SilentError(f"what answers at {self.name} is late, or does not repeat any more what it is told")
         raise ForeignError(f"what answers at {self.name} does not repeat what it is told, as an axis does")
 
-    def _drain(self) -> None:
-        """Take what has come, until nothing does for a while."""
-        waited, self._client.comm_params.timeout_connect = self._client.comm_params.timeout_connect, PAUSE_S
+    def _drain(self, silent_s: float) -> None:
+        """Take what has come, until nothing does for some time; what goes on for too long is no board."""
+        until_s = time.monotonic() + self._answer_s
         try:
-            while self._client.recv(None):
-                pass
+            while time.monotonic() < until_s:
+                self._client.until_s = time.monotonic() + silent_s
+                if not self._client.recv(None):
+                    return
         except ConnectionException:
             self._gone = True
             raise PortError(f"{self.name} is gone: is the cable in, and the board powered?") from None
-        finally:
-            self._client.comm_params.timeout_connect = waited
 
 
 class _Request:
-    """A request: what it is about, how it is sent, and whether an answer fits it."""
+    """A request: what it is about, the bytes of it and its answer, how it is sent, and whether an answer fits it."""
 
-    def __init__(self, what: str, send: Callable[[Any], Any], fits: Callable[[Any], bool]):
-        self.what, self.send, self.fits = what, send, fits
+    def __init__(self, what: str, size: int, send: Callable[[Any], Any], fits: Callable[[Any], bool]):
+        self.what, self.size, self.send, self.fits = what, size, send, fits
 
     @classmethod
     def reading(cls, address: int, count: int) -> "_Request":
         return cls(
             f"read {count} registers from {address:#06x} on",
+            8 + 5 + 2 * count,
             lambda client: client.read_holding_registers(address, count=count),
             lambda answer: len(getattr(answer, "registers", ())) == count,
         )
@@ -271,6 +225,7 @@ class _Request:
     def writing(cls, address: int, registers: tuple[int, ...]) -> "_Request":
         return cls(
             f"write {len(registers)} registers from {address:#06x} on",
+            9 + 2 * len(registers) + 8,
             lambda client: client.write_registers(address, list(registers)),
             lambda answer: (
                 (getattr(answer, "address", None), getattr(answer, "count", None)) == (address, len(registers))
@@ -281,6 +236,7 @@ class _Request:
     def identifying(cls) -> "_Request":
         return cls(
             "identify itself",
+            7 + FRAME_MAX,
             lambda client: client.read_device_information(read_code=1, object_id=0),
             lambda answer: hasattr(answer, "information"),
         )
@@ -289,6 +245,7 @@ class _Request:
     def echoing(cls, word: bytes) -> "_Request":
         return cls(
             "repeat a word",
+            8 + 8,
             lambda client: client.diag_query_data(word),
             lambda answer: getattr(answer, "message", None) == word,
         )

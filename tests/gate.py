@@ -13,13 +13,13 @@ import sys
 
 from targets import conclude
 
-from gates.families import FAMILIES
 from gates.run import Case, Outcome, run
 from gates.tops import TOPS
 from hardwall.sim.jobs.result import Table
+from hardwall.sim.rtl.families import FAMILIES
 
 SAMPLES = int(os.environ.get("HARDWALL_SAMPLES", "20000"))
-CASES = [Case(family, top) for family in FAMILIES for top in TOPS]
+CASES = [Case(family, top) for family in FAMILIES.values() for top in TOPS]
 CELLS = {"lut4": "LUT4", "ff": "FF", "dsp": "DSP", "bram": "BRAM"}
 COLUMNS = {
     "family": "left",

@@ -7,13 +7,13 @@ import gate
 import pytest
 
 from gates import run
-from gates.families import FAMILIES
-from gates.netlist import Netlist, mapped
 from gates.run import Case, Outcome, compared
 from gates.tops import SMALL, TOPS
 from hardwall.sim.boards.parts import PARTS
+from hardwall.sim.rtl.families import FAMILIES
+from hardwall.sim.rtl.netlist import Netlist, mapped
 
-ECP5 = FAMILIES[0]
+ECP5 = FAMILIES["ecp5"]
 CELLS, AXIS, SMALLEST = (Case(ECP5, top) for top in (TOPS[0], TOPS[1], SMALL))
 
 
@@ -64,8 +64,8 @@ def test_registers_without_a_value_at_power_up_are_found():
 
 
 def test_netlists_are_mapped_as_the_parts_are():
-    assert {family.synth for family in FAMILIES} >= {part.synth for part in PARTS.values()}
-    assert FAMILIES[1].count(["SB_LUT4", "SB_DFFESR", "SB_DFF", "SB_MAC16"]) == {
+    assert {family.synth for family in FAMILIES.values()} >= {part.synth for part in PARTS.values()}
+    assert FAMILIES["ice40"].count(["SB_LUT4", "SB_DFFESR", "SB_DFF", "SB_MAC16"]) == {
         "lut4": 1, "dsp": 1, "bram": 0, "ff": 2
     }  # fmt: skip
 

@@ -5,8 +5,9 @@ from typing import Annotated
 import typer
 
 from ...host import State, TrippedError
+from ...host.port import BAUD
 from .options import within
-from .port import RATE, BaudOption, IdentityOption, PortArgument, SecondsOption, axis_at
+from .port import AcknowledgeOption, BaudOption, IdentityOption, PaceOption, PortArgument, SecondsOption, axis_at
 from .set import values_of
 from .watch import PERIOD_S, Lines
 
@@ -16,19 +17,20 @@ def command(
     words: Annotated[
         list[str] | None, typer.Argument(metavar="WORD=VALUE...", help="words in SI units, written before")
     ] = None,
-    baud: BaudOption = RATE,
+    baud: BaudOption = BAUD,
     identity: IdentityOption = None,
-    acknowledge: Annotated[bool, typer.Option("--acknowledge", help="acknowledge first what is latched")] = False,
+    pace: PaceOption = 1.0,
+    acknowledge: AcknowledgeOption = False,
     seconds: SecondsOption = None,
 ) -> None:
     if seconds is not None:
         within(seconds, "--seconds", 0.0, 1e6, "s")
     values = values_of(words or [])
-    with axis_at(port, baud, identity) as axis, Lines() as lines:
+    with axis_at(port, baud, identity, pace) as axis, Lines() as lines:
         if values:
             axis.set(**values)
-        if acknowledge and (trip := axis.trip):
-            axis.acknowledge(trip)
+        if acknowledge:
+            axis.acknowledge()
         axis.arm()
         for status in axis.watch(PERIOD_S, seconds):
             lines.show(status)

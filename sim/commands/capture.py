@@ -8,12 +8,13 @@ import typer
 
 from ...host import Axis
 from ...host.capture import Captured
+from ...host.port import BAUD
 from ...model.capture import SOURCES
 from ...model.checks import shown
 from ..jobs.result import Summary
 from .errors import BadInput
 from .options import output_file, within
-from .port import RATE, BaudOption, IdentityOption, PortArgument, axis_at
+from .port import BaudOption, IdentityOption, PaceOption, PortArgument, axis_at
 from .set import values_of
 from .study import StudyOptions, study
 from .terminal import log, progress
@@ -65,14 +66,15 @@ def command(
     level: Annotated[float, typer.Option(metavar="M", help="the position of the triggers rise and fall, m")] = 0.0,
     arm: Annotated[bool, typer.Option("--arm", help="arm the axis first, and disarm it at the end")] = False,
     seconds: Annotated[float, typer.Option(metavar="S", help="the longest wait")] = 60.0,
-    baud: BaudOption = RATE,
+    baud: BaudOption = BAUD,
     identity: IdentityOption = None,
+    pace: PaceOption = 1.0,
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE.npz", help="file for the records")] = None,
 ) -> None:
     within(seconds, "--seconds", 0.0, 1e6, "s")
     out = output_file(out, "--out", (".npz",))
     values, sources = values_of(words or []), _sources(trigger)
-    with axis_at(port, baud, identity) as axis:
+    with axis_at(port, baud, identity, pace) as axis:
         if values:
             axis.set(**values)
         if arm:

@@ -6,9 +6,10 @@ from typing import Annotated, Any
 import typer
 
 from ...host import Axis
+from ...host.port import BAUD
 from ...model.register import Kind, Register
 from ..jobs.result import Table, table_of, text_of
-from .port import RATE, BaudOption, IdentityOption, PortArgument, axis_at
+from .port import BaudOption, IdentityOption, PaceOption, PortArgument, axis_at
 from .study import StudyOptions, study
 
 KINDS = tuple(kind for kind in Kind if kind not in (Kind.PULSE, Kind.CONSTANT))
@@ -46,11 +47,12 @@ class Board:
 def command(
     options: StudyOptions,
     port: PortArgument,
-    baud: BaudOption = RATE,
+    baud: BaudOption = BAUD,
     identity: IdentityOption = None,
+    pace: PaceOption = 1.0,
     registers: Annotated[bool, typer.Option("--registers", help="every register, too")] = False,
 ) -> None:
-    with axis_at(port, baud, identity) as axis:
+    with axis_at(port, baud, identity, pace) as axis:
         summary = _summary(port, axis)
         rows = [_row(axis, each) for each in axis.device.registers.values() if each.kind in KINDS] if registers else []
     options.finish(Board(summary, rows))

@@ -1,15 +1,23 @@
 """The command `disarm`."""
 
+from ...host.port import BAUD
 from ..jobs.result import Values
-from .port import RATE, BaudOption, IdentityOption, PortArgument, axis_at
+from .port import AcknowledgeOption, BaudOption, IdentityOption, PaceOption, PortArgument, axis_at
 from .study import StudyOptions, study
 
 
 @study()
 def command(
-    options: StudyOptions, port: PortArgument, baud: BaudOption = RATE, identity: IdentityOption = None
+    options: StudyOptions,
+    port: PortArgument,
+    baud: BaudOption = BAUD,
+    identity: IdentityOption = None,
+    pace: PaceOption = 1.0,
+    acknowledge: AcknowledgeOption = False,
 ) -> None:
-    with axis_at(port, baud, identity) as axis:
+    with axis_at(port, baud, identity, pace) as axis:
         axis.disarm()
+        if acknowledge:
+            axis.acknowledge()
         state = axis.status.state.name
     options.finish(Values({"state": state}))

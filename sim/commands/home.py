@@ -4,9 +4,10 @@ from typing import Annotated
 
 import typer
 
+from ...host.port import BAUD
 from ..jobs.result import Values
 from .options import within
-from .port import RATE, BaudOption, IdentityOption, PortArgument, axis_at
+from .port import BaudOption, IdentityOption, PaceOption, PortArgument, axis_at
 from .study import StudyOptions, study
 from .terminal import log
 
@@ -16,12 +17,13 @@ def command(
     options: StudyOptions,
     port: PortArgument,
     at: Annotated[float, typer.Option(metavar="M", help="the position of the index, m")] = 0.0,
-    baud: BaudOption = RATE,
+    baud: BaudOption = BAUD,
     identity: IdentityOption = None,
+    pace: PaceOption = 1.0,
     seconds: Annotated[float, typer.Option(metavar="S", help="the longest wait")] = 60.0,
 ) -> None:
     within(seconds, "--seconds", 0.0, 1e6, "s")
-    with axis_at(port, baud, identity) as axis:
+    with axis_at(port, baud, identity, pace) as axis:
         count = axis.device.registers["count"]
         within(at, "--at", count.low * count.lsb, count.high * count.lsb, "m")
         log.print("move the handle over its index, and let it rest")

@@ -16,13 +16,14 @@ from ...host.panel.estimates import Estimates
 from ...host.panel.hand import Hand
 from ...host.panel.live import Bench
 from ...host.panel.serving import LOCAL, PanelServer
+from ...host.port import BAUD
 from ...model import supervisor
 from ..jobs import ending
 from ..scene.load import load
 from ..scene.schema import Scene
 from .errors import BadInput
 from .options import EstimatorOption, SetOption, changes_of, within
-from .port import RATE, BaudOption, IdentityOption, SecondsOption
+from .port import BaudOption, IdentityOption, PaceOption, SecondsOption, check_pace
 from .terminal import log
 from .virtual import COUNTS
 
@@ -36,8 +37,8 @@ GAINS = {"levant_lambda": 3.5, "levant_alpha": 13.2, "levant_output": 1.0}
 """So too, where its estimator is Levant's: gains for accelerations of a hand, 12 m/s^2, and the smooth output. The
 paper's, for its walls, are larger."""
 LOSS = 1 << supervisor.names(supervisor.ALL).index("encoder_loss")
-ANSWER_S = 3.0
-"""How long its answers are waited for: it may be much slower than a board."""
+PACE = 0.3
+"""Its seconds in a second, of which it may have so few beside a browser."""
 PORT_LINE = "serial port: "
 
 
@@ -51,14 +52,16 @@ def command(
     ] = None,
     estimator: EstimatorOption = None,
     set_: SetOption = None,
-    baud: BaudOption = RATE,
+    baud: BaudOption = BAUD,
     identity: IdentityOption = None,
+    pace: PaceOption = 1.0,
     host: Annotated[str, typer.Option(metavar="ADDRESS", help="the address at which the page is served")] = LOCAL,
     http: Annotated[int, typer.Option(min=0, max=65535, metavar="PORT", help="its port; 0 for any that is free")] = 0,
     seconds: SecondsOption = None,
 ) -> None:
     if seconds is not None:
         within(seconds, "--seconds", 0.0, 1e6, "s")
+    check_pace(pace)
     if port == VIRTUAL:
         name = scene or SCENE
         changes = changes_of(set_, controller__estimator=estimator)
@@ -75,7 +78,7 @@ def command(
     elif scene or estimator or set_:
         raise BadInput("SCENE, --estimator and --set are for `hardwall panel virtual`, not for a board at a port")
     else:
-        _serve(lambda: connect(port, baud, identity=identity), None, port, (host, http), seconds)
+        _serve(lambda: connect(port, baud, identity=identity, pace=pace), None, port, (host, http), seconds)
 
 
 class VirtualBench:
@@ -116,7 +119,7 @@ class VirtualBench:
         """Start the process unless it runs; return its axis, with a wall."""
         if self._process is None or self._process.poll() is not None:
             self._start()
-        axis = connect(self._port, answer_s=ANSWER_S, identity=self._identity)
+        axis = connect(self._port, identity=self._identity, pace=PACE)
         causes = int(axis.get("supervisor_causes")) | LOSS
         gains = {name: value for name, value in GAINS.items() if name in axis.names}
         axis.set(**WALL, **gains, supervisor_causes=causes)

@@ -7,10 +7,11 @@ from typing import Annotated
 import typer
 
 from ...host import Axis, Status, connect
-from ...host.port import BAUD, BAUD_MAX
+from ...host.port import BAUD_MAX, PACE_LEAST
 from ...model.checks import FieldError
 from ..jobs import ending
 from .errors import BadInput
+from .options import within
 
 PortArgument = Annotated[
     str, typer.Argument(metavar="PORT", help="a serial port, e.g. of /dev/serial/by-id; or tcp://HOST:PORT")
@@ -19,18 +20,26 @@ BaudOption = Annotated[int, typer.Option(min=1, max=BAUD_MAX, help="the board's 
 IdentityOption = Annotated[
     str | None, typer.Option(metavar="HASH", help="the identity that the board must have", show_default="any")
 ]
+AcknowledgeOption = Annotated[bool, typer.Option("--acknowledge", help="acknowledge what is latched")]
 SecondsOption = Annotated[
     float | None, typer.Option(metavar="S", help="time to run", show_default="until it is interrupted")
 ]
-RATE = BAUD
-"""The default of `BaudOption`."""
+PaceOption = Annotated[
+    float, typer.Option(metavar="PACE", help="seconds of a slow simulation in a second, or fewer; 1 of a board")
+]
+
+
+def check_pace(pace: float) -> None:
+    """Raise BadInput if no board can have such a pace."""
+    within(pace, "--pace", PACE_LEAST, 1.0, "s/s")
 
 
 @contextmanager
-def axis_at(port: str, baud: int, identity: str | None = None) -> Iterator[Axis]:
+def axis_at(port: str, baud: int, identity: str | None, pace: float) -> Iterator[Axis]:
     """Yield the axis at a port, and disarm and close it, also when a signal ends the program."""
+    check_pace(pace)
     try:
-        with connect(port, baud, identity=identity) as axis, ending.undone_by_signal(axis.close):
+        with connect(port, baud, identity=identity, pace=pace) as axis, ending.undone_by_signal(axis.close):
             yield axis
     except FieldError as error:
         raise BadInput(str(error)) from None

@@ -4,10 +4,11 @@ from typing import Annotated
 
 import typer
 
+from ...host.port import BAUD
 from ...model.checks import shown
 from ..jobs.result import Values
 from .errors import BadInput
-from .port import RATE, BaudOption, IdentityOption, PortArgument, axis_at
+from .port import BaudOption, IdentityOption, PaceOption, PortArgument, axis_at
 from .study import StudyOptions, study
 
 
@@ -16,11 +17,12 @@ def command(
     options: StudyOptions,
     port: PortArgument,
     words: Annotated[list[str], typer.Argument(metavar="WORD=VALUE...", help="words in SI units")],
-    baud: BaudOption = RATE,
+    baud: BaudOption = BAUD,
     identity: IdentityOption = None,
+    pace: PaceOption = 1.0,
 ) -> None:
     values = values_of(words)
-    with axis_at(port, baud, identity) as axis:
+    with axis_at(port, baud, identity, pace) as axis:
         axis.set(**values)
         used = {name: axis.get(name) for name in values}
     options.finish(Values(used))

@@ -10,16 +10,20 @@ from typing import Annotated
 
 import typer
 
+from ...model.checks import shown
+from ..rtl.board_library import NETLISTS
 from ..scene.load import load
 from ..virtual.orders import ORDERS, OrderError, obey
 from ..virtual.serial_port import Line
 from ..virtual.virtual_board import GRASP_S, VirtualBoard
-from .errors import one_line
+from .errors import BadInput, one_line
 from .options import EstimatorOption, SceneArgument, SetOption, changes_of, within
 from .terminal import log
 
 JUDGED_S = 3.0
 """The time after which the speed is told."""
+SLOW, MARGIN = 0.8, 2.0
+"""The speed below which a pace is for hosts to be told, and how much lower it is: a machine is not always as fast."""
 LOOK_S = 0.05
 """The longest wait for bytes of hosts between two looks for orders."""
 LINE_MAX = 1024
@@ -45,12 +49,22 @@ def command(
         float | None, typer.Option(metavar="S", help="simulated time to run", show_default="until it is interrupted")
     ] = None,
     counts: Annotated[bool, typer.Option("--counts", help="print the encoder's count at every sample, too")] = False,
+    netlist: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FAMILY",
+            help=f"the board's netlist on a family of FPGAs, {', '.join(NETLISTS)}; much slower",
+            show_default="its Verilog",
+        ),
+    ] = None,
 ) -> None:
     within(speed, "--speed", 0.0, 1000.0, "s/s")
     if seconds is not None:
         within(seconds, "--seconds", 0.0, 1e6, "s")
+    if netlist is not None and netlist not in NETLISTS:
+        raise BadInput(f"--netlist must be one of {', '.join(NETLISTS)}, not {shown(netlist)}")
     of = load(scene, changes_of(set_, controller__estimator=estimator))
-    with Line(tcp) as line, VirtualBoard(of, baud) as board:
+    with Line(tcp) as line, VirtualBoard(of, baud, netlist) as board:
         # The first call compiles, for which no host would wait.
         board.run()
         print(f"serial port: {line.path}")
@@ -131,7 +145,11 @@ def _run(board: VirtualBoard, line: Line, pace: _Pace, counts: _Counts | None) -
             counts.take(board)
         if not told and real_s > JUDGED_S:
             told = True
-            log.print(f"it runs at {simulated_s / real_s:.2f} of real time")
+            said = f"it runs at {simulated_s / real_s:.2g} of real time"
+            if simulated_s < SLOW * real_s:
+                slower = f"{simulated_s / real_s / MARGIN:.1g}"
+                said += f": tell its hosts --pace {slower}"
+            log.print(said)
     simulated_s, real_s = passed()
     print(f"{simulated_s:g} s in {real_s:.3g} s: {simulated_s / real_s:.2f} of real time")
 

@@ -7,8 +7,9 @@ from rich.live import Live
 from rich.text import Text
 
 from ...host import Status
+from ...host.port import BAUD
 from .options import within
-from .port import RATE, BaudOption, IdentityOption, PortArgument, SecondsOption, axis_at, line_of
+from .port import BaudOption, IdentityOption, PaceOption, PortArgument, SecondsOption, axis_at, line_of
 
 PERIOD_S = 0.05
 """The time between two looks at the board."""
@@ -43,13 +44,14 @@ class Lines:
 
 def command(
     port: PortArgument,
-    baud: BaudOption = RATE,
+    baud: BaudOption = BAUD,
     identity: IdentityOption = None,
+    pace: PaceOption = 1.0,
     seconds: SecondsOption = None,
 ) -> None:
     if seconds is not None:
         within(seconds, "--seconds", 0.0, 1e6, "s")
-    with axis_at(port, baud, identity) as axis, Lines() as lines:
+    with axis_at(port, baud, identity, pace) as axis, Lines() as lines:
         began = time.monotonic()
         while seconds is None or time.monotonic() - began < seconds:
             lines.show(axis.status)

@@ -1,7 +1,8 @@
 """The Verilated board with what is around it, as a shared library: clocks, the other end of its line, an amplifier.
 
 A board has the pins of packages; behind its line is a host of bytes, and behind its drive an amplifier for its stage.
-They, and the faults of wires, are in `around_board.v`, `amplifiers.v` and `board_library.cpp`.
+They, and the faults of wires, are in `around_board.v`, `amplifiers.v` and `board_library.cpp`. The board is its
+Verilog, or the netlist that Yosys maps it to, with models of the cells of a family of FPGAs.
 """
 
 import ctypes
@@ -17,7 +18,8 @@ from ...hdl.link.link import Link
 from ...model.drive import dac
 from ...model.registers import RegisterMap
 from ...model.spec import AxisSpec
-from . import shared_library
+from . import netlist, shared_library
+from .families import FAMILIES
 from .shared_library import Recipe
 from .verilated import Rtl, RtlState
 
@@ -26,6 +28,9 @@ AROUND, AMPLIFIERS, SHIM = (
 )
 OSCILLATOR_HZ = 2.4e6
 """About the frequency of the oscillator beside the clock; the clock has a whole number of it in every half period."""
+NETLISTS = "ecp5", "gw1nr"
+"""The families of `FAMILIES` whose netlist can be the board. That of the iCE40 does not answer its host here, though
+`make gate` finds it equal to the Verilog."""
 ROOM = 1024
 """Bytes from the board that are kept until they are taken."""
 
@@ -43,11 +48,17 @@ def _board(spec: AxisSpec, baud: int | None) -> tuple[Board, str]:
     return board, to_verilog(board, "board")
 
 
-def build(spec: AxisSpec, baud: int | None = None) -> Path:
+def build(spec: AxisSpec, baud: int | None = None, family: str | None = None) -> Path:
     """Return the shared library of the board, with a serial line of that rate; build it first if it is missing.
+
+    Args:
+        spec: the axis.
+        baud: the rate of the serial line; None for the board's own.
+        family: the family of FPGAs whose netlist is the board, one of `NETLISTS`; None for the board's Verilog.
 
     Raises:
         BuildError: if the build fails.
+        SynthesisError: if Yosys is missing or fails.
     """
     board, verilog = _board(spec, baud)
     around = {
@@ -55,9 +66,13 @@ def build(spec: AxisSpec, baud: int | None = None) -> Path:
         "OSCILLATOR_CLOCKS": max(round(spec.clock_hz / OSCILLATOR_HZ / 2), 1),
     }
     around |= _dac(spec)
-    ours = {path.name: path.read_text(encoding="utf-8") for path in (AROUND, AMPLIFIERS, SHIM)}
     options = ("--top-module", "around_board", *(f"-G{name}={value}" for name, value in around.items()))
     options += (f"-DSTAGE_{spec.stage.name.upper()}",)
+    if family is not None:
+        mapped = netlist.mapped(board, FAMILIES[family], "board")
+        verilog, options = f"{mapped.gates}
+{mapped.models}", (*options, *netlist.OPTIONS)
+    ours = {path.name: path.read_text(encoding="utf-8") for path in (AROUND, AMPLIFIERS, SHIM)}
     files = {"board.v": verilog, **ours}
     return shared_library.build(Recipe(files, SHIM.name, "Vboard", options))
 
@@ -86,14 +101,17 @@ class BoardHardware:
         number: the handle's count at the start.
         turn_counts: counts between two pulses of the encoder's index.
         baud: the rate of the serial line; None for the board's own.
+        family: the family of FPGAs whose netlist is the board, one of `NETLISTS`; None for the board's Verilog.
 
     Attributes:
         given_n: the mean force over a sample, N, of the amplifier's drive 1.
     """
 
-    def __init__(self, spec: AxisSpec, number: int, turn_counts: int, baud: int | None = None):
+    def __init__(
+        self, spec: AxisSpec, number: int, turn_counts: int, baud: int | None = None, family: str | None = None
+    ):
         board, _ = _board(spec, baud)
-        self._library_at = functools.partial(build, spec, baud)
+        self._library_at = functools.partial(build, spec, baud, family)
         self._spec, self._board, self._number, self._turn = spec, board, number, turn_counts
         # A bridge, or pulses, have one step; and the amplifier behind an inverted stage turns the sign back.
         codes = spec.drive.steps if isinstance(spec.drive, dac.Design) else 1

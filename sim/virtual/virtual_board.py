@@ -61,6 +61,7 @@ class VirtualBoard:
     Args:
         scene: the scene; its wall and gains are the host's to write.
         baud: the rate of the serial line; None for the board's own.
+        family: the family of FPGAs whose netlist is the board, one of `NETLISTS`; None for the board's Verilog.
 
     Attributes:
         hardware: the board's wires and loops.
@@ -71,16 +72,17 @@ class VirtualBoard:
     Raises:
         SceneError: if the scene has an output of its own, for the board's is that of its drive stage.
         BuildError: if the hardware cannot be built.
+        SynthesisError: if its netlist cannot be made.
     """
 
-    def __init__(self, scene: Scene, baud: int | None = None):
+    def __init__(self, scene: Scene, baud: int | None = None, family: str | None = None):
         if scene.output is not None:
             raise SceneError(f"{scene.name}: output must be absent, for the drive stage of the board is its output")
         # The board's own stage makes the steps of its force.
         self.scene, self._world = scene, world_of(scene)._replace(converter=None)
         self._progress = start_of(scene, self._world)
         turn_counts = max(round(TURN_M / scene.encoder.count_m), 4)
-        self.hardware = BoardHardware(scene.spec, self._progress.moment.cell.number, turn_counts, baud)
+        self.hardware = BoardHardware(scene.spec, self._progress.moment.cell.number, turn_counts, baud, family)
         self.hand, self.reversed = Hand(scene.protocol.start_m), False
         self._edges, self._push_n = room_for(loop.EDGE_CAPACITY), 0.0
         self._number, self.positions_m = self._progress.moment.cell.number, np.zeros(0)

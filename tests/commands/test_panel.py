@@ -6,16 +6,14 @@ import psutil
 import pytest
 
 from stimuli.processes import HARDWALL, ended, line, started, wait_until
-
-SLOW = {"controller.clock_hz": 4_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
-"""As few clocks as the scene's axis needs, on a simulator that shares its machine."""
+from stimuli.virtual_boards import SCENE
 
 
 def changes(*assignments: str) -> list[str]:
     return [word for each in assignments for word in ("--set", each)]
 
 
-WORDS = [str(HARDWALL), "panel", "virtual", *changes(*(f"{key}={value}" for key, value in SLOW.items()))]
+WORDS = [str(HARDWALL), "panel", "virtual", *changes(*(f"{key}={value}" for key, value in SCENE.items()))]
 
 
 def test_its_end_leaves_no_process_and_a_board_is_not_asked_for_twice():

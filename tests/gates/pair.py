@@ -4,9 +4,8 @@ from amaranth.hdl import Cat, ClockDomain, Instance, Module, Shape, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from hardwall.sim.rtl.netlist import GATES, RTL
 from hardwall.testing.packing import Packing
-
-from .netlist import GATES, RTL
 
 COUNTER_BITS = 32
 START = 0x5354_4152

@@ -7,25 +7,16 @@ from pathlib import Path
 
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs.scratch import scratch
-from hardwall.sim.rtl import cocotb_runner
+from hardwall.sim.rtl import cocotb_runner, netlist
+from hardwall.sim.rtl.families import Family
+from hardwall.sim.rtl.netlist import Netlist, mapped
 from hardwall.testing import SEED
 
-from .families import Family
-from .netlist import Netlist, mapped
 from .pair import Pair
 from .tops import Top
 
 OPTIONS = (
-    # The files of cells that a family needs are named; they include no others.
-    "-DNO_INCLUDES",
-    # Yosys leaves out pins that a mode has no use for. Its models name no generate blocks, few have a time scale, and
-    # they have delays and parameters that mean nothing here.
-    *(f"-Wno-{name}" for name in ("PINMISSING", "GENUNNAMED", "TIMESCALEMOD", "SPECIFYIGN", "UNUSEDPARAM")),
-    # Parameters of a bit have a whole number as their default there, and bits of one vector may follow from each
-    # other.
-    *("-Wno-WIDTHTRUNC", "-Wno-UNOPTFLAT"),
-    # A large memory of theirs loses all that it has in a loop where its power goes off.
-    "-Wno-BLKSEQ",
+    *netlist.OPTIONS,
     # What no initial value and no reset has set is random, and so is what Yosys leaves open.
     *("--x-initial", "unique", "--x-assign", "unique"),
 )
@@ -90,7 +81,7 @@ class Outcome:
         return said
 
 
-def compared(case: Case, netlist: Netlist, samples: int) -> Outcome:
+def compared(case: Case, made: Netlist, samples: int) -> Outcome:
     """Return what comes of a netlist beside its RTL, from power-up on; the simulator's log is in the build folder.
 
     Raises:
@@ -106,16 +97,16 @@ def compared(case: Case, netlist: Netlist, samples: int) -> Outcome:
             environ={"HARDWALL_PARAMETERS": json.dumps(given)},
             seed=SEED,
             log=folder / f"{case.name.replace(' ', '-')}.log",
-            more=netlist.verilog,
+            more=made.verilog,
             options=OPTIONS,
             plusargs=PLUSARGS,
         )
-        cocotb_runner.simulate(Pair(netlist.component), "pair", job)
+        cocotb_runner.simulate(Pair(made.component), "pair", job)
         found = json.loads(report.read_text(encoding="ascii"))
     unlike = {name: (value, found["gates"][name]) for name, value in found["rtl"].items()}
     return Outcome(
         case,
-        netlist,
+        made,
         samples,
         found["clocks"],
         found["different"],

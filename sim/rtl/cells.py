@@ -184,7 +184,9 @@ def _gowin_modes(number: str, port: str) -> str:
     return f"localparam MODE_{port} = {chosen};"
 
 
-def _gowin_memories() -> str:
+def _gowin_two_ports() -> str:
+    """Return the memory with two ports of a width."""
+
     def wires(p: str, number: str) -> str:
         return f"""
   wire clk_{p} = CLK{p}, en_{p} = CE{p}, we_{p} = WRE{p};
@@ -208,7 +210,12 @@ module DPX9B(
 {wires("A", "0")}{wires("B", "1")}{_memory("INIT_RAM_", 18)}
 {_port("A", "B", "BIT_WIDTH_0", "MODE_A")}{_port("B", "A", "BIT_WIDTH_0", "MODE_B")}
 endmodule
+"""
 
+
+def _gowin_one_port() -> str:
+    """Return the memories with one port."""
+    return f"""
 module SPX9(
     input CLK, CE, OCE, RESET, WRE, input [13:0] AD, input [35:0] DI, input [2:0] BLKSEL, output [35:0] DO
 );
@@ -241,7 +248,12 @@ module SP(
   always @* if (RESET || BLKSEL != 0) $fatal(1, "a memory is reset or not selected");
 {_narrow("DI[0]", 1)}
 endmodule
+"""
 
+
+def _gowin_wide() -> str:
+    """Return the memory of 36 bits."""
+    return f"""
 module SDPX9B(
     input CLKA, CEA, CLKB, CEB, OCE, RESETA, RESETB, input [13:0] ADA, ADB, input [35:0] DI,
     input [2:0] BLKSELA, BLKSELB, output [35:0] DO
@@ -262,4 +274,4 @@ endmodule
 
 
 ECP5 = _ecp5_multiplier() + _ecp5_memory()
-GOWIN = _gowin_multiplier(9) + _gowin_multiplier(18) + _gowin_memories()
+GOWIN = _gowin_multiplier(9) + _gowin_multiplier(18) + _gowin_two_ports() + _gowin_one_port() + _gowin_wide()

