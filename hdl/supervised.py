@@ -57,6 +57,8 @@ class SupervisedAxis(wiring.Component):
         One of the latter beyond its range in `design.ranges` is the cause word_range.
     the outputs of `Supervisor` : Out
         As there; `driven`, or `magnitude` and `negative`, is the drive that may leave the FPGA.
+    referenced : Out(1)
+        The count was preloaded since the index was found: arming may ask for it.
     drive_inverted : Out(1)
         The sign of the drive's pins is to be reversed: `drive_invert`, as it was when the axis was last not ARMED.
     a_channel_idle : Out(1)
@@ -80,6 +82,7 @@ class SupervisedAxis(wiring.Component):
                 **dict.fromkeys((*COMPLEMENTS, *LOOPS), In(1)),
                 **{name: supervisor[name] for name in (*REQUESTS, *SHOWN)},
                 **{word.name: In(shape(word.format)) for word in design.live},
+                "referenced": Out(1),
                 "drive_inverted": Out(1),
                 "a_channel_idle": Out(1),
             }
@@ -158,8 +161,13 @@ class SupervisedAxis(wiring.Component):
             supervisor.drive.eq(axis.drive),
             supervisor.stamp.eq(axis.stamp),
             supervisor.enable.eq(levels["drive_enable"]),
-            supervisor.referenced.eq(axis.index_latched),
+            supervisor.referenced.eq(self.referenced),
         ]
+        # An index that was found is no reference yet: a host may have given up, and the count is what it was.
+        with m.If(self.index_arm):
+            m.d.sync += self.referenced.eq(0)
+        with m.Elif(self.preload & axis.index_latched):
+            m.d.sync += self.referenced.eq(1)
         # The other direction turns the wall around: the drive is zero before the axis takes it.
         inverted = Signal()
         with m.If(self.commit):

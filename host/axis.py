@@ -68,7 +68,6 @@ class Axis(Named):
         # not wait for a thread that is held up in `arm`.
         self._called_off = False
         # Whether the board was told to wait for its index, and no origin has been made of it.
-        self._without_origin = False
         beat = Beat(port, device.registers["heartbeat"])
         self._lease_s = LEASE_S / port.pace
         self._heartbeat = Heartbeat(beat, self._words.written("supervisor_watchdog"), self._lease_s)
@@ -130,7 +129,6 @@ class Axis(Named):
             HostError: if the board is not reached.
         """
         check = self._check_wanted if name == "arm" else None
-        self._without_origin |= name == "index_arm"
         self._port.write(self.device.registers[name].address, (1,), once=name not in TWICE, check=check)
 
     def _check_wanted(self) -> None:
@@ -250,7 +248,7 @@ class Axis(Named):
                 break
         if status.trip:
             raise TrippedError(f"the axis is tripped; acknowledge it first: {status.trip}")
-        if not status.ready or self._lacks_reference(status):
+        if not status.ready:
             raise NotReadyError(f"the axis cannot be armed: {self._why_not(status)}")
 
     def disarm(self) -> None:
@@ -303,7 +301,6 @@ class Axis(Named):
             self.pulse("preload")
         except RefusedError as error:
             raise NotReadyError("the axis is ARMED: disarm it before its position is set") from error
-        self._without_origin = False
 
     def homing(self, index_m: float = 0.0) -> Generator[str, None, Homed]:
         """Home as `home` does, a look at a step: see `hardwall.host.homing.homing`."""
@@ -315,8 +312,8 @@ class Axis(Named):
         Returns the position of the handle, which must rest at the end: how far the old origin was off is the
         difference.
 
-        A homing that does not end leaves the board waiting for its index, for which it has no way back. This program
-        then arms no axis that needs its reference, though the index may come, before another homing or a preload.
+        A homing that does not end leaves the board waiting for its index, for which it has no way back, and without a
+        reference, until another one ends.
 
         Raises:
             FieldError: if `index_m` is beyond the range of positions, or the time is not finite, or negative.
@@ -338,14 +335,11 @@ class Axis(Named):
     def _why_not(self, status: Status) -> str:
         if status.state is State.ARMED:
             return "it is ARMED"
-        if self._lacks_reference(status):
+        if self.supervisor.reference and not status.referenced:
             return "it needs its reference: home it first"
         if not status.live:
             return "no heartbeat has reached it"
         return "the loop of drive_enable is open"
-
-    def _lacks_reference(self, status: Status) -> bool:
-        return (self._without_origin or not status.referenced) and bool(self.supervisor.reference)
 
     def _let_go(self) -> None:
         if self._unwanted:

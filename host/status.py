@@ -49,7 +49,7 @@ class Status:
         force_n: the force that is let out.
         stamp_s: the time of the clock, which wraps behind the largest value of the register `stamp`.
         live: whether the heartbeat is not overdue; ready: whether the axis can be armed.
-        referenced: whether the index has been found.
+        referenced: whether the position was set since the index was found.
         flags: names of the sticky flags; the estimator's own are `estimator_0` and so on.
         a_channel_idle: the warning that the last edges were all of one channel.
         trip: the causes that are latched; None if none is.
@@ -80,7 +80,7 @@ def status_of(words: dict[str, int], si: dict[str, float], flag_bits: int) -> St
         si["stamp"],
         bool(words["live"]),
         bool(words["ready"]),
-        bool(words["index_latched"]),
+        bool(words["referenced"]),
         tuple(name for bit, name in enumerate(flag_names(flag_bits)) if words["flags"] >> bit & 1),
         bool(words["a_channel_idle"]),
         _trip(words) if words["latched"] else None,

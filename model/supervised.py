@@ -52,6 +52,7 @@ class Design:
             ("state", UQ(2, 0), "The state of the supervisor: 0 DISARMED, 1 ARMED, 2 TRIPPED."),
             ("live", UQ(1, 0), "The host's heartbeat is not overdue."),
             ("ready", UQ(1, 0), "The axis can be armed."),
+            ("referenced", UQ(1, 0), "The count was preloaded since the index was found."),
             ("latched", UQ(COUNT, 0), f"The causes since the last acknowledgement: {causes}."),
             ("first", UQ(COUNT, 0), "The causes of the clock that led to the last trip."),
             ("a_channel_idle", UQ(1, 0), "A warning: the last edges were all of one channel."),

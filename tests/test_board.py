@@ -21,6 +21,8 @@ from stimuli.specs import spec
 
 CLOCKS = max(SAMPLES, 80_000)
 """Fewer clocks do not reach every case."""
+LONGEST = 5
+"""How often as many clocks are, at most, for the cases that are still not reached."""
 SHOWN = "stamp", "capture_stamp"
 """The first and the last status that a host of a capture looks at."""
 LOOKS = ("drive", "capture_stamp"), ("index_latched", "first")
@@ -70,6 +72,17 @@ async def random_capture(host: Host) -> None:
     await host.write(capture_start=1)
 
 
+def lacks(host: Host, seen: list[dict[str, int]]) -> list[str]:
+    """Return the cases that a campaign has not reached yet."""
+    cases = {
+        "states": {DISARMED, ARMED, TRIPPED} <= {row["state"] for row in seen},
+        "index": {0, 1} <= {row["index_latched"] for row in seen},
+        "captures": {WAITING, DONE} <= {row.get("capture_state") for row in seen},
+        "pulses": {(pulse, sign) for pulse in (0, 1) for sign in (0, 1)} <= set(host.pulses),
+    }
+    return [name for name, reached in cases.items() if not reached]
+
+
 @cocotb.test()
 async def a_random_host_at_a_random_handle(dut):
     host = Host(dut, **parameters())
@@ -77,7 +90,7 @@ async def a_random_host_at_a_random_handle(dut):
     random, seen = host.random, []
     ramp, stiffness = host.registers["supervisor_ramp"], host.registers["wall_stiffness"]
     await host.write(supervisor_ramp=ramp.high, supervisor_watchdog=2000, supervisor_causes=REQUIRED)
-    while host.twin.clocks < CLOCKS:
+    while host.twin.clocks < CLOCKS or (lacks(host, seen) and host.twin.clocks < LONGEST * CLOCKS):
         host.rate = float(random.choice((0.0, 0.005, 0.02)))
         host.illegal_rate = float(random.choice((0.0, 0.05), p=(0.8, 0.2)))
         host.open_rate = float(random.choice((0.0, 1e-3), p=(0.8, 0.2)))
@@ -103,16 +116,22 @@ async def a_random_host_at_a_random_handle(dut):
             await random_capture(host)
         else:
             await host.write(disarm=1)
+    assert lacks(host, seen) == []
+    # The index that is found becomes a reference only by a preload, and not after the next index_arm.
+    host.rate = 0.02
+    await host.write(disarm=1)
+    for _ in range(2):
+        await host.write(index_arm=1)
+        while not seen[-1].get("index_latched"):
+            seen.append(await host.look(*LOOKS[1]))
+        await host.write(preload=1)
+        seen.append(await host.look(*LOOKS[1]))
     # An axis without a heartbeat, or one that is armed, is not armed.
     for _ in range(2):
         await host.write(arm=1)
-    # The campaign must reach every case.
-    assert {row["state"] for row in seen} == {DISARMED, ARMED, TRIPPED}
-    assert {row["index_latched"] for row in seen} == {0, 1}
-    assert {WAITING, DONE} <= {row.get("capture_state") for row in seen}
     assert host.refused
     assert set(host.refused) == {FAILURE}
-    assert set(host.pulses) == {(pulse, sign) for pulse in (0, 1) for sign in (0, 1)}
+    assert {row["referenced"] for row in seen} == {0, 1}
 
 
 @cocotb.test()

@@ -33,7 +33,7 @@ class HomeCard:
             self._said.set_text(f"It waits for {view.homing}.")
         else:
             homed = view.status and view.status.referenced
-            self._said.set_text("The index was found." if homed else "The index was not found yet.")
+            self._said.set_text("It is homed." if homed else "It is not homed yet.")
 
     def _press(self) -> None:
         if self._driver.view.homing:

@@ -10,6 +10,7 @@ from hardwall.host.connect import connect
 from hardwall.host.errors import NotReadyError, TrippedError
 from hardwall.host.heartbeat import LEASE_S
 from hardwall.host.status import State, Status
+from stimuli.processes import wait_until
 from stimuli.virtual_boards import NETLIST_PACE, PACE, SCENE, SMALL, VirtualBoard, running
 
 WALL_M, STIFFNESS_N_PER_M = 1e-3, 2000.0
@@ -167,7 +168,17 @@ def test_what_cannot_be_armed_says_why(virtual, axis):
 def test_the_index_becomes_the_origin(virtual, axis):
     with pytest.raises(TimeoutError, match=r"in 0.2 s there was not the index: move the handle over it"):
         axis.home(seconds=0.2)
-    # The hand holds it at places of the world, and there is an index every 4 mm.
+    # The hand holds it at places of the world, and there is an index every 4 mm. One that is found by chance, behind a
+    # homing that did not end, is no reference.
+    virtual.order("hold 7")
+    wait_until(lambda: axis.sleep(0.05) or axis.read("index_latched"))
+    axis.supervisor.reference = 1
+    with pytest.raises(NotReadyError, match="it needs its reference: home it first"):
+        axis.arm()
+    axis.supervisor.reference = 0
+    virtual.order("hold -1")
+    axis.sleep(0.3)
+    rests(axis)
     virtual.order("hold 7")
     position_m = axis.home(0.1, PATIENCE_S)
     assert position_m == pytest.approx(rests(axis).position_m, abs=2e-5)

@@ -313,21 +313,6 @@ def test_a_time_that_is_none_is_refused(board, axis, seconds):
     assert len(board.requests) == before
 
 
-def test_a_homing_that_did_not_end_is_no_reference(board, supervised, axis):
-    axis.supervisor.reference = 1
-    board.show(index_armed=1, index_latched=0)
-    with pytest.raises(TimeoutError):
-        axis.home(seconds=0.05)
-    # The handle comes over the index later, by chance.
-    board.show(index_armed=0, index_latched=1)
-    with pytest.raises(NotReadyError, match="it needs its reference: home it first"):
-        axis.arm()
-    assert "arm" not in supervised.heard
-    axis.home(seconds=PATIENCE_S)
-    axis.arm()
-    assert supervised.state == State.ARMED
-
-
 def test_what_is_latched_is_acknowledged_exactly_as_it_is_read(board, supervised, axis):
     board.show(state=State.TRIPPED, latched=5, first=1)
     acknowledged = []

@@ -19,6 +19,7 @@ class Follower:
 
     Attributes:
         supervisor: the supervisor's state.
+        referenced: whether the count was preloaded since the index was found.
         inverted: whether the sign of the drive's pins is to be reversed.
         reached: every cause that was latched so far.
     """
@@ -27,18 +28,19 @@ class Follower:
         self._design = design
         self._monitors, self.supervisor = monitors.START, supervisor.START
         self._pins = [{name: int(name in high) for name in PINS}] * (SYNCHRONISER + 1)
-        self.inverted = self.reached = self._encoder_inverted = 0
+        self.referenced = self.inverted = self.reached = self._encoder_inverted = 0
 
     def restart(self, given: dict[str, int]) -> None:
         """Advance by a clock edge under reset, which the synchronisers of the pins do not have."""
         self._pins = [*self._pins[1:], {name: given[name] for name in PINS}]
         self._monitors, self.supervisor = monitors.START, supervisor.START
-        self.inverted = self._encoder_inverted = 0
+        self.referenced = self.inverted = self._encoder_inverted = 0
 
     def wanted(self) -> dict[str, int]:
         """Return the outputs now, by name."""
         shown = {name: getattr(self.supervisor, name) for name in SHOWN}
-        return shown | {"a_channel_idle": self._monitors.a_channel_idle, "drive_inverted": self.inverted}
+        own = {"referenced": self.referenced, "drive_inverted": self.inverted}
+        return shown | own | {"a_channel_idle": self._monitors.a_channel_idle}
 
     def level(self, pin: str) -> int:
         """Return the level of a pin as the axis sees it at the next edge."""
@@ -66,8 +68,10 @@ class Follower:
             self._encoder_inverted, own["disarm"] = given["encoder_invert"], 1
         heard = supervisor.Inputs(**own | {
             "strobe": shown["sampled"], "drive": shown["drive"], "causes": causes, "stamp": shown["stamp"],
-            "enable": level["drive_enable"], "referenced": shown["index_latched"],
+            "enable": level["drive_enable"], "referenced": self.referenced,
         })  # fmt: skip
+        if given["index_arm"] or (given["preload"] and shown["index_latched"]):
+            self.referenced = int(not given["index_arm"])
         if self.supervisor.state != supervisor.ARMED:
             self.inverted = given["drive_invert"]
         self._monitors = monitors.step(self._design.monitors.params, self._monitors, seen)

@@ -134,7 +134,7 @@ def test_a_clock_that_stands_leaves_no_drive(board, host):
 
 @pytest.fixture(params=STAGES)
 def staged(request):
-    with VirtualBoard(load("seed-2011", SLOW | STAGES[request.param])) as virtual:
+    with VirtualBoard(load("seed-2011", SCENE | STAGES[request.param])) as virtual:
         yield virtual
 
 

@@ -250,7 +250,7 @@ def test_the_index_becomes_the_origin_and_the_first_one_again(tab):
     wait_until(lambda: "move the handle over it" in card.inner_text())
     with tab.dragged(4):
         wait_until(lambda: "it is homed: the handle is at" in tab.text("said"))
-    wait_until(lambda: "The index was found." in card.inner_text())
+    wait_until(lambda: "It is homed." in card.inner_text())
     at_mm = float(re.search(r"at (-?[\d.e-]+) mm", tab.text("said"))[1])
     assert abs(at_mm) < 9
     # What the hand holds is in the board's positions, which have moved.
