@@ -70,8 +70,7 @@ def build(spec: AxisSpec, baud: int | None = None, family: str | None = None) ->
     options += (f"-DSTAGE_{spec.stage.name.upper()}",)
     if family is not None:
         mapped = netlist.mapped(board, FAMILIES[family], "board")
-        verilog, options = f"{mapped.gates}
-{mapped.models}", (*options, *netlist.OPTIONS)
+        verilog, options = f"{mapped.gates}\n{mapped.models}", (*options, *netlist.OPTIONS)
     ours = {path.name: path.read_text(encoding="utf-8") for path in (AROUND, AMPLIFIERS, SHIM)}
     files = {"board.v": verilog, **ours}
     return shared_library.build(Recipe(files, SHIM.name, "Vboard", options))
