@@ -28,7 +28,9 @@ STAGES = {
     | {"drive.stage": "dac", "drive.dac_bits": 16, "drive.dac_serial_hz": 2_000_000, "drive.offset_v": 0.01}
     | {"drive.dac_header_bits": 8, "drive.dac_header": 3, "drive.dac_mode": 1, "drive.dac_setup": [0x040168]},
 }
-"""The drive stages: at a clock of 4 MHz a sample has two periods of the bridge."""
+"""The drive stages; a sample has two periods of the bridge."""
+FINE = {"controller.clock_hz": 4_000_000}
+"""A clock that leaves the bridge steps as fine as a steady contact needs."""
 WALL_M = 1e-3
 """The wall, behind the count 0, which is where the board is powered up."""
 
@@ -134,7 +136,7 @@ def test_a_clock_that_stands_leaves_no_drive(board, host):
 
 @pytest.fixture(params=STAGES)
 def staged(request):
-    with VirtualBoard(load("seed-2011", SCENE | STAGES[request.param])) as virtual:
+    with VirtualBoard(load("seed-2011", SCENE | FINE | STAGES[request.param])) as virtual:
         yield virtual
 
 
