@@ -132,10 +132,14 @@ def _run(board: VirtualBoard, line: Line, pace: _Pace, counts: _Counts | None) -
         return board.handle.time_s - begun_s, time.monotonic() - began
 
     while board.handle.time_s - begun_s < pace.seconds - GRASP_S / 2:
+        # What an order does lasts a run at least, before the next order.
+        text = None
         while True:
             simulated_s, real_s = passed()
             ahead_s = simulated_s / pace.speed - real_s if pace.speed else 0.0
-            _carry(board, line, orders, min(max(ahead_s, 0.0), LOOK_S))
+            _carry(board, line, min(max(ahead_s, 0.0), LOOK_S))
+            if text is None and (text := orders.take()) is not None:
+                _obey(board, line, text)
             if ahead_s <= 0:
                 break
         if not board.run():
@@ -154,14 +158,12 @@ def _run(board: VirtualBoard, line: Line, pace: _Pace, counts: _Counts | None) -
     print(f"{simulated_s:g} s in {real_s:.3g} s: {simulated_s / real_s:.2f} of real time")
 
 
-def _carry(board: VirtualBoard, line: Line, orders: _Orders, wait_s: float) -> None:
-    """Wait for a host for some time; carry its bytes to the board, unless many wait there already, and an order."""
+def _carry(board: VirtualBoard, line: Line, wait_s: float) -> None:
+    """Wait for a host for some time, and carry its bytes to the board, unless many wait there already."""
     if board.hardware.waiting < WAITING_MAX:
         board.hardware.send(line.take(wait_s))
     else:
         time.sleep(wait_s)
-    if (text := orders.take()) is not None:
-        _obey(board, line, text)
 
 
 def _obey(board: VirtualBoard, line: Line, text: str) -> None:
