@@ -19,10 +19,8 @@ from stimuli import frames
 from stimuli.restless import Restless
 from stimuli.specs import spec
 
-CLOCKS = max(SAMPLES, 80_000)
-"""Fewer clocks do not reach every case."""
-LONGEST = 5
-"""How often as many clocks are, at most, for the cases that are still not reached."""
+CLOCKS, LONGEST = max(SAMPLES, 30_000), 10
+"""Clocks of the campaign; and how often as many are, at most, for the cases that are still not reached."""
 SHOWN = "stamp", "capture_stamp"
 """The first and the last status that a host of a capture looks at."""
 LOOKS = ("drive", "capture_stamp"), ("index_latched", "first")

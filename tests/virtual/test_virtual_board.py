@@ -21,7 +21,6 @@ STEP_S = 2e-4
 """The time between two looks."""
 VOLTS = {"drive.newtons_per_volt": 4.0, "drive.full_scale_v": 12.0}
 STAGES = {
-    "pdm": {},
     "pdm of volts": VOLTS | {"drive.stage": "pdm"},
     "pwm": VOLTS | {"drive.stage": "pwm", "drive.pwm_hz": 20_000, "drive.dead_time_s": 1e-6, "drive.inverted": True},
     "dac": VOLTS
