@@ -112,6 +112,7 @@ async def a_random_host_at_a_random_handle(dut):
             await random_live_word(host)
         elif act < 0.9:
             await random_capture(host)
+            seen.append(await host.look(*LOOKS[0]))
         else:
             await host.write(disarm=1)
     assert lacks(host, seen) == []
