@@ -73,10 +73,10 @@ async def random_capture(host: Host) -> None:
 def lacks(host: Host, seen: list[dict[str, int]]) -> list[str]:
     """Return the cases that a campaign has not reached yet."""
     cases = {
-        "states": {DISARMED, ARMED, TRIPPED} <= {row["state"] for row in seen},
-        "index": {0, 1} <= {row["index_latched"] for row in seen},
+        "states": {DISARMED, ARMED, TRIPPED} == {row["state"] for row in seen},
+        "index": {0, 1} == {row["index_latched"] for row in seen},
         "captures": {WAITING, DONE} <= {row.get("capture_state") for row in seen},
-        "pulses": {(pulse, sign) for pulse in (0, 1) for sign in (0, 1)} <= set(host.pulses),
+        "pulses": {(pulse, sign) for pulse in (0, 1) for sign in (0, 1)} == set(host.pulses),
     }
     return [name for name, reached in cases.items() if not reached]
 
