@@ -67,7 +67,6 @@ class Axis(Named):
         # Whether a disarming has begun since the last arming did. There is no lock, for one who ends this program must
         # not wait for a thread that is held up in `arm`.
         self._called_off = False
-        # Whether the board was told to wait for its index, and no origin has been made of it.
         beat = Beat(port, device.registers["heartbeat"])
         self._lease_s = LEASE_S / port.pace
         self._heartbeat = Heartbeat(beat, self._words.written("supervisor_watchdog"), self._lease_s)
