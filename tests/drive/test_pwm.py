@@ -100,22 +100,25 @@ def test_the_difference_of_the_legs_is_the_drive_in_every_period(name, negative)
 @pytest.mark.parametrize("name", NAMES)
 def test_the_gates_are_off_one_clock_after_the_axis_is_not_armed_and_at_once_without_permission(name):
     d = design(name)
-    state = d.start
-    for wait in range(d.period + 7):
-        for _ in range(d.latency + wait):
-            state = pwm.step(d.params, state, Inputs(d.magnitude.max // 2, 0, 1))
-        assert not any(pwm.pins(d, state, 0).values())
-        state = pwm.step(d.params, state, Inputs(d.magnitude.max // 2, 0, 0))
-        assert not any(pwm.pins(d, state, 1).values())
+    armed, on = d.start, 0
+    for _ in range(d.latency + 2 * d.period):
+        armed = pwm.step(d.params, armed, Inputs(d.magnitude.max // 2, 0, 1))
+        on += any(pwm.pins(d, armed, 1).values())
+        assert not any(pwm.pins(d, armed, 0).values())
+        # From here it is not ARMED.
+        off = pwm.step(d.params, armed, Inputs(d.magnitude.max // 2, 0, 0))
+        assert not any(pwm.pins(d, off, 1).values())
+    assert on > d.period
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_drive_comes_at_the_latest_when_the_latency_says(name):
     d, waits = design(name), []
-    for phase in range(d.period):
-        state = d.start
-        for _ in range(2 * d.period + phase):
-            state = pwm.step(d.params, state, Inputs(0, 0, 1))
+    rest = d.start
+    for _ in range(2 * d.period):
+        rest = pwm.step(d.params, rest, Inputs(0, 0, 1))
+    for _ in range(d.period):
+        rest = state = pwm.step(d.params, rest, Inputs(0, 0, 1))
         clocks = 0
         while not state.a.high:
             state, clocks = pwm.step(d.params, state, Inputs(d.magnitude.max, 0, 1)), clocks + 1
