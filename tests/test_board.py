@@ -143,7 +143,7 @@ async def an_open_loop_stops_the_pulses(dut):
     for loop in LOOPS:
         await host.arm()
         await host.edges(host.settling)
-        assert (await host.look())["driven"] == -most
+        assert host.shown()["driven"] == -most
         while not int(dut.drive_pdm.value):
             await host.edges(1)
         # The pin falls between two edges, and the pulse with it; a fault of the amplifier comes through the supervisor.

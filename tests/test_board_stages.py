@@ -45,7 +45,7 @@ class Pusher:
         await host.write(drive_invert=inverted)
         await host.arm()
         await host.edges(host.settling + host.board.stage.latency)
-        assert (await host.look())["driven"] == -host.twin.spec.force_limit_word
+        assert host.shown()["driven"] == -host.twin.spec.force_limit_word
         while self.is_safe:
             await host.edges(1)
 

@@ -1,6 +1,7 @@
-"""The quick ones of the proofs, each with its bugs, and the means: `make prove` proves everything."""
+"""The quick ones of the proofs, each with one of its bugs, and the means: `make prove` proves everything with all."""
 
 import inspect
+from dataclasses import replace
 from itertools import product
 
 import prove
@@ -47,10 +48,10 @@ def test_every_property_has_a_bug_and_a_name_of_its_own():
 
 
 @pytest.mark.parametrize("known", QUICK, ids=[known.name for known in QUICK])
-def test_is_proven_and_its_bugs_are_found(known):
-    (outcome,) = run([known], lambda _: None)
+def test_is_proven_and_a_bug_is_found(known):
+    (outcome,) = run([replace(known, bugs=known.bugs[:1])], lambda _: None)
     assert outcome.verdict.proved, outcome.explanation
-    assert [verdict.refuted for verdict in outcome.bugs] == [True] * len(known.bugs)
+    assert [verdict.refuted for verdict in outcome.bugs] == [True]
 
 
 @pytest.mark.parametrize("known", QUICK, ids=[known.name for known in QUICK])

@@ -232,6 +232,7 @@ class Host:
     async def arm(self) -> None:
         """Beat, acknowledge what is latched, and arm."""
         await self.write(heartbeat=self.server.file.active["heartbeat"] + 1 & 0xFFFF)
-        await self.write(acknowledged=(await self.look())["latched"])
-        await self.write(acknowledge=1, clear_flags=1)
+        if latched := self.shown()["latched"]:
+            await self.write(acknowledged=latched)
+            await self.write(acknowledge=1, clear_flags=1)
         await self.write(arm=1)
