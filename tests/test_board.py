@@ -19,7 +19,7 @@ from stimuli import frames
 from stimuli.restless import Restless
 from stimuli.specs import spec
 
-CLOCKS, LONGEST = max(SAMPLES, 30_000), 10
+CLOCKS, LONGEST = 3 * SAMPLES // 10, 10
 """Clocks of the campaign; and how often as many are, at most, for the cases that are still not reached."""
 SHOWN = "stamp", "capture_stamp"
 """The first and the last status that a host of a capture looks at."""

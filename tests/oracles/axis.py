@@ -1,6 +1,7 @@
 """An axis clock for clock from the models of its blocks: decoder, estimator, wall and output stage."""
 
 from collections.abc import Callable
+from operator import attrgetter
 
 from hardwall.model import output, quadrature, wall
 from hardwall.model.estimators.estimate import estimate
@@ -12,6 +13,9 @@ DECODED = (
     "index_latched", "stamp", "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall",
 )  # fmt: skip
 """Outputs of an axis that are its decoder's, by the same names."""
+OWN = "drive", "sampled_count", "velocity", "wall_force", "flags"
+OWN_OF, DECODED_OF = attrgetter(*OWN), attrgetter(*DECODED)
+NO_PULSES = dict.fromkeys(("sampled", "actuated", "estimated", "saturated", "strobe_busy"), 0)
 
 
 class AxisTwin:
@@ -65,10 +69,10 @@ class AxisTwin:
 
     def outputs(self) -> dict[str, int]:
         """Return every output of the axis now, by name."""
-        own = {name: getattr(self, name) for name in ("drive", "sampled_count", "velocity", "wall_force", "flags")}
-        pulses = dict.fromkeys(("sampled", "actuated", "estimated", "saturated", "strobe_busy"), 0)
-        decoded = {name: getattr(self.decoder, name) for name in DECODED} | {"edge_kind": self.decoder.edge}
-        return {**own, **decoded, **pulses, **self.pulses.get(self.clocks, {}), "commit_pending": int(self.pending)}
+        own = dict(zip(OWN, OWN_OF(self), strict=True))
+        decoded = dict(zip(DECODED, DECODED_OF(self.decoder), strict=True))
+        decoded["edge_kind"] = self.decoder.edge
+        return {**own, **decoded, **NO_PULSES, **self.pulses.get(self.clocks, {}), "commit_pending": int(self.pending)}
 
     def _sample(self) -> None:
         d, decoder, now = self.design, self.decoder, self.clocks

@@ -51,6 +51,8 @@ STAGES: dict[str, Stage] = {
     ),
 }
 """Drive stages that the axes with 40 N may have at this clock."""
+CAPTURED = tuple(name for name in capture.Inputs._fields if name.startswith("capture_"))
+"""Inputs of the capture memory that come from the host."""
 KERNELS = {"pdm": pdm, "pwm": pwm, "dac": dac}
 
 
@@ -135,22 +137,23 @@ class Twin(AxisTwin):
         """Advance by one clock edge, with the pins, what the link asks, and what the axis shows just before it."""
         supervisor = self.follower.supervisor
         self._capture(asked, seen["sampled"])
-        given = {
+        staging = {
             "strobe": self.actuated,
             "magnitude": supervisor.magnitude,
             "negative": supervisor.negative ^ self.follower.inverted,
             "armed": int(supervisor.state == ARMED),
         }
         kinds = self.stage.Inputs
-        inputs = kinds(**{name: value for name, value in given.items() if name in kinds._fields})
+        inputs = kinds(**{name: staging[name] for name in kinds._fields})
         self.staged = self.stage.step(self.spec.drive.params, self.staged, inputs)
         self.actuated = seen["actuated"]
 
         enabled = self.follower.level("drive_enable")
-        self.follower.edge({**pins, **asked}, seen)
+        given = pins | asked
+        self.follower.edge(given, seen)
         if self.strobe and self.pending:
             assert self.asked.items() <= asked.items(), "words moved before the axis had them"
-        self.advance({**pins, **asked}, enabled)
+        self.advance(given, enabled)
         if asked["commit"]:
             self.asked = {name: asked[name] for name in self.words if name in asked}
 
@@ -162,11 +165,19 @@ class Twin(AxisTwin):
         """Advance the capture memory by one clock edge."""
         narrowed = self.design.estimator.velocity.width - self.captures.velocity.width
         supervisor = self.follower.supervisor
-        taken = {"count": self.sampled_count, "velocity": self.velocity >> narrowed, "wall_force": self.wall_force}
-        taken |= {"sampled": sampled, "flags": self.flags, "stamp": self.decoder.stamp}
-        taken |= {name: getattr(supervisor, name) for name in ("driven", "state", "live")}
-        taken |= {name: asked[name] for name in capture.Inputs._fields if name in asked}
-        self.captured = capture.step(self.captures.params, self.memory, self.captured, capture.Inputs(**taken))
+        taken = capture.Inputs(
+            **{name: asked[name] for name in CAPTURED},
+            count=self.sampled_count,
+            velocity=self.velocity >> narrowed,
+            wall_force=self.wall_force,
+            sampled=sampled,
+            flags=self.flags,
+            stamp=self.decoder.stamp,
+            driven=supervisor.driven,
+            state=supervisor.state,
+            live=supervisor.live,
+        )
+        self.captured = capture.step(self.captures.params, self.memory, self.captured, taken)
 
     def window(self) -> list[int]:
         """Return the registers of the frozen ring, the oldest record first."""

@@ -1,5 +1,7 @@
 """Monitors and supervisor beside a supervised axis: from what the axis shows and the host asks, what must come out."""
 
+from operator import attrgetter, itemgetter
+
 from hardwall.hdl.supervised import COMPLEMENTS, LOOPS, SHOWN
 from hardwall.model import monitors, supervisor
 from hardwall.model.supervised import FROM_AXIS, FROM_OUTSIDE, Design
@@ -8,6 +10,13 @@ from hardwall.model.supervisor import CAUSES
 SYNCHRONISER = 2
 PINS = ("encoder_a", "encoder_b", *COMPLEMENTS, *LOOPS)
 BITS = {cause.name: 1 << bit for bit, cause in enumerate(CAUSES)}
+SHOWING = attrgetter(*SHOWN)
+OTHERS = *FROM_AXIS, *FROM_OUTSIDE
+WATCHED = "count", "stepped", "edge_kind", "indexed", "velocity", "saturated", "negative"
+"""Inputs of the monitors that the axis shows by the same names."""
+OWN = "strobe", "drive", "causes", "stamp", "enable", "referenced"
+HEARD = tuple(name for name in supervisor.Inputs._fields if name not in OWN)
+"""Inputs of the supervisor: those from the axis around it, and the host's."""
 
 
 class Follower:
@@ -29,6 +38,8 @@ class Follower:
         self._monitors, self.supervisor = monitors.START, supervisor.START
         self._pins = [{name: int(name in high) for name in PINS}] * (SYNCHRONISER + 1)
         self.referenced = self.inverted = self.reached = self._encoder_inverted = 0
+        self._asked = itemgetter(*(word.name for word in design.monitors.words), *design.ranges, *HEARD)
+        self._last: tuple[int, ...] = ()
 
     def restart(self, given: dict[str, int]) -> None:
         """Advance by a clock edge under reset, which the synchronisers of the pins do not have."""
@@ -38,7 +49,7 @@ class Follower:
 
     def wanted(self) -> dict[str, int]:
         """Return the outputs now, by name."""
-        shown = {name: getattr(self.supervisor, name) for name in SHOWN}
+        shown = dict(zip(SHOWN, SHOWING(self.supervisor), strict=True))
         own = {"referenced": self.referenced, "drive_inverted": self.inverted}
         return shown | own | {"a_channel_idle": self._monitors.a_channel_idle}
 
@@ -50,26 +61,23 @@ class Follower:
         """Advance by a clock edge, with the inputs just before it, and what the axis shows then."""
         self._pins = [*self._pins[1:], {name: given[name] for name in PINS}]
         level = self._pins[0]
-        own = {name: shown[name] for name in monitors.Inputs._fields if name in shown}
-        own |= {word.name: given[word.name] for word in self._design.monitors.words}
-        seen = monitors.Inputs(**own | {
+        if (asked := self._asked(given)) != self._last:
+            self._last = asked
+            self._take(given)
+        seen = self._watched._replace(**{name: shown[name] for name in WATCHED}, **{
             "valid": shown["estimated"], "at_limit": self.supervisor.at_limit,
             "a": level["encoder_a"], "a_n": level["encoder_a_n"], "b": level["encoder_b"], "b_n": level["encoder_b_n"],
         })  # fmt: skip
         stands = {"encoder_illegal": shown["illegal"], "encoder_overspeed": shown["overspeed"]}
-        ranges = self._design.ranges.items()
-        beyond = any(not least <= given[name] <= most for name, (least, most) in ranges)
-        stands |= {"strobe_busy": shown["strobe_busy"], "word_range": beyond}
+        stands |= {"strobe_busy": shown["strobe_busy"], "word_range": self._beyond}
         stands |= {"external_fault": not level["external_fault"], "emergency_stop": not level["emergency_stop"]}
-        assert set(stands) == {*FROM_AXIS, *FROM_OUTSIDE}
-        causes = self._monitors.causes | sum(BITS[name] for name, present in stands.items() if present)
-        own = {name: given[name] for name in supervisor.Inputs._fields if name in given}
+        causes = self._monitors.causes | sum(BITS[name] for name in OTHERS if stands[name])
+        heard = self._heard._replace(
+            strobe=shown["sampled"], drive=shown["drive"], causes=causes, stamp=shown["stamp"],
+            enable=level["drive_enable"], referenced=self.referenced,
+        )  # fmt: skip
         if given["commit"] and given["encoder_invert"] != self._encoder_inverted:
-            self._encoder_inverted, own["disarm"] = given["encoder_invert"], 1
-        heard = supervisor.Inputs(**own | {
-            "strobe": shown["sampled"], "drive": shown["drive"], "causes": causes, "stamp": shown["stamp"],
-            "enable": level["drive_enable"], "referenced": self.referenced,
-        })  # fmt: skip
+            self._encoder_inverted, heard = given["encoder_invert"], heard._replace(disarm=1)
         if given["index_arm"] or (given["preload"] and shown["index_latched"]):
             self.referenced = int(not given["index_arm"])
         if self.supervisor.state != supervisor.ARMED:
@@ -77,3 +85,10 @@ class Follower:
         self._monitors = monitors.step(self._design.monitors.params, self._monitors, seen)
         self.supervisor = supervisor.step(self._design.supervisor.params, self.supervisor, heard)
         self.reached |= self.supervisor.latched
+
+    def _take(self, given: dict[str, int]) -> None:
+        """Make what follows from the host's words alone, which few edges see changed."""
+        self._watched = monitors.Inputs(**{word.name: given[word.name] for word in self._design.monitors.words})
+        self._heard = supervisor.Inputs(**{name: given[name] for name in HEARD})
+        ranges = self._design.ranges.items()
+        self._beyond = any(not least <= given[name] <= most for name, (least, most) in ranges)
