@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from ...model.checks import shown
-from ..rtl.board_library import NETLISTS
+from ..rtl.families import FAMILIES
 from ..scene.load import load
 from ..virtual.orders import ORDERS, OrderError, obey
 from ..virtual.serial_port import Line
@@ -53,7 +53,7 @@ def command(
         str | None,
         typer.Option(
             metavar="FAMILY",
-            help=f"the board's netlist on a family of FPGAs, {', '.join(NETLISTS)}; much slower",
+            help=f"the board's netlist on a family of FPGAs, {', '.join(FAMILIES)}; much slower",
             show_default="its Verilog",
         ),
     ] = None,
@@ -61,8 +61,8 @@ def command(
     within(speed, "--speed", 0.0, 1000.0, "s/s")
     if seconds is not None:
         within(seconds, "--seconds", 0.0, 1e6, "s")
-    if netlist is not None and netlist not in NETLISTS:
-        raise BadInput(f"--netlist must be one of {', '.join(NETLISTS)}, not {shown(netlist)}")
+    if netlist is not None and netlist not in FAMILIES:
+        raise BadInput(f"--netlist must be one of {', '.join(FAMILIES)}, not {shown(netlist)}")
     of = load(scene, changes_of(set_, controller__estimator=estimator))
     with Line(tcp) as line, VirtualBoard(of, baud, netlist) as board:
         # The first call compiles, for which no host would wait.

