@@ -68,8 +68,7 @@ class Axis(Named):
         # not wait for a thread that is held up in `arm`.
         self._called_off = False
         beat = Beat(port, device.registers["heartbeat"])
-        self._lease_s = LEASE_S / port.pace
-        self._heartbeat = Heartbeat(beat, self._words.written("supervisor_watchdog"), self._lease_s)
+        self._heartbeat = Heartbeat(beat, self._words.written("supervisor_watchdog"))
 
     def __enter__(self) -> "Axis":
         return self
@@ -166,9 +165,13 @@ class Axis(Named):
         """
         self._let_go()
         self._heartbeat.watchdog_s = self._words.written("supervisor_watchdog")
-        self._heartbeat.renew()
+        self._heartbeat.renew(self._lease_s)
         if self._heartbeat.lost:
             raise self._heartbeat.lost
+
+    @property
+    def _lease_s(self) -> float:
+        return LEASE_S / self._port.pace
 
     def sleep(self, seconds: float) -> None:
         """Wait, and live meanwhile.

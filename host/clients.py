@@ -13,10 +13,8 @@ from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException
 
+from ..model.link.told_pace import NETWORK
 from .errors import PortError
-
-NETWORK = "tcp://"
-"""How the name of a port of the network begins."""
 
 # Every failure is an exception here: what the library says of it besides is said twice.
 logging.getLogger("pymodbus.logging").setLevel(logging.CRITICAL)

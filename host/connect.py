@@ -7,7 +7,7 @@ from .port import ANSWER_S, BAUD, Port
 
 
 def connect(
-    name: str, baud: int = BAUD, answer_s: float = ANSWER_S, identity: str | None = None, pace: float = 1.0
+    name: str, baud: int = BAUD, answer_s: float = ANSWER_S, identity: str | None = None, pace: float | None = None
 ) -> Axis:
     """Return the axis of the board at a port, which no other program can use meanwhile. Nothing moves.
 
@@ -17,7 +17,8 @@ def connect(
         answer_s: the time behind which a board without an answer is silent, in the board's time.
         identity: the identity that the board must have; None for any.
         pace: of a simulation that is slower than a board, its seconds in a second, or fewer: every wait for it, and the
-            lease of the application, is longer by that.
+            lease of the application, is longer by that. None: what a virtual board on this machine tells, whenever it
+            changes; and 1 of any other.
 
     Raises:
         FieldError: if a number is out of its range.

@@ -69,21 +69,23 @@ class Heartbeat:
     Args:
         beat: sends one beat; what it raises is kept in `lost` until a beat succeeds.
         watchdog_s: as below.
-        lease_s: how long it goes on after a renewal.
 
     Attributes:
         watchdog_s: the board's watchdog; `BEATS` beats are sent in it.
         lost: why the last beat did not reach the board; None if it did.
     """
 
-    def __init__(self, beat: Callable[[], None], watchdog_s: float, lease_s: float = LEASE_S):
-        self._beat, self._until_s, self.watchdog_s, self._lease_s = beat, 0.0, watchdog_s, lease_s
+    def __init__(self, beat: Callable[[], None], watchdog_s: float):
+        self._beat, self._until_s, self.watchdog_s = beat, 0.0, watchdog_s
         self._ended, self._thread = threading.Event(), threading.Thread(target=self._run, daemon=True)
         self.lost: HostError | None = None
         self._thread.start()
 
-    def renew(self) -> None:
+    def renew(self, lease_s: float = LEASE_S) -> None:
         """Let the heartbeat go on for another lease; if it had ended, a beat is sent before this returns.
+
+        Args:
+            lease_s: how long it goes on.
 
         Raises:
             HostError: if the beat cannot be sent.
@@ -91,7 +93,7 @@ class Heartbeat:
         if not self.beats:
             self._beat()
             self.lost = None
-        self._until_s = time.monotonic() + self._lease_s
+        self._until_s = time.monotonic() + lease_s
 
     @property
     def beats(self) -> bool:

@@ -13,6 +13,7 @@ from pymodbus.pdu import ModbusPDU
 from ..model.checks import check_int, check_range
 from ..model.link.line import FRAME_MAX
 from ..model.link.server import FAILURE, READ_MAX, VALUE, WRITE_MAX
+from ..model.link.told_pace import PACE_LEAST, Told
 from .clients import client_of, reason
 from .errors import ForeignError, PortError, RefusedError, SilentError
 
@@ -28,8 +29,6 @@ BRIDGE_S = 0.016
 """The time for which a USB bridge keeps what it has received, unless its driver is told otherwise."""
 MACHINE_S = 0.02
 """The time for which this machine may keep an answer, or a request, while it does something else."""
-PACE_LEAST = 1e-3
-"""The slowest board, in its seconds in a second."""
 TRIES = 5
 """Attempts to find the beginning of an answer again."""
 PAUSE_S = 0.025
@@ -52,27 +51,30 @@ class Port:
         name: a serial port's path, or tcp://HOST:PORT.
         baud: the rate of a serial port.
         answer_s: how long an answer is waited for in all, in the board's time.
-        pace: seconds of the board in a second, or fewer; 1 but for simulations.
+        pace: seconds of the board in a second, or fewer; None: what a virtual board tells, and 1 of any other.
 
     Attributes:
-        name, pace: as given.
+        name: as given.
 
     Raises:
         FieldError: if a number is out of its range.
         PortError: if the port cannot be had.
     """
 
-    def __init__(self, name: str, baud: int = BAUD, answer_s: float = ANSWER_S, pace: float = 1.0):
+    def __init__(self, name: str, baud: int = BAUD, answer_s: float = ANSWER_S, pace: float | None = None):
         check_int("baud", baud, 1, BAUD_MAX)
         check_range("answer_s", answer_s, ANSWER_S_LEAST, ANSWER_S_MOST)
-        check_range("pace", pace, PACE_LEAST, 1.0)
-        self.name, self.pace, self._baud, self._answer_s = name, pace, baud, answer_s / pace
+        if pace is not None:
+            check_range("pace", pace, PACE_LEAST, 1.0)
+        self.name, self._given, self._baud, self._board_s = name, pace, baud, answer_s
+        self._told = Told(name)
         self._client, self._in_step, self._gone = client_of(name, baud, self._answer_s), False, False
         # Whether it has ever been in step; and when something was last sent, of which the board may await the rest.
         self._known, self._sent_s = False, time.monotonic()
         try:
             self._client.connect()
         except (OSError, ValueError, OverflowError) as error:
+            self._told.close()
             raise PortError(f"{name} cannot be opened: {reason(error)}") from None
         # A request that waits in a thread of its own is not torn by an interrupt, and none overtakes another.
         self._turns = ThreadPoolExecutor(1, "hardwall-port")
@@ -82,6 +84,16 @@ class Port:
         self._gone = True
         self._turns.shutdown()
         self._client.close()
+        self._told.close()
+
+    @property
+    def pace(self) -> float:
+        """The seconds of the board in a second, or fewer: what was given, or else what it tells now."""
+        return self._told.pace if self._given is None else self._given
+
+    @property
+    def _answer_s(self) -> float:
+        return self._board_s / self.pace
 
     def read(self, address: int, count: int) -> tuple[int, ...]:
         """Return successive registers, in as many requests as they need.

@@ -1,5 +1,6 @@
 """The quick ones of the netlists beside their RTL, and the means: `make gate` simulates every netlist."""
 
+import ctypes
 import re
 from dataclasses import replace
 
@@ -10,11 +11,27 @@ from gates import run
 from gates.run import Case, Outcome, compared
 from gates.tops import SMALL, TOPS
 from hardwall.sim.boards.parts import PARTS
+from hardwall.sim.rtl import netlist, shared_library
 from hardwall.sim.rtl.families import FAMILIES
-from hardwall.sim.rtl.netlist import Netlist, mapped
+from hardwall.sim.rtl.netlist import GATES, Netlist, mapped
 
 ECP5 = FAMILIES["ecp5"]
 CELLS, AXIS, SMALLEST = (Case(ECP5, top) for top in (TOPS[0], TOPS[1], SMALL))
+FIRST = """\
+#include "Vgates__ALL.cpp"
+extern "C" uint32_t found(uint32_t a, uint32_t b) {
+    VerilatedContext context;
+    Vgates top{&context};
+    top.a = a;
+    top.b = b;
+    top.write = 1;
+    top.eval();
+    top.clk = 1;
+    top.eval();
+    return top.found;
+}
+"""
+"""What the netlist of `SMALL` finds of inputs that it has before anything is evaluated."""
 
 
 def netlist_of(case: Case) -> Netlist:
@@ -61,6 +78,17 @@ def test_registers_without_a_value_at_power_up_are_found():
     # Nothing is reset for a while, and the first clock edge finds what power-up left.
     assert outcome.different > 0
     assert outcome.first == 0
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_first_evaluation_leaves_the_inputs_as_they_are(family):
+    """In the gate there is none that has inputs; on a virtual board the first one has the reset."""
+    made = netlist_of(Case(FAMILIES[family], SMALL))
+    files = {"gates.v": f"{made.gates}\n{made.models}", "first.cpp": FIRST}
+    options = ("--top-module", GATES, *netlist.OPTIONS)
+    recipe = shared_library.Recipe(files, "first.cpp", "Vgates", options, shared_library.FAST_TO_BUILD)
+    library = ctypes.CDLL(str(shared_library.build(recipe)))
+    assert library.found(0x3_5A5A, 0x0_FF00) == 0x3_5A5A ^ 0x0_FF00
 
 
 def test_netlists_are_mapped_as_the_parts_are():

@@ -19,7 +19,7 @@ def command(
     ] = None,
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
-    pace: PaceOption = 1.0,
+    pace: PaceOption = None,
     acknowledge: AcknowledgeOption = False,
     seconds: SecondsOption = None,
 ) -> None:

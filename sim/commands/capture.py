@@ -68,7 +68,7 @@ def command(
     seconds: Annotated[float, typer.Option(metavar="S", help="the longest wait")] = 60.0,
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
-    pace: PaceOption = 1.0,
+    pace: PaceOption = None,
     out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE.npz", help="file for the records")] = None,
 ) -> None:
     within(seconds, "--seconds", 0.0, 1e6, "s")

@@ -49,7 +49,7 @@ def command(
     port: PortArgument,
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
-    pace: PaceOption = 1.0,
+    pace: PaceOption = None,
     registers: Annotated[bool, typer.Option("--registers", help="every register, too")] = False,
 ) -> None:
     with axis_at(port, baud, identity, pace) as axis:

@@ -12,7 +12,7 @@ def command(
     port: PortArgument,
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
-    pace: PaceOption = 1.0,
+    pace: PaceOption = None,
     acknowledge: AcknowledgeOption = False,
 ) -> None:
     with axis_at(port, baud, identity, pace) as axis:

@@ -19,7 +19,7 @@ def command(
     at: Annotated[float, typer.Option(metavar="M", help="the position of the index, m")] = 0.0,
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
-    pace: PaceOption = 1.0,
+    pace: PaceOption = None,
     seconds: Annotated[float, typer.Option(metavar="S", help="the longest wait")] = 60.0,
 ) -> None:
     within(seconds, "--seconds", 0.0, 1e6, "s")

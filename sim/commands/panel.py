@@ -37,8 +37,6 @@ GAINS = {"levant_lambda": 3.5, "levant_alpha": 13.2, "levant_output": 1.0}
 """So too, where its estimator is Levant's: gains for accelerations of a hand, 12 m/s^2, and the smooth output. The
 paper's, for its walls, are larger."""
 LOSS = 1 << supervisor.names(supervisor.ALL).index("encoder_loss")
-PACE = 0.3
-"""Its seconds in a second, of which it may have so few beside a browser."""
 PORT_LINE = "serial port: "
 
 
@@ -54,7 +52,7 @@ def command(
     set_: SetOption = None,
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
-    pace: PaceOption = 1.0,
+    pace: PaceOption = None,
     host: Annotated[str, typer.Option(metavar="ADDRESS", help="the address at which the page is served")] = LOCAL,
     http: Annotated[int, typer.Option(min=0, max=65535, metavar="PORT", help="its port; 0 for any that is free")] = 0,
     seconds: SecondsOption = None,
@@ -119,7 +117,7 @@ class VirtualBench:
         """Start the process unless it runs; return its axis, with a wall."""
         if self._process is None or self._process.poll() is not None:
             self._start()
-        axis = connect(self._port, identity=self._identity, pace=PACE)
+        axis = connect(self._port, identity=self._identity)
         causes = int(axis.get("supervisor_causes")) | LOSS
         gains = {name: value for name, value in GAINS.items() if name in axis.names}
         axis.set(**WALL, **gains, supervisor_causes=causes)

@@ -7,8 +7,9 @@ from typing import Annotated
 import typer
 
 from ...host import Axis, Status, connect
-from ...host.port import BAUD_MAX, PACE_LEAST
+from ...host.port import BAUD_MAX
 from ...model.checks import FieldError
+from ...model.link.told_pace import PACE_LEAST
 from ..jobs import ending
 from .errors import BadInput
 from .options import within
@@ -25,17 +26,21 @@ SecondsOption = Annotated[
     float | None, typer.Option(metavar="S", help="time to run", show_default="until it is interrupted")
 ]
 PaceOption = Annotated[
-    float, typer.Option(metavar="PACE", help="seconds of a slow simulation in a second, or fewer; 1 of a board")
+    float | None,
+    typer.Option(
+        metavar="PACE", help="seconds of a slow simulation in a second, or fewer", show_default="what it tells"
+    ),
 ]
 
 
-def check_pace(pace: float) -> None:
+def check_pace(pace: float | None) -> None:
     """Raise BadInput if no board can have such a pace."""
-    within(pace, "--pace", PACE_LEAST, 1.0, "s/s")
+    if pace is not None:
+        within(pace, "--pace", PACE_LEAST, 1.0, "s/s")
 
 
 @contextmanager
-def axis_at(port: str, baud: int, identity: str | None, pace: float) -> Iterator[Axis]:
+def axis_at(port: str, baud: int, identity: str | None, pace: float | None) -> Iterator[Axis]:
     """Yield the axis at a port, and disarm and close it, also when a signal ends the program."""
     check_pace(pace)
     try:

@@ -19,7 +19,7 @@ def command(
     words: Annotated[list[str], typer.Argument(metavar="WORD=VALUE...", help="words in SI units")],
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
-    pace: PaceOption = 1.0,
+    pace: PaceOption = None,
 ) -> None:
     values = values_of(words)
     with axis_at(port, baud, identity, pace) as axis:

@@ -11,8 +11,10 @@ from typing import Annotated
 import typer
 
 from ...model.checks import shown
-from ..rtl.board_library import NETLISTS
+from ...model.link.told_pace import Teller
+from ..rtl.families import FAMILIES
 from ..scene.load import load
+from ..virtual.keeping import Keeping
 from ..virtual.orders import ORDERS, OrderError, obey
 from ..virtual.serial_port import Line
 from ..virtual.virtual_board import GRASP_S, VirtualBoard
@@ -22,8 +24,6 @@ from .terminal import log
 
 JUDGED_S = 3.0
 """The time after which the speed is told."""
-SLOW, MARGIN = 0.8, 2.0
-"""The speed below which a pace is for hosts to be told, and how much lower it is: a machine is not always as fast."""
 LOOK_S = 0.05
 """The longest wait for bytes of hosts between two looks for orders."""
 LINE_MAX = 1024
@@ -53,7 +53,7 @@ def command(
         str | None,
         typer.Option(
             metavar="FAMILY",
-            help=f"the board's netlist on a family of FPGAs, {', '.join(NETLISTS)}; much slower",
+            help=f"the board's netlist on a family of FPGAs, {', '.join(FAMILIES)}; much slower",
             show_default="its Verilog",
         ),
     ] = None,
@@ -61,8 +61,8 @@ def command(
     within(speed, "--speed", 0.0, 1000.0, "s/s")
     if seconds is not None:
         within(seconds, "--seconds", 0.0, 1e6, "s")
-    if netlist is not None and netlist not in NETLISTS:
-        raise BadInput(f"--netlist must be one of {', '.join(NETLISTS)}, not {shown(netlist)}")
+    if netlist is not None and netlist not in FAMILIES:
+        raise BadInput(f"--netlist must be one of {', '.join(FAMILIES)}, not {shown(netlist)}")
     of = load(scene, changes_of(set_, controller__estimator=estimator))
     with Line(tcp) as line, VirtualBoard(of, baud, netlist) as board:
         # The first call compiles, for which no host would wait.
@@ -71,7 +71,9 @@ def command(
         if line.tcp_port is not None:
             print(f"tcp port: 127.0.0.1:{line.tcp_port}")
         print(f"orders: {', '.join(f'{name} {order.operand}' for name, order in ORDERS.items())}", flush=True)
-        _run(board, line, _Pace(speed, math.inf if seconds is None else seconds), _Counts() if counts else None)
+        pace = _Pace(speed, math.inf if seconds is None else seconds)
+        with Teller(line.names) as teller:
+            _run(board, line, teller, pace, _Counts() if counts else None)
 
 
 @dataclass(frozen=True)
@@ -122,9 +124,9 @@ class _Orders:
                 self._rest += data or b"\n" * bool(self._rest)
 
 
-def _run(board: VirtualBoard, line: Line, pace: _Pace, counts: _Counts | None) -> None:
-    """Let the board run, and carry bytes and orders to it."""
-    orders, told = _Orders(), False
+def _run(board: VirtualBoard, line: Line, teller: Teller, pace: _Pace, counts: _Counts | None) -> None:
+    """Let the board run, carry bytes and orders to it, and tell its hosts how much of real time it keeps."""
+    orders, keeping, told = _Orders(), Keeping(), False
     began, begun_s = time.monotonic(), board.handle.time_s
 
     def passed() -> tuple[float, float]:
@@ -147,13 +149,12 @@ def _run(board: VirtualBoard, line: Line, pace: _Pace, counts: _Counts | None) -
         line.give(board.hardware.take())
         if counts:
             counts.take(board)
+        keeping.take(*passed())
+        if keeping.least is not None:
+            teller.tell(keeping.least)
         if not told and real_s > JUDGED_S:
             told = True
-            said = f"it runs at {simulated_s / real_s:.2g} of real time"
-            if simulated_s < SLOW * real_s:
-                slower = f"{simulated_s / real_s / MARGIN:.1g}"
-                said += f": tell its hosts --pace {slower}"
-            log.print(said)
+            log.print(f"it runs at {simulated_s / real_s:.2g} of real time")
     simulated_s, real_s = passed()
     print(f"{simulated_s:g} s in {real_s:.3g} s: {simulated_s / real_s:.2f} of real time")
 

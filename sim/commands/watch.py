@@ -46,7 +46,7 @@ def command(
     port: PortArgument,
     baud: BaudOption = BAUD,
     identity: IdentityOption = None,
-    pace: PaceOption = 1.0,
+    pace: PaceOption = None,
     seconds: SecondsOption = None,
 ) -> None:
     if seconds is not None:

@@ -28,9 +28,6 @@ AROUND, AMPLIFIERS, SHIM = (
 )
 OSCILLATOR_HZ = 2.4e6
 """About the frequency of the oscillator beside the clock; the clock has a whole number of it in every half period."""
-NETLISTS = "ecp5", "gw1nr"
-"""The families of `FAMILIES` whose netlist can be the board. That of the iCE40 does not answer its host here, though
-`make gate` finds it equal to the Verilog."""
 ROOM = 1024
 """Bytes from the board that are kept until they are taken."""
 
@@ -54,7 +51,7 @@ def build(spec: AxisSpec, baud: int | None = None, family: str | None = None) ->
     Args:
         spec: the axis.
         baud: the rate of the serial line; None for the board's own.
-        family: the family of FPGAs whose netlist is the board, one of `NETLISTS`; None for the board's Verilog.
+        family: the family of FPGAs whose netlist is the board, one of `FAMILIES`; None for the board's Verilog.
 
     Raises:
         BuildError: if the build fails.
@@ -100,7 +97,7 @@ class BoardHardware:
         number: the handle's count at the start.
         turn_counts: counts between two pulses of the encoder's index.
         baud: the rate of the serial line; None for the board's own.
-        family: the family of FPGAs whose netlist is the board, one of `NETLISTS`; None for the board's Verilog.
+        family: the family of FPGAs whose netlist is the board, one of `FAMILIES`; None for the board's Verilog.
 
     Attributes:
         given_n: the mean force over a sample, N, of the amplifier's drive 1.

@@ -7,7 +7,10 @@ import socket
 import tty
 from contextlib import suppress
 
+from ...model.link.told_pace import NETWORK
+
 CHUNK = 4096
+LOOPBACK = "127.0.0.1"
 
 
 class PortError(RuntimeError):
@@ -33,7 +36,7 @@ class Line:
     def __init__(self, tcp_port: int | None = None):
         self.drops = 0
         try:
-            self._listener = None if tcp_port is None else socket.create_server(("127.0.0.1", tcp_port), backlog=1)
+            self._listener = None if tcp_port is None else socket.create_server((LOOPBACK, tcp_port), backlog=1)
         except OSError as error:
             raise PortError(f"port {tcp_port} of 127.0.0.1 cannot be had: {os.strerror(error.errno)}") from None
         try:
@@ -64,6 +67,11 @@ class Line:
             self._listener.close()
         os.close(self._master)
         os.close(self._slave)
+
+    @property
+    def names(self) -> list[str]:
+        """The names of its ports, as a host gives them."""
+        return [self.path] if self.tcp_port is None else [self.path, f"{NETWORK}{LOOPBACK}:{self.tcp_port}"]
 
     @property
     def tcp_port(self) -> int | None:

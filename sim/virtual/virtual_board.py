@@ -61,7 +61,7 @@ class VirtualBoard:
     Args:
         scene: the scene; its wall and gains are the host's to write.
         baud: the rate of the serial line; None for the board's own.
-        family: the family of FPGAs whose netlist is the board, one of `NETLISTS`; None for the board's Verilog.
+        family: the family of FPGAs whose netlist is the board, one of `FAMILIES`; None for the board's Verilog.
 
     Attributes:
         hardware: the board's wires and loops.

