@@ -64,7 +64,8 @@ def command(
     if netlist is not None and netlist not in FAMILIES:
         raise BadInput(f"--netlist must be one of {', '.join(FAMILIES)}, not {shown(netlist)}")
     of = load(scene, changes_of(set_, controller__estimator=estimator))
-    with Line(tcp) as line, VirtualBoard(of, baud, netlist) as board:
+    # A host that knows a port asks at once who tells its pace.
+    with Line(tcp) as line, Teller(line.names) as teller, VirtualBoard(of, baud, netlist) as board:
         # The first call compiles, for which no host would wait.
         board.run()
         print(f"serial port: {line.path}")
@@ -72,8 +73,7 @@ def command(
             print(f"tcp port: 127.0.0.1:{line.tcp_port}")
         print(f"orders: {', '.join(f'{name} {order.operand}' for name, order in ORDERS.items())}", flush=True)
         pace = _Pace(speed, math.inf if seconds is None else seconds)
-        with Teller(line.names) as teller:
-            _run(board, line, teller, pace, _Counts() if counts else None)
+        _run(board, line, teller, pace, _Counts() if counts else None)
 
 
 @dataclass(frozen=True)
