@@ -8,11 +8,17 @@ from .signals import Signal, signals_of
 PULLS = {"up": "up", "down": "down", "none": ""}
 RECEIVERS = """\
 - **No pin takes 5 V, and none takes RS-422.** An encoder with differential outputs needs receivers that run from 3.3 V,
-  such as an AM26LV32 (four in a package) or an SN65HVD3x of Texas Instruments (one each), with the encoder's 120 Ω
-  across each pair. An encoder of 5 V with single outputs needs a buffer whose inputs stand 5 V at a supply of 3.3 V,
-  such as an SN74LVC14A.
-- **A complement is a wire of its own.** `encoder_a_n` and `encoder_b_n` come from receivers of their own, or a cut wire
-  is not seen. Without them leave both open and the cause `encoder_loss` off.
+  with the encoder's 120 Ω across each pair. Of Texas Instruments: the AM26LV32 (data sheet SLLS202), four in a package,
+  to 32 MHz and a common mode of -0.3 to 5.5 V, so with the encoder's ground beside the pairs; or the SN65HVD30 and 33
+  (SLLS665), one in a package beside a driver that stays unused, to 25 Mbit/s and a common mode of -7 to 12 V. The
+  SN65HVD31 and 34 end at 5, the 32 and 35 at 1 Mbit/s; a bit is two counts.
+- **An encoder of 5 V with single outputs** needs inputs that stand 5 V at a supply of 3.3 V: an SN74LVC1G17 (SCES351)
+  for each wire, or an SN74LVC14A (SCAS285), six in a package, two in series for each wire because it inverts. One alone
+  leaves A and B in their order, but turns the index around. Open-collector outputs need their resistors to 5 V.
+- **A complement is a wire of its own.** `encoder_a_n` and `encoder_b_n` come from receivers of their own at the same
+  pairs, with their inputs swapped: with the index that is five. Both receivers of a pair that is open, shorted or cut
+  are high then, by their fail-safe, and that is what `encoder_loss` sees: it needs receivers that promise it for a pair
+  with its 120 Ω, as these do. Without complements leave both open and the cause `encoder_loss` off.
 - **Resistors outside**, beside the board, at every pin that the table marks: they hold it low, or high, before the FPGA
   is configured, while it is loaded, and when the board has lost its supply.
 - **Loops** close to the board's 3.3 V. What opens them (a button, a relay of the amplifier) stands in series.
