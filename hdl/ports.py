@@ -87,7 +87,7 @@ MEANINGS = {
     "dac_cs_n": "chip select of the DAC, low during a frame",
     "dac_sclk": "serial clock of the DAC",
     "dac_mosi": "serial data of the DAC, the uppermost bit first",
-    "dac_clear_n": "clear of the DAC: low makes it go to its middle code; safe when low",
+    "dac_clear_n": "clear of the DAC: its level holds it at its middle code while low; safe when low",
     "alive": "square wave while ARMED, for the charge pump of an amplifier's enable; safe when low",
     "outputs_enable": "enable of the buffers of the drive's pins and alive: both clocks run, the reset has ended",
 }

@@ -46,7 +46,7 @@ class Dac(Block):
     dac_sclk, dac_mosi : Out(1)
         Serial clock and data, the uppermost bit first.
     dac_clear_n : Out(1)
-        Clear: low makes the DAC go to its middle code.
+        Clear: its level holds the DAC at its middle code while it is low.
 
     Raises
     ------

@@ -11,7 +11,8 @@ zeros. Half a period of the serial clock has H clocks; with F bits a frame is un
 fall of the chip select to its rise, and another half later the next may begin.
 
 Behind every arming the frames of `setup` go out first, one at an actuation: what a DAC wants to be told before it makes
-volts. The clear pin is low unless the axis is ARMED: the DAC must make its middle code of it, without a frame.
+volts. The clear pin is low unless the axis is ARMED: its level must hold the DAC at the middle code, or its output at
+ground, without a frame. An edge is not enough: it may come with the rise of the chip select, behind the last bit.
 """
 
 from dataclasses import dataclass
@@ -125,7 +126,7 @@ class Design(StageDesign):
 
     stage_class = Stage
     pins = "dac_cs_n", "dac_sclk", "dac_mosi", "dac_clear_n"
-    safe = "dac_clear_n is low, and the DAC at its middle code"
+    safe = "dac_clear_n is low, and holds the DAC at its middle code"
 
     def __init__(self, axis: AxisRequirements, stage: Stage):
         super().__init__(axis, stage)

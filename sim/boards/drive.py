@@ -76,8 +76,9 @@ def _dac(spec: AxisSpec) -> str:
     return (
         f"A DAC of {stage.bits} bits, frames of {stage.frame_bits} bits at {serial_hz / 1e6:.4g} MHz in mode "
         f"{stage.mode}, {design.frame_clocks} clocks each, one at an actuation.{setup} At rest `dac_clear_n` is low "
-        "and the chip select high; the DAC's clear must be set to its middle code, and a load pin tied to act at once. "
-        "On a scope the output goes to the middle when `dac_clear_n` falls, in the middle of a frame, too."
+        "and the chip select high. The level of `dac_clear_n` must hold the DAC at its middle code, or its output at "
+        "ground: an input that acts at the edge alone is overtaken by a frame that ends with it. A load pin is tied to "
+        "act at once. On a scope the output goes to the middle when `dac_clear_n` falls, in the middle of a frame, too."
     )
 
 

@@ -59,7 +59,7 @@ OF_STAGE = {
         Signal("gate_low_b", True, "low gate of leg B, to its driver", DOWN, "low"),
     ),
     "dac": (
-        Signal("dac_clear_n", True, "clear of the DAC, which low makes go to its middle code", DOWN, "low"),
+        Signal("dac_clear_n", True, "clear of the DAC, or its reset: low holds it at its middle code", DOWN, "low"),
         Signal("dac_cs_n", True, "chip select of the DAC", UP, "high"),
         Signal("dac_sclk", True, "serial clock of the DAC", DOWN, "the level of its mode"),
         Signal("dac_mosi", True, "serial data of the DAC", DOWN, "low"),

@@ -18,13 +18,15 @@ module pwm_amplifier (
   assign shot = gate_high_a && gate_low_a || gate_high_b && gate_low_b;
 endmodule
 
-// A DAC that counts the bits of a frame, takes it at the rise of its chip select, and is at its middle code while its
-// clear is low; and an amplifier that is off meanwhile.
+// A DAC that counts the bits of a frame and takes it at the rise of its chip select. While its clear is low it is at its
+// middle code, and forgets what it was told: where it needs a setup, it makes no volts until it has heard that again.
 module dac_amplifier #(
     parameter BITS = 16, HEADER_BITS = 0, HEADER = 0, TRAILING_BITS = 0,
     parameter FLIP = 1,            // codes are in offset binary
     parameter TAKES = 1,           // the level of the serial clock behind the edge at which a bit is taken
-    parameter OFFSET = 0           // the code without force
+    parameter OFFSET = 0,          // the code without force
+    parameter NEEDS = 0,           // frames of setup, without which there are no volts
+    parameter [63:0] SETUP = 0     // the last of them
 ) (
     input tick,
     input dac_cs_n, dac_sclk, dac_mosi, dac_clear_n,
@@ -33,7 +35,7 @@ module dac_amplifier #(
   localparam FRAME_BITS = HEADER_BITS + BITS + TRAILING_BITS;
   reg [63:0] frame = 0;
   reg [31:0] count = 0;
-  reg clock = 0, selected = 0;
+  reg clock = 0, selected = 0, told = 0;
   reg signed [31:0] code = 0;
   wire [63:0] header = frame >> (BITS + TRAILING_BITS);
   wire [BITS-1:0] coded = BITS'(frame >> TRAILING_BITS) ^ BITS'(FLIP << (BITS - 1));
@@ -45,8 +47,13 @@ module dac_amplifier #(
       frame <= {frame[62:0], dac_mosi} & ((64'd1 << FRAME_BITS) - 1);
       count <= count + 1;
     end
-    if (!dac_clear_n) code <= 0;
-    else if (dac_cs_n && selected && count == FRAME_BITS && header == HEADER) code <= 32'(signed'(coded));
+    if (!dac_clear_n) begin
+      code <= 0;
+      told <= 0;
+    end else if (dac_cs_n && selected && count == FRAME_BITS) begin
+      if (NEEDS != 0 && !told && frame == SETUP) told <= 1;
+      else if (header == HEADER) code <= 32'(signed'(coded));
+    end
   end
-  assign steps = dac_clear_n ? code - OFFSET : 0;
+  assign steps = dac_clear_n && (NEEDS == 0 || told) ? code - OFFSET : 0;
 endmodule

@@ -7,7 +7,8 @@ module around_board #(
     parameter BIT_PARTS = 3328,        // the serial line's bit, in parts of a clock, 256 each
 `ifdef STAGE_DAC
     parameter DAC_BITS = 16, DAC_HEADER_BITS = 0, DAC_HEADER = 0, DAC_TRAILING_BITS = 0,
-    parameter DAC_FLIP = 1, DAC_TAKES = 1, DAC_OFFSET = 0,   // see dac_amplifier
+    parameter DAC_FLIP = 1, DAC_TAKES = 1, DAC_OFFSET = 0, DAC_NEEDS = 0,   // see dac_amplifier
+    parameter [63:0] DAC_SETUP = 0,
 `endif
     parameter OSCILLATOR_CLOCKS = 2    // half a period of the oscillator
 ) (
@@ -81,7 +82,7 @@ module around_board #(
 `elsif STAGE_DAC
   dac_amplifier #(
     .BITS(DAC_BITS), .HEADER_BITS(DAC_HEADER_BITS), .HEADER(DAC_HEADER), .TRAILING_BITS(DAC_TRAILING_BITS),
-    .FLIP(DAC_FLIP), .TAKES(DAC_TAKES), .OFFSET(DAC_OFFSET)
+    .FLIP(DAC_FLIP), .TAKES(DAC_TAKES), .OFFSET(DAC_OFFSET), .NEEDS(DAC_NEEDS), .SETUP(DAC_SETUP)
   ) amplifier(
     .tick(tick), .dac_cs_n(dac_cs_n || !outputs_enable), .dac_sclk(dac_sclk), .dac_mosi(dac_mosi),
     .dac_clear_n(dac_clear_n && outputs_enable), .steps(steps)

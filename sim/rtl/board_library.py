@@ -62,7 +62,7 @@ def build(spec: AxisSpec, baud: int | None = None, family: str | None = None) ->
         "BIT_PARTS": round(256 * spec.clock_hz / board.link.baud),
         "OSCILLATOR_CLOCKS": max(round(spec.clock_hz / OSCILLATOR_HZ / 2), 1),
     }
-    around |= _dac(spec)
+    around |= of_dac(spec)
     options = ("--top-module", "around_board", *(f"-G{name}={value}" for name, value in around.items()))
     options += (f"-DSTAGE_{spec.stage.name.upper()}",)
     if family is not None:
@@ -73,8 +73,8 @@ def build(spec: AxisSpec, baud: int | None = None, family: str | None = None) ->
     return shared_library.build(Recipe(files, SHIM.name, "Vboard", options))
 
 
-def _dac(spec: AxisSpec) -> dict[str, int]:
-    """Return what the simulated DAC is to know of its frames; nothing without one."""
+def of_dac(spec: AxisSpec) -> dict[str, int]:
+    """Return what the simulated DAC is to know of its frames, by parameters of `around_board`; nothing without one."""
     stage, design = spec.stage, spec.drive
     if not isinstance(stage, dac.Stage) or not isinstance(design, dac.Design):
         return {}
@@ -86,6 +86,8 @@ def _dac(spec: AxisSpec) -> dict[str, int]:
         "DAC_FLIP": int(stage.coding == "offset-binary"),
         "DAC_TAKES": int(stage.mode in (0, 3)),
         "DAC_OFFSET": design.offset,
+        "DAC_NEEDS": len(stage.setup),
+        "DAC_SETUP": stage.setup[-1] if stage.setup else 0,
     }
 
 

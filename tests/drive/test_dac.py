@@ -8,6 +8,7 @@ from hardwall.model.drive import dac
 from hardwall.model.drive.dac import Design, Inputs
 from hardwall.model.drive.stage import Amplifier
 from hardwall.testing import SAMPLES, Recorded, check, parameters, play, rng, simulate
+from oracles.ad5761r import Ad5761r
 from stimuli.stages import STAGES, axis, drives
 
 NAMES = ["dac", "dac bare", "dac narrow", "dac high"]
@@ -175,6 +176,23 @@ def test_the_code_is_there_when_the_latency_says(name):
         reader.see(**dac.pins(d, state, 1))
     assert len(reader.frames) == before + 1
     assert reader.frames[-1] == dac.frame(d, min(d.offset + d.most, d.steps - 1))
+
+
+def test_an_ad5761r_has_the_volts_of_the_drive_at_its_reset_pin_and_none_before_its_range_is_set():
+    d, amplifier, chip = design("dac"), STAGES["dac"][1].amplifier, Ad5761r()
+    state, most, between = d.start, d.magnitude.max // 2, d.frame_clocks
+    for armed, size, negative in ((0, most, 0), (1, most, 0), (1, most, 1), (0, most, 0), (1, most // 3, 0), (1, 0, 0)):
+        volts = []
+        for clock in range((len(d.stage.setup) + 3) * between):
+            state = dac.step(d.params, state, Inputs(int(clock % between == 0), size, negative, armed))
+            chip.see(*dac.pins(d, state, 1).values())
+            volts.append(chip.volts)
+        wanted = armed * size * axis("dac").force_resolution_n / amplifier.newtons_per_unit * (-1 if negative else 1)
+        assert abs(volts[-1] - wanted) <= d.step_n / amplifier.newtons_per_unit * 5 / 8 + 1e-9
+        assert not chip.overrange
+        # On the way there is nothing but the volts before, none, and those of the drive.
+        assert set(volts[1:]) <= {volts[0], 0.0, volts[-1]}
+        assert armed or set(volts[1:]) == {0.0}
 
 
 def wrong(**fields) -> dac.Stage:

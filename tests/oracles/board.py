@@ -47,7 +47,7 @@ STAGES: dict[str, Stage] = {
     "pdm scaled": pdm.Stage(amplifier=AMPLIFIER),
     "pwm": pwm.Stage(amplifier=AMPLIFIER, pwm_hz=100_000, dead_time_s=200e-9),
     "dac": dac.Stage(
-        amplifier=AMPLIFIER, bits=16, serial_hz=6_000_000, header_bits=8, header=3, mode=1, setup=(0x040168,)
+        amplifier=AMPLIFIER, bits=16, serial_hz=6_000_000, header_bits=8, header=3, mode=1, setup=(0x0F0000, 0x040268)
     ),
 }
 """Drive stages that the axes with 40 N may have at this clock."""

@@ -49,7 +49,7 @@ STAGES: dict[str, tuple[str, Stage]] = {
             header_bits=8,
             header=3,
             mode=1,
-            setup=(0x0F0000, 0x040168),
+            setup=(0x0F0000, 0x040268),
         ),
     ),
     # As an AD5542A, and with an offset: 16 bits, taken at the rising edge.

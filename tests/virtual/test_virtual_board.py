@@ -28,7 +28,7 @@ STAGES = {
     "pwm": VOLTS | {"drive.stage": "pwm", "drive.pwm_hz": 20_000, "drive.dead_time_s": 1e-6, "drive.inverted": True},
     "dac": VOLTS
     | {"drive.stage": "dac", "drive.dac_bits": 16, "drive.dac_serial_hz": 2_000_000, "drive.offset_v": 0.01}
-    | {"drive.dac_header_bits": 8, "drive.dac_header": 3, "drive.dac_mode": 1, "drive.dac_setup": [0x040168]},
+    | {"drive.dac_header_bits": 8, "drive.dac_header": 3, "drive.dac_mode": 1, "drive.dac_setup": [0x0F0000, 0x040268]},
 }
 """The drive stages; a sample has two periods of the bridge."""
 FINE = {"controller.clock_hz": 4_000_000}
