@@ -1,6 +1,6 @@
 """Faults injected into the board in the closed loop, and what came of each.
 
-    make faults                     inject everything
+    make faults                     inject everything, with each drive stage
     make faults ONLY="the host"     only the faults whose names begin so
 
 Prints a table and one last line for a script; exits with 1 if any fault does not come to what is promised of it.
@@ -15,6 +15,7 @@ from injection.every import FAULTS
 from injection.run import run
 
 COLUMNS = {
+    "stage": "left",
     "fault": "left",
     "expected": "left",
     "came": "left",
@@ -29,11 +30,12 @@ COLUMNS = {
 
 def main(begins: str) -> int:
     """Inject the faults whose names begin so; return the exit code."""
-    outcomes = run([fault for fault in FAULTS if fault.name.startswith(begins)])
-    good = sum(outcome.safe for outcome in outcomes)
-    return conclude(
-        Table(COLUMNS, [outcome.row for outcome in outcomes]), (), "faults: {} faults, {} safe", len(outcomes), good
-    )
+    rows, good = [], 0
+    for stage, faults in FAULTS.items():
+        outcomes = run(stage, [fault for fault in faults if fault.name.startswith(begins)])
+        rows += [[stage, *outcome.row] for outcome in outcomes]
+        good += sum(outcome.safe for outcome in outcomes)
+    return conclude(Table(COLUMNS, rows), (), "faults: {} faults, {} safe", len(rows), good)
 
 
 if __name__ == "__main__":

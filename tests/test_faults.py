@@ -1,13 +1,16 @@
-"""A few of the faults, a bug that they find, and the means: `make faults` injects them all."""
+"""A few of the faults, bugs that they find, and the means: `make faults` injects them all."""
 
 import faults
 import pytest
 
+from hardwall.hdl.drive.dac import Dac
+from hardwall.hdl.drive.pwm import Pwm
 from hardwall.hdl.supervisor import Supervisor
 from hardwall.model.supervisor import CAUSES
 from injection.every import FAULTS
 from injection.fault import Outcome
 from injection.run import run
+from injection.staged import STAGED
 from oracles.supervised import BITS
 from proofs.bugs import Bug
 
@@ -16,7 +19,6 @@ QUICK = (
     "the loop of external_fault opens",
     "the loop of drive_enable opens",
     "the host acknowledges other causes",
-    "the clock stops while the drive's pin is high",
 )
 MASKED = Bug(
     Supervisor.elaborate,
@@ -26,42 +28,75 @@ MASKED = Bug(
 """A supervisor that does not hear of an external fault."""
 
 
-def chosen(*names: str) -> list:
-    return [fault for fault in FAULTS if fault.name in names]
+HELD = (
+    (
+        "pwm",
+        Bug(
+            Pwm._leg,
+            "[high_pin.eq(high & self.permitted), low_pin.eq(low & self.permitted)]",
+            "[high_pin.eq(high), low_pin.eq(low)]",
+        ),
+    ),
+    ("dac", Bug(Dac.elaborate, "ready & self.permitted", "ready")),
+)
+"""Stages whose pins act on when nothing permits it, as long as no clock says so."""
+
+
+def chosen(stage: str, *names: str) -> list:
+    return [fault for fault in FAULTS[stage] if fault.name in names]
+
+
+def in_the_act(stage: str) -> list:
+    """Return the faults that meet the stage in the act: a clock that stops, and a loop that opens at the worst."""
+    acting, worst = STAGED[stage].acting, list(STAGED[stage].moments)[-1]
+    return chosen(stage, f"the clock stops {acting}", f"the loop of drive_enable opens {worst}")
 
 
 @pytest.mark.rtl
-def test_the_quick_ones_are_safe():
-    outcomes = run(chosen(*QUICK))
-    assert len(outcomes) == len(QUICK)
+@pytest.mark.parametrize("stage", STAGED)
+def test_the_quick_ones_are_safe(stage):
+    faults = [*(chosen(stage, *QUICK) if stage == "pdm" else ()), *in_the_act(stage)]
+    outcomes = run(stage, faults)
+    assert len(outcomes) == len(faults) >= 2
     assert {outcome.name: outcome.wrong for outcome in outcomes if not outcome.safe} == {}
 
 
 @pytest.mark.rtl
 def test_a_cause_that_is_masked_is_found():
-    deaf, heard = run(chosen(*QUICK[1:3]), MASKED)
+    deaf, heard = run("pdm", chosen("pdm", *QUICK[1:3]), MASKED)
     assert deaf.wrong[:2] == ("ARMED, not external_fault", "the drive is not down within 3 clocks")
     assert heard.safe
 
 
-def test_every_cause_is_expected_of_a_fault():
-    assert {name for fault in FAULTS for name in fault.expected.causes} == {cause.name for cause in CAUSES}
+@pytest.mark.rtl
+@pytest.mark.parametrize(("stage", "bug"), HELD)
+def test_pins_that_need_a_clock_to_be_safe_are_found(stage, bug):
+    opens, stands = run(stage, in_the_act(stage), bug)
+    assert "the drive is not down within 72 clocks" in stands.wrong
+    assert any("at the pins" in wrong for wrong in opens.wrong)
 
 
-def test_every_fault_has_a_name_of_its_own():
-    assert len({fault.name for fault in FAULTS}) == len(FAULTS)
+@pytest.mark.parametrize("stage", STAGED)
+def test_every_cause_is_expected_of_a_fault(stage):
+    assert {name for fault in FAULTS[stage] for name in fault.expected.causes} == {cause.name for cause in CAUSES}
 
 
-@pytest.mark.parametrize(("wrong", "last"), [((), "1 safe"), (("the force is not as before",), "0 safe")])
+@pytest.mark.parametrize("stage", STAGED)
+def test_every_fault_has_a_name_of_its_own(stage):
+    assert len({fault.name for fault in FAULTS[stage]}) == len(FAULTS[stage])
+
+
+@pytest.mark.parametrize(("wrong", "last"), [((), "3 safe"), (("the force is not as before",), "0 safe")])
 def test_the_command_ends_in_a_line_for_a_script(wrong, last, monkeypatch, capsys):
     given = []
 
-    def came(some):
-        given.extend(some)
+    def came(stage, some):
+        given.extend((stage, fault.name) for fault in some)
         return [Outcome("a", "ARMED", "ARMED", 3, 11.7, 1e-3, 4.0, wrong)]
 
     monkeypatch.setattr(faults, "run", came)
-    code = faults.main("the loop of e")
-    assert [fault.name for fault in given] == ["the loop of external_fault opens", "the loop of emergency_stop opens"]
-    assert capsys.readouterr().out.splitlines()[-1] == f"faults: 1 faults, {last}"
-    assert code == len(wrong)
+    code = faults.main("the host is k")
+    killed = "the host is killed (supervisor_watchdog 50 ms)"
+    assert given == [(stage, killed) for stage in STAGED]
+    assert capsys.readouterr().out.splitlines()[-1] == f"faults: 3 faults, {last}"
+    assert code == (1 if wrong else 0)

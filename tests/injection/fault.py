@@ -5,13 +5,9 @@ from dataclasses import dataclass, field
 
 from hardwall.model.supervisor import ARMED, DISARMED, ENABLED, TRIPPED
 
-from .scene import CLOCK_HZ, OSCILLATOR_NS, PUSH_N, board
+from .scene import CLOCK_HZ, OSCILLATOR_NS, PUSH_N, TREMOR_N
 
 STATES = {DISARMED: "DISARMED", ARMED: "ARMED", TRIPPED: "TRIPPED"}
-PULSES = board().safe_latency - 1
-"""Clock edges from a drive of zero to the edge that can see its last pulse."""
-TREMOR_N = 0.5
-"""How far the force of a contact that no fault disturbs is from the hand's push, at most."""
 
 
 async def nothing(rig) -> None:
@@ -27,10 +23,11 @@ class Expected:
         state: the state in which it is then.
         within: the most clock edges until the drive is at most `down_n`; None: it need not be.
         down_n: see `within`.
-        pins_within: the most clock edges until the last pulse is seen; None for `PULSES` more than `within`.
+        pins_within: the most clock edges until the last force at the pins; None for the stage's latency more than
+            `within`.
         largest_n: the largest force from the fault on.
         steady: the force stays what it was.
-        stopped: the clock stands still, and the amplifier alone ends the force.
+        stopped: the clock stands still: the pins end the force without it, or the amplifier alone does.
     """
 
     causes: tuple[str, ...] = ()

@@ -10,16 +10,17 @@ from hardwall.testing import parameters
 from injection.every import FAULTS
 from injection.judged import judged
 from injection.rig import Rig
+from injection.staged import STAGED
 
 
 @cocotb.test()
 async def every_fault(dut):
     order = parameters()
-    chosen = {fault.name: fault for fault in FAULTS}
+    chosen = {fault.name: fault for fault in FAULTS[order["stage"]]}
     clocks = None
     with Path(order["report"]).open("w", encoding="utf-8") as report:
         for name in order["names"]:
-            rig = Rig(dut)
+            rig = Rig(dut, STAGED[order["stage"]])
             clocks = await rig.start(clocks, chosen[name].oscillator_ns)
             outcome = await judged(rig, chosen[name])
             await rig.start_clocks()

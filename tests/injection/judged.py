@@ -7,9 +7,9 @@ import numpy as np
 from hardwall.model.supervisor import ARMED, DISARMED, TRIPPED, names
 from hardwall.testing import SEED
 
-from .fault import PULSES, STATES, TREMOR_N, Expected, Fault, Outcome
+from .fault import STATES, Expected, Fault, Outcome
 from .rig import NotSteadyError, Rig
-from .scene import CLOCKS_PER_MS, SPEC, STEP_CLOCKS
+from .scene import CLOCKS_PER_MS, SPEC, STEP_CLOCKS, TREMOR_N
 
 REST_MS = 0.2
 """How long the drive is watched after every act of the host on the way back."""
@@ -49,7 +49,7 @@ async def _way_back(rig: Rig, fault: Fault) -> None:
         return
     await fault.repair(rig)
     rig.handle.held = rig.handle.number
-    turns, last_pulse = len(rig.turns), rig.last_pulse
+    turns, last = len(rig.turns), rig.last_asked
     await host.heartbeat()
     latched = rig.see("latched")
     if fault.expected.state == TRIPPED:
@@ -59,7 +59,7 @@ async def _way_back(rig: Rig, fault: Fault) -> None:
         await host.acknowledge(latched)
         rig.claim(rig.sees(DISARMED), f"{' + '.join(names(rig.see('latched')))} is not acknowledged")
     await rig.run(REST_MS)
-    rig.claim(turns == len(rig.turns) and last_pulse == rig.last_pulse, "the drive came back before the arm")
+    rig.claim(turns == len(rig.turns) and last == rig.last_asked, "the drive came back before the arm")
     if fault.rearms:
         rig.claim(await host.arm(), "an arm is refused")
         await rig.run(REST_MS)
@@ -76,8 +76,8 @@ def _outcome(rig: Rig, fault: Fault, drives: list[tuple[int, float]]) -> Outcome
     """Return what was measured, without the verdict."""
     expected = fault.expected
     down = next((clock for k, (clock, _) in enumerate(drives) if _is_down(expected, drives[k:])), None)
-    largest = max(rig.stuck_n, *(abs(driven) for _, driven in drives))
-    clocks = rig.stuck_clocks if expected.stopped else None if down is None else down - rig.began
+    largest = max(rig.largest_n, *(abs(driven) for _, driven in drives))
+    clocks = rig.given_clocks if expected.stopped else None if down is None else down - rig.began
     tripped = rig.sees(TRIPPED)
     came = " + ".join(names(rig.see("first"))) if tripped else STATES[rig.see("state")]
     return Outcome(
@@ -105,9 +105,13 @@ def _shortcomings(rig: Rig, expected: Expected, outcome: Outcome, drives: list[t
     if expected.within is not None and (outcome.clocks is None or outcome.clocks > expected.within):
         wrong.append(f"the drive is not down within {expected.within} clocks")
     if expected.within is not None and expected.state != ARMED and not expected.stopped:
-        most = expected.within + PULSES if expected.pins_within is None else expected.pins_within
-        if rig.last_pulse > rig.began + most:
-            wrong.append(f"a pulse {rig.last_pulse - rig.began} clocks after the fault")
+        most = expected.pins_within
+        if most is None:
+            most = expected.within + rig.stage.pins_latency
+        if rig.last_asked > rig.began + most:
+            wrong.append(f"a force at the pins {rig.last_asked - rig.began} clocks after the fault")
+    if rig.see("shot"):
+        wrong.append("both gates of a leg have been on together")
     if outcome.largest_n > expected.largest_n + SPEC.force_resolution_n:
         wrong.append(f"{outcome.largest_n:.3f} N is more than {expected.largest_n:.3f} N")
     if expected.steady and any(abs(driven - drives[0][1]) > TREMOR_N for _, driven in drives):

@@ -1,12 +1,11 @@
 """The closed loop around the board under test: its clock, its plant step by step, its host, and what is measured."""
 
-import sys
 from collections.abc import Callable
 
 import cocotb
 from cocotb.clock import Clock
 from cocotb.simtime import get_sim_time
-from cocotb.triggers import FallingEdge, Timer, ValueChange
+from cocotb.triggers import Timer, ValueChange
 
 from hardwall.hdl.supervised import LOOPS
 from hardwall.model.supervisor import ARMED, names
@@ -19,7 +18,6 @@ from .scene import (
     CLOCKS_PER_MS,
     DAMPING_N_S_PER_M,
     DEPTH,
-    FULL_SCALE_N,
     PUSH_N,
     REGISTERS,
     REST,
@@ -30,15 +28,14 @@ from .scene import (
     words,
 )
 from .serial_host import SerialHost
+from .staged import Staged
 
 RESET_CLOCKS, SETTLING_MS = 100, 1.0
 """The reset lasts until the oscillator has seen that the clock runs."""
-PULSE_N = FULL_SCALE_N / STEP_CLOCKS
-"""The mean force over a step of one pulse in it."""
+TICK_NS = CLOCK_NS - 2
+"""Ticks come behind every change of a pin and before the next clock edge; the tick before an edge has its number."""
 STEADY_N, STEADY_M_PER_S = 0.3, 2e-3
 """How far force and speed of a steady contact are from the hand's push and from rest, at most."""
-PUMP_CLOCKS = CLOCKS_PER_MS // 5
-"""The time, 200 us, after which a charge pump without an edge of `alive` has run down: 2.5 of its periods."""
 
 
 class NotSteadyError(AssertionError):
@@ -49,6 +46,7 @@ class Rig:
     """The board in its loop, with the clock as the time.
 
     Attributes:
+        stage: the board's drive stage.
         handle: the plant.
         host: the host.
         swapped: whether the wires of the motor are swapped.
@@ -56,22 +54,21 @@ class Rig:
         began: the clock after whose edge the fault is there; before_n: the drive of that clock.
         turns: clocks and words of every change of the drive that is let out.
         wrong: what the fault itself has found to be wrong.
-        stuck_n: the largest force without a clock.
+        largest_n: the largest force of the amplifier while it keeps one: of a DAC, or without a clock.
     """
 
-    def __init__(self, dut):
-        self.dut = dut
+    def __init__(self, dut, stage: Staged):
+        self.dut, self.stage = dut, stage
         self.handle = Grasped()
         self.swapped = False
         self.on_count: Callable[[int], None] = lambda number: None
         self.began, self.before_n = 0, 0.0
         self.turns: list[tuple[int, int]] = []
         self.wrong: list[str] = []
-        self.stuck_n = self._stuck_n_s = self._drive_n = 0.0
-        self._stuck: int | None = None
+        self.largest_n = self._drive_n = 0.0
         self._stopped: list[Clock] = []
         self._number = START
-        self._alive_at = self._fell_at = self._pulses = self._pulses_before = 0
+        self._given = self._given_before = 0
         self._tasks: list = []
 
     @property
@@ -82,7 +79,7 @@ class Rig:
     def see(self, name: str) -> int:
         """Return a watched port."""
         value = getattr(self.dut, name).value
-        return value.to_signed() if name in ("driven", "count", "pulses") else int(value)
+        return value.to_signed() if name in ("driven", "count", "steps", "given") else int(value)
 
     def sees(self, state: int) -> bool:
         """Return whether the supervisor is in a state."""
@@ -109,7 +106,9 @@ class Rig:
         if clocks is None:
             self.clock = Clock(dut.clk, CLOCK_NS, "ns", impl="gpi")
             self.clock.start()
-            await Timer(CLOCK_NS // 2, "ns")
+            await Timer(TICK_NS, "ns")
+            Clock(dut.tick, CLOCK_NS, "ns", impl="gpi").start()
+            await Timer(CLOCK_NS + CLOCK_NS // 2 - TICK_NS, "ns")
         else:
             self.clock, before = clocks
             before.stop()
@@ -118,9 +117,9 @@ class Rig:
         await Timer(RESET_CLOCKS * CLOCK_NS, "ns")
         dut.rst.value = 0
         await Timer(RESET_CLOCKS * CLOCK_NS, "ns")
-        self._pulses = self.see("pulses")
+        self._given = self.see("given")
         self.host = SerialHost(dut)
-        self._tasks = [cocotb.start_soon(each) for each in (self._turn(), self._watch_drive(), self._watch_alive())]
+        self._tasks = [cocotb.start_soon(each) for each in (self._turn(), self._watch_drive())]
         return self.clock, self.oscillator
 
     def close(self) -> None:
@@ -144,12 +143,6 @@ class Rig:
             await change
             self.turns.append((self.now, self.see("driven")))
 
-    async def _watch_alive(self) -> None:
-        change = ValueChange(self.dut.alive)
-        while True:
-            await change
-            self._alive_at = self.now
-
     async def _turn(self) -> None:
         """Close the loop, step by step."""
         while True:
@@ -165,31 +158,22 @@ class Rig:
             self._drive_n = self._given_n()
 
     def _given_n(self) -> float:
-        """Return the amplifier's force by the last step's pulses; without a clock, by the level of the pin."""
-        if self._stuck is None:
-            pulses = self.see("pulses")
-            given = (pulses - self._pulses) * PULSE_N
-            self._pulses = pulses
-            return given
-        # The pin is at one level until it falls, and acts only as long as the pump lasts.
-        ends = min(self.now, self._fell_at, self._alive_at + PUMP_CLOCKS)
-        given = (1 - 2 * self.see("drive_sign")) * max(ends - self._stuck, 0) * PULSE_N
-        self._stuck_n_s += given * STEP_CLOCKS / CLOCK_HZ
-        if given:
-            self._stuck, self.stuck_n = ends, FULL_SCALE_N
-        return given
+        """Return the amplifier's mean force over the last step."""
+        given = self.see("given")
+        mean_n = (given - self._given) * self.stage.step_n / STEP_CLOCKS
+        self._given = given
+        self._keep()
+        return mean_n
 
-    async def _watch_pin(self) -> None:
-        await FallingEdge(self.dut.drive_pdm)
-        self._fell_at = self.now + 1
+    def _keep(self) -> None:
+        """Take part of the largest force, where the amplifier keeps what it has now."""
+        if self.stage.has_codes or self.clock in self._stopped:
+            self.largest_n = max(self.largest_n, abs(self.see("steps")) * self.stage.step_n)
 
     def stop_clock(self) -> None:
-        """Stop the board's clock; from now on the amplifier looks at `alive`, and its drive is the level of the pin."""
-        self._stuck = self._fell_at = self.now
-        if self.see("drive_pdm"):
-            self._fell_at = sys.maxsize
-            self._tasks.append(cocotb.start_soon(self._watch_pin()))
+        """Stop the board's clock."""
         self._stop(self.clock)
+        self._keep()
 
     def stop_oscillator(self) -> None:
         """Stop the clock that watches the board's."""
@@ -200,31 +184,49 @@ class Rig:
         clock.stop()
 
     async def start_clocks(self) -> None:
-        """Let what was stopped go on, and count pulses again."""
+        """Let what was stopped go on."""
         while self._stopped:
             await Timer(CLOCK_NS // 2, "ns")
             self._stopped.pop().start()
             await Timer(CLOCK_NS // 2, "ns")
-        self._stuck, self._pulses = None, self.see("pulses")
 
     @property
-    def stuck_clocks(self) -> int:
-        """Clocks from the fault to the end of the force of an amplifier without a clock."""
-        return self._stuck - self.began
+    def given_clocks(self) -> int:
+        """Clocks from the fault to the end of the amplifier's force."""
+        return max(self._edge("last_given") + 1 - self.began, 0)
 
     def begin(self) -> None:
         """Take it that the fault is there from now on."""
-        self.began, self.before_n, self._pulses_before = self.now, self.driven_n, self.see("pulses")
+        self.began, self.before_n, self._given_before = self.now, self.driven_n, self.see("given")
+        self.largest_n = 0.0
+        self._keep()
 
     @property
     def impulse_n_s(self) -> float:
-        """The impulse that the pins have asked for since the fault."""
-        return (self.see("pulses") - self._pulses_before) * PULSE_N * STEP_CLOCKS / CLOCK_HZ + self._stuck_n_s
+        """The impulse of the amplifier since the fault."""
+        return (self.see("given") - self._given_before) * self.stage.step_n / CLOCK_HZ
 
     @property
-    def last_pulse(self) -> int:
-        """The clock edge that has seen the last pulse at the pin."""
-        return self.now + 1 - self.see("now") + self.see("last_pulse")
+    def last_asked(self) -> int:
+        """The clock edge that has seen the last force at the pins."""
+        return self._edge("last_asked")
+
+    def _edge(self, name: str) -> int:
+        """Return the clock edge of a tick."""
+        return self.now + 1 - self.see("ticks") + self.see(name)
+
+    async def acting(self, moment: str) -> None:
+        """Wait for the next such moment of the stage."""
+        for acts in (False, True):
+            await self.until(lambda acts=acts: self.acts is acts, 1, f"it is {moment}", clocks=1)
+        if clocks := self.stage.moments[moment]:
+            await self.run(clocks / CLOCKS_PER_MS)
+
+    @property
+    def acts(self) -> bool:
+        """Whether the stage acts."""
+        name, level = self.stage.acts
+        return self.see(name) == level
 
     def claim(self, right: bool, otherwise: str) -> None:
         """Keep what is wrong, unless it is right."""

@@ -2,8 +2,6 @@
 
 import dataclasses
 
-from hardwall.hdl.board import Board
-from hardwall.hdl.link.link import Link
 from hardwall.model.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervised import Design
@@ -18,14 +16,15 @@ WORDS = {word.name: word for word in DESIGN.words}
 STEP_CLOCKS = SPEC.clocks_per_sample * SPEC.samples_per_actuation
 """The plant's step, over which the pulses of the drive act as their mean."""
 CLOCKS_PER_MS = CLOCK_HZ // 1000
-DRIVE_BITS = SPEC.force.width - 2
-FULL_SCALE_N = SPEC.force_resolution_n * 2**DRIVE_BITS
-"""The force of a drive whose pulses never end: what a pin that is stuck high asks for."""
+PUMP_CLOCKS = CLOCKS_PER_MS // 5
+"""The time, 200 us, after which a charge pump without an edge of `alive` has run down: 2.5 of its periods."""
 
 MASS_KG, VISCOUS_N_S_PER_M = 0.35, 1.0
 PUSH_N, STIFFNESS_N_PER_M, DAMPING_N_S_PER_M = 11.7, 5e3, 20.0
 START, MARK, REST = -5, 0, 100
 """Counts: the handle starts at the first, its index is at the second, and the hand holds it at the third."""
+TREMOR_N = 0.5
+"""How far the force of a contact that no fault disturbs is from the hand's push, at most."""
 DEPTH = round(PUSH_N / STIFFNESS_N_PER_M / SPEC.count_m)
 """Counts in the wall at which its spring holds the hand."""
 TURN = 4000
@@ -44,8 +43,3 @@ COUNTED = GLITCH + 4
 def words(**values: float) -> dict[str, int]:
     """Return words by name for values in SI units."""
     return {name: WORDS[name].from_si(value) for name, value in values.items()}
-
-
-def board() -> Board:
-    """Return the board under test."""
-    return Board(SPEC, Link(RegisterMap(SPEC), BAUD))

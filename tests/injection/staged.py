@@ -1,0 +1,96 @@
+"""The drive stages that faults are injected with: the axis and board of each, and when its pins act."""
+
+import dataclasses
+from dataclasses import dataclass
+from functools import cached_property
+
+from hardwall.hdl.board import Board
+from hardwall.hdl.link.link import Link
+from hardwall.model.drive import dac
+from hardwall.model.registers import RegisterMap
+from hardwall.model.spec import AxisSpec
+from hardwall.sim.rtl.board_library import of_dac
+from oracles.board import STAGES
+
+from .scene import BAUD, PUSH_N, SPEC, STEP_CLOCKS, TREMOR_N
+
+
+@dataclass(frozen=True)
+class Staged:
+    """A drive stage under fault.
+
+    Attributes:
+        name: the stage's.
+        acts: a port, and its level while the stage acts.
+        moments: the moments at which a fault may do the most, in words, and the clocks to them since the stage acts;
+            the first one is in the middle.
+        resting: while the stage does not act, in words.
+        brief: an act lasts a clock.
+    """
+
+    name: str
+    acts: tuple[str, int]
+    moments: dict[str, int]
+    resting: str
+    brief: bool = False
+
+    @property
+    def acting(self) -> str:
+        """The first moment, in words."""
+        return next(iter(self.moments))
+
+    @cached_property
+    def spec(self) -> AxisSpec:
+        return dataclasses.replace(SPEC, stage=STAGES[self.name])
+
+    def board(self) -> Board:
+        """Return a board with the stage."""
+        return Board(self.spec, Link(RegisterMap(self.spec), BAUD))
+
+    @property
+    def has_codes(self) -> bool:
+        """Whether the amplifier has a step for each code of the drive; otherwise it has one, of the full scale."""
+        return isinstance(self.spec.drive, dac.Design)
+
+    @property
+    def step_n(self) -> float:
+        """The force of a step of the amplifier."""
+        return self.spec.drive.full_scale_n / (self.spec.drive.steps if self.has_codes else 1)
+
+    @property
+    def parameters(self) -> tuple[tuple[str, str, int], ...]:
+        """What the amplifier in simulation is to know of the stage, for an instance of it."""
+        return tuple(("p", name.removeprefix("DAC_"), value) for name, value in of_dac(self.spec).items())
+
+    def stuck_n(self, drive_n: float = PUSH_N + TREMOR_N) -> float:
+        """Return the largest force of pins that stay as they are, at a drive: a DAC keeps it, a pulse is full scale."""
+        return drive_n if self.has_codes else self.spec.drive.full_scale_n
+
+    @property
+    def pins_latency(self) -> int:
+        """Clock edges from a drive of zero to the edge that can see its last pulse."""
+        return self.board().safe_latency - 1
+
+
+STAGED = {
+    each.name: each
+    for each in (
+        Staged(
+            "pdm",
+            ("drive_pdm", 1),
+            {"while the drive's pin is high": 0},
+            "while the drive's pin is low",
+            brief=True,
+        ),
+        # The force of the contact is negative.
+        Staged("pwm", ("steps", -1), {"within a pulse": STEP_CLOCKS // 12}, "between two pulses"),
+        # A frame of 24 bits, two clocks each: the last bit is taken one clock before the chip select rises.
+        Staged(
+            "dac",
+            ("dac_cs_n", 0),
+            {"within a frame": 24, "behind the last bit of a frame": 48},
+            "between two frames",
+        ),
+    )
+}
+"""The stages by their names."""
