@@ -1,8 +1,8 @@
 """What a packer wrote, read back and held against what nextpnr has placed and routed.
 
 Of an iCE40 every bit of every tile is compared. The unpackers of the others write a configuration in other words than
-nextpnr does, for a default may be said or left out: of these the part and the contents of every logic cell that has a
-function, by its place, and of an ECP5 all memories.
+nextpnr does, for a default may be said or left out. Of these it is the part, the contents of every logic cell that has
+a function, by its place, and the switches of the wires; and of an ECP5 all memories.
 """
 
 import json
@@ -17,6 +17,21 @@ Facts = dict[str, str]
 """What is compared, by name or place."""
 CONSTANT = {"0" * 16, "1" * 16}
 """Contents of a logic cell without a function: a cell that is not used has one of these."""
+UNTOLD_ECP5 = re.compile(
+    r"\w+_SLICE|\w+_PIO|\w*(BOUNCE|JMUIA\d+|JPADDI|JREFCLK\d_\d|(BNK_|G_J|SYNC)ECLK\d|CLKINTFB|DDRDEL)"
+)
+"""Sources of wires of an ECP5 that are not compared. They have no bits, for they are connected unless another one is;
+but for outputs of logic cells, some of whose bits their mode sets, too, and edge clocks, which are not used."""
+UNTOLD_GOWIN = re.compile(r"XD\d|GT00")
+"""Wires of a Gowin that cannot be told: from a logic cell to its flip-flop there is no switch, and where clocks are
+tapped, four spines have the same bits."""
+ROWS, COLUMNS = 29, 47
+"""The places of the Gowin, a GW1N-9C."""
+TOWARDS = {"N": (1, 0), "E": (0, -1), "S": (-1, 0), "W": (0, 1)}
+"""Rows and columns from a place on a wire that leads there back to where it begins."""
+TURNED = {"N": "S", "E": "W", "S": "N", "W": "E"}
+WIRE = "wire "
+"""How the name of a wire of a Gowin begins. The unpacker has a source for every wire, also where none was routed."""
 
 
 def check(board: Description, routed: Path, unpacked: Path, bitstream: Path) -> int:
@@ -36,7 +51,8 @@ def check(board: Description, routed: Path, unpacked: Path, bitstream: Path) -> 
     device = DEVICES.get(part.suffixes.bitstream, lambda _: read[".device"])(bitstream)
     if device != part.code:
         raise SynthesisError(f"the bitstream of {board.name} is for the part {device}, not {part.code}")
-    wrong = sorted(name for name in placed.keys() | read.keys() if placed.get(name) != read.get(name))
+    names = placed.keys() | {name for name in read if not name.startswith(WIRE)}
+    wrong = sorted(name for name in names if placed.get(name) != read.get(name))
     if wrong or len(placed) < 2:
         raise SynthesisError(
             f"the bitstream of {board.name} is not what was placed: {len(wrong)} of {len(placed)} differ "
@@ -70,7 +86,7 @@ def _asc(path: Path) -> Facts:
 
 
 def _config(path: Path) -> Facts:
-    """Return the contents of every logic cell and memory of an ECP5."""
+    """Return the contents of every logic cell and memory of an ECP5, and the source of every wire that is switched."""
     facts = {}
     for heading, lines in _blocks(path):
         kind, _, rest = heading.partition(" ")
@@ -79,14 +95,18 @@ def _config(path: Path) -> Facts:
         elif kind == ".bram_init":
             facts[heading] = "\n".join(lines)
         elif kind == ".tile":
-            for name, bits in re.findall(r"^word: (\w+\.K\d\.INIT) (\d+)$", "\n".join(lines), re.MULTILINE):
+            said = "\n".join(lines)
+            for name, bits in re.findall(r"^word: (\w+\.K\d\.INIT) (\d+)$", said, re.MULTILINE):
                 if bits not in CONSTANT:
                     facts[f"{rest} {name}"] = bits
+            for wire, source in re.findall(r"^arc: (\S+) (\S+)$", said, re.MULTILINE):
+                if not UNTOLD_ECP5.fullmatch(source):
+                    facts[f"{rest} {wire}"] = source
     return facts
 
 
 def _routed_json(path: Path) -> Facts:
-    """Return the contents of every logic cell of a Gowin, from what nextpnr wrote."""
+    """Return the contents of every logic cell of a Gowin, and the source of every wire, as nextpnr wrote them."""
     facts = {}
     (module,) = json.loads(path.read_text(encoding="utf-8"))["modules"].values()
     for cell in module["cells"].values():
@@ -97,14 +117,47 @@ def _routed_json(path: Path) -> Facts:
             bits *= 16 // len(bits)
             if bits not in CONSTANT:
                 facts[f"R{int(down) + 1}C{int(across) + 1}_LUT4_{place}"] = bits
+    for net in module["netnames"].values():
+        routing = net["attributes"].get("ROUTING", "")
+        for across, down, wire, source in re.findall(r"X(\d+)Y(\d+)/([^/;]+)/([^/;]+);", routing):
+            if not UNTOLD_GOWIN.fullmatch(wire):
+                place = int(down) + 1, int(across) + 1
+                facts[WIRE + wire_of(*place, wire)] = wire_of(*place, source)
     return facts
 
 
+def wire_of(row: int, column: int, wire: str) -> str:
+    """Return the unpacker's name of a wire of a Gowin at a place: one that leads there has that of where it begins.
+
+    Args:
+        row, column: the place, from 1 on.
+        wire: its name there, for instance W272: to the west, of two places, the seventh, and the place is its end.
+    """
+    between = re.fullmatch(r"([NESW])([128]\d)(\d)", wire)
+    if not between:
+        return wire if wire in ("VCC", "VSS") else f"R{row}C{column}_{wire}"
+    direction, number, places = between.groups()
+    rows, columns = TOWARDS[direction]
+    # A wire that leads out of the part comes back in the other direction.
+    row, turned = _folded(row + rows * int(places), ROWS)
+    column, turned_too = _folded(column + columns * int(places), COLUMNS)
+    return f"R{row}C{column}_{TURNED[direction] if turned or turned_too else direction}{number}"
+
+
+def _folded(at: int, most: int) -> tuple[int, bool]:
+    """Return a row or column within the part, and whether it had to be brought there."""
+    return (1 - at, True) if at < 1 else (2 * most + 1 - at, True) if at > most else (at, False)
+
+
 def _unpacked_verilog(path: Path) -> Facts:
-    """Return the contents of every logic cell of a Gowin, from what the unpacker wrote."""
-    found = re.findall(r"^defparam (\w+)\.INIT = 16'h(\w+);", path.read_text(encoding="utf-8"), re.MULTILINE)
-    facts = {name: f"{int(bits, 16):016b}" for name, bits in found if "_LUT4_" in name}
-    return {name: bits for name, bits in facts.items() if bits not in CONSTANT}
+    """Return the contents of every logic cell of a Gowin, and the source of every wire, as the unpacker wrote them."""
+    text = path.read_text(encoding="utf-8")
+    found = re.findall(r"^defparam (\w+)\.INIT = 16'h(\w+);", text, re.MULTILINE)
+    contents = {name: f"{int(bits, 16):016b}" for name, bits in found if "_LUT4_" in name}
+    facts = {name: bits for name, bits in contents.items() if bits not in CONSTANT}
+    # A name that another one stands for is a macro.
+    wires = re.findall(r"^assign `?(\w+) = `?(\w+);", text, re.MULTILINE)
+    return facts | {WIRE + wire: source for wire, source in wires}
 
 
 def _idcode(path: Path) -> str:

@@ -94,9 +94,14 @@ def test_a_second_run_replaces_the_folder_and_a_failure_leaves_it(calls, tmp_pat
         ("LFE5U-25F|LFE5U-12F", "the bitstream of ulx3s-25f is for the part LFE5U-12F, not LFE5U-25F"),
         (
             "0000000011111111|0000000011111110",
-            "the bitstream of ulx3s-25f is not what was placed: 1 of 3 differ (R2C3:PLC2 SLICEA.K0.INIT)",
+            "the bitstream of ulx3s-25f is not what was placed: 1 of 4 differ (R2C3:PLC2 SLICEA.K0.INIT)",
         ),
-        ("000 111|000 110", "the bitstream of ulx3s-25f is not what was placed: 1 of 3 differ (.bram_init 1)"),
+        ("000 111|000 110", "the bitstream of ulx3s-25f is not what was placed: 1 of 4 differ (.bram_init 1)"),
+        ("0101 F0|0101 F1", "the bitstream of ulx3s-25f is not what was placed: 1 of 4 differ (R2C3:PLC2 E1_H02E0101)"),
+        (
+            "arc: F0 F0_SLICE|arc: E1_H02E0701 F1",
+            "the bitstream of ulx3s-25f is not what was placed: 1 of 4 differ (R2C3:PLC2 E1_H02E0701)",
+        ),
     ],
 )
 def test_a_bitstream_that_is_not_what_was_placed_is_refused(calls, tmp_path, damage, message):
