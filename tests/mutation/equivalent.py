@@ -4,7 +4,8 @@ The component and its mutant are put side by side, with the same inputs. They ha
 common: that the mutant's next value of such a bit is the component's is proven with the outputs. The other bits, those
 that a search has found to differ, are of each alone. What both have alike is merged, so that a multiplier that is in
 both need not be understood. A memory that is written is outside of both: what goes there is proven, and what comes from
-there is the same for both. There are three ways, and any is enough:
+there is the same for both. A register without a first value powers up with any, but with the same in both: the mutant is
+asked what the component would do from there. There are three ways, and any is enough:
 
 - **One step**, in which common bits have any value, and the others have any value in either.
 - **Induction** from power-up on, and after some clocks in which all was equal: so states that do not last are not
@@ -25,6 +26,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Collection
+from itertools import count
 from pathlib import Path
 
 from hardwall.model.build_folder import build_dir
@@ -41,6 +43,8 @@ CPU_S = 15
 ROUNDS, STEPS, STEPS_IN_COMMON = 8, 20, 16
 """The most searches of bits that differ, and the most clocks of the induction, with no bit and with some in common."""
 FLAT = "flatten; memory_collect; memory_map -rom-only; dffunmap; opt_clean"
+START, FIRST = "START", "FIRST"
+"""The ports of the first values of registers that have none of their own, and of the clock at which these hold."""
 TO_MEMORY = ("RD_ADDR", "RD_EN", "WR_ADDR", "WR_DATA", "WR_EN")
 BETWEEN = "___"
 """What joins the names of a module inside and of its port."""
@@ -103,12 +107,45 @@ def part_from_memories(module: dict) -> None:
             module["ports"][f"M_{number}_{port}"] = {"direction": direction, "bits": pins[port]}
 
 
-def joined(module: dict) -> str:
-    """Return Verilog of `machine`: the two side by side, with one register for both in the place of their ports."""
+def first_values(module: dict) -> dict[int, str]:
+    """Return the value at power-up, 0 or 1, of every bit that has one."""
     initial = {}
     for net in module["netnames"].values():
         bits = zip(net["bits"], reversed(net["attributes"].get("init", "")), strict=False)
         initial |= {bit: value for bit, value in bits if value in "01"}
+    return initial
+
+
+def start_alike(module: dict) -> None:
+    """Give every register without a first value that of a port, which is the same for the two that are compared.
+
+    The solver would choose one for each of the two, and find that they differ from power-up on.
+    """
+    initial = first_values(module)
+    numbers = count(1 + max(bit for net in module["netnames"].values() for bit in net["bits"] if isinstance(bit, int)))
+    first, start = next(numbers), []
+    for name, cell in [(name, cell) for name, cell in module["cells"].items() if cell["type"] == "$dff"]:
+        pins = cell["connections"]
+        seen = [bit for bit in pins["Q"] if bit not in initial]
+        if seen:
+            held, given = ([next(numbers) for _ in seen] for _ in range(2))
+            renamed = dict(zip(seen, held, strict=True))
+            pins["Q"] = [renamed.get(bit, bit) for bit in pins["Q"]]
+            module["cells"][f"{START}_{name}"] = {
+                "type": "$mux",
+                "parameters": {"WIDTH": f"{len(seen):032b}"},
+                "port_directions": {"A": "input", "B": "input", "S": "input", "Y": "output"},
+                "connections": {"A": held, "B": given, "S": [first], "Y": seen},
+            }
+            start += given
+    if start:
+        module["ports"][START] = {"direction": "input", "bits": start}
+        module["ports"][FIRST] = {"direction": "input", "bits": [first]}
+
+
+def joined(module: dict) -> str:
+    """Return Verilog of `machine`: the two side by side, with one register for both in the place of their ports."""
+    initial = first_values(module)
     heads, inside, pins = ["output trigger"], [], ["trigger"]
     for name, port in module["ports"].items():
         width, number = f"[{len(port['bits']) - 1}:0]", name.removeprefix("Q_")
@@ -119,6 +156,10 @@ def joined(module: dict) -> str:
             bits = "".join(initial.get(bit, "x") for bit in reversed(port["bits"]))
             inside.append(f"reg {width} in_{name} = {len(bits)}'b{bits};")
             inside.append(f"always @(posedge of_both) in_{name} <= gold_D_{number};")
+            pins.append(f"in_{name}")
+        elif name == FIRST:
+            inside.append(f"reg in_{name} = 1'b1;")
+            inside.append(f"always @(posedge of_both) in_{name} <= 1'b0;")
             pins.append(f"in_{name}")
         elif name != SELECTOR:
             heads.append(f"input {width} in_{name}")
@@ -235,6 +276,8 @@ def _asked(work: Path, design: dict, number: int, how: str, joint: bool = True) 
         how: options of the solver.
         joint: whether these ports are joined by registers; otherwise they have any value.
     """
+    if joint:
+        start_alike(design["modules"][BLOCK])
     (work / "design.json").write_text(json.dumps(design), encoding="utf-8")
     (work / "joined.v").write_text(joined(design["modules"][BLOCK]), encoding="utf-8")
     top = "machine" if joint else "miter"
