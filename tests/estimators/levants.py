@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from functools import cache
+from random import Random
 
 import cocotb
 import numpy as np
@@ -52,12 +53,37 @@ def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
         alpha = random.randint(top[1] * 3 // 4, top[1]) if ramp > 1 else top[1]
         for k in range(d.velocity.max // alpha + 50):
             yield (-k, k)[ramp % 2] * (fast + 1), int(k == 0), (top[0], 0)[ramp // 2 % 2], alpha, k % 2
+    yield from led(d, samples // 4, random)
     # A random walk with jumps, gains anywhere in their range, and restarts.
     count = 0
-    for _ in range(samples - samples // 4 - samples // 10):
+    for _ in range(samples - 2 * (samples // 4) - samples // 10):
         count += random.randrange(-half, half) if random.random() < 0.01 else random.randint(-2 * fast, 2 * fast)
         gains = reset if random.random() < 0.5 else [random.randint(0, most) for most in top]
         yield count, int(random.random() < 0.002), *gains, random.randrange(2)
+
+
+def led(d: levant.Design, samples: int, random: Random) -> Iterator[tuple[int, ...]]:
+    """Yield rows whose counts lead the error to a size and a side, by the model, and keep it there, or are at rest.
+
+    So every size is met for every time: a small one for long, which no count that moves freely gives, and rests long
+    enough for all bits of the error to go to 0, one after the other.
+    """
+    half, state, restart, left = 1 << (d.count_width - 1), d.start(), 1, samples
+    while left:
+        gains = reset_words(d)[:2]
+        if random.random() < 0.5:
+            gains = [word.max >> random.randrange(word.width) for word in (d.lambda_, d.alpha)]
+        output, side = random.randrange(2), random.choice((-1, 0, 1))
+        size = random.randrange(half) >> random.randrange(d.count_width)
+        params = d.params(dict(zip((word.name for word in d.words), (*gains, output), strict=True)))
+        rows = min(left, 1 + (random.randrange(max(samples // 8, 1)) >> random.randrange(8)))
+        for _ in range(rows):
+            moved = (state.lead >> d.velocity.f) - side * size if side else 0
+            count = (state.count + moved + half) % (2 * half) - half
+            yield count, restart, *gains, output
+            state, _, _ = estimate(params, state, seen_count(count), restart)
+            restart = 0
+        left -= rows
 
 
 def wrapped(d: levant.Design, rows) -> list[tuple[int, ...]]:

@@ -42,7 +42,8 @@ CPU_S = 15
 """The processor's time for a question; one that takes longer is not answered."""
 ROUNDS, STEPS, STEPS_IN_COMMON = 8, 20, 16
 """The most searches of bits that differ, and the most clocks of the induction, with no bit and with some in common."""
-FLAT = "flatten; memory_collect; memory_map -rom-only; dffunmap; opt_clean"
+FLAT = "flatten; memory_collect; memory_map -rom-only; dffunmap; setundef -zero; opt_clean"
+"""Registers and memories in the simplest form. What has no value is 0, which the simulation takes it for, too."""
 START, FIRST = "START", "FIRST"
 """The ports of the first values of registers that have none of their own, and of the clock at which these hold."""
 TO_MEMORY = ("RD_ADDR", "RD_EN", "WR_ADDR", "WR_DATA", "WR_EN")
