@@ -15,7 +15,8 @@ from reasons import Reason, reasons_for
 
 from hardwall.testing import SEED, Bench
 from mutation import run
-from mutation.equivalent import EQUIVALENT, cut, joined, known_of, registers
+from mutation.cutting import cut, joined, registers
+from mutation.equivalent import EQUIVALENT, known_of
 from mutation.fates import REASONS, Fate, Result
 from mutation.netlist import BLOCK, mutated
 from mutation.run import fates_of, modules_of
@@ -112,9 +113,7 @@ def test_a_module_is_compared_without_what_is_around_it():
 def test_a_register_without_a_first_value_powers_up_alike_in_both():
     """What it holds without a read is never shown; what it reads is shown a clock later."""
     netlist = mutated(Stored(), (BLOCK,), MANY, SEED)
-    held, read = (
-        [mutant.number for mutant in netlist.mutants if f"procmux.{port}[" in mutant.change] for port in "AB"
-    )
+    held, read = ([mutant.number for mutant in netlist.mutants if f"procmux.{port}[" in mutant.change] for port in "AB")
     known = known_of(netlist, held[:1] + read[:1])
     assert list(known.values()) == [EQUIVALENT, "differs after 1 clocks"]
 

@@ -62,27 +62,34 @@ def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
         yield count, int(random.random() < 0.002), *gains, random.randrange(2)
 
 
-def led(d: levant.Design, samples: int, random: Random) -> Iterator[tuple[int, ...]]:
-    """Yield rows whose counts lead the error to a size and a side, by the model, and keep it there, or are at rest.
+class Leader:
+    """Leads the error, by the model, to a size and a side, and keeps it there: for as long as no free motion would."""
 
-    So every size is met for every time: a small one for long, which no count that moves freely gives, and rests long
-    enough for all bits of the error to go to 0, one after the other.
-    """
-    half, state, restart, left = 1 << (d.count_width - 1), d.start(), 1, samples
+    def __init__(self, d: levant.Design):
+        self._design, self._state, self._restart = d, d.start(), 1
+
+    def rows(self, size: int, side: int, samples: int, words: list[int]) -> Iterator[tuple[int, ...]]:
+        """Yield rows with an error from `size` times `side` up to a count more; with no side, of a count at rest."""
+        d, half = self._design, 1 << (self._design.count_width - 1)
+        params = d.params(dict(zip((word.name for word in d.words), words, strict=True)))
+        for _ in range(samples):
+            moved = (self._state.lead >> d.velocity.f) - side * size if side else 0
+            count = (self._state.count + moved + half) % (2 * half) - half
+            yield count, self._restart, *words
+            self._state, _, _ = estimate(params, self._state, seen_count(count), self._restart)
+            self._restart = 0
+
+
+def led(d: levant.Design, samples: int, random: Random) -> Iterator[tuple[int, ...]]:
+    """Yield rows with errors of every size for every time, and rests in which all bits of the error go to 0."""
+    leader, left = Leader(d), samples
     while left:
         gains = reset_words(d)[:2]
         if random.random() < 0.5:
             gains = [word.max >> random.randrange(word.width) for word in (d.lambda_, d.alpha)]
-        output, side = random.randrange(2), random.choice((-1, 0, 1))
-        size = random.randrange(half) >> random.randrange(d.count_width)
-        params = d.params(dict(zip((word.name for word in d.words), (*gains, output), strict=True)))
+        size = random.randrange(1 << d.count_width - 1) >> random.randrange(d.count_width)
         rows = min(left, 1 + (random.randrange(max(samples // 8, 1)) >> random.randrange(8)))
-        for _ in range(rows):
-            moved = (state.lead >> d.velocity.f) - side * size if side else 0
-            count = (state.count + moved + half) % (2 * half) - half
-            yield count, restart, *gains, output
-            state, _, _ = estimate(params, state, seen_count(count), restart)
-            restart = 0
+        yield from leader.rows(size, random.choice((-1, 0, 1)), rows, [*gains, random.randrange(2)])
         left -= rows
 
 

@@ -16,6 +16,8 @@ from hardwall.model.estimators.kalman import FLOAT_START, START, Design, Gains, 
 from hardwall.model.estimators.riccati import INDEX_MAX
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
+from hardwall.model.estimators.estimate import estimate
+from hardwall.model.quadrature import seen_count
 from stimuli.papers_signal import BOUND, RATES, axis_at, swing
 from stimuli.seeded import seeded
 from stimuli.specs import spec
@@ -59,6 +61,7 @@ def stimulus(name: str, samples: int):
     for chosen in ([0, 0, 0], [0, top[1], 0], [0, 0, top[2]], [1, 1, 1], top):
         for k in range(min(samples // 20, 2 * d.lead.max // (d.step_max << d.lead.f))):
             yield k * (d.step_max + 1), 0, *chosen
+    yield from sunk(d)
     # A random walk with jumps and restarts, with gains anywhere in their range.
     count, chosen = 0, reset
     for _ in range(samples // 2):
@@ -67,6 +70,29 @@ def stimulus(name: str, samples: int):
         if random.random() < 0.02:
             chosen = random.choice([reset, double, [random.randint(0, most) for most in top]])
         yield count, int(random.random() < 0.002), *chosen
+
+
+def sunk(d: Design):
+    """Yield rows that lead, by the model, to the lowest velocity, and there to an acceleration of an LSB below 0.
+
+    Of all sums, the one that is an LSB beyond the range comes by no chance.
+    """
+    state, count, restart = START, 0, 1
+    top, half, one = [word.format.max for word in d.words], 1 << (d.count_width - 1), 1 << d.lead.f
+    lowest, near = -d.velocity.max << (d.v.f - d.velocity.f), 1 << (d.a.f - d.v.f + d.shifts[2] + d.lead.f - d.operand.f)
+    ending = 2
+    while ending:
+        words, moved = [0, top[1], top[2]], -d.step_max
+        if state.v == lowest:
+            ahead = state.lead + (state.v >> (d.v.f - d.lead.f))
+            moved = max(-d.step_max, min(d.step_max, ahead // one))
+            ending -= ahead - moved * one < near
+            words = [0, 0, int(ending < 2)]
+        count = (count + moved + half) % (2 * half) - half
+        yield count, restart, *words
+        params = d.params(dict(zip((word.name for word in d.words), words, strict=True)))
+        state, _, _ = estimate(params, state, seen_count(count), restart)
+        restart = 0
 
 
 @cocotb.test(**CAMPAIGN)

@@ -3,6 +3,7 @@
 import itertools
 import math
 from dataclasses import replace
+from random import Random
 
 import levants
 import numpy as np
@@ -36,8 +37,9 @@ def make(name: str) -> Estimator:
 
 def stimulus(d: levant_adaptive.Design, samples: int):
     """Yield the family's rows, then calm down to the last level, losses of all sizes from it, and a restart there."""
-    yield from levants.stimulus(d, samples // 2)
+    yield from levants.stimulus(d, samples * 2 // 5)
     random, reset, count = seeded(), reset_words(d)[:2], 0
+    yield from losses(d, samples // 10, random)
     most = max(samples // 20, 1)
     for run in range(10):
         # The first samples after a jump are for tracking, the rest for calm.
@@ -48,6 +50,23 @@ def stimulus(d: levant_adaptive.Design, samples: int):
         for _ in range(20):
             count += run % 4
             yield count, 0, *reset, 0
+
+
+def losses(d: levant_adaptive.Design, samples: int, random: Random):
+    """Yield rows of a calm of any time, then a time on one side and a loss there; the level then says what it reached."""
+    leader, words = levants.Leader(d), reset_words(d)
+    calm, reach = sum(map(d.hold_samples, range(d.levels))), d.reach_samples(d.levels)
+    while samples > 0:
+        side = random.choice((-1, 1))
+        # An error from 0 to a count is on the one side, and from -1 to 0 on the other.
+        parts = [
+            (int(side > 0), -side, random.randrange(calm + 20)),
+            (int(side < 0), side, 1 + random.randrange(reach + 10)),
+            (LOST << random.randrange(3), side, 3),
+        ]
+        for size, where, rows in parts:
+            yield from leader.rows(size, where, rows, words)
+            samples -= rows
 
 
 follows_model, reset_mid_stream_starts_afresh = levants.campaign(make, START, stimulus, fewer=("brisk",))

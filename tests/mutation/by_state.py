@@ -1,0 +1,189 @@
+"""Mutants that are equal to the component because what differs is not read in the states in which it differs.
+
+The component and its mutant begin alike and get the same inputs. Two kinds of facts are found and then proven for a
+single step, so that they hold for ever:
+
+- **States that are reached**: words of the registers in `CONTROL`, which are to be alike always.
+- **Registers that differ**: in which of these states each of the others may. None does at power-up; a register is given
+  every state in which some step makes it differ, until no step makes another.
+
+Before the first state is left for the first time, most registers still have their first values. That is found, too: all
+that have one are taken to, but for those that some step changes there.
+"""
+
+import copy
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .asking import answer, copies
+from .cutting import cut, first_values, registers
+from .netlist import BLOCK, SELECTOR
+
+CONTROL = ("fsm_state", "running")
+"""The registers by which states are told apart. A block with more bits of them than `MOST_BITS` is not tried."""
+MOST_BITS = 8
+PROVEN = "SUCCESS"
+QUESTIONS, ANSWERS, STATES = 40, 12, 400
+"""The most questions, the most examples of each, and the most steps from a state to another."""
+_VALUE = re.compile(r"^ *\\(\S+) .* ([01]+)$", re.MULTILINE)
+
+
+@dataclass
+class Facts:
+    """What is taken to hold.
+
+    Attributes:
+        bits: the control's bits, each the number of its register and its place in it.
+        reached: the states that are reached.
+        firsts: the first value of every register that has one.
+        untouched: the registers that have it as long as the first state lasts.
+        differ: the states in which a register may differ, by its number.
+    """
+
+    bits: list[tuple[int, int]]
+    reached: set[int] = field(default_factory=set)
+    firsts: dict[int, str] = field(default_factory=dict)
+    untouched: set[int] = field(default_factory=set)
+    differ: dict[int, set[int]] = field(default_factory=dict)
+
+    @property
+    def control(self) -> set[int]:
+        return {register for register, _ in self.bits}
+
+    @property
+    def first(self) -> int:
+        """The state at power-up."""
+        return sum((self.firsts[register][::-1][place] == "1") << n for n, (register, place) in enumerate(self.bits))
+
+    def word(self, prefix: str) -> str:
+        """Return Verilog of the control's word."""
+        return "{" + ", ".join(f"{prefix}{register}[{place}]" for register, place in reversed(self.bits)) + "}"
+
+    def among(self, word: str, states: set[int]) -> str:
+        """Return Verilog that says whether a word of the control is among some states."""
+        return "(" + " | ".join([f"({word} == {state})" for state in sorted(states)] or ["1'b0"]) + ")"
+
+
+def equal_by_state(work: Path, flat: dict, number: int) -> bool:
+    """Return whether a mutant is proven equal so; False where it is not, or has no control.
+
+    Args:
+        work: a folder for the files.
+        flat: the component with its mutants, as Yosys writes it, without memories.
+        number: the mutant.
+    """
+    design = copy.deepcopy(flat)
+    module = design["modules"][BLOCK]
+    initial, cells = first_values(module), sorted({name for name, _ in registers(module)})
+    outputs = {n: module["cells"][name]["connections"]["Q"] for n, name in enumerate(cells)}
+    named = [net["bits"] for name, net in module["netnames"].items() if name.rpartition(".")[2] in CONTROL]
+    control = {bit for bits in named for bit in bits}
+    facts = Facts([(n, k) for n, bits in outputs.items() for k, bit in enumerate(bits) if bit in control])
+    facts.firsts = {
+        n: "".join(initial[bit] for bit in reversed(bits))
+        for n, bits in outputs.items()
+        if all(bit in initial for bit in bits)
+    }
+    if not 0 < len(facts.bits) <= MOST_BITS or not facts.control <= set(facts.firsts):
+        return False
+    facts.untouched = set(facts.firsts) - facts.control
+    cut(module, registers(module), free=False)
+    steps = _examples(work, design, number, _stepping(module, facts), f"-max {STATES}")
+    if not steps or len(steps) >= STATES:
+        return False
+    new = {facts.first}
+    while new:
+        facts.reached |= new
+        new = {step["next"] for step in steps if step["at"] in facts.reached} - facts.reached
+    for _ in range(QUESTIONS):
+        found = _examples(work, design, number, _pair(module, facts), f"-prove trigger 0 -max {ANSWERS}")
+        if not found:
+            return found is not None
+        for example in found:
+            if example["bad"]:
+                return False
+            for n in outputs:
+                if example["new"] >> n & 1:
+                    facts.differ.setdefault(n, set()).add(example["next"])
+                if example["off"] >> n & 1:
+                    facts.untouched.discard(n)
+    return False
+
+
+def _stepping(module: dict, facts: Facts) -> str:
+    """Return Verilog of a machine whose outputs are any state of the control and the next one."""
+    ports, pins = [], []
+    for name, port in module["ports"].items():
+        if name != SELECTOR:
+            ports.append(f"{port['direction']} [{len(port['bits']) - 1}:0] {name}")
+            pins.append(f".{name}({name})")
+    width = len(facts.bits) - 1
+    return (
+        f"module machine({', '.join(ports)}, output [{width}:0] at, output [{width}:0] next);\n"
+        f"gold gold({', '.join(pins)});\n"
+        f"assign at = {facts.word('Q_')};\nassign next = {facts.word('D_')};\nendmodule\n"
+    )
+
+
+def _pair(module: dict, facts: Facts) -> str:
+    """Return Verilog of a machine that triggers where a step from what is taken to hold leads out of it.
+
+    Its outputs are `next`, the next state; `bad`, whether an output or the control differs; `new`, with a bit for every
+    register that differs in the next state and was not known to; and `off`, with one for every register that loses its
+    first value in the first state.
+    """
+    heads, body, bad = [], [], ["1'b0"]
+    pins: dict[str, list[str]] = {"gold": [], "gate": []}
+    now, following = facts.word("Q_"), facts.word("gold_D_")
+    new, off, held = {}, {}, [facts.among("now", facts.reached)]
+    for name, port in module["ports"].items():
+        width, n = f"[{len(port['bits']) - 1}:0]", int(name[2:]) if name[:2] in ("Q_", "D_") else None
+        if name == SELECTOR:
+            continue
+        if port["direction"] == "output":
+            for side, each in pins.items():
+                body.append(f"wire {width} {side}_{name};")
+                each.append(f".{name}({side}_{name})")
+            unlike = f"(gold_{name} != gate_{name})"
+            if n is None or n in facts.control:
+                bad.append(unlike)
+            else:
+                new[n] = f"{unlike} & ~{facts.among('next', facts.differ.get(n, set()))}"
+            if n in facts.untouched:
+                off[n] = f"(next == {facts.first}) & (gold_{name} != {len(port['bits'])}'b{facts.firsts[n]})"
+            continue
+        heads.append(f"input {width} {name}")
+        pins["gold"].append(f".{name}({name})")
+        if n in facts.differ:
+            heads.append(f"input {width} other_{name}")
+            body.append(f"wire {width} gate_{name} = {facts.among('now', facts.differ[n])} ? other_{name} : {name};")
+            pins["gate"].append(f".{name}(gate_{name})")
+        else:
+            pins["gate"].append(f".{name}({name})")
+        if n in facts.untouched:
+            held.append(f"((now != {facts.first}) | ({name} == {len(port['bits'])}'b{facts.firsts[n]}))")
+    width = f"[{len(facts.bits) - 1}:0]"
+    every = range(1 + max((n for n in new), default=0), 0, -1)
+    words = {
+        "new": "{" + ", ".join(new.get(n - 1, "1'b0") for n in every) + "}",
+        "off": "{" + ", ".join(off.get(n - 1, "1'b0") for n in every) + "}",
+    }
+    heads += ["output trigger", "output bad", *(f"output [{len(every) - 1}:0] {name}" for name in words)]
+    heads.append(f"output {width} next")
+    lines = [f"module machine({', '.join(heads)});", *body, f"wire {width} now = {now};", f"assign next = {following};"]
+    lines += [f"{side} {side}({', '.join(each)});" for side, each in pins.items()]
+    lines += [f"assign bad = {' | '.join(bad)};", *(f"assign {name} = {value};" for name, value in words.items())]
+    lines += [f"assign trigger = {' & '.join(held)} & (bad | (|new) | (|off));", "endmodule"]
+    return "\n".join(lines) + "\n"
+
+
+def _examples(work: Path, design: dict, number: int, machine: str, how: str) -> list[dict[str, int]] | None:
+    """Return what the machine's outputs are in the solver's examples; None if it has no answer in its time."""
+    (work / "machine.v").write_text(machine, encoding="utf-8")
+    shown = " ".join(f"-show {name}" for name in ("at", "next", "bad", "new", "off") if f" {name} =" in machine)
+    said = answer(work, design, [*copies(number), "read_verilog machine.v"], "machine", f"{how} {shown}")
+    tables = said.split("Signal Name")[1:]
+    if not tables and PROVEN not in said:
+        return None
+    return [{name: int(bits, 2) for name, bits in _VALUE.findall(table)} for table in tables]
