@@ -18,7 +18,7 @@ from mutation import run
 from mutation.cutting import cut, joined, registers
 from mutation.equivalent import EQUIVALENT, known_of
 from mutation.fates import REASONS, Fate, Result
-from mutation.netlist import BLOCK, mutated
+from mutation.netlist import BLOCK, Mutant, Netlist, mutated
 from mutation.run import fates_of, modules_of
 from mutation.sizes import Size, sizes_of
 
@@ -116,6 +116,40 @@ def test_a_register_without_a_first_value_powers_up_alike_in_both():
     held, read = ([mutant.number for mutant in netlist.mutants if f"procmux.{port}[" in mutant.change] for port in "AB")
     known = known_of(netlist, held[:1] + read[:1])
     assert list(known.values()) == [EQUIVALENT, "differs after 1 clocks"]
+
+
+SUM = """
+module block(input clk, input start, input [1:0] word, input [15:0] mutant, output reg [1:0] total);
+  reg fsm_state = 0, running = 0;
+  reg [1:0] held = 0;
+  reg [5:0] left = 0;
+  initial total = 0;
+  always @(posedge clk)
+    if (!fsm_state) begin
+      if (mutant == 1) held <= ~held;
+      if (start) begin
+        fsm_state <= 1;
+        running <= 1;
+        held <= word;
+        if (running ? mutant == 4 : mutant != 2) total <= 0;
+      end
+    end else begin
+      left <= left + 1;
+      if (mutant == 3) held <= ~held;
+      if (&left) begin
+        total <= total + held * held;
+        fsm_state <= 0;
+      end
+    end
+endmodule
+"""
+"""Adds squares of words, each long after its start. What holds the word matters in that time; the first clear never."""
+
+
+@pytest.mark.parametrize(("number", "equal"), [(1, True), (2, True), (3, False), (4, False)])
+def test_what_differs_where_no_state_reads_it_is_equivalent(number, equal):
+    known = known_of(Netlist(Answer(), SUM, (BLOCK,), [Mutant(number, "planted")]), [number])
+    assert (known[number] == EQUIVALENT) == equal
 
 
 def test_tests_that_fail_without_a_mutant_say_nothing(monkeypatch):

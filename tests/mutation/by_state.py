@@ -7,6 +7,8 @@ single step, so that they hold for ever:
 - **Registers that differ**: in which of these states each of the others may. None does at power-up; a register is given
   every state in which some step makes it differ, until no step makes another.
 
+A product is any number, the same for both where its factors are: that two products are equal, a solver finds slowly.
+
 Before the first state is left for the first time, most registers still have their first values. That is found, too: all
 that have one are taken to, but for those that some step changes there.
 """
@@ -26,6 +28,8 @@ MOST_BITS = 8
 PROVEN = "SUCCESS"
 QUESTIONS, ANSWERS, STATES = 40, 12, 400
 """The most questions, the most examples of each, and the most steps from a state to another."""
+_REGISTER, _PRODUCT = re.compile(r"[DQ]_(\d+)$"), re.compile(r"(TIMES_\d+)_[ABY]$")
+"""The ports of registers and of multipliers."""
 _VALUE = re.compile(r"^ *\\(\S+) .* ([01]+)$", re.MULTILINE)
 
 
@@ -89,6 +93,7 @@ def equal_by_state(work: Path, flat: dict, number: int) -> bool:
         return False
     facts.untouched = set(facts.firsts) - facts.control
     cut(module, registers(module), free=False)
+    _part_from_products(module)
     steps = _examples(work, design, number, _stepping(module, facts), f"-max {STATES}")
     if not steps or len(steps) >= STATES:
         return False
@@ -109,6 +114,16 @@ def equal_by_state(work: Path, flat: dict, number: int) -> bool:
                 if example["off"] >> n & 1:
                     facts.untouched.discard(n)
     return False
+
+
+def _part_from_products(module: dict) -> None:
+    """Put ports of the module in the place of its multipliers: outputs for factors, and an input for the product."""
+    products = [name for name, cell in module["cells"].items() if cell["type"] == "$mul"]
+    for number, name in enumerate(products):
+        pins = module["cells"].pop(name)["connections"]
+        for pin in "ABY":
+            direction = "input" if pin == "Y" else "output"
+            module["ports"][f"TIMES_{number}_{pin}"] = {"direction": direction, "bits": pins[pin]}
 
 
 def _stepping(module: dict, facts: Facts) -> str:
@@ -133,49 +148,51 @@ def _pair(module: dict, facts: Facts) -> str:
     register that differs in the next state and was not known to; and `off`, with one for every register that loses its
     first value in the first state.
     """
-    heads, body, bad = [], [], ["1'b0"]
-    pins: dict[str, list[str]] = {"gold": [], "gate": []}
-    now, following = facts.word("Q_"), facts.word("gold_D_")
-    new, off, held = {}, {}, [facts.among("now", facts.reached)]
+    sides: dict[str, list[str]] = {"gold": [], "gate": []}
+    heads, body, held = [], [], [facts.among("now", facts.reached)]
+    bad, new, off = ["1'b0"], {}, {}
     for name, port in module["ports"].items():
-        width, n = f"[{len(port['bits']) - 1}:0]", int(name[2:]) if name[:2] in ("Q_", "D_") else None
-        if name == SELECTOR:
-            continue
+        width, register = len(port["bits"]), _REGISTER.match(name)
+        n = int(register[1]) if register else None
+        first = f"{width}'b{facts.firsts[n]}" if n in facts.untouched else None
         if port["direction"] == "output":
-            for side, each in pins.items():
-                body.append(f"wire {width} {side}_{name};")
-                each.append(f".{name}({side}_{name})")
+            for side, pins in sides.items():
+                body.append(f"wire [{width - 1}:0] {side}_{name};")
+                pins.append(f".{name}({side}_{name})")
             unlike = f"(gold_{name} != gate_{name})"
-            if n is None or n in facts.control:
-                bad.append(unlike)
-            else:
+            if n is not None and n not in facts.control:
                 new[n] = f"{unlike} & ~{facts.among('next', facts.differ.get(n, set()))}"
-            if n in facts.untouched:
-                off[n] = f"(next == {facts.first}) & (gold_{name} != {len(port['bits'])}'b{facts.firsts[n]})"
-            continue
-        heads.append(f"input {width} {name}")
-        pins["gold"].append(f".{name}({name})")
-        if n in facts.differ:
-            heads.append(f"input {width} other_{name}")
-            body.append(f"wire {width} gate_{name} = {facts.among('now', facts.differ[n])} ? other_{name} : {name};")
-            pins["gate"].append(f".{name}(gate_{name})")
-        else:
-            pins["gate"].append(f".{name}({name})")
-        if n in facts.untouched:
-            held.append(f"((now != {facts.first}) | ({name} == {len(port['bits'])}'b{facts.firsts[n]}))")
-    width = f"[{len(facts.bits) - 1}:0]"
-    every = range(1 + max((n for n in new), default=0), 0, -1)
-    words = {
-        "new": "{" + ", ".join(new.get(n - 1, "1'b0") for n in every) + "}",
-        "off": "{" + ", ".join(off.get(n - 1, "1'b0") for n in every) + "}",
+            elif not _PRODUCT.match(name):
+                bad.append(unlike)
+            if first:
+                off[n] = f"(next == {facts.first}) & (gold_{name} != {first})"
+        elif name != SELECTOR:
+            heads += [f"input [{width - 1}:0] {side}{name}" for side in ("", "other_")]
+            body.append(f"wire [{width - 1}:0] gate_{name} = {_apart(name, n, facts)} ? other_{name} : {name};")
+            sides["gold"].append(f".{name}({name})")
+            sides["gate"].append(f".{name}(gate_{name})")
+            if first:
+                held.append(f"((now != {facts.first}) | ({name} == {first}))")
+    every = range(max(new, default=0), -1, -1)
+    words = {"next": facts.word("gold_D_"), "bad": " | ".join(bad)}
+    words |= {
+        key: "{" + ", ".join(each.get(n, "1'b0") for n in every) + "}" for key, each in (("new", new), ("off", off))
     }
-    heads += ["output trigger", "output bad", *(f"output [{len(every) - 1}:0] {name}" for name in words)]
-    heads.append(f"output {width} next")
-    lines = [f"module machine({', '.join(heads)});", *body, f"wire {width} now = {now};", f"assign next = {following};"]
-    lines += [f"{side} {side}({', '.join(each)});" for side, each in pins.items()]
-    lines += [f"assign bad = {' | '.join(bad)};", *(f"assign {name} = {value};" for name, value in words.items())]
+    widths = {"next": len(facts.bits), "bad": 1, "new": len(every), "off": len(every)}
+    heads += ["output trigger", *(f"output [{widths[key] - 1}:0] {key}" for key in words)]
+    lines = [f"module machine({', '.join(heads)});", *body, f"wire [{len(facts.bits) - 1}:0] now = {facts.word('Q_')};"]
+    lines += [f"{side} {side}({', '.join(pins)});" for side, pins in sides.items()]
+    lines += [f"assign {key} = {value};" for key, value in words.items()]
     lines += [f"assign trigger = {' & '.join(held)} & (bad | (|new) | (|off));", "endmodule"]
     return "\n".join(lines) + "\n"
+
+
+def _apart(name: str, register: int | None, facts: Facts) -> str:
+    """Return Verilog that says when an input may have a value for the mutant that it has not for the component."""
+    if product := _PRODUCT.match(name):
+        factors = (f"{product[1]}_{pin}" for pin in "AB")
+        return "(" + " | ".join(f"(gold_{factor} != gate_{factor})" for factor in factors) + ")"
+    return facts.among("now", facts.differ.get(register, set()))
 
 
 def _examples(work: Path, design: dict, number: int, machine: str, how: str) -> list[dict[str, int]] | None:
