@@ -51,8 +51,11 @@ def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
     steps = d.velocity.max // top[1] + 50
     for ramp in range(max(2, samples // 10 // steps)):
         alpha = random.randint(top[1] * 3 // 4, top[1]) if ramp > 1 else top[1]
+        lam, way, count = (top[0], 0)[ramp // 2 % 2], (-1, 1)[ramp % 2], 0
         for k in range(d.velocity.max // alpha + 50):
-            yield (-k, k)[ramp % 2] * (fast + 1), int(k == 0), (top[0], 0)[ramp // 2 % 2], alpha, k % 2
+            count = way * k * (fast + 1)
+            yield count, int(k == 0), lam, alpha, k % 2
+        yield from ends(d, count, way, random)
     yield from led(d, samples // 4, random)
     # A random walk with jumps, gains anywhere in their range, and restarts.
     count = 0
@@ -60,6 +63,23 @@ def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
         count += random.randrange(-half, half) if random.random() < 0.01 else random.randint(-2 * fast, 2 * fast)
         gains = reset if random.random() < 0.5 else [random.randint(0, most) for most in top]
         yield count, int(random.random() < 0.002), *gains, random.randrange(2)
+
+
+def ends(d: levant.Design, count: int, way: int, random: Random) -> Iterator[tuple[int, ...]]:
+    """Yield rows that leave an end of u1, to which a ramp in a direction has led, and come back to it."""
+    far = (1 << (d.count_width - 1)) - 1
+    # By every power of two and an LSB less, with rests of u1 at the end and beside it; two jumps turn the error round.
+    for step in ((1 << n // 2) - n % 2 for n in range(2, 2 * d.alpha.width + 1)):
+        for turn, alphas in ((-way, (0, 0, 0, step)), (way, (0, 0, 0, d.alpha.max))):
+            for alpha in alphas:
+                count += turn * far
+                yield count, 0, 0, alpha, 1
+    # By steps of any size, and more of another size back, so that the last one comes to it from anywhere.
+    for turn in range(40):
+        alpha = random.randrange(d.alpha.max) >> random.randrange(8)
+        for k in range(random.randint(3, 6) + 4 * (turn % 2)):
+            count += (-way, way)[turn % 2] * far
+            yield count, 0, 0, alpha, k % 2
 
 
 class Leader:

@@ -12,12 +12,12 @@ from scipy.linalg import solve_discrete_are
 from hardwall.hdl.estimators.kalman import Estimator
 from hardwall.model.axis import Axis
 from hardwall.model.estimators import kalman
+from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.kalman import FLOAT_START, START, Design, Gains, State, steady_state
 from hardwall.model.estimators.riccati import INDEX_MAX
+from hardwall.model.quadrature import seen_count
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
-from hardwall.model.estimators.estimate import estimate
-from hardwall.model.quadrature import seen_count
 from stimuli.papers_signal import BOUND, RATES, axis_at, swing
 from stimuli.seeded import seeded
 from stimuli.specs import spec
@@ -79,7 +79,10 @@ def sunk(d: Design):
     """
     state, count, restart = START, 0, 1
     top, half, one = [word.format.max for word in d.words], 1 << (d.count_width - 1), 1 << d.lead.f
-    lowest, near = -d.velocity.max << (d.v.f - d.velocity.f), 1 << (d.a.f - d.v.f + d.shifts[2] + d.lead.f - d.operand.f)
+    lowest, near = (
+        -d.velocity.max << (d.v.f - d.velocity.f),
+        1 << (d.a.f - d.v.f + d.shifts[2] + d.lead.f - d.operand.f),
+    )
     ending = 2
     while ending:
         words, moved = [0, top[1], top[2]], -d.step_max

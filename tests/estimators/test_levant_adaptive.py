@@ -53,7 +53,7 @@ def stimulus(d: levant_adaptive.Design, samples: int):
 
 
 def losses(d: levant_adaptive.Design, samples: int, random: Random):
-    """Yield rows of a calm of any time, then a time on one side and a loss there; the level then says what it reached."""
+    """Yield rows of a calm of any time, a time on one side and a loss there; the level then says what it reached."""
     leader, words = levants.Leader(d), reset_words(d)
     calm, reach = sum(map(d.hold_samples, range(d.levels))), d.reach_samples(d.levels)
     while samples > 0:
