@@ -109,8 +109,13 @@ def led(d: levant.Design, samples: int, random: Random) -> Iterator[tuple[int, .
             gains = [word.max >> random.randrange(word.width) for word in (d.lambda_, d.alpha)]
         size = random.randrange(1 << d.count_width - 1) >> random.randrange(d.count_width)
         rows = min(left, 1 + (random.randrange(max(samples // 8, 1)) >> random.randrange(8)))
-        yield from leader.rows(size, random.choice((-1, 0, 1)), rows, [*gains, random.randrange(2)])
+        side, words = random.choice((-1, 0, 1)), [*gains, random.randrange(2)]
+        yield from leader.rows(size, side, rows, words)
         left -= rows
+        if left and not side:
+            # From rest to just below the largest error.
+            yield from leader.rows((1 << d.count_width - 1) - 1, 1, 1, words)
+            left -= 1
 
 
 def wrapped(d: levant.Design, rows) -> list[tuple[int, ...]]:

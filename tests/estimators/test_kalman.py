@@ -61,7 +61,9 @@ def stimulus(name: str, samples: int):
     for chosen in ([0, 0, 0], [0, top[1], 0], [0, 0, top[2]], [1, 1, 1], top):
         for k in range(min(samples // 20, 2 * d.lead.max // (d.step_max << d.lead.f))):
             yield k * (d.step_max + 1), 0, *chosen
-    yield from sunk(d)
+    # An acceleration that comes to an LSB beyond its lowest, and then stays there.
+    if name in BRINKS:
+        yield from brink(d, *BRINKS[name])[0]
     # A random walk with jumps and restarts, with gains anywhere in their range.
     count, chosen = 0, reset
     for _ in range(samples // 2):
@@ -72,30 +74,45 @@ def stimulus(name: str, samples: int):
         yield count, int(random.random() < 0.002), *chosen
 
 
-def sunk(d: Design):
-    """Yield rows that lead, by the model, to the lowest velocity, and there to an acceleration of an LSB below 0.
+BRINKS = {"mhz": (3, 47911, 8782)}
+"""For how many rows the lead waits, and the gains of velocity and then of position: those that end it where it must."""
 
-    Of all sums, the one that is an LSB beyond the range comes by no chance.
+
+def brink(d: Design, wait: int, velocity: int, position: int) -> tuple[list[tuple[int, ...]], list[tuple[State, int]]]:
+    """Return rows that lead the acceleration, by the model, to its lowest, and the states and flags from the start on.
+
+    There it comes to the one sum that is an LSB beyond the range, and then stays. That comes by no chance: the lead
+    must be within what the least gain makes an LSB of, above 0 and a sample later below.
     """
-    state, count, restart = START, 0, 1
-    top, half, one = [word.format.max for word in d.words], 1 << (d.count_width - 1), 1 << d.lead.f
-    lowest, near = (
-        -d.velocity.max << (d.v.f - d.velocity.f),
-        1 << (d.a.f - d.v.f + d.shifts[2] + d.lead.f - d.operand.f),
-    )
-    ending = 2
-    while ending:
-        words, moved = [0, top[1], top[2]], -d.step_max
-        if state.v == lowest:
-            ahead = state.lead + (state.v >> (d.v.f - d.lead.f))
-            moved = max(-d.step_max, min(d.step_max, ahead // one))
-            ending -= ahead - moved * one < near
-            words = [0, 0, int(ending < 2)]
-        count = (count + moved + half) % (2 * half) - half
-        yield count, restart, *words
+    one, half = 1 << d.lead.f, 1 << (d.count_width - 1)
+    rows, seen, count = [], [(START, 0)], 0
+
+    def lead(goal: int, *words: int) -> None:
+        """Add a row that brings the lead to the goal or up to a count more, as far as a step may."""
+        nonlocal count
+        state, _ = seen[-1]
+        onward = (2 * state.v + (state.a >> (d.a.f - d.v.f))) >> (d.v.f - d.lead.f + 1)
+        moved = (state.lead + onward - goal * one) >> d.lead.f
+        count += max(-d.step_max, min(d.step_max, moved))
+        count = (count + half) % (2 * half) - half
+        rows.append((count, int(not rows), *words))
         params = d.params(dict(zip((word.name for word in d.words), words, strict=True)))
-        state, _, _ = estimate(params, state, seen_count(count), restart)
-        restart = 0
+        state, _, flags = estimate(params, state, seen_count(count), rows[-1][1])
+        seen.append((state, flags))
+
+    while seen[-1][0].a != -d.a.max:
+        lead(2 * half, 0, 0, d.words[2].format.max)
+    while seen[-1][0].lead > 100 * one:
+        lead(0, 0, 0, 1)
+    for _ in range(wait):
+        lead(100, 0, velocity, 1)
+    while seen[-1][0].lead > 30 * one:
+        lead(0, 0, velocity, 1)
+    lead(0, position, 0, 1)
+    while seen[-1][0].lead > one:
+        lead(0, 0, 0, 1)
+    lead(0, 0, 0, 1)
+    return rows, seen
 
 
 @cocotb.test(**CAMPAIGN)
@@ -125,6 +142,17 @@ async def reset_mid_stream_starts_afresh(dut):
 @pytest.mark.parametrize("name", ["mhz", "narrow"])
 def test_rtl(name):
     simulate(__file__, make, name=name)
+
+
+@pytest.mark.parametrize("name", BRINKS)
+def test_the_acceleration_comes_to_an_lsb_beyond_its_lowest_and_stays(name):
+    d = design(name)
+    _, seen = brink(d, *BRINKS[name])
+    (before, _), (state, flags), (after, last) = seen[-3:]
+    # The least gain makes an LSB of a lead up to this.
+    assert 0 < state.lead <= 1 << (d.lead.f - d.operand.f + d.shifts[2])
+    assert before.a == state.a == after.a == -d.a.max
+    assert (flags & 4, last & 4) == (4, 0)
 
 
 def oracle(d: Design, rows):
