@@ -112,10 +112,11 @@ def led(d: levant.Design, samples: int, random: Random) -> Iterator[tuple[int, .
         side, words = random.choice((-1, 0, 1)), [*gains, random.randrange(2)]
         yield from leader.rows(size, side, rows, words)
         left -= rows
-        if left and not side:
-            # From rest to just below the largest error.
-            yield from leader.rows((1 << d.count_width - 1) - 1, 1, 1, words)
-            left -= 1
+        if not side:
+            # From rest to just below the largest error, and back to where the root is fine.
+            for jump, stay in (((1 << d.count_width - 1) - 1, 1), (0, 20)):
+                yield from leader.rows(jump, 1, min(left, stay), words)
+                left -= min(left, stay)
 
 
 def wrapped(d: levant.Design, rows) -> list[tuple[int, ...]]:
