@@ -26,7 +26,7 @@ CONTROL = ("fsm_state", "running")
 """The registers by which states are told apart. A block with more bits of them than `MOST_BITS` is not tried."""
 MOST_BITS = 8
 PROVEN = "SUCCESS"
-QUESTIONS, ANSWERS, STATES = 40, 12, 400
+QUESTIONS, ANSWERS, STATES = 40, 12, 10_000
 """The most questions, the most examples of each, and the most steps from a state to another."""
 _REGISTER, _PRODUCT = re.compile(r"[DQ]_(\d+)$"), re.compile(r"(TIMES_\d+)_[ABY]$")
 """The ports of registers and of multipliers."""

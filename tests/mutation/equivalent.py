@@ -15,7 +15,8 @@ four ways, and any is enough:
 
 Where one module was changed, it is compared alone, without what is inside it: what it gives to the modules inside is an
 output, and what it gets from them an input. So the question does not grow with what is around and inside. A mutant that
-is equal so is equal in the component, too. Where that module is the component, all of it is compared, too.
+is equal so is equal in the component, too. Where that module is the component, all of it is compared, too. Otherwise
+the module around it is, in a step: so it may give anything where nobody takes it.
 
 The search from power-up may instead find inputs at which an output differs: then a test could kill the mutant, unless
 what is around or inside never gives such inputs.
@@ -68,11 +69,31 @@ def known_of(netlist: Netlist, numbers: Collection[int]) -> dict[int, str]:
     with scratch(build_dir() / "mutate") as work:
         (work / "mutated.v").write_text(netlist.verilog, encoding="utf-8")
         for commands in _compared(netlist):
-            run_yosys(work, f"read_verilog mutated.v; {commands}; {FLAT}; write_json flat.json")
-            flat = json.loads((work / "flat.json").read_text(encoding="utf-8"))
-            part_from_memories(flat["modules"][BLOCK])
+            flat = _flat(work, commands)
             known |= {number: _known(work, flat, number) for number in numbers if known.get(number) != EQUIVALENT}
+        left = [number for number in numbers if known[number] != EQUIVALENT]
+        if left and (around := _around(netlist)):
+            flat = _flat(work, around)
+            known |= dict.fromkeys([number for number in left if _equal_in_a_step(work, flat, number)], EQUIVALENT)
     return known
+
+
+def _around(netlist: Netlist) -> str:
+    """Return the commands that make `BLOCK` of the module around the one that was changed; an empty text for none."""
+    outer = netlist.modules[0].rpartition(".")[0]
+    return f"hierarchy -top {outer}; proc; rename {outer} {BLOCK}" if outer and len(netlist.modules) == 1 else ""
+
+
+def _flat(work: Path, commands: str) -> dict:
+    """Return what is compared, as Yosys writes it, without its memories."""
+    run_yosys(work, f"read_verilog mutated.v; {commands}; {FLAT}; write_json flat.json")
+    flat = json.loads((work / "flat.json").read_text(encoding="utf-8"))
+    part_from_memories(flat["modules"][BLOCK])
+    return flat
+
+
+def _equal_in_a_step(work: Path, flat: dict, number: int) -> bool:
+    return _unequal_in_a_step(work, flat, number) is None or equal_by_state(work, flat, number)
 
 
 def _known(work: Path, flat: dict, number: int) -> str:
