@@ -109,14 +109,8 @@ def led(d: levant.Design, samples: int, random: Random) -> Iterator[tuple[int, .
             gains = [word.max >> random.randrange(word.width) for word in (d.lambda_, d.alpha)]
         size = random.randrange(1 << d.count_width - 1) >> random.randrange(d.count_width)
         rows = min(left, 1 + (random.randrange(max(samples // 8, 1)) >> random.randrange(8)))
-        side = random.choice((-1, 0, 1))
-        yield from leader.rows(size, side, rows, [*gains, random.randrange(2)])
+        yield from leader.rows(size, random.choice((-1, 0, 1)), rows, [*gains, random.randrange(2)])
         left -= rows
-        if not side:
-            # From rest to just below the largest error, and back to where the root is fine.
-            for jump, stay in (((1 << d.count_width - 1) - 1, 1), (0, 20)):
-                yield from leader.rows(jump, 1, min(left, stay), [*gains, 0])
-                left -= min(left, stay)
 
 
 def wrapped(d: levant.Design, rows) -> list[tuple[int, ...]]:
