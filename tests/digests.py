@@ -159,7 +159,7 @@ def _walls() -> Iterator[Case]:
             options = ("--backend", backend, *MAPPED, *GRID, *workers)
             yield Case(f"zwidth/{scene}/{backend}", ("zwidth", scene, *options), parts, short and backend == "fixed")
     yield Case("cutoff/seed-2011", ("cutoff", "seed-2011", *MAPPED, *GRID, *workers), parts, short=True)
-    yield Case("drop/seed-2011", ("drop", "seed-2011", *SHORTEST, *GRID, *workers), parts)
+    yield Case("drop/seed-2011", ("drop", "seed-2011", *SHORTEST, *GRID, *workers), parts, short=True)
 
 
 def _netlists() -> Iterator[Case]:

@@ -1,5 +1,7 @@
 """A few of the faults, bugs that they find, and the means: `make faults` injects them all."""
 
+import os
+
 import faults
 import pytest
 
@@ -68,6 +70,7 @@ def test_a_cause_that_is_masked_is_found():
     assert heard.safe
 
 
+@pytest.mark.skipif(os.environ.get("HARDWALL_LOOPS") != "all", reason="make soak, or HARDWALL_LOOPS=all")
 @pytest.mark.rtl
 @pytest.mark.parametrize(("stage", "bug"), HELD)
 def test_pins_that_need_a_clock_to_be_safe_are_found(stage, bug):

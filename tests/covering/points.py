@@ -53,7 +53,7 @@ def _lines(file: str) -> tuple[str, ...]:
 def _source(fields: dict[str, str]) -> str:
     """Return the line of Verilog at a point, without what differs between sizes of a block."""
     text = _lines(fields["f"])[int(fields["l"]) - 1].strip()
-    return re.sub(r"\d+", "0", text)
+    return re.sub(r"\d+('h[0-9a-f]+)?", "0", text)
 
 
 def _fields(line: str) -> tuple[dict[str, str], int] | None:
