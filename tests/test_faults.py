@@ -22,6 +22,7 @@ QUICK = (
     "the loop of drive_enable opens",
     "the host acknowledges other causes",
 )
+LONG = pytest.mark.skipif(os.environ.get("HARDWALL_LOOPS") != "all", reason="make soak, or HARDWALL_LOOPS=all")
 MASKED = Bug(
     Supervisor.elaborate,
     "self.supervisor_causes | REQUIRED)",
@@ -63,6 +64,7 @@ def test_the_quick_ones_are_safe(stage):
     assert {outcome.name: outcome.wrong for outcome in outcomes if not outcome.safe} == {}
 
 
+@LONG
 @pytest.mark.rtl
 def test_a_cause_that_is_masked_is_found():
     deaf, heard = run("pdm", chosen("pdm", *QUICK[1:3]), MASKED)
@@ -70,7 +72,7 @@ def test_a_cause_that_is_masked_is_found():
     assert heard.safe
 
 
-@pytest.mark.skipif(os.environ.get("HARDWALL_LOOPS") != "all", reason="make soak, or HARDWALL_LOOPS=all")
+@LONG
 @pytest.mark.rtl
 @pytest.mark.parametrize(("stage", "bug"), HELD)
 def test_pins_that_need_a_clock_to_be_safe_are_found(stage, bug):

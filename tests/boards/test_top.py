@@ -92,7 +92,11 @@ def verilog(name: str, clock_hz: int, stage: str = "pdm") -> str:
     return top_verilog(BOARDS[name], clock_hz, stage) + board_verilog(clock_hz, stage)
 
 
-STAGED = [*((*each, "pdm") for each in CLOCKS), ("ulx3s-25f", 50_000_000, "pwm"), ("ulx3s-25f", 50_000_000, "dac")]
+STAGED = [
+    *((*each, "pdm") for each in dict(CLOCKS).items()),
+    ("ulx3s-25f", 50_000_000, "pwm"),
+    ("ulx3s-25f", 50_000_000, "dac"),
+]
 
 
 @pytest.mark.parametrize(("name", "clock_hz", "stage"), STAGED)
