@@ -74,7 +74,7 @@ def test_rtl_gives_the_models_force_words_on_a_device_of_every_part(output):
     assert same_words("seed-2011", STABLE | ONE_SECOND | parts).max_force_n > 1
 
 
-@pytest.mark.parametrize("estimator", ["levant u", "fdm u"])
+@pytest.mark.parametrize("estimator", ["levant u", "fdm u"] if EVERY else ["levant u"])
 def test_rtl_gives_the_models_force_words_when_samples_leave_no_slack(estimator):
     """The fastest sampling that a clock allows: the next strobe comes as the drive changes."""
     clock_hz = load("mhz", ESTIMATORS[estimator]).spec.design.latency_to_drive * 1_000_000
