@@ -85,7 +85,7 @@ synth: $(VENV)/.synth $(VENV)/.test | tools ## size and fmax on three devices, m
 	@for device in $(DEVICES); do $(HARDWALL) synth --device $$device --seeds 3; done
 	@$(RUN) pytest -q -n 0 tests/rtl/test_synthesis.py tests/rtl/test_bitstream.py
 
-boards: $(VENV)/.synth | tools ## bitstreams for three boards, with their wiring, in build/boards/ (a quarter of an hour)
+boards: $(VENV)/.synth | tools ## bitstreams for three boards, with their wiring, in build/boards/ (some minutes)
 	@for board in $(BOARDS); do $(HARDWALL) board $$board -o build/boards/$$board; done
 
 constraints: $(VENV)/.sim | tools ## write the files of constraints/ anew from the descriptions of the boards
