@@ -66,15 +66,20 @@ class Port:
         check_range("answer_s", answer_s, ANSWER_S_LEAST, ANSWER_S_MOST)
         if pace is not None:
             check_range("pace", pace, PACE_LEAST, 1.0)
-        self.name, self._given, self._baud, self._board_s = name, pace, baud, answer_s
-        self._told = Told(name)
-        self._client, self._in_step, self._gone = client_of(name, baud, self._answer_s), False, False
+        self.name, self._given, self._baud, self._board_s = name, pace or 1.0, baud, answer_s
+        self._told = Told(name) if pace is None else None
+        try:
+            self._client = client_of(name, baud, self._answer_s)
+        except BaseException:
+            self._leave()
+            raise
+        self._in_step, self._gone = False, False
         # Whether it has ever been in step; and when something was last sent, of which the board may await the rest.
         self._known, self._sent_s = False, time.monotonic()
         try:
             self._client.connect()
         except (OSError, ValueError, OverflowError) as error:
-            self._told.close()
+            self._leave()
             raise PortError(f"{name} cannot be opened: {reason(error)}") from None
         # A request that waits in a thread of its own is not torn by an interrupt, and none overtakes another.
         self._turns = ThreadPoolExecutor(1, "hardwall-port")
@@ -84,12 +89,17 @@ class Port:
         self._gone = True
         self._turns.shutdown()
         self._client.close()
-        self._told.close()
+        self._leave()
+
+    def _leave(self) -> None:
+        """Hear no more of the board's pace."""
+        if self._told is not None:
+            self._told.close()
 
     @property
     def pace(self) -> float:
         """The seconds of the board in a second, or fewer: what was given, or else what it tells now."""
-        return self._told.pace if self._given is None else self._given
+        return self._given if self._told is None else self._told.pace
 
     @property
     def _answer_s(self) -> float:

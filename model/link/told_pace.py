@@ -6,6 +6,8 @@ of the virtual board is, so that no board is taken for one that has gone; and a 
 
 import os
 import socket
+import struct
+import threading
 from collections.abc import Iterable
 from contextlib import suppress
 
@@ -53,6 +55,7 @@ class Teller:
     def __init__(self, ports: Iterable[str]):
         self._listeners: list[socket.socket] = []
         self._hosts: list[socket.socket] = []
+        self._behind: list[socket.socket] = []
         self._told = 0.0
         for port in ports:
             self._listeners.append(listener := _socket())
@@ -81,7 +84,8 @@ class Teller:
         They are told less, by `MARGIN`, and never more than that part of 1.
         """
         safe = max(min(pace, 1.0) / MARGIN, PACE_LEAST)
-        new = self._welcome()
+        self._leave_those_that_have_gone()
+        new, self._behind = self._welcome() + self._behind, []
         if abs(safe - self._told) > CHANGE * self._told:
             self._told, new = safe, self._hosts
         word = f"{self._told:.3g}".encode("ascii")
@@ -89,17 +93,28 @@ class Teller:
             try:
                 host.send(word)
             except BlockingIOError:
-                # It has not asked for long, and hears of the next change.
-                pass
+                # It has not asked for long, and is told again.
+                self._behind.append(host)
             except OSError:
                 host.close()
                 self._hosts.remove(host)
+
+    def _leave_those_that_have_gone(self) -> None:
+        """Close the ends of hosts that have closed theirs. A host says nothing else."""
+        for host in list(self._hosts):
+            with suppress(BlockingIOError):
+                with suppress(ConnectionError):
+                    host.recv(WORD)
+                host.close()
+                self._hosts.remove(host)
+        self._behind = [host for host in self._behind if host in self._hosts]
 
     def _welcome(self) -> list[socket.socket]:
         """Return the hosts that have come."""
         new = []
         for listener in self._listeners:
-            with suppress(BlockingIOError):
+            # Nobody waits, or this process has no room for more; then they wait.
+            with suppress(OSError):
                 while True:
                     host, _ = listener.accept()
                     host.setblocking(False)
@@ -116,28 +131,45 @@ class Told:
     """
 
     def __init__(self, port: str):
-        self._line, self._pace = _socket(), 1.0
-        self._line.settimeout(FIRST_S)
-        # Without a virtual board there is nobody to be heard; one that stands will not answer anything else either.
-        with suppress(OSError, ValueError):
+        self._pace, self._lock = 1.0, threading.Lock()
+        self._line: socket.socket | None = None
+        # Without a virtual board there is nobody to be heard, and no such socket but on Linux; a board that stands will
+        # not answer anything else either.
+        with suppress(OSError, ValueError, AttributeError):
+            self._line = _socket()
+            self._line.settimeout(FIRST_S)
             self._line.connect(place_of(port))
-            self._hear()
-        self._line.setblocking(False)
+            if _owner(self._line) in (os.getuid(), 0):
+                self._hear()
+                self._line.setblocking(False)
+                return
+        self.close()
 
     def close(self) -> None:
-        self._line.close()
+        if self._line is not None:
+            self._line.close()
+            self._line = None
 
     @property
     def pace(self) -> float:
-        """The seconds of the board in a second, or fewer; 1 of what is no virtual board."""
-        with suppress(OSError):
+        """The seconds of the board in a second, or fewer; 1 of what is no virtual board of this user."""
+        with self._lock, suppress(OSError):
             while self._hear():
                 pass
         return self._pace
 
     def _hear(self) -> bool:
-        """Take what was told; return whether there was something."""
+        """Take what was told, unless it is no pace; return whether there was something."""
+        if self._line is None:
+            return False
         word = self._line.recv(WORD)
-        if word:
-            self._pace = float(word)
+        with suppress(ValueError):
+            pace = float(word)
+            if PACE_LEAST <= pace <= 1.0:
+                self._pace = pace
         return bool(word)
+
+
+def _owner(line: socket.socket) -> int:
+    """Return the user whose process is at the other end."""
+    return struct.unpack("3i", line.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12))[1]

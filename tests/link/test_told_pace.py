@@ -1,6 +1,7 @@
 """The pace of a virtual board: what its hosts are told of it, beside the line."""
 
 import os
+import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
 
@@ -104,3 +105,39 @@ def test_several_hosts_may_come_at_once(teller):
     for each in coming:
         assert each.result().pace == pytest.approx(0.5 / MARGIN, rel=SAID)
         each.result().close()
+
+
+def test_a_host_that_was_behind_is_told_again_though_nothing_changes(teller):
+    host = heard(teller, 1.0)
+    for number in range(10_001):
+        teller.tell(0.9 if number % 2 else 0.3)
+    assert host.pace < 1.0
+    teller.tell(0.3)
+    assert host.pace == pytest.approx(0.3 / MARGIN, rel=SAID)
+    host.close()
+
+
+def test_hosts_that_have_gone_leave_no_end(teller):
+    heard(teller, 0.5).close()
+    teller.tell(0.5)
+    before = len(os.listdir("/proc/self/fd"))
+    for _ in range(20):
+        heard(teller, 0.5).close()
+    teller.tell(0.5)
+    assert len(os.listdir("/proc/self/fd")) == before
+
+
+@pytest.mark.parametrize("word", [b"abc", b"0", b"nan", b"-1", b"2"])
+def test_a_word_that_is_no_pace_is_not_taken(word):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as end:
+        end.bind(place_of(PORT))
+        end.listen(1)
+        with ThreadPoolExecutor(1) as other:
+            coming = other.submit(Told, PORT)
+            line, _ = end.accept()
+            line.send(b"0.5")
+            host = coming.result()
+        line.send(word)
+        assert host.pace == 0.5
+        host.close()
+        line.close()
