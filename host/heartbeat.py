@@ -81,7 +81,7 @@ class Heartbeat:
         self.lost: HostError | None = None
         self._thread.start()
 
-    def renew(self, lease_s: float = LEASE_S) -> None:
+    def renew(self, lease_s: float) -> None:
         """Let the heartbeat go on for another lease; if it had ended, a beat is sent before this returns.
 
         Args:

@@ -1,7 +1,5 @@
 """The board with each of its drive stages, against the models clock for clock: a push, every stop, and safe pins."""
 
-import os
-
 import cocotb
 import pytest
 from cocotb.triggers import ClockCycles, RisingEdge, Timer
@@ -12,6 +10,7 @@ from hardwall.model.supervisor import ARMED, DISARMED
 from hardwall.testing import parameters, simulate
 from oracles.board import STAGES, SYNCHRONISER, make
 from oracles.board_host import Host
+from stimuli.lengths import LONG
 
 SAFE = {
     "pdm": {"drive_pdm": 0},
@@ -109,9 +108,7 @@ async def a_clock_that_stops_makes_the_pins_safe_and_comes_back_disarmed(dut):
 
 
 # The board's own test has pulses; those that are scaled belong to `make soak`.
-TESTED = [
-    name for name in STAGES if name != "pdm" and (name != "pdm scaled" or os.environ.get("HARDWALL_LOOPS") == "all")
-]
+TESTED = [name for name in STAGES if name != "pdm" and (name != "pdm scaled" or LONG)]
 
 
 @pytest.mark.parametrize("stage", TESTED)

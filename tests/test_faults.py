@@ -1,7 +1,5 @@
 """A few of the faults, bugs that they find, and the means: `make faults` injects them all."""
 
-import os
-
 import faults
 import pytest
 
@@ -15,6 +13,7 @@ from injection.run import run
 from injection.staged import STAGED
 from oracles.supervised import BITS
 from proofs.bugs import Bug
+from stimuli.lengths import long_form
 
 QUICK = (
     "both channels change at once: the scale slips by two counts",
@@ -22,7 +21,6 @@ QUICK = (
     "the loop of drive_enable opens",
     "the host acknowledges other causes",
 )
-LONG = pytest.mark.skipif(os.environ.get("HARDWALL_LOOPS") != "all", reason="make soak, or HARDWALL_LOOPS=all")
 MASKED = Bug(
     Supervisor.elaborate,
     "self.supervisor_causes | REQUIRED)",
@@ -64,7 +62,7 @@ def test_the_quick_ones_are_safe(stage):
     assert {outcome.name: outcome.wrong for outcome in outcomes if not outcome.safe} == {}
 
 
-@LONG
+@long_form
 @pytest.mark.rtl
 def test_a_cause_that_is_masked_is_found():
     deaf, heard = run("pdm", chosen("pdm", *QUICK[1:3]), MASKED)
@@ -72,7 +70,7 @@ def test_a_cause_that_is_masked_is_found():
     assert heard.safe
 
 
-@LONG
+@long_form
 @pytest.mark.rtl
 @pytest.mark.parametrize(("stage", "bug"), HELD)
 def test_pins_that_need_a_clock_to_be_safe_are_found(stage, bug):

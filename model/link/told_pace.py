@@ -25,8 +25,8 @@ HOSTS = 8
 """Hosts that may wait for it."""
 WORD = 64
 """More bytes than what is told has."""
-HERE = ("localhost", "127.0.0.1")
-"""A name of this machine, and the address in its place."""
+LOOPBACK = "127.0.0.1"
+"""The address of this machine on itself, where `localhost` is said for it, too."""
 
 
 def place_of(port: str) -> str:
@@ -34,7 +34,7 @@ def place_of(port: str) -> str:
     if not port.startswith(NETWORK):
         return f"\0hardwall pace {os.path.realpath(port)}"
     host, _, number = port.removeprefix(NETWORK).rpartition(":")
-    return f"\0hardwall pace {NETWORK}{HERE[1] if host == HERE[0] else host}:{number}"
+    return f"\0hardwall pace {NETWORK}{LOOPBACK if host == 'localhost' else host}:{number}"
 
 
 def _socket() -> socket.socket:

@@ -7,10 +7,9 @@ import socket
 import tty
 from contextlib import suppress
 
-from ...model.link.told_pace import NETWORK
+from ...model.link.told_pace import LOOPBACK, NETWORK
 
 CHUNK = 4096
-LOOPBACK = "127.0.0.1"
 
 
 class PortError(RuntimeError):
@@ -38,7 +37,7 @@ class Line:
         try:
             self._listener = None if tcp_port is None else socket.create_server((LOOPBACK, tcp_port), backlog=1)
         except OSError as error:
-            raise PortError(f"port {tcp_port} of 127.0.0.1 cannot be had: {os.strerror(error.errno)}") from None
+            raise PortError(f"port {tcp_port} of {LOOPBACK} cannot be had: {os.strerror(error.errno)}") from None
         try:
             self._master, self._slave = pty.openpty()
         except OSError as error:

@@ -1,7 +1,6 @@
 """Accuracy of estimators: the founding paper's figures, every backend, and refused input."""
 
 import math
-import os
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from hardwall.sim.estimates.accuracy import (
 )
 from hardwall.sim.estimates.recording import load
 from hardwall.sim.estimates.replay import replay
+from stimuli.lengths import LONG
 from stimuli.specs import EVERY_OUTPUT
 
 RECORDINGS = ("davinci_L2_02.csv", "davinci_L2_22.csv", "davinci_R5_42.csv")
@@ -52,7 +52,7 @@ def test_the_papers_second_figure_rises_and_falls_as_published():
 # cost of words.
 REPEATABLE = [pair for pair in EVERY_OUTPUT if pair[0] != "levant-adaptive"]
 
-RATES = [1_000, 10_000, *([100_000, 1_000_000] if os.environ.get("HARDWALL_LOOPS") == "all" else [])]
+RATES = [1_000, 10_000, *([100_000, 1_000_000] if LONG else [])]
 """Sample rates at which words are compared with float64, in Hz: the last two by `make soak`."""
 
 

@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-import os
 import re
 from functools import partial
 
@@ -16,10 +15,10 @@ from hardwall.sim.estimates.replay import ReplayError, check_length, replay
 from hardwall.sim.pictures.replay import draw
 from hardwall.sim.pictures.style import SUFFIXES, save
 from hardwall.testing import rng
+from stimuli.lengths import LONG
 from stimuli.replays import BOUND, COARSEN, EVERY, recording, reference_of, swing
 
 FILES = ["davinci_L2_02.csv", "davinci_L2_22.csv", "davinci_R5_42.csv"]
-LONG = os.environ.get("HARDWALL_LOOPS") == "all"
 REPLAYED = FILES if LONG else FILES[:1]
 """The recordings that every estimator gets: `make soak` gives it all."""
 BY_RTL = ESTIMATORS if LONG else ("levant", "levant-edge", "kalman")

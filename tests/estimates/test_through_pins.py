@@ -1,7 +1,6 @@
 """Counts through pins: every strobe sees the recorded count, and the RTL gives the words of the model."""
 
 import hashlib
-import os
 from functools import cache
 
 import numpy as np
@@ -14,14 +13,13 @@ from hardwall.sim.estimates.replay_axis import run
 from hardwall.sim.estimates.through_pins import through_pins
 from hardwall.sim.world.encoder import level
 from hardwall.testing import rng
+from stimuli.lengths import LONG
 from stimuli.replays import BOUND, COARSEN, recording, swing
 from stimuli.specs import EVERY_OUTPUT
 
 # One estimator on the count, one with a memory, one on the stamps; by `make soak` all.
 KINDS = [("levant", "u"), ("window", "u"), ("levant-edge", "u")]
-SOME = pytest.mark.parametrize(
-    ("estimator", "output"), EVERY_OUTPUT if os.environ.get("HARDWALL_LOOPS") == "all" else KINDS
-)
+SOME = pytest.mark.parametrize(("estimator", "output"), EVERY_OUTPUT if LONG else KINDS)
 
 
 @cache

