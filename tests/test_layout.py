@@ -55,6 +55,7 @@ BROAD = {
     "rtl/test_simulators": "the written Verilog, in another simulator",
     "test_board_stages": "the board with each of its drive stages",
     "test_cover": "the means of the coverage",
+    "test_cutting": "netlists of mutants in pieces",
     "test_digests": "whatever the program computes",
     "test_docs": "the pages",
     "test_endurance": "every estimator",

@@ -15,7 +15,6 @@ from reasons import Reason, reasons_for
 
 from hardwall.testing import SEED, Bench
 from mutation import run
-from mutation.cutting import cut, joined, registers
 from mutation.equivalent import EQUIVALENT, known_of
 from mutation.fates import REASONS, Fate, Result
 from mutation.netlist import BLOCK, Mutant, Netlist, mutated
@@ -157,6 +156,26 @@ def test_what_differs_where_no_state_reads_it_is_equivalent(number, equal):
     assert (known[number] == EQUIVALENT) == equal
 
 
+LEVEL = """
+module block(input clk, input go, input [15:0] mutant, output at);
+  reg [7:0] level = 2;
+  reg [5:0] clocks = 0;
+  always @(posedge clk) begin
+    if (go) level <= level == 8 ? 2 : level + 3;
+    if (!(&clocks)) clocks <= clocks + 1;
+  end
+  assign at = mutant == 1 ? level == 131 : mutant == 2 ? level == 8 & &clocks : 0;
+endmodule
+"""
+"""Goes through three levels, and may rest at any. From 11 it would come to 131, behind the end of the induction."""
+
+
+@pytest.mark.parametrize(("number", "known"), [(1, EQUIVALENT), (2, "undecided")])
+def test_what_differs_in_no_state_that_is_reached_is_equivalent(number, known):
+    """A difference behind more clocks than the induction has is none that is proven absent."""
+    assert known_of(Netlist(Answer(), LEVEL, (BLOCK,), [Mutant(number, "planted")]), [number]) == {number: known}
+
+
 def test_tests_that_fail_without_a_mutant_say_nothing(monkeypatch):
     """A first campaign may be too short for the tests themselves; the whole one may not."""
     asked, whole = [], "too few samples"
@@ -213,22 +232,6 @@ def test_a_block_is_mutated_in_its_own_modules():
     modules = {block.name: modules_of(block) for block in BLOCKS}
     assert modules["wall"] == (BLOCK,)
     assert modules["link/uart"] == (f"{BLOCK}.receiver", f"{BLOCK}.transmitter")
-
-
-def test_registers_become_ports_or_any_value_or_stay():
-    pins = {"CLK": [1], "D": [2, 3], "Q": [4, 5]}
-    cell = {"type": "$dff", "connections": pins, "parameters": {"WIDTH": f"{2:032b}"}}
-    free, stays = ({"ports": {}, "netnames": {}, "cells": {"one": cell}} for _ in range(2))
-    assert registers(free) == {("one", 0), ("one", 1)}
-    assert cut(free, {("one", 1)}, free=True) == {"D_0": [("one", 1)]}
-    assert {name: port["bits"] for name, port in free["ports"].items()} == {"D_0": [3], "Q_0": [5]}
-    assert free["cells"]["one"]["connections"] == {"Q": [4]}
-    cut(stays, {("one", 1)}, free=False)
-    assert stays["cells"]["one"]["connections"] == {"CLK": [1], "D": [2], "Q": [4]}
-    stays["netnames"]["register"] = {"bits": [4, 5], "attributes": {"init": "10"}}
-    assert "reg [0:0] in_Q_0 = 1'b1;" in joined(stays)
-    with pytest.raises(ValueError, match=r"not \$adff$"):
-        registers({"cells": {"one": {"type": "$adff"}}})
 
 
 KILLED = [Fate(f"killed {number}", "a test") for number in range(19)]

@@ -39,6 +39,11 @@ EXCEPTIONS = [
     (bytes([43, 14, 4, 3]), 2),
     (frames.write_and_read(0x80, [0, 0], 0, 0), 3),
     (frames.write_and_read(0x20, [0, 0], 0, 2), 2),
+    # One bit beside what is known: a sub-function, a kind, a code and an object of identification.
+    *((bytes([8]) + frames.words(11 | 1 << bit, 0), 1) for bit in range(4, 16)),
+    *((bytes([43, 14 ^ 1 << bit, 1, 0]), 1) for bit in range(8)),
+    *((bytes([43, 14, 3 | 1 << bit, 0]), 3) for bit in range(2, 8)),
+    *((bytes([43, 14, 4, 1 << bit]), 2) for bit in range(2, 8)),
 ]
 """A request for every reason of an exception of the server's own, and its code."""
 

@@ -13,6 +13,12 @@ from .netlist import BLOCK, SELECTOR, SELECTOR_BITS
 
 CPU_S = 15
 """The processor's time for a question; one that takes longer is not answered."""
+REACHING_S = 60
+"""The time for a question of what is reached."""
+ABC = "read_aiger,abc.aig;pdr,-T,{seconds};write_status,abc.status"
+ANY = "module any(input a, input b, output y); assign y = a & b; endmodule\n"
+UNREACHED = "snl_UNSAT"
+"""How ABC's report of a proof begins."""
 
 
 def copies(number: int) -> list[str]:
@@ -43,18 +49,48 @@ def answer(work: Path, design: dict, made: list[str], top: str, how: str) -> str
     Raises:
         SynthesisError: if Yosys fails.
     """
-    (work / "design.json").write_text(json.dumps(design), encoding="utf-8")
-    # Registers stay as they are: what is made of those with a constant bit loses their values at power-up.
-    whole = [f"hierarchy -top {top}", "proc", "flatten", *("opt_expr -full", "opt_merge -share_all", "opt_clean") * 3]
-    script = ["read_json design.json", *made, *whole, f"sat {how} {top}"]
-    (work / "ask.ys").write_text("\n".join(script) + "\n", encoding="utf-8")
-    tool = shutil.which(YOSYS, path=tools.TOOLS)
-    # This Yosys has no clock to end its solver by.
-    limited = ("/bin/sh", "-c", 'ulimit -t "$0" && exec "$@"', str(CPU_S), tool, "-s", "ask.ys")
-    done = children.run(limited, cwd=work, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    done = _run(work, design, [*made, *_whole(top), f"sat {how} {top}"], CPU_S)
     if done.returncode > 0:
         why = next(
             (line for line in done.stdout.splitlines() if line.startswith("ERROR: ")), f"exit code {done.returncode}"
         )
         raise tools.SynthesisError(f"Yosys cannot compare a mutant: {why.removeprefix('ERROR: ')}")
     return done.stdout if done.returncode == 0 else ""
+
+
+def never(work: Path, design: dict, made: list[str], top: str) -> bool:
+    """Return whether ABC, which Yosys has inside, proves that `trigger` is 0 in every state that `top` comes to.
+
+    It looks for the invariant itself, by property-directed reachability.
+
+    Args:
+        work: a folder for the files.
+        design: the component with its mutants, as Yosys writes it.
+        made: the commands that make the module of the question.
+        top: that module, whose other outputs are `gold_*` and `gate_*`.
+    """
+    said = work / "abc.status"
+    said.unlink(missing_ok=True)
+    (work / "any.v").write_text(ANY, encoding="utf-8")
+    one_output = [f"delete -output {top}/o:gold_* {top}/o:gate_*", "opt_clean -purge"]
+    gates = ["techmap", "opt_expr -full", "opt_merge -share_all", "opt_clean", "aigmap", "write_aiger -zinit abc.aig"]
+    # ABC is called for any netlist, and reads its own. What it leaves of that is none that Yosys takes.
+    asked = ["design -reset", "read_verilog any.v", "techmap", f"abc -script +{ABC.format(seconds=REACHING_S)}"]
+    _run(work, design, [*made, *_whole(top), *one_output, *gates, *asked], REACHING_S + CPU_S)
+    return said.exists() and said.read_text(encoding="utf-8").startswith(UNREACHED)
+
+
+def _whole(top: str) -> list[str]:
+    """Return the commands that make one module without parts of `top`, in which what is alike is merged."""
+    # Registers stay as they are: what is made of those with a constant bit loses their values at power-up.
+    return [f"hierarchy -top {top}", "proc", "flatten", *("opt_expr -full", "opt_merge -share_all", "opt_clean") * 3]
+
+
+def _run(work: Path, design: dict, commands: list[str], cpu_s: int) -> subprocess.CompletedProcess:
+    """Run commands of Yosys on a design, for some time of the processor."""
+    (work / "design.json").write_text(json.dumps(design), encoding="utf-8")
+    (work / "ask.ys").write_text("\n".join(["read_json design.json", *commands]) + "\n", encoding="utf-8")
+    tool = shutil.which(YOSYS, path=tools.TOOLS)
+    # This Yosys has no clock to end its solver by.
+    limited = ("/bin/sh", "-c", 'ulimit -t "$0" && exec "$@"', str(cpu_s), tool, "-s", "ask.ys")
+    return children.run(limited, cwd=work, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)

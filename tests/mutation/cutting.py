@@ -7,6 +7,8 @@ from .netlist import SELECTOR
 START, FIRST = "START", "FIRST"
 """The ports of the first values of registers that have none of their own, and of the clock at which these hold."""
 TO_MEMORY = ("RD_ADDR", "RD_EN", "WR_ADDR", "WR_DATA", "WR_EN")
+OWN = {"RD_CLK": "clk", "WR_CLK": "clk", "RD_ARST": "rst", "RD_SRST": "rst"}
+"""What else goes to a memory, and the input of the module that it must be, if it is not left at 0."""
 
 Bit = tuple[str, int]
 """A bit of a register: the name of its cell, and its place in it."""
@@ -55,10 +57,17 @@ def cut(module: dict, kept: set[Bit], free: bool) -> dict[str, list[Bit]]:
 
 
 def part_from_memories(module: dict) -> None:
-    """Put ports of the module in the place of its memories: their contents are equal while equal writes go there."""
+    """Put ports of the module in the place of its memories: their contents are equal while equal writes go there.
+
+    Raises:
+        ValueError: if a memory's clock or reset is not the module's: two of them may then not be equal.
+    """
     memories = [name for name, cell in module["cells"].items() if cell["type"] == "$mem_v2"]
     for number, name in enumerate(memories):
         pins = module["cells"].pop(name)["connections"]
+        for port, own in OWN.items():
+            if not set(pins[port]) <= {"0", *module["ports"].get(own, {"bits": []})["bits"]}:
+                raise ValueError(f"{port} of the memory {name} must be the module's input {own}, or 0")
         for port in (*TO_MEMORY, "RD_DATA"):
             direction = "output" if port in TO_MEMORY else "input"
             module["ports"][f"M_{number}_{port}"] = {"direction": direction, "bits": pins[port]}

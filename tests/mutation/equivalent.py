@@ -5,18 +5,20 @@ common: that the mutant's next value of such a bit is the component's is proven 
 that a search has found to differ, are of each alone. What both have alike is merged, so that a multiplier that is in
 both need not be understood. A memory that is written is outside of both: what goes there is proven, and what comes from
 there is the same for both. A register without a first value powers up with any, but with the same in both. There are
-four ways, and any is enough:
+five ways, and any is enough:
 
 - **One step**, in which common bits have any value, and the others have any value in either.
 - **One step by states**, in which what differs may do so in some states alone: see `by_state.py`.
 - **Induction** from power-up on, and after some clocks in which all was equal: so states that do not last are not
   searched.
+- **Induction with an invariant** that ABC looks for, so that what holds in all states that are reached is enough.
 - **Induction of the outputs**, with no bit in common, for more clocks.
 
 Where one module was changed, it is compared alone, without what is inside it: what it gives to the modules inside is an
 output, and what it gets from them an input. So the question does not grow with what is around and inside. A mutant that
 is equal so is equal in the component, too. Where that module is the component, all of it is compared, too. Otherwise
-the module around it is, in a step: so it may give anything where nobody takes it.
+the module around it is, but for the two inductions that go clock by clock: so it may give anything where nobody takes
+it.
 
 The search from power-up may instead find inputs at which an output differs: then a test could kill the mutant, unless
 what is around or inside never gives such inputs.
@@ -31,7 +33,7 @@ from pathlib import Path
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs.scratch import scratch
 
-from .asking import answer, copies
+from .asking import answer, copies, never
 from .by_state import equal_by_state
 from .cutting import Bit, cut, joined, part_from_memories, registers, start_alike
 from .netlist import BLOCK, Netlist, run_yosys
@@ -74,7 +76,7 @@ def known_of(netlist: Netlist, numbers: Collection[int]) -> dict[int, str]:
         left = [number for number in numbers if known[number] != EQUIVALENT]
         if left and (around := _around(netlist)):
             flat = _flat(work, around)
-            known |= dict.fromkeys([number for number in left if _equal_in_a_step(work, flat, number)], EQUIVALENT)
+            known |= dict.fromkeys([number for number in left if _equal_around(work, flat, number)], EQUIVALENT)
     return known
 
 
@@ -92,8 +94,9 @@ def _flat(work: Path, commands: str) -> dict:
     return flat
 
 
-def _equal_in_a_step(work: Path, flat: dict, number: int) -> bool:
-    return _unequal_in_a_step(work, flat, number) is None or equal_by_state(work, flat, number)
+def _equal_around(work: Path, flat: dict, number: int) -> bool:
+    kept = _unequal_in_a_step(work, flat, number)
+    return kept is None or equal_by_state(work, flat, number) or _equal_where_reached(work, flat, number, kept)
 
 
 def _known(work: Path, flat: dict, number: int) -> str:
@@ -103,10 +106,12 @@ def _known(work: Path, flat: dict, number: int) -> str:
     answer = ""
     # What differs from some state may be the same from all states that the block comes to.
     for common in (registers(flat["modules"][BLOCK]), kept):
-        answer = _induced(work, flat, number, common)
+        answer, alike = _induced(work, flat, number, common)
         if any(said in answer for said in (PROVEN, DIFFERS)):
             break
     else:
+        if _equal_where_reached(work, flat, number, alike):
+            return EQUIVALENT
         answer = _asked(work, copy.deepcopy(flat), number, f"-tempinduct -maxsteps {STEPS}")
     if DIFFERS in answer:
         steps = re.findall(r"\[base case (\d+)\] Solving", answer)
@@ -114,8 +119,8 @@ def _known(work: Path, flat: dict, number: int) -> str:
     return EQUIVALENT if PROVEN in answer else "undecided"
 
 
-def _induced(work: Path, flat: dict, number: int, kept: set[Bit]) -> str:
-    """Return the answer of the induction with some bits in common, without those that it finds to differ."""
+def _induced(work: Path, flat: dict, number: int, kept: set[Bit]) -> tuple[str, set[Bit]]:
+    """Return the answer of the induction with some bits in common, and these without those that it finds to differ."""
     answer = ""
     for _ in range(ROUNDS):
         design = copy.deepcopy(flat)
@@ -123,9 +128,16 @@ def _induced(work: Path, flat: dict, number: int, kept: set[Bit]) -> str:
         answer = _asked(work, design, number, f"-tempinduct -maxsteps {STEPS_IN_COMMON} -show-outputs")
         unlike = _unlike(answer, ports) if DIFFERS in answer else set()
         if not unlike:
-            return answer
+            return answer, kept
         kept = kept - unlike
-    return ""
+    return "", kept
+
+
+def _equal_where_reached(work: Path, flat: dict, number: int, kept: set[Bit]) -> bool:
+    """Return whether a mutant with some bits in common is proven equal in all states that are reached."""
+    design = copy.deepcopy(flat)
+    cut(design["modules"][BLOCK], kept, free=False)
+    return never(work, design, *_side_by_side(work, design, number, joint=True))
 
 
 def _unequal_in_a_step(work: Path, flat: dict, number: int) -> set[Bit] | None:
@@ -174,9 +186,14 @@ def _asked(work: Path, design: dict, number: int, how: str, joint: bool = True) 
         how: options of the solver.
         joint: whether these ports are joined by registers; otherwise they have any value.
     """
+    made, top = _side_by_side(work, design, number, joint)
+    return answer(work, design, made, top, f"-prove trigger 0 {how}")
+
+
+def _side_by_side(work: Path, design: dict, number: int, joint: bool) -> tuple[list[str], str]:
+    """Return the commands that put a design and its mutant side by side, and the module that is made."""
     if joint:
         start_alike(design["modules"][BLOCK])
     (work / "joined.v").write_text(joined(design["modules"][BLOCK]), encoding="utf-8")
     made = [*copies(number), "miter -equiv -flatten -make_outputs gold gate miter"]
-    made += ["read_verilog joined.v"] if joint else []
-    return answer(work, design, made, "machine" if joint else "miter", f"-prove trigger 0 {how}")
+    return ([*made, "read_verilog joined.v"], "machine") if joint else (made, "miter")
