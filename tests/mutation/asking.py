@@ -16,9 +16,11 @@ CPU_S = 15
 REACHING_S = 60
 """The time for a question of what is reached."""
 ABC = "read_aiger,abc.aig;pdr,-T,{seconds};write_status,abc.status"
-ANY = "module any(input a, input b, output y); assign y = a & b; endmodule\n"
+"""ABC's commands. Its answer is in a file, for Yosys shows nothing of what it prints."""
 UNREACHED = "snl_UNSAT"
-"""How ABC's report of a proof begins."""
+"""How the answer begins where it is a proof."""
+ANY = "module any(input a, input b, output y); assign y = a & b; endmodule\n"
+"""What ABC is called for: Yosys calls it for a netlist that it takes for gates alone, and it reads its own."""
 
 
 def copies(number: int) -> list[str]:
@@ -74,7 +76,7 @@ def never(work: Path, design: dict, made: list[str], top: str) -> bool:
     (work / "any.v").write_text(ANY, encoding="utf-8")
     one_output = [f"delete -output {top}/o:gold_* {top}/o:gate_*", "opt_clean -purge"]
     gates = ["techmap", "opt_expr -full", "opt_merge -share_all", "opt_clean", "aigmap", "write_aiger -zinit abc.aig"]
-    # ABC is called for any netlist, and reads its own. What it leaves of that is none that Yosys takes.
+    # What ABC leaves of its own netlist Yosys does not take for this one, and ends with an error.
     asked = ["design -reset", "read_verilog any.v", "techmap", f"abc -script +{ABC.format(seconds=REACHING_S)}"]
     _run(work, design, [*made, *_whole(top), *one_output, *gates, *asked], REACHING_S + CPU_S)
     return said.exists() and said.read_text(encoding="utf-8").startswith(UNREACHED)
