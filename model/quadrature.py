@@ -122,6 +122,12 @@ def seen(state: State) -> Seen:
 
 
 @compiled
+def fault(state):
+    """Return the sticky flags of a state as a word, `illegal` first."""
+    return state.illegal | state.overspeed << 1
+
+
+@compiled
 def stamp_of(record, kind):
     """Return the last stamp of a kind of edge from a `Seen`, or from any record with the same four fields."""
     low = record.stamp_b_rise if kind & 1 else record.stamp_a_rise
@@ -135,12 +141,16 @@ def seen_count(count: int) -> Seen:
     return Seen(count, 0, 0, 0, 0, 0, 0, 0, 0)
 
 
+LATENCY = 4
+"""The latency without a glitch filter: see `latency`."""
+
+
 def latency(glitch_clocks: int) -> int:
     """Return the clock edges from the first that sees a pin changed to the one that sets the new count, both included.
 
     The synchroniser takes two, the filter `glitch_clocks` + 1, and decoding and adding one.
     """
-    return glitch_clocks + 4
+    return LATENCY + glitch_clocks
 
 
 @compiled
@@ -232,10 +242,11 @@ def settled(state, pins):
 
 
 @compiled
-def _rest(params, state, pins, clocks):
-    """Return a settled state `clocks` clocks, 1 or more, later."""
+def resting(params, state, count, pins, clocks):
+    """Return the settled state `clocks` clocks, 1 or more, later, if the edges until then led to this count and these
+    pins; of their kinds and stamps it knows nothing."""
     return State(
-        count=state.count,
+        count=count,
         index_count=state.index_count,
         index_armed=state.index_armed,
         index_latched=state.index_latched,
@@ -268,11 +279,61 @@ def _rest(params, state, pins, clocks):
 
 
 @compiled
+def _lone(state, pins, inputs, clocks):
+    """Return whether a settled state meets the edge of one channel, A or B, that is decoded and settled in `clocks`."""
+    changed = state.level ^ pins
+    return (changed == 1 or changed == 2) and clocks > LATENCY + inputs.glitch_clocks and settled(state, state.level)
+
+
+@compiled
+def _edge(params, state, inputs, pins, clocks):
+    """Return the state `clocks` clocks after a `_lone` edge: what `step` makes of it, in closed form."""
+    changed = state.level ^ pins
+    mask = (1 << params.stamp_width) - 1
+    decoded = (state.stamp + LATENCY + inputs.glitch_clocks - 1) & mask
+    down = ~(pins ^ state.level >> 1 ^ inputs.invert) & 1
+    kind = (changed >> 1) + 2 * int((changed & pins) == 0)
+    return State(
+        count=wrap(state.count + 1 - 2 * down, params.count_width),
+        index_count=state.index_count,
+        index_armed=state.index_armed,
+        index_latched=state.index_latched,
+        stamp=(state.stamp + clocks) & mask,
+        stamp_a_rise=_either(kind == A_RISE, decoded, state.stamp_a_rise),
+        stamp_b_rise=_either(kind == B_RISE, decoded, state.stamp_b_rise),
+        stamp_a_fall=_either(kind == A_FALL, decoded, state.stamp_a_fall),
+        stamp_b_fall=_either(kind == B_FALL, decoded, state.stamp_b_fall),
+        stepped=0,
+        indexed=0,
+        edge=kind,
+        down=down,
+        run=_either(state.down == down, min(state.run + 1, RUN_MAX), 1),
+        illegal=state.illegal,
+        overspeed=state.overspeed,
+        illegal_count=state.illegal_count,
+        first=pins,
+        second=pins,
+        previous=pins & 3,
+        level=pins,
+        moved=0,
+        up=(pins ^ pins >> 1) & 1,
+        pending=0,
+        held_a=0,
+        held_b=0,
+        held_z=0,
+        crossed=0,
+        starting=0,
+    )
+
+
+@compiled
 def _settle(params, state, inputs, pins, clocks):
+    if _lone(state, pins, inputs, clocks):
+        return _edge(params, state, inputs, pins, clocks)
     while clocks > 0 and not settled(state, pins):
         state = step(params, state, inputs, NO_STROBES)
         clocks -= 1
-    return _rest(params, state, pins, clocks) if clocks > 0 else state
+    return resting(params, state, state.count, pins, clocks) if clocks > 0 else state
 
 
 @inlined
@@ -284,7 +345,7 @@ def advance(params, state, inputs, clocks):
     """
     pins = inputs.a | inputs.b << 1 | inputs.z << 2
     if clocks > 0 and settled(state, pins):
-        return _rest(params, state, pins, clocks)
+        return resting(params, state, state.count, pins, clocks)
     return _settle(params, state, inputs, pins, clocks)
 
 

@@ -69,12 +69,32 @@ def _decode(controller, decoder, level, clocks):
 
 
 @inlined
+def _decoded(state, decoder, clock, level):
+    """Return the state with another decoder, at another clock and with other pins."""
+    return State(state.drive, state.velocity, state.force, state.flags, decoder, state.axis, clock, level)
+
+
+@inlined
 def sample_quietly(controller, state, strobe):
     """Take the sample at clock `strobe`, with no edge between the last sample and this one: return the state."""
     decoder = _decode(controller, state.decoder, state.level, strobe - state.clock)
-    fault = decoder.illegal | decoder.overspeed << 1
+    fault = quadrature.fault(decoder)
     after, velocity, force = step(controller.axis, state.axis, quadrature.seen(decoder), 0, fault, 1)
     return State(after.output.drive, velocity, force, after.flags, decoder, after, strobe, state.level)
+
+
+@inlined
+def _meet(controller, state, edges, n_edges, until):
+    """Return (state, number of edges consumed) with the decoder at the last edge before clock `until`."""
+    decoder, clock, level, taken = state.decoder, state.clock, state.level, 0
+    # A clock sees registers loaded by the clocks before it: an edge at clock `until` comes later.
+    while taken < n_edges and edges.clocks[taken] < until:
+        if edges.clocks[taken] > clock:
+            decoder = _decode(controller, decoder, level, edges.clocks[taken] - clock)
+            clock = edges.clocks[taken]
+        level = edges.levels[taken]
+        taken += 1
+    return _decoded(state, decoder, clock, level), taken
 
 
 @compiled
@@ -86,16 +106,16 @@ def sample(controller, state, edges, n_edges, strobe):
         edges: `Edges`.
         n_edges: the number of edges.
     """
-    decoder, clock, level, taken = state.decoder, state.clock, state.level, 0
-    # The strobe sees registers loaded by the clocks before it: an edge at the strobe's clock is for the next sample.
-    while taken < n_edges and edges.clocks[taken] < strobe:
-        if edges.clocks[taken] > clock:
-            decoder = _decode(controller, decoder, level, edges.clocks[taken] - clock)
-            clock = edges.clocks[taken]
-        level = edges.levels[taken]
-        taken += 1
-    state = State(state.drive, state.velocity, state.force, state.flags, decoder, state.axis, clock, level)
+    state, taken = _meet(controller, state, edges, n_edges, strobe)
     return sample_quietly(controller, state, strobe), taken
+
+
+@compiled
+def decode(controller, state, edges, n_edges, until):
+    """Take no sample: return (state, number of edges consumed) with the decoder at clock `until`; see `sample`."""
+    state, taken = _meet(controller, state, edges, n_edges, until)
+    decoder = _decode(controller, state.decoder, state.level, until - state.clock)
+    return _decoded(state, decoder, until, state.level), taken
 
 
 @compiled

@@ -1,6 +1,8 @@
 """The world of a scene in the form that the loop takes; parts that the scene lacks are left out."""
 
-from ..loop import loop
+from ...model import quadrature
+from ...model.stamped import Controller
+from ..loop.values import Progress, Sweep, World
 from ..world import device
 from ..world.advance import Moment
 from ..world.converter import AS_IT_IS, Converter, Pulse, converted, width_of
@@ -9,6 +11,9 @@ from ..world.euler import Stepped, stepped
 from ..world.linear import State
 from ..world.rigid import Coulomb, Handle, Motion, Rigid, span
 from .schema import Scene
+
+MARGIN_COUNTS = 1e-6
+"""The least distance of a counted position from an edge: far more than rounding moves the time of an edge."""
 
 
 def device_of(scene: Scene) -> device.Device | None:
@@ -61,7 +66,7 @@ def output_step_n(scene: Scene) -> float:
     return 2 * output.full_scale_n / (output.pwm_steps or 1 << output.dac_bits)
 
 
-def work_of(world: loop.World) -> int:
+def work_of(world: World) -> int:
     """Return about how many steps of the solver a sample takes."""
     plant = world.plant
     if isinstance(plant, Rigid):
@@ -71,7 +76,7 @@ def work_of(world: loop.World) -> int:
     return 1 + int(world.timing.clocks_per_sample / world.encoder.clock_hz / step_s) + 2 * pulses
 
 
-def world_of(scene: Scene) -> loop.World:
+def world_of(scene: Scene) -> World:
     """Return the loop's constants for a scene."""
     spec, timing = scene.spec, scene.spec.design.timing
     after_s = timing.latency / spec.clock_hz
@@ -85,7 +90,7 @@ def world_of(scene: Scene) -> loop.World:
         plant, before, after = device.train(parts, max(before_s, after_s)), before_s, after_s
         if scene.solver:
             plant = stepped(plant, parts.transmission is not None, scene.solver.step_s)
-    return loop.World(
+    return World(
         plant=plant,
         encoder=Encoder(spec.count_m, float(spec.clock_hz), scene.encoder.offsets),
         converter=_converter(scene),
@@ -97,7 +102,29 @@ def world_of(scene: Scene) -> loop.World:
     )
 
 
-def start_of(scene: Scene, world: loop.World) -> loop.Progress:
+def sweep_of(scene: Scene, world: World, controller: object) -> Sweep | None:
+    """Return what the loop needs to sweep over samples; None if it cannot: see `sim.loop.sweep`.
+
+    Only a model can be given a count, a rigid handle alone has a motion of one sign, and the estimator must not look at
+    stamps. The edges before a changed drive must be counted at the strobe after the next.
+    """
+    spec, timing = scene.spec, world.timing
+    if not isinstance(controller, Controller) or not isinstance(world.plant, Rigid):
+        return None
+    if spec.design.estimator.uses_stamps():
+        return None
+    latency = quadrature.latency(controller.glitch_clocks)
+    clocks = timing.clocks_per_sample - timing.latency - latency
+    offsets = scene.encoder.offsets
+    closest_m = min(1 + offsets[(kind + 1) % 4] - offsets[kind] for kind in range(4)) * spec.count_m
+    # An edge that is decoded before the next one has been seen is the only one under way.
+    least, most = spec.count_m * spec.sample_hz, closest_m * spec.clock_hz / (latency + 1)
+    if clocks < 1 or least >= most:
+        return None
+    return Sweep(span(world.plant.handle, clocks / spec.clock_hz), least, most, MARGIN_COUNTS * spec.count_m)
+
+
+def start_of(scene: Scene, world: World) -> Progress:
     """Return the start of a run: at rest, under the push alone."""
     position_m, push_n = scene.protocol.start_m, converted(world.converter, world.push_n)
     motion = Motion(position_m, 0.0)
@@ -105,4 +132,4 @@ def start_of(scene: Scene, world: loop.World) -> loop.Progress:
         pulse = world.plant.pulse
         width = width_of(pulse, push_n) if pulse.period else 0
         motion = State(position_m, 0.0, (0.0, 0.0, 0.0), width)
-    return loop.Progress(0, Moment(motion, locate(world.encoder, position_m), 0), push_n)
+    return Progress(0, Moment(motion, locate(world.encoder, position_m), 0), push_n)

@@ -18,8 +18,8 @@ from cocotb.triggers import ClockCycles, ReadOnly, Timer
 
 from ...model.design import strobe_of
 from ...model.stamped import room_for
-from ..loop import loop
 from ..loop.controllers import taken_off
+from ..loop.values import EDGE_CAPACITY
 from ..scene.build import start_of, world_of
 from ..scene.case import Case
 from ..world.advance import Interval, advance
@@ -36,7 +36,7 @@ async def closed_loop(dut):
     order = json.loads(os.environ["HARDWALL_LOOP"])
     case = order["case"]
     scene = Case("", case["scene"], case["text"], case["changes"]).scene
-    world, edges = world_of(scene), room_for(loop.EDGE_CAPACITY)
+    world, edges = world_of(scene), room_for(EDGE_CAPACITY)
     _, moment, force_n = start_of(scene, world)
     await _open(dut, scene, int(level(moment.cell.number)))
     # `_open` has run clock 0. Half a period later, pins change between two rising edges: in clock n, before edge n.

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...model.stamped import room_for
 from ..loop import loop
+from ..loop.values import EDGE_CAPACITY, Memory
 from ..rtl.board_library import BoardHardware
 from ..scene.build import start_of, world_of
 from ..scene.errors import SceneError
@@ -84,7 +85,7 @@ class VirtualBoard:
         turn_counts = max(round(TURN_M / scene.encoder.count_m), 4)
         self.hardware = BoardHardware(scene.spec, self._progress.moment.cell.number, turn_counts, baud, family)
         self.hand, self.reversed = Hand(scene.protocol.start_m), False
-        self._edges, self._push_n = room_for(loop.EDGE_CAPACITY), 0.0
+        self._edges, self._push_n = room_for(EDGE_CAPACITY), 0.0
         self._number, self.positions_m = self._progress.moment.cell.number, np.zeros(0)
 
     def __enter__(self) -> "VirtualBoard":
@@ -103,7 +104,7 @@ class VirtualBoard:
         self._push_n = self.hand.force_n(self.scene.handle.mass_kg, motion[0], motion[1])
         given_n = -self.hardware.given_n if self.reversed else self.hardware.given_n
         world = self._world._replace(push_n=self._push_n, force_lsb_n=given_n)
-        memory = loop.Memory(self._edges, None, None, None, *room)
+        memory = Memory(self._edges, None, None, None, *room)
         until = self._progress.sample + samples
         controller = self.hardware.controller
         self._state, self._progress = loop.run(world, controller, self._state, self._progress, memory, until)

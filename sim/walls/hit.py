@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,8 @@ from ..jobs.result import Summary
 from ..jobs.stages import stage
 from ..loop import loop, record
 from ..loop.backends import Opened, is_exact, number_of, opened
-from ..scene.build import output_step_n, start_of, work_of, world_of
+from ..loop.values import EDGE_CAPACITY, Memory
+from ..scene.build import output_step_n, start_of, sweep_of, work_of, world_of
 from ..scene.schema import Scene
 from ..world.encoder import level
 from .tally import Tally
@@ -24,8 +26,8 @@ CHUNK = 1 << 16
 """Most samples in one call of the loop, between two checks for an interrupt; fewer if a sample takes long."""
 LOOKS = 100
 """Number of progress reports in a run."""
-LOOK_S = 0.1
-"""Time between two checks whether the verdict is sure."""
+LOOK_S = 0.25
+"""Time between two checks whether the verdict is sure; a call of the loop costs as much as some 10^4 samples."""
 OVERVIEW_POINTS = 6000
 DETAIL_FROM_M = -0.2e-3
 DETAIL_S = 0.1
@@ -156,6 +158,17 @@ class Hit(Summary):
         }
 
 
+_compiled: set[Any] = set()
+"""What `_kinds` returned for the arguments of the loops that this process has compiled."""
+
+
+def _kinds(value: Any) -> Any:
+    """Return what the compiler sees of a value: the types of all its parts."""
+    if isinstance(value, tuple):
+        return type(value), *map(_kinds, value)
+    return (value.dtype, value.ndim) if isinstance(value, np.ndarray) else type(value)
+
+
 class _Loop:
     """The closed loop of a scene on a backend: its progress, the arrays that it writes to, and its tally."""
 
@@ -166,14 +179,14 @@ class _Loop:
         self.start_level = int(level(self.at.moment.cell.number))
         self.tally = Tally(scene, is_exact(backend))
         number, spec = number_of(backend), scene.spec
-        chunk = max(round(LOOK_S * spec.sample_hz), 1) if until_sure else CHUNK
-        self.chunk = max(1, min(chunk, CHUNK // work_of(self.world)))
+        self.chunk = max(1, CHUNK // work_of(self.world))
+        self.look = max(round(LOOK_S * spec.sample_hz), 1) if until_sure else scene.samples
         overview = detail = None
         if traces:
             overview = record.overview(spec, number, scene.samples, OVERVIEW_POINTS)
             detail = record.detail(spec, number, DETAIL_FROM_M, round(DETAIL_S * spec.sample_hz))
-        self.memory = loop.Memory(
-            edges=stamped.room_for(loop.EDGE_CAPACITY),
+        self.memory = Memory(
+            edges=stamped.room_for(EDGE_CAPACITY),
             delay=np.zeros(scene.delay_samples, number) if scene.delay_samples else None,
             overview=overview,
             detail=detail,
@@ -188,21 +201,34 @@ class _Loop:
             RuntimeError: if the handle outran every decoder's limit by far.
         """
         controller, state, _ = axis
+        self.world = self.world._replace(sweep=sweep_of(self.scene, self.world, controller))
         actions, total = dict(marks), self.scene.samples
-        # A first call without samples compiles the loop, so that compiling is not in the measured time.
-        with stage("compiling the loop, once"):
-            loop.run(self.world, controller, state, self.at, self.memory, 0)
+        self._compile(controller, state)
         began = time.perf_counter()
         while self.at.sample < total and not (self.until_sure and self.tally.sure_unstable):
             first = self.at.sample
             if first in actions:
                 actions.pop(first)()
-            until = min(first + self.chunk, total, *(sample for sample in actions if sample > first))
+            until = min(first + self.chunk, self._next_look(first), *(sample for sample in actions if sample > first))
             state = self._chunk(controller, state, until, progress)
             if self.lost_edges:
                 break
             self.tally.add(first, self.memory.positions[: until - first], self.memory.drives[: until - first])
         return self._hit(time.perf_counter() - began, int(state.flags))
+
+    def _compile(self, controller, state) -> None:
+        """Compile the loop by a call without samples, so that compiling is not in the measured time."""
+        arguments = self.world, controller, state, self.at, self.memory
+        kinds = _kinds(arguments)
+        if kinds not in _compiled:
+            with stage("compiling the loop, once"):
+                loop.run(*arguments, 0)
+            _compiled.add(kinds)
+
+    def _next_look(self, sample: int) -> int:
+        """Return the end of a chunk that begins at a sample, as far as a verdict may be sure there."""
+        settled = round(self.scene.protocol.settle_s * self.scene.spec.sample_hz)
+        return min(max(settled, sample) + self.look, self.scene.samples)
 
     def _chunk(self, controller, state, until: int, progress: Callable[[int], None] | None):
         """Run to the end of a chunk, in pieces if progress is reported; return the controller's state."""
@@ -223,7 +249,7 @@ class _Loop:
         lost = self.at.moment.n_edges < 0
         if lost and not self.until_sure:
             when = self.at.sample / self.scene.spec.sample_hz
-            raise RuntimeError(f"the handle passed more than {loop.EDGE_CAPACITY} edges in a sample, at {when:g} s")
+            raise RuntimeError(f"the handle passed more than {EDGE_CAPACITY} edges in a sample, at {when:g} s")
         return lost
 
     def _hit(self, seconds: float, flags: int) -> Hit:
