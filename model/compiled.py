@@ -32,8 +32,11 @@ class ByType(Protocol):
 
 
 def _jit(function: Kernel, folder: str, **options: Any) -> Any:
-    """Return `function` compiled with Numba, kept on disk: see `kernel_cache`."""
-    kernel = numba.njit(error_model="numpy", **options)(function)
+    """Return `function` compiled with Numba, kept on disk: see `kernel_cache`.
+
+    Python code of other threads runs beside a kernel.
+    """
+    kernel = numba.njit(error_model="numpy", nogil=True, **options)(function)
     if not cast(Any, config).DISABLE_JIT:
         kernel._cache = KernelCache(function, folder)
     return kernel

@@ -16,6 +16,7 @@ from typing import Any
 
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from . import provenance
@@ -59,7 +60,7 @@ class KernelCache(_Cache):  # type: ignore[misc]
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         """Return the variant of a signature; None if there is none that is whole."""
-        target_context.refresh()
+        rtsys.initialize(target_context)
         shelf = self._shelf(sig)
         if shelf is None:
             return None

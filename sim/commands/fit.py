@@ -8,7 +8,7 @@ from ..scene.case import Case
 from ..studies import fit
 from ..walls.methods import methods
 from .drop import refuse_methods_and_walls
-from .maps import MapsOnOneCluster
+from .maps import MapsOfOneCrew
 from .options import ModelOption, SceneArgument, refuse
 from .study import StudyOptions, study
 from .terminal import progress
@@ -32,7 +32,7 @@ def command(
     refuse_methods_and_walls(changes)
     refuse(changes, ("zwidth",), "its maps go a little beyond the paper's axes")
     case = Case.of(scene, changes)
-    with MapsOnOneCluster(options, backend, len(methods())) as maps:
+    with MapsOfOneCrew(options, backend, len(methods())) as maps:
         for each in [reading] if reading else fit.READINGS:
             with progress(f"{case.scene.name}, B axis {each}", evaluations) as advance:
                 fits.append(fit.study(case, each, evaluations, seed, maps, advance))

@@ -1,12 +1,11 @@
-"""The maps of stable walls that several commands make, on a cluster chosen by the options."""
+"""The maps of stable walls that several commands make, by this machine or by the cluster of the options."""
 
 import time
 from contextlib import AbstractContextManager
+from importlib import import_module
 from typing import Any, Self
 
-from distributed import Client
-
-from ..jobs import cluster
+from ..jobs.crew import Crew, Threads
 from ..jobs.store import Store
 from ..scene.case import Case
 from ..walls import zwidth
@@ -17,10 +16,16 @@ from .study import StudyOptions
 from .terminal import progress
 
 
+def _cluster() -> Any:
+    """Return the module of clusters; Dask is loaded only if there is one."""
+    return import_module("...jobs.cluster", __name__)
+
+
 def check_cluster(options: StudyOptions) -> None:
     """Raise BadInput if no cluster can be what the options `--workers` and `--scheduler` ask for."""
     if options.scheduler is None:
         return
+    cluster = _cluster()
     try:
         cluster.check_address(options.scheduler)
     except cluster.AddressError as error:
@@ -44,36 +49,37 @@ class Maps:
         self._hits += sum(a_map.hits for a_map in maps)
         return maps
 
-    def _client(self, jobs: int) -> AbstractContextManager[Client | None]:
-        """Return a context with the client of a cluster for so many jobs at a time."""
-        return cluster.client(jobs, self._options.workers, self._options.scheduler)
+    def _crew(self, jobs: int) -> AbstractContextManager[Crew]:
+        """Return a context with who does so many jobs at a time."""
+        options = self._options
+        return _cluster().connected(options.scheduler) if options.scheduler else Threads(jobs, options.workers)
 
     def _made(self, title: str, cases: list[Case]) -> list[Map]:
         known = Store("zwidth", self._options.resume)
-        with self._client(len(cases)) as client, progress(title, len(cases)) as advance:
-            return zwidth.run(cases, self._backend, known, client, advance)
+        with self._crew(len(cases)) as crew, progress(title, len(cases)) as advance:
+            return zwidth.run(cases, self._backend, known, crew, advance)
 
     def effort(self) -> Effort:
         """Return the effort of the maps so far."""
         return Effort(self._backend, self._hits, time.perf_counter() - self._began)
 
 
-class MapsOnOneCluster(Maps):
-    """A context in which all maps, of so many cases at a time, are made on one cluster: for very many maps.
+class MapsOfOneCrew(Maps):
+    """A context in which all maps, of so many cases at a time, are made by one crew: for very many maps.
 
     They have no progress bar of their own.
     """
 
     def __init__(self, options: StudyOptions, backend: str, cases: int):
         super().__init__(options, backend)
-        self._known, self._cluster = Store(options.study, options.resume), self._client(cases)
+        self._known, self._context = Store(options.study, options.resume), self._crew(cases)
 
     def __enter__(self) -> Self:
-        self._connected = self._cluster.__enter__()
+        self._joined = self._context.__enter__()
         return self
 
     def __exit__(self, *exception: Any) -> bool | None:
-        return self._cluster.__exit__(*exception)
+        return self._context.__exit__(*exception)
 
     def _made(self, title: str, cases: list[Case]) -> list[Map]:
-        return zwidth.run(cases, self._backend, self._known, self._connected)
+        return zwidth.run(cases, self._backend, self._known, self._joined)

@@ -60,7 +60,7 @@ SeedsOption = Annotated[int, typer.Option(min=1, max=99, help="number of placeme
 RateOption = Annotated[float, typer.Option(metavar="HZ", help="sample rate")]
 
 WorkersOption = Annotated[
-    int | None, typer.Option(min=1, max=1024, help="number of processes", show_default="one a core")
+    int | None, typer.Option(min=1, max=1024, help="number of threads", show_default="one a core")
 ]
 SchedulerOption = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="address of a running Dask cluster, whose workers are used")

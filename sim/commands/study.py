@@ -37,7 +37,7 @@ class StudyOptions:
 
     Attributes:
         study: name of the command and of its picture module.
-        workers, scheduler: number of processes for the jobs, or the Dask cluster that runs them.
+        workers, scheduler: number of threads for the jobs, or the Dask cluster that runs them.
         resume: whether results of an earlier run are used.
         set_: changes of the scene, as they were given.
         plot: file of the picture.

@@ -1,26 +1,25 @@
-"""Workers for many independent runs: a Dask cluster of this machine's cores, or a cluster that already runs.
+"""Jobs on the workers of a Dask cluster that runs already, perhaps on many machines.
 
 Whatever becomes of a cluster is a RuntimeError of one line: the logs of Dask are silenced.
 """
 
 import asyncio
 import logging
-import os
 import threading
 import time
-from collections.abc import Iterator
-from concurrent.futures import CancelledError, ThreadPoolExecutor
+from collections.abc import Callable, Hashable, Iterator
+from concurrent.futures import CancelledError
 from concurrent.futures import Future as Answer
 from contextlib import contextmanager
+from typing import Any
 
-from distributed import Client, Future, LocalCluster, Worker
+from distributed import Client, Future, as_completed
 from distributed.comm.addressing import parse_address, parse_host_port
 from distributed.core import rpc
 from distributed.scheduler import KilledWorker
 from distributed.security import Security
 
 from ...model.checks import shown
-from . import children
 
 TIMEOUT_S = 8.0
 """The time for a scheduler to answer, and the time for it to have a worker then."""
@@ -28,8 +27,6 @@ PATIENCE_S = 30.0
 """The time that a cluster may be without a worker in the middle of the work."""
 POLL_S = 1.0
 SCHEMES = ("tcp", "tls")
-GROUP = "HARDWALL_GROUP"
-"""The variable that tells the workers of a local cluster the number of their process group."""
 HOST_MAX = 253
 """The most characters of a host's name."""
 SILENT = ("asyncio", "distributed", "tornado")
@@ -53,11 +50,6 @@ def check_address(text: str) -> None:
         raise AddressError(f"must be an address such as tcp://10.0.0.7:8786, not {shown(text)}")
 
 
-def dask_setup(_: Worker) -> None:
-    """Tie a worker of a local cluster to the process that waits for it; Dask calls this function in every worker."""
-    children.join(int(os.environ[GROUP]))
-
-
 def result_of(future: Future) -> dict:
     """Return the result of a job.
 
@@ -74,14 +66,32 @@ def result_of(future: Future) -> dict:
         raise RuntimeError(f"the Dask cluster could not run a hit: {reason}") from None
 
 
+class Cluster:
+    """A `crew.Crew` of the workers of a Dask cluster, which need this project."""
+
+    def __init__(self, client: Client):
+        self._client, self._queue = client, as_completed()
+        self._tags: dict[str, Hashable] = {}
+
+    def give(self, tag: Hashable, function: Callable[..., Any], job: dict) -> None:
+        """Have `function(**job)` called: see `crew.Crew`."""
+        # Every job is a call of its own, even if another one is equal.
+        future = self._client.submit(function, **job, pure=False)
+        self._tags[future.key] = tag
+        self._queue.add(future)
+
+    def take(self) -> tuple[Any, Any]:
+        """Return the tag and the result of a job that is done: see `crew.Crew`."""
+        future = next(self._queue)
+        return self._tags.pop(future.key), result_of(future)
+
+
 @contextmanager
-def client(jobs: int, workers: int | None = None, scheduler: str | None = None) -> Iterator[Client | None]:
-    """Provide a client of a cluster, or None if this process does all the work.
+def connected(scheduler: str) -> Iterator[Cluster]:
+    """Provide the workers of a cluster that runs already.
 
     Args:
-        jobs: number of jobs at a time; more workers than jobs would have nothing to do.
-        workers: processes of a cluster that lasts as long as the context; None for one a core.
-        scheduler: address of a cluster to use instead, e.g. tcp://10.0.0.7:8786. Its workers need this project.
+        scheduler: the address of its scheduler, e.g. tcp://10.0.0.7:8786.
 
     Raises:
         AddressError: if the address cannot be one.
@@ -90,62 +100,23 @@ def client(jobs: int, workers: int | None = None, scheduler: str | None = None) 
     for name in logging.root.manager.loggerDict:
         if name.partition(".")[0] in SILENT:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
-    if scheduler is not None:
-        with _connected(scheduler) as connected:
-            yield connected
-        return
-    workers = min(workers or os.cpu_count() or 1, jobs)
-    if workers == 1:
-        yield None
-        return
-    with _local(workers) as connected:
-        yield connected
-
-
-@contextmanager
-def _local(workers: int) -> Iterator[Client]:
-    """Provide a client of a cluster on this machine, whose workers end with this process."""
-    options = {"threads_per_worker": 1, "dashboard_address": ":0", "silence_logs": logging.CRITICAL}
-    # No memory limit: a hit needs little, but on many cores a worker's share is less than Python itself needs.
-    options |= {"preload": [__name__], "memory_limit": 0}
-    with children.Group() as group:
-        options["env"] = {GROUP: str(group.number)}
-        # Dask's threads start its processes: they come from a thread of its own, so that this one still hears SIGINT.
-        with ThreadPoolExecutor(1) as starter:
-            local = starter.submit(_quiet_cluster, n_workers=workers, **options).result()
-        with local, Client(local) as connected:
-            yield connected
-
-
-def _quiet_cluster(**options) -> LocalCluster:
-    with children.quiet_children():
-        return LocalCluster(**options)
-
-
-@contextmanager
-def _connected(scheduler: str) -> Iterator[Client]:
-    """Provide a client of a cluster that runs already.
-
-    Raises:
-        AddressError, RuntimeError: see `client`.
-    """
     check_address(scheduler)
     _check_scheduler(scheduler)
     try:
-        connected = Client(scheduler, timeout=TIMEOUT_S)
+        client = Client(scheduler, timeout=TIMEOUT_S)
     except (OSError, ValueError) as error:
         raise RuntimeError(f"no Dask scheduler answers at {scheduler}: {error or 'timed out'}") from None
-    with connected:
+    with client:
         try:
-            connected.wait_for_workers(1, TIMEOUT_S)
+            client.wait_for_workers(1, TIMEOUT_S)
         except TimeoutError:
             raise RuntimeError(f"the Dask scheduler at {scheduler} has no workers") from None
-        with _watched(connected, scheduler):
-            yield connected
+        with _watched(client, scheduler):
+            yield Cluster(client)
 
 
 @contextmanager
-def _watched(connected: Client, scheduler: str) -> Iterator[None]:
+def _watched(client: Client, scheduler: str) -> Iterator[None]:
     """Cancel all jobs when a cluster has had no worker for `PATIENCE_S`: Dask itself waits for ever.
 
     Raises:
@@ -157,11 +128,11 @@ def _watched(connected: Client, scheduler: str) -> Iterator[None]:
         peopled = time.monotonic()
         while not over.wait(POLL_S):
             now = time.monotonic()
-            if connected.scheduler_info()["workers"]:
+            if client.scheduler_info()["workers"]:
                 peopled = now
             elif now - peopled > PATIENCE_S:
                 deserted.set()
-                connected.cancel([Future(key, connected) for key in list(connected.futures)])
+                client.cancel([Future(key, client) for key in list(client.futures)])
                 return
 
     watcher = threading.Thread(target=watch, daemon=True)

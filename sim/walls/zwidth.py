@@ -1,8 +1,8 @@
 """Z-width: the boundary of the region of stable walls for each case, a scene with its changes.
 
-A map is a trace, and a trace asks for one hit at a time. Hits of different traces run side by side on the workers of a
-Dask cluster; every verdict is kept as it comes. A verdict depends on the scene and the wall alone, so the map is the
-same for any number of workers, and an interrupted map continues where it was.
+A map is a trace, and a trace asks for one hit at a time. Hits of different traces run side by side; every verdict is
+kept as it comes. A verdict depends on the scene and the wall alone, so the map is the same for any crew, and an
+interrupted map continues where it was.
 """
 
 import platform
@@ -10,10 +10,8 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Protocol
 
-from distributed import Client, as_completed
-
 from ..jobs import store
-from ..jobs.cluster import result_of
+from ..jobs.crew import Crew
 from ..scene.case import Case
 from . import hit
 from .boundary import BoundaryPoint, area, trace
@@ -189,7 +187,7 @@ def run(
     cases: list[Case],
     backend: str,
     known: store.Store,
-    client: Client | None = None,
+    crew: Crew,
     progress: Callable[[float], None] | None = None,
 ) -> list[Map]:
     """Return the map of each case.
@@ -198,7 +196,7 @@ def run(
         cases: the cases to map, each on its scene's grid.
         backend: one of `backends.BACKENDS`.
         known: the store of verdicts.
-        client: a client of a Dask cluster; None for this process alone.
+        crew: who hits the walls.
         progress: called after every verdict with the number of maps done, unfinished maps counted in part.
 
     Raises:
@@ -216,26 +214,16 @@ def run(
             progress(sum(running.done for running in traces))
         return tracing.wanted
 
-    def keep(tracing: _Tracing, result: dict) -> dict | None:
-        """Keep a verdict; return the next hit to run, or None at the end of the trace."""
+    under_way = 0
+    for tracing in traces:
+        if job := forward(tracing):
+            crew.give(tracing, verdict, job)
+            under_way += 1
+    while under_way:
+        tracing, result = crew.take()
         known.put(tracing.wanted, result)
-        return forward(tracing)
-
-    if client is None:
-        for tracing in traces:
-            job = forward(tracing)
-            while job:
-                job = keep(tracing, verdict(**job))
-    else:
-        # Every hit is a separate run, even if another trace has asked for the same hit.
-        waiting = {
-            client.submit(verdict, **job, pure=False): tracing for tracing in traces if (job := forward(tracing))
-        }
-        queue = as_completed(waiting)
-        for future in queue:
-            tracing = waiting.pop(future)
-            if job := keep(tracing, result_of(future)):
-                following = client.submit(verdict, **job, pure=False)
-                waiting[following] = tracing
-                queue.add(following)
+        if job := forward(tracing):
+            crew.give(tracing, verdict, job)
+        else:
+            under_way -= 1
     return [tracing.found for tracing in traces]

@@ -2,7 +2,6 @@
 
 import os
 import signal
-import subprocess
 import sys
 
 import pytest
@@ -50,44 +49,6 @@ def test_a_command_is_in_a_group_of_its_own():
     with children.Group() as group:
         assert os.getpgid(group.number) == group.number != os.getpgid(0)
     assert gone(group.number)
-
-
-# The fork is there, and the worker is never told what to do.
-BEGINNING = """
-import multiprocessing, sys, time
-from multiprocessing import util
-from hardwall.sim.jobs import children, ending
-ending.hear_signals()
-start = util.spawnv_passfds
-def start_and_wait(path, args, *others):
-    number = start(path, args, *others)
-    if "--multiprocessing-fork" in args:
-        print("begun", flush=True)
-        time.sleep(600)
-    return number
-util.spawnv_passfds = start_and_wait
-with children.Group() as group, children.quiet_children():
-    multiprocessing.get_context("spawn").Process(target=print).start()
-"""
-
-
-@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
-def test_a_worker_that_has_just_begun_ends_in_silence(number):
-    with started(sys.executable, "-c", BEGINNING) as process:
-        assert line(process) == "begun"
-        # An interrupt of the terminal goes to all processes of its group.
-        send = os.killpg if number == "SIGINT" else os.kill
-        send(process.pid, signal.Signals[number])
-        wait_until(lambda: session(process) == [])
-        assert ended_by(number, process) == ("", "", "")
-
-
-def test_children_are_deaf_to_an_interrupt_and_this_process_is_not():
-    program = "import signal; print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))"
-    with children.quiet_children():
-        inside = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
-    outside = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
-    assert (inside, outside) == ("True\n", "False\n")
 
 
 def gone(number: int) -> bool:

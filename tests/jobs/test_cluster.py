@@ -1,19 +1,19 @@
-"""Clusters that do not answer, that are no clusters, that lose their workers or their scheduler; local ones end."""
+"""Clusters that do not answer, that are no clusters, that lose their workers or their scheduler."""
 
-import os
-import signal
+import json
 import socket
 import sys
 import threading
 from collections.abc import Callable
 from contextlib import contextmanager
+from functools import partialmethod
 
 import pytest
-from distributed import LocalCluster
+from distributed import Client, LocalCluster
 
 from hardwall.sim.jobs import cluster
 from stimuli.command_line import call
-from stimuli.processes import ended_by, line, session, started, wait_until
+from stimuli.processes import line, started
 
 LOCAL = {"threads_per_worker": 1, "dashboard_address": ":0"}
 
@@ -85,7 +85,7 @@ def test_what_no_host_is_called_is_no_address(address):
 )
 @pytest.mark.parametrize("command", ["zwidth", "fit", "rates"])
 def test_what_is_no_address_is_refused_before_any_work(monkeypatch, capsys, address, command):
-    monkeypatch.setattr(cluster, "client", lambda *_: pytest.fail("it connects"))
+    monkeypatch.setattr(cluster, "connected", lambda *_: pytest.fail("it connects"))
     expected = f"hardwall: error: --scheduler must be an address such as tcp://10.0.0.7:8786, not {address!r}\n"
     assert call(monkeypatch, capsys, command, "--scheduler", address) == (2, "", expected)
 
@@ -118,13 +118,15 @@ def test_a_scheduler_that_is_not_there_is_a_failure(monkeypatch, capsys):
     assert err.startswith("hardwall: error: no Dask scheduler answers at tcp://127.0.0.1:1: ")
 
 
-def wait_for_nobody(address: str, happens: Callable[[], object]) -> None:
+def wait_for_nobody(address: str, monkeypatch, happens: Callable[[], object]) -> None:
     """Wait for a job that no worker takes, while something happens to the cluster."""
-    with cluster.client(9, None, address) as client:
-        assert cluster.result_of(client.submit(abs, -7)) == 7
-        waiting = client.submit(abs, -8, workers=["nowhere"])
+    with cluster.connected(address) as crew:
+        crew.give("taken", json.dumps, {"obj": 7})
+        assert crew.take() == ("taken", "7")
+        monkeypatch.setattr(Client, "submit", partialmethod(Client.submit, workers=["nowhere"]))
+        crew.give("not taken", json.dumps, {"obj": 8})
         happens()
-        cluster.result_of(waiting)
+        crew.take()
 
 
 def test_a_cluster_that_loses_its_workers_is_left(monkeypatch):
@@ -134,7 +136,7 @@ def test_a_cluster_that_loses_its_workers_is_left(monkeypatch):
     with LocalCluster(n_workers=1, processes=False, protocol="tcp", **LOCAL) as local:
         message = f"^the Dask cluster at {local.scheduler_address} has had no worker for 1 s$"
         with pytest.raises(RuntimeError, match=message):
-            wait_for_nobody(local.scheduler_address, lambda: local.scale(0))
+            wait_for_nobody(local.scheduler_address, monkeypatch, lambda: local.scale(0))
 
 
 SCHEDULER = """
@@ -151,36 +153,5 @@ def test_a_scheduler_that_is_killed_is_a_failure_in_a_line(monkeypatch, capfd):
     with started(sys.executable, "-c", SCHEDULER) as scheduler:
         address = line(scheduler)
         with pytest.raises(RuntimeError, match=r"^the connection to the Dask scheduler is lost$"):
-            wait_for_nobody(address, scheduler.kill)
+            wait_for_nobody(address, monkeypatch, scheduler.kill)
     assert capfd.readouterr() == ("", "")
-
-
-LOCAL_PROGRAM = """
-import sys, time
-from hardwall.sim.jobs import cluster, ending
-ending.hear_signals()
-if __name__ == "__main__":
-    print("begun", flush=True)
-    with cluster.client(2, 2) as client:
-        print("ready", flush=True)
-        client.submit(time.sleep, 600).result()
-"""
-
-
-@pytest.mark.parametrize("moment", ["begun", "ready"])
-@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGKILL"])
-def test_a_local_cluster_ends_with_its_client(tmp_path, moment, number):
-    """An interrupt goes to all processes of the terminal, at the start of the cluster, too."""
-    program = tmp_path / "program.py"
-    program.write_text(LOCAL_PROGRAM)
-    with started(sys.executable, program) as process:
-        while line(process) != moment:
-            pass
-        if moment == "begun":
-            wait_until(lambda: len(session(process)) >= 5)
-        if number == "SIGINT":
-            os.killpg(process.pid, signal.SIGINT)
-        else:
-            process.send_signal(signal.Signals[number])
-        wait_until(lambda: session(process) == [])
-        assert ended_by(number, process)[1:] == ("", "")

@@ -13,7 +13,6 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable
-from contextlib import nullcontext
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -80,10 +79,6 @@ def _shorten(folder: Path) -> None:
     bench.study = zwidth.run = shared_library.build = synth.synthesise = board.build = board.load_into = _begin
     panel.VirtualBench.connect = _begin
     store.build_dir = lambda: folder / "build"
-    connected = cluster.client
-    cluster.client = lambda jobs, workers=None, scheduler=None: (
-        nullcontext() if scheduler is None else connected(jobs, workers, scheduler)
-    )
 
 
 def _child(arguments: tuple[str, ...], folder: Path) -> int:

@@ -1,4 +1,4 @@
-"""Jobs for worker processes: module-level functions, because other processes call them."""
+"""Jobs that wait for a tool or fail, and a program that runs them for ever."""
 
 import subprocess
 from pathlib import Path
@@ -25,7 +25,7 @@ def fail_beside_a_long_job(number: int) -> int:
 
 
 def run_for_ever() -> None:
-    """Run jobs on two workers, of which all but the first wait."""
+    """Run jobs on two threads, of which all but the first wait."""
     ending.hear_signals()
     parallel.run(wait_with_a_tool, [{"number": number} for number in range(3)], Store("waits"), 2)
 

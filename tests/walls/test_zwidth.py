@@ -1,4 +1,4 @@
-"""Maps of stable walls: early ends, any number of workers, interrupts, what is printed and what is refused."""
+"""Maps of stable walls: early ends, any crew, interrupts, what is printed and what is refused."""
 
 import json
 import os
@@ -8,9 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from distributed import Client, LocalCluster
+from distributed import LocalCluster
 
 from hardwall.model.build_folder import build_dir
+from hardwall.sim.jobs import cluster
+from hardwall.sim.jobs.crew import Threads
 from hardwall.sim.jobs.store import Store
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
@@ -41,11 +43,17 @@ METHODS = [methods.methods()[name] for name in ("fdm-100", "adjusted")]
 CASES = [Case(each.label, "seed-2011", read("seed-2011"), SMALL | each.changes) for each in METHODS]
 
 
+def mapped(cases: list[Case]) -> list[zwidth.Map]:
+    """Return the maps of cases by one thread."""
+    with Threads(1) as crew:
+        return zwidth.run(cases, "fixed", Store("zwidth"), crew)
+
+
 @pytest.fixture(scope="module")
-def map_of_one_process(tmp_path_factory):
+def map_of_one_thread(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("hardwall.sim.jobs.store.build_dir", lambda: tmp_path_factory.mktemp("one"))
-        return zwidth.run(CASES, "fixed", Store("zwidth"))
+        return mapped(CASES)
 
 
 @pytest.mark.parametrize("backend", ["float", "fixed"])
@@ -79,13 +87,15 @@ def test_a_worker_with_other_sources_is_refused():
         zwidth.verdict("seed-2011", read("seed-2011"), "0", {}, 1e3, 10.0, "fixed")
 
 
-def test_two_workers_give_the_map_of_one(map_of_one_process):
+def test_two_workers_and_two_threads_give_the_map_of_one(map_of_one_thread):
     options = {"threads_per_worker": 1, "dashboard_address": ":0"}
-    with LocalCluster(n_workers=2, **options) as cluster, Client(cluster) as client:
-        assert zwidth.run(CASES, "fixed", Store("zwidth"), client) == map_of_one_process
+    with LocalCluster(n_workers=2, **options) as local, cluster.connected(local.scheduler_address) as crew:
+        assert zwidth.run(CASES, "fixed", Store("zwidth"), crew) == map_of_one_thread
+    with Threads(2) as crew:
+        assert zwidth.run(CASES, "fixed", Store("zwidth"), crew) == map_of_one_thread
 
 
-def test_a_map_goes_on_from_what_is_known(map_of_one_process, monkeypatch):
+def test_a_map_goes_on_from_what_is_known(map_of_one_thread, monkeypatch):
     """A map that is ended after five hits and resumed hits none of the five again, and is the same."""
     real, hits = zwidth.verdict, []
 
@@ -97,11 +107,11 @@ def test_a_map_goes_on_from_what_is_known(map_of_one_process, monkeypatch):
 
     monkeypatch.setattr(zwidth, "verdict", counted)
     with pytest.raises(KeyboardInterrupt):
-        zwidth.run(CASES, "fixed", Store("zwidth"))
+        mapped(CASES)
     before = list(hits)
     monkeypatch.setattr(zwidth, "verdict", lambda **job: hits.append(job) or real(**job))
-    assert zwidth.run(CASES, "fixed", Store("zwidth")) == map_of_one_process
-    assert len(hits) == sum(each.hits for each in map_of_one_process)
+    assert mapped(CASES) == map_of_one_thread
+    assert len(hits) == sum(each.hits for each in map_of_one_thread)
     assert all(job not in before for job in hits[5:])
 
 
@@ -123,7 +133,7 @@ def test_walls_below_the_boundary_are_hit_where_the_scene_asks():
     changes = {**METHODS[1].changes, "zwidth.walls_below": 8, "zwidth.stiffness_step_n_per_m": 4e3}
     changes |= {"zwidth.damping_from_n_s_per_m": 90.0, "zwidth.damping_to_n_s_per_m": 100.0}
     changes |= {"zwidth.damping_step_n_s_per_m": 10.0}
-    (found,) = zwidth.run([replace(CASES[1], changes=changes)], "fixed", Store("zwidth"))
+    (found,) = mapped([replace(CASES[1], changes=changes)])
     left, right = (point.held * point.stable_n_per_m for point in found.boundary)
     assert all(0 < point.held < 1 for point in found.boundary)
     assert found.report()["area_held_n2_s_per_m2"] == found.area_held == pytest.approx(10 * (left + right) / 2)
@@ -138,22 +148,22 @@ def test_walls_out_of_place_are_left_out_of_the_area_in_place():
     assert found.area_in_place == 30 * 20e3
 
 
-def test_a_map_knows_which_of_its_walls_are_in_place(map_of_one_process):
-    filtered = map_of_one_process[0]
+def test_a_map_knows_which_of_its_walls_are_in_place(map_of_one_thread):
+    filtered = map_of_one_thread[0]
     assert filtered.in_place == [point.stable_n_per_m > 0 for point in filtered.boundary]
     assert filtered.area_in_place == filtered.area > 0
     large = {"controller.gains.levant": {"lambda_sqrt_m_per_s": 100.0, "alpha_m_per_s2": 560.0}}
-    (chatters,) = zwidth.run([replace(CASES[1], changes=CASES[1].changes | large)], "fixed", Store("zwidth"))
+    (chatters,) = mapped([replace(CASES[1], changes=CASES[1].changes | large)])
     assert chatters.area > chatters.area_in_place == 0
 
 
-def test_report_and_picture(monkeypatch, capsys, tmp_path, map_of_one_process):
+def test_report_and_picture(monkeypatch, capsys, tmp_path, map_of_one_thread):
     picture = tmp_path / "map.svg"
     names = ["--estimators", "fdm-100,adjusted", "--workers", 1]
     code, out, _ = call(monkeypatch, capsys, "zwidth", *SET, *names, "--json", "--plot", picture)
     assert code == 0
     report = json.loads(out)
-    expected = [each.report() for each in map_of_one_process]
+    expected = [each.report() for each in map_of_one_thread]
     assert all(each.pop("seconds") > 0 for each in expected + report["maps"])
     assert report["maps"] == expected
     assert report["hits"] == sum(each["hits"] for each in report["maps"])
@@ -210,13 +220,13 @@ def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, mes
     assert err.count("\n") == 1
 
 
-def test_a_scene_of_a_file_need_not_be_there_any_more(tmp_path, map_of_one_process):
+def test_a_scene_of_a_file_need_not_be_there_any_more(tmp_path, map_of_one_thread):
     file = tmp_path / "mine.toml"
     file.write_text(read("seed-2011"))
     cases = [replace(case, source=str(file), text=read(str(file))) for case in CASES]
     file.unlink()
-    maps = zwidth.run(cases, "fixed", Store("zwidth"))
-    assert [each.boundary for each in maps] == [each.boundary for each in map_of_one_process]
+    maps = mapped(cases)
+    assert [each.boundary for each in maps] == [each.boundary for each in map_of_one_thread]
 
 
 @pytest.mark.parametrize("workers", [1, 2])
