@@ -282,7 +282,7 @@ def resting(params, state, count, pins, clocks):
 def _lone(state, pins, inputs, clocks):
     """Return whether a settled state meets the edge of one channel, A or B, that is decoded and settled in `clocks`."""
     changed = state.level ^ pins
-    return (changed == 1 or changed == 2) and clocks > LATENCY + inputs.glitch_clocks and settled(state, state.level)
+    return 0 < changed < 3 and clocks > LATENCY + inputs.glitch_clocks and settled(state, state.level)
 
 
 @compiled

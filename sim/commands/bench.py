@@ -1,12 +1,29 @@
 """The command `bench`."""
 
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
 from ..scene.case import Case
-from ..studies import bench
+from ..studies import bench, waits
+from .errors import BadInput
 from .options import SceneArgument
 from .study import StudyOptions, study
 from .terminal import log
 
 
 @study()
-def command(options: StudyOptions, scene: SceneArgument = "mhz") -> None:
-    options.finish(bench.study(Case.of(scene), log.print))
+def command(
+    options: StudyOptions,
+    scene: SceneArgument = "mhz",
+    against: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="another checkout, set up, or environment: its commands are timed in turns"),
+    ] = None,
+) -> None:
+    try:
+        python = against and waits.python_of(against)
+    except ValueError as error:
+        raise BadInput(f"--against {error}") from None
+    options.finish(bench.study(Case.of(scene), log.print, python))

@@ -1,4 +1,4 @@
-"""How fast the closed loop runs, and what every optional part of a scene costs, measured side by side in one run.
+"""How fast the closed loop runs, what every optional part of a scene costs, and how long a user waits at the prompt.
 
 Every figure is a median over rounds in which the contestants take turns: see `jobs.rounds`.
 """
@@ -6,17 +6,21 @@ Every figure is a median over rounds in which the contestants take turns: see `j
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from ...model.build_folder import build_dir
-from ..jobs.result import Table, text_of
+from ...model.estimators.registry import ESTIMATORS
+from ..jobs.result import Table, table_of, text_of
 from ..jobs.rounds import medians
 from ..jobs.scratch import scratch
 from ..rtl.cocotb_runner import Job, simulate_axis
-from ..scene.case import Case
+from ..scene.case import Case, accepted
 from ..scene.schema import Scene
 from ..walls import hit
+from .waits import Wait, measure, table
 
+OUTPUT = "controller.output"
 ROUNDS = 5
 SECONDS_OF_SCENE = {"float": 6.0, "fixed": 6.0, "rtl": 0.2}
 """Simulated time (s) of a round, by backend: the whole protocol for the models, enough to time the RTL."""
@@ -82,6 +86,20 @@ def _cocotb(case: Case) -> Callable[[], float]:
     return run
 
 
+class Clocks(NamedTuple):
+    """The fewest clocks from a sample to the next, and those from a sample to the changed drive."""
+
+    interval: int
+    latency: int
+
+
+def clocks_of_estimators(case: Case) -> dict[str, Clocks]:
+    """Return the clocks of every estimator that a scene can have."""
+    cases = accepted({name: case.changed({"controller.estimator": name, OUTPUT: None}) for name in ESTIMATORS})
+    designs = {name: each.scene.spec.design for name, each in cases.items()}
+    return {name: Clocks(design.interval, design.latency_to_drive) for name, design in designs.items()}
+
+
 @dataclass(frozen=True)
 class Speeds:
     """The measured speeds.
@@ -91,12 +109,16 @@ class Speeds:
         samples_per_s: speed by backend, and under cocotb.
         clocks_per_sample: clocks of the hardware in a sample.
         ns_per_sample_of_parts: time of a sample by optional part.
+        clocks: by estimator, the fewest clocks from a sample to the next, and those from a sample to the changed drive.
+        waits: what a user waits for at the prompt.
     """
 
     scene: str
     samples_per_s: dict[str, float]
     clocks_per_sample: int
     ns_per_sample_of_parts: dict[str, float]
+    clocks: dict[str, Clocks]
+    waits: list[Wait]
 
     def _ratios(self) -> dict[str, float]:
         rtl, cocotb = self.samples_per_s["rtl"], self.samples_per_s["cocotb"]
@@ -105,25 +127,30 @@ class Speeds:
     def report(self) -> dict[str, Any]:
         """Return what the command line prints, units in the keys."""
         head = {"scene": self.scene, "rounds": ROUNDS, "samples_per_s": self.samples_per_s}
-        return head | self._ratios() | {"ns_per_sample_of_parts": self.ns_per_sample_of_parts}
+        clocks = {name: each._asdict() for name, each in self.clocks.items()}
+        tail = {"clocks_of_estimators": clocks, "from_the_prompt": [wait.report() for wait in self.waits]}
+        return head | self._ratios() | {"ns_per_sample_of_parts": self.ns_per_sample_of_parts} | tail
 
     def tables(self) -> list[Table]:
-        """Return the same numbers, one a line."""
+        """Return the same numbers, one a line, and a table each of the estimators and of the prompt."""
         speeds = {f"{name} (samples/s)": value for name, value in self.samples_per_s.items()}
         costs = {f"{name} (ns/sample)": value for name, value in self.ns_per_sample_of_parts.items()}
         lines = {"scene": self.scene, "rounds": ROUNDS} | self._ratios() | speeds | costs
-        return [Table({}, [[key, text_of(value)] for key, value in lines.items()])]
+        rows = [[name, str(each.interval), str(each.latency)] for name, each in self.clocks.items()]
+        clocks = table_of(("estimator",), ("clocks a sample", "clocks to the drive"), rows)
+        return [Table({}, [[key, text_of(value)] for key, value in lines.items()]), clocks, table(self.waits)]
 
     def notes(self) -> list[str]:
         return []
 
 
-def study(case: Case, progress: Callable[[str], None]) -> Speeds:
-    """Return samples a second by backend, and nanoseconds a sample by optional part.
+def study(case: Case, progress: Callable[[str], None], against: Path | None = None) -> Speeds:
+    """Return samples a second by backend, nanoseconds a sample by optional part, and the time of whole commands.
 
     Args:
         case: the scene.
         progress: function called with the name of the next measurement.
+        against: the Python of another hardwall, whose commands are run in turns with those of this one.
 
     Raises:
         RuntimeError: if the force words of the RTL under cocotb differ from the model's.
@@ -138,4 +165,5 @@ def study(case: Case, progress: Callable[[str], None]) -> Speeds:
     }
     samples_per_s = medians(speeds, ROUNDS, progress)
     costs = {name: 1e9 / rate for name, rate in medians(parts, ROUNDS, progress).items()}
-    return Speeds(case.source, samples_per_s, spec.clocks_per_sample, costs)
+    clocks, waits = clocks_of_estimators(case), measure(case.text, against, progress)
+    return Speeds(case.source, samples_per_s, spec.clocks_per_sample, costs, clocks, waits)

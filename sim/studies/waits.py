@@ -1,0 +1,156 @@
+"""How long a user waits at the prompt: whole commands, each a process, of this checkout and of another one."""
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ...model.build_folder import build_dir
+from ..jobs import children
+from ..jobs.result import Table, table_of
+from ..jobs.scratch import scratch
+
+PROGRAM = "import sys; sys.argv[0] = 'hardwall'; from hardwall.sim.commands.app import main; main()"
+SPEED = "samples_per_s"
+BUILD = "HARDWALL_BUILD"
+PYTHONS = (".venv/bin/python", "bin/python")
+"""The places of Python in a checkout that `make tools` has set up, and in an environment of one's own."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command to be measured.
+
+    Attributes:
+        words: its words, without `hardwall`.
+        rounds: how often it is run.
+        speed: whether its own speed is taken, in samples a second, rather than the seconds that it takes.
+        cold: whether it begins with nothing that an earlier one has compiled, built or found.
+    """
+
+    words: tuple[str, ...]
+    rounds: int
+    speed: bool = False
+    cold: bool = False
+
+
+SCENE = "scene.toml"
+"""The file of the scene whose hits give the speed of the loop."""
+SHORT = ("--set", "protocol.settle_s=0.1", "--set", "protocol.mean_s=0.05", "--set", "protocol.measure_s=0.1")
+COMMANDS = {
+    "float (samples/s)": Command(("hit", SCENE, "--backend", "float", "--json"), 5, speed=True),
+    "fixed (samples/s)": Command(("hit", SCENE, "--json"), 5, speed=True),
+    "rtl (samples/s)": Command(("hit", SCENE, "--backend", "rtl", *SHORT, "--json"), 5, speed=True),
+    "a hit (s)": Command(("hit", "seed-2011", "--json"), 5),
+    "a hit, nothing compiled (s)": Command(("hit", "seed-2011", "--json"), 3, cold=True),
+    "Figure 5 on fixed (s)": Command(("zwidth", "seed-2011", "--json"), 3),
+    "Figure 5 on rtl, nothing built (s)": Command(("zwidth", "seed-2011", "--backend", "rtl", "--json"), 1, cold=True),
+}
+"""The commands, by what is measured."""
+
+
+def python_of(folder: Path) -> Path:
+    """Return the Python of another checkout or environment, which has its own hardwall.
+
+    Raises:
+        ValueError: if there is none.
+    """
+    for place in PYTHONS:
+        if (folder / place).exists():
+            return folder.absolute() / place
+    raise ValueError(f"must be a checkout in which make tools has run, or an environment with hardwall, not {folder}")
+
+
+@dataclass(frozen=True)
+class Wait:
+    """The values of one command, here and by another hardwall, pair by pair; `other` is empty without one."""
+
+    name: str
+    here: list[float]
+    other: list[float]
+
+    @property
+    def ratios(self) -> list[float]:
+        """How many times as fast each run here is as the other's beside it, sorted."""
+        pairs = zip(self.here, self.other, strict=False)
+        return sorted(here / other if self.name.endswith("(samples/s)") else other / here for here, other in pairs)
+
+    def report(self) -> dict[str, Any]:
+        """Return the medians and the ratios."""
+        median = statistics.median(self.ratios) if self.other else None
+        spread = [self.ratios[0], self.ratios[-1]] if self.other else None
+        other = statistics.median(self.other) if self.other else None
+        return {
+            "name": self.name,
+            "here": statistics.median(self.here),
+            "against": other,
+            "times_as_fast": median,
+            "times_as_fast_from_to": spread,
+        }
+
+
+def table(waits: list[Wait]) -> Table:
+    """Return what was measured as a table."""
+    rows, compared = [], any(wait.other for wait in waits)
+    for wait in waits:
+        report = wait.report()
+        row = [wait.name, f"{report['here']:.4g}"]
+        if compared:
+            low, high = report["times_as_fast_from_to"]
+            row += [f"{report['against']:.4g}", f"{report['times_as_fast']:.2f} ({low:.2f} to {high:.2f})"]
+        rows.append(row)
+    return table_of(("from the prompt",), ("here", "against", "times as fast")[: 3 if compared else 1], rows)
+
+
+def _run(python: Path, command: Command, text: str, build: str | None) -> float:
+    """Run a command by a Python, with the text of a scene; return its seconds, or its own speed.
+
+    Raises:
+        RuntimeError: if it fails.
+    """
+    environ = {key: value for key, value in os.environ.items() if key != BUILD}
+    if python != Path(sys.executable):
+        environ.pop("PYTHONPATH", None)
+    with scratch(build_dir() / "bench") as folder:
+        (folder / SCENE).write_text(text, encoding="utf-8")
+        environ[BUILD] = build or str(folder / "build")
+        words = [str(python), "-c", PROGRAM, *command.words]
+        began = time.perf_counter()
+        done = children.run(words, cwd=folder, env=environ, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        seconds = time.perf_counter() - began
+    if done.returncode:
+        last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+        raise RuntimeError(f"{' '.join(command.words)} by {python} failed: {last}")
+    return json.loads(done.stdout)[SPEED] if command.speed else seconds
+
+
+def measure(text: str, against: Path | None, progress: Callable[[str], None]) -> list[Wait]:
+    """Measure every command, in turns with the Python of another hardwall if one is given.
+
+    Args:
+        text: the text of a scene.
+        against: the other's Python, from `python_of`.
+        progress: called with a text that names the next run.
+
+    Raises:
+        RuntimeError: if a command fails.
+    """
+    waits = []
+    pythons = [Path(sys.executable), *([against] if against else [])]
+    for name, command in COMMANDS.items():
+        values: list[list[float]] = [[], []]
+        # The first run of those that find things kept is the one that keeps them.
+        untimed = int(not command.cold)
+        for number in range(-untimed, command.rounds):
+            progress(f"round {number + 1} of {command.rounds}: {name}")
+            for side, python in enumerate(pythons):
+                kept = str(build_dir() / "bench" / f"kept-{side}")
+                values[side].append(_run(python, command, text, None if command.cold else kept))
+        waits.append(Wait(name, values[0][untimed:], values[1][untimed:]))
+    return waits
