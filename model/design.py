@@ -63,6 +63,7 @@ class Design:
         words: every run-time word, in the order of the hardware's ports.
         flags: names of the sticky flags, bit 0 first.
         latency_to_drive: clocks from the sample strobe to the changed drive.
+        interval: the fewest clocks from a sample strobe to the next.
         timing: the clocks per sample, and `latency_to_drive`.
     """
 
@@ -99,6 +100,7 @@ class Design:
         self.flags = (*ENCODER_FLAGS, *self.estimator.flags, *self.output.flags)
         self._flag_bits = len(ENCODER_FLAGS), len(ENCODER_FLAGS) + len(self.estimator.flags)
         self.latency_to_drive = self.estimator.latency + self.wall.latency + self.output.latency
+        self.interval = self.latency_to_drive
         self.timing = Timing(requirements.clocks_per_sample, self.latency_to_drive)
 
     def encode(self, **si: float) -> dict[str, int]:
