@@ -1,0 +1,50 @@
+"""Whole commands from the prompt: timed in turns, compared as ratios, and refused where there is no hardwall."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from hardwall.sim.scene.load import read
+from hardwall.sim.studies import waits
+from hardwall.sim.studies.waits import SCENE, Command, Wait
+from stimuli.command_line import call
+
+HIT = ("hit", SCENE, *waits.SHORT, "--json")
+
+
+def test_two_versions_are_timed_in_turns(monkeypatch, capsys):
+    """Both are this one: what is measured is the same command, through another Python's name."""
+    monkeypatch.setattr(waits, "COMMANDS", {"fixed (samples/s)": Command(HIT, 2, speed=True)})
+    other = Path(sys.executable).parent / "." / Path(sys.executable).name
+    said: list[str] = []
+    (wait,) = waits.measure(read("seed-2011"), other, said.append)
+    assert said == [f"round {number} of 2: fixed (samples/s)" for number in (0, 1, 2)]
+    assert len(wait.here) == len(wait.other) == 2
+    assert waits.table([wait]).rows[0][0] == "fixed (samples/s)"
+
+
+def test_ratios_say_how_many_times_as_fast_this_one_is():
+    speed, seconds = Wait("fixed (samples/s)", [4.0, 6.0, 9.0], [2.0] * 3), Wait("a hit (s)", [1.0, 2.0], [4.0, 4.0])
+    assert (speed.ratios, seconds.ratios) == ([2.0, 3.0, 4.5], [2.0, 4.0])
+    assert speed.report()["times_as_fast"] == 3.0
+    assert waits.table([speed, seconds]).rows == [
+        ["fixed (samples/s)", "6", "2", "3.00 (2.00 to 4.50)"],
+        ["a hit (s)", "1.5", "4", "3.00 (2.00 to 4.00)"],
+    ]
+    assert waits.table([Wait("a hit (s)", [1.0], [])]).rows == [["a hit (s)", "1"]]
+
+
+def test_a_command_that_fails_is_named(monkeypatch):
+    monkeypatch.setattr(waits, "COMMANDS", {"a hit (s)": Command(("hit", "nowhere"), 1, cold=True)})
+    with pytest.raises(RuntimeError, match=r"^hit nowhere by \S+ failed: hardwall: error: .*nowhere"):
+        waits.measure(read("seed-2011"), None, lambda text: None)
+
+
+def test_what_has_no_hardwall_is_refused(tmp_path, monkeypatch, capsys):
+    code, out, err = call(monkeypatch, capsys, "bench", "--against", str(tmp_path))
+    assert (code, out) == (2, "")
+    assert err == (
+        "hardwall: error: --against must be a checkout in which make tools has run, or an environment with hardwall, "
+        f"not {tmp_path}\n"
+    )
