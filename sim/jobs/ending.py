@@ -92,8 +92,6 @@ def hear_signals() -> None:
     heard, told = os.pipe()
     os.set_blocking(told, False)
     signal.set_wakeup_fd(told, warn_on_full_buffer=False)
-    # Python's tracker of shared semaphores removes what an early end leaves of them; it need not complain about it.
-    sys.warnoptions.append("ignore:resource_tracker")
     for number in CODES:
         signal.signal(number, lambda number, _: _end(number))
     threading.Thread(target=_hear, args=[heard], daemon=True).start()

@@ -1,7 +1,7 @@
 """Messages about long stages of work: their name after a second, and the time that they took at their end.
 
 Messages go to the logger of the project at level INFO. They are shown only where that logger has a handler: the
-command line adds one; a worker process or a user's own study has none.
+command line adds one; a worker of a cluster or a user's own study has none.
 """
 
 import logging
