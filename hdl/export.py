@@ -8,7 +8,7 @@ from pathlib import Path
 os.environ.setdefault("AMARANTH_USE_YOSYS", "builtin")
 
 from amaranth.back import verilog
-from amaranth.hdl import Module, Signal
+from amaranth.hdl import Fragment, Module, Signal, Value, _ir, _nir
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 
@@ -76,6 +76,21 @@ def to_verilog(component: wiring.Component, name: str) -> str:
     """
     text = verilog.convert(component, name=name, platform=_AnyPart(), emit_src=False, strip_internal_attrs=True)
     return _with_start(_CONTENTS.sub(r"\1", text))
+
+
+def to_netlist(component: wiring.Component, name: str) -> _nir.Netlist:
+    """Return the netlist of `component` that `to_verilog` writes as text: Amaranth's own, before any tool has seen it.
+
+    Amaranth, whose version is pinned, has no public name for it.
+    """
+    ports = {
+        "__".join(map(str, path)): (
+            Value.cast(value),
+            _ir.PortDirection.Input if member.flow == wiring.In else _ir.PortDirection.Output,
+        )
+        for path, member, value in component.signature.flatten(component)
+    }
+    return _ir.build_netlist(Fragment.get(component, _AnyPart()), ports, name=name)
 
 
 def _facts(spec: AxisSpec) -> list[str]:

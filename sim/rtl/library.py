@@ -10,80 +10,127 @@ from amaranth.hdl import Shape
 from amaranth.lib.wiring import In
 
 from ...hdl.axis import Axis
-from ...hdl.export import to_verilog
+from ...hdl.export import to_netlist, to_verilog
+from ...model import quadrature
 from ...model.spec import AxisSpec
-from . import shared_library
+from ..jobs.stages import logger
+from . import resting, shared_library
+from .resting import Counter, RestsNotError
 from .shared_library import FAST_TO_BUILD, FAST_TO_RUN, Recipe
 from .verilated import Rtl, RtlState
 
 SHIM = Path(__file__).with_name("library.cpp")
 
 
-def _ports(spec: AxisSpec) -> str:
-    """Return the header that describes the ports of this axis to the shim."""
+SHOWN = ("drive", "velocity", "flags")
+"""The outputs of an axis that the compiled loop reads."""
+
+
+def counters(spec: AxisSpec) -> tuple[Counter, ...]:
+    """Return what may run in an axis while all else rests.
+
+    Raises:
+        RestsNotError: if none of its clocks may be skipped.
+    """
+    return resting.check(to_netlist(Axis(spec), "axis"), SHOWN)
+
+
+def _header(spec: AxisSpec, running: tuple[Counter, ...] | None) -> str:
+    """Return the header that describes an axis to the shim: its ports, and its counters, None if no clock is skipped.
+
+    Of the names of a counter Verilator keeps one, which is none with a `$` or two underscores.
+    """
     words = " ".join(f"WORD({index}, {word.name})" for index, word in enumerate(spec.design.words))
+    members = [
+        (f"harness__DOT__axis__DOT__{name.replace('.', '__DOT__')}, {(1 << counter.width) - 1}", counter.stops)
+        for counter in running or ()
+        for name in counter.names
+        if "$" not in name and "__" not in name
+    ]
     return (
         f"#define DRIVE_WIDTH {spec.force.width}\n"
         f"#define VELOCITY_WIDTH {spec.design.estimator.velocity.width}\n"
         f"#define AXIS_WORDS {words}\n"
+        f"#define SKIPS {int(running is not None)}\n"
+        f"#define SAMPLE_CLOCKS {spec.design.latency_to_drive}\n"
+        f"#define COUNTERS {' '.join(f'COUNTER({member})' for member, _ in members)}\n"
+        f"#define STOPS {' '.join(f'STOP({member}, {stop})' for member, stops in members for stop in stops)}\n"
     )
 
 
 def _harness(component: Axis) -> str:
-    """Return Verilog that gives the axis any number of clocks for one change of `go`.
+    """Return Verilog around the axis in which nothing follows from an input before the next clock.
 
-    At every call Verilator evaluates the logic that depends on the inputs. With a synchronous reset among them that is
-    the whole next-state logic. With its clock generated inside, the axis pays for it once a call, not twice a clock.
+    So Verilator's function for the clock is all there is to evaluate, and it is the smaller for it. Inputs that do not
+    change are constant; parameters are in registers, from the clock after `commit` on; A and B go to registers in the
+    axis.
     """
     members = component.signature.members
-    ports = [("input", 1, "rst")]
-    ports += [
-        ("input" if member.flow == In else "output", Shape.cast(member.shape).width, name)
-        for name, member in members.items()
-    ]
-    declared = "".join(f",\n  {way} [{width - 1}:0] {name}" for way, width, name in ports)
-    connected = "".join(f", .{name}({name})" for _, _, name in ports)
-    return f"""module harness(input go, input [31:0] clocks{declared});
-  reg clk = 0, gone = 0;
-  reg [31:0] left = 0;
-  axis axis(.clk(clk){connected});
-  always @(go or posedge clk or negedge clk)
-    if (clk) clk <= 0;
-    else if (go != gone) begin
-      gone <= go;
-      left <= clocks - 1;
-      clk <= 1;
-    end else if (left != 0) begin
-      left <= left - 1;
-      clk <= 1;
-    end
+    widths = {name: Shape.cast(member.shape).width for name, member in members.items()}
+    words = [word.name for word in component.spec.design.words]
+    ports = ["input clk", "input encoder_a", "input encoder_b", "input commit"]
+    ports += [f"input [{widths[name] - 1}:0] {name}" for name in words]
+    ports += [f"output [{widths[name] - 1}:0] {name}" for name in SHOWN]
+    given = {"clk": "clk", "rst": "1'b0", "encoder_a": "encoder_a", "encoder_b": "encoder_b", "drive_enable": "1'b1"}
+    given |= {"commit": "committed"} | {name: f"held_{name}" for name in words} | {name: name for name in SHOWN}
+    others = {name: f"{widths[name]}'b0" if member.flow == In else "" for name, member in members.items()}
+    connected = ", ".join(f".{name}({value})" for name, value in (others | given).items())
+    held = "".join(f"  reg [{widths[name] - 1}:0] held_{name} = 0;\n" for name in words)
+    taken = "".join(f"      held_{name} <= {name};\n" for name in words)
+    return f"""module harness({", ".join(ports)});
+  // verilator lint_off PINCONNECTEMPTY
+  reg committed = 0;
+{held}  axis axis({connected});
+  always @(posedge clk) begin
+    committed <= commit;
+    if (commit) begin
+{taken}    end
+  end
 endmodule
 """
 
 
+@dataclass(frozen=True)
+class _Sources:
+    """What a library is made of: its files, and why none of its clocks can be skipped, if that is so."""
+
+    files: dict[str, str]
+    why_not: str = ""
+
+
 @functools.lru_cache(maxsize=1 << 6)
-def _sources(spec: AxisSpec, traced: bool) -> dict[str, str]:
-    """Return the sources of a library by file name; they take as long to make as a short hit to run."""
+def _sources(spec: AxisSpec, traced: bool) -> _Sources:
+    """Return the sources of a library; they take as long to make as a short hit to run."""
     component = Axis(spec)
-    files = {"axis.v": to_verilog(component, "axis"), "axis_ports.h": _ports(spec)}
-    files[SHIM.name] = SHIM.read_text(encoding="utf-8")
-    return files if traced else files | {"harness.v": _harness(component)}
+    files = {"axis.v": to_verilog(component, "axis"), SHIM.name: SHIM.read_text(encoding="utf-8")}
+    if traced:
+        return _Sources(files | {"axis_ports.h": _header(spec, None)})
+    files["harness.v"] = _harness(component)
+    try:
+        return _Sources(files | {"axis_ports.h": _header(spec, counters(spec))})
+    except RestsNotError as error:
+        return _Sources(files | {"axis_ports.h": _header(spec, None)}, str(error))
 
 
 def build(spec: AxisSpec, traced: bool = False, short: bool = False) -> Path:
     """Return the shared library of the axis; build it first if it is missing.
 
+    Where clocks cannot be skipped the log says why.
+
     Args:
         spec: the axis.
-        traced: include the code that records waveforms, which is slower.
+        traced: include the code that records waveforms, of every clock, which is slower.
         short: build quickly, for a run so short that building takes most of the time.
 
     Raises:
         BuildError: if the build fails.
     """
+    sources = _sources(spec, traced)
+    if sources.why_not:
+        logger.warning(f"the RTL runs every clock, for {sources.why_not}")
     options = ("--trace-vcd", "--top-module", "axis") if traced else ("--top-module", "harness")
     optimisation = FAST_TO_BUILD if short else FAST_TO_RUN
-    return shared_library.build(Recipe(_sources(spec, traced), SHIM.name, "Vaxis", options, optimisation))
+    return shared_library.build(Recipe(sources.files, SHIM.name, "Vaxis", options, optimisation))
 
 
 @dataclass
@@ -107,9 +154,11 @@ class Hardware:
     def __enter__(self) -> "Hardware":
         self._library = ctypes.CDLL(str(build(self.spec, self.traced, self.short)))
         self._library.axis_open.restype = ctypes.c_void_p
-        self._library.axis_open.argtypes = [ctypes.c_int64, ctypes.c_void_p]
+        self._library.axis_evaluated.restype = ctypes.c_int64
+        self._library.axis_open.argtypes = [ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64]
         words = np.array([self.words[word.name] for word in self.spec.design.words], np.int64)
-        self._context = self._library.axis_open(self.level, words.ctypes.data)
+        decoder_clocks = quadrature.latency(self.words["encoder_glitch_clocks"])
+        self._context = self._library.axis_open(self.level, words.ctypes.data, decoder_clocks)
         return self
 
     def __exit__(self, *_) -> None:
@@ -124,6 +173,15 @@ class Hardware:
     def end_trace(self) -> None:
         """Close the waveform."""
         self._library.axis_end_trace(ctypes.c_void_p(self._context))
+
+    def skip_nothing(self) -> None:
+        """Evaluate every clock from here on."""
+        self._library.axis_skip_nothing(ctypes.c_void_p(self._context))
+
+    @property
+    def evaluated(self) -> int:
+        """How many clocks were evaluated since the reset; the others were skipped."""
+        return self._library.axis_evaluated(ctypes.c_void_p(self._context))
 
     @property
     def controller(self) -> Rtl:

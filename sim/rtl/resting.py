@@ -1,0 +1,225 @@
+"""What may run while all else of a component rests: a check of its netlist, which allows a simulation to skip clocks.
+
+Between two samples an axis does nothing but count clocks. A simulation that knows so may leave these clocks out, and
+add their number to the counters. `check` finds in Amaranth's netlist, the one that the Verilog is written from, whether
+that is so for the registers that `COUNTERS` names, and at which of their values anything else sees them, their stops.
+
+**What is checked.** A counter reaches the rest of the component through nothing but
+
+- comparisons with a constant, its stops: the bit of such a comparison may go anywhere;
+- the data of registers behind decisions (multiplexers, assignments under a condition) that are not the counter's, as a
+  word in which its lowest bit stands as it is: the latch of a stamp.
+
+Its own next value is, behind such decisions again, its successor, itself, or what is not made of counters. What is
+`shown` is not made of counters, and all registers have one clock and no asynchronous reset.
+
+**Why that is enough.** Let the inputs be constant, and let two clocks in a row leave every register as it was, but for
+the counters, which are one further after each; and let no counter be at a stop before, between or after the two. All
+that decides then depends on what has not changed, so in both clocks every register takes its value by the same way. It
+cannot be the way from a counter: the counter's lowest bit differs in the two clocks, and the register would, too. So
+what a register takes is made of what has not changed. And a counter goes by the way of its successor, for by any other
+it would not be one further after each clock. The third clock begins as the second did, but for the counters, so it goes
+the same ways; and so does every clock up to one with a counter at a stop, or with other inputs.
+
+A simulation has to see two such clocks each time; what it then skips is exact. If the check fails, nothing is skipped.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from amaranth.hdl import _nir as nir
+
+COUNTERS = ("divider", "decoder.seen__stamp")
+"""The registers that may run: what tells an axis when to sample, and the number of the clock."""
+
+
+class RestsNotError(ValueError):
+    """A component whose clocks cannot be skipped; one line that says what is in the way."""
+
+
+@dataclass(frozen=True)
+class Counter:
+    """A register that may run while all else rests.
+
+    Attributes:
+        names: all its names, those of the modules below the top first, with dots between.
+        width: its bits; it wraps.
+        stops: its values at which anything else sees it.
+    """
+
+    names: tuple[str, ...]
+    width: int
+    stops: tuple[int, ...]
+
+
+def check(netlist: nir.Netlist, shown: Iterable[str], listed: Iterable[str] = COUNTERS) -> tuple[Counter, ...]:
+    """Return the counters of a component that may run while all else rests.
+
+    Args:
+        netlist: the component, from `hdl.export.to_netlist`.
+        shown: the outputs that are looked at while clocks are skipped.
+        listed: names of the counters; those that it does not have are left out.
+
+    Raises:
+        RestsNotError: if a counter reaches what it must not.
+    """
+    return _Check(netlist, tuple(listed)).run(tuple(shown))
+
+
+class _Check:
+    def __init__(self, netlist: nir.Netlist, listed: tuple[str, ...]):
+        self._netlist, self._cells = netlist, netlist.cells
+        self._names: dict[nir.Value, list[str]] = {}
+        for module in netlist.modules:
+            for signal, name in module.signal_names.items():
+                self._names.setdefault(netlist.signals[signal], []).append(".".join([*module.name[1:], name]))
+        self._counters = {
+            value[0].cell: value
+            for value, names in self._names.items()
+            if set(names) & set(listed) and isinstance(self._cells[value[0].cell], nir.FlipFlop)
+        }
+        self._stops: dict[int, set[int]] = {number: set() for number in self._counters}
+        self._made = self._made_of_counters()
+
+    def run(self, shown: tuple[str, ...]) -> tuple[Counter, ...]:
+        clocks = {(cell.clk, cell.clk_edge) for cell in self._cells if isinstance(cell, nir.FlipFlop)}
+        if len(clocks) > 1:
+            raise RestsNotError("it has more than one clock")
+        for number, cell in enumerate(self._cells):
+            self._check(number, cell)
+        for name in shown:
+            self._decides(f"the output {name}", self._netlist.top.ports_o[name])
+        return tuple(
+            Counter(tuple(self._names[value]), len(value), tuple(sorted(self._stops[number])))
+            for number, value in self._counters.items()
+        )
+
+    def _made_of_counters(self) -> set[nir.Net]:
+        """Return the nets that follow from counters without a register between, but for the bits of stops."""
+        users: dict[int, set[int]] = {}
+        for number, cell in enumerate(self._cells[1:], 1):
+            for net in cell.input_nets():
+                users.setdefault(net.cell if net.is_cell else 0, set()).add(number)
+        made = {net for value in self._counters.values() for net in value}
+        waiting = list(self._counters)
+        while waiting:
+            for number in users.get(waiting.pop(), ()):
+                cell = self._cells[number]
+                if isinstance(cell, nir.FlipFlop | nir.SyncReadPort) or self._is_stop(cell):
+                    continue
+                new = {
+                    net
+                    for net in cell.output_nets(number) - made
+                    if any(source in made for source, _ in cell.comb_edges_to(net.bit))
+                }
+                if new:
+                    made |= new
+                    waiting.append(number)
+        return made
+
+    def _is_stop(self, cell: nir.Cell) -> bool:
+        """Return whether a cell compares a counter with a constant, which is then one of its stops."""
+        if not isinstance(cell, nir.Operator) or cell.operator not in ("==", "!="):
+            return False
+        for value, other in (cell.inputs, cell.inputs[::-1]):
+            for number, counter in self._counters.items():
+                if other.is_const and value == _extended(counter, len(value)):
+                    self._stops[number].add(_constant(other))
+                    return True
+        return False
+
+    def _check(self, number: int, cell: nir.Cell) -> None:
+        """Raise RestsNotError if a cell with a memory takes from a counter what it must not."""
+        match cell:
+            case nir.FlipFlop():
+                if not cell.arst.is_const:
+                    raise RestsNotError(f"{self._name(number)} has an asynchronous reset")
+                self._decides(f"the clock of {self._name(number)}", [cell.clk])
+                (self._next if number in self._counters else self._taken)(number, cell.data)
+            case nir.SyncWritePort():
+                self._decides(self._name(number), [*cell.addr, *cell.en])
+                self._taken(number, cell.data)
+            case nir.SyncReadPort():
+                self._decides(self._name(number), [*cell.addr, cell.en])
+            case nir.Top() | nir.Operator() | nir.Part() | nir.Matches() | nir.PriorityMatch() | nir.AssignmentList():
+                pass
+            case nir.Memory() | nir.AsyncReadPort():
+                pass
+            case _:
+                raise RestsNotError(f"nothing is known of a cell {type(cell).__name__}")
+
+    def _decides(self, what: str, nets: Iterable[nir.Net]) -> None:
+        if any(net in self._made for net in nets):
+            raise RestsNotError(f"{what} depends on a counter")
+
+    def _ways(self, number: int, value: nir.Value) -> list[nir.Value] | None:
+        """Return the values between which a decision chooses, if all of a value is the output of one; else None."""
+        cells = {net.cell if net.is_cell else 0 for net in value}
+        cell = self._cells[cells.pop()]
+        if cells or not isinstance(cell, nir.Operator | nir.AssignmentList):
+            return None
+        bits = [net.bit for net in value]
+        if isinstance(cell, nir.AssignmentList):
+            self._decides(f"what {self._name(number)} takes", [assignment.cond for assignment in cell.assignments])
+            ways = [nir.Value(cell.default[bit] for bit in bits)]
+            for assignment in cell.assignments:
+                end = assignment.start + len(assignment.value)
+                inside = [bit - assignment.start for bit in bits if assignment.start <= bit < end]
+                if inside and len(inside) < len(bits):
+                    return None
+                if inside:
+                    ways.append(nir.Value(assignment.value[bit] for bit in inside))
+            return ways
+        if cell.operator != "m":
+            return None
+        self._decides(f"what {self._name(number)} takes", cell.inputs[0])
+        return [nir.Value(way[bit] for bit in bits) for way in cell.inputs[1:]]
+
+    def _taken(self, number: int, value: nir.Value) -> None:
+        """Raise RestsNotError unless every way to the data of a register is one that the argument allows."""
+        made = [net for net in value if net in self._made]
+        if not made or any(counter[0] in made for counter in self._counters.values()):
+            return
+        ways = self._ways(number, value)
+        if ways is None:
+            raise RestsNotError(f"{self._name(number)} takes what is computed from a counter")
+        for way in ways:
+            self._taken(number, way)
+
+    def _next(self, number: int, value: nir.Value) -> None:
+        """Raise RestsNotError unless every way to the next value of a counter is one that the argument allows."""
+        counter = self._counters[number]
+        if value == counter or not any(net in self._made for net in value) or self._is_successor(value, counter):
+            return
+        ways = self._ways(number, value)
+        if ways is None:
+            raise RestsNotError(f"{self._name(number)} does not count by one")
+        for way in ways:
+            self._next(number, way)
+
+    def _is_successor(self, value: nir.Value, counter: nir.Value) -> bool:
+        cell = self._cells[value[0].cell if value[0].is_cell else 0]
+        if not isinstance(cell, nir.Operator) or cell.operator != "+":
+            return False
+        one, width = nir.Value.from_const(1, cell.width), len(value)
+        sums = nir.Value(nir.Net.from_cell(value[0].cell, bit) for bit in range(width))
+        counted = [_extended(counter, cell.width), one]
+        return value == sums and list(cell.inputs) in (counted, counted[::-1])
+
+    def _name(self, number: int) -> str:
+        """Return what a cell with a memory is called."""
+        cell = self._cells[number]
+        if isinstance(cell, nir.SyncWritePort | nir.SyncReadPort):
+            memory = self._cells[cell.memory]
+            return ".".join([*self._netlist.modules[memory.module_idx].name[1:], memory.name])
+        value = nir.Value(nir.Net.from_cell(number, bit) for bit in range(len(cell.data)))
+        return min(self._names.get(value, ["a register"]), key=len)
+
+
+def _extended(value: nir.Value, width: int) -> nir.Value:
+    """Return a value with zeros above it, so that it has some bits."""
+    return nir.Value([*value, *nir.Value.zeros(max(width - len(value), 0))])
+
+
+def _constant(value: nir.Value) -> int:
+    return sum(net.const << bit for bit, net in enumerate(value))
