@@ -52,7 +52,7 @@ def _header(spec: AxisSpec, running: tuple[Counter, ...] | None) -> str:
         f"#define VELOCITY_WIDTH {spec.design.estimator.velocity.width}\n"
         f"#define AXIS_WORDS {words}\n"
         f"#define SKIPS {int(running is not None)}\n"
-        f"#define SAMPLE_CLOCKS {spec.design.latency_to_drive}\n"
+        f"#define SAMPLE_CLOCKS {spec.design.latency_to_drive + 1}\n"
         f"#define COUNTERS {' '.join(f'COUNTER({member})' for member, _ in members)}\n"
         f"#define STOPS {' '.join(f'STOP({member}, {stop})' for member, stops in members for stop in stops)}\n"
     )

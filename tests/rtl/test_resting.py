@@ -14,6 +14,7 @@ from hardwall.hdl.axis import Axis
 from hardwall.hdl.export import to_netlist
 from hardwall.model.axis import Axis as Model
 from hardwall.model.estimators import registry
+from hardwall.model.quadrature import latency
 from hardwall.sim.rtl import library
 from hardwall.sim.rtl.c_function import call
 from hardwall.sim.rtl.library import Hardware
@@ -270,6 +271,22 @@ def _stimulus(axis, random: np.random.Generator, edges: int) -> tuple[np.ndarray
     ways = np.repeat(random.choice([1, -1], edges // 100), 100)
     wild = np.where(random.random(edges) < 0.9, random.choice([1, -1], edges), 2)
     return clocks, np.array([0, 1, 3, 2])[np.cumsum(np.where(np.arange(edges) < half, ways, wild)) % 4]
+
+
+@pytest.mark.parametrize("estimator", registry.ESTIMATORS if LONG else ("levant", "levant-edge"))
+def test_what_is_evaluated_is_the_way_to_the_drive_and_through_the_decoder(estimator):
+    axis = load("seed-2011", {"controller.estimator": estimator}).spec
+    every, words = axis.clocks_per_sample, Model(axis).words
+    with Hardware(axis, words, short=True) as hardware:
+        evaluated = []
+        for first, until, edges in ((0, 1, 0), (1, 101, 0), (101, 201, 300)):
+            clocks = np.linspace(first * every + 500, until * every - 500, edges).astype(int)
+            before = hardware.evaluated
+            _advance(hardware, clocks, np.array([1, 3, 2, 0])[np.arange(edges) % 4], until * every)
+            evaluated.append(hardware.evaluated - before)
+    decoder_clocks = latency(words["encoder_glitch_clocks"])
+    assert evaluated[1] <= 100 * (axis.design.latency_to_drive + 6)
+    assert evaluated[2] <= evaluated[1] + 300 * (decoder_clocks + 4)
 
 
 SLACK = (0, 3, 4, 5, 200)
