@@ -237,15 +237,14 @@ class RegisterFile(wiring.Component):
         m.d.comb += ports.eq(chain[-len(ports) :])
         head = max(len(loads[each]) for each in (Source.EDGE, Source.EVENTS))
         shifted, moment, edge, events = (Cat(load, shifted[len(load) :]) for load in loads.values())
+        # Two cells of four inputs a bit: the first gives one of two, or which of the two others it is. The bits of
+        # `source` are three, or the one that both cells have would be one signal, which takes three cells. As words, not
+        # bit by bit: so a simulator has a few operations for all of them.
+        first = Mux(source[0], moment, shifted)
+        which = Mux(source[1], source[0].replicate(head), first[:head])
+        one_of_two = (which & events[:head]) | (~which & edge[:head])
         with m.If(moving):
-            for k, bit_of_chain in enumerate(chain):
-                # Two cells of four inputs: the first gives one of two, or which of the two others it is. The bits of
-                # `source` are three, or the one that both cells have would be one signal, which takes three cells.
-                first = Mux(source[0], moment[k], shifted[k])
-                if k < head:
-                    which = Mux(source[1], source[0], first)
-                    first = Mux(source[2], Mux(which, events[k], edge[k]), which)
-                m.d.sync += bit_of_chain.eq(first)
+            m.d.sync += chain.eq(Cat(Mux(source[2], one_of_two, which), first[head:]))
 
         # What `shift` takes: a cell, the host's value, or a bit of the chain.
         fetched, given, turning = Signal(), Signal(), Signal()
