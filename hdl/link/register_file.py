@@ -238,8 +238,8 @@ class RegisterFile(wiring.Component):
         head = max(len(loads[each]) for each in (Source.EDGE, Source.EVENTS))
         shifted, moment, edge, events = (Cat(load, shifted[len(load) :]) for load in loads.values())
         # Two cells of four inputs a bit: the first gives one of two, or which of the two others it is. The bits of
-        # `source` are three, or the one that both cells have would be one signal, which takes three cells. As words, not
-        # bit by bit: so a simulator has a few operations for all of them.
+        # `source` are three, or the one that both cells have would be one signal, which takes three cells. They are
+        # words, so that a simulator has a few operations for all the bits.
         first = Mux(source[0], moment, shifted)
         which = Mux(source[1], source[0].replicate(head), first[:head])
         one_of_two = (which & events[:head]) | (~which & edge[:head])

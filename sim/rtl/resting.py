@@ -13,13 +13,13 @@ that is so for the registers that `COUNTERS` names, and at which of their values
 Its own next value is, behind such decisions again, its successor, itself, or what is not made of counters. What is
 `shown` is not made of counters, and all registers have one clock and no asynchronous reset.
 
-**Why that is enough.** Let the inputs be constant, and let two clocks in a row leave every register and memory as it was, but
-for the counters, which are one further after each; and let no counter be at a stop before, between or after the two. All
-that decides then depends on what has not changed, so in both clocks every register takes its value by the same way. It
-cannot be the way from a counter: the counter's lowest bit differs in the two clocks, and the register would, too. So
-what a register takes is made of what has not changed. And a counter goes by the way of its successor, for by any other
-it would not be one further after each clock. The third clock begins as the second did, but for the counters, so it goes
-the same ways; and so does every clock up to one with a counter at a stop, or with other inputs.
+**Why that is enough.** Let the inputs be constant, and let two clocks in a row leave every register and memory as it
+was, but for the counters, which are one further after each; and let no counter be at a stop before, between or after
+the two. All that decides then depends on what has not changed, so in both clocks every register takes its value by the
+same way. It cannot be the way from a counter: the counter's lowest bit differs in the two clocks, and the register
+would, too. So what a register takes is made of what has not changed. And a counter goes by the way of its successor,
+for by any other it would not be one further after each clock. The third clock begins as the second did, but for the
+counters, so it goes the same ways; and so does every clock up to one with a counter at a stop, or with other inputs.
 
 A simulation has to see two such clocks each time; what it then skips is exact. If the check fails, nothing is skipped.
 It may keep more than registers from clock to clock, as Verilator does: what follows from them. All of that is compared;
