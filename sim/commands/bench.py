@@ -23,7 +23,7 @@ def command(
     ] = None,
 ) -> None:
     try:
-        python = against and waits.python_of(against)
+        program = against and waits.program_of(against)
     except ValueError as error:
         raise BadInput(f"--against {error}") from None
-    options.finish(bench.study(Case.of(scene), log.print, python))
+    options.finish(bench.study(Case.of(scene), log.print, program))

@@ -2,12 +2,16 @@
 
 import os
 import threading
+import time
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future, ThreadPoolExecutor
 from queue import SimpleQueue
 from typing import Any, Protocol, Self
 
 from . import children
+
+POLL_S = 0.05
+"""The time between two looks whether the jobs that are to end have ended."""
 
 
 class Crew(Protocol):
@@ -28,8 +32,8 @@ class Threads:
     """A context in which threads of this process do jobs.
 
     Compiled kernels and the tools that a job waits for run side by side; the Python between them does not. If the
-    context is left by an exception, no other job begins, the tools of those under way are killed, and their kernels
-    are waited for.
+    context is left by an exception, no other job begins, the tools of those under way are killed, also those that they
+    begin from then on, and their kernels are waited for.
 
     Args:
         jobs: the most jobs at a time.
@@ -58,6 +62,7 @@ class Threads:
 
     def __exit__(self, kind: type | None, *exception: Any) -> None:
         self._pool.shutdown(wait=False, cancel_futures=True)
-        if kind:
+        while kind and self._identities & {thread.ident for thread in threading.enumerate()}:
             children.kill_those_of(self._identities)
+            time.sleep(POLL_S)
         self._pool.shutdown()

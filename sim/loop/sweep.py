@@ -114,10 +114,14 @@ def sweep(constants, world, controller, state, progress, memory, first, until):
     if constants is None:
         return state, progress
     begin, moment, force_n = progress
-    # The cell in which the count is 0, once all edges so far are counted.
+    # The cell in which the count is 0, once all edges so far are counted; unless one of them is yet to raise a flag.
     counted = strobe_of(world.timing, begin) + world.timing.latency + quadrature.LATENCY + controller.glitch_clocks
-    count = stamped.decode(controller, state, memory.edges, moment.n_edges, counted)[0].decoder.count
-    start = moment.cell.number + (count if controller.invert else -count)
+    decoder = stamped.decode(controller, state, memory.edges, moment.n_edges, counted)[0].decoder
+    if quadrature.fault(decoder) != quadrature.fault(state.decoder):
+        return state, progress
+    if decoder.illegal_count != state.decoder.illegal_count:
+        return state, progress
+    start = moment.cell.number + (decoder.count if controller.invert else -decoder.count)
     swept = Swept(begin, moment.motion, force_n, state, moment.motion, force_n)
     while swept.sample + 1 < until:
         motion, force_n, k = swept.motion, swept.force_n, swept.sample + 1

@@ -2,7 +2,7 @@
 
 from ...model import quadrature
 from ...model.stamped import Controller
-from ..loop.values import Progress, Sweep, World
+from ..loop.values import EDGE_CAPACITY, Progress, Sweep, World
 from ..world import device
 from ..world.advance import Moment
 from ..world.converter import AS_IT_IS, Converter, Pulse, converted, width_of
@@ -117,8 +117,10 @@ def sweep_of(scene: Scene, world: World, controller: object) -> Sweep | None:
     clocks = timing.clocks_per_sample - timing.latency - latency
     offsets = scene.encoder.offsets
     closest_m = min(1 + offsets[(kind + 1) % 4] - offsets[kind] for kind in range(4)) * spec.count_m
-    # An edge that is decoded before the next one has been seen is the only one under way.
-    least, most = spec.count_m * spec.sample_hz, closest_m * spec.clock_hz / (latency + 1)
+    # An edge that is decoded before the next one has been seen is the only one under way; and edge by edge, a sample
+    # would not have so many that some are lost.
+    apart_s = max((latency + 1) / spec.clock_hz, 4 / EDGE_CAPACITY / spec.sample_hz)
+    least, most = spec.count_m * spec.sample_hz, closest_m / apart_s
     if clocks < 1 or least >= most:
         return None
     return Sweep(span(world.plant.handle, clocks / spec.clock_hz), least, most, MARGIN_COUNTS * spec.count_m)

@@ -150,7 +150,7 @@ def study(case: Case, progress: Callable[[str], None], against: Path | None = No
     Args:
         case: the scene.
         progress: function called with the name of the next measurement.
-        against: the Python of another hardwall, whose commands are run in turns with those of this one.
+        against: the program of another hardwall, whose commands are run in turns with those of this one.
 
     Raises:
         RuntimeError: if the force words of the RTL under cocotb differ from the model's.

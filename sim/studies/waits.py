@@ -6,7 +6,7 @@ import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,8 +19,10 @@ from ..jobs.scratch import scratch
 PROGRAM = "import sys; sys.argv[0] = 'hardwall'; from hardwall.sim.commands.app import main; main()"
 SPEED = "samples_per_s"
 BUILD = "HARDWALL_BUILD"
-PYTHONS = (".venv/bin/python", "bin/python")
-"""The places of Python in a checkout that `make tools` has set up, and in an environment of one's own."""
+PLACES = (".venv/bin/hardwall", "bin/hardwall")
+"""The places of the program in a checkout that `make tools` has set up, and in an environment of one's own."""
+HERE = (sys.executable, "-c", PROGRAM)
+"""This hardwall, wherever it was imported from."""
 
 
 @dataclass(frozen=True)
@@ -50,18 +52,18 @@ COMMANDS = {
     "a hit (s)": Command(("hit", "seed-2011", "--json"), 5),
     "a hit, nothing compiled (s)": Command(("hit", "seed-2011", "--json"), 3, cold=True),
     "Figure 5 on fixed (s)": Command(("zwidth", "seed-2011", "--json"), 3),
-    "Figure 5 on rtl, nothing built (s)": Command(("zwidth", "seed-2011", "--backend", "rtl", "--json"), 1, cold=True),
+    "Figure 5 on rtl, nothing built (s)": Command(("zwidth", "seed-2011", "--backend", "rtl", "--json"), 3, cold=True),
 }
 """The commands, by what is measured."""
 
 
-def python_of(folder: Path) -> Path:
-    """Return the Python of another checkout or environment, which has its own hardwall.
+def program_of(folder: Path) -> Path:
+    """Return the program of another checkout or environment.
 
     Raises:
         ValueError: if there is none.
     """
-    for place in PYTHONS:
+    for place in PLACES:
         if (folder / place).exists():
             return folder.absolute() / place
     raise ValueError(f"must be a checkout in which make tools has run, or an environment with hardwall, not {folder}")
@@ -108,49 +110,49 @@ def table(waits: list[Wait]) -> Table:
     return table_of(("from the prompt",), ("here", "against", "times as fast")[: 3 if compared else 1], rows)
 
 
-def _run(python: Path, command: Command, text: str, build: str | None) -> float:
-    """Run a command by a Python, with the text of a scene; return its seconds, or its own speed.
+def _run(program: Sequence[str], command: Command, text: str, build: str | None) -> float:
+    """Run a command of a program, with the text of a scene; return its seconds, or its own speed.
 
     Raises:
         RuntimeError: if it fails.
     """
     environ = {key: value for key, value in os.environ.items() if key != BUILD}
-    if python != Path(sys.executable):
+    if program != HERE:
         environ.pop("PYTHONPATH", None)
     with scratch(build_dir() / "bench") as folder:
         (folder / SCENE).write_text(text, encoding="utf-8")
         environ[BUILD] = build or str(folder / "build")
-        words = [str(python), "-c", PROGRAM, *command.words]
+        words = [*program, *command.words]
         began = time.perf_counter()
         done = children.run(words, cwd=folder, env=environ, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         seconds = time.perf_counter() - began
     if done.returncode:
         last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
-        raise RuntimeError(f"{' '.join(command.words)} by {python} failed: {last}")
+        raise RuntimeError(f"{' '.join(command.words)} by {program[0]} failed: {last}")
     return json.loads(done.stdout)[SPEED] if command.speed else seconds
 
 
 def measure(text: str, against: Path | None, progress: Callable[[str], None]) -> list[Wait]:
-    """Measure every command, in turns with the Python of another hardwall if one is given.
+    """Measure every command, in turns with the program of another hardwall if one is given.
 
     Args:
         text: the text of a scene.
-        against: the other's Python, from `python_of`.
+        against: the other's program, from `program_of`.
         progress: called with a text that names the next run.
 
     Raises:
         RuntimeError: if a command fails.
     """
     waits = []
-    pythons = [Path(sys.executable), *([against] if against else [])]
+    programs = [HERE, *([(str(against),)] if against else [])]
     for name, command in COMMANDS.items():
         values: list[list[float]] = [[], []]
         # The first run of those that find things kept is the one that keeps them.
         untimed = int(not command.cold)
         for number in range(-untimed, command.rounds):
             progress(f"round {number + 1} of {command.rounds}: {name}")
-            for side, python in enumerate(pythons):
+            for side, program in enumerate(programs):
                 kept = str(build_dir() / "bench" / f"kept-{side}")
-                values[side].append(_run(python, command, text, None if command.cold else kept))
+                values[side].append(_run(program, command, text, None if command.cold else kept))
         waits.append(Wait(name, values[0][untimed:], values[1][untimed:]))
     return waits

@@ -2,6 +2,7 @@
 
 import json
 import math
+import threading
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ from ..world.encoder import level
 from .tally import Tally
 
 CHUNK = 1 << 16
-"""Most samples in one call of the loop, between two checks for an interrupt; fewer if a sample takes long."""
+"""Most samples in one call of the loop, which keeps them all; fewer if a sample takes long."""
 LOOKS = 100
 """Number of progress reports in a run."""
 LOOK_S = 0.25
@@ -160,6 +161,8 @@ class Hit(Summary):
 
 _compiled: set[Any] = set()
 """What `_kinds` returned for the arguments of the loops that this process has compiled."""
+_compiling = threading.Lock()
+"""Held by the thread that compiles: the others, whose loop may be the same, wait in silence."""
 
 
 def _kinds(value: Any) -> Any:
@@ -220,10 +223,11 @@ class _Loop:
         """Compile the loop by a call without samples, so that compiling is not in the measured time."""
         arguments = self.world, controller, state, self.at, self.memory
         kinds = _kinds(arguments)
-        if kinds not in _compiled:
-            with stage("compiling the loop, once"):
-                loop.run(*arguments, 0)
-            _compiled.add(kinds)
+        with _compiling:
+            if kinds not in _compiled:
+                with stage("compiling the loop, once"):
+                    loop.run(*arguments, 0)
+                _compiled.add(kinds)
 
     def _next_look(self, sample: int) -> int:
         """Return the end of a chunk that begins at a sample, as far as a verdict may be sure there."""

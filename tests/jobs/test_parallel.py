@@ -2,11 +2,13 @@
 
 import signal
 import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
 
-from hardwall.sim.jobs import parallel
+from hardwall.sim.jobs import children, parallel
 from hardwall.sim.jobs.store import Store
 from stimuli import jobs
 from stimuli.processes import ended_by, session, started, wait_until
@@ -29,3 +31,19 @@ def test_a_job_that_fails_ends_the_others(tmp_path, monkeypatch, fresh):
     with pytest.raises(ValueError, match=r"^this job fails$"):
         parallel.run(jobs.fail_beside_a_long_job, [{"number": 0}, {"number": 1}], Store("failures"), 2)
     assert Path("begun-1").exists()
+
+
+def test_a_tool_that_begins_behind_the_failure_ends_too(fresh):
+    """The other job is in Python of its own when the first fails."""
+    failed = threading.Event()
+
+    def job(number: int) -> None:
+        if number:
+            failed.wait()
+            time.sleep(0.3)
+            children.run(["sleep", "600"])
+        failed.set()
+        raise ValueError("this job fails")
+
+    with pytest.raises(ValueError, match=r"^this job fails$"):
+        parallel.run(job, [{"number": 1}, {"number": 0}], Store("failures"), 2)

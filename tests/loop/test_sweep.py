@@ -186,6 +186,40 @@ def test_a_position_that_is_counted_close_to_an_edge_is_not(phase_error):
             assert swept_from(run, at_edge_m - travel_m + counts * count_m, velocity, friction_n) == swept, counts
 
 
+def test_far_from_zero_rounding_counts_too():
+    """At 10^9 counts a position has 20 bits behind the point."""
+    run = moving()
+    at_edge_m, count_m = edge(run.world.encoder, 10**9), run.scene.spec.count_m
+    velocity, travel_m = 0.1, 0.1 * run.world.sweep.until_counted.coast_s
+    for counts, swept in ((5e-6, 0), (1e-4, 1)):
+        start_m = at_edge_m - travel_m + counts * count_m
+        assert swept_from(run, start_m, velocity, run.scene.handle.coulomb_n) == swept, counts
+
+
+def test_a_fault_that_is_under_way_is_raised_before_anything_is_swept():
+    """Two edges in one clock, which the decoder has not seen when the drive changes, and a slow handle behind them."""
+    run = moving()
+    first = run.at.sample - 1
+    changed = strobe_of(run.world.timing, first) + run.world.timing.latency
+    moment = Moment(Motion(-0.03, 0.1), locate(run.world.encoder, -0.03), 2)
+    run.memory.edges.clocks[:2], run.memory.edges.levels[:2] = changed - 1, (run.state.level ^ 1, run.state.level ^ 3)
+    rest = quadrature.resting(run.controller.decoder, run.state.decoder, 0, run.state.level, 1)
+    state = run.state._replace(decoder=rest, clock=changed - 20)
+    at = Progress(first, moment, 0.2)
+    _, end = sweep(run.world.sweep, run.world, run.controller, state, at, run.memory, first, first + 9)
+    assert end.sample == first
+    run.memory.edges.clocks[1] = changed + 50  # the same edges one by one
+    _, end = sweep(run.world.sweep, run.world, run.controller, state, at, run.memory, first, first + 9)
+    assert end.sample == first + 8
+
+
+def test_what_would_be_lost_edge_by_edge_is_not_swept():
+    slow = {"controller.clock_hz": 100_000_000, "controller.sample_hz": 1000, "controller.actuation_hz": 1000}
+    fine = {"encoder.count_m": 1e-7, "controller.glitch_clocks": 0, "controller.speed_max_m_per_s": 1.0}
+    run = Run(load("seed-2011", slow | fine), "fixed", True)
+    assert run.world.sweep.most_m_per_s / 1e-7 / 1000 < EDGE_CAPACITY / 3
+
+
 def test_the_speed_at_the_limit_leaves_edges_apart():
     """Just below it, on a poor encoder, every edge is decoded by itself: the same state as edge by edge."""
     for phase_error in (-0.45, 0.0, 0.45):
@@ -226,8 +260,9 @@ def test_what_cannot_be_swept_has_no_sweep():
     assert constants({}, "rtl") is None
     assert constants({"controller.estimator": "levant-edge"}) is None
     assert constants(HAND) is None
-    latency = load("seed-2011").spec.design.latency_to_drive
     close = {"controller.sample_hz": 100_000, "controller.actuation_hz": 100_000, "controller.glitch_clocks": 2}
+    close |= {"controller.speed_max_m_per_s": 0.1}
+    latency = load("seed-2011", close | {"controller.clock_hz": 4_000_000}).spec.design.latency_to_drive
     tight = (latency + quadrature.LATENCY + 2) * 100_000
     assert constants(close | {"controller.clock_hz": tight}) is None
 

@@ -244,7 +244,8 @@ def test_an_axis_that_fails_the_check_runs_every_clock_and_says_why(monkeypatch,
         _advance(hardware, [], [], 5_000)
         assert hardware.evaluated == 5_000
     library._sources.cache_clear()
-    assert caplog.messages == ["the RTL runs every clock, for late takes what is computed from a counter"]
+    said = [message for message in caplog.messages if not message.startswith("building")]
+    assert said == ["the RTL runs every clock, for late takes what is computed from a counter"]
 
 
 def _advance(hardware: Hardware, clocks, levels, until: int) -> tuple[int, ...]:
