@@ -210,7 +210,9 @@ needs_tools = pytest.mark.skipif(
 # The memories are of the registers and their map, of the stamps of edges, and of a frame; the capture has SPRAM, or 16.
 @needs_tools
 @pytest.mark.parametrize(
-    ("device", "lut4", "bram"), [("ice40-up5k", 5280, 8 + 2 + 1), ("gw1nr-9", 8640, 16 + 2 + 1 + 1)], ids=["ice40", "gowin"]
+    ("device", "lut4", "bram"),
+    [("ice40-up5k", 5280, 8 + 2 + 1), ("gw1nr-9", 8640, 16 + 2 + 1 + 1)],
+    ids=["ice40", "gowin"],
 )
 def test_a_small_axis_on_a_real_part(tmp_path, monkeypatch, device, lut4, bram):
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
