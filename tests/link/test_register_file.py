@@ -161,6 +161,30 @@ async def random_operations(dut):
 
 
 @cocotb.test()
+async def a_bit_beside_an_address_is_another_address(dut):
+    host = Host(dut)
+    await host.bench.reset()
+    await host.do(Operation.SNAPSHOT)
+    host.twin.snapshot()
+    registers = (*host.registers.words, *host.registers.live, *host.registers.pulses, *host.registers.status)
+    places = {register.address + k for register in registers for k in range(register.size)}
+    wide = (2 * SPACE - 1).bit_length()
+    for address in sorted({each ^ 1 << bit for each in places for bit in range(wide)}):
+        await host.clear()
+        await host.do(Operation.CHECK_READ, address, 0, 1, 1)
+        host.twin.check_read(address, 1, 1)
+        await RisingEdge(dut.clk)
+        assert host.found() == host.expected(), hex(address)
+        if not host.twin.absent:
+            assert await host.read(address) == host.twin.read(address), hex(address)
+        await host.clear()
+        await host.do(Operation.CHECK_WRITE, address, 1, 1, 1)
+        host.twin.check_write(address, 1, 1, 1)
+        await RisingEdge(dut.clk)
+        assert host.found() == host.expected(), hex(address)
+
+
+@cocotb.test()
 async def every_bit_of_every_word_and_of_the_capture_memory(dut):
     host = Host(dut)
     await host.bench.reset()
