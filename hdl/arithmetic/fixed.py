@@ -42,9 +42,14 @@ def fitted(value: Value, bits: int) -> Value:
     """Return a signed `value` held within `bits` of two's complement: its top bits decide, no comparison is needed."""
     if len(value) <= bits:
         return value
-    top = value[bits - 1 :]
     held = Mux(value[-1], -1 << (bits - 1), (1 << (bits - 1)) - 1)
-    return Mux(top.any() & ~top.all(), held, value[:bits].as_signed())
+    return Mux(fits(value, bits), value[:bits].as_signed(), held)
+
+
+def fits(value: Value, bits: int) -> Value:
+    """Return whether a signed `value` is within `bits` of two's complement."""
+    top = value[bits - 1 :]
+    return ~top.any() | top.all()
 
 
 def less(value: Value, bound: int) -> Value:

@@ -58,7 +58,7 @@ class Estimator(levant_semi_implicit.Estimator):
         slowed = (product << self.design.spare) >> (self._level >> 1)
         return shift_round_half_up(slowed, self.design.product + self.design.spare - self.design.velocity.f)
 
-    def _adapt(self, m, first, e, size):
+    def _adapt(self, m, first, negative, size):
         design, level = self.design, self._level
         whole = size[design.velocity.f :]
         # Time thresholds in whole samples, by level: to reach the next level, and to leave the level.
@@ -70,8 +70,8 @@ class Estimator(levant_semi_implicit.Estimator):
         limit = Signal(len(whole) + 2, init=LOST)
 
         with m.State("SIDE"):
-            sign = Mux(e < 0, -1, e > 0)
-            with m.If(first | (e != 0) & (sign != side)):
+            sign = Mux(negative, -1, size != 0)
+            with m.If(first | (size != 0) & (sign != side)):
                 m.d.sync += [side.eq(sign), elapsed.eq(0), reached.eq(0), limit.eq(LOST)]
             with m.If(first):
                 m.d.sync += [level.eq(0), calm.eq(0)]

@@ -7,7 +7,7 @@ from hardwall.model.estimators.levant_semi_implicit import Design
 from ..arithmetic.fixed import saturate, shape, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import Sqrt
 from .estimate import EstimatorBlock
-from .levant import arrive
+from .levant import arrive, distance_of, magnitude
 
 
 class Estimator(EstimatorBlock):
@@ -48,7 +48,7 @@ class Estimator(EstimatorBlock):
         """Return alpha, valid from state BAND on."""
         return self._word(1)
 
-    def _adapt(self, m, fresh, e, size) -> str:
+    def _adapt(self, m, first, negative, size) -> str:
         """Add states between MAGNITUDE and BAND; return the name of the first of them, or BAND."""
         return "BAND"
 
@@ -75,9 +75,7 @@ class Estimator(EstimatorBlock):
         lead = Signal(signed(max(error.width, velocity.width) + 1))
         u1 = Signal(shape(velocity))
 
-        # A step takes one clock, and a clock has one carry chain.
-        e = Signal(shape(error))
-        negative = Signal()
+        distance, negative = distance_of(self.design), Signal()
         size, near, beyond, rest = (Signal(error.width - 1) for _ in range(4))
         difference = Signal(signed(max(len(size), self.design.alpha.width) + 1))
         far_u1, far_u = (Signal(signed(max(len(size), len(u1)) + 2)) for _ in range(2))
@@ -91,10 +89,16 @@ class Estimator(EstimatorBlock):
 
         m.d.sync += self.valid.eq(0)
         with m.FSM():
-            first = arrive(m, self, lead, u1, e, "MAGNITUDE")
-            after = self._adapt(m, first, e, size)
+            first = arrive(m, self, distance, lead, u1, "MAGNITUDE")
+            after = self._adapt(m, first, negative, size)
             with m.State("MAGNITUDE"):
-                m.d.sync += [size.eq(Mux(e < 0, -e, e)), negative.eq(e < 0), product.eq(self._word(0) * factor)]
+                limited, over = magnitude(distance, error)
+                m.d.sync += [
+                    size.eq(limited),
+                    negative.eq(distance[-1]),
+                    self.saturated[0].eq(over),
+                    product.eq(self._word(0) * factor),
+                ]
                 m.next = after
             with m.State("BAND"):
                 m.d.sync += difference.eq(size - self._alpha())

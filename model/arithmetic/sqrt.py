@@ -20,9 +20,14 @@ def isqrt(radicand):
     return root
 
 
+def digits(width: int) -> int:
+    """Return the number of digits in base 4 of the root of a `width`-bit radicand."""
+    return -(-width // 4)
+
+
 def latency(width: int) -> int:
     """Return the clocks from `start` to `done` of the hardware root of a `width`-bit radicand.
 
-    One clock loads the radicand, and one clock makes each of the ceil(width / 2) bits of the result.
+    One clock loads the radicand, and one clock makes each digit of the result.
     """
-    return 1 + (width + 1) // 2
+    return 1 + digits(width)

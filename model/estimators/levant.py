@@ -60,7 +60,7 @@ POSITION_BUDGET = 2.0**-5
 """Largest displacement of the position, in counts, by all rounding at |e| = 1 count."""
 HEADROOM_BITS = 2
 """A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
-STEPS = 7
+STEPS = 1
 """Clocks of the sequence besides the root: see `hardwall.hdl.estimators.levant`."""
 
 
@@ -282,9 +282,9 @@ def step(params, state, seen, restart):
     sign = sign_of(error)
     root = isqrt(shift_floor(abs(error), params.radicand_shift))
     far_u = u1 - sign * shift_round_half_up(params.lambda_ * (2 * root + 1), params.product_shift)
-    u = saturate(far_u, -params.velocity_max, params.velocity_max)
+    u = saturate(far_u, -params.velocity_max - 1, params.velocity_max)
     far_u1 = u1 - sign * params.alpha
-    u1 = saturate(far_u1, -params.velocity_max, params.velocity_max)
+    u1 = saturate(far_u1, -params.velocity_max - 1, params.velocity_max)
 
     flags = int(error != distance) | int(u != far_u or u1 != far_u1) << 1
     return State(1, seen.count, error + u, u1), u1 if params.output else u, flags

@@ -84,7 +84,7 @@ from .estimate import estimate
 from .levant import POSITION_BUDGET, Gains, arrive, sign_of
 from .levant_semi_implicit import band, float_settle, settle
 
-STEPS = 17
+STEPS = 15
 """Clocks of the sequence besides the root: see `hardwall.hdl.estimators.levant_adaptive`."""
 LEVELS = 12
 """Largest number of halvings of L: noise, which is proportional to sqrt(L), then spans a factor of 64."""

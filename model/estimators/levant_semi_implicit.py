@@ -62,7 +62,7 @@ from . import levant
 from .estimate import estimate
 from .levant import State, arrive, sign_of
 
-STEPS = 12
+STEPS = 10
 """Clocks of the sequence besides the root: see `hardwall.hdl.estimators.levant_semi_implicit`."""
 
 

@@ -41,7 +41,7 @@ def oracle(d: levant.Design, rows):
 
     All but lambda and the root is in LSBs of the velocity.
     """
-    one, v_max, e_max = 2**d.velocity.f, d.velocity.max, d.error.max
+    one, (v_min, v_max), e_max = 2**d.velocity.f, (d.velocity.min, d.velocity.max), d.error.max
     modulus, half = 2**d.count_width, 2 ** (d.count_width - 1)
     last = position = x = u1 = None
     for count, restart, lam, alpha, output in rows:
@@ -58,7 +58,7 @@ def oracle(d: levant.Design, rows):
         step = levants.half_up(lam * twice_root * one, 2**d.lambda_.f * 2 * scale)
         sign = (e > 0) - (e < 0)
         far_u, far_u1 = u1 - sign * step, u1 - sign * alpha
-        u, u1 = (max(-v_max, min(v_max, v)) for v in (far_u, far_u1))
+        u, u1 = (max(v_min, min(v_max, v)) for v in (far_u, far_u1))
         x = position + e + u
         yield (u1 if output else u), flags | (u != far_u or u1 != far_u1) << 1
 
