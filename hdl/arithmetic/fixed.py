@@ -1,5 +1,7 @@
 """Fixed-point formats as Amaranth shapes, and the named ways a value may narrow."""
 
+from collections.abc import Sequence
+
 from amaranth.hdl import Cat, Const, Mux, Shape, Value
 
 from hardwall.model.arithmetic.fixed import Format
@@ -82,3 +84,8 @@ def below(complement: Value, limit: Value) -> Value:
     """Return whether a number is less than the limit, as `not_above` does; the difference of equals is one too few."""
     width = max(len(complement), len(limit))
     return (Cat(complement, Const(1, 1).replicate(width - len(complement))) + limit)[width]
+
+
+def choice(reached: Value, values: Sequence[Value]) -> Value:
+    """Return the value of four whose number has been reached: bit n - 1 says whether it is at least n."""
+    return Mux(reached[1], Mux(reached[2], values[3], values[2]), Mux(reached[0], values[1], values[0]))

@@ -1,11 +1,13 @@
 """Integer square root, rounded down: two result bits a clock."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal, signed
+from amaranth.hdl import Cat, Const, Module, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.arithmetic import sqrt as model
 from hardwall.model.checks import check_int
+
+from .fixed import choice
 
 
 class Sqrt(wiring.Component):
@@ -33,10 +35,10 @@ class Sqrt(wiring.Component):
         Unsigned; valid from `done` until the next `start`.
     done : Out(1)
         High for one clock.
-    digit : Out(2)
-        The next two bits of the root, in the clocks that make them; `last` is high in the last of these.
+    reached : Out(3)
+        In the clocks that make the root, what its next two bits are: bit d - 1 is high if they are at least d.
     last : Out(1)
-        `done` follows at the next clock, unless a `start` is in its way.
+        High in the last of these clocks.
 
     Raises
     ------
@@ -57,7 +59,7 @@ class Sqrt(wiring.Component):
                 "radicand": In(width),
                 "root": Out((width + 1) // 2),
                 "done": Out(1),
-                "digit": Out(2),
+                "reached": Out(3),
                 "last": Out(1),
             }
         )
@@ -74,34 +76,40 @@ class Sqrt(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         clocks = model.digits(self._width)
-        # The radicand moves, four bits a clock, from its top into a remainder that is at most twice the root so far.
+        # The radicand moves, four bits a clock, from its top into a remainder that is at most twice the root so far. The
+        # root is kept as its complement, which is what a subtraction adds, and as three times that, plus one.
         digits = Signal(4 * clocks)
         remainder = Signal(2 * clocks + 1)
+        complement = Signal(signed(len(self.root) + 1), init=-1)
+        triple = Signal(signed(len(complement) + 2), init=-2)
         left = Signal(range(clocks + 1))
+        m.d.comb += self.root.eq(~complement)
 
-        # The digits 1 to 3 are tried side by side: (4 root + d)^2 = 16 root^2 + d (8 root + d).
+        # The digits 1 to 3 are tried side by side: (4 root + d)^2 = 16 root^2 + d (8 root + d), and the complement is
+        # -root - 1.
         taken = Cat(digits[-4:], remainder)
-        rests = [taken]
-        for trial in ((self.root << 3) + 1, (self.root << 4) + 4, (self.root << 4) + (self.root << 3) + 9):
-            rests.append(Signal(signed(len(taken) + 1), name=f"rest_{len(rests)}"))
-            m.d.comb += rests[-1].eq(taken - trial)
-        fits = [rest >= 0 for rest in rests[1:]]
-        rest = Mux(fits[1], Mux(fits[2], rests[3], rests[2]), Mux(fits[0], rests[1], rests[0]))
-        m.d.comb += [self.digit.eq(Cat(Mux(fits[1], fits[2], fits[0]), fits[1])), self.last.eq(left == 1)]
+        trials = (complement << 3) | 7, (complement << 4) | 12, (triple << 3) | 7
+        rests = [taken, *(taken + trial for trial in trials)]
+        m.d.comb += [self.reached.eq(Cat(rest >= 0 for rest in rests[1:])), self.last.eq(left == 1)]
+        # The complement of a digit d is 3 - d; four times the triple is to have 3 (3 - d) - 3 more.
+        complements = [Cat(Const(3 - digit, 2), complement).as_signed() for digit in range(4)]
+        triples = [Cat(Const(6 - 3 * digit & 3, 2), triple + (6 - 3 * digit >> 2)).as_signed() for digit in range(4)]
 
         m.d.sync += self.done.eq(self.last)
         with m.If(left != 0):
             m.d.sync += [
                 digits.eq(digits << 4),
-                remainder.eq(rest[: len(remainder)]),
-                self.root.eq(Cat(self.digit, self.root)[: len(self.root)]),
+                remainder.eq(choice(self.reached, rests)[: len(remainder)]),
+                complement.eq(choice(self.reached, complements)[: len(complement)]),
+                triple.eq(choice(self.reached, triples)[: len(triple)]),
                 left.eq(left - 1),
             ]
         with m.If(self.start):
             m.d.sync += [
                 digits.eq(self.radicand),
                 remainder.eq(0),
-                self.root.eq(0),
+                complement.eq(-1),
+                triple.eq(-2),
                 left.eq(clocks),
                 self.done.eq(0),
             ]

@@ -5,7 +5,7 @@ from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed
 from hardwall.model.arithmetic.sqrt import digits as sqrt_digits
 from hardwall.model.estimators.levant import Design
 
-from ..arithmetic.fixed import fits, fitted, negated, shape, shift_floor
+from ..arithmetic.fixed import choice, fits, fitted, negated, shape, shift_floor
 from ..arithmetic.sqrt import Sqrt
 from .estimate import EstimatorBlock
 
@@ -47,13 +47,14 @@ class Estimator(EstimatorBlock):
         m.submodules.square_root = root = Sqrt(design.radicand.width)
 
         # The distance from the count, and from state PREPARE on the error.
-        e, rooting = distance_of(design), Signal()
+        e, rooting, by_u1 = distance_of(design), Signal(), Signal()
         next_u, far_u = self._corrected(m, e, u1, root, rooting)
 
+        m.d.comb += self.velocity.eq(Mux(by_u1, u1, u))
         m.d.sync += self.valid.eq(0)
         with m.FSM():
             # Since the last error, the tracked position has moved by u.
-            arrive(m, self, e, e + u, u1, "PREPARE")
+            first = arrive(m, self, e, e + u, "PREPARE")
             with m.State("PREPARE"):
                 size, over = magnitude(e, error)
                 m.d.comb += [root.start.eq(1), root.radicand.eq(shift_floor(size, velocity.f - design.radicand.f))]
@@ -71,10 +72,12 @@ class Estimator(EstimatorBlock):
                     m.d.sync += [
                         u.eq(next_u),
                         u1.eq(next_u1),
-                        self.velocity.eq(Mux(self.levant_output, next_u1, next_u)),
+                        by_u1.eq(self.levant_output),
                         self.saturated[1].eq(far_u | ~fits(far_u1, velocity.width)),
                         self.valid.eq(1),
                     ]
+                    with m.If(first):
+                        m.d.sync += [u.eq(0), u1.eq(0)]
                     m.next = "SAMPLE"
         return m
 
@@ -86,32 +89,51 @@ class Estimator(EstimatorBlock):
         """
         design, velocity = self.design, self.design.velocity
         digits = sqrt_digits(design.radicand.width)
-        # The product of the step and the root has `finer` bits more than u, or `coarser` bits less.
-        finer, coarser = max(design.product - velocity.f, 0), max(velocity.f - design.product, 0)
+        # The product of the step and the root has `finer` bits more than u, if `coarser` zeros are added.
+        finer = max(design.product - velocity.f, 1)
+        coarser = finer - (design.product - velocity.f)
         step = Signal(signed(design.lambda_.width + coarser + 1))
         triple = Signal(signed(len(step) + 2))
-        whole = Signal(signed(max(velocity.width + finer, len(step) + 2 * digits + 1) + 1))
-        low, total = Signal(2 * digits + 1), Signal(signed(len(whole) - 1))
+        begun = Signal(signed(max(velocity.width + finer, len(step) + 2 * digits + 1) + 1))
+        low, total, still = Signal(2 * digits), Signal(signed(len(begun) - 1)), Signal()
 
-        # The step has the other sign than e. Half an LSB of u is added to round half up the product, not the sum.
-        against = negated(self.levant_lambda << coarser, ~e[-1])
-        half = Mux(e[-1], 1 << finer >> 1, (1 << finer >> 1) - 1)[:finer]
-        m.d.comb += whole.eq(Cat(half, u1).as_signed() + Mux(e == 0, 0, against))
+        # The step has the other sign than e. A complement is one less than the negative: as the half LSB of u that is
+        # added for the rounding must be, for it is the product that is rounded half up.
+        lambda_ = Cat(Const(0, coarser), self.levant_lambda, Const(0, 1)).as_signed()
+        inverse = ~e[-1]
+        against, fourfold = _inverted(lambda_, inverse), _inverted(lambda_ << 2, inverse)
+        m.d.comb += begun.eq(Cat(Const(1 << (finer - 1), finer), u1).as_signed() + against)
+        with m.If(root.start):
+            m.d.sync += [
+                step.eq(against + inverse),
+                # Three times a number is four times it, plus its complement, plus one.
+                triple.eq(_plus_one(fourfold, _inverted(lambda_, e[-1]))),
+                Cat(low, total).eq(begun >> 1),
+                still.eq(e == 0),
+            ]
 
         shifted = Cat(low[-2:], total)[: len(total)].as_signed()
         sums = [Signal.like(total, name=f"sum_{number}") for number in range(4)]
         m.d.comb += [each.eq(shifted + more) for each, more in zip(sums, (0, step, step << 1, triple), strict=True)]
-        chosen = _choice(root.digit, sums)
-        with m.If(root.start):
-            m.d.sync += [step.eq(against), triple.eq(against + (against << 1)), Cat(low, total).eq(whole)]
         with m.If(rooting):
-            m.d.sync += [low.eq(low << 2), total.eq(chosen)]
+            m.d.sync += [low.eq(low << 2), total.eq(choice(root.reached, sums))]
 
-        # Whether the last sum fits is found for every digit before the digit is.
-        whole_sums = [Cat(low[-3], each).as_signed() >> finer for each in sums]
-        far = ~_choice(root.digit, [fits(each, velocity.width) for each in whole_sums])
-        limit = Mux(chosen[-1], velocity.min, velocity.max)
-        return Mux(far, limit, _choice(root.digit, whole_sums)[: velocity.width].as_signed()), far
+        # Whether the last sum fits is found for every digit before the digit is. An error of 0 has no sign.
+        last = [each >> (finer - 1) for each in sums]
+        last[0] = Mux(still, u1, last[0])
+        beyond = choice(root.reached, [~fits(each, velocity.width) for each in last])
+        limit = Mux(choice(root.reached, [each[-1] for each in last]), velocity.min, velocity.max)
+        return Mux(beyond, limit, choice(root.reached, last)[: velocity.width].as_signed()), beyond
+
+
+def _inverted(value, inverse):
+    """Return a signed value, or its complement where `inverse` is high."""
+    return value ^ inverse.replicate(len(value)).as_signed()
+
+
+def _plus_one(first, second):
+    """Return the sum of two signed values and one, in one chain of carries."""
+    return (Cat(Const(1, 1), first).as_signed() + Cat(Const(1, 1), second).as_signed()) >> 1
 
 
 def distance_of(design):
@@ -120,11 +142,11 @@ def distance_of(design):
     return Signal(signed(max(led, design.count_width + design.velocity.f) + 1))
 
 
-def arrive(m, block, distance, lead, u1, then):
+def arrive(m, block, distance, lead, then):
     """Add the state of the strobe, with which the whole family begins: it takes the distance; state `then` follows.
 
-    The first sample clears `distance` and `u1`; the returned signal says, after the strobe, whether it is the first one.
-    `lead` is the distance from the last count.
+    The distance is 0 at the first sample; the returned signal says, after the strobe, whether it is that one, and the
+    block starts from zero then. `lead` is the distance from the last count.
     """
     running, first = Signal(), Signal()
     last, moved = Signal.like(block.seen.count), Signal.like(block.seen.count)
@@ -134,7 +156,6 @@ def arrive(m, block, distance, lead, u1, then):
     with m.State("SAMPLE"), m.If(block.strobe):
         m.d.sync += [
             distance.eq(Mux(fresh, 0, lead - (moved << block.design.velocity.f))),
-            u1.eq(Mux(fresh, 0, u1)),
             last.eq(block.seen.count),
             running.eq(1),
             first.eq(fresh),
@@ -146,10 +167,6 @@ def arrive(m, block, distance, lead, u1, then):
 def magnitude(distance, error):
     """Return the magnitude of a distance, within the format of the error, and whether it was beyond."""
     size = negated(distance, distance[-1])
-    over = size[error.width - 1 :].any()
+    # Within the width of the error, only the least number has a magnitude that is too large.
+    over = ~fits(distance, error.width) | (distance[-1] & (distance[: error.width - 1] == 0))
     return Mux(over, error.max, size[: error.width - 1]), over
-
-
-def _choice(digit, values):
-    """Return the value at `digit`, 0 to 3."""
-    return Mux(digit[1], Mux(digit[0], values[3], values[2]), Mux(digit[0], values[1], values[0]))

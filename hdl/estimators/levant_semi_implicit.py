@@ -89,7 +89,7 @@ class Estimator(EstimatorBlock):
 
         m.d.sync += self.valid.eq(0)
         with m.FSM():
-            first = arrive(m, self, distance, lead, u1, "MAGNITUDE")
+            first = arrive(m, self, distance, lead, "MAGNITUDE")
             after = self._adapt(m, first, negative, size)
             with m.State("MAGNITUDE"):
                 limited, over = magnitude(distance, error)
@@ -122,6 +122,8 @@ class Estimator(EstimatorBlock):
                     self.saturated[1].eq((u != far_u) | (next_u1 != far_u1)),
                     self.valid.eq(1),
                 ]
+                with m.If(first):
+                    m.d.sync += [lead.eq(0), u1.eq(0), self.velocity.eq(0)]
                 m.next = "SAMPLE"
         return m
 
