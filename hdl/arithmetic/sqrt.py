@@ -99,9 +99,9 @@ class Sqrt(wiring.Component):
         with m.If(left != 0):
             m.d.sync += [
                 digits.eq(digits << 4),
-                remainder.eq(choice(self.reached, rests)[: len(remainder)]),
-                complement.eq(choice(self.reached, complements)[: len(complement)]),
-                triple.eq(choice(self.reached, triples)[: len(triple)]),
+                remainder.eq(choice(self.reached, rests)),
+                complement.eq(choice(self.reached, complements)),
+                triple.eq(choice(self.reached, triples)),
                 left.eq(left - 1),
             ]
         with m.If(self.start):

@@ -108,7 +108,8 @@ class Estimator(EstimatorBlock):
                 step.eq(against + inverse),
                 # Three times a number is four times it, plus its complement, plus one.
                 triple.eq(_plus_one(fourfold, _inverted(lambda_, e[-1]))),
-                Cat(low, total).eq(begun >> 1),
+                low.eq(begun[1 : len(low) + 1]),
+                total.eq(begun >> len(low) + 1),
                 still.eq(e == 0),
             ]
 

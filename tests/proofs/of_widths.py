@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
+from amaranth.hdl import Cat
 from amaranth.lib import wiring
 
 from hardwall.hdl.arithmetic.divide import Divide
@@ -33,6 +34,7 @@ from stimuli.specs import spec
 
 from .bench import Bench
 from .bugs import Bug
+from .of_arithmetic import root_keeps
 from .property import Property
 from .widths import Widths
 
@@ -46,15 +48,6 @@ def estimator(name: str, axis: str) -> EstimatorBlock:
     return block_of(spec(axis, name).design.estimator)
 
 
-def root(bench: Bench, path: str = "") -> None:
-    """Promise what a root under way keeps: the remainder is at most twice the root, which has as many bits as made."""
-    inner = bench.inner
-    so_far, left, bits = inner[f"{path}root"], inner[f"{path}left"], len(inner[f"{path}root"])
-    bench.promise(left <= bits)
-    bench.promise(inner[f"{path}remainder"] <= 2 * so_far)
-    bench.promise((so_far >> (bits - left)[: len(left)]) == 0)
-
-
 def phase(bench: Bench, stage: Output) -> None:
     bench.within(phase=(0, stage.design.decimation - 1))
 
@@ -65,8 +58,31 @@ def start(bench: Bench, decoder: Quadrature) -> None:
 
 def levants(bench: Bench, block: wiring.Component) -> None:
     velocity, error = block.design.velocity, block.design.error
-    root(bench, "root.")
-    bench.within(e=error.max, u1=velocity.max, next_u1=velocity.max, lead=error.max + velocity.max)
+    root_keeps(bench, "root.")
+    bench.within(u1=velocity.max, next_u1=velocity.max, lead=error.max + velocity.max)
+
+
+def levant_alone(bench: Bench, block: wiring.Component) -> None:
+    """Promise that u1 with the steps of the digits so far leaves room for those of the digits that are left.
+
+    A sum goes up by a digit's place, takes in two bits, and adds three steps at most.
+    """
+    inner, design, root_path = bench.inner, block.design, "square_root."
+    root_keeps(bench, root_path)
+    total, left, digits = inner["total"], inner[f"{root_path}left"], len(inner["low"]) // 2
+    rooting = bench.state("ROOT")
+    bench.promise(rooting == (left != 0))
+    bench.promise(bench.state("PREPARE") | (inner["e"] >= -design.error.max) & (inner["e"] <= design.error.max))
+    lambda_ = (1 << len(inner["step"]) - 1) - 1
+    bench.within(step=lambda_, triple=3 * lambda_, relay=design.alpha.max)
+    finer = len(inner["step"]) - 1 - design.lambda_.width + design.product - design.velocity.f
+    room = (((-design.velocity.min << finer) + lambda_ + 1) >> 2 * digits + 1) + 1
+    for taken in range(digits + 1):
+        bench.promise((left != digits - taken) | (total >= -room) & (total <= room))
+        room = 4 * room + 3 + 3 * lambda_
+    shifted = Cat(inner["low"][-2:], total).as_signed()
+    for number, more in enumerate((0, inner["step"], inner["step"] << 1, inner["triple"])):
+        bench.promise(~rooting | (inner[f"sum_{number}"] == shifted + more))
 
 
 def adaptive(bench: Bench, block: wiring.Component) -> None:
@@ -137,8 +153,8 @@ CASES = {
     "sqrt": Case(
         lambda axis: Sqrt(31),
         ("digits",),
-        Bug(Sqrt.elaborate, "Signal(bits + 2)", "Signal(bits)"),
-        lambda bench, _: root(bench),
+        Bug(Sqrt.elaborate, "Signal(2 * clocks + 1)", "Signal(2 * clocks)"),
+        lambda bench, _: root_keeps(bench),
         ALONE,
     ),
     "divide": Case(
@@ -169,11 +185,12 @@ CASES = {
         MOVED,
         Bug(finite_difference.Estimator.elaborate, "saturate(moved, fmt.min, fmt.max)", "moved"),
     ),
+    # What the sums are while there is no root is not used; else it is promised.
     "levant": Case(
         partial(estimator, "levant"),
-        (*MOVED, "digits"),
-        Bug(levant.arrive, "lead.eq(Mux(fresh, 0, lead))", "lead.eq(Mux(fresh, 1 << len(lead), lead))"),
-        levants,
+        (*MOVED, "digits", "low", *(f"sum_{number}" for number in range(4))),
+        Bug(levant.Estimator._corrected, "2 * digits + 1) + 1", "2 * digits - 1)"),
+        levant_alone,
     ),
     "levant-semi-implicit": Case(partial(estimator, "levant-semi-implicit"), (*MOVED, "digits"), PRODUCT, levants),
     "levant-implicit": Case(partial(estimator, "levant-implicit"), (*MOVED, "digits"), PRODUCT, levants),
