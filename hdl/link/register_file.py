@@ -288,14 +288,8 @@ class RegisterFile(wiring.Component):
                     with m.Case(Operation.READ):
                         m.next = "DONE"
                     with m.Case(Operation.WRITE):
-                        m.next = "KEEP"
-                        m.d.comb += given.eq(1)
+                        m.next = "TAKE"
                         m.d.sync += marks.eq(marks | wanted)
-                        # The upper half has been written just before, and is still there.
-                        with m.If(below[6:] == LIVE >> 6), m.Switch(below[:6]):
-                            for word in registers.live:
-                                with m.Case(word.address - LIVE + 1):
-                                    m.d.sync += getattr(self, word.name).eq(Cat(host.value, shift))
                     with m.Case(Operation.COUNT):
                         m.next = "COUNT"
                     with m.Case(Operation.FINISH):
@@ -321,6 +315,14 @@ class RegisterFile(wiring.Component):
                 with m.If((top | tied[1]) & difference[-1]):
                     m.d.sync += host.outside.eq(1)
                 m.next = "DONE"
+            with m.State("TAKE"):
+                m.d.comb += given.eq(1)
+                # The upper half has been written just before, and is still there.
+                with m.If(below[6:] == LIVE >> 6), m.Switch(below[:6]):
+                    for word in registers.live:
+                        with m.Case(word.address - LIVE + 1):
+                            m.d.sync += getattr(self, word.name).eq(Cat(host.value, shift))
+                m.next = "KEEP"
             with m.State("KEEP"):
                 m.d.comb += [place.eq(below), write.en.eq(~is_pulse)]
                 m.next = "DONE"

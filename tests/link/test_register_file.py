@@ -18,7 +18,7 @@ CLOCKS = {
     Operation.CHECK_READ: 1,
     Operation.CHECK_WRITE: 4,
     Operation.READ: 1,
-    Operation.WRITE: 2,
+    Operation.WRITE: 3,
     Operation.COUNT: 3,
 }
 

@@ -69,6 +69,7 @@ def live_words_are_written(bench: Bench) -> None:
     written = host.start & (host.operation == Operation.WRITE)
     # Only what was checked is written, and a check refuses what is beyond the book.
     bench.assume(~written | (host.address < END))
+    bench.promise(~bench.state("TAKE") | written)
     for word in block.design.registers.live:
         port = getattr(block, word.name)
         told = bench.past(written & (host.address == word.address + 1)) | bench.past(bench.reset)
@@ -121,6 +122,7 @@ def every_operation_ends(bench: Bench) -> None:
         "LEAST": 4,
         "ABOVE": 3,
         "BELOW": 2,
+        "TAKE": 3,
         "KEEP": 2,
         "COUNT": 3,
         "COUNTED": 2,
@@ -153,7 +155,7 @@ def every_operation_ends(bench: Bench) -> None:
     latencies = {
         Operation.CHECK_READ: 1,
         Operation.READ: 1,
-        Operation.WRITE: 2,
+        Operation.WRITE: 3,
         Operation.COUNT: 3,
         Operation.CHECK_WRITE: 4,
         Operation.SNAPSHOT: block.snapshot_clocks,
