@@ -1,12 +1,32 @@
 """The virtual wall: a unilateral spring and damper."""
 
-from amaranth.hdl import Module, Mux, Signal, signed
+from amaranth.hdl import Module, Mux, Signal, Value, signed
 from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.wall import Design
 
 from .arithmetic.fixed import shape, shift_floor
 from .block import Block
+
+PART_BITS = 16
+"""Bits of an operand that a multiplier of every part takes beside a gain word; a wider one is split."""
+
+
+def split(value: Value) -> list[Value]:
+    """Return the parts of a signed value, `PART_BITS` apart, the lowest first: the last is signed, the others not."""
+    low = [value[start : start + PART_BITS] for start in range(0, len(value) - PART_BITS, PART_BITS)]
+    return [*low, value[len(low) * PART_BITS :].as_signed()]
+
+
+def products(name: str, gain: Value, operand: Value) -> tuple[list, Value]:
+    """Return the assignments that take the products of a gain and the parts of an operand, and the registers' sum.
+
+    Nothing but a register is behind a multiplier: what adds the parts has a clock of its own.
+    """
+    made = [gain * part for part in split(operand)]
+    taken = [Signal(each.shape(), name=f"{name}_{place}") for place, each in enumerate(made)]
+    whole = sum(each << place * PART_BITS for place, each in enumerate(taken))
+    return [register.eq(each) for register, each in zip(taken, made, strict=True)], whole
 
 
 class Wall(Block):
@@ -20,11 +40,11 @@ class Wall(Block):
 
     `wall_forbid_pull` holds push at 0 or more.
 
-    Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
-    both products in turn.
+    Latency: `latency` clocks from `strobe` to `valid`. A sample's `lead` comes `design.lead` clocks or more before its
+    `strobe`, and not before the last sample's `strobe`; it may come with that one.
 
     Rounding and overflow: low bits of the velocity beyond `design.coarse` are dropped; the exact sum of the products
-    is rounded once, half up, to a force LSB, then saturates at the force format.
+    is rounded once, half of a push up, to a force LSB, then saturates at the force format.
 
     Parameters
     ----------
@@ -33,12 +53,14 @@ class Wall(Block):
 
     Members
     -------
-    strobe : In(1)
-        Pulse: take a sample.
+    lead : In(1)
+        Pulse: take a sample's count.
     count : In(signed)
-        Position, counts; may wrap.
+        With `lead`: position, counts; may wrap.
+    strobe : In(1)
+        Pulse: take the same sample's velocity.
     velocity : In(SQ)
-        Velocity, counts a sample.
+        With `strobe`: velocity, counts a sample.
     wall_stiffness, wall_damping : In(UQ)
         Force LSB a count, and force LSB a count/sample.
     wall_position : In(signed)
@@ -47,6 +69,7 @@ class Wall(Block):
         1: side is -1.
     wall_forbid_pull : In(1)
         1: the wall only pushes.
+        All these words are constant from the clock after a sample's `lead` to its `strobe`.
     force : Out(SQ)
         Force on the handle, force LSB; constant from one `valid` to the next.
     valid : Out(1)
@@ -65,8 +88,9 @@ class Wall(Block):
     @staticmethod
     def members(design: Design) -> dict[str, Member]:
         return {
-            "strobe": In(1),
+            "lead": In(1),
             "count": In(signed(design.count_width)),
+            "strobe": In(1),
             "velocity": In(shape(design.velocity)),
             **{word.name: In(shape(word.format)) for word in design.words},
             "force": Out(shape(design.force)),
@@ -76,55 +100,47 @@ class Wall(Block):
     def elaborate(self, platform):
         m = Module()
         design = self._design
+        counted = Signal(signed(design.count_width))
+        offset = Signal(signed(design.count_width))
+        left, positive, negative = Signal(), Signal(), Signal()
+        known, placed, damped, summed = Signal(), Signal(), Signal(), Signal()
 
-        depth = Signal(signed(design.count_width))
-        inward = Signal(signed(design.coarse.width + 1))
-        gain = Signal(max(design.stiffness.width, design.damping.width))
-        operand = Signal(signed(max(len(depth), len(inward))))
-        product = Signal(signed(len(gain) + len(operand)))
-        spring_shift = design.push - design.stiffness.f
-        damper_shift = design.push - design.damping.f - design.coarse.f
-        half = 1 << (design.push - 1) if design.push > 0 else 0
-        spring = Signal(signed(max(len(product) + spring_shift, half.bit_length() + 1) + 1))
-        total = Signal(signed(max(len(spring), len(product) + damper_shift) + 1))
+        m.d.sync += [known.eq(self.lead), placed.eq(known)]
+        with m.If(self.lead):
+            m.d.sync += counted.eq(self.count)
+        # The force is that of a spring to the surface and a damper, whatever the side: -side push = stiffness offset -
+        # damping velocity. The side says where it acts.
+        with m.If(known):
+            m.d.sync += offset.eq((self.wall_position - counted)[: len(offset)].as_signed())
+        pulled, spring = products("spring", self.wall_stiffness, offset)
+        inside = offset[:-1].any() & (offset[-1] != self.wall_left)
+        with m.If(placed):
+            m.d.sync += [
+                *pulled,
+                left.eq(self.wall_left),
+                positive.eq(inside & (self.wall_left | ~self.wall_forbid_pull)),
+                negative.eq(inside & ~(self.wall_left & self.wall_forbid_pull)),
+            ]
 
-        m.d.sync += self.valid.eq(0)
-        with m.FSM():
-            with m.State("DEPTH"), m.If(self.strobe):
-                offset = Mux(self.wall_left, self.wall_position - self.count, self.count - self.wall_position)
-                coarse = shift_floor(self.velocity, design.velocity.f - design.coarse.f)
-                m.d.sync += [
-                    depth.eq(offset[: len(depth)].as_signed()),
-                    inward.eq(Mux(self.wall_left, -coarse, coarse)),
-                ]
-                m.next = "SPRING"
-            with m.State("SPRING"):
-                m.d.sync += [gain.eq(self.wall_stiffness), operand.eq(depth)]
-                m.next = "DAMPER"
-            with m.State("DAMPER"):
-                m.d.sync += [gain.eq(self.wall_damping), operand.eq(inward)]
-                m.next = "SUM"
-            with m.State("SUM"):
-                # Half a force LSB is added, so that rounding the sum down rounds half up.
-                m.d.sync += spring.eq((product << spring_shift) + half)
-                m.next = "PUSH"
-            with m.State("PUSH"):
-                m.d.sync += total.eq(spring + (product << damper_shift))
-                m.next = "FORCE"
-            with m.State("FORCE"):
-                # The sign and the limits are computed in parallel: either alone is a carry chain.
-                top, left = design.force.max, self.wall_left
-                rounded = shift_floor(total, design.push)
-                push = rounded[: design.force.width].as_signed()
-                above = rounded > top
-                below = Mux(self.wall_forbid_pull, rounded < 0, rounded < -top)
-                limit = Mux(below & self.wall_forbid_pull, 0, Mux(above == left, top, -top))
-                within = Mux(left, push, -push)
-                m.d.sync += [
-                    self.force.eq(Mux(depth > 0, Mux(above | below, limit, within), 0)),
-                    self.valid.eq(1),
-                ]
-                m.next = "DEPTH"
-        # The multiplier has registers on both sides: its result is ready two clocks after its operands are chosen.
-        m.d.sync += product.eq(gain * operand)
+        coarse = shift_floor(self.velocity, design.velocity.f - design.coarse.f)[: design.coarse.width].as_signed()
+        braked, damper = products("damper", self.wall_damping, coarse)
+        m.d.sync += [damped.eq(self.strobe), summed.eq(damped), self.valid.eq(summed)]
+        with m.If(self.strobe):
+            m.d.sync += braked
+
+        # A push of half a force LSB is rounded up. The sum rounded down is -side push where the side is -1; where it is
+        # +1, half an LSB is rounded the other way if it is added but for a unit.
+        spring_shift, damper_shift = design.push - design.stiffness.f, design.push - design.damping.f - design.coarse.f
+        half = (1 << (design.push - 1)) - 1 + left if design.push > 0 else 0
+        total = Signal(signed(design.total_bits))
+        with m.If(damped):
+            m.d.sync += total.eq((spring << spring_shift) - (damper << damper_shift) + half)
+
+        # A sum is in range if its bits above the force are all as its sign; the force's least word is out of range.
+        sign, top = total[-1], design.push + design.force.width - 1
+        limited = total[top:].any() & ~total[top:].all() | sign & ~total[design.push : top].any()
+        limit = Mux(sign, -design.force.max, design.force.max)
+        within = (total >> design.push)[: design.force.width].as_signed()
+        with m.If(summed):
+            m.d.sync += self.force.eq(Mux(Mux(sign, negative, positive), Mux(limited, limit, within), 0))
         return m

@@ -25,7 +25,12 @@ from .compiled import by_type, compiled
 from .requirements import AxisRequirements
 from .words import Word, gain_format
 
-LATENCY = 6
+LEAD = 2
+"""Clocks from the pulse `lead`, with a sample's count, to the strobe with its velocity, at least.
+
+The next sample's `lead` may come with that strobe, so that these are the clocks from a lead to the next, too.
+"""
+LATENCY = 3
 """Clocks from the strobe to `valid`: see `hardwall.hdl.wall`."""
 
 
@@ -63,6 +68,7 @@ class Design:
         stiffness, damping: gain formats.
         coarse: format of the velocity as the damper takes it.
         push: fraction bits in which the two products are added.
+        total_bits: bits of their sum, with half a force LSB.
         words: `wall_stiffness`, `wall_damping`, `wall_position`, `wall_left`, `wall_forbid_pull`.
 
     Raises:
@@ -70,6 +76,7 @@ class Design:
     """
 
     latency = LATENCY
+    lead = interval = LEAD
 
     def __init__(self, axis: AxisRequirements, velocity: SQ):
         q, r, tau = axis.count_m, axis.force_resolution_n, 1 / axis.sample_hz
@@ -91,6 +98,7 @@ class Design:
                     name,
                     f"must be at least {least:g} beside the other gain's largest and the largest speed, not {value!r}",
                 )
+        self.total_bits = max(spring_bits, damper_bits, self.push + self.force.width) + 2
         self.words = (
             Word("wall_stiffness", self.stiffness, r / q, "N/m", 0, "spring of the wall"),
             Word("wall_damping", self.damping, r * tau / q, "N s/m", 0, "damper of the wall"),

@@ -12,6 +12,7 @@ from hardwall.hdl.wall import Wall
 from hardwall.model import wall
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from stimuli.magnitudes import magnitudes
+from stimuli.sampled import Sampled
 from stimuli.specs import spec
 
 NAMES = ("wall_stiffness", "wall_damping", "wall_position", "wall_left", "wall_forbid_pull")
@@ -21,8 +22,8 @@ def design(name: str, estimator: str = "levant") -> wall.Design:
     return spec(name, estimator).design.wall
 
 
-def make(name: str, estimator: str = "levant") -> Wall:
-    return Wall(design(name, estimator))
+def make(name: str, estimator: str, after: int) -> Sampled:
+    return Sampled(Wall(design(name, estimator)), after)
 
 
 def stimulus(d: wall.Design, samples: int):
@@ -67,12 +68,15 @@ async def follows_model(dut):
     component = make(**parameters())
     bench = Bench(dut, component)
     await bench.reset()
-    rows = stimulus(component.design, SAMPLES)
-    inputs, outputs = await bench.campaign("strobe", "valid", ("count", "velocity", *NAMES), ("force",), rows)
-    expected = model(component.design, inputs.rows)
-    top = component.design.force.max
-    assert {-top, 0, top} <= set(expected)
-    check(inputs, outputs, {"force": np.array(expected)}, component.latency)
+    names, top = ("count", "velocity", *NAMES), component.design.force.max
+    # The next sample comes with this one's velocity, or later by any number of clocks until it comes behind its force.
+    gaps = range(component.after, component.latency + 2, 2)
+    for every in gaps:
+        rows = stimulus(component.design, SAMPLES // len(gaps))
+        inputs, outputs = await bench.campaign("strobe", "valid", names, ("force",), rows, every=every, momentary=names)
+        expected = model(component.design, inputs.rows)
+        assert {-top, 0, top} <= set(expected)
+        check(inputs, outputs, {"force": np.array(expected)}, component.latency)
 
 
 @cocotb.test()
@@ -94,9 +98,12 @@ async def the_force_is_constant_from_one_valid_to_the_next(dut):
                 before = wall.render(d.params({name: row[name] for name in NAMES}), count, velocity)
 
 
-@pytest.mark.parametrize(("name", "estimator"), [("paper", "fdm"), ("mhz", "levant"), ("narrow", "levant")])
-def test_rtl(name, estimator):
-    simulate(__file__, make, name=name, estimator=estimator)
+@pytest.mark.parametrize(
+    ("name", "estimator", "after"),
+    [("paper", "fdm", wall.LEAD), ("mhz", "levant", wall.LEAD + 1), ("narrow", "levant", 9), ("wide", "levant", 5)],
+)
+def test_rtl(name, estimator, after):
+    simulate(__file__, make, name=name, estimator=estimator, after=after)
 
 
 def oracle(d: wall.Design, row) -> int:

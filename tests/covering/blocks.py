@@ -36,7 +36,7 @@ BLOCKS = (
     *(Block(f"estimators/{name}") for name in ("cycle_times", "history")),
     *(Block("estimators/finite_difference" if n == "fdm" else f"estimators/{n.replace('-', '_')}") for n in ESTIMATORS),
     Block("quadrature", RECORDED),
-    Block("wall"),
+    Block("wall", ("component.law",)),
     Block("output"),
     Block("monitors", RECORDED),
     Block("supervisor", RECORDED),

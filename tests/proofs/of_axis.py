@@ -48,10 +48,12 @@ def zero_before_a_commit(estimator: str, bench: Bench) -> None:
     for word in axis.spec.design.words:
         bench.promise(inner[f"active_{word.name}"] == word.reset)
     half = 1 << (axis.spec.design.wall.push - 1)
-    for name in ("wall.gain", "wall.product", "wall.force", "output_stage.slewed"):
-        bench.promise(inner[name] == 0)
-    for name in ("wall.spring", "wall.total"):
-        bench.promise((inner[name] == 0) | (inner[name] == half))
+    for name, signal in inner.items():
+        if name.startswith(("wall.spring_", "wall.damper_")) or name == "wall.force":
+            bench.promise(signal == 0)
+    bench.promise((inner["wall.total"] == 0) | (inner["wall.total"] == half - 1))
+    bench.promise(inner["wall.left"] == 0)
+    bench.promise(inner["output_stage.slewed"] == 0)
     # The complement of the force, in the clock that looks at it.
     bench.promise(inner["output_stage.less"].all() | (inner["output_stage.fsm_state"] != 1))
     bench.promise(axis.drive == 0)

@@ -17,29 +17,43 @@ def wall(axis: str) -> Wall:
     return Wall(spec(axis).design.wall)
 
 
-def latched(bench: Bench, block: Wall) -> dict[str, Value]:
-    """Return the inputs as the last strobe took them; they are assumed to be constant from there to `valid`."""
-    idle = bench.inner["fsm_state"] == 0
-    taken = {}
-    for name in ("count", "velocity", *(word.name for word in block.design.words)):
-        now = getattr(block, name)
-        taken[name] = Signal.like(now)
-        with bench.m.If(idle & block.strobe):
-            bench.m.d.sync += taken[name].eq(now)
-        bench.assume(idle | (now == taken[name]))
-    return taken
+def samples(bench: Bench, block: Wall) -> Value:
+    """Assume that samples come as the wall promises to take them; return whether one waits for its strobe.
+
+    A sample's strobe comes `lead` clocks or more behind its lead, the next lead with it or later, and the words are
+    constant from the clock after the lead to the strobe.
+    """
+    age = Signal(range(block.design.lead + 1))
+    ready = age == block.design.lead
+    with bench.m.If(block.lead):
+        bench.m.d.sync += age.eq(1)
+    with bench.m.Elif(block.strobe):
+        bench.m.d.sync += age.eq(0)
+    with bench.m.Elif((age != 0) & ~ready):
+        bench.m.d.sync += age.eq(age + 1)
+    bench.assume(~block.strobe | ready)
+    bench.assume(~block.lead | (age == 0) | block.strobe)
+    for word in block.design.words:
+        now = getattr(block, word.name)
+        bench.assume((age < 2) | (now == bench.past(now)))
+    bench.promise(bench.inner["known"] == (age == 1))
+    bench.promise(~bench.inner["placed"] | ready)
+    return ready & ~bench.inner["placed"]
 
 
 def force_is_in_range(axis: str, bench: Bench) -> None:
-    block = bench.block(wall(axis), Widths(("depth",)))
+    block = bench.block(wall(axis), Widths(("offset",)))
     bench.within(force=block.design.force.max)
 
 
 def never_pulls(axis: str, bench: Bench) -> None:
-    block = bench.block(wall(axis), Widths(("depth",)))
-    taken = latched(bench, block)
-    pushes = Mux(taken["wall_left"], block.force >= 0, block.force <= 0)
-    bench.promise(~block.valid | ~taken["wall_forbid_pull"] | pushes)
+    block = bench.block(wall(axis), Widths(("offset",)))
+    waits = samples(bench, block)
+    left, forbidden = block.wall_left, block.wall_forbid_pull
+    for side, allowed in ((0, bench.inner["positive"]), (1, bench.inner["negative"])):
+        bench.promise(~waits | ~forbidden | ~allowed | (left != side))
+    left, forbidden = (bench.past(word, block.latency) for word in (left, forbidden))
+    bench.promise(~block.valid | ~forbidden | Mux(left, block.force >= 0, block.force <= 0))
 
 
 PROPERTIES = [
@@ -48,7 +62,7 @@ PROPERTIES = [
         "wall mhz",
         partial(force_is_in_range, "mhz"),
         depth=8,
-        bugs=(Bug(Wall.elaborate, "rounded < -top", "0"),),
+        bugs=(Bug(Wall.elaborate, "sign & ~total[design.push : top].any()", "0"),),
     ),
     Property(
         "a wall that may not pull never pulls",
@@ -56,6 +70,6 @@ PROPERTIES = [
         partial(never_pulls, "mhz"),
         depth=10,
         quick=True,
-        bugs=(Bug(Wall.elaborate, "below & self.wall_forbid_pull, 0", "below & self.wall_left, 0"),),
+        bugs=(Bug(Wall.elaborate, "inside & ~(self.wall_left & self.wall_forbid_pull)", "inside"),),
     ),
 ]

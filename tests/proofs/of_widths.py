@@ -171,8 +171,8 @@ CASES = {
     ),
     "wall": Case(
         lambda axis: Wall(spec(axis).design.wall),
-        ("depth",),
-        Bug(Wall.elaborate, "signed(len(gain) + len(operand))", "signed(len(gain) + len(operand) - 1)"),
+        ("offset",),
+        Bug(Wall.elaborate, "signed(design.total_bits)", "signed(design.total_bits - 3)"),
     ),
     "output": Case(
         lambda axis: Output(spec(axis).design.output),

@@ -15,7 +15,7 @@ class Layered(Block):
 
     Equation: the sum of two `Wall`s; the core has no damper, and its surface lies `core_depth` below the wall's.
 
-    Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`.
+    Latency: `latency` clocks from `strobe` to `valid`; a sample's `lead` and `strobe` come as to a `Wall`.
 
     Rounding and overflow: every layer rounds and saturates as `Wall`; the exact sum saturates at the force format.
 
@@ -26,7 +26,7 @@ class Layered(Block):
 
     Members
     -------
-    strobe, count, velocity, force, valid
+    lead, count, strobe, velocity, force, valid
         The same as in `Wall`.
     one input for each of `design.words` : In
         Run-time parameters.
@@ -45,8 +45,9 @@ class Layered(Block):
         m.submodules.core = core = Wall(design.layer)
         for layer in (skin, core):
             m.d.comb += [
-                layer.strobe.eq(self.strobe),
+                layer.lead.eq(self.lead),
                 layer.count.eq(self.count),
+                layer.strobe.eq(self.strobe),
                 layer.velocity.eq(self.velocity),
                 layer.wall_left.eq(self.wall_left),
                 layer.wall_forbid_pull.eq(self.wall_forbid_pull),

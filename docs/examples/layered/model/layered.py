@@ -47,6 +47,7 @@ class Design:
     """
 
     latency = LATENCY
+    lead, interval = wall.Design.lead, wall.Design.interval
 
     def __init__(self, axis, velocity: SQ):
         self.layer = wall.Design(axis, velocity)

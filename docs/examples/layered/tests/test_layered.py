@@ -7,6 +7,7 @@ from hardwall.hdl.layered import Layered
 from hardwall.model import wall
 from hardwall.model.layered import Design
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from stimuli.sampled import Sampled
 from stimuli.specs import spec
 
 
@@ -15,8 +16,8 @@ def design(name: str) -> Design:
     return Design(axis, axis.design.estimator.velocity)
 
 
-def make(name: str) -> Layered:
-    return Layered(design(name))
+def make(name: str) -> Sampled:
+    return Sampled(Layered(design(name)), wall.LEAD)
 
 
 def stimulus(d: Design, samples: int):
@@ -44,7 +45,8 @@ async def follows_model(dut):
     d, bench = component.design, Bench(dut, component)
     names = ("count", "velocity", *(word.name for word in d.words))
     await bench.reset()
-    inputs, outputs = await bench.campaign("strobe", "valid", names, ("force",), stimulus(d, SAMPLES // 2))
+    rows, every = stimulus(d, SAMPLES // 2), d.interval
+    inputs, outputs = await bench.campaign("strobe", "valid", names, ("force",), rows, every=every, momentary=names)
     check(inputs, outputs, {"force": model(d, inputs.rows)}, component.latency)
 
 
