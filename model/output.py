@@ -17,8 +17,12 @@ from .requirements import AxisRequirements
 from .words import Word
 
 FLAGS = ("slew_limited", "force_limited")
-LATENCY = 3
+LATENCY = 1
 """Clocks from the strobe to the changed drive: see `hardwall.hdl.output`."""
+INTERVAL = 2
+"""Clocks from a strobe to the next, at least."""
+AHEAD = 2
+"""Clocks from the one at which the hardware takes the limits to the strobe of the first force that they limit."""
 
 
 class Params(NamedTuple):
@@ -48,6 +52,8 @@ class Design:
     """
 
     latency = LATENCY
+    interval = INTERVAL
+    ahead = AHEAD
     flags = FLAGS
 
     def __init__(self, axis: AxisRequirements):

@@ -37,7 +37,7 @@ BLOCKS = (
     *(Block("estimators/finite_difference" if n == "fdm" else f"estimators/{n.replace('-', '_')}") for n in ESTIMATORS),
     Block("quadrature", RECORDED),
     Block("wall", ("component.law",)),
-    Block("output"),
+    Block("output", ("component.stage",)),
     Block("monitors", RECORDED),
     Block("supervisor", RECORDED),
     Block("clock_monitor", RECORDED),

@@ -43,7 +43,7 @@ class AxisTwin:
         self.words, self.pending = {word.name: word.reset for word in self.design.words} | self.fixed(), False
         self.decoder, self.estimator, self.output = quadrature.START, self.design.start().estimator, output.START
         self.sampled_count = self.velocity = self.wall_force = self.drive = self.sticky = 0
-        self.allowed = False
+        self.enabled = 0
         self.due: dict[int, Callable[[], None]] = {}
         self.raised: dict[int, int] = {}
         self.pulses: dict[int, dict[str, int]] = {}
@@ -84,14 +84,11 @@ class AxisTwin:
         force = wall.render(params.wall, decoder.count, velocity)
         fault = decoder.illegal | decoder.overspeed
 
-        def allow() -> None:
-            self.allowed = not fault
-
         def drive() -> None:
             # The output stage slews from the drive, which a low enable has made zero.
             begun = self.output._replace(drive=self.drive)
             self.pulses[self.clocks + 1] = {"sampled": 1, "actuated": int(begun.phase == 0)}
-            self.output, limited = output.step(params.output, begun, force, self.allowed)
+            self.output, limited = output.step(params.output, begun, force, self.enabled and not fault)
             self.drive = self.output.drive
             self.raised[self.clocks + 1] = limited << params.output_bit
 
@@ -102,7 +99,6 @@ class AxisTwin:
         self.raised[estimated] = raised << params.estimator_bit
         self.pulses[estimated] = {"estimated": 1, "saturated": int(raised != 0)}
         self.due[walled - 1] = lambda: setattr(self, "wall_force", force)
-        self.due[walled] = allow
         self.due[now + d.latency_to_drive - 1] = drive
 
     def advance(self, given: dict[str, int], enabled: int) -> None:
@@ -118,10 +114,11 @@ class AxisTwin:
             self.restart = 0
         pulses = quadrature.Strobes(*(given[name] for name in PULSES))
         self.decoder = quadrature.step(self.decoder_params, self.decoder, inputs, pulses)
+        self.enabled = enabled
         if self.clocks in self.due:
             self.due.pop(self.clocks)()
         if not enabled:
-            self.drive, self.allowed = 0, False
+            self.drive = 0
         if given["preload"]:
             self.restart = 1
         if given["commit"]:

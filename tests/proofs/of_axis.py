@@ -53,9 +53,6 @@ def zero_before_a_commit(estimator: str, bench: Bench) -> None:
             bench.promise(signal == 0)
     bench.promise((inner["wall.total"] == 0) | (inner["wall.total"] == half - 1))
     bench.promise(inner["wall.left"] == 0)
-    bench.promise(inner["output_stage.slewed"] == 0)
-    # The complement of the force, in the clock that looks at it.
-    bench.promise(inner["output_stage.less"].all() | (inner["output_stage.fsm_state"] != 1))
     bench.promise(axis.drive == 0)
 
 
@@ -101,7 +98,7 @@ def of(estimator: str, *deep: Bug) -> list[Property]:
 PROPERTIES = [
     *of(
         "fdm",
-        Bug(Output.elaborate, "Mux(over, limit, slewed)", "Mux(over & ~negative, limit, slewed)"),
+        Bug(Output.elaborate, "Mux(too_low, lowest, fall)", "fall"),
         Bug(Axis.elaborate, "output.enable.eq(self.drive_enable)", "output.enable.eq(1)"),
     ),
     *of("levant"),

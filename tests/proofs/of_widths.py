@@ -176,8 +176,8 @@ CASES = {
     ),
     "output": Case(
         lambda axis: Output(spec(axis).design.output),
-        ("less",),
-        Bug(Output.elaborate, "Signal(len(self.output_slew_limit) + 1)", "Signal(len(self.output_slew_limit))"),
+        (),
+        Bug(Output.elaborate, "design.slew.max + design.force.max + 1", "design.slew.max + 1"),
         phase,
     ),
     "fdm": Case(
