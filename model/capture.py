@@ -27,8 +27,8 @@ trigger; the record at that place is the one that was being taken, or else the n
 
 Triggers are the host's `capture_trigger`, and those that `capture_sources` has of `SOURCES`. A trip counts at its
 clock; the others are found from one sample to the next, of which both are behind the start. What comes with the
-start belongs to the new capture. Only a clock that is as fast as the last sample's way through the axis allows is
-refused: a value would be the next sample's before it is written.
+start belongs to the new capture. Samples that follow each other too closely are refused: a value would be the next
+sample's before it is written.
 """
 
 from typing import NamedTuple
@@ -143,10 +143,11 @@ class Design:
         check_int("records", records, 2, RECORDS_MAX)
         if records & (records - 1):
             raise ValueError(f"records must be a power of two, not {records}")
-        axis, needed = spec.design, TAKEN_AT["velocity"] + 1
-        spare = spec.clocks_per_sample - axis.latency_to_drive + axis.estimator.latency
-        if spare < needed:
-            fewest = spec.clocks_per_sample + needed - spare
+        axis = spec.design
+        # The next velocity comes before the next drive, and the next force of the wall in between.
+        behind = axis.latency_to_drive - axis.estimator.latency
+        fewest = max(behind + TAKEN_AT["velocity"] + 1, axis.output.latency + TAKEN_AT["flags"] + 1, RECORD_REGISTERS)
+        if spec.clocks_per_sample < fewest:
             raise FieldError(
                 "sample_hz",
                 f"must leave {fewest} clocks for a sample that is captured, so at most {spec.clock_hz // fewest} at "

@@ -40,7 +40,7 @@ class Timing(NamedTuple):
     """The clocks at which an axis samples and changes its drive; clock 0 is the first one after reset."""
 
     clocks_per_sample: int
-    latency: int  # clocks from a strobe to the changed drive
+    latency: int  # clocks from a strobe to the changed drive, which comes before the second next strobe
 
 
 @compiled
@@ -49,8 +49,28 @@ def strobe_of(timing, k):
     return (k + 1) * timing.clocks_per_sample - 1
 
 
+@compiled
+def change_of(timing, k):
+    """Return the number of the clock at which the drive has changed to that of sample k."""
+    return strobe_of(timing, k) + timing.latency
+
+
+@compiled
+def overlap_of(timing):
+    """Return how many samples are taken between a strobe and its changed drive: 1 if samples overlap, else 0.
+
+    A sample that is taken in the very clock of the change is not between.
+    """
+    return (timing.latency - 1) // timing.clocks_per_sample
+
+
 class Design:
     """Formats, run-time words and latencies of an axis, derived from its requirements and the choice of an estimator.
+
+    A sample may begin before the drive of the last one has changed. `interval` is then that of the slowest block, and
+    so long that the next velocity comes after the changed drive: what is read with a drive is all of its sample. Since
+    no interval of an estimator is below its latency, both together are more than `latency_to_drive`: a drive changes
+    before the second next strobe.
 
     Args:
         requirements: the axis's `AxisRequirements`.
@@ -100,7 +120,8 @@ class Design:
         self.flags = (*ENCODER_FLAGS, *self.estimator.flags, *self.output.flags)
         self._flag_bits = len(ENCODER_FLAGS), len(ENCODER_FLAGS) + len(self.estimator.flags)
         self.latency_to_drive = self.estimator.latency + self.wall.latency + self.output.latency
-        self.interval = self.latency_to_drive
+        behind = self.wall.latency + self.output.latency
+        self.interval = max(self.estimator.interval, self.wall.interval, self.output.interval, behind + 1)
         self.timing = Timing(requirements.clocks_per_sample, self.latency_to_drive)
 
     def encode(self, **si: float) -> dict[str, int]:

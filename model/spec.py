@@ -34,11 +34,11 @@ class AxisSpec(AxisRequirements):
         super().__post_init__()
         if not isinstance(self.stage, Stage):
             raise TypeError(f"stage must be a drive stage, not {shown(self.stage)}")
-        if self.design.latency_to_drive > self.clocks_per_sample:
-            fastest = self.clock_hz // self.design.latency_to_drive
+        if self.design.interval > self.clocks_per_sample:
+            fastest = self.clock_hz // self.design.interval
             raise FieldError(
                 "sample_hz",
-                f"must leave {self.design.latency_to_drive} clocks for the force path, so at most {fastest} "
+                f"must leave {self.design.interval} clocks from a sample to the next, so at most {fastest} "
                 f"at clock_hz {self.clock_hz}, not {self.sample_hz!r}",
             )
         _ = self.drive

@@ -52,6 +52,7 @@ class EstimatorDesign(ABC):
         velocity: format of the velocity, counts a sample.
         words: the run-time words, in the order of the hardware's ports.
         latency: clocks from the strobe to `valid`.
+        interval: the fewest clocks from a strobe to the next, not below `latency`.
 
     Raises:
         ValueError: if the gains or the axis do not fit what int64 and the hardware hold, with the accepted range.
@@ -72,6 +73,11 @@ class EstimatorDesign(ABC):
     @abstractmethod
     def latency(self) -> int:
         """Clocks from the strobe to `valid`."""
+
+    @property
+    def interval(self) -> int:
+        """The fewest clocks from a strobe to the next, which may come with `valid`."""
+        return self.latency
 
     @abstractmethod
     def params(self, words: Mapping[str, int]) -> tuple:
