@@ -4,7 +4,7 @@ from amaranth.hdl import Cat, Module, Mux, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from hardwall.model.design import GLITCH_WIDTH, ILLEGAL_WIDTH
+from hardwall.model.design import ENCODER_FLAGS, GLITCH_WIDTH, ILLEGAL_WIDTH
 from hardwall.model.spec import AxisSpec
 
 from .arithmetic.fixed import shape
@@ -17,17 +17,20 @@ from .wall import Wall
 class Axis(wiring.Component):
     """An axis from encoder pins to drive: decoder, velocity estimator, wall and output stage.
 
-    Every `spec.clocks_per_sample` clocks a strobe takes the count; `latency` clocks later the drive has changed.
+    Every `spec.clocks_per_sample` clocks a strobe takes the count; `latency` clocks later the drive has changed. The
+    next strobe may come before that: then two samples are under way, and what belongs to one travels beside it.
 
     Parameters at run time: the words of `spec.design.words` are inputs. Pulse `commit` and hold the words until
-    `commit_pending` falls: at the next strobe all words take effect together, from that sample on. After reset every
-    parameter has its reset word (the wall is off).
+    `commit_pending` falls: all words take effect together, from the sample of the next strobe on. The output stage
+    takes its words with the velocity of that sample, for until then it may be at work on the one before. After reset
+    every parameter has its reset word (the wall is off).
 
     Faults: after an illegal transition, or if the encoder is too fast for the decoder, the position is unknown, so the
     drive is zero from the next sample on until `clear_flags`. `drive_enable` low makes the drive zero at the next
     clock. Saturation in the path raises sticky `flags` and otherwise acts as the block's docstring says.
 
-    Latency: `latency` clocks from the strobe to the changed drive; the decoder's latency from a pin to the strobe.
+    Latency: `latency` clocks from the strobe to the changed drive; the decoder's latency from a pin to the strobe. A
+    strobe may follow the last one after `spec.design.interval` clocks.
 
     Rounding and overflow: as in the blocks.
 
@@ -54,9 +57,10 @@ class Axis(wiring.Component):
         High for one clock with the changed drive: `sampled` after every sample, `actuated` after a sample at which the
         drive follows the force.
     count, sampled_count, velocity, wall_force : Out(signed)
-        The live count; the last sample's count, velocity and wall force.
+        The live count; a sample's count and velocity, from the same clock on; its wall force, which comes later. With
+        `sampled`, all are of the sample of the drive.
     flags : Out
-        Sticky flags, bits as in `spec.design.flags`; the encoder's flags as the samples saw them.
+        Sticky flags, bits as in `spec.design.flags`; the encoder's flags as the samples saw them, with their velocity.
     stepped, edge_kind : Out
         High for one clock with the count of a new edge, and the kind of the last edge.
     indexed : Out(1)
@@ -64,7 +68,7 @@ class Axis(wiring.Component):
     estimated, saturated : Out(1)
         High for one clock with a sample's velocity; with it, the estimator is saturated.
     strobe_busy : Out(1)
-        High for one clock if a sample begins before the last one's drive has changed, which no spec allows.
+        High for one clock behind a strobe that came before the last sample's velocity, which no spec allows.
     illegal, overspeed : Out(1)
         The encoder's sticky flags, now.
     illegal_count : Out
@@ -74,7 +78,7 @@ class Axis(wiring.Component):
     stamp, stamp_a_rise, stamp_b_rise, stamp_a_fall, stamp_b_fall : Out
         The number of this clock, and the stamp of the last edge of every kind.
     commit_pending : Out(1)
-        Parameters wait for the next strobe.
+        Parameters wait for the next strobe, or the output stage's words for the velocity that comes of it.
 
     Raises
     ------
@@ -151,13 +155,7 @@ class Axis(wiring.Component):
         m.d.comb += strobe.eq(divider == spec.clocks_per_sample - 1)
         m.d.sync += divider.eq(Mux(strobe, 0, divider + 1))
 
-        # Parameters wait at the inputs and take effect together at a strobe.
-        active = {
-            word.name: Signal(shape(word.format), init=word.reset, name=f"active_{word.name}") for word in design.words
-        }
-        m.d.sync += self.commit_pending.eq(self.commit | (self.commit_pending & ~strobe))
-        with m.If(strobe & self.commit_pending):
-            m.d.sync += [signal.eq(getattr(self, name)) for name, signal in active.items()]
+        active = self._active(m, strobe, estimator.valid)
         for block, words in (
             (estimator, design.estimator.words),
             (wall, design.wall.words),
@@ -170,11 +168,19 @@ class Axis(wiring.Component):
         m.d.sync += restart.eq(self.preload | (restart & ~strobe))
 
         working = Signal()
-        m.d.sync += working.eq(strobe | (working & ~output.valid))
+        m.d.sync += [
+            working.eq(strobe | (working & ~estimator.valid)),
+            self.strobe_busy.eq(strobe & working & ~estimator.valid),
+        ]
 
-        sampled_fault = Signal()
+        # What a strobe has taken is kept up to the velocity, with which the next strobe may come; and then up to the
+        # next velocity, which comes behind the changed drive.
+        taken_count, shown_count = Signal.like(self.sampled_count), Signal.like(self.sampled_count)
+        taken_fault, fault = Signal(len(ENCODER_FLAGS)), Signal()
         with m.If(strobe):
-            m.d.sync += [self.sampled_count.eq(decoder.seen.count), sampled_fault.eq(decoder.fault)]
+            m.d.sync += [taken_count.eq(decoder.seen.count), taken_fault.eq(Cat(decoder.illegal, decoder.overspeed))]
+        with m.If(estimator.valid):
+            m.d.sync += [shown_count.eq(taken_count), fault.eq(taken_fault.any())]
 
         wiring.connect(m, decoder.seen, estimator.seen)
         m.d.comb += [
@@ -195,12 +201,13 @@ class Axis(wiring.Component):
             wall.velocity.eq(estimator.velocity),
             output.strobe.eq(wall.valid),
             output.force.eq(wall.force),
-            output.fault.eq(sampled_fault),
+            output.fault.eq(fault),
             output.enable.eq(self.drive_enable),
             self.drive.eq(output.drive),
             self.sampled.eq(output.valid),
             self.actuated.eq(output.actuated),
             self.count.eq(decoder.seen.count),
+            self.sampled_count.eq(Mux(estimator.valid, taken_count, shown_count)),
             self.velocity.eq(estimator.velocity),
             self.wall_force.eq(wall.force),
             self.stepped.eq(decoder.stepped),
@@ -208,7 +215,6 @@ class Axis(wiring.Component):
             self.indexed.eq(decoder.indexed),
             self.estimated.eq(estimator.valid),
             self.saturated.eq(estimator.valid & estimator.saturated.any()),
-            self.strobe_busy.eq(strobe & working & ~output.valid),
             self.illegal.eq(decoder.illegal),
             self.overspeed.eq(decoder.overspeed),
             self.illegal_count.eq(decoder.illegal_count),
@@ -224,11 +230,29 @@ class Axis(wiring.Component):
 
         # A flag is visible from the sample that raised it until it is cleared.
         raised = Cat(
-            Mux(strobe, Cat(decoder.illegal, decoder.overspeed), 0),
-            Mux(estimator.valid, estimator.saturated, 0),
+            Mux(estimator.valid, Cat(taken_fault, estimator.saturated), 0),
             Mux(output.valid, output.limited, 0),
         )
         sticky = Signal(len(raised))
         m.d.sync += sticky.eq(Mux(self.clear_flags, 0, sticky) | raised)
         m.d.comb += self.flags.eq(sticky | raised)
         return m
+
+    def _active(self, m: Module, strobe: Signal, estimated: Signal) -> dict[str, Signal]:
+        """Return the words in use by name: they wait at the inputs, and take effect together from a sample on."""
+        design, pending = self._spec.design, self.commit_pending
+        active = {
+            word.name: Signal(shape(word.format), init=word.reset, name=f"active_{word.name}") for word in design.words
+        }
+        # The output stage's words come last: a strobe that comes with them is the next sample's.
+        late = {word.name for word in design.output.words}
+        begun = Signal()
+        m.d.sync += [
+            begun.eq(Mux(begun, ~estimated, strobe & pending)),
+            pending.eq(self.commit | (pending & ~(begun & estimated))),
+        ]
+        with m.If(strobe & pending & ~begun):
+            m.d.sync += [signal.eq(getattr(self, name)) for name, signal in active.items() if name not in late]
+        with m.If(begun & estimated):
+            m.d.sync += [signal.eq(getattr(self, name)) for name, signal in active.items() if name in late]
+        return active

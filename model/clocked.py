@@ -4,14 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import axis, design, output, quadrature
+from . import design, output, quadrature, wall
 from .compiled import compiled
+from .estimators.estimate import estimate
 
 
 class Pins(NamedTuple):
     """The inputs of the hardware at every clock, by the same names: int64 arrays.
 
-    `drive_enable` and `clear_flags` may change only between a change of the drive and the next strobe.
+    `drive_enable` and `clear_flags` may change only between a change of the drive and the next velocity.
     """
 
     encoder_a: np.ndarray
@@ -43,23 +44,52 @@ class Outputs(NamedTuple):
     stamp_b_fall: np.ndarray
 
 
+class UnderWay(NamedTuple):
+    """A sample from its strobe to its changed drive, for which the words of the output stage are kept."""
+
+    force: int
+    enable: int  # no fault was taken with it
+    flags: int
+    stage: output.Params
+    output_bit: int
+
+
 class State(NamedTuple):
-    """The states of decoder and axis; `restart` is 1 from a preload until the next sample."""
+    """The states of decoder and axis, and what is under way; of two samples, `older` is the one that came first."""
 
     decoder: quadrature.State
-    axis: design.State
-    restart: int
+    axis: design.State  # the estimator's after the last strobe; the others' after the last changed drive
+    restart: int  # 1 from a preload until the next sample
+    older: UnderWay
+    newer: UnderWay
+
+
+def start(axis: design.Design) -> State:
+    """Return the state after reset."""
+    nothing = UnderWay(0, 0, 0, output.Params(0, 0, 1), 0)
+    return State(quadrature.START, axis.start(), 0, nothing, nothing)
 
 
 @compiled
-def _take(params, state, outputs, k, enable):
-    """Take sample k, store its outputs, and return the axis's state."""
-    fault = state.decoder.illegal | state.decoder.overspeed << 1
-    outputs.actuated[k] = state.axis.output.phase == 0
+def _take(params, state, outputs, k):
+    """Take sample k: return (the estimator's state, the sample under way), and store what is known of it."""
     seen = quadrature.seen(state.decoder)
-    now, outputs.velocity[k], outputs.wall_force[k] = axis.step(params, state.axis, seen, state.restart, fault, enable)
-    outputs.drive[k], outputs.flags[k] = now.output.drive, now.flags
-    return now
+    estimator, velocity, raised = estimate(params.estimator, state.axis.estimator, seen, state.restart)
+    force = wall.render(params.wall, seen.count, velocity)
+    fault = state.decoder.illegal | state.decoder.overspeed << 1
+    outputs.velocity[k], outputs.wall_force[k] = velocity, force
+    flags = fault | raised << params.estimator_bit
+    return estimator, UnderWay(force, int(fault == 0), flags, params.output, params.output_bit)
+
+
+@compiled
+def _drive(now, outputs, k, sample, enable):
+    """Let the drive follow sample k: store what it comes to, and return the axis's state."""
+    outputs.actuated[k] = now.output.phase == 0
+    driven, limited = output.step(sample.stage, now.output, sample.force, enable and sample.enable)
+    flags = now.flags | sample.flags | limited << sample.output_bit
+    outputs.drive[k], outputs.flags[k] = driven.drive, flags
+    return design.State(now.estimator, driven, flags)
 
 
 @compiled
@@ -84,13 +114,20 @@ def run(controller, timing, state, pins, outputs, first, until):
         outputs: `Outputs`, from sample 0 on.
     """
     per_sample, latency = timing
+    overlap = design.overlap_of(timing)
     for n in range(first, until):
-        now, restart, decoder = state.axis, state.restart, state.decoder
+        now, restart, older, newer = state.axis, state.restart, state.older, state.newer
         if (n + 1) % per_sample == 0:
-            now = _take(controller.axis, state, outputs, (n + 1) // per_sample - 1, pins.drive_enable[n])
-            restart = 0
-        elif (n + 1 - latency) % per_sample == 0 and n >= latency:
-            _show(outputs, (n + 1 - latency) // per_sample - 1, decoder)
+            estimator, sample = _take(controller.axis, state, outputs, (n + 1) // per_sample - 1)
+            now = design.State(estimator, now.output, now.flags)
+            restart, older, newer = 0, newer, sample
+        # The strobes whose drive has changed before this edge, and behind it.
+        before, behind = n - latency, n + 1 - latency
+        if before >= 0 and (before + 1) % per_sample == 0:
+            _show(outputs, (before + 1) // per_sample - 1, state.decoder)
+        if behind >= 0 and (behind + 1) % per_sample == 0:
+            sample = older if overlap else newer
+            now = _drive(now, outputs, (behind + 1) // per_sample - 1, sample, pins.drive_enable[n])
         if pins.clear_flags[n]:
             now = design.State(now.estimator, now.output, 0)
         if not pins.drive_enable[n]:
@@ -99,5 +136,6 @@ def run(controller, timing, state, pins, outputs, first, until):
             pins.encoder_a[n], pins.encoder_b[n], pins.encoder_z[n], controller.glitch_clocks, controller.invert
         )
         strobes = quadrature.Strobes(pins.preload[n], pins.preload_count[n], pins.index_arm[n], pins.clear_flags[n])
-        state = State(quadrature.step(controller.decoder, decoder, inputs, strobes), now, restart | pins.preload[n])
+        decoder = quadrature.step(controller.decoder, state.decoder, inputs, strobes)
+        state = State(decoder, now, restart | pins.preload[n], older, newer)
     return state

@@ -1,18 +1,21 @@
 """One axis, pins to force: RTL against the models of decoder and axis, with everything changing while it runs."""
 
+from itertools import count
+
 import cocotb
 import numpy as np
 import pytest
 from cocotb.triggers import ClockCycles, RisingEdge, Timer, ValueChange
 
 from hardwall.hdl.axis import Axis
-from hardwall.model import clocked, quadrature, stamped
+from hardwall.model import clocked, stamped
+from hardwall.model.design import change_of, overlap_of, strobe_of
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervised import Design
 from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from oracles.axis import AxisTwin
 from stimuli import handle
-from stimuli.axes import busy, random_words
+from stimuli.axes import busy, fastest, random_words
 
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
 LATE = 1 << 20
@@ -22,8 +25,8 @@ ACTS, CHANCES = ("", "words", "drive_enable", *STROBES), (0.968, 0.006, 0.006, *
 """What a host does at a clock, and the chance of each."""
 
 
-def make(estimator: str) -> Axis:
-    return Axis(busy(estimator))
+def make(estimator: str, overlaps: bool) -> Axis:
+    return Axis(fastest(busy(estimator)) if overlaps else busy(estimator))
 
 
 class Events:
@@ -51,12 +54,12 @@ class Events:
         return pins
 
 
-def reference(spec: AxisSpec, pins: np.ndarray, commits: list[tuple[int, dict[str, int]]], samples: int) -> np.ndarray:
+def reference(spec: AxisSpec, pins: np.ndarray, commits: list[tuple[int, dict[str, int]]]) -> np.ndarray:
     """Return the model's OUTPUTS of every sample; `commits` says at which strobe which words take effect."""
     design = spec.design
     words = {word.name: word.reset for word in design.words}
-    state = clocked.State(quadrature.START, design.start(), 0)
-    out = np.zeros((len(OUTPUTS), samples), np.int64)
+    state = clocked.start(design)
+    out = np.zeros((len(OUTPUTS), pins.shape[1] // spec.clocks_per_sample), np.int64)
     clock = 0
 
     def run_to(clocks: int, settings: dict[str, int], gains: dict[str, int]) -> None:
@@ -86,28 +89,27 @@ async def motion(bench: Bench, spec: AxisSpec, samples: int, random: np.random.G
         await Timer(clocks * bench.period_ns, "ns")
 
 
-async def committed_with(dut) -> None:
-    """Check that a commit has ended when the next sample has."""
-    await RisingEdge(dut.sampled)
-    assert not int(dut.commit_pending.value)
-
-
 async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Generator, commits: list) -> None:
-    """Act in the slack of the samples: commit words, preload, clear, arm, drop the enable and raise it again."""
-    dut, sampled = bench.dut, bench.dut.sampled
+    """Act behind changed drives: commit words, preload, clear, arm, drop the enable and raise it again."""
+    dut, sampled, timing = bench.dut, bench.dut.sampled, spec.design.timing
     half = 1 << (spec.count_width - 1)
+    committed = 0
     for sample in range(samples - 1):
         await RisingEdge(sampled)
+        if sample == committed:
+            assert not int(dut.commit_pending.value), "a commit has ended with the drive of its sample"
         act = random.random()
         if act > 0.1:
             continue
         await RisingEdge(dut.clk)
         await Timer(bench.period_ns // 2, "ns")
         pulse = ""
-        if act < 0.02:
+        if act < 0.02 and sample >= committed:
             words, pulse = random_words(spec.design, random), "commit"
             bench.drive(**words)
-            commits.append(((sample + 2) * spec.clocks_per_sample - 1, words))
+            # The commit is seen a clock behind the changed drive, and waits from the next clock on.
+            committed = next(k for k in count(sample) if strobe_of(timing, k) >= change_of(timing, sample) + 2)
+            commits.append((strobe_of(timing, committed), words))
         elif act < 0.03:
             pulse = "preload"
             bench.drive(preload_count=int(random.integers(-half, half)))
@@ -124,12 +126,11 @@ async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Gen
         if pulse == "commit":
             await Timer(bench.period_ns, "ns")
             assert int(dut.commit_pending.value), "a commit waits for the strobe"
-            cocotb.start_soon(committed_with(dut))
 
 
 @cocotb.test()
 async def follows_model(dut):
-    spec = busy(**parameters())
+    spec = make(**parameters()).spec
     # Every estimator has its own campaign; this one tests the wiring.
     samples, random = SAMPLES // (5 if spec.estimator in ("levant", "fdm") else 20), rng()
     bench = Bench(dut, Axis(spec))
@@ -149,8 +150,10 @@ async def follows_model(dut):
     kept = len(seen.rows) - 1
     assert kept >= samples - 2
     assert len(commits) > samples // 100
-    pins = events.records(first_clock, (kept + 1) * spec.clocks_per_sample)
-    expected = reference(spec, pins, commits, kept + 1)
+    timing = spec.design.timing
+    assert overlap_of(timing) == parameters()["overlaps"]
+    pins = events.records(first_clock, change_of(timing, kept))
+    expected = reference(spec, pins, commits)
     for row, name in enumerate(OUTPUTS):
         found = seen.column(name)[:kept]
         wrong = np.flatnonzero(found != expected[row, :kept])
@@ -161,13 +164,12 @@ async def follows_model(dut):
     rose = spec.design.flag_names(int(np.bitwise_or.reduce(seen.column("flags"))))
     limits = {"error_saturated", "slew_limited", "force_limited"}
     assert {"encoder_illegal", "encoder_overspeed", *limits} <= set(rose)
-    latency = spec.design.latency_to_drive
-    assert {(clock - first_clock - latency + 1) % spec.clocks_per_sample for clock in seen.clocks} == {0}
+    assert [clock - first_clock for clock in seen.clocks[:kept]] == [change_of(timing, k) for k in range(kept)]
 
 
 @cocotb.test()
 async def every_output_is_the_twins_at_every_clock(dut):
-    spec, random = busy(**parameters()), rng()
+    spec, random = make(**parameters()).spec, rng()
     bench, twin, moves = Bench(dut, Axis(spec)), AxisTwin(Design(spec)), handle.edges(random, handle.Habits(index=0.1))
     await bench.reset()
     pins, words, left, half = dict.fromkeys(PINS, 0), random_words(spec.design, random), 0, 1 << spec.count_width - 1
@@ -195,7 +197,7 @@ async def every_output_is_the_twins_at_every_clock(dut):
 
 @cocotb.test()
 async def late_edges_have_late_stamps(dut):
-    bench, passed = Bench(dut, Axis(busy(**parameters()))), 40
+    bench, passed = Bench(dut, make(**parameters())), 40
     await bench.reset()
     await Timer((LATE + passed) * bench.period_ns, "ns")
     for (a, b), kind in zip(((1, 0), (1, 1), (0, 1), (0, 0)), ("a_rise", "b_rise", "a_fall", "b_fall"), strict=True):
@@ -206,9 +208,10 @@ async def late_edges_have_late_stamps(dut):
 
 
 # One estimator on the count and one on the stamps. `test_loop` runs all estimators.
+@pytest.mark.parametrize("overlaps", [False, True])
 @pytest.mark.parametrize("estimator", ["levant", "levant-edge"])
-def test_rtl(estimator):
-    simulate(__file__, make, estimator=estimator)
+def test_rtl(estimator, overlaps):
+    simulate(__file__, make, estimator=estimator, overlaps=overlaps)
 
 
 def test_wrong_spec_is_refused():

@@ -1,5 +1,6 @@
 """An axis clock for clock from the models of its blocks: decoder, estimator, wall and output stage."""
 
+from collections import defaultdict
 from collections.abc import Callable
 from operator import attrgetter
 
@@ -29,7 +30,7 @@ class AxisTwin:
     Attributes:
         clocks: the edges since the reset.
         words: the words of the axis that act now.
-        pending: whether words wait for the next sample.
+        pending: whether words wait for a sample, or for its velocity.
     """
 
     def __init__(self, design: Design):
@@ -40,11 +41,12 @@ class AxisTwin:
     def restarted(self) -> None:
         """Take the state after a reset."""
         self.clocks = self.restart = 0
-        self.words, self.pending = {word.name: word.reset for word in self.design.words} | self.fixed(), False
+        self.words = {word.name: word.reset for word in self.design.words} | self.fixed()
+        self.pending = self.begun = False
         self.decoder, self.estimator, self.output = quadrature.START, self.design.start().estimator, output.START
         self.sampled_count = self.velocity = self.wall_force = self.drive = self.sticky = 0
         self.enabled = 0
-        self.due: dict[int, Callable[[], None]] = {}
+        self.due: defaultdict[int, list[Callable[[], None]]] = defaultdict(list)
         self.raised: dict[int, int] = {}
         self.pulses: dict[int, dict[str, int]] = {}
 
@@ -59,8 +61,7 @@ class AxisTwin:
 
     def _raised(self) -> int:
         """Return the flags that rise with the next edge; the pins already show them."""
-        encoder = self.decoder.illegal | self.decoder.overspeed << 1 if self.strobe else 0
-        return self.raised.get(self.clocks, 0) | encoder
+        return self.raised.get(self.clocks, 0)
 
     @property
     def flags(self) -> int:
@@ -77,12 +78,14 @@ class AxisTwin:
     def _sample(self) -> None:
         d, decoder, now = self.design, self.decoder, self.clocks
         params = d.params(self.words)
-        self.sampled_count = decoder.count
         self.estimator, velocity, raised = estimate(
             params.estimator, self.estimator, quadrature.seen(decoder), self.restart
         )
         force = wall.render(params.wall, decoder.count, velocity)
-        fault = decoder.illegal | decoder.overspeed
+        count, fault = decoder.count, decoder.illegal | decoder.overspeed << 1
+
+        def estimate_shown() -> None:
+            self.sampled_count, self.velocity = count, velocity
 
         def drive() -> None:
             # The output stage slews from the drive, which a low enable has made zero.
@@ -95,11 +98,21 @@ class AxisTwin:
         # A result is seen `latency` edges after the strobe, so its register is loaded at the edge before.
         estimated = now + d.estimator.latency
         walled = estimated + d.wall.latency
-        self.due[estimated - 1] = lambda: setattr(self, "velocity", velocity)
-        self.raised[estimated] = raised << params.estimator_bit
+        self.due[estimated - 1] += [estimate_shown]
+        self.raised[estimated] = fault | raised << params.estimator_bit
         self.pulses[estimated] = {"estimated": 1, "saturated": int(raised != 0)}
-        self.due[walled - 1] = lambda: setattr(self, "wall_force", force)
-        self.due[now + d.latency_to_drive - 1] = drive
+        self.due[walled - 1] += [lambda: setattr(self, "wall_force", force)]
+        self.due[now + d.latency_to_drive - 1] += [drive]
+
+    def _take_words(self, given: dict[str, int]) -> None:
+        """Take the words that wait for the sample that begins; the output stage takes its own with the velocity."""
+
+        def taken() -> None:
+            self.pending = self.begun = False
+
+        self.words = {name: given[name] for name in self.words if name in given} | self.fixed()
+        self.begun = True
+        self.due[self.clocks + self.design.estimator.latency] += [taken]
 
     def advance(self, given: dict[str, int], enabled: int) -> None:
         """Advance by one clock edge, with the inputs just before it and the level of `drive_enable` there."""
@@ -107,16 +120,15 @@ class AxisTwin:
         channels = [given[name] for name in ("encoder_a", "encoder_b", "encoder_z")]
         inputs = quadrature.Inputs(*channels, self.words["encoder_glitch_clocks"], self.words["encoder_invert"])
         if self.strobe:
-            if self.pending:
-                self.words = {name: given[name] for name in self.words if name in given} | self.fixed()
-                self.pending = False
+            if self.pending and not self.begun:
+                self._take_words(given)
             self._sample()
             self.restart = 0
         pulses = quadrature.Strobes(*(given[name] for name in PULSES))
         self.decoder = quadrature.step(self.decoder_params, self.decoder, inputs, pulses)
         self.enabled = enabled
-        if self.clocks in self.due:
-            self.due.pop(self.clocks)()
+        for act in self.due.pop(self.clocks, ()):
+            act()
         if not enabled:
             self.drive = 0
         if given["preload"]:

@@ -14,9 +14,9 @@ from .widths import FreeProducts
 
 
 def axis_of(estimator: str) -> Axis:
-    """Return an axis of 1 MHz with the slowest clock that has time for a sample, so that proofs see many samples."""
-    latency = spec("mhz", estimator).design.latency_to_drive
-    return Axis(AxisSpec(**{**MHZ, "clock_hz": (latency + 2) * MHZ["sample_hz"]}, estimator=estimator))
+    """Return an axis of 1 MHz with the slowest clock that it takes, so that proofs see many samples, which overlap."""
+    clocks = spec("mhz", estimator).design.interval
+    return Axis(AxisSpec(**{**MHZ, "clock_hz": clocks * MHZ["sample_hz"]}, estimator=estimator))
 
 
 def never_beyond_its_limit(estimator: str, bench: Bench) -> None:
@@ -32,12 +32,17 @@ def zero_without_enable(estimator: str, bench: Bench) -> None:
 
 def parameters_change_at_a_strobe(estimator: str, bench: Bench) -> None:
     axis = bench.block(axis_of(estimator), FreeProducts())
-    allowed = bench.past(bench.inner["strobe"] & axis.commit_pending) | bench.past(bench.reset)
-    taken = bench.past(bench.inner["strobe"] & axis.commit_pending) & ~bench.past(bench.reset)
+    begun, late = bench.inner["begun"], axis.spec.design.output.words
+    first = bench.past(bench.inner["strobe"] & axis.commit_pending & ~begun & ~bench.reset)
+    last = bench.past(begun & axis.estimated & ~bench.reset)
     for word in axis.spec.design.words:
-        active = bench.inner[f"active_{word.name}"]
-        bench.promise(allowed | (active == bench.past(active, init=word.reset)))
+        active, taken = bench.inner[f"active_{word.name}"], last if word in late else first
+        bench.promise(taken | bench.past(bench.reset) | (active == bench.past(active, init=word.reset)))
         bench.promise(~taken | (active == bench.past(getattr(axis, word.name))))
+    # None is left out: between the first and the last of them the commit is pending, and the last end it.
+    bench.promise(~begun | axis.commit_pending)
+    bench.promise(~first | begun)
+    bench.promise(~last | ~begun & (axis.commit_pending == bench.past(axis.commit)))
 
 
 def zero_before_a_commit(estimator: str, bench: Bench) -> None:
@@ -79,18 +84,22 @@ def of(estimator: str, *deep: Bug) -> list[Property]:
             quick=estimator == "levant",
         ),
         Property(
-            "parameters take effect together, at a strobe after a commit",
+            "parameters take effect together, at a strobe after a commit, the output stage's with its velocity",
             block,
             partial(parameters_change_at_a_strobe, estimator),
             depth=4,
-            bugs=(Bug(Axis.elaborate, "m.If(strobe & self.commit_pending)", "m.If(self.commit_pending)"),),
+            bugs=(
+                Bug(Axis._active, "m.If(strobe & pending & ~begun)", "m.If(pending & ~begun)"),
+                Bug(Axis._active, "m.If(begun & estimated)", "m.If(estimated)"),
+                Bug(Axis._active, "pending & ~(begun & estimated)", "pending & ~strobe"),
+            ),
         ),
         Property(
             "the drive is zero until a commit",
             block,
             partial(zero_before_a_commit, estimator),
             depth=12,
-            bugs=(PAST_THE_OUTPUT, Bug(Axis.elaborate, "init=word.reset", "init=1")),
+            bugs=(PAST_THE_OUTPUT, Bug(Axis._active, "init=word.reset", "init=1")),
         ),
     ]
 

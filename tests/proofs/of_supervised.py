@@ -27,8 +27,8 @@ PAST_THE_SUPERVISOR = "getattr(self, name).eq(axis.count if name == 'driven' els
 
 
 def supervised(estimator: str, bench: Bench) -> SupervisedAxis:
-    """Return a supervised axis of 1 MHz with the slowest clock that has time for a sample, its products free."""
-    clock_hz = (spec("mhz", estimator).design.latency_to_drive + 2) * MHZ["sample_hz"]
+    """Return a supervised axis of 1 MHz with the slowest clock that it takes, its products free."""
+    clock_hz = spec("mhz", estimator).design.interval * MHZ["sample_hz"]
     return bench.block(SupervisedAxis(AxisSpec(**{**MHZ, "clock_hz": clock_hz}, estimator=estimator)), FreeProducts())
 
 

@@ -1,14 +1,19 @@
 """Axes that sample as fast as they can, and words for them."""
 
+import dataclasses
+from contextlib import suppress
+from itertools import count
+
 import numpy as np
 
+from hardwall.model.checks import FieldError
 from hardwall.model.design import Design
 from hardwall.model.spec import AxisSpec
 
 from .specs import ADJUSTED, MHZ, spec
 
 SLACK = 12
-"""Clocks of every sample after the drive has changed, in which the host may act."""
+"""Clocks of every sample after the drive has changed."""
 
 
 def busy(estimator: str) -> AxisSpec:
@@ -17,6 +22,19 @@ def busy(estimator: str) -> AxisSpec:
     gains = ADJUSTED if estimator == "levant" else None
     rates = {"clock_hz": 100_000 * (latency + SLACK), "sample_hz": 100_000, "actuation_hz": 50_000}
     return AxisSpec(**{**MHZ, **rates, "speed_max_m_per_s": 0.05, "travel_m": 1e-3}, estimator=estimator, gains=gains)
+
+
+def with_clocks(axis: AxisSpec, clocks: int) -> AxisSpec:
+    """Return an axis at the same rates, with so many clocks a sample."""
+    return dataclasses.replace(axis, clock_hz=clocks * axis.sample_hz)
+
+
+def fastest(axis: AxisSpec) -> AxisSpec:
+    """Return an axis at the same rates, with the fewest clocks a sample that it takes."""
+    for clocks in count(1):
+        with suppress(FieldError):
+            return with_clocks(axis, clocks)
+    raise AssertionError("there is no such axis")
 
 
 def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
