@@ -251,7 +251,7 @@ class Axis(wiring.Component):
             begun.eq(Mux(begun, ~estimated, strobe & pending)),
             pending.eq(self.commit | (pending & ~(begun & estimated))),
         ]
-        with m.If(strobe & pending & ~begun):
+        with m.If(strobe & pending):
             m.d.sync += [signal.eq(getattr(self, name)) for name, signal in active.items() if name not in late]
         with m.If(begun & estimated):
             m.d.sync += [signal.eq(getattr(self, name)) for name, signal in active.items() if name in late]

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...model.compiled import compiled
-from ...model.design import strobe_of
+from ...model.design import change_of, strobe_of
 from ...model.spec import AxisSpec
 from ...model.stamped import Edges
 from ..loop.backends import is_exact, number_of, opened
@@ -29,7 +29,7 @@ def _take(controller, state, timing, edges, taken, first, velocity):
     for i in range(len(velocity)):
         strobe = strobe_of(timing, first + i)
         remaining = len(edges.clocks) - taken
-        if remaining > 0 and edges.clocks[taken] < strobe + timing.latency:
+        if remaining > 0 and edges.clocks[taken] < change_of(timing, first + i):
             rest = Edges(edges.clocks[taken:], edges.levels[taken:])
             state, some = sample(controller, state, rest, remaining, strobe)
             taken += some

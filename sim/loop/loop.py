@@ -3,10 +3,13 @@
 Time is the FPGA's clock. Sample k is taken at the strobe, clock (k + 1) D - 1, at time k / sample_hz; the drive that
 follows from it changes `latency` clocks later, on every backend. The plant is advanced exactly over the two intervals
 between those instants, under a constant force in each.
+
+Where samples overlap the next strobe comes before that: the plant is then a strobe ahead of the sample whose drive
+changes, and a model leaves the edges in between to the next sample.
 """
 
 from ...model.compiled import compiled
-from ...model.design import strobe_of
+from ...model.design import change_of, overlap_of, strobe_of
 from ..world.advance import Interval, Moment, advance, advance_quietly
 from .actuation import actuated
 from .controllers import sample, sample_quietly, taken_off
@@ -27,31 +30,33 @@ def run(world, controller, state, progress, memory, until):
             lost.
     """
     plant, timing, edges = world.plant, world.timing, memory.edges
-    first, moment, force_n = progress
+    overlap = overlap_of(timing)
+    first, moment, force_n, at = progress
     k = first
     while k < until and moment.n_edges >= 0:
-        strobe = strobe_of(timing, k)
-        at = moment.motion
+        strobe, changed = strobe_of(timing, k + overlap), change_of(timing, k)
+        now = moment.motion
 
         # From the strobe until the drive changes, the old force acts.
-        interval = Interval(world.after, strobe, timing.latency)
+        interval = Interval(world.after, strobe, changed - strobe)
         after, quiet = advance_quietly(plant, moment, force_n, interval)
         moment = after if quiet else advance(plant, world.encoder, moment, force_n, interval, edges)
 
         if moment.n_edges > 0:
-            state, taken = sample(controller, state, edges, moment.n_edges, strobe)
+            state, taken = sample(controller, state, edges, moment.n_edges, strobe_of(timing, k))
             moment = Moment(moment.motion, moment.cell, taken_off(edges, moment.n_edges, taken))
         else:
-            state = sample_quietly(controller, state, strobe)
+            state = sample_quietly(controller, state, strobe_of(timing, k))
         force_n = actuated(world, memory, k - first, k, at, state)
 
         if sweeps(world.sweep, moment):
-            state, (k, moment, force_n) = sweep(
-                world.sweep, world, controller, state, Progress(k, moment, force_n), memory, first, until
+            state, (k, moment, force_n, at) = sweep(
+                world.sweep, world, controller, state, Progress(k, moment, force_n, at), memory, first, until
             )
-        changed = strobe_of(timing, k) + timing.latency
-        interval = Interval(world.before, changed, timing.clocks_per_sample - timing.latency)
+        changed = change_of(timing, k)
+        interval = Interval(world.before, changed, strobe_of(timing, k + 1 + overlap) - changed)
         after, quiet = advance_quietly(plant, moment, force_n, interval)
         moment = after if quiet else advance(plant, world.encoder, moment, force_n, interval, edges)
         k += 1
-    return state, Progress(k, moment, force_n)
+        at = now if overlap else moment.motion
+    return state, Progress(k, moment, force_n, at)

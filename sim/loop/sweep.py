@@ -23,7 +23,7 @@ from ...model import quadrature, stamped
 from ...model.arithmetic.fixed import wrap
 from ...model.axis import step
 from ...model.compiled import compiled, inlined
-from ...model.design import strobe_of
+from ...model.design import change_of, strobe_of
 from ..world.advance import Interval, Moment, advance
 from ..world.encoder import level, locate
 from ..world.rigid import Motion, glide, net_force
@@ -84,13 +84,13 @@ def _with_edges(world, controller, swept, start, edges):
     """Return (state, moment) after a swept sample, with its edges, as the loop would have left them."""
     timing, motion = world.timing, swept.before
     strobe = strobe_of(timing, swept.sample)
-    changed = strobe - timing.clocks_per_sample + timing.latency
+    changed = change_of(timing, swept.sample - 1)
     moment = Moment(motion, locate(world.encoder, motion.position_m), 0)
     pins, count = level(moment.cell.number), _count(controller, start, moment.cell.number)
     old = swept.state
     decoder = quadrature.resting(controller.decoder, old.decoder, count, pins, changed - old.clock)
     state = stamped.State(old.drive, old.velocity, old.force, old.flags, decoder, old.axis, changed, pins)
-    interval = Interval(world.before, changed, timing.clocks_per_sample - timing.latency)
+    interval = Interval(world.before, changed, strobe - changed)
     moment = advance(world.plant, world.encoder, moment, swept.force_before_n, interval, edges)
     state, taken = stamped.decode(controller, state, edges, moment.n_edges, strobe)
     moment = Moment(moment.motion, moment.cell, taken_off(edges, moment.n_edges, taken))
@@ -107,15 +107,15 @@ def sweep(constants, world, controller, state, progress, memory, first, until):
         world, memory: as in `loop`.
         controller, state: `stamped.Controller` and `stamped.State`.
         progress: the `Progress` right after the change of the drive: `sample` is the sample that it comes from. The
-            progress that is returned is such a one, too.
+            progress that is returned is such a one, too; nobody asks what was `taken`.
         first: number of the sample whose place in the arrays is the first.
         until: number of the first sample not to take.
     """
     if constants is None:
         return state, progress
-    begin, moment, force_n = progress
+    begin, moment, force_n, taken = progress
     # The cell in which the count is 0, once all edges so far are counted; unless one of them is yet to raise a flag.
-    counted = strobe_of(world.timing, begin) + world.timing.latency + quadrature.LATENCY + controller.glitch_clocks
+    counted = change_of(world.timing, begin) + quadrature.LATENCY + controller.glitch_clocks
     decoder = stamped.decode(controller, state, memory.edges, moment.n_edges, counted)[0].decoder
     if quadrature.fault(decoder) != quadrature.fault(state.decoder):
         return state, progress
@@ -139,4 +139,4 @@ def sweep(constants, world, controller, state, progress, memory, first, until):
     if swept.sample == begin:
         return state, progress
     state, moment = _with_edges(world, controller, swept, start, memory.edges)
-    return state, Progress(swept.sample, moment, swept.force_n)
+    return state, Progress(swept.sample, moment, swept.force_n, taken)

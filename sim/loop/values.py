@@ -13,7 +13,8 @@ from ..world.advance import Moment
 from ..world.converter import Converter
 from ..world.encoder import Encoder
 from ..world.euler import Stepped
-from ..world.rigid import Rigid, Span
+from ..world.linear import State
+from ..world.rigid import Motion, Rigid, Span
 from ..world.taylor import Train
 from .record import Kept
 
@@ -24,7 +25,8 @@ EDGE_CAPACITY = 1 << 14
 class World(NamedTuple):
     """The plant and parts that the controller is connected to, with their timing.
 
-    `before` is the time from a changed drive to the next strobe, `after` the time from the strobe to the changed drive.
+    `before` is the time from a changed drive to the next strobe, `after` the time from the last strobe to the changed
+    drive: of the sample itself, or of the next one if samples overlap.
     """
 
     plant: Rigid | Train | Stepped
@@ -48,11 +50,12 @@ class Sweep(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """The state of the loop between the drive's change after sample `sample - 1` and the strobe of `sample`."""
+    """The state of the loop before the drive of `sample` changes, at its strobe; at the next one if samples overlap."""
 
     sample: int
     moment: Moment
     force_n: float
+    taken: Motion | State  # the motion at the strobe of `sample`
 
 
 class Memory(NamedTuple):

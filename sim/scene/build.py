@@ -1,6 +1,7 @@
 """The world of a scene in the form that the loop takes; parts that the scene lacks are left out."""
 
 from ...model import quadrature
+from ...model.design import overlap_of
 from ...model.stamped import Controller
 from ..loop.values import EDGE_CAPACITY, Progress, Sweep, World
 from ..world import device
@@ -79,8 +80,9 @@ def work_of(world: World) -> int:
 def world_of(scene: Scene) -> World:
     """Return the loop's constants for a scene."""
     spec, timing = scene.spec, scene.spec.design.timing
-    after_s = timing.latency / spec.clock_hz
-    before_s = (timing.clocks_per_sample - timing.latency) / spec.clock_hz
+    after = timing.latency - overlap_of(timing) * timing.clocks_per_sample
+    after_s = after / spec.clock_hz
+    before_s = (timing.clocks_per_sample - after) / spec.clock_hz
     parts = device_of(scene)
     if parts is None:
         handle = Handle(scene.handle.mass_kg, scene.handle.viscous_n_s_per_m)
@@ -127,11 +129,11 @@ def sweep_of(scene: Scene, world: World, controller: object) -> Sweep | None:
 
 
 def start_of(scene: Scene, world: World) -> Progress:
-    """Return the start of a run: at rest, under the push alone."""
+    """Return the start of a run: at rest, under the push alone. If samples overlap, the first two are taken there."""
     position_m, push_n = scene.protocol.start_m, converted(world.converter, world.push_n)
     motion = Motion(position_m, 0.0)
     if not isinstance(world.plant, Rigid):
         pulse = world.plant.pulse
         width = width_of(pulse, push_n) if pulse.period else 0
         motion = State(position_m, 0.0, (0.0, 0.0, 0.0), width)
-    return Progress(0, Moment(motion, locate(world.encoder, position_m), 0), push_n)
+    return Progress(0, Moment(motion, locate(world.encoder, position_m), 0), push_n, motion)

@@ -66,19 +66,24 @@ def _hits(scene: Scene, backend: str) -> Callable[[], float]:
     return run
 
 
+def under_cocotb(case: Case, samples: int) -> dict[str, Any]:
+    """Return the `seconds` that the loop under cocotb takes for the first samples of a case, and its `force_sha256`."""
+    with scratch(build_dir() / "cocotb") as folder:
+        report = folder / "report.json"
+        order = {"case": case.job(), "samples": samples, "report": str(report)}
+        environ = {"HARDWALL_LOOP": json.dumps(order), "COCOTB_LOG_LEVEL": "WARNING"}
+        log = build_dir() / "cocotb" / "bench.log"
+        simulate_axis(case.scene.spec, Job("hardwall.sim.studies.cocotb_loop", folder, environ, log=log))
+        return json.loads(report.read_text())
+
+
 def _cocotb(case: Case) -> Callable[[], float]:
     """Return the same for the loop under cocotb, which raises RuntimeError if the force words are not the model's."""
     spec = case.scene.spec
     words = hit.run(_scene(case, {}, COCOTB_SAMPLES / spec.sample_hz), "fixed").force_sha256
 
     def run() -> float:
-        with scratch(build_dir() / "cocotb") as folder:
-            report = folder / "report.json"
-            order = {"case": case.job(), "samples": COCOTB_SAMPLES, "report": str(report)}
-            environ = {"HARDWALL_LOOP": json.dumps(order), "COCOTB_LOG_LEVEL": "WARNING"}
-            log = build_dir() / "cocotb" / "bench.log"
-            simulate_axis(spec, Job("hardwall.sim.studies.cocotb_loop", folder, environ, log=log))
-            result = json.loads(report.read_text())
+        result = under_cocotb(case, COCOTB_SAMPLES)
         if result["force_sha256"] != words:
             raise RuntimeError(f"the RTL under cocotb and the model differ in their first {COCOTB_SAMPLES} force words")
         return COCOTB_SAMPLES / result["seconds"]

@@ -16,7 +16,7 @@ import numpy as np
 from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, ReadOnly, Timer
 
-from ...model.design import strobe_of
+from ...model.design import change_of, overlap_of, strobe_of
 from ...model.stamped import room_for
 from ..loop.controllers import taken_off
 from ..loop.values import EDGE_CAPACITY
@@ -37,7 +37,8 @@ async def closed_loop(dut):
     case = order["case"]
     scene = Case("", case["scene"], case["text"], case["changes"]).scene
     world, edges = world_of(scene), room_for(EDGE_CAPACITY)
-    _, moment, force_n = start_of(scene, world)
+    timing, overlap = world.timing, overlap_of(world.timing)
+    _, moment, force_n, _ = start_of(scene, world)
     await _open(dut, scene, int(level(moment.cell.number)))
     # `_open` has run clock 0. Half a period later, pins change between two rising edges: in clock n, before edge n.
     await Timer(PERIOD_NS // 2, "ns")
@@ -47,9 +48,8 @@ async def closed_loop(dut):
     words: list[int] = []
     began = time.perf_counter()
     for k in range(order["samples"]):
-        strobe = strobe_of(world.timing, k)
-        until = strobe + world.timing.latency
-        interval = Interval(world.after, strobe, world.timing.latency)
+        strobe, until = strobe_of(timing, k + overlap), change_of(timing, k)
+        interval = Interval(world.after, strobe, until - strobe)
         moment = advance(world.plant, world.encoder, moment, force_n, interval, edges)
         taken = 0
         while taken < moment.n_edges and edges.clocks[taken] < until:
@@ -67,7 +67,7 @@ async def closed_loop(dut):
         words.append(drive)
         late.append(drive)
         force_n = converted(world.converter, world.push_n + world.force_lsb_n * late.pop(0))
-        remaining = world.timing.clocks_per_sample - world.timing.latency
+        remaining = strobe_of(timing, k + 1 + overlap) - until
         if remaining:
             interval = Interval(world.before, until, remaining)
             moment = advance(world.plant, world.encoder, moment, force_n, interval, edges)

@@ -86,7 +86,11 @@ class Loop:
     def __init__(self, scene: Scene):
         self._a, self._b, self._c, self._d = _estimator(scene)
         device = equations(_device(scene))
-        n, spec, delay = len(device.rates), scene.spec, scene.delay_samples
+        n, spec = len(device.rates), scene.spec
+        # A force that comes later than the next sample is as late as an amplifier makes it, and by a part of a sample.
+        decoder, per_sample = latency(scene.glitch_clocks), spec.clocks_per_sample
+        late = (decoder + spec.design.latency_to_drive - 1) // per_sample
+        delay = scene.delay_samples + late
         self._seen = np.array(device.seen[:n])
         command, self._drive = n, n + 1
         self._n_state = n + 2 + delay + len(self._a)
@@ -94,11 +98,11 @@ class Loop:
         # Constant forces move the equilibrium, and do not affect its stability.
         rates = np.zeros((n + 1, n + 1))
         rates[:n] = np.delete(device.rates, n, axis=1)
-        seen_s = latency(scene.glitch_clocks) / spec.clock_hz
-        until_drive_s = spec.design.latency_to_drive / spec.clock_hz
-        early, late, applied = (np.eye(self._n_state) for _ in range(3))
+        seen_s = decoder / spec.clock_hz
+        until_drive_s = (spec.design.latency_to_drive - late * per_sample) / spec.clock_hz
+        early, rest, applied = (np.eye(self._n_state) for _ in range(3))
         early[: n + 1, : n + 1] = scipy.linalg.expm(rates * (seen_s + until_drive_s))
-        late[: n + 1, : n + 1] = scipy.linalg.expm(rates * (1 / spec.sample_hz - seen_s - until_drive_s))
+        rest[: n + 1, : n + 1] = scipy.linalg.expm(rates * (1 / spec.sample_hz - seen_s - until_drive_s))
         applied[command] = 0
         if delay:
             # The oldest drive leaves the amplifier, and the new drive enters it.
@@ -109,7 +113,7 @@ class Loop:
             applied[first + delay - 1, self._drive] = 1
         else:
             applied[command, self._drive] = 1
-        after = late @ applied @ early
+        after = rest @ applied @ early
         self._after_first = np.linalg.matrix_power(after @ self._sampled(), spec.samples_per_actuation - 1) @ after
 
     def _sampled(self) -> np.ndarray:

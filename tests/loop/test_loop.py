@@ -2,12 +2,16 @@
 
 import json
 import math
+from collections.abc import Iterable
 
 import numpy as np
 import pytest
 
+from hardwall.model.design import Design, overlap_of
 from hardwall.sim.commands import app
+from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load
+from hardwall.sim.studies.bench import under_cocotb
 from hardwall.sim.walls import hit
 from stimuli.lengths import LONG
 from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, TWO_SECONDS
@@ -73,12 +77,39 @@ def test_rtl_gives_the_models_force_words_on_a_device_of_every_part(output):
     assert same_words("seed-2011", STABLE | ONE_SECOND | parts).max_force_n > 1
 
 
-@pytest.mark.parametrize("estimator", ["levant u", "fdm u"] if LONG else ["levant u"])
-def test_rtl_gives_the_models_force_words_when_samples_leave_no_slack(estimator):
-    """The fastest sampling that a clock allows: the next strobe comes as the drive changes."""
-    clock_hz = load("mhz", ESTIMATORS[estimator]).spec.design.latency_to_drive * 1_000_000
-    slow = {"controller.clock_hz": clock_hz, "controller.glitch_clocks": 0, "protocol.measure_s": 0.01}
-    assert same_words("mhz", ESTIMATORS[estimator] | ONE_SECOND | slow).max_force_n > 1
+QUICK_HIT = {
+    "controller.glitch_clocks": 0, "controller.travel_m": 0.01, "controller.speed_max_m_per_s": 0.2,
+    "encoder.count_m": 1e-7, "protocol.start_m": -1e-5, "protocol.push_n": 20.0, "protocol.settle_s": 4e-3,
+    "protocol.mean_s": 1e-3, "protocol.measure_s": 2e-3, "wall.stiffness_n_per_m": 100e3,
+}  # fmt: skip
+"""A hard hit near the start of `mhz`: a count at every other sample, and a wall that throws the handle back."""
+CLOSE = [
+    (estimator, overlap)
+    for estimator in ("levant u", "fdm u", "levant-edge u")
+    for overlap in ("all", "no slack", "some", "none")
+    if LONG or estimator == "levant u" or overlap == "all"
+]
+
+
+def spacings(design: Design, overlap: str) -> Iterable[int]:
+    """Return the clocks a sample with which samples overlap so much; the long test has every number of them."""
+    least, latency = design.interval, design.latency_to_drive
+    few = {"all": [least], "some": [latency - 1], "no slack": [latency], "none": [latency + 2]}
+    every = few | {"some": range(least + 1, latency), "none": [latency + 1, latency + 2]}
+    return (every if LONG else few)[overlap]
+
+
+@pytest.mark.parametrize(("estimator", "overlap"), CLOSE)
+def test_rtl_gives_the_models_force_words_however_closely_samples_follow(estimator, overlap):
+    """From the fewest clocks that the axis takes: two samples are under way at once, or the strobe comes as the drive
+    changes, or before the next one there is a rest."""
+    changes = ESTIMATORS[estimator] | QUICK_HIT
+    for clocks in spacings(load("mhz", changes).spec.design, overlap):
+        case = Case.of("mhz", changes | {"controller.clock_hz": clocks * 1_000_000})
+        assert overlap_of(case.scene.spec.design.timing) == (overlap in ("all", "some"))
+        result = same_words("mhz", case.changes)
+        assert result.max_force_n > 30
+        assert under_cocotb(case, result.samples)["force_sha256"] == result.force_sha256
 
 
 def test_rtl_gives_the_models_force_words_and_flags_when_the_encoder_is_too_fast():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hardwall.model import quadrature
-from hardwall.model.design import strobe_of
+from hardwall.model.design import change_of
 from hardwall.model.stamped import room_for
 from hardwall.sim.loop import loop
 from hardwall.sim.loop.backends import number_of, opened
@@ -143,10 +143,10 @@ def moving(changes: dict | None = None) -> Run:
 def swept_from(run: Run, position_m: float, velocity_m_per_s: float, force_n: float, samples: int = 1) -> int:
     """Return how many samples are swept from a motion at the change of the drive after the run's last sample."""
     first = run.at.sample - 1
-    changed = strobe_of(run.world.timing, first) + run.world.timing.latency
+    changed = change_of(run.world.timing, first)
     state = run.state._replace(clock=changed)
     moment = Moment(Motion(position_m, velocity_m_per_s), locate(run.world.encoder, position_m), 0)
-    at = Progress(first, moment, force_n)
+    at = Progress(first, moment, force_n, moment.motion)
     _, end = sweep(run.world.sweep, run.world, run.controller, state, at, run.memory, first, first + 1 + samples)
     return end.sample - first
 
@@ -200,12 +200,12 @@ def test_a_fault_that_is_under_way_is_raised_before_anything_is_swept():
     """Two edges in one clock, which the decoder has not seen when the drive changes, and a slow handle behind them."""
     run = moving()
     first = run.at.sample - 1
-    changed = strobe_of(run.world.timing, first) + run.world.timing.latency
+    changed = change_of(run.world.timing, first)
     moment = Moment(Motion(-0.03, 0.1), locate(run.world.encoder, -0.03), 2)
     run.memory.edges.clocks[:2], run.memory.edges.levels[:2] = changed - 1, (run.state.level ^ 1, run.state.level ^ 3)
     rest = quadrature.resting(run.controller.decoder, run.state.decoder, 0, run.state.level, 1)
     state = run.state._replace(decoder=rest, clock=changed - 20)
-    at = Progress(first, moment, 0.2)
+    at = Progress(first, moment, 0.2, moment.motion)
     _, end = sweep(run.world.sweep, run.world, run.controller, state, at, run.memory, first, first + 9)
     assert end.sample == first
     run.memory.edges.clocks[1] = changed + 50  # the same edges one by one
@@ -234,7 +234,7 @@ def test_the_speed_at_the_limit_leaves_edges_apart():
             pins = int(level(cell.number))
             decoder = quadrature.resting(run.controller.decoder, run.state.decoder, count, pins, 1)
             run.state = run.state._replace(decoder=decoder, level=pins)
-            run.at = Progress(0, Moment(motion, cell, 0), run.scene.handle.coulomb_n)
+            run.at = Progress(0, Moment(motion, cell, 0), run.scene.handle.coulomb_n, motion)
             run.to(50)
         assert_equal(swept, by_edges)
 

@@ -33,7 +33,7 @@ def zero_without_enable(estimator: str, bench: Bench) -> None:
 def parameters_change_at_a_strobe(estimator: str, bench: Bench) -> None:
     axis = bench.block(axis_of(estimator), FreeProducts())
     begun, late = bench.inner["begun"], axis.spec.design.output.words
-    first = bench.past(bench.inner["strobe"] & axis.commit_pending & ~begun & ~bench.reset)
+    first = bench.past(bench.inner["strobe"] & axis.commit_pending & ~bench.reset)
     last = bench.past(begun & axis.estimated & ~bench.reset)
     for word in axis.spec.design.words:
         active, taken = bench.inner[f"active_{word.name}"], last if word in late else first
@@ -41,7 +41,7 @@ def parameters_change_at_a_strobe(estimator: str, bench: Bench) -> None:
         bench.promise(~taken | (active == bench.past(getattr(axis, word.name))))
     # None is left out: between the first and the last of them the commit is pending, and the last end it.
     bench.promise(~begun | axis.commit_pending)
-    bench.promise(~first | begun)
+    bench.promise(~first | begun | last)
     bench.promise(~last | ~begun & (axis.commit_pending == bench.past(axis.commit)))
 
 
@@ -89,7 +89,7 @@ def of(estimator: str, *deep: Bug) -> list[Property]:
             partial(parameters_change_at_a_strobe, estimator),
             depth=4,
             bugs=(
-                Bug(Axis._active, "m.If(strobe & pending & ~begun)", "m.If(pending & ~begun)"),
+                Bug(Axis._active, "m.If(strobe & pending)", "m.If(pending)"),
                 Bug(Axis._active, "m.If(begun & estimated)", "m.If(estimated)"),
                 Bug(Axis._active, "pending & ~(begun & estimated)", "pending & ~strobe"),
             ),
