@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy
 
 from hardwall.model.quadrature import latency
 from hardwall.sim.scene.load import load
@@ -25,6 +26,12 @@ PROMPT = {
     "amplifier": None, "controller.actuation_hz": 10_000, "controller.stiffness_max_n_per_m": 1e6,
     "encoder.count_m": 1e-8, "protocol.threshold_mm": 5e-4,
 }  # fmt: skip
+# As few clocks a sample as the axis takes: the force comes behind the next sample. An oscillation soon leaves the wall.
+OVERLAPPING = {
+    "amplifier": None, "controller.sample_hz": 50_000, "controller.actuation_hz": 50_000,
+    "controller.stiffness_max_n_per_m": 2e6, "controller.speed_max_m_per_s": 0.01, "protocol.start_m": -2e-5,
+    "protocol.threshold_mm": 1e-3,
+}  # fmt: skip
 CASES = {
     "fdm, soft": ("fdm", {}, 10.0, {}),
     "fdm, damped": ("fdm", {}, 60.0, {}),
@@ -32,6 +39,7 @@ CASES = {
     "filter of 1 kHz": ("butterworth", {"cutoff_hz": 1000.0}, 100.0, {}),
     "force at every sample": ("fdm", {}, 10.0, PROMPT),
     "filter, force at every sample": ("butterworth", {"cutoff_hz": 300.0}, 30.0, PROMPT),
+    "samples overlap": ("fdm", {}, 5.0, OVERLAPPING),
     "amplifier with a bandwidth": ("fdm", {}, 20.0, AMPLIFIER),
     "cable, encoder at the handle": ("fdm", {}, 20.0, CABLE),
     "cable, encoder at the motor": ("fdm", {}, 7.0, CABLE | {"transmission.encoder_at": "motor"}),
@@ -46,6 +54,9 @@ def test_the_simulation_turns_unstable_within_2_percent_of_the_linear_limit(case
     name, gains, damping, others = CASES[case]
     changes = LINEAR | others | {"controller.estimator": name, "wall.damping_n_s_per_m": damping}
     changes |= {f"controller.gains.{name}": gains} if gains else {}
+    if others.items() >= OVERLAPPING.items():
+        interval = load("seed-2011", changes).spec.design.interval
+        changes["controller.clock_hz"] = interval * OVERLAPPING["controller.sample_hz"]
     limit = theory.linear_limit_n_per_m(theory.Loop(load("seed-2011", changes)), damping)
     assert limit > 1000
     for share, stable in ((0.98, True), (1.02, False)):
@@ -54,6 +65,39 @@ def test_the_simulation_turns_unstable_within_2_percent_of_the_linear_limit(case
         )
         assert result.flags == [] or not result.stable
         assert result.stable == stable, f"{share} of {limit} N/m: RMS {result.rms_m} m"
+
+
+def radius_clock_by_clock(scene, stiffness_n_per_m: float, damping_n_s_per_m: float) -> float:
+    """Return the radius of a rigid handle's loop with `fdm`, from a matrix of every clock and a pipe of forces."""
+    clock_s, per_sample, handle = 1 / scene.spec.clock_hz, scene.spec.clocks_per_sample, scene.handle
+    pipe = latency(scene.glitch_clocks) + scene.spec.design.latency_to_drive + scene.delay_samples * per_sample
+    x, v, before, held, first = range(5)
+    acting = first + pipe - 1
+    rates = np.zeros((3, 3))
+    rates[0, 1], rates[1] = 1, np.array([0, -handle.viscous_n_s_per_m, 1]) / handle.mass_kg
+    moved = scipy.linalg.expm(rates * clock_s)
+    clock = np.zeros((acting + 1, acting + 1))
+    clock[np.ix_([x, v], [x, v, acting])] = moved[:2]
+    clock[before, before] = clock[held, held] = clock[first, held] = 1
+    clock[range(first + 1, acting + 1), range(first, acting)] = 1
+    sample, per_s = np.eye(acting + 1), damping_n_s_per_m * scene.spec.sample_hz
+    sample[before], sample[held] = 0, 0
+    sample[before, x], sample[held, x], sample[held, before] = 1, -stiffness_n_per_m - per_s, per_s
+    return float(np.abs(np.linalg.eigvals(np.linalg.matrix_power(clock, per_sample) @ sample)).max())
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 20e-6])
+def test_the_matrix_of_a_period_is_that_of_its_clocks(delay_s):
+    """From the fewest clocks a sample on: the force comes behind the next sample, with it, and before it."""
+    changes = LINEAR | OVERLAPPING | {"controller.estimator": "fdm", "handle.mass_kg": 0.005}
+    changes |= {"amplifier.delay_s": delay_s}
+    design = load("seed-2011", changes).spec.design
+    path = design.latency_to_drive + latency(0)
+    for clocks in (design.interval, path - 1, path, path + 1, 2 * path):
+        scene = load("seed-2011", changes | {"controller.clock_hz": clocks * 50_000})
+        for stiffness, damping in ((300e3, 5.0), (800e3, 20.0), (100e3, 60.0)):
+            exact = radius_clock_by_clock(scene, stiffness, damping)
+            assert theory.Loop(scene).radius(stiffness, damping) == pytest.approx(exact, rel=1e-9), clocks
 
 
 def test_a_loop_without_damping_anywhere_is_unstable_at_every_stiffness():
