@@ -120,14 +120,17 @@ def summary(design: Design, runs: Sequence[Placed], glitch_clocks: int) -> dict:
             least 0.
         lut4, ff, dsp, bram: cells in use; available: cells of the part (flip-flops: at most one a LUT4).
         untimed: types of cells in use whose delays are not known; the paths of these are not in fmax.
-        clocks_per_sample: least clocks between two samples; max_sample_hz: the sample rate that follows at fmax_mhz.
+        clocks_per_sample, interval_clocks: the fewest clocks from a sample to the next; max_sample_hz: the sample rate
+            that follows at fmax_mhz.
         latency_clocks: clock edges from the first that sees a pin changed to the one that changes the drive that the
-            supervisor lets out, both included, if the sample is taken as soon as the decoder has counted the edge.
+            supervisor lets out, both included, if the sample is taken as soon as the decoder has counted the edge;
+            pin_to_force_ns: the longest time that follows at fmax_mhz, for the pin may change just behind an edge.
         critical_path: the longest path with the slowest seed.
     """
     spec, part = design.top.spec, design.board.part
     fmax = statistics.median(run.fmax_mhz for run in runs)
     slack = 1e9 / spec.clock_hz - 1e3 / fmax
+    interval, latency = spec.design.interval, quadrature.latency(glitch_clocks) + design.top.drive_latency
     slowest = max(runs, key=lambda run: (run.longest, run.path))
     return {
         "estimator": spec.estimator,
@@ -139,8 +142,10 @@ def summary(design: Design, runs: Sequence[Placed], glitch_clocks: int) -> dict:
         "slack_ns": round(slack, 3),
         "ok": slack >= 0,
         **size(part, runs[0].report["utilization"], [cell["type"] for cell in design.cells.values()]),
-        "clocks_per_sample": spec.design.latency_to_drive,
-        "max_sample_hz": round(fmax * 1e6 / spec.design.latency_to_drive),
-        "latency_clocks": quadrature.latency(glitch_clocks) + design.top.drive_latency,
+        "clocks_per_sample": interval,
+        "interval_clocks": interval,
+        "max_sample_hz": round(fmax * 1e6 / interval),
+        "latency_clocks": latency,
+        "pin_to_force_ns": round(latency * 1e3 / fmax, 1),
         "critical_path": f"{slowest.path}, {slowest.longest:.1f} ns",
     }

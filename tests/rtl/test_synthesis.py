@@ -47,7 +47,10 @@ def test_report_of_a_part_that_nextpnr_knows(calls):
     assert (report["lut4"], report["dsp"], report["bram"], report["ff"]) == (0, 1, 2, 3)
     assert report["available"] == {"lut4": 100, "dsp": 101, "bram": 102}
     assert report["untimed"] == []
-    assert (report["clocks_per_sample"], report["max_sample_hz"]) == (latency, round(60e6 / latency))
+    interval = axis.design.interval
+    assert report["clocks_per_sample"] == report["interval_clocks"] == interval < latency
+    assert report["max_sample_hz"] == round(60e6 / interval)
+    assert report["pin_to_force_ns"] == round(report["latency_clocks"] * 1e9 / 60e6, 1)
     assert (
         report["latency_clocks"]
         == quadrature.latency(2) + Board(axis).drive_latency
