@@ -11,7 +11,7 @@ from hardwall.hdl.supervised import SupervisedAxis
 from hardwall.model import monitors
 from hardwall.model.supervised import FROM_AXIS, FROM_OUTSIDE
 from hardwall.model.supervisor import ALL, ARMED, CAUSES, DISARMED, TRIPPED, names
-from hardwall.testing import SAMPLES, SEED, Bench, Recorded, simulate
+from hardwall.testing import SAMPLES, SEED, Bench, Recorded, parameters, simulate
 from oracles.axis import AxisTwin
 from oracles.supervised import BITS, Follower
 from stimuli.specs import spec
@@ -23,13 +23,19 @@ SLOW = {"clock_hz": 10_000, "sample_hz": 250, "actuation_hz": 125, "speed_max_m_
 SLOW |= {"damping_max_n_s_per_m": 800e3}
 
 
-def make() -> Recorded:
-    return Recorded(SupervisedAxis(dataclasses.replace(spec("narrow", "fdm"), **SLOW)))
+def make(overlaps: bool) -> Recorded:
+    axis = dataclasses.replace(spec("narrow", "fdm"), **SLOW)
+    clocks = axis.design.interval if overlaps else axis.clocks_per_sample
+    per_s = axis.clock_hz // clocks / axis.sample_hz
+    fields = ("sample_hz", "actuation_hz", "speed_max_m_per_s")
+    faster = {name: type(getattr(axis, name))(getattr(axis, name) * per_s) for name in fields}
+    faster["damping_max_n_s_per_m"] = axis.damping_max_n_s_per_m / per_s
+    return Recorded(SupervisedAxis(dataclasses.replace(axis, **faster)))
 
 
 @cocotb.test()
 async def follows_models(dut):
-    recorded = make()
+    recorded = make(**parameters())
     design, bench = recorded.component.design, Bench(dut, recorded)
     await bench.reset()
     world, record, random = World(design, SEED), bench.dut.record, plain.Random(SEED)
@@ -69,8 +75,9 @@ def unlike(shown: dict[str, int], wanted: dict[str, int]) -> str:
     return ", ".join(f"{name} is {shown.get(name)}, not {wanted.get(name)}" for name in names_of_both)
 
 
-def test_rtl():
-    simulate(__file__, make)
+@pytest.mark.parametrize("overlaps", [False, True])
+def test_rtl(overlaps):
+    simulate(__file__, make, overlaps=overlaps)
 
 
 def test_every_cause_has_one_source():

@@ -91,7 +91,8 @@ class AxisTwin:
             # The output stage slews from the drive, which a low enable has made zero.
             begun = self.output._replace(drive=self.drive)
             self.pulses[self.clocks + 1] = {"sampled": 1, "actuated": int(begun.phase == 0)}
-            self.output, limited = output.step(params.output, begun, force, self.enabled and not fault)
+            stage = d.output.params(self.words)
+            self.output, limited = output.step(stage, begun, force, self.enabled and not fault)
             self.drive = self.output.drive
             self.raised[self.clocks + 1] = limited << params.output_bit
 
@@ -105,23 +106,24 @@ class AxisTwin:
         self.due[now + d.latency_to_drive - 1] += [drive]
 
     def _take_words(self, given: dict[str, int]) -> None:
-        """Take the words that wait for the sample that begins; the output stage takes its own with the velocity."""
-
-        def taken() -> None:
-            self.pending = self.begun = False
-
-        self.words = {name: given[name] for name in self.words if name in given} | self.fixed()
-        self.begun = True
-        self.due[self.clocks + self.design.estimator.latency] += [taken]
+        """Take the words that wait for the sample that begins, or those of the output stage for its velocity."""
+        estimated = "estimated" in self.pulses.get(self.clocks, {})
+        begins, ends = self.strobe and self.pending, self.begun and estimated
+        late = {word.name for word in self.design.output.words}
+        for name in (self.words.keys() & given.keys()) - set(FIXED):
+            if (name in late and ends) or (name not in late and begins):
+                self.words[name] = given[name]
+        self.begun = not estimated if self.begun else begins
+        self.pending = bool(given["commit"]) or (self.pending and not ends)
 
     def advance(self, given: dict[str, int], enabled: int) -> None:
         """Advance by one clock edge, with the inputs just before it and the level of `drive_enable` there."""
         self.sticky = (0 if given["clear_flags"] else self.sticky) | self._raised()
         channels = [given[name] for name in ("encoder_a", "encoder_b", "encoder_z")]
         inputs = quadrature.Inputs(*channels, self.words["encoder_glitch_clocks"], self.words["encoder_invert"])
+        if self.pending or given["commit"]:
+            self._take_words(given)
         if self.strobe:
-            if self.pending and not self.begun:
-                self._take_words(given)
             self._sample()
             self.restart = 0
         pulses = quadrature.Strobes(*(given[name] for name in PULSES))
@@ -133,6 +135,4 @@ class AxisTwin:
             self.drive = 0
         if given["preload"]:
             self.restart = 1
-        if given["commit"]:
-            self.pending = True
         self.clocks += 1
