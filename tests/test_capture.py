@@ -3,7 +3,8 @@
 import dataclasses
 import random as plain
 from collections import Counter
-from itertools import pairwise
+from contextlib import suppress
+from itertools import count, pairwise
 
 import cocotb
 import numpy as np
@@ -25,6 +26,7 @@ from hardwall.model.capture import (
     Inputs,
     Record,
 )
+from hardwall.model.checks import FieldError
 from hardwall.model.supervisor import ARMED, DISARMED, TRIPPED
 from hardwall.testing import SAMPLES, SEED, Recorded, check, parameters, play, simulate
 from stimuli.specs import spec
@@ -308,6 +310,42 @@ def test_a_frozen_ring_stays_as_it_is():
     axis.take(50)
     assert axis.records() == records
     assert axis.state.capture_stamp == state.capture_stamp
+
+
+def captured(design: Design, apart: int) -> list[Record]:
+    """Return the records of an axis with so many clocks from a sample to the next, which overlap: all of sample k is k,
+    but its wall has a force if k is odd."""
+    memory, state, path = design.memory(), START, design.spec.design
+    behind = path.wall.latency + path.output.latency
+    for clock in range((RECORDS + 4) * apart):
+        estimated, walled, drive = (
+            (clock + ahead) // apart for ahead in (behind, path.output.latency, -1)
+        )  # fmt: skip
+        values = {"count": estimated, "velocity": estimated, "wall_force": walled % 2, "driven": drive}
+        begins = int(clock == apart // 2)
+        pulses = {"sampled": int(clock % apart == 0), "capture_start": begins, "capture_trigger": begins}
+        state = capture.step(design.params, memory, state, Inputs(**values, **pulses, stamp=clock))
+    assert state.capture_state == DONE
+    return [design.record(tuple(registers)) for registers in np.roll(memory, -state.ring, axis=0).tolist()]
+
+
+def test_records_of_samples_that_overlap_are_of_one_sample_each():
+    """With the fewest clocks that are not refused; one less would be too few."""
+    slow = spec("mhz", "fdm")
+    for apart in count(slow.design.interval):
+        with suppress(FieldError):
+            design = Design(dataclasses.replace(slow, clock_hz=apart * slow.sample_hz), RECORDS)
+            break
+    assert design.spec.design.interval < apart
+
+    def whole(record: Record) -> bool:
+        return record.velocity == record.driven == record.count and record.flags >> 2 & 1 == record.count % 2
+
+    records = captured(design, apart)
+    assert all(map(whole, records))
+    assert {after.count - before.count for before, after in pairwise(records)} == {1}
+    records = captured(design, apart - 1)
+    assert not all(map(whole, records)) or {b.count - a.count for a, b in pairwise(records)} != {1}
 
 
 def test_its_verilog_says_nothing_of_first_contents():
