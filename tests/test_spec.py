@@ -60,7 +60,7 @@ def test_gain_words_are_as_close_as_promised(name):
         ({"force_resolution_n": 1e-9}, r"force_resolution_n must be .* to 40"),
         ({"force_resolution_n": 41.0}, r"force_resolution_n must be .* to 40"),
         (
-            {"sample_hz": 1_000_000},
+            {"sample_hz": 2_000_000},
             r"sample_hz must leave 24 clocks from a sample to the next, so at most 500000 at clock_hz 12000000, not",
         ),
         ({"estimator": "nobody"}, f"estimator must be one of {', '.join(ESTIMATORS)}, not 'nobody'"),
