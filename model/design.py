@@ -119,6 +119,11 @@ class Design:
         )
         self.flags = (*ENCODER_FLAGS, *self.estimator.flags, *self.output.flags)
         self._flag_bits = len(ENCODER_FLAGS), len(ENCODER_FLAGS) + len(self.estimator.flags)
+        if self.estimator.latency < self.wall.lead:
+            raise ValueError(
+                f"estimator must take {self.wall.lead} clocks or more, as the wall's lead does, "
+                f"not {self.estimator.latency}"
+            )
         self.latency_to_drive = self.estimator.latency + self.wall.latency + self.output.latency
         behind = self.wall.latency + self.output.latency
         self.interval = max(self.estimator.interval, self.wall.interval, self.output.interval, behind + 1)

@@ -61,7 +61,7 @@ def test_gain_words_are_as_close_as_promised(name):
         ({"force_resolution_n": 41.0}, r"force_resolution_n must be .* to 40"),
         (
             {"sample_hz": 2_000_000},
-            r"sample_hz must leave 24 clocks from a sample to the next, so at most 500000 at clock_hz 12000000, not",
+            r"sample_hz must leave 10 clocks from a sample to the next, so at most 1200000 at clock_hz 12000000, not",
         ),
         ({"estimator": "nobody"}, f"estimator must be one of {', '.join(ESTIMATORS)}, not 'nobody'"),
         (
@@ -73,6 +73,12 @@ def test_gain_words_are_as_close_as_promised(name):
 def test_impossible_axes_are_refused(changes, message):
     with pytest.raises(ValueError, match=message):
         AxisSpec(**(PAPER | changes))
+
+
+def test_an_estimator_that_is_too_quick_for_the_wall_is_refused(monkeypatch):
+    monkeypatch.setattr(ESTIMATORS["fdm"], "latency", 1)
+    with pytest.raises(ValueError, match=r"^estimator must take 2 clocks or more, as the wall's lead does, not 1$"):
+        AxisSpec(**PAPER, estimator="fdm")
 
 
 @pytest.mark.parametrize("changes", [{"clock_hz": 12e6}, {"count_m": "1"}, {"travel_m": True}])
