@@ -146,7 +146,10 @@ class Design:
         axis = spec.design
         # The next velocity comes before the next drive, and the next force of the wall in between.
         behind = axis.latency_to_drive - axis.estimator.latency
-        fewest = max(behind + TAKEN_AT["velocity"] + 1, axis.output.latency + TAKEN_AT["flags"] + 1, RECORD_REGISTERS)
+        # The ring is frozen a clock behind its last record, before another begins.
+        fewest = max(
+            behind + TAKEN_AT["velocity"] + 1, axis.output.latency + TAKEN_AT["flags"] + 1, RECORD_REGISTERS + 1
+        )
         if spec.clocks_per_sample < fewest:
             raise FieldError(
                 "sample_hz",
