@@ -125,7 +125,7 @@ class Top:
     still: tuple[str, ...] = ()
 
 
-# No spec lets a sample begin before the last one's drive has changed.
+# No spec lets a sample begin before the last one's velocity is there.
 NEVER = ("strobe_busy",)
 TOPS = (
     Top("cells", "cells", Cells),
