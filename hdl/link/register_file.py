@@ -34,7 +34,7 @@ class RegisterFile(wiring.Component):
     - SNAPSHOT: take the status for what is read from then on, in the turns of `design.turns`: what is taken in one turn
       is of one clock, and every value is whole. `taken_clocks` has the clock of each.
 
-    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ and READ; 2 for WRITE, 3 for COUNT; 4 for
+    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ; 2 for READ; 3 for WRITE and COUNT; 4 for
     CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if `commit` or `preload` is marked, `shift_clocks`
     and the wait for the sample. After a reset the first `start` may come at once; it waits up to `boot_clocks`.
 
@@ -191,19 +191,20 @@ class RegisterFile(wiring.Component):
         # The lowest bits of the address, an area, and whether it is in the window.
         step, shift = Signal(range(END)), Signal(CELL_BITS)
         place, area, window, counting = Signal(range(END)), Signal(Area), Signal(), Signal()
-        cell = Signal(CELL_BITS)
         m.d.comb += [
             read.addr.eq(Cat(place, Mux(window, address[len(place) : within], area), window)),
             write.addr.eq(place),
             write.data.eq(shift + counting),
-            cell.eq(read.data),
-            host.data.eq(cell),
+            host.data.eq(shift),
         ]
+        # A memory is slow: what it gives goes to a register, and from there to the host.
+        found, reading = Signal(CELL_BITS), Signal()
+        m.d.comb += found.eq(read.data)
         if registers.capture:
             in_capture = (address[15:] == CAPTURE >> 15) & less(address[:15], registers.capture_registers)
             m.d.comb += self.capture_address.eq(address)
-            with m.If(address[15]):
-                m.d.comb += host.data.eq(self.capture_data & self.capture_done.replicate(CELL_BITS))
+            with m.If(reading & address[15]):
+                m.d.comb += found.eq(self.capture_data & self.capture_done.replicate(CELL_BITS))
         with m.If(host.clear):
             m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0)]
 
@@ -250,7 +251,7 @@ class RegisterFile(wiring.Component):
         fetched, given, turning = Signal(), Signal(), Signal()
         turned = Cat(shift[1:], Mux(fresh, taken, extended & shift[-1]))
         with m.If(fetched | given | turning):
-            m.d.sync += shift.eq(Mux(turning, turned, Mux(given, host.value, read.data)))
+            m.d.sync += shift.eq(Mux(turning, turned, Mux(given, host.value, found)))
 
         with m.FSM():
             with m.State("BOOT"):
@@ -286,7 +287,7 @@ class RegisterFile(wiring.Component):
                             m.d.sync += host.refused.eq(1)
                         m.next = "LEAST"
                     with m.Case(Operation.READ):
-                        m.next = "DONE"
+                        m.next = "READ"
                     with m.Case(Operation.WRITE):
                         m.next = "TAKE"
                         m.d.sync += marks.eq(marks | wanted)
@@ -301,6 +302,9 @@ class RegisterFile(wiring.Component):
                     with m.Case(Operation.SNAPSHOT):
                         m.d.sync += step.eq(design.turns[0][1][0].address + 1)
                         m.next = "SWEEP"
+            with m.State("READ"):
+                m.d.comb += [fetched.eq(1), reading.eq(1)]
+                m.next = "DONE"
             with m.State("LEAST"):
                 m.d.comb += [place.eq(below), area.eq(Area.MOST), fetched.eq(1)]
                 m.next = "ABOVE"

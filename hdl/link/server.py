@@ -28,7 +28,7 @@ class Server(wiring.Component):
     to check it, and once to do it, so nothing is done of a frame that ends in an exception. A frame that reads takes a
     snapshot before the first register.
 
-    Latency: to the first byte of an answer less than 30 clocks, 21 for every register to write, 3 for every register to
+    Latency: to the first byte of an answer less than 30 clocks, 21 for every register to write, 4 for every register to
     read, and the register file's times for a snapshot and a commit. Throughput: one frame after the other; a byte of an
     answer waits for the line.
 

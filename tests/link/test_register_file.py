@@ -17,7 +17,7 @@ from stimuli.supervised import CAPTURE_REGISTERS, supervised
 CLOCKS = {
     Operation.CHECK_READ: 1,
     Operation.CHECK_WRITE: 4,
-    Operation.READ: 1,
+    Operation.READ: 2,
     Operation.WRITE: 3,
     Operation.COUNT: 3,
 }

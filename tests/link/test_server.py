@@ -192,7 +192,7 @@ async def the_largest_request_is_answered_in_time(dut):
     begun, asked = len(world.sent.rows), world.bench.clock_number()
     await world.request(pdu)
     written, component = len(pulses) + len(values), RegisterFile(world.design)
-    most = 30 + 21 * written + 3 * 124 + component.snapshot_clocks + component.shift_clocks
+    most = 30 + 21 * written + 4 * 124 + component.snapshot_clocks + component.shift_clocks
     # The commit waits 50 clocks for its sample.
     assert world.sent.clocks[begun] - asked - len(pdu) <= most + 50 < 6000
 

@@ -119,6 +119,7 @@ def every_operation_ends(bench: Bench) -> None:
         "BOOT_TAKE": boot + 2,
         "BOOT_WRITE": boot + 1,
         "IDLE": 0,
+        "READ": 2,
         "LEAST": 4,
         "ABOVE": 3,
         "BELOW": 2,
@@ -154,7 +155,7 @@ def every_operation_ends(bench: Bench) -> None:
     shifts = Cat(inner["marks"][names.index(name)] for name in ("commit", "preload")).any()
     latencies = {
         Operation.CHECK_READ: 1,
-        Operation.READ: 1,
+        Operation.READ: 2,
         Operation.WRITE: 3,
         Operation.COUNT: 3,
         Operation.CHECK_WRITE: 4,
