@@ -47,7 +47,7 @@ def test_products_and_memories_are_those_of_their_cells():
 
 def test_the_netlist_of_an_axis_is_equal_to_it():
     outcome = compared(AXIS, netlist_of(AXIS), 2_000)
-    assert outcome.netlist.cells["dsp"] == 1
+    assert outcome.netlist.cells["dsp"] == 2
     assert outcome.clocks >= 2_000 * outcome.netlist.component.spec.clocks_per_sample
     assert outcome.different == 0, outcome.explanation
     # So few samples need not have one with a velocity beyond its range.

@@ -64,10 +64,10 @@ def test_a_bug_must_be_of_a_part_that_the_source_has_once():
     code = Output.elaborate.__code__
     with pytest.raises(ValueError, match=r"^Output\.elaborate must have 'self\.drive' once, not \d+$"):
         Bug(Output.elaborate, "self.drive", "0").seeded().__enter__()
-    with Bug(Output.elaborate, "turn & allowed", "turn & 1").seeded():
+    with Bug(Output.elaborate, "turn & self.enable", "turn & 1").seeded():
         assert Output.elaborate.__code__ is not code
     assert Output.elaborate.__code__ is code
-    assert "& allowed" in inspect.getsource(Output.elaborate)
+    assert "turn & self.enable" in inspect.getsource(Output.elaborate)
 
 
 def test_a_value_that_loses_a_bit_is_found_unless_it_is_meant_to_wrap():

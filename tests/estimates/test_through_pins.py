@@ -32,7 +32,7 @@ def extremes(spec, samples=20_000) -> np.ndarray:
     """Return counts that move as fast as the pins allow, turn at every sample, rest, wrap the axis's count, wander."""
     random, most = rng(), spec.clocks_per_sample
     parts = [
-        np.full(20, most),
+        np.full(200, most),
         np.tile([most, -most], 20),
         np.tile([most, -1, 1 - most, 0], 20),
         np.zeros(50, np.int64),

@@ -1,11 +1,12 @@
 """What the whole axis promises, with any estimator's arithmetic: limits, zero, and parameters that change together."""
 
+from dataclasses import replace
 from functools import partial
 
 from hardwall.hdl.axis import Axis
 from hardwall.hdl.output import Output
 from hardwall.model.spec import AxisSpec
-from stimuli.specs import MHZ, spec
+from stimuli.specs import MHZ
 
 from .bench import Bench
 from .bugs import Bug
@@ -15,8 +16,8 @@ from .widths import FreeProducts
 
 def axis_of(estimator: str) -> Axis:
     """Return an axis of 1 MHz with the slowest clock that it takes, so that proofs see many samples, which overlap."""
-    clocks = spec("mhz", estimator).design.interval
-    return Axis(AxisSpec(**{**MHZ, "clock_hz": clocks * MHZ["sample_hz"]}, estimator=estimator))
+    roomy = AxisSpec(**MHZ, estimator=estimator)
+    return Axis(replace(roomy, clock_hz=roomy.design.interval * roomy.sample_hz))
 
 
 def never_beyond_its_limit(estimator: str, bench: Bench) -> None:
