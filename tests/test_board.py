@@ -96,7 +96,7 @@ async def a_random_host_at_a_random_handle(dut):
             host.change(drive_enable=1, external_fault=1, emergency_stop=1)
         # A look takes longer than an act; what is inside is held to the twin at every clock.
         look = random.random()
-        status = await host.look(*LOOKS[look > 0.1]) if look < 0.4 else host.shown()
+        status = await host.look(*LOOKS[look > 0.2]) if look < 0.4 else host.shown()
         seen.append(status)
         if status["state"] == TRIPPED:
             await host.write(acknowledged=status["latched"])
