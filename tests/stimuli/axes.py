@@ -6,14 +6,20 @@ from itertools import count
 
 import numpy as np
 
+from hardwall.model.axes import AxesSpec
 from hardwall.model.checks import FieldError
 from hardwall.model.design import Design
+from hardwall.model.estimators import levant
 from hardwall.model.spec import AxisSpec
 
 from .specs import ADJUSTED, MHZ, spec
 
 SLACK = 12
 """Clocks of every sample after the drive has changed."""
+
+
+HASTY = levant.Gains(4 * ADJUSTED.lambda_sqrt_m_per_s, 2_000.0)
+"""Gains that drive a differentiator to its limits within a few samples."""
 
 
 def busy(estimator: str) -> AxisSpec:
@@ -54,3 +60,13 @@ def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
     if len(outputs) > 1:
         words[selector] = int(random.integers(0, len(outputs)))
     return words
+
+
+def rota(axes: int, estimator: str, spare: int = 0) -> AxesSpec:
+    """Return axes in a rota with that many clocks to spare, each like the axis of `busy`."""
+    gains = HASTY if estimator == "levant" else None
+    fields = {**MHZ, "sample_hz": 100_000, "actuation_hz": 50_000, "speed_max_m_per_s": 0.01, "travel_m": 1e-3}
+    made = {**fields, "axes": axes, "estimator": estimator, "gains": gains}
+    # The clock alone changes no format of the pipeline, and so not the slots either.
+    slots = AxesSpec(**{**made, "clock_hz": 100_000_000}).slots
+    return AxesSpec(**{**made, "clock_hz": 100_000 * (slots + spare)})

@@ -1,0 +1,166 @@
+"""Several axes through one pipeline: one specification for all of them, and for each axis words of its own.
+
+Every axis equals a single one (`axis`) with its words, sample for sample. All sample at one rate, in turn: in a rota of
+`clocks_per_sample` clocks, clock i takes a sample of axis i. A rota has at least `slots` clocks: one for every axis,
+and no fewer than the recurrence, the clocks until what a sample leaves to the next one of its axis is kept.
+
+The latency from a sample to its drive may exceed the rota: several samples of an axis are then under way at once.
+
+    axes = Axes(spec, [{"wall_stiffness": 20e3}, {"wall_stiffness": 5e3, "wall_left": 1}])
+    record = axes.run(counts)           # one row for each axis
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from . import checks
+from .axis import Record, run
+from .checks import FieldError, check_int
+from .design import Design
+from .estimators.estimate import EstimatorGains
+from .requirements import AxisRequirements
+
+AXES_MAX = 32
+"""The most axes of one pipeline."""
+ROOT_BITS = 2
+"""Bits of a root that a stage of the pipeline makes."""
+FRONT_LATENCY = 2
+"""Clocks from the strobe to the count in the pipeline: the choice among many decoders takes two."""
+WALL_LATENCY = 5
+"""Clocks from the velocity to the wall's force."""
+OUTPUT_LATENCY = 4
+"""Clocks from the wall's force to the changed drive, which is also the output stage's recurrence."""
+
+
+class Pipeline(NamedTuple):
+    """The clocks from a count to its velocity, and the fewest from a count to the next one of the same axis."""
+
+    latency: int
+    recurrence: int
+
+
+def _levant(design: Any) -> Pipeline:
+    """Distance, limit, magnitude, root, product, sum and limit; the tracked position is read in the second of these."""
+    roots = -(-((design.radicand.width + 1) // 2) // ROOT_BITS)
+    return Pipeline(7 + roots, 7 + roots)
+
+
+PIPELINES: dict[str, Callable[[Any], Pipeline]] = {
+    "fdm": lambda design: Pipeline(2, 1),
+    "levant": _levant,
+}
+"""The pipelines of estimators, by the estimator's name."""
+
+
+class Timing(NamedTuple):
+    """The clocks at which one of the axes samples and changes its drive; clock 0 is the first one after reset."""
+
+    clocks_per_sample: int
+    strobe: int  # the clock of the first sample
+    latency: int  # clocks from a sample to the changed drive
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxesSpec(AxisRequirements):
+    """The requirements of every one of the axes, their number and their estimator.
+
+    Attributes:
+        axes: the number of axes, 1 to `AXES_MAX`.
+        estimator: name of the velocity estimator, one of `PIPELINES`.
+        gains: that estimator's `Gains`, or None for its default ones; the words of an axis may say otherwise.
+
+    The other attributes, and the errors, are those of `requirements.AxisRequirements`.
+    """
+
+    axes: int
+    estimator: str = "levant"
+    gains: EstimatorGains | None = None
+
+    def __post_init__(self) -> None:
+        check_int("axes", self.axes, 1, AXES_MAX)
+        super().__post_init__()
+        if self.estimator not in PIPELINES:
+            raise FieldError("estimator", f"must be one of {', '.join(PIPELINES)}, not {self.estimator!r}")
+        if self.clocks_per_sample < self.slots:
+            raise FieldError(
+                "sample_hz",
+                f"must leave {self.slots} clocks for {self.axes} axes in turn, so at most "
+                f"{self.clock_hz // self.slots} at clock_hz {self.clock_hz}, not {self.sample_hz!r}",
+            )
+
+    @cached_property
+    def design(self) -> Design:
+        """The formats, words and flags of every axis; its latency is that of a single one."""
+        return Design(self, self.estimator, self.gains)
+
+    @cached_property
+    def pipeline(self) -> Pipeline:
+        """The pipeline of the estimator."""
+        return PIPELINES[self.estimator](self.design.estimator)
+
+    @property
+    def slots(self) -> int:
+        """The fewest clocks of a rota."""
+        return max(self.axes, self.pipeline.recurrence, OUTPUT_LATENCY)
+
+    @property
+    def latency(self) -> int:
+        """Clocks from the strobe of an axis to its changed drive."""
+        return FRONT_LATENCY + self.pipeline.latency + WALL_LATENCY + OUTPUT_LATENCY
+
+    def timing(self, axis: int) -> Timing:
+        """Return when an axis samples, and when its drive changes."""
+        return Timing(self.clocks_per_sample, axis, self.latency)
+
+
+class Axes:
+    """Axes with their run-time parameters set, in SI units by the name of the word; see `Design.words`.
+
+    Args:
+        spec: the axes.
+        si: for every axis its run-time parameters, e.g. `{"wall_stiffness": 20e3}` (N/m); the others keep their reset
+            values (the wall is off).
+
+    Attributes:
+        spec, design: the `AxesSpec`, and the `design.Design` of every axis.
+        words: for every axis its run-time words by name.
+        params: for every axis the parameters of `axis.step`.
+
+    Raises:
+        TypeError: if `spec` is not an AxesSpec, or a value is not a number.
+        ValueError: if there are not as many sets of parameters as axes, a name is unknown or a value is out of range.
+    """
+
+    def __init__(self, spec: AxesSpec, si: Sequence[Mapping[str, float]]):
+        if not isinstance(spec, AxesSpec):
+            raise TypeError(f"spec must be an AxesSpec, not {spec!r}")
+        if len(si) != spec.axes:
+            raise ValueError(f"si must have parameters for each of the {spec.axes} axes, not for {len(si)}")
+        self.spec, self.design = spec, spec.design
+        self.words = [self.design.encode(**given) for given in si]
+        self.params = [self.design.params(words) for words in self.words]
+
+    def run(self, counts: ArrayLike) -> Record:
+        """Run a record of counts of every axis from the start state.
+
+        Args:
+            counts: integers, shape (axes, samples). A count may exceed the count's width: it wraps, as in the hardware.
+                It may not jump by half of its range.
+
+        Raises:
+            TypeError: if the counts are not integers.
+            ValueError: if the counts have no row for every axis, or jump.
+        """
+        spec = self.spec
+        lanes = checks.lanes_of_counts(counts, spec.count_width, spec.clocks_per_sample)
+        if lanes.ndim != 2 or len(lanes) != spec.axes:
+            raise ValueError(f"counts must have a row for each of the {spec.axes} axes, not the shape {lanes.shape}")
+        velocity, force, drive, flags = (np.zeros(lanes.shape, np.int64) for _ in range(4))
+        for lane, params in enumerate(self.params):
+            run(params, self.design.start(), lanes[lane], velocity[lane], force[lane], drive[lane], flags[lane])
+        return Record(self.design, velocity, force, drive, flags)
