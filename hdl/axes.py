@@ -12,12 +12,12 @@ from hardwall.model.design import GLITCH_WIDTH, ILLEGAL_WIDTH
 from hardwall.model.words import Word
 
 from .arithmetic.fixed import shape
-from .pipelines import finite_difference, levant, output, wall
+from .pipelines import finite_difference, levant, output, wall, window
 from .pipelines.estimator import Entered
 from .pipelines.pipe import Pipe, chosen
 from .quadrature import Quadrature
 
-ESTIMATORS = {"fdm": finite_difference.estimate, "levant": levant.estimate}
+ESTIMATORS = {"fdm": finite_difference.estimate, "levant": levant.estimate, "window": window.estimate}
 """The pipelines of estimators, by the estimator's name."""
 GROUP_BITS = 3
 """Of so many bits of the axis's number, the first clock chooses among decoders; the second chooses by the others."""
@@ -81,8 +81,10 @@ class Axes(wiring.Component):
         The index latch.
     commit_pending : Out(axes)
         Words wait for the axis's next strobe.
-    record_valid : Out(1), record_axis, record_count, record_velocity, record_wall_force, record_drive, record_flags : Out
-        One clock after the end of every sample: its axis, its count, what was made of it, and the axis's flags then.
+    record_valid : Out(1)
+        High for one clock, a clock after the end of every sample of any axis.
+    record_axis, record_count, record_velocity, record_wall_force, record_drive, record_flags : Out
+        With `record_valid`: the sample's axis, its count, what was made of it, and the axis's flags at its end.
 
     Raises
     ------
@@ -168,9 +170,7 @@ class Axes(wiring.Component):
         )
         driven = output.drive(pipe, design.output, forced, self.drive_enable, word)
         end = stage + 3
-        raised = Cat(
-            pipe.later(fault, end - FRONT_LATENCY), pipe.later(estimate.saturated, end - stage + WALL_LATENCY)
-        )
+        raised = Cat(pipe.later(fault, end - FRONT_LATENCY), pipe.later(estimate.saturated, end - stage + WALL_LATENCY))
         self._end(pipe, end, driven, raised)
         m.d.sync += [
             self.record_valid.eq(pipe.valid(end + 1)),

@@ -19,6 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import checks
+from .arithmetic.divide import latency as divide_latency
+from .arithmetic.signed_divide import BITS_PER_CLOCK
 from .axis import Record, run
 from .checks import FieldError, check_int
 from .design import Design
@@ -50,9 +52,15 @@ def _levant(design: Any) -> Pipeline:
     return Pipeline(7 + roots, 7 + roots)
 
 
+def _window(design: Any) -> Pipeline:
+    """Change, limit, position, place, memory, difference and magnitude, quotient, sign."""
+    return Pipeline(6 + divide_latency(design.velocity.width - 1, BITS_PER_CLOCK), 1)
+
+
 PIPELINES: dict[str, Callable[[Any], Pipeline]] = {
     "fdm": lambda design: Pipeline(2, 1),
     "levant": _levant,
+    "window": _window,
 }
 """The pipelines of estimators, by the estimator's name."""
 

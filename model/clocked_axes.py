@@ -1,11 +1,10 @@
-"""One of several axes, decoder included, clock by clock from its pins: the reference that `hardwall.hdl.axes` equals."""
+"""One of several axes, decoder included, clock by clock from its pins: the reference of `hardwall.hdl.axes`."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from . import axes, design, output, quadrature, wall
-from .clocked import Pins
 from .compiled import compiled
 from .estimators.estimate import estimate
 

@@ -41,6 +41,13 @@ NOT_TWINNED = {
     "link/axi_link": "the subordinate of a bus and the register file, joined; each of them has its twin",
     "link/link": "the blocks of the link, joined; each of them has its twin",
     "link/requests": "wires",
+    "pipelines/estimator": "what goes into and comes out of a pipeline",
+    "pipelines/finite_difference": "the block of its name in estimators, an axis a clock; its twin is that block's",
+    "pipelines/levant": "the block of its name in estimators, an axis a clock; its twin is that block's",
+    "pipelines/output": "the output stage, an axis a clock; its twin is that block's",
+    "pipelines/pipe": "registers, delays and memories",
+    "pipelines/wall": "the wall, an axis a clock; its twin is that block's",
+    "pipelines/window": "the block of its name in estimators, an axis a clock; its twin is that block's",
     "ports": "text about the hardware",
 }
 # Tests of more than one source, and what they cover.

@@ -7,6 +7,8 @@ strobe, which is stage 0; a register loaded in stage s is seen in stage s + 1.
 from amaranth.hdl import Module, Mux, Shape, Signal, Value, unsigned
 from amaranth.lib.memory import Memory
 
+from ..capture import NO_FIRST_CONTENTS
+
 RING_LEAST = 5
 """The shortest delay, in clocks, that is a memory instead of registers."""
 RING_BITS = 48
@@ -71,7 +73,7 @@ class Pipe:
     def _ring(self, value: Value, clocks: int) -> Value:
         """Return a value as it was `clocks` clocks ago: each word of a memory is read in the clock that replaces it."""
         self._rings += 1
-        memory = Memory(shape=value.shape(), depth=clocks, init=[])
+        memory = Memory(shape=value.shape(), depth=clocks, init=[], attrs={NO_FIRST_CONTENTS: 1})
         self.m.submodules[f"ring_{self._rings}"] = memory
         write, read = memory.write_port(), memory.read_port(domain="comb")
         place = self._place(clocks)
@@ -98,7 +100,7 @@ class Kept:
         self._pipe = pipe
         shape = unsigned(shape) if isinstance(shape, int) else shape
         # A memory of one word would have no address.
-        self._memory = Memory(shape=shape, depth=max(pipe.axes, 2), init=[])
+        self._memory = Memory(shape=shape, depth=max(pipe.axes, 2), init=[], attrs={NO_FIRST_CONTENTS: 1})
         pipe.m.submodules[name] = self._memory
 
     def read(self, stage: int) -> Value:

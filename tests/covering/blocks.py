@@ -44,6 +44,7 @@ BLOCKS = (
     *(Block(f"drive/{name}", RECORDED) for name in ("scale", "pdm", "pwm", "dac")),
     Block("capture", RECORDED),
     Block("axis"),
+    Block("axes"),
     Block("supervised", RECORDED),
     Block("link/uart", ("component.receiver", "component.transmitter")),
     Block("link/line", ("component.line",)),

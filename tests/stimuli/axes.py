@@ -9,7 +9,7 @@ import numpy as np
 from hardwall.model.axes import AxesSpec
 from hardwall.model.checks import FieldError
 from hardwall.model.design import Design
-from hardwall.model.estimators import levant
+from hardwall.model.estimators import levant, window
 from hardwall.model.spec import AxisSpec
 
 from .specs import ADJUSTED, MHZ, spec
@@ -62,9 +62,9 @@ def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
     return words
 
 
-def rota(axes: int, estimator: str, spare: int = 0) -> AxesSpec:
+def rota(axes: int, estimator: str, spare: int = 0, window_s: float = 1e-4) -> AxesSpec:
     """Return axes in a rota with that many clocks to spare, each like the axis of `busy`."""
-    gains = HASTY if estimator == "levant" else None
+    gains = {"levant": HASTY, "window": window.Gains(window_s)}.get(estimator)
     fields = {**MHZ, "sample_hz": 100_000, "actuation_hz": 50_000, "speed_max_m_per_s": 0.01, "travel_m": 1e-3}
     made = {**fields, "axes": axes, "estimator": estimator, "gains": gains}
     # The clock alone changes no format of the pipeline, and so not the slots either.
