@@ -75,12 +75,19 @@ class Axes(wiring.Component):
     sampled, actuated : Out(axes)
         High for one clock with the changed drive: `sampled` after every sample, `actuated` after a sample at which the
         drive follows the force.
+    stepped : Out(axes), edge_kind : Out(array), indexed : Out(axes)
+        High for one clock with the count of a new edge, and the kind of the last edge; high for one clock with the
+        count at a rising edge of Z.
+    estimated : Out(axes), velocity, saturated : Out
+        High for one clock with a sample's velocity; the velocity, and whether the estimator is saturated.
     illegal, overspeed : Out(axes), illegal_count : Out(array)
         The encoder's sticky flags, now, and the illegal transitions since the last clear; saturates.
     index_count : Out(array), index_armed, index_latched : Out(axes)
         The index latch.
     commit_pending : Out(axes)
         Words wait for the axis's next strobe.
+    stamp : Out
+        The number of this clock.
     record_valid : Out(1)
         High for one clock, a clock after the end of every sample of any axis.
     record_axis, record_count, record_velocity, record_wall_force, record_drive, record_flags : Out
@@ -98,13 +105,13 @@ class Axes(wiring.Component):
         self._spec = spec
         design, axes, count, number = spec.design, spec.axes, signed(spec.count_width), range(max(spec.axes, 2))
         bits = ("encoder_a", "encoder_b", "encoder_z", "drive_enable", "clear_flags", "preload", "index_arm", "commit")
-        shown = (
-            "sampled", "actuated", "illegal", "overspeed", "index_armed", "index_latched", "commit_pending"
-        )  # fmt: skip
+        shown = ("sampled", "actuated", "stepped", "indexed", "estimated", "illegal", "overspeed")
+        shown += ("index_armed", "index_latched", "commit_pending")
         arrays = {
             "drive": shape(spec.force),
             "flags": len(design.flags),
             "count": count,
+            "edge_kind": 2,
             "illegal_count": ILLEGAL_WIDTH,
             "index_count": count,
         }
@@ -128,6 +135,9 @@ class Axes(wiring.Component):
                 "word_ready": Out(1),
                 **{name: Out(axes) for name in shown},
                 **{name: Out(ArrayLayout(each, axes)) for name, each in arrays.items()},
+                "velocity": Out(shape(design.estimator.velocity)),
+                "saturated": Out(1),
+                "stamp": Out(spec.stamp_width),
                 **{f"record_{name}": Out(each) for name, each in record.items()},
             }
         )
@@ -162,6 +172,11 @@ class Axes(wiring.Component):
         estimate = ESTIMATORS[spec.estimator](pipe, design.estimator, entered)
         stage = FRONT_LATENCY + spec.pipeline.latency
         count = pipe.later(entered.count, spec.pipeline.latency)
+        m.d.comb += [
+            self.estimated.eq(Cat(pipe.turns(stage))),
+            self.velocity.eq(estimate.velocity),
+            self.saturated.eq(estimate.saturated.any()),
+        ]
         force = wall.force(pipe, design.wall, stage, count, estimate.velocity, word)
 
         stage += WALL_LATENCY
@@ -244,6 +259,9 @@ class Axes(wiring.Component):
                 decoder.arm.eq(self.index_arm[number]),
                 decoder.clear.eq(self.clear_flags[number]),
                 self.count[number].eq(decoder.seen.count),
+                self.stepped[number].eq(decoder.stepped),
+                self.edge_kind[number].eq(decoder.seen.edge),
+                self.indexed[number].eq(decoder.indexed),
                 self.illegal[number].eq(decoder.illegal),
                 self.overspeed[number].eq(decoder.overspeed),
                 self.illegal_count[number].eq(decoder.illegal_count),
@@ -251,6 +269,7 @@ class Axes(wiring.Component):
                 self.index_armed[number].eq(decoder.index_armed),
                 self.index_latched[number].eq(decoder.index_latched),
             ]
+        m.d.comb += self.stamp.eq(decoders[0].seen.stamp)
         return decoders
 
     def _entered(self, pipe: Pipe, decoders: list[Any], first: Value, word) -> tuple[Entered, Value]:

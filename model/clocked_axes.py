@@ -25,13 +25,17 @@ class Samples(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """The outputs of one axis at every clock, by the names of the hardware's: int64 arrays."""
+    """The outputs of one axis at every clock, by the names of the hardware's: int64 arrays. All have one `stamp`."""
 
     drive: np.ndarray
     flags: np.ndarray
     sampled: np.ndarray
     actuated: np.ndarray
     count: np.ndarray  # type: ignore[assignment]  # a tuple has a method of this name
+    stepped: np.ndarray
+    edge_kind: np.ndarray
+    indexed: np.ndarray
+    stamp: np.ndarray
     index_count: np.ndarray
     index_armed: np.ndarray
     index_latched: np.ndarray
@@ -67,7 +71,8 @@ def _show(outputs, n, state):
     decoder = state.decoder
     outputs.drive[n], outputs.flags[n] = state.output.drive, state.flags
     outputs.sampled[n], outputs.actuated[n] = state.sampled, state.actuated
-    outputs.count[n], outputs.index_count[n] = decoder.count, decoder.index_count
+    outputs.count[n], outputs.stepped[n], outputs.edge_kind[n] = decoder.count, decoder.stepped, decoder.edge
+    outputs.stamp[n], outputs.indexed[n], outputs.index_count[n] = decoder.stamp, decoder.indexed, decoder.index_count
     outputs.index_armed[n], outputs.index_latched[n] = decoder.index_armed, decoder.index_latched
     outputs.illegal[n], outputs.overspeed[n] = decoder.illegal, decoder.overspeed
     outputs.illegal_count[n] = decoder.illegal_count

@@ -11,6 +11,7 @@ from hardwall.hdl.axes import Axes
 from hardwall.model import axes, axis, clocked
 from hardwall.model.axes import AxesSpec
 from hardwall.model.clocked_axes import Outputs
+from hardwall.model.design import ENCODER_FLAGS
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from oracles.axes import Lane, Write, lane
@@ -116,7 +117,12 @@ class Seen:
     def __init__(self, bench: Bench, spec: AxesSpec):
         self.packing, self.spec, self.words = bench.packing, spec, []
         design = spec.design
-        self.shapes = {"drive": (spec.force.width, 1), "flags": (len(design.flags), 0), "illegal_count": (8, 0)}
+        self.shapes = {
+            "drive": (spec.force.width, 1),
+            "flags": (len(design.flags), 0),
+            "illegal_count": (8, 0),
+            "edge_kind": (2, 0),
+        }
         self.shapes |= dict.fromkeys(("count", "index_count"), (spec.count_width, 1))
 
     def port(self, name: str) -> list[int]:
@@ -134,14 +140,27 @@ class Seen:
 
 def check_clocks(spec: AxesSpec, lanes: list[Lane], seen: Seen) -> None:
     """Check every output of every axis at every clock."""
-    for name in (*Outputs._fields, "commit_pending"):
+    for name in {*Outputs._fields, "commit_pending"} - {"stamp"}:
         found = seen.lanes(name)
         for number, each in enumerate(lanes):
             wanted = each.commit_pending if name == "commit_pending" else getattr(each.outputs, name)
             wrong = np.flatnonzero(found[number] != wanted)
             assert not len(wrong), f"{name} of axis {number}: {len(wrong)} clocks differ, first clock {wrong[:1]}"
+    assert seen.port("stamp") == lanes[0].outputs.stamp.tolist()
     ready = seen.port("word_ready")
     assert ready == [int(clock >= spec.clocks_per_sample) for clock in range(len(ready))]
+
+
+def check_estimates(spec: AxesSpec, lanes: list[Lane], seen: Seen) -> None:
+    """Check the velocity of every sample, its clock, and whether the estimator was saturated."""
+    velocity, saturated = np.array(seen.port("velocity")), np.array(seen.port("saturated"))
+    for number, estimated in enumerate(seen.lanes("estimated")):
+        came = np.flatnonzero(estimated)
+        first = number + axes.FRONT_LATENCY + spec.pipeline.latency
+        assert came.tolist() == list(range(first, len(velocity), spec.clocks_per_sample))
+        samples = lanes[number].samples
+        assert (velocity[came] == samples.velocity[: len(came)]).all()
+        assert (saturated[came] == (samples.raised[: len(came)] >> len(ENCODER_FLAGS) != 0)).all()
 
 
 def check_records(spec: AxesSpec, lanes: list[Lane], seen: Seen) -> None:
@@ -179,6 +198,7 @@ async def every_axis_is_a_single_one(dut):
         bench.drive(rst=0)
         lanes = [world.lane(number) for number in range(spec.axes)]
         check_clocks(spec, lanes, seen)
+        check_estimates(spec, lanes, seen)
         check_records(spec, lanes, seen)
         assert all(each.committed > 5 for each in lanes)
         rose |= int(np.bitwise_or.reduce([np.bitwise_or.reduce(each.outputs.flags) for each in lanes]))

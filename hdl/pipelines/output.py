@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from amaranth.hdl import Cat, Mux, Signal, Value
+from amaranth.hdl import C, Cat, Mux, Signal, Value
 
 from hardwall.model.output import Design
 
@@ -66,10 +66,14 @@ def drive(pipe: Pipe, design: Design, forced: Forced, enable: Value, word: Calla
     over = slewed > limit
     pipe.m.d.comb += magnitude.eq(Mux(over, limit, slewed))
     limited = pipe.taken(magnitude, "limited")
-    negative, turn = pipe.later(negative, 3), pipe.later(forced.turn, 3)
-    now = Mux(turn, Cat(limited, negative), pipe.later(before, 3)) & pipe.later(~forced.fault, 3).replicate(len(before))
+    fault, turn = pipe.later(forced.fault, 3), C(1, 1)
+    now = Cat(limited, pipe.later(negative, 3))
+    if design.decimation > 1:
+        turn = pipe.later(forced.turn, 3)
+        now = Mux(turn, now, pipe.later(before, 3))
+    now &= (~fault).replicate(len(now))
     kept.leave(stage + 3, now)
-    acted = pipe.later(forced.turn & ~forced.fault, 3)
+    acted = turn & ~fault
     value = negated(Cat(now[:-1], 0).as_signed(), now[-1])
     return Driven(
         value[: design.force.width].as_signed(),

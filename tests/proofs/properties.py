@@ -2,6 +2,7 @@
 
 from . import (
     of_arithmetic,
+    of_axes,
     of_axis,
     of_capture,
     of_drive,
@@ -23,6 +24,7 @@ PROPERTIES = [
     *of_output.PROPERTIES,
     *of_supervisor.PROPERTIES,
     *of_axis.PROPERTIES,
+    *of_axes.PROPERTIES,
     *of_supervised.PROPERTIES,
     *of_drive.PROPERTIES,
     *of_capture.PROPERTIES,

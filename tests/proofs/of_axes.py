@@ -1,0 +1,96 @@
+"""What axes in a rota promise, each of them, with any estimator's arithmetic: limits and zero."""
+
+from hardwall.hdl.axes import Axes
+from hardwall.hdl.pipelines import output
+from hardwall.model.axes import OUTPUT_LATENCY, AxesSpec
+from stimuli.specs import MHZ
+
+from .bench import Bench
+from .bugs import Bug
+from .property import Property
+from .widths import FreeProducts
+
+WHERE = "axes mhz fdm"
+NUMBER = 2
+
+
+def axes(bench: Bench) -> Axes:
+    """Return two axes of 1 MHz with the slowest clock, so that proofs see many samples."""
+    rota = {**MHZ, "axes": NUMBER, "estimator": "fdm"}
+    slots = AxesSpec(**rota).slots
+    return bench.block(Axes(AxesSpec(**{**rota, "clock_hz": slots * MHZ["sample_hz"]})), FreeProducts())
+
+
+def never_beyond_its_limit(bench: Bench) -> None:
+    block = axes(bench)
+    most = block.spec.force_limit_word
+    for drive in block.drive:
+        bench.promise((drive <= most) & (drive >= -most))
+
+
+def zero_without_enable(bench: Bench) -> None:
+    block = axes(bench)
+    for number, drive in enumerate(block.drive):
+        bench.promise(bench.past(block.drive_enable[number]) | (drive == 0))
+
+
+def zero_until_enabled_from_force_to_drive(bench: Bench) -> None:
+    block = axes(bench)
+    for number, drive in enumerate(block.drive):
+        rose = (drive != 0) & (bench.past(drive) == 0)
+        for clocks in range(1, OUTPUT_LATENCY + 1):
+            bench.promise(~rose | bench.past(block.drive_enable[number], clocks))
+
+
+def zero_after_a_fault(bench: Bench) -> None:
+    block = axes(bench)
+    for number, drive in enumerate(block.drive):
+        fault = bench.past(block.illegal[number] | block.overspeed[number], block.latency)
+        bench.promise(~block.sampled[number] | ~fault | (drive == 0))
+
+
+def changes_with_its_sample_alone(bench: Bench) -> None:
+    block = axes(bench)
+    for number, drive in enumerate(block.drive):
+        same = drive == bench.past(drive)
+        bench.promise(same | block.sampled[number] | (drive == 0))
+    bench.promise(~block.sampled.all())
+
+
+PROPERTIES = [
+    Property(
+        "no drive exceeds its axis's limit",
+        WHERE,
+        never_beyond_its_limit,
+        depth=5,
+        bugs=(Bug(output.drive, "Mux(over, limit, slewed)", "slewed"),),
+    ),
+    Property(
+        "the drive of an axis is zero one clock after its drive_enable is low",
+        WHERE,
+        zero_without_enable,
+        depth=4,
+        bugs=(Bug(Axes._end, "mine | ~self.drive_enable[number]", "mine"),),
+    ),
+    Property(
+        "the drive of an axis stays zero until its drive_enable is high from the force to the drive",
+        WHERE,
+        zero_until_enabled_from_force_to_drive,
+        depth=8,
+        bugs=(Bug(output.drive, "~enable[number] | (mine & ~turn)", "mine & ~turn"),),
+    ),
+    Property(
+        "a fault at the strobe of an axis makes its drive zero with that sample",
+        WHERE,
+        zero_after_a_fault,
+        depth=16,
+        bugs=(Bug(output.drive, "(~fault).replicate(len(now))", "C(1, 1).replicate(len(now))"),),
+    ),
+    Property(
+        "the drive of an axis changes with its own sample alone, or to zero",
+        WHERE,
+        changes_with_its_sample_alone,
+        depth=6,
+        bugs=(Bug(Axes._end, "with m.If(turn)", "with m.If(pipe.valid(end))"),),
+    ),
+]
