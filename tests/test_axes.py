@@ -67,7 +67,7 @@ class World:
         """Return the inputs of the host that are high in this clock."""
         spec, random = self.spec, self.random
         acts = {"word_write": 0, "commit": 0, **dict.fromkeys(PULSES, 0)}
-        if not self.orders and random.random() < 0.05:
+        if not self.orders and random.random() < 0.2:
             self._orders()
         if self.orders and random.random() < 0.8:
             number, name, word = self.orders.popleft()

@@ -53,7 +53,9 @@ def drive(pipe: Pipe, design: Design, forced: Forced, enable: Value, word: Calla
     negative = forced.force[-1]
     magnitude = Signal(range(most + 1))
     kept = pipe.kept("driven", len(magnitude) + 1)
-    before = Mux(pipe.of(dropped, stage), 0, kept.read(stage))
+    # The choice among many axes has a clock of its own: whether the axis will be dropped is known before.
+    off = pipe.of([mine | ~enable[number] for number, mine in enumerate(dropped)], stage - 1)
+    before = Mux(pipe.taken(off), 0, kept.read(stage))
     held = Mux(negative == before[-1], before[:-1], 0)
     reach = pipe.taken(held + word("output_slew_limit", stage), "reach")
     less = pipe.taken((~negated(forced.force, negative))[: len(forced.force)], "less")

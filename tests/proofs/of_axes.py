@@ -3,22 +3,22 @@
 from hardwall.hdl.axes import Axes
 from hardwall.hdl.pipelines import output
 from hardwall.model.axes import OUTPUT_LATENCY, AxesSpec
-from stimuli.specs import MHZ
+from stimuli.specs import NARROW
 
 from .bench import Bench
 from .bugs import Bug
 from .property import Property
 from .widths import FreeProducts
 
-WHERE = "axes mhz fdm"
+WHERE = "axes narrow fdm"
 NUMBER = 2
 
 
 def axes(bench: Bench) -> Axes:
-    """Return two axes of 1 MHz with the slowest clock, so that proofs see many samples."""
-    rota = {**MHZ, "axes": NUMBER, "estimator": "fdm"}
+    """Return two axes with narrow words and the slowest clock, so that proofs see many samples."""
+    rota = {**NARROW, "actuation_hz": NARROW["sample_hz"], "axes": NUMBER, "estimator": "fdm"}
     slots = AxesSpec(**rota).slots
-    return bench.block(Axes(AxesSpec(**{**rota, "clock_hz": slots * MHZ["sample_hz"]})), FreeProducts())
+    return bench.block(Axes(AxesSpec(**{**rota, "clock_hz": slots * NARROW["sample_hz"]})), FreeProducts())
 
 
 def never_beyond_its_limit(bench: Bench) -> None:
@@ -36,6 +36,11 @@ def zero_without_enable(bench: Bench) -> None:
 
 def zero_until_enabled_from_force_to_drive(bench: Bench) -> None:
     block = axes(bench)
+    # An axis in a stage was in stage 0 as many clocks ago, so that two samples of an axis are a rota apart.
+    clock = bench.inner["clock"]
+    for stage in range(1, block.latency):
+        begun = (clock - stage)[: len(clock)]
+        bench.promise(~bench.inner[f"valid_{stage}"] | (bench.inner[f"axis_{stage}"] == begun))
     for number, drive in enumerate(block.drive):
         rose = (drive != 0) & (bench.past(drive) == 0)
         for clocks in range(1, OUTPUT_LATENCY + 1):
