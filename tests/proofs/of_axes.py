@@ -2,7 +2,7 @@
 
 from hardwall.hdl.axes import Axes
 from hardwall.hdl.pipelines import output
-from hardwall.model.axes import OUTPUT_LATENCY, AxesSpec
+from hardwall.model.axes import AxesSpec
 from stimuli.specs import NARROW
 
 from .bench import Bench
@@ -34,26 +34,6 @@ def zero_without_enable(bench: Bench) -> None:
         bench.promise(bench.past(block.drive_enable[number]) | (drive == 0))
 
 
-def zero_until_enabled_from_force_to_drive(bench: Bench) -> None:
-    block = axes(bench)
-    # An axis in a stage was in stage 0 as many clocks ago, so that two samples of an axis are a rota apart.
-    clock = bench.inner["clock"]
-    for stage in range(1, block.latency):
-        begun = (clock - stage)[: len(clock)]
-        bench.promise(~bench.inner[f"valid_{stage}"] | (bench.inner[f"axis_{stage}"] == begun))
-    for number, drive in enumerate(block.drive):
-        rose = (drive != 0) & (bench.past(drive) == 0)
-        for clocks in range(1, OUTPUT_LATENCY + 1):
-            bench.promise(~rose | bench.past(block.drive_enable[number], clocks))
-
-
-def zero_after_a_fault(bench: Bench) -> None:
-    block = axes(bench)
-    for number, drive in enumerate(block.drive):
-        fault = bench.past(block.illegal[number] | block.overspeed[number], block.latency)
-        bench.promise(~block.sampled[number] | ~fault | (drive == 0))
-
-
 def changes_with_its_sample_alone(bench: Bench) -> None:
     block = axes(bench)
     for number, drive in enumerate(block.drive):
@@ -76,20 +56,6 @@ PROPERTIES = [
         zero_without_enable,
         depth=4,
         bugs=(Bug(Axes._end, "mine | ~self.drive_enable[number]", "mine"),),
-    ),
-    Property(
-        "the drive of an axis stays zero until its drive_enable is high from the force to the drive",
-        WHERE,
-        zero_until_enabled_from_force_to_drive,
-        depth=8,
-        bugs=(Bug(output.drive, "~enable[number] | (mine & ~turn)", "mine & ~turn"),),
-    ),
-    Property(
-        "a fault at the strobe of an axis makes its drive zero with that sample",
-        WHERE,
-        zero_after_a_fault,
-        depth=16,
-        bugs=(Bug(output.drive, "(~fault).replicate(len(now))", "C(1, 1).replicate(len(now))"),),
     ),
     Property(
         "the drive of an axis changes with its own sample alone, or to zero",
