@@ -5,7 +5,7 @@ from amaranth.hdl import C, Cat, Mux, Signal, Value, signed
 from hardwall.model.axes import ROOT_BITS
 from hardwall.model.estimators.levant import Design
 
-from ..arithmetic.fixed import negated, shift_floor
+from ..arithmetic.fixed import fits, fitted, negated, shift_floor
 from .estimator import Entered, Estimate, held, moved_since
 from .pipe import Pipe
 
@@ -40,14 +40,15 @@ def estimate(pipe: Pipe, design: Design, entered: Entered) -> Estimate:
     alpha = entered.word(design.words[1].name, stage)
     far_u1 = pipe.taken(integral + Mux(positive, -alpha, Mux(negative, alpha, 0)), "far_u1")
 
-    (next_u, u_beyond), (next_u1, u1_beyond) = held(far_u, velocity), held(far_u1, velocity)
+    next_u, next_u1 = fitted(far_u, velocity.width), fitted(far_u1, velocity.width)
+    limited = ~fits(far_u, velocity.width) | ~fits(far_u1, velocity.width)
     output = Mux(entered.word(design.words[2].name, stage + 1), next_u1, next_u)
-    u = pipe.taken(next_u[: velocity.width].as_signed(), "u")
+    u = pipe.taken(next_u, "u")
     end = stage + 2
-    u1.leave(end, pipe.taken(next_u1[: velocity.width].as_signed(), "next_u1"))
+    u1.leave(end, pipe.taken(next_u1, "next_u1"))
     lead.leave(end, pipe.later(e, end - at) + u)
-    raised = Cat(pipe.later(far, end - at), pipe.taken(u_beyond | u1_beyond))
-    return Estimate(pipe.taken(output[: velocity.width].as_signed(), "velocity"), raised)
+    raised = Cat(pipe.later(far, end - at), pipe.taken(limited))
+    return Estimate(pipe.taken(output, "velocity"), raised)
 
 
 def _corrected(value: Value, product: Value, shift: int, negative: Value, positive: Value) -> Value:
