@@ -57,8 +57,8 @@ class Axis(wiring.Component):
         High for one clock with the changed drive: `sampled` after every sample, `actuated` after a sample at which the
         drive follows the force.
     count, sampled_count, velocity, wall_force : Out(signed)
-        The live count; a sample's count and velocity, from the same clock on; its wall force, which comes later. With
-        `sampled`, all are of the sample of the drive.
+        The live count; a sample's velocity, a clock later its count, and then its wall force. With `sampled`, all are of
+        the sample of the drive.
     flags : Out
         Sticky flags, bits as in `spec.design.flags`; the encoder's flags as the samples saw them, with their velocity.
     stepped, edge_kind : Out
@@ -175,12 +175,12 @@ class Axis(wiring.Component):
 
         # What a strobe has taken is kept up to the velocity, with which the next strobe may come; and then up to the
         # next velocity, which comes behind the changed drive.
-        taken_count, shown_count = Signal.like(self.sampled_count), Signal.like(self.sampled_count)
+        taken_count = Signal.like(self.sampled_count)
         taken_fault, fault = Signal(len(ENCODER_FLAGS)), Signal()
         with m.If(strobe):
             m.d.sync += [taken_count.eq(decoder.seen.count), taken_fault.eq(Cat(decoder.illegal, decoder.overspeed))]
         with m.If(estimator.valid):
-            m.d.sync += [shown_count.eq(taken_count), fault.eq(taken_fault.any())]
+            m.d.sync += [self.sampled_count.eq(taken_count), fault.eq(taken_fault.any())]
 
         wiring.connect(m, decoder.seen, estimator.seen)
         m.d.comb += [
@@ -207,7 +207,6 @@ class Axis(wiring.Component):
             self.sampled.eq(output.valid),
             self.actuated.eq(output.actuated),
             self.count.eq(decoder.seen.count),
-            self.sampled_count.eq(Mux(estimator.valid, taken_count, shown_count)),
             self.velocity.eq(estimator.velocity),
             self.wall_force.eq(wall.force),
             self.stepped.eq(decoder.stepped),

@@ -84,9 +84,6 @@ class AxisTwin:
         force = wall.render(params.wall, decoder.count, velocity)
         count, fault = decoder.count, decoder.illegal | decoder.overspeed << 1
 
-        def estimate_shown() -> None:
-            self.sampled_count, self.velocity = count, velocity
-
         def drive() -> None:
             # The output stage slews from the drive, which a low enable has made zero.
             begun = self.output._replace(drive=self.drive)
@@ -99,7 +96,8 @@ class AxisTwin:
         # A result is seen `latency` edges after the strobe, so its register is loaded at the edge before.
         estimated = now + d.estimator.latency
         walled = estimated + d.wall.latency
-        self.due[estimated - 1] += [estimate_shown]
+        self.due[estimated - 1] += [lambda: setattr(self, "velocity", velocity)]
+        self.due[estimated] += [lambda: setattr(self, "sampled_count", count)]
         self.raised[estimated] = fault | raised << params.estimator_bit
         self.pulses[estimated] = {"estimated": 1, "saturated": int(raised != 0)}
         self.due[walled - 1] += [lambda: setattr(self, "wall_force", force)]

@@ -92,7 +92,7 @@ def every_operation_ends(bench: Bench) -> None:
     with m.Switch(place):
         for at in (*snapshot, *commit):
             with m.Case(at):
-                bench.m.d.comb += known.eq(inner["cell"] == design.book[Area.LEAST * END + at])
+                bench.m.d.comb += known.eq(inner["found"] == design.book[Area.LEAST * END + at])
     cells = Signal()
     for one, moves in ((0, snapshot), (1, commit)):
         for index, at in enumerate(moves):

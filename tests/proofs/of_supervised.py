@@ -8,7 +8,7 @@ from hardwall.hdl.supervised import SupervisedAxis
 from hardwall.hdl.supervisor import Supervisor
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervisor import ALWAYS, ARMED, CAUSES, LINK, REQUIRED, TRIPPED
-from stimuli.specs import MHZ, spec
+from stimuli.specs import MHZ
 
 from .bench import Bench
 from .bugs import Bug
@@ -28,7 +28,8 @@ PAST_THE_SUPERVISOR = "getattr(self, name).eq(axis.count if name == 'driven' els
 
 def supervised(estimator: str, bench: Bench) -> SupervisedAxis:
     """Return a supervised axis of 1 MHz with the slowest clock that it takes, its products free."""
-    clock_hz = spec("mhz", estimator).design.interval * MHZ["sample_hz"]
+    roomy = AxisSpec(**MHZ, estimator=estimator)
+    clock_hz = roomy.design.interval * roomy.sample_hz
     return bench.block(SupervisedAxis(AxisSpec(**{**MHZ, "clock_hz": clock_hz}, estimator=estimator)), FreeProducts())
 
 
