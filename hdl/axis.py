@@ -57,8 +57,8 @@ class Axis(wiring.Component):
         High for one clock with the changed drive: `sampled` after every sample, `actuated` after a sample at which the
         drive follows the force.
     count, sampled_count, velocity, wall_force : Out(signed)
-        The live count; a sample's velocity, a clock later its count, and then its wall force. With `sampled`, all are of
-        the sample of the drive.
+        The live count; a sample's velocity, a clock later its count, and then its wall force. With `sampled`, all are
+        of the sample of the drive.
     flags : Out
         Sticky flags, bits as in `spec.design.flags`; the encoder's flags as the samples saw them, with their velocity.
     stepped, edge_kind : Out
