@@ -24,8 +24,8 @@ OPTIONS = (
     # one variable, gives them to that net at the first evaluation, up to the pins of the top. Open inputs are 0 here.
     "-DNO_ICE40_DEFAULT_ASSIGNMENTS",
     # Yosys leaves out pins that a mode has no use for. Its models name no generate blocks, few have a time scale, and
-    # they have delays and parameters that mean nothing here.
-    *(f"-Wno-{name}" for name in ("PINMISSING", "GENUNNAMED", "TIMESCALEMOD", "SPECIFYIGN", "UNUSEDPARAM")),
+    # they have delays and parameters that mean nothing here. A name of the source may have lost bits that nothing needs.
+    *(f"-Wno-{name}" for name in ("PINMISSING", "GENUNNAMED", "TIMESCALEMOD", "SPECIFYIGN", "UNUSEDPARAM", "UNDRIVEN")),
     # Parameters of a bit have a whole number as their default there, and bits of one vector may follow from each
     # other.
     *("-Wno-WIDTHTRUNC", "-Wno-UNOPTFLAT"),
@@ -66,7 +66,7 @@ def mapped(component: wiring.Component, family: Family, name: str = GATES) -> Ne
         SynthesisError: if Yosys is missing or fails.
     """
     made_by, rtl = tools.versions([YOSYS]), to_verilog(component, RTL)
-    # A name that is left of the source may have lost bits that nothing needs: without a driver, that looks wrong.
+    # Names of the source that nothing needs are left out.
     script = (
         f"read_verilog rtl.v; {family.synth} -top {RTL} -json netlist.json; "
         f"delete t:$scopeinfo; opt_clean -purge; rename {RTL} {name}; write_verilog -noattr gates.v"
