@@ -24,7 +24,7 @@ OPTIONS = (
     # one variable, gives them to that net at the first evaluation, up to the pins of the top. Open inputs are 0 here.
     "-DNO_ICE40_DEFAULT_ASSIGNMENTS",
     # Yosys leaves out pins that a mode has no use for. Its models name no generate blocks, few have a time scale, and
-    # they have delays and parameters that mean nothing here. A name of the source may have lost bits that nothing needs.
+    # they have delays and parameters that mean nothing here. A name may have lost bits that nothing needs.
     *(f"-Wno-{name}" for name in ("PINMISSING", "GENUNNAMED", "TIMESCALEMOD", "SPECIFYIGN", "UNUSEDPARAM", "UNDRIVEN")),
     # Parameters of a bit have a whole number as their default there, and bits of one vector may follow from each
     # other.
