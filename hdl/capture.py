@@ -48,7 +48,7 @@ class Capture(Block):
     sampled : In(1)
         High for one clock with the changed drive of a sample.
     count, velocity, wall_force : In(SQ)
-        The count that was taken at the last sample, and what was made of it.
+        The count that was taken at the last sample, and what was made of it: count and force a clock before `sampled`.
     driven : In(SQ)
         The drive that is let out, a clock behind `sampled`.
     state, live : In
@@ -141,10 +141,14 @@ class Capture(Block):
 
     def _trigger(self, m: Module, seen: Signal) -> Value:
         """Return whether a trigger comes at this clock."""
-        contact, under, tripped = self.wall_force.any(), Signal(), self.state == TRIPPED
+        # The force and the count are there a clock before `sampled`, and have a clock of their own to be looked at.
+        contact, under, tripped = Signal(), Signal(), self.state == TRIPPED
         was_in_contact, was_under, was_tripped = Signal(), Signal(), Signal()
-        m.d.comb += under.eq(self.count < self.capture_level)
-        m.d.sync += was_tripped.eq(tripped)
+        m.d.sync += [
+            contact.eq(self.wall_force.any()),
+            under.eq(self.count < self.capture_level),
+            was_tripped.eq(tripped),
+        ]
         with m.If(self.sampled):
             m.d.sync += [was_in_contact.eq(contact), was_under.eq(under)]
         chosen = dict(zip(SOURCES, self.capture_sources, strict=True))

@@ -26,7 +26,8 @@ behind it. When the capture is DONE every record of the ring is of this capture,
 trigger; the record at that place is the one that was being taken, or else the next.
 
 Triggers are the host's `capture_trigger`, and those that `capture_sources` has of `SOURCES`. A trip counts at its
-clock; the others are found from one sample to the next, of which both are behind the start. What comes with the
+clock; the others are found from one sample to the next, of which both are behind the start, with the count, the force
+and the level as they are a clock before a sample's changed drive. What comes with the
 start belongs to the new capture. Samples that follow each other too closely are refused: a value would be the next
 sample's before it is written.
 """
@@ -101,8 +102,10 @@ class State(NamedTuple):
     upper: int  # the high register of the value whose low one is written
     left: int  # samples until the next record; it is due at 1 or 0
     seen: int  # a sample has come since the start
-    contact: int  # at the last sample the wall had a force
-    below: int  # at the last sample the count was less than the level
+    contact: int  # at the last clock the wall had a force
+    below: int  # at the last clock the count was less than the level
+    was_in_contact: int  # the same of the clock before the last sample
+    was_below: int
     tripped: int  # at the last clock the supervisor was TRIPPED
 
 
@@ -231,9 +234,8 @@ def _triggered(state, inputs):
         return True
     if not inputs.sampled or not state.seen or inputs.capture_start:
         return False
-    below = inputs.count < inputs.capture_level
-    touches = inputs.wall_force != 0 and not state.contact
-    rises, falls = state.below and not below, below and not state.below
+    touches = state.contact and not state.was_in_contact
+    rises, falls = state.was_below and not state.below, state.below and not state.was_below
     return bool((sources & 1 and touches) or (sources & 4 and rises) or (sources & 8 and falls))
 
 
@@ -295,7 +297,9 @@ def step(params, memory, state, inputs):
         upper=upper,
         left=0 if start else left,
         seen=int((state.seen or sampled) and not start),
-        contact=int(inputs.wall_force != 0) if sampled else state.contact,
-        below=int(inputs.count < inputs.capture_level) if sampled else state.below,
+        contact=int(inputs.wall_force != 0),
+        below=int(inputs.count < inputs.capture_level),
+        was_in_contact=state.contact if sampled else state.was_in_contact,
+        was_below=state.below if sampled else state.was_below,
         tripped=int(inputs.state == TRIPPED),
     )

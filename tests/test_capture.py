@@ -87,12 +87,13 @@ class World:
             self.until = random.choice((11, 11, 12, random.randint(11, 60)))
             if random.random() < 0.2:
                 self.until = random.choice((RECORD_REGISTERS, random.randint(1, RECORD_REGISTERS)))
+            held["velocity"] = self._value(design.velocity)
+            held["flags"] = random.getrandbits(len(design.spec.design.flags))
+        if self.until == random.choice((1, 1, 1, 3)):
             count = held["count"] + random.choice((-1, 0, 1))
             held["count"] = count if random.random() < 0.9 else self._value(design.count)
             held["count"] = min(max(held["count"], design.count.min), design.count.max)
-            held["velocity"] = self._value(design.velocity)
             held["wall_force"] = random.choice((0, held["wall_force"], self._value(design.force)))
-            held["flags"] = random.getrandbits(len(design.spec.design.flags))
         if random.random() < 0.02:
             held["state"] = random.choice((DISARMED, ARMED, TRIPPED))
             held["live"] = random.getrandbits(1)

@@ -34,8 +34,8 @@ class RegisterFile(wiring.Component):
     - SNAPSHOT: take the status for what is read from then on, in the turns of `design.turns`: what is taken in one turn
       is of one clock, and every value is whole. `taken_clocks` has the clock of each.
 
-    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ; 2 for READ; 3 for WRITE and COUNT; 4 for
-    CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if `commit` or `preload` is marked, `shift_clocks`
+    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ; 2 for READ, 3 of the capture memory; 3 for WRITE
+    and COUNT; 4 for CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if `commit` or `preload` is marked, `shift_clocks`
     and the wait for the sample. After a reset the first `start` may come at once; it waits up to `boot_clocks`.
 
     Rounding and overflow: a value of fewer bits than its registers is extended by its sign or by zeros.
@@ -198,13 +198,16 @@ class RegisterFile(wiring.Component):
             host.data.eq(shift),
         ]
         # A memory is slow: what it gives goes to a register, and from there to the host.
-        found, reading = Signal(CELL_BITS), Signal()
+        found, captured = Signal(CELL_BITS), Signal()
         m.d.comb += found.eq(read.data)
         if registers.capture:
             in_capture = (address[15:] == CAPTURE >> 15) & less(address[:15], registers.capture_registers)
             m.d.comb += self.capture_address.eq(address)
-            with m.If(reading & address[15]):
-                m.d.comb += found.eq(self.capture_data & self.capture_done.replicate(CELL_BITS))
+            # That memory is large, and far away: what it gives has a register of its own first.
+            arrived = Signal(CELL_BITS)
+            m.d.sync += arrived.eq(self.capture_data & self.capture_done.replicate(CELL_BITS))
+            with m.If(captured):
+                m.d.comb += found.eq(arrived)
         with m.If(host.clear):
             m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0)]
 
@@ -303,8 +306,15 @@ class RegisterFile(wiring.Component):
                         m.d.sync += step.eq(design.turns[0][1][0].address + 1)
                         m.next = "SWEEP"
             with m.State("READ"):
-                m.d.comb += [fetched.eq(1), reading.eq(1)]
+                m.d.comb += fetched.eq(1)
                 m.next = "DONE"
+                if registers.capture:
+                    with m.If(address[15]):
+                        m.next = "READ_CAPTURE"
+            if registers.capture:
+                with m.State("READ_CAPTURE"):
+                    m.d.comb += [fetched.eq(1), captured.eq(1)]
+                    m.next = "DONE"
             with m.State("LEAST"):
                 m.d.comb += [place.eq(below), area.eq(Area.MOST), fetched.eq(1)]
                 m.next = "ABOVE"

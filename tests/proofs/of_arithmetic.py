@@ -24,16 +24,22 @@ SMALL = 12
 
 
 def root_keeps(bench: Bench, path: str = "") -> None:
-    """Promise what a root under way keeps: the remainder is at most twice the root, which has as many bits as made."""
+    """Promise what a root under way keeps: the remainder is at most twice the root, which has as many bits as made.
+
+    A root with an odd number of bits has one bit after its first step, for the first digit is at most 1: nothing stands
+    above the radicand then.
+    """
     inner = bench.inner
-    complement, left, clocks = inner[f"{path}complement"], inner[f"{path}left"], len(inner[f"{path}digits"]) // 4
+    complement, left, digits = inner[f"{path}complement"], inner[f"{path}left"], inner[f"{path}digits"]
+    clocks, above = len(digits) // 4, len(digits) // 2 - len(inner[f"{path}root"])
     root = Signal(2 * clocks)
     bench.m.d.comb += root.eq(~complement)
     bench.promise(complement < 0)
     bench.promise(inner[f"{path}triple"] == 3 * complement + 1)
     bench.promise(left <= clocks)
     bench.promise(inner[f"{path}remainder"] <= root << 1)
-    bench.promise((root >> ((clocks - left) << 1)[: len(root).bit_length()]) == 0)
+    bench.promise((root << above) >> ((clocks - left) << 1)[: len(root).bit_length()] == 0)
+    bench.promise((left != clocks) | (digits[len(digits) - 2 * above :] == 0))
 
 
 def root_is_exact(width: int, bench: Bench) -> None:

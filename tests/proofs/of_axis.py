@@ -51,6 +51,7 @@ def zero_before_a_commit(estimator: str, bench: Bench) -> None:
     inner = bench.inner
     bench.assume(~axis.commit)
     bench.promise(~axis.commit_pending)
+    bench.promise(~inner["begun"])
     for word in axis.spec.design.words:
         bench.promise(inner[f"active_{word.name}"] == word.reset)
     half = 1 << (axis.spec.design.wall.push - 1)
