@@ -66,10 +66,9 @@ def mapped(component: wiring.Component, family: Family, name: str = GATES) -> Ne
         SynthesisError: if Yosys is missing or fails.
     """
     made_by, rtl = tools.versions([YOSYS]), to_verilog(component, RTL)
-    # Names of the source that nothing needs are left out.
     script = (
         f"read_verilog rtl.v; {family.synth} -top {RTL} -json netlist.json; "
-        f"delete t:$scopeinfo; opt_clean -purge; rename {RTL} {name}; write_verilog -noattr gates.v"
+        f"delete t:$scopeinfo; rename {RTL} {name}; write_verilog -noattr gates.v"
     )
     content = "\0".join([rtl, script, *made_by])
     folder = build_dir() / "gate" / f"{family.name}-{hashlib.sha256(content.encode()).hexdigest()[:16]}"
