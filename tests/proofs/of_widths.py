@@ -189,7 +189,7 @@ CASES = {
     "levant": Case(
         partial(estimator, "levant"),
         (*MOVED, "digits", "low", *(f"sum_{number}" for number in range(4))),
-        Bug(levant.Estimator._corrected, "2 * digits + 1) + 1", "2 * digits + 1) - 2"),
+        Bug(levant.Estimator._corrected, "design.lambda_.width + coarser + 1", "design.lambda_.width + coarser"),
         levant_alone,
     ),
     "levant-semi-implicit": Case(partial(estimator, "levant-semi-implicit"), (*MOVED, "digits"), PRODUCT, levants),
