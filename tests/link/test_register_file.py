@@ -27,9 +27,9 @@ PLACES = 0, 0x60, 0xC0, MAP, CAPTURE, CAPTURE + CAPTURE_REGISTERS - 150, SPACE, 
 """Where there are registers or their end, and the same beyond the last address."""
 
 
-def place(random: np.random.Generator) -> int:
-    """Return an address, mostly near these."""
-    near = random.choice(PLACES) + random.integers(0, 160)
+def place(random: np.random.Generator, design: model.Design) -> int:
+    """Return an address, mostly near these or the end of the map."""
+    near = random.choice((*PLACES, MAP + len(design.map_cells) - 80)) + random.integers(0, 160)
     return int(random.choice((near, random.integers(0, 2 * SPACE)), p=(0.8, 0.2)))
 
 
@@ -112,7 +112,7 @@ async def random_operations(dut):
     pulsed, before = [host.bench.monitor(pulse.name) for pulse in pulses], [0] * len(pulses)
     for _ in range(400):
         case, first, last = random.random(), int(random.integers(0, 2)), int(random.integers(0, 2))
-        address = place(random)
+        address = place(random, host.design)
         value = int(random.integers(0, 1 << 16))
         if case < 0.25:
             await host.do(Operation.CHECK_READ, address, 0, first, last)
@@ -129,8 +129,8 @@ async def random_operations(dut):
             for k, half in enumerate(register.to_registers(word)):
                 await host.do(Operation.WRITE, register.address + k, half)
                 host.twin.write(register.address + k, half)
-            for each in host.registers.live:
-                assert host.bench.reader(each.name)() == host.twin.active[each.name]
+                for each in host.registers.live:
+                    assert host.bench.reader(each.name)() == host.twin.active[each.name]
         elif case < 0.8:
             await host.do(Operation.COUNT, COUNTERS + value % 8)
             host.twin.count(COUNTERS + value % 8)
@@ -153,6 +153,9 @@ async def random_operations(dut):
             assert await host.do(Operation.SNAPSHOT) == host.component.snapshot_clocks
             host.twin.status = now
             host.twin.snapshot()
+            for each in statuses:
+                for k in range(each.size):
+                    assert await host.read(each.address + k) == host.twin.read(each.address + k), each.name
         await RisingEdge(dut.clk)
         assert host.found() == host.expected()
         if host.expected() != (0, 0, 0):
