@@ -11,7 +11,7 @@ from .options import EstimatorsOption, PartName, SeedsOption, curves_of
 from .study import StudyOptions, study
 
 
-@study()
+@study("plot")
 def command(
     options: StudyOptions,
     wanted: EstimatorsOption = None,

@@ -11,7 +11,7 @@ from matplotlib.text import Text
 
 from hardwall.sim.estimates import figures
 from hardwall.sim.estimates.replay import replay
-from hardwall.sim.pictures import accuracy, bits, cutoff, drop, gains, hit, lipschitz, rates, trade, zwidth
+from hardwall.sim.pictures import accuracy, bits, costs, cutoff, drop, gains, hit, lipschitz, rates, trade, zwidth
 from hardwall.sim.pictures import replay as replayed
 from hardwall.sim.pictures.style import PAGE_IN, lay_out, save
 from hardwall.sim.studies.accuracy import Accuracy
@@ -42,6 +42,7 @@ PICTURES = {
     "figure 1": figure_1,
     "figure 2": lambda: accuracy.draw(results.rows()),
     "bits": lambda: bits.draw(results.bits_dropped()),
+    "costs": lambda: costs.draw(results.costs_of_boards()),
     "cutoff": lambda: cutoff.draw(results.devices()),
     "gains": lambda: gains.draw(results.search()),
     "lipschitz": lambda: lipschitz.draw(results.fit()),

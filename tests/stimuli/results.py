@@ -9,7 +9,7 @@ from hardwall.sim.estimates import figures
 from hardwall.sim.loop.record import Overview, Trace
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
-from hardwall.sim.studies import bits, cutoff, drop, gains, lipschitz, rates, shortcuts, sines, trade
+from hardwall.sim.studies import bits, costs, cutoff, drop, gains, lipschitz, rates, shortcuts, sines, trade
 from hardwall.sim.studies.accuracy import Accuracy
 from hardwall.sim.studies.drop_result import Drop, End, Law, Shaken
 from hardwall.sim.studies.zwidth import ZWidth
@@ -84,6 +84,23 @@ def bits_dropped() -> bits.Bits:
         for dropped in list(bits.DROPPED)[:3]
     ]
     return bits.Bits(rows)
+
+
+def costs_of_boards() -> costs.Costs:
+    """Return the costs of three estimators on two parts, one of which is too small for the largest."""
+
+    def row(estimator: str, device: str, lut4: int, max_sample_hz: float) -> dict:
+        board = {"lut4": lut4, "max_sample_hz": max_sample_hz} if lut4 < 5000 else None
+        return {"estimator": estimator, "device": device, "board": board}
+
+    return costs.Costs(
+        [
+            row(estimator, device, lut4, hz / interval)
+            for device, hz in (("ecp5-25k", 100e6), ("ice40-up5k", 25e6))
+            for estimator, lut4, interval in (("fdm", 3400, 5), ("levant", 4500, 9), ("levant-edge", 4900, 35))
+        ]
+        + [row("levant-adaptive", "ice40-up5k", 6000, 1e6)]
+    )
 
 
 def devices() -> cutoff.Cutoffs:
