@@ -108,9 +108,8 @@ class Capture(Block):
         state, records = self.capture_state, self._design.records
         waiting = (state == FILLING) | (state == WAITING)
         kept, ring = Signal(range(records + 1)), Signal(range(records), reset_less=True)
-        seen = Signal()
-        m.d.comb += self.done.eq(state == DONE)
-        trigger = self._trigger(m, seen)
+        seen, trigger = Signal(), Signal()
+        m.d.comb += [self.done.eq(state == DONE), trigger.eq(self._trigger(m, seen))]
 
         # A record is due at 1, and at 0, which is the first behind the start.
         left, due = Signal.like(self.capture_decimation), Signal()

@@ -74,7 +74,7 @@ class World:
         if random.random() < 0.5:
             held["capture_before"] = random.choice((0, 1, most, random.randint(0, most)))
         if random.random() < 0.3:
-            held["capture_decimation"] = random.choice((1, 1, 2, random.randint(1, 5), 4095))
+            held["capture_decimation"] = random.choice((1, 1, 2, random.randint(1, 5), random.randint(6, 255), 4095))
         elif held["capture_decimation"] > 5:
             held["capture_decimation"] = 1
 
@@ -87,6 +87,9 @@ class World:
             self.until = random.choice((11, 11, 12, random.randint(11, 60)))
             if random.random() < 0.2:
                 self.until = random.choice((RECORD_REGISTERS, random.randint(1, RECORD_REGISTERS)))
+            # Else a record that is many samples away would never come.
+            if held["capture_decimation"] > 5 and random.random() < 0.9:
+                self.until = 1
             held["velocity"] = self._value(design.velocity)
             held["flags"] = random.getrandbits(len(design.spec.design.flags))
         if self.until == random.choice((1, 1, 1, 3)):

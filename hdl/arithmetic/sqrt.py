@@ -36,7 +36,8 @@ class Sqrt(wiring.Component):
     done : Out(1)
         High for one clock.
     reached : Out(3)
-        In the clocks that make the root, what its next two bits are: bit d - 1 is high if they are at least d.
+        What the next two bits of the root are: bit d - 1 is high if they are at least d. Behind the last clock that
+        makes the root, they are those behind its point.
     last : Out(1)
         High in the last of these clocks.
 

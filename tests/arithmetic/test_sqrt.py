@@ -8,7 +8,7 @@ import pytest
 from cocotb.triggers import ClockCycles, RisingEdge
 
 from hardwall.hdl.arithmetic.sqrt import Sqrt
-from hardwall.model.arithmetic.sqrt import isqrt
+from hardwall.model.arithmetic.sqrt import digits, isqrt
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 
 
@@ -59,6 +59,27 @@ async def a_new_start_abandons_the_old_one(dut):
         await ClockCycles(dut.clk, clocks - 1) if clocks > 1 else None
         await bench.transact("start", "done", radicand=top)
     assert roots.rows == [(math.isqrt(top),)] * (component.latency - 1)
+
+
+@cocotb.test()
+async def every_digit_is_told_as_it_is_made(dut):
+    component = Sqrt(**parameters())
+    bench, clocks = Bench(dut, component), digits(component.width)
+    await bench.reset()
+    shown = [bench.reader(name) for name in ("reached", "last", "done", "root")]
+    told = []
+    for radicand in [*around_squares(component.width), *rng().integers(0, 1 << component.width, 200).tolist()]:
+        bench.drive(start=1, radicand=radicand)
+        await RisingEdge(dut.clk)
+        bench.drive(start=0, radicand=0)
+        # A root that is done goes on with the digits of a radicand that ends in zeros, and stays as it is.
+        for made in (*range(clocks), clocks, clocks):
+            await RisingEdge(dut.clk)
+            after = math.isqrt(radicand << 4 >> 4 * (clocks - made))
+            told.append(tuple(read() for read in shown))
+            done = made == clocks and told[-2][1]
+            assert told[-1] == ((1 << after % 4) - 1, made == clocks - 1, done, after >> 2), (radicand, made)
+    assert {reached for reached, *_ in told} == {0, 1, 3, 7} or component.width <= 3
 
 
 @pytest.mark.parametrize("width", [1, 2, 3, 16, 35])

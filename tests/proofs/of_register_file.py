@@ -110,7 +110,7 @@ def every_operation_ends(bench: Bench) -> None:
     bench.promise(~bench.state("LOAD", "SHIFT", "STORE") | (last == (to_come == 1)))
     bench.promise(~bench.state("LOOK", "LOAD", "SHIFT", "STORE") | read & (place == step))
 
-    sends = 3
+    sends, captured = 3, host.address[15]
     per_cell = CELL_BITS + 4 + Mux(committing, 2, 0)
     others = (to_come - 1)[: len(to_come)] * per_cell + Mux(committing, sends, 1)
     boot = (END - 1 - step)[: len(step)] * 3
@@ -119,7 +119,8 @@ def every_operation_ends(bench: Bench) -> None:
         "BOOT_TAKE": boot + 2,
         "BOOT_WRITE": boot + 1,
         "IDLE": 0,
-        "READ": 2,
+        "READ": 2 + captured,
+        "READ_CAPTURE": 2,
         "LEAST": 4,
         "ABOVE": 3,
         "BELOW": 2,
@@ -155,7 +156,7 @@ def every_operation_ends(bench: Bench) -> None:
     shifts = Cat(inner["marks"][names.index(name)] for name in ("commit", "preload")).any()
     latencies = {
         Operation.CHECK_READ: 1,
-        Operation.READ: 2,
+        Operation.READ: 2 + captured,
         Operation.WRITE: 3,
         Operation.COUNT: 3,
         Operation.CHECK_WRITE: 4,
