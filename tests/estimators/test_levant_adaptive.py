@@ -58,10 +58,13 @@ def losses(d: levant_adaptive.Design, samples: int, random: Random):
     calm, reach = sum(map(d.hold_samples, range(d.levels))), d.reach_samples(d.levels)
     while samples > 0:
         side = random.choice((-1, 1))
+        # Any time, or one beside that at which another level is reached.
+        beside = d.reach_samples(random.randint(1, d.levels)) + random.randint(-4, 4)
+        time = random.choice((max(beside, 1), 1 + random.randrange(reach + 10)))
         # An error from 0 to a count is on the one side, and from -1 to 0 on the other.
         parts = [
             (int(side > 0), -side, random.randrange(calm + 20)),
-            (int(side < 0), side, 1 + random.randrange(reach + 10)),
+            (int(side < 0), side, time),
             (LOST << random.randrange(3), side, 3),
         ]
         for size, where, rows in parts:
