@@ -84,6 +84,7 @@ COVERED = {
     "cocotb_loop": "studies/test_bench",
     "costs": "rtl/test_synthesis",
     "drop_result": "studies/test_drop",
+    "published": "pictures/test_draw",
     "shortcuts": "studies/test_trade",
     "trade_runs": "studies/test_trade",
     "zwidth": "walls/test_zwidth",

@@ -34,9 +34,10 @@ class RegisterFile(wiring.Component):
     - SNAPSHOT: take the status for what is read from then on, in the turns of `design.turns`: what is taken in one turn
       is of one clock, and every value is whole. `taken_clocks` has the clock of each.
 
-    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ; 2 for READ, 3 of the capture memory; 3 for WRITE
-    and COUNT; 4 for CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if `commit` or `preload` is marked, `shift_clocks`
-    and the wait for the sample. After a reset the first `start` may come at once; it waits up to `boot_clocks`.
+    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ; 2 for READ, 3 of the capture memory; 3 for
+    WRITE and COUNT; 4 for CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if `commit` or `preload` is
+    marked, `shift_clocks` and the wait for the sample. After a reset the first `start` may come at once; it waits up to
+    `boot_clocks`.
 
     Rounding and overflow: a value of fewer bits than its registers is extended by its sign or by zeros.
 

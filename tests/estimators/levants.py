@@ -57,8 +57,8 @@ def stimulus(d: levant.Design, samples: int) -> Iterator[tuple[int, ...]]:
             yield count, int(k == 0), lam, alpha, k % 2
         yield from ends(d, count, way, random)
     yield from led(d, samples // 4, random)
-    # The least distance of the error's width alone has a magnitude beyond it: to it and beside it, in two jumps, between
-    # which gains of 0 leave the distance as it is.
+    # The least distance of the error's width alone has a magnitude beyond it: to it and beside it, in two jumps,
+    # between which gains of 0 leave the distance as it is.
     far = 1 << d.error.width - 1 - d.velocity.f
     for count in (way * (far + beside) for way in (-1, 1) for beside in (-1, 0, 1)):
         yield from ((0, 1, 0, 0, 0), (count // 2, 0, 0, 0, 0), (count, 0, 0, 0, 0))
