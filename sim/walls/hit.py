@@ -126,10 +126,13 @@ class Hit(Summary):
         Raises:
             OSError: if the file cannot be written.
         """
-        kept = {"overview": self.overview, "detail": self.detail}
-        arrays = {f"{name}_{key}": array for name, trace in kept.items() for key, array in vars(trace).items()}
         with whole_file(path) as part, part.open("wb") as file:
-            np.savez_compressed(file, report=json.dumps(self.report()), **arrays)
+            np.savez_compressed(file, report=json.dumps(self.report()), **self.arrays())
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return the arrays of the traces, by `overview_` or `detail_` and their name."""
+        kept = {"overview": self.overview, "detail": self.detail}
+        return {f"{name}_{key}": array for name, trace in kept.items() for key, array in vars(trace).items()}
 
     def notes(self) -> list[str]:
         """Return what keeps the velocity's error from being known."""

@@ -12,7 +12,7 @@ from stimuli import results
 from stimuli.replays import COARSEN, swing
 from stimuli.reports import SCHEMA, check, check_text
 
-PARTS = {"fact", "map", "placed", "trial"}
+PARTS = {"fact", "map", "placed", "struck", "trial"}
 """Definitions of the schema that are no command's, but parts of several."""
 ELSEWHERE = {
     *("accuracy", "bench", "board", "capture", "choose", "connect", "costs", "disarm", "fit", "home", "set", "synth"),
