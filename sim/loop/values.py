@@ -50,7 +50,7 @@ class Sweep(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """The state of the loop before the drive of `sample` changes, at its strobe; if samples overlap, at that of the last
+    """The state of the loop before the drive of `sample` changes: at its strobe or, if samples overlap, at that of the last
     sample that is taken before then."""
 
     sample: int

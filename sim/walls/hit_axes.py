@@ -5,8 +5,10 @@ the axis's turn in the rota: nothing goes from one axis to another. In `rtl` the
 """
 
 import json
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +16,9 @@ import numpy as np
 
 from ...model.whole_file import whole_file
 from ..jobs.result import Table, table_of
+from ..jobs.stages import stage
+from ..loop.turns import turns
+from ..loop.values import EDGE_CAPACITY, Memory
 from ..scene.several import AxesScene
 from . import hit
 from .hit_rows import NOTES, NUMBERS, row_of
@@ -75,13 +80,15 @@ def run(scene: AxesScene, backend: str, traces: bool = False, progress: Callable
 
     Args:
         scene: a scene from `scene.tables.load_any`.
-        backend: `float` or `fixed`.
+        backend: one of `backends.BACKENDS`.
         traces: keep samples of the whole runs and of the contacts.
         progress: called with the number of samples done, of all axes together.
 
     Raises:
-        RuntimeError: if a handle outran every decoder's limit by far.
+        RuntimeError: if a handle outran every decoder's limit by far, or the RTL could not be built.
     """
+    if backend == "rtl":
+        return _run_rtl(scene, traces, progress)
     hits = {}
     for number, axis in enumerate(scene.axes):
 
@@ -91,3 +98,46 @@ def run(scene: AxesScene, backend: str, traces: bool = False, progress: Callable
 
         hits[axis.axis] = hit.run(axis, backend, traces, done)
     return AxesHit(scene, backend, sum(each.seconds for each in hits.values()), hits)
+
+
+def _in_room(memory: Memory, room: int) -> Memory:
+    """Return a memory whose arrays have room for that many samples."""
+    return memory._replace(positions=memory.positions[:room], drives=memory.drives[:room])
+
+
+def _run_rtl(scene: AxesScene, traces: bool, progress: Callable[[int], None] | None) -> AxesHit:
+    """Close all loops around one piece of hardware."""
+    from ..rtl.axes_library import HardwareOfAxes  # noqa: PLC0415  (the other backends need no C++ compiler)
+
+    loops = [hit.Loop(axis, "rtl", traces, False) for axis in scene.axes]
+    # The loops write to their arrays in step, and all are read at once.
+    room = min(min(loop.chunk for loop in loops), max(scene.samples // hit.LOOKS, 1))
+    flags = np.zeros((len(loops), 1), np.int64)
+    words, levels = [axis.words for axis in scene.axes], [loop.start_level for loop in loops]
+    with HardwareOfAxes(scene.spec, words, levels) as hardware:
+        with stage("compiling the loops, once"):
+            ways = [
+                turns(loop.world, controller, loop.at, _in_room(loop.memory, room), raised, scene.samples)
+                for loop, controller, raised in zip(loops, hardware.controllers, flags, strict=True)
+            ]
+        began = time.perf_counter()
+        rounds = zip(*ways, strict=False)  # a loop that lost edges ends before the others
+        next(rounds)  # the edges until the first change
+        for first in range(0, scene.samples, room):
+            count = min(room, scene.samples - first)
+            done = sum(1 for _ in islice(rounds, count))
+            if done < count:
+                when = (first + done) / scene.spec.sample_hz
+                raise RuntimeError(f"a handle passed more than {EDGE_CAPACITY} edges in a sample, at {when:g} s")
+            for loop in loops:
+                loop.tally.add(first, loop.memory.positions[:count], loop.memory.drives[:count])
+            if progress:
+                progress((first + count) * len(loops))
+        seconds = time.perf_counter() - began
+    for loop in loops:
+        loop.at = loop.at._replace(sample=scene.samples)
+    hits = {
+        axis.axis: loop.result(seconds, int(raised[0]))
+        for axis, loop, raised in zip(scene.axes, loops, flags, strict=True)
+    }
+    return AxesHit(scene, "rtl", seconds, hits)
