@@ -50,15 +50,13 @@ class Sweep(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """The state of the loop before the drive of `sample` changes: at its strobe or, if samples overlap, at that of the last
-    sample that is taken before then."""
+    """The state of the loop before the drive of `sample` changes: at its strobe or, if samples overlap, at that of the
+    last one that is taken before then."""
 
     sample: int
     moment: Moment
     force_n: float
-    taken: tuple[
-        Motion | State, ...
-    ]  # the motions at the strobes of `sample` and of those that overlap it but the last
+    taken: tuple[Motion | State, ...]  # at the strobe of `sample`, and of those that overlap it but the last
 
 
 class Memory(NamedTuple):

@@ -13,7 +13,7 @@ ROW_IN, TITLE_IN = 1.3, 0.8
 
 @page
 def draw(result: AxesHit) -> Figure:
-    """Return the picture of hits with traces: a row for each axis, with its position on the left and force on the right.
+    """Return the picture of hits with traces: a row for each axis, position on the left and force on the right.
 
     A row has the samples of the whole run at equal distances; its force is the range from each of them to the next.
     """

@@ -1,4 +1,4 @@
-"""The compiled loop's view of Verilated axes: the addresses of their functions, and the values last read from one."""
+"""The compiled loop's view of Verilated axes: the addresses of functions, and the values last read from an axis."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ class RtlState(NamedTuple):
 
 
 class RtlAxis(NamedTuple):
-    """The addresses of three functions of `sim/rtl/axes_library.cpp` and of their context, and the number of an axis."""
+    """The addresses of three functions of `sim/rtl/axes_library.cpp` and of their context, and an axis's number."""
 
     give: int
     drive: int

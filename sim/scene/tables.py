@@ -57,13 +57,8 @@ def parse_axes(scene: str, text: str, changes: dict[str, Any] | None = None) -> 
         wrong = stranger((section,))
         if wrong or section in ABSENT:
             raise SceneError(f"{scene}: {wrong or f'{section} must be absent beside [[axis]]: {ABSENT[section]}'}")
-    general = _changed(scene, tables, changes or {})
-    for key, value in general.items():
-        put(content, scene, key, value)
+    _change(scene, content, tables, changes or {})
     merged = {name: _merged(content, table) for name, table in tables.items()}
-    for each in merged.values():
-        for key, value in general.items():
-            put(each, scene, key, value)
     first = next(iter(merged))
     plain = {key: value for key, value in merged[first].items() if key != "controller"}
     only = {"controller": content["controller"]} if "controller" in content else {}
@@ -120,24 +115,34 @@ def _check_own(scene: str, name: str, key: tuple[str, ...]) -> None:
         raise SceneError(f"{scene}: axis {name}: {wrong}")
 
 
-def _changed(scene: str, tables: dict[str, Content], changes: dict[str, Any]) -> dict[str, Any]:
-    """Put the changes of single axes into their tables, and return the others."""
-    general = {}
-    for key, value in changes.items():
-        first, *rest = key.split(".")
-        if first != AXIS:
-            if first in ABSENT and value is not None:
-                raise SceneError(f"{scene}: {first} must be absent beside [[axis]]: {ABSENT[first]}")
-            general[key] = value
-            continue
-        if not rest or rest[0] not in tables:
+def _change(scene: str, content: Content, tables: dict[str, Content], changes: dict[str, Any]) -> None:
+    """Put changes where they belong: those of single axes into their tables, the others in place of what tables say."""
+    of_all = {key: value for key, value in changes.items() if key.split(".")[0] != AXIS}
+    for key, value in of_all.items():
+        parts = key.split(".")
+        if parts[0] in ABSENT and value is not None:
+            raise SceneError(f"{scene}: {parts[0]} must be absent beside [[axis]]: {ABSENT[parts[0]]}")
+        put(content, scene, key, value)
+        for table in tables.values():
+            _take_out(table, parts)
+    for key in [key for key in changes if key not in of_all]:
+        name, _, own = key.removeprefix(AXIS).removeprefix(".").partition(".")
+        if name not in tables:
             raise SceneError(f"{scene}: {shown(key)} is of no axis of this scene: they are {', '.join(tables)}")
-        name, *own = rest
         if not own:
             raise SceneError(f"{scene}: {shown(key)} must go on with the key of a scene")
-        _check_own(scene, name, tuple(own))
-        put(tables[name], scene, ".".join(own), value)
-    return general
+        _check_own(scene, name, tuple(own.split(".")))
+        put(tables[name], scene, own, changes[key])
+
+
+def _take_out(table: Content, parts: list[str]) -> None:
+    """Take a key, by its parts, out of a table that may not have it."""
+    *sections, last = parts
+    for section in sections:
+        table = table.get(section, {})
+        if not isinstance(table, dict):
+            return
+    table.pop(last, None)
 
 
 def _merged(content: Content, table: Content) -> Content:

@@ -6,9 +6,9 @@ the axis's turn in the rota: nothing goes from one axis to another. In `rtl` the
 
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from ...model.whole_file import whole_file
 from ..jobs.result import Table, table_of
 from ..jobs.stages import stage
 from ..loop.turns import turns
-from ..loop.values import EDGE_CAPACITY, Memory
+from ..loop.values import EDGE_CAPACITY
 from ..scene.several import AxesScene
 from . import hit
 from .hit_rows import NOTES, NUMBERS, row_of
@@ -100,44 +100,48 @@ def run(scene: AxesScene, backend: str, traces: bool = False, progress: Callable
     return AxesHit(scene, backend, sum(each.seconds for each in hits.values()), hits)
 
 
-def _in_room(memory: Memory, room: int) -> Memory:
-    """Return a memory whose arrays have room for that many samples."""
-    return memory._replace(positions=memory.positions[:room], drives=memory.drives[:room])
-
-
 def _run_rtl(scene: AxesScene, traces: bool, progress: Callable[[int], None] | None) -> AxesHit:
     """Close all loops around one piece of hardware."""
     from ..rtl.axes_library import HardwareOfAxes  # noqa: PLC0415  (the other backends need no C++ compiler)
 
     loops = [hit.Loop(axis, "rtl", traces, False) for axis in scene.axes]
-    # The loops write to their arrays in step, and all are read at once.
-    room = min(min(loop.chunk for loop in loops), max(scene.samples // hit.LOOKS, 1))
     flags = np.zeros((len(loops), 1), np.int64)
     words, levels = [axis.words for axis in scene.axes], [loop.start_level for loop in loops]
     with HardwareOfAxes(scene.spec, words, levels) as hardware:
         with stage("compiling the loops, once"):
             ways = [
-                turns(loop.world, controller, loop.at, _in_room(loop.memory, room), raised, scene.samples)
+                turns(loop.world, controller, loop.at, loop.memory, raised, scene.samples)
                 for loop, controller, raised in zip(loops, hardware.controllers, flags, strict=True)
             ]
         began = time.perf_counter()
-        rounds = zip(*ways, strict=False)  # a loop that lost edges ends before the others
-        next(rounds)  # the edges until the first change
-        for first in range(0, scene.samples, room):
-            count = min(room, scene.samples - first)
-            done = sum(1 for _ in islice(rounds, count))
-            if done < count:
-                when = (first + done) / scene.spec.sample_hz
-                raise RuntimeError(f"a handle passed more than {EDGE_CAPACITY} edges in a sample, at {when:g} s")
-            for loop in loops:
-                loop.tally.add(first, loop.memory.positions[:count], loop.memory.drives[:count])
+        for done in _rounds(ways, loops, scene):
             if progress:
-                progress((first + count) * len(loops))
+                progress(done * len(loops))
         seconds = time.perf_counter() - began
-    for loop in loops:
-        loop.at = loop.at._replace(sample=scene.samples)
-    hits = {
-        axis.axis: loop.result(seconds, int(raised[0]))
-        for axis, loop, raised in zip(scene.axes, loops, flags, strict=True)
-    }
+    hits = {loop.scene.axis: loop.result(seconds, int(raised[0])) for loop, raised in zip(loops, flags, strict=True)}
     return AxesHit(scene, "rtl", seconds, hits)
+
+
+def _rounds(ways: list[Iterator[int]], loops: list[hit.Loop], scene: AxesScene) -> Iterator[int]:
+    """Let the loops take their turns to the end; yield the number of samples of every axis that are done, now and then.
+
+    Every loop's samples are tallied when its arrays are full, as those of a loop that runs alone.
+
+    Raises:
+        RuntimeError: if a handle outran every decoder's limit by far.
+    """
+    rounds = zip(*ways, strict=False)  # a loop that lost edges ends before the others
+    steps = {max(scene.samples // hit.LOOKS, 1), *(loop.chunk for loop in loops)}
+    ends = sorted({scene.samples}.union(*(range(step, scene.samples, step) for step in steps)))
+    next(rounds, None)  # the edges until the first change
+    for first, end in pairwise([0, *ends]):
+        done = first + sum(1 for _ in islice(rounds, end - first))
+        if done < end:
+            when = done / scene.spec.sample_hz
+            raise RuntimeError(f"a handle passed more than {EDGE_CAPACITY} edges in a sample, at {when:g} s")
+        for loop in loops:
+            begin = first // loop.chunk * loop.chunk
+            if end == scene.samples or end % loop.chunk == 0:
+                loop.tally.add(begin, loop.memory.positions[: end - begin], loop.memory.drives[: end - begin])
+                loop.at = loop.at._replace(sample=end)
+        yield end

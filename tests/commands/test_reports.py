@@ -47,6 +47,15 @@ def test_a_result_is_as_its_schema_says(name):
     check(name, RESULTS[name]().report())
 
 
+def test_the_hits_of_several_axes_are_as_their_schema_says():
+    report = results.hit_axes().report()
+    check("hit", report)
+    first, *others = report["rows"]
+    for wrong in ({"axis": None}, {"rms_mm": -1.0}, {"more": 1}):
+        with pytest.raises(AssertionError, match=r"^hit: "):
+            check("hit", report | {"rows": [first | wrong, *others]})
+
+
 def test_what_is_not_as_the_schema_says_is_found():
     report = results.hit().report()
     for wrong in (report | {"rms_mm": -1.0}, report | {"more": 1}, {**report, "flags": "none"}, [report]):

@@ -46,6 +46,8 @@ def test_a_change_is_of_every_axis_or_of_the_one_that_it_names():
     assert [each.wall.stiffness_n_per_m for each in scene.axes if each.axis == "grip"] == [3e3]
     assert [each.axis for each in scene.axes if each.wall.stiffness_n_per_m == 3e3] == ["grip"]
     assert [each.axis for each in scene.axes if each.hand] == ["grip"]
+    both = {"axis.grip.wall.damping_n_s_per_m": 7.0, "wall.damping_n_s_per_m": 33.0}
+    assert [each.wall.damping_n_s_per_m for each in load_any("eight-axes", both).axes] == [33.0] * 7 + [7.0]
     assert load_any("eight-axes", {"axis.grip.wall.forbid_pull": None}).axes[-1].wall.forbid_pull is False
 
 

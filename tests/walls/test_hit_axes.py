@@ -10,9 +10,11 @@ import pytest
 from hardwall.model.design import Timing, overlap_of
 from hardwall.sim.scene.load import load
 from hardwall.sim.scene.schema import Scene
+from hardwall.sim.scene.several import AxesScene
 from hardwall.sim.scene.tables import load_any, parse_axes, read
 from hardwall.sim.walls import hit, hit_axes
-from stimuli.scenes import SHORT_OF_AXES
+from stimuli.lengths import LONG
+from stimuli.scenes import AMPLIFIER, CABLE, HAND, SHORT_OF_AXES
 
 FDM = {"controller.estimator": "fdm", "controller.output": None, "controller.gains": None}
 EIGHT = read("eight-axes")
@@ -87,6 +89,73 @@ def test_a_handle_takes_its_way_however_many_samples_overlap(clocks, overlap):
         m, b, n = axis.handle.mass_kg, axis.handle.viscous_n_s_per_m, axis.protocol.push_n - axis.handle.coulomb_n
         exact = axis.protocol.start_m + n / b * (t + m / b * np.expm1(-b * t / m))
         assert np.abs(result.overview.position_m[:1000] - exact).max() < 1e-12, name
+
+
+FAST = {
+    "controller.sample_hz": 1_000_000, "controller.speed_max_m_per_s": 0.2, "protocol.settle_s": 4e-3,
+    "protocol.mean_s": 1e-3, "protocol.measure_s": 2e-3, "protocol.start_m": -1e-5, "protocol.push_n": 10.0,
+    "controller.glitch_clocks": 0,
+}  # fmt: skip
+"""A hard hit near the start of every axis."""
+PARTS = {
+    f"axis.shoulder.{key}": value for key, value in (AMPLIFIER | CABLE | HAND | {"amplifier.delay_s": 4e-6}).items()
+}
+ON_RTL = {
+    **({"no overlap": {"controller.clock_hz": 40_000_000}} if LONG else {}),
+    "one sample overlaps": {"controller.clock_hz": 16_000_000, "controller.actuation_hz": 500_000},
+    "three samples overlap": FDM | {"controller.clock_hz": 4_000_000},
+    "a window": FDM | {"controller.estimator": "window", "controller.clock_hz": 9_000_000},
+}
+
+
+def three(changes: dict) -> AxesScene:
+    """Return the first three axes of the scene: one of them with cable, hand and late amplifier, one with gains of its
+    own and an encoder out of phase."""
+    own = {"axis.elbow.controller.gains.levant.lambda_sqrt_m_per_s": 25.0, "axis.elbow.encoder.phase_error_counts": 0.2}
+    own |= {"axis.elbow.controller.gains.levant.alpha_m_per_s2": 90.0}
+    text = "[[axis]]".join(EIGHT.split("[[axis]]")[:4])
+    return parse_axes("eight-axes", text, FAST | {"controller.actuation_hz": 1_000_000} | PARTS | own | changes)
+
+
+@pytest.mark.parametrize("case", ON_RTL)
+def test_rtl_gives_the_models_force_words_in_every_axis(case):
+    scene = three(ON_RTL[case])
+    overlaps = {"no overlap": 0, "one sample overlaps": 1, "three samples overlap": 3}
+    assert overlap_of(scene.axes[0].timing) == overlaps.get(case, overlap_of(scene.axes[0].timing))
+    fixed, rtl = (hit_axes.run(scene, backend, traces=True).hits for backend in ("fixed", "rtl"))
+    for name, result in rtl.items():
+        assert kept(result) | {"backend": "fixed"} == kept(fixed[name])
+        for trace in ("overview", "detail"):
+            for key, values in vars(getattr(result, trace)).items():
+                assert (values == getattr(getattr(fixed[name], trace), key)).all(), f"{trace} {key} of {name}"
+        assert result.max_force_n > 1
+        assert len(result.detail.time_s) > 1000
+    assert len({result.force_sha256 for result in rtl.values()}) == 3
+
+
+def test_rtl_of_an_axis_that_is_too_fast_has_its_neighbours_as_they_were():
+    """The motor of one axis turns its encoder faster than its filter follows: a flag rises, and the drive is zero."""
+    changes = ON_RTL["one sample overlaps"]
+    own = {"protocol.push_n": 39.0, "protocol.start_m": -0.1, "handle.mass_kg": 0.02, "controller.glitch_clocks": 15}
+    too_fast = changes | {f"axis.elbow.{key}": value for key, value in own.items()}
+    calm, wild = (hit_axes.run(three(given), "rtl").hits for given in (changes, too_fast))
+    fixed = hit_axes.run(three(too_fast), "fixed").hits
+    assert kept(wild["elbow"]) | {"backend": "fixed"} == kept(fixed["elbow"])
+    assert "encoder_overspeed" in wild["elbow"].flags
+    assert wild["elbow"].max_force_n == 0
+    assert [kept(wild[name]) for name in ("base", "shoulder")] == [kept(calm[name]) for name in ("base", "shoulder")]
+    assert not calm["elbow"].flags
+
+
+@pytest.mark.parametrize("backend", ["fixed", "rtl"])
+def test_a_handle_that_outruns_every_decoder_ends_the_run(backend):
+    changes = FDM | {"controller.sample_hz": 100, "controller.actuation_hz": 100}
+    changes |= {"controller.clock_hz": 100_000, "controller.speed_max_m_per_s": 0.001, "protocol.start_m": -0.15}
+    changes |= {"protocol.settle_s": 1.0, "axis.elbow.protocol.push_n": 1e4, "axis.elbow.handle.mass_kg": 0.001}
+    changes |= {f"protocol.{key}": 1.0 for key in ("mean_s", "measure_s")}
+    changes |= {f"axis.shoulder.{key}": None for key in ("amplifier", "transmission", "hand")}
+    with pytest.raises(RuntimeError, match=r"passed more than 16384 edges in a sample, at .* s$"):
+        hit_axes.run(three(changes), backend)
 
 
 def test_the_report_has_a_row_for_each_axis_and_the_traces_too(tmp_path):
