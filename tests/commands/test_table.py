@@ -18,11 +18,10 @@ def report() -> dict:
 
 def test_every_axis_has_a_row(monkeypatch, capsys, tmp_path, report):
     (tmp_path / "r.json").write_text(json.dumps(report))
-    monkeypatch.setenv("COLUMNS", "200")
     code, out, _ = call(monkeypatch, capsys, "table", tmp_path / "r.json", tmp_path / "r.json")
     assert code == 0
     for row in report["rows"]:
-        assert out.count(f"levant {row['output']}, float, eight-axes, {row['axis']} ") == 2
+        assert out.count(row["axis"]) == 2
 
 
 @pytest.mark.parametrize(

@@ -163,7 +163,7 @@ def test_every_axis_has_its_row_with_its_name_and_its_verdict():
     made = results.hit_axes()
     figure = hit_axes.draw(made)
     left, right = columns(figure)
-    assert [panel.get_title() for panel in left] == list(made.hits)
+    assert [panel.get_title(loc="left") for panel in left] == list(made.hits)
     verdicts = [panel.get_title(loc="right").rpartition(": ")[2] for panel in right]
     assert verdicts == ["stable, at rest"] * 2 + ["unstable, RMS 4.2 µm"] + ["stable, at rest"] * 4 + [
         "unstable, at rest"
