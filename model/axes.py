@@ -23,9 +23,8 @@ from .arithmetic.divide import latency as divide_latency
 from .arithmetic.signed_divide import BITS_PER_CLOCK
 from .axis import Record, run
 from .checks import FieldError, check_int
-from .design import Design
-from .estimators.estimate import EstimatorGains
-from .requirements import AxisRequirements
+from .design import Timing
+from .designed import DesignedAxis
 
 AXES_MAX = 32
 """The most axes of one pipeline."""
@@ -65,29 +64,18 @@ PIPELINES: dict[str, Callable[[Any], Pipeline]] = {
 """The pipelines of estimators, by the estimator's name."""
 
 
-class Timing(NamedTuple):
-    """The clocks at which one of the axes samples and changes its drive; clock 0 is the first one after reset."""
-
-    clocks_per_sample: int
-    strobe: int  # the clock of the first sample
-    latency: int  # clocks from a sample to the changed drive
-
-
 @dataclass(frozen=True, kw_only=True)
-class AxesSpec(AxisRequirements):
+class AxesSpec(DesignedAxis):
     """The requirements of every one of the axes, their number and their estimator.
 
     Attributes:
         axes: the number of axes, 1 to `AXES_MAX`.
-        estimator: name of the velocity estimator, one of `PIPELINES`.
-        gains: that estimator's `Gains`, or None for its default ones; the words of an axis may say otherwise.
 
-    The other attributes, and the errors, are those of `requirements.AxisRequirements`.
+    The other attributes are those of `designed.DesignedAxis`, and the errors those of `requirements.AxisRequirements`.
+    The estimator is one of `PIPELINES`; the words of an axis may say other gains.
     """
 
     axes: int
-    estimator: str = "levant"
-    gains: EstimatorGains | None = None
 
     def __post_init__(self) -> None:
         check_int("axes", self.axes, 1, AXES_MAX)
@@ -100,11 +88,6 @@ class AxesSpec(AxisRequirements):
                 f"must leave {self.slots} clocks for {self.axes} axes in turn, so at most "
                 f"{self.clock_hz // self.slots} at clock_hz {self.clock_hz}, not {self.sample_hz!r}",
             )
-
-    @cached_property
-    def design(self) -> Design:
-        """The formats, words and flags of every axis; its latency is that of a single one."""
-        return Design(self, self.estimator, self.gains)
 
     @cached_property
     def pipeline(self) -> Pipeline:
@@ -121,9 +104,17 @@ class AxesSpec(AxisRequirements):
         """Clocks from the strobe of an axis to its changed drive."""
         return FRONT_LATENCY + self.pipeline.latency + WALL_LATENCY + OUTPUT_LATENCY
 
-    def timing(self, axis: int) -> Timing:
-        """Return when an axis samples, and when its drive changes."""
-        return Timing(self.clocks_per_sample, axis, self.latency)
+    @property
+    def rotas_to_write(self) -> int:
+        """The rotas from a reset until all words of all axes may be in use: no word is taken in the first one, then one
+        a clock, and two clocks commit them. The rota after these is one at which the drives follow the force."""
+        clocks = self.clocks_per_sample + self.axes * len(self.design.words) + 2
+        actuations = -(-clocks // (self.clocks_per_sample * self.samples_per_actuation))
+        return actuations * self.samples_per_actuation
+
+    def timing(self, axis: int, rota: int = 0) -> Timing:
+        """Return when an axis samples, and when its drive changes, from a rota on."""
+        return Timing(self.clocks_per_sample, rota * self.clocks_per_sample + axis, self.latency)
 
 
 class Axes:

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 from . import checks, output, quadrature, wall
 from .compiled import compiled, inlined
 from .design import Design, Params, State
+from .designed import DesignedAxis
 from .estimators.estimate import estimate
-from .spec import AxisSpec
 
 
 @inlined
@@ -86,22 +86,22 @@ class Axis:
     """An axis with its run-time parameters set, in SI units by port name; see `Design.words`.
 
     Args:
-        spec: the axis.
+        spec: the axis, an `AxisSpec`; or the `AxesSpec` of several, for one of them.
         floating: true for the same algorithms in float64, with gains unrounded and the estimator unsaturated.
         si: run-time parameters, e.g. `wall_stiffness=20e3` (N/m); the others keep their reset values (the wall is off).
 
     Attributes:
-        spec, design: the `AxisSpec`, and its `design.Design`.
+        spec, design: the specification, and its `design.Design`.
         words: run-time words by port name.
         params: parameters of `step`.
 
     Raises:
-        TypeError: if `spec` is not an AxisSpec, or a value is not a number.
+        TypeError: if `spec` is neither, or a value is not a number.
         ValueError: if a name is unknown or a value is out of range.
     """
 
-    def __init__(self, spec: AxisSpec, floating: bool = False, **si: float):
-        if not isinstance(spec, AxisSpec):
+    def __init__(self, spec: DesignedAxis, floating: bool = False, **si: float):
+        if not isinstance(spec, DesignedAxis):
             raise TypeError(f"spec must be an AxisSpec, not {spec!r}")
         self.spec, self.design = spec, spec.design
         self.words = words = self.design.encode(**si)

@@ -113,7 +113,7 @@ def run(controller, timing, state, pins, outputs, first, until):
         pins: `Pins`, from clock 0 on.
         outputs: `Outputs`, from sample 0 on.
     """
-    per_sample, latency = timing
+    per_sample, latency = timing.clocks_per_sample, timing.latency
     overlap = design.overlap_of(timing)
     for n in range(first, until):
         now, restart, older, newer = state.axis, state.restart, state.older, state.newer

@@ -40,13 +40,14 @@ class Timing(NamedTuple):
     """The clocks at which an axis samples and changes its drive; clock 0 is the first one after reset."""
 
     clocks_per_sample: int
-    latency: int  # clocks from a strobe to the changed drive, which comes before the second next strobe
+    strobe: int  # the clock of the first sample
+    latency: int  # clocks from a strobe to the changed drive
 
 
 @compiled
 def strobe_of(timing, k):
     """Return the number of the clock at which sample k is taken."""
-    return (k + 1) * timing.clocks_per_sample - 1
+    return k * timing.clocks_per_sample + timing.strobe
 
 
 @compiled
@@ -57,9 +58,9 @@ def change_of(timing, k):
 
 @compiled
 def overlap_of(timing):
-    """Return how many samples are taken between a strobe and its changed drive: 1 if samples overlap, else 0.
+    """Return how many samples are taken between a strobe and its changed drive; 0 if samples do not overlap.
 
-    A sample that is taken in the very clock of the change is not between.
+    A sample that is taken in the very clock of the change is not between. An axis that is alone has one at most.
     """
     return (timing.latency - 1) // timing.clocks_per_sample
 
@@ -84,7 +85,7 @@ class Design:
         flags: names of the sticky flags, bit 0 first.
         latency_to_drive: clocks from the sample strobe to the changed drive.
         interval: the fewest clocks from a sample strobe to the next.
-        timing: the clocks per sample, and `latency_to_drive`.
+        timing: the `Timing` of the axis alone, whose first sample ends the first `clocks_per_sample` clocks.
     """
 
     words: tuple[Word, ...]
@@ -127,7 +128,8 @@ class Design:
         self.latency_to_drive = self.estimator.latency + self.wall.latency + self.output.latency
         behind = self.wall.latency + self.output.latency
         self.interval = max(self.estimator.interval, self.wall.interval, self.output.interval, behind + 1)
-        self.timing = Timing(requirements.clocks_per_sample, self.latency_to_drive)
+        per_sample = requirements.clocks_per_sample
+        self.timing = Timing(per_sample, per_sample - 1, self.latency_to_drive)
 
     def encode(self, **si: float) -> dict[str, int]:
         """Return every run-time word by name: converted from the SI value where one is given, else its reset word.

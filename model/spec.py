@@ -6,28 +6,22 @@ from functools import cached_property
 from typing import Any
 
 from .checks import FieldError, shown
-from .design import Design
+from .designed import DesignedAxis
 from .drive import registry
 from .drive.pdm import USUAL
 from .drive.stage import Stage, StageDesign
-from .estimators.estimate import EstimatorGains
-from .requirements import AxisRequirements
 
 
 @dataclass(frozen=True, kw_only=True)
-class AxisSpec(AxisRequirements):
+class AxisSpec(DesignedAxis):
     """The requirements of one axis and its estimator; the RTL, the model and the host's conversions are built from it.
 
     Attributes:
-        estimator: name of the velocity estimator.
-        gains: that estimator's `Gains`, or None for its default ones.
         stage: what makes pins of the drive, a `Stage` of one of `drive.registry`.
 
-    The other attributes, and the errors, are those of `requirements.AxisRequirements`.
+    The other attributes are those of `designed.DesignedAxis`, and the errors those of `requirements.AxisRequirements`.
     """
 
-    estimator: str = "levant"
-    gains: EstimatorGains | None = None
     stage: Stage = USUAL
 
     def __post_init__(self) -> None:
@@ -42,11 +36,6 @@ class AxisSpec(AxisRequirements):
                 f"at clock_hz {self.clock_hz}, not {self.sample_hz!r}",
             )
         _ = self.drive
-
-    @cached_property
-    def design(self) -> Design:
-        """Every derived format, word and latency."""
-        return Design(self, self.estimator, self.gains)
 
     @cached_property
     def drive(self) -> StageDesign:

@@ -3,6 +3,7 @@
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated
@@ -11,8 +12,9 @@ import typer
 
 from ..jobs.ending import undone
 from ..rtl.waveform import vcd_to_fst
-from ..scene.load import load
-from ..walls import hit
+from ..scene.several import AxesScene
+from ..scene.tables import load_any
+from ..walls import hit, hit_axes
 from .errors import BadInput
 from .options import BackendOption, EstimatorOption, OutputOption, SceneArgument, output_file
 from .study import StudyOptions, study
@@ -38,16 +40,28 @@ def command(
         wall__stiffness_n_per_m=stiffness,
         wall__damping_n_s_per_m=damping,
     )
-    of = load(scene, changes)
+    of = load_any(scene, changes)
     trace = output_file(trace, "--trace", (".fst", ".npz"))
     waveform = trace if trace and trace.suffix == ".fst" else None
     if waveform and backend != "rtl":
         raise BadInput(f"--trace {waveform.name} needs --backend rtl: only hardware has waveforms")
+    if isinstance(of, AxesScene):
+        _hit_axes(options, of, backend, trace)
+        return
     with _room_for_vcd() if waveform else nullcontext() as vcd:
         with progress(f"{of.name} {of.controller.estimator} {backend}", of.samples) as advance:
             result = hit.run(of, backend, bool(options.plot or trace), advance, vcd)
         save = partial(vcd_to_fst, vcd) if waveform else result.save
         options.finish(result, {"trace": (trace, save)} if trace else {})
+
+
+def _hit_axes(options: StudyOptions, scene: AxesScene, backend: str, trace: Path | None) -> None:
+    """Hit the walls of several axes, whose result has a picture of its own."""
+    if trace and trace.suffix != ".npz":
+        raise BadInput(f"--trace {trace.name} is a waveform of one axis; the traces of several go to an .npz")
+    with progress(f"{scene.name} {scene.spec.estimator} {backend}", scene.samples * len(scene.axes)) as advance:
+        result = hit_axes.run(scene, backend, bool(options.plot or trace), advance)
+    replace(options, study="hit_axes").finish(result, {"trace": (trace, result.save)} if trace else {})
 
 
 @contextmanager

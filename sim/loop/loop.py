@@ -1,11 +1,11 @@
 """The closed loop: plant and encoder, a controller, and the force that goes back to the plant.
 
-Time is the FPGA's clock. Sample k is taken at the strobe, clock (k + 1) D - 1, at time k / sample_hz; the drive that
+Time is the FPGA's clock. Sample k is taken at its strobe (`design.strobe_of`), at time k / sample_hz; the drive that
 follows from it changes `latency` clocks later, on every backend. The plant is advanced exactly over the two intervals
 between those instants, under a constant force in each.
 
-Where samples overlap the next strobe comes before that: the plant is then a strobe ahead of the sample whose drive
-changes, and a model leaves the edges in between to the next sample.
+Where samples overlap, the next strobe comes before that, or several: the plant is then so many strobes ahead of the
+sample whose drive changes, and a model leaves the edges in between to the next samples.
 """
 
 from ...model.compiled import compiled
@@ -47,7 +47,7 @@ def run(world, controller, state, progress, memory, until):
             moment = Moment(moment.motion, moment.cell, taken_off(edges, moment.n_edges, taken))
         else:
             state = sample_quietly(controller, state, strobe_of(timing, k))
-        force_n = actuated(world, memory, k - first, k, at, state)
+        force_n = actuated(world, memory, k - first, k, at[0], state)
 
         if sweeps(world.sweep, moment):
             state, (k, moment, force_n, at) = sweep(
@@ -58,5 +58,6 @@ def run(world, controller, state, progress, memory, until):
         after, quiet = advance_quietly(plant, moment, force_n, interval)
         moment = after if quiet else advance(plant, world.encoder, moment, force_n, interval, edges)
         k += 1
-        at = now if overlap else moment.motion
+        newest = now if overlap else moment.motion
+        at = at[1:] + (newest,)  # noqa: RUF005  (Numba joins tuples, and unpacks none)
     return state, Progress(k, moment, force_n, at)

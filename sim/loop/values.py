@@ -26,7 +26,7 @@ class World(NamedTuple):
     """The plant and parts that the controller is connected to, with their timing.
 
     `before` is the time from a changed drive to the next strobe, `after` the time from the last strobe to the changed
-    drive: of the sample itself, or of the next one if samples overlap.
+    drive: of the sample itself, or of a later one if samples overlap.
     """
 
     plant: Rigid | Train | Stepped
@@ -50,12 +50,13 @@ class Sweep(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """The state of the loop before the drive of `sample` changes, at its strobe; at the next one if samples overlap."""
+    """The state of the loop before the drive of `sample` changes: at its strobe or, if samples overlap, at that of the
+    last one that is taken before then."""
 
     sample: int
     moment: Moment
     force_n: float
-    taken: Motion | State  # the motion at the strobe of `sample`
+    taken: tuple[Motion | State, ...]  # at the strobe of `sample`, and of those that overlap it but the last
 
 
 class Memory(NamedTuple):

@@ -1,4 +1,4 @@
-"""The compiled loop's view of the Verilated axis: the addresses of its functions, and the values last read from it."""
+"""The compiled loop's view of Verilated axes: the addresses of functions, and the values last read from an axis."""
 
 from typing import NamedTuple
 
@@ -18,3 +18,13 @@ class RtlState(NamedTuple):
     drive: int
     velocity: int
     flags: int
+
+
+class RtlAxis(NamedTuple):
+    """The addresses of three functions of `sim/rtl/axes_library.cpp` and of their context, and an axis's number."""
+
+    give: int
+    drive: int
+    read: int
+    context: int
+    axis: int

@@ -47,8 +47,9 @@ def _pulse(scene: Scene) -> Pulse:
 
 
 def _converter(scene: Scene) -> Converter | None:
-    output, drive = scene.output, scene.spec.drive
+    output = scene.output
     if scene.drive is not None:
+        drive = scene.spec.drive
         # The mean force of pulses has steps, too.
         return Converter(drive.step_n, -drive.most, drive.highest)
     if output is None or output.dac_bits is None:
@@ -79,7 +80,7 @@ def work_of(world: World) -> int:
 
 def world_of(scene: Scene) -> World:
     """Return the loop's constants for a scene."""
-    spec, timing = scene.spec, scene.spec.design.timing
+    spec, timing = scene.spec, scene.timing
     after = timing.latency - overlap_of(timing) * timing.clocks_per_sample
     after_s = after / spec.clock_hz
     before_s = (timing.clocks_per_sample - after) / spec.clock_hz
@@ -129,11 +130,12 @@ def sweep_of(scene: Scene, world: World, controller: object) -> Sweep | None:
 
 
 def start_of(scene: Scene, world: World) -> Progress:
-    """Return the start of a run: at rest, under the push alone. If samples overlap, the first two are taken there."""
+    """Return the start of a run: at rest, under the push alone. If samples overlap, as many more are taken there."""
     position_m, push_n = scene.protocol.start_m, converted(world.converter, world.push_n)
     motion = Motion(position_m, 0.0)
     if not isinstance(world.plant, Rigid):
         pulse = world.plant.pulse
         width = width_of(pulse, push_n) if pulse.period else 0
         motion = State(position_m, 0.0, (0.0, 0.0, 0.0), width)
-    return Progress(0, Moment(motion, locate(world.encoder, position_m), 0), push_n, motion)
+    taken = (motion,) * max(overlap_of(world.timing), 1)
+    return Progress(0, Moment(motion, locate(world.encoder, position_m), 0), push_n, taken)

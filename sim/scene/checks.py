@@ -10,6 +10,7 @@ from ..world.euler import longest_s
 from .build import device_of
 from .schema import Scene
 from .sentences import plain
+from .several import GAIN_WORDS
 
 SAMPLES_MAX = 10**9
 """The most samples in a run's settling or measuring: a minute or two with the model, hours with the RTL."""
@@ -39,7 +40,7 @@ def _key_of(field: str, scene: Scene) -> str:
         return f"drive.{scene.drive.key_of(field.removeprefix(OF_THE_STAGE))}"
     if field in KEYS:
         return KEYS[field]
-    controller = scene.controller
+    controller, field = scene.controller, GAIN_WORDS.get(field, field)
     section = "controller" if field in type(controller).model_fields else f"controller.gains.{controller.estimator}"
     return f"{section}.{field}"
 
@@ -96,7 +97,7 @@ def _check_words(scene: Scene) -> None:
     si = scene.parameters
     for word in scene.spec.design.words:
         value = si.get(word.name)
-        if word.name in KEYS and value and not _fits(word, value):
+        if word.name in KEYS | GAIN_WORDS and value and not _fits(word, value):
             raise FieldError(word.name, f"must be {_range_of(word, scene)}, not {value!r}")
     scene.spec.design.encode(**si)
 

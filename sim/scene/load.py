@@ -4,8 +4,9 @@ Every error is one line that names the file, the key and what is accepted.
 """
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -21,6 +22,11 @@ WALL = {("wall", "stiffness_n_per_m"), ("wall", "damping_n_s_per_m")}
 """The keys of the wall, which the controller limits."""
 BYTES_MAX = 10**6
 """The largest file of a scene."""
+
+AXIS = "axis"
+"""The key of a scene's tables of several axes: see `tables`."""
+
+AnyScene = TypeVar("AnyScene", bound=Scene)
 
 
 def names() -> list[str]:
@@ -69,27 +75,51 @@ def parse(scene: str, text: str, changes: dict[str, Any] | None = None) -> Scene
     Raises:
         SceneError: as in `load`.
     """
+    content = content_of_scene(scene, text)
+    if AXIS in content:
+        raise SceneError(
+            f"{scene}: has several axes, [[axis]], which `hardwall hit` takes; this takes scenes of one axis"
+        )
+    for key, value in (changes or {}).items():
+        put(content, scene, key, value)
+    return made(scene, content, lambda given: Scene(**given))
+
+
+def content_of_scene(scene: str, text: str) -> dict[str, Any]:
+    """Return what the text of a scene says, by section and key.
+
+    Raises:
+        SceneError: if it is not TOML, or has a name.
+    """
     try:
         content = toml_of(text)
     except ValueError as error:
         raise SceneError(f"{scene}: must be a readable TOML file: {error}") from None
     if "name" in content:
         raise SceneError(f"{scene}: name is not a key of a scene: its file has its name")
-    for key, value in (changes or {}).items():
-        _change(content, scene, key, value)
+    return content
+
+
+def made(scene: str, content: dict[str, Any], make: Callable[[dict[str, Any]], AnyScene]) -> AnyScene:
+    """Return the checked scene that `make` makes of a name and a content.
+
+    Raises:
+        SceneError: if the scene is not valid.
+    """
+    content = {**content, "name": _path(scene).stem}
     try:
-        result = Scene(name=_path(scene).stem, **content)
+        result = make(content)
         check(result)
     except ValidationError as error:
         # A misspelt key also makes a key missing; the message about the misspelling says more.
         worst = min(error.errors(), key=lambda problem: problem["type"] != "extra_forbidden")
-        raise SceneError(f"{scene}: {_of_the_wall(content, error) or sentence(worst)}") from None
+        raise SceneError(f"{scene}: {_of_the_wall(content, error, make) or sentence(worst)}") from None
     except ValueError as error:
         raise SceneError(f"{scene}: {error}") from None
     return result
 
 
-def _of_the_wall(content: dict[str, Any], error: ValidationError) -> str | None:
+def _of_the_wall(content: dict[str, Any], error: ValidationError, make: Callable) -> str | None:
     """Return what is wrong with a wall, by the range of the scene's controller, narrower than that of its keys.
 
     None if something else is wrong with the scene, or the wall is none of numbers.
@@ -99,7 +129,7 @@ def _of_the_wall(content: dict[str, Any], error: ValidationError) -> str | None:
         return None
     given = {key: value for (_, key), value in given.items()}
     try:
-        other = Scene(name="", **content | {"wall": content["wall"] | dict.fromkeys(given, 0.0)})
+        other = make(content | {"wall": content["wall"] | dict.fromkeys(given, 0.0)})
         check(other)
         check(other.model_copy(update={"wall": other.wall.model_copy(update=given)}))
     except ValueError as refusal:
@@ -107,7 +137,7 @@ def _of_the_wall(content: dict[str, Any], error: ValidationError) -> str | None:
     return None
 
 
-def _change(content: dict[str, Any], scene: str, key: str, value: Any) -> None:
+def put(content: dict[str, Any], scene: str, key: str, value: Any) -> None:
     """Change a dotted key of a scene's content; a value of None takes it out."""
     *sections, last = key.split(".")
     wrong = stranger((*sections, last))

@@ -5,10 +5,12 @@ Units are in the keys. Every error is one line that names the file, the key and 
 
 import dataclasses
 from functools import cached_property
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, create_model
 
+from ...model.design import Timing
+from ...model.designed import DesignedAxis
 from ...model.drive import pdm
 from ...model.estimators import registry
 from ...model.quadrature_speed import GLITCH_CLOCKS_MAX, glitch_clocks_for
@@ -205,17 +207,30 @@ class Scene(Section):
     protocol: ProtocolSection
     zwidth: ZWidthSection | None = None
 
+    @property
+    def requirements(self) -> dict[str, Any]:
+        """The fields of a `DesignedAxis`, by name."""
+        names = {field.name for field in dataclasses.fields(DesignedAxis)} - {"count_m", "gains"}
+        fields = self.controller.model_dump(include=names, exclude_unset=False)
+        gains = self.gains
+        if gains is not None:
+            gains = registry.design_of(self.controller.estimator).gains_class(**gains.model_dump())
+        return fields | {"glitch_clocks": self.glitch_clocks, "count_m": self.encoder.count_m, "gains": gains}
+
     @cached_property
     def spec(self) -> AxisSpec:
         """The axis."""
-        of_the_spec = {field.name for field in dataclasses.fields(AxisSpec)} - {"count_m", "gains", "stage"}
-        fields = self.controller.model_dump(include=of_the_spec, exclude_unset=False)
-        fields["glitch_clocks"] = self.glitch_clocks
-        gains = getattr(self.controller.gains, self.controller.estimator)
-        if gains is not None:
-            gains = registry.design_of(self.controller.estimator).gains_class(**gains.model_dump())
-        stage = pdm.USUAL if self.drive is None else self.drive.made
-        return AxisSpec(count_m=self.encoder.count_m, gains=gains, stage=stage, **fields)
+        return AxisSpec(stage=pdm.USUAL if self.drive is None else self.drive.made, **self.requirements)
+
+    @property
+    def gains(self) -> Section | None:
+        """The gains of the scene's estimator; None for its default ones."""
+        return getattr(self.controller.gains, self.controller.estimator)
+
+    @property
+    def timing(self) -> Timing:
+        """The clocks at which the axis samples and changes its drive."""
+        return self.spec.design.timing
 
     @property
     def glitch_clocks(self) -> int:

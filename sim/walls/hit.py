@@ -126,10 +126,13 @@ class Hit(Summary):
         Raises:
             OSError: if the file cannot be written.
         """
-        kept = {"overview": self.overview, "detail": self.detail}
-        arrays = {f"{name}_{key}": array for name, trace in kept.items() for key, array in vars(trace).items()}
         with whole_file(path) as part, part.open("wb") as file:
-            np.savez_compressed(file, report=json.dumps(self.report()), **arrays)
+            np.savez_compressed(file, report=json.dumps(self.report()), **self.arrays())
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return the arrays of the traces, by `overview_` or `detail_` and their name."""
+        kept = {"overview": self.overview, "detail": self.detail}
+        return {f"{name}_{key}": array for name, trace in kept.items() for key, array in vars(trace).items()}
 
     def notes(self) -> list[str]:
         """Return what keeps the velocity's error from being known."""
@@ -172,7 +175,7 @@ def _kinds(value: Any) -> Any:
     return (value.dtype, value.ndim) if isinstance(value, np.ndarray) else type(value)
 
 
-class _Loop:
+class Loop:
     """The closed loop of a scene on a backend: its progress, the arrays that it writes to, and its tally."""
 
     def __init__(self, scene: Scene, backend: str, traces: bool, until_sure: bool):
@@ -217,7 +220,7 @@ class _Loop:
             if self.lost_edges:
                 break
             self.tally.add(first, self.memory.positions[: until - first], self.memory.drives[: until - first])
-        return self._hit(time.perf_counter() - began, int(state.flags))
+        return self.result(time.perf_counter() - began, int(state.flags))
 
     def _compile(self, controller, state) -> None:
         """Compile the loop by a call without samples, so that compiling is not in the measured time."""
@@ -256,7 +259,8 @@ class _Loop:
             raise RuntimeError(f"the handle passed more than {EDGE_CAPACITY} edges in a sample, at {when:g} s")
         return lost
 
-    def _hit(self, seconds: float, flags: int) -> Hit:
+    def result(self, seconds: float, flags: int) -> Hit:
+        """Return the hit, of the samples that the tally has."""
         scene, tally, memory = self.scene, self.tally, self.memory
         return Hit(
             scene=scene,
@@ -296,7 +300,7 @@ def run(
     Raises:
         RuntimeError: if the handle outran every decoder's limit by far, or the RTL could not be built.
     """
-    closed = _Loop(scene, backend, traces, until_sure)
+    closed = Loop(scene, backend, traces, until_sure)
     with opened(scene.spec, backend, scene.parameters, closed.start_level, traced=vcd is not None) as axis:
         # The contact is known before the hardware runs, because the bit-accurate model has it at the same sample.
         result = closed.run(axis, _waveform_marks(scene, axis.hardware, vcd) if vcd else (), progress)

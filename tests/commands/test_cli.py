@@ -5,17 +5,21 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hardwall.sim.commands.terminal import show
 from hardwall.sim.jobs.result import Table
 from hardwall.sim.scene import load
 from stimuli.command_line import call
+from stimuli.scenes import SHORT_OF_AXES
 
 SEED = (load.FOLDER / "seed-2011.toml").read_text()
 STIFFNESS = "0, or 1.95313 (half of its word's LSB) to 200000 (what the controller is for)"
 DAMPING = "0, or 0.003125 (half of its word's LSB) to 400 (what the controller is for)"
 """What the wall of the scene `seed-2011` may be."""
+OF_ONE_AXIS_ALONE = ("bench", "cutoff", "drop", "fit", "gains", "lipschitz", "rates", "trade", "verilog", "zwidth")
+"""Commands that take a scene of one axis."""
 
 
 @pytest.mark.parametrize(
@@ -179,6 +183,46 @@ def test_json_has_the_promised_keys_and_nothing_else_is_on_stdout(monkeypatch, c
         "force_sha256",
     }  # fmt: skip
     assert (report["output"], report["backend"], report["samples"]) == ("u1", "fixed", 60_000)
+
+
+def test_several_axes_are_hit_and_have_rows_a_picture_and_traces(monkeypatch, capsys, tmp_path):
+    short = [f"--set={key}={value}" for key, value in SHORT_OF_AXES.items()]
+    picture, traces = tmp_path / "axes.svg", tmp_path / "axes.npz"
+    files = ["--plot", picture, "--trace", traces]
+    code, out, _ = call(monkeypatch, capsys, "hit", "eight-axes", "--json", "--damping", "30", *short, *files)
+    assert code == 0
+    rows = json.loads(out)["rows"]
+    assert len(rows) == 8
+    assert {row["damping_n_s_per_m"] for row in rows} == {30.0}
+    for name in ("base", "grip"):
+        assert name in picture.read_text()
+    with np.load(traces) as arrays:
+        assert json.loads(str(arrays["report"]))["rows"] == rows
+    code, out, _ = call(monkeypatch, capsys, "hit", "eight-axes", "--backend", "float", *short)
+    assert code == 0
+    assert "wrist-turn" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["hit", "--backend", "rtl", "--trace", "x.fst"], "--trace x.fst is a waveform of one axis; the traces of sev"),
+        (["hit", "--trace", "x.fst"], "--trace x.fst needs --backend rtl"),
+        (["hit", "--estimator", "kalman"], "controller.estimator must be one of fdm, levant, window, not 'kalman'"),
+        (
+            ["hit", "--set", "axis.grip.wall.damping_n_s_per_m=1e9"],
+            "eight-axes: axis grip: wall.damping_n_s_per_m must",
+        ),
+        *(([command], "eight-axes: has several axes, [[axis]], which `hardwall hit`") for command in OF_ONE_AXIS_ALONE),
+    ],
+)
+def test_what_is_not_for_several_axes_says_so_in_a_line(monkeypatch, capsys, tmp_path, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    command, *options = arguments
+    folder = ["-o", "out"] if command == "verilog" else []
+    code, out, err = call(monkeypatch, capsys, command, "eight-axes", *options, *folder)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert message in err
 
 
 def test_table_puts_reports_side_by_side(monkeypatch, capsys, tmp_path):

@@ -12,7 +12,7 @@ from stimuli import results
 from stimuli.replays import COARSEN, swing
 from stimuli.reports import SCHEMA, check, check_text
 
-PARTS = {"fact", "map", "placed", "trial"}
+PARTS = {"fact", "map", "placed", "struck", "trial"}
 """Definitions of the schema that are no command's, but parts of several."""
 ELSEWHERE = {
     *("accuracy", "bench", "board", "capture", "choose", "connect", "costs", "disarm", "fit", "home", "set", "synth"),
@@ -45,6 +45,15 @@ def test_every_command_that_prints_json_has_its_definition():
 @pytest.mark.parametrize("name", [name for name in COMMANDS if name in SCHEMA["$defs"] and name not in ELSEWHERE])
 def test_a_result_is_as_its_schema_says(name):
     check(name, RESULTS[name]().report())
+
+
+def test_the_hits_of_several_axes_are_as_their_schema_says():
+    report = results.hit_axes().report()
+    check("hit", report)
+    first, *others = report["rows"]
+    for wrong in ({"axis": None}, {"rms_mm": -1.0}, {"more": 1}):
+        with pytest.raises(AssertionError, match=r"^hit: "):
+            check("hit", report | {"rows": [first | wrong, *others]})
 
 
 def test_what_is_not_as_the_schema_says_is_found():

@@ -92,6 +92,8 @@ def test_every_strobe_sees_the_recorded_count(clocks):
     state = stamped.State(0, 0, 0, 0, quadrature.START, spec.design.start(), 0, int(level(0)))
     controller, velocity = stamped.Controller(decoder, 0, 0, axis), np.zeros(len(counts), np.int64)
     edges = stamped.room_for(2 * clocks)
-    state, left = through_pins(controller, state, Timing(clocks, 30), counts, velocity, edges, 0, 0, len(counts))
+    state, left = through_pins(
+        controller, state, Timing(clocks, clocks - 1, 30), counts, velocity, edges, 0, 0, len(counts)
+    )
     assert velocity.tolist() == np.diff(counts, prepend=0).tolist()
     assert (left, state.flags) == (0, 0)

@@ -146,7 +146,7 @@ def swept_from(run: Run, position_m: float, velocity_m_per_s: float, force_n: fl
     changed = change_of(run.world.timing, first)
     state = run.state._replace(clock=changed)
     moment = Moment(Motion(position_m, velocity_m_per_s), locate(run.world.encoder, position_m), 0)
-    at = Progress(first, moment, force_n, moment.motion)
+    at = Progress(first, moment, force_n, (moment.motion,))
     _, end = sweep(run.world.sweep, run.world, run.controller, state, at, run.memory, first, first + 1 + samples)
     return end.sample - first
 
@@ -221,7 +221,7 @@ def test_a_fault_that_is_under_way_is_raised_before_anything_is_swept(edges, swe
     rest = quadrature.resting(run.controller.decoder, run.state.decoder, 0, run.state.level, 1)
     rest = rest._replace(illegal=before, illegal_count=before)
     state = run.state._replace(decoder=rest, clock=changed - 20)
-    at = Progress(first, moment, 0.2, motion)
+    at = Progress(first, moment, 0.2, (motion,))
     _, end = sweep(run.world.sweep, run.world, run.controller, state, at, run.memory, first, first + 9)
     assert end.sample - first == swept
 
@@ -247,7 +247,7 @@ def test_the_speed_at_the_limit_leaves_edges_apart():
             pins = int(level(cell.number))
             decoder = quadrature.resting(run.controller.decoder, run.state.decoder, count, pins, 1)
             run.state = run.state._replace(decoder=decoder, level=pins)
-            run.at = Progress(0, Moment(motion, cell, 0), run.scene.handle.coulomb_n, motion)
+            run.at = Progress(0, Moment(motion, cell, 0), run.scene.handle.coulomb_n, (motion,))
             run.to(50)
         assert_equal(swept, by_edges)
 

@@ -11,7 +11,20 @@ from matplotlib.text import Text
 
 from hardwall.sim.estimates import figures
 from hardwall.sim.estimates.replay import replay
-from hardwall.sim.pictures import accuracy, bits, costs, cutoff, drop, gains, hit, lipschitz, rates, trade, zwidth
+from hardwall.sim.pictures import (
+    accuracy,
+    bits,
+    costs,
+    cutoff,
+    drop,
+    gains,
+    hit,
+    hit_axes,
+    lipschitz,
+    rates,
+    trade,
+    zwidth,
+)
 from hardwall.sim.pictures import replay as replayed
 from hardwall.sim.pictures.style import PAGE_IN, lay_out, save
 from hardwall.sim.studies.accuracy import Accuracy
@@ -38,6 +51,7 @@ PICTURES = {
     "hit": lambda: hit.draw(results.hit()),
     "hit, unstable": lambda: hit.draw(results.hit(4.2e-6)),
     "hit, never reached": lambda: hit.draw(results.hit(reached=False)),
+    "hit of several axes": lambda: hit_axes.draw(results.hit_axes()),
     "replay": lambda: replayed.draw(replay(swing(), coarsen=COARSEN, acceleration_max_counts_per_s2=BOUND)),
     "figure 1": figure_1,
     "figure 2": lambda: accuracy.draw(results.rows()),
@@ -143,6 +157,18 @@ def test_the_error_of_a_hit_is_the_estimate_minus_the_truth():
     true, estimate = (line.get_ydata() for line in velocity.lines[:2])
     (own,) = [line for line in error.lines if "RMS" in line.get_label()]
     assert own.get_ydata() == pytest.approx((estimate - true) * 1e3)
+
+
+def test_every_axis_has_its_row_with_its_name_and_its_verdict():
+    made = results.hit_axes()
+    figure = hit_axes.draw(made)
+    left, right = columns(figure)
+    assert [panel.get_title(loc="left") for panel in left] == list(made.hits)
+    verdicts = [panel.get_title(loc="right").rpartition(": ")[2] for panel in right]
+    assert verdicts == ["stable, at rest"] * 2 + ["unstable, RMS 4.2 µm"] + ["stable, at rest"] * 4 + [
+        "unstable, at rest"
+    ]
+    assert "6 of 8 walls are stable" in figure.get_suptitle()
 
 
 def test_the_whole_run_shows_what_happens_between_its_points():

@@ -7,9 +7,10 @@ import pytest
 
 from hardwall.model.quadrature_speed import max_edge_rate
 from hardwall.sim.scene.errors import SceneError
-from hardwall.sim.scene.load import BYTES_MAX, load, names, parse, read
+from hardwall.sim.scene.load import BYTES_MAX, load, parse, read
 from hardwall.sim.scene.schema import Scene
 from hardwall.sim.scene.sentences import sections_of
+from stimuli.scenes import OF_ONE_AXIS
 
 SEED = read("seed-2011")
 
@@ -153,7 +154,7 @@ def test_every_number_has_a_range():
     assert found > 60
 
 
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", OF_ONE_AXIS)
 @pytest.mark.parametrize("errors", [0.0, 0.3])
 def test_without_a_glitch_filter_given_it_is_the_longest_that_leaves_twice_the_speed(name, errors):
     scene = load(name, {"controller.glitch_clocks": None, "encoder.phase_error_counts": errors})

@@ -1,5 +1,6 @@
 """Small results of studies, made by hand, from which pictures are drawn without a run."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -9,6 +10,7 @@ from hardwall.sim.estimates import figures
 from hardwall.sim.loop.record import Overview, Trace
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
+from hardwall.sim.scene.tables import load_any
 from hardwall.sim.studies import bits, costs, cutoff, drop, gains, lipschitz, rates, shortcuts, sines, trade
 from hardwall.sim.studies.accuracy import Accuracy
 from hardwall.sim.studies.drop_result import Drop, End, Law, Shaken
@@ -16,6 +18,7 @@ from hardwall.sim.studies.zwidth import ZWidth
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.chatter import Chatter
 from hardwall.sim.walls.hit import Hit
+from hardwall.sim.walls.hit_axes import AxesHit
 from hardwall.sim.walls.methods import methods
 from hardwall.sim.walls.zwidth import Effort, Map
 
@@ -37,6 +40,17 @@ def hit(rms_m: float = 0.0, reached: bool = True) -> Hit:
     overview = Overview(*vars(whole).values(), wrong - 0.02, wrong + 0.02, whole.force_n, whole.force_n)
     kept = {"overview": overview, "detail": contact}
     return Hit(load("seed-2011"), "fixed", rms_m=rms_m, flags=[], force_sha256="0" * 64, **run, **kept)
+
+
+def hit_axes() -> AxesHit:
+    """Return hits of eight axes, one of them unstable, and one that never reached its wall."""
+    scene = load_any("eight-axes")
+    made = {axis.axis: replace(hit(), scene=axis) for axis in scene.axes}
+    made |= {
+        "elbow": replace(hit(4.2e-6), scene=scene.axes[2]),
+        "grip": replace(hit(reached=False), scene=scene.axes[7]),
+    }
+    return AxesHit(scene, "fixed", 1.0, made)
 
 
 def map_of(method: str, stiffest_n_per_m: float, last_n_s_per_m: float, case: Case | None = None) -> Map:

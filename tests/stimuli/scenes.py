@@ -1,4 +1,9 @@
-"""Changes of scenes that several tests share: the parts of a device, and short protocols."""
+"""Scenes, and changes of scenes that several tests share: the parts of a device, and short protocols."""
+
+from hardwall.sim.scene.load import AXIS, content_of_scene, names, read
+
+OF_ONE_AXIS = [name for name in names() if AXIS not in content_of_scene(name, read(name))]
+"""The scenes that come with the project, without those of several axes."""
 
 AMPLIFIER = {"amplifier.bandwidth_hz": 400.0}
 CABLE = {
@@ -13,3 +18,9 @@ PULSES = {"output.full_scale_n": 50.0, "output.pwm_carrier_hz": 20_000, "output.
 ONE_SECOND = {"protocol.settle_s": 0.7, "protocol.mean_s": 0.1, "protocol.measure_s": 0.3}
 TWO_SECONDS = {"protocol.settle_s": 1.5, "protocol.mean_s": 0.2, "protocol.measure_s": 0.5}
 ODD = {"controller.sample_hz": 11_000, "controller.clock_hz": 9_900_000}
+SHORT_OF_AXES = {
+    "protocol.settle_s": 0.02,
+    "protocol.mean_s": 0.005,
+    "protocol.measure_s": 0.01,
+    "protocol.start_m": -2e-5,
+}

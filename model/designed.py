@@ -1,0 +1,28 @@
+"""The requirements of an axis with the choice of its estimator: all that its formats, words and flags follow from."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from .design import Design
+from .estimators.estimate import EstimatorGains
+from .requirements import AxisRequirements
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignedAxis(AxisRequirements):
+    """The requirements of one axis, alone (`spec.AxisSpec`) or one of several (`axes.AxesSpec`), and its estimator.
+
+    Attributes:
+        estimator: name of the velocity estimator.
+        gains: that estimator's `Gains`, or None for its default ones.
+
+    The other attributes, and the errors, are those of `requirements.AxisRequirements`.
+    """
+
+    estimator: str = "levant"
+    gains: EstimatorGains | None = None
+
+    @cached_property
+    def design(self) -> Design:
+        """Every derived format, word and flag, and the latency of an axis that is alone."""
+        return Design(self, self.estimator, self.gains)
