@@ -14,9 +14,10 @@ from hardwall.model.supervisor import CAUSES, COUNT, COUNT_BITS
 
 from .arithmetic.fixed import less, shape
 from .axes import Axes
+from .pipelines import gathered
 from .pipelines.doors import Doors
 from .pipelines.live_words import LiveWords, Writing
-from .pipelines.monitors import Looked, Monitors, Sample
+from .pipelines.monitors import Looked, Monitors
 from .pipelines.pipe import Pipe
 from .pipelines.supervisor import Judged, Supervisors, Turn
 from .supervised import COMPLEMENTS, LOOPS
@@ -29,16 +30,16 @@ LET = "magnitude", "negative", "armed", "alive", "drive_inverted"
 TURN = "state", "ready", "latched", "first", "first_stamp", "counts"
 """What a turn shows of its supervisor."""
 HIDDEN = "drive", "strobe", "strobe_axis", "sampled", "actuated"
-"""Outputs of the axes that do not leave: the drive that nobody has let out, and what belongs to it."""
+"""Outputs of the axes that do not leave: the drive that nobody has let out, and what says when it changed."""
 
 
 class SupervisedAxes(wiring.Component):
     """Axes from encoder pins to drives that are let out: `Axes`, and `Monitors` and `Supervisors` in the same rota.
 
-    Every axis has a supervisor of its own, which promises what `hardwall.hdl.supervisor.Supervisor` does. It acts in the
-    axis's turn, once a sample: what pins, host and decoder did since the last turn waits for it, and so does a pulse of
-    the host. A turn looks `LOOK` clocks before the sample's drive is there, and decides a clock after that, with the
-    monitors' causes of that very sample: a sample that is wrong is never let out.
+    Every axis has a supervisor of its own, which promises what `hardwall.hdl.supervisor.Supervisor` does. It acts in
+    the axis's turn, once a sample: what pins, host and decoder did since the last turn waits for it, and so do pulses
+    of the host. A turn looks `LOOK` clocks before the sample's drive is there, and decides a clock after that, with the
+    monitors' causes of that very sample: the drive of a sample that is wrong is never let out.
 
     Between the turns, zero is as near as for a single axis: a loop that opens makes the drive zero at the third clock
     edge, and it stays zero until the turn, which no longer finds the axis ARMED. The loop of `external_fault` does so
@@ -56,9 +57,9 @@ class SupervisedAxes(wiring.Component):
     Causes: those of `hardwall.model.supervisor`, as `hardwall.model.sampled_monitors` sees them. strobe_busy is never
     present: the rota has a clock for every axis, and nothing can begin in it sooner.
 
-    Latency: `latency` clocks from a strobe to the changed drive that is let out, 3 more than `Axes`. From a pin of a loop
-    that opens to a drive of zero `loop_latency` clock edges, the first of which sees it. From whatever else is wrong to
-    a drive of zero `trip_latency` clock edges at most, of the pins two more for their synchronisers.
+    Latency: `latency` clocks from a strobe to the changed drive that is let out, 3 more than `Axes`. From a pin of a
+    loop that opens to a drive of zero `loop_latency` clock edges, the first of which sees it. From a fault of the
+    decoder, a word or the host to a drive of zero `trip_latency` clock edges at most: a rota, and the clocks of a turn.
 
     An acknowledgement within a rota of another one takes its place: the other is void.
 
@@ -91,7 +92,8 @@ class SupervisedAxes(wiring.Component):
         The host's heartbeat is not overdue.
     turn_valid : Out(1)
         High for one clock, with the changed drive of every turn of any axis.
-    turn_axis, turn_state, turn_ready, turn_latched, turn_first, turn_first_stamp, turn_counts, turn_a_channel_idle : Out
+    turn_axis, turn_state, turn_ready, turn_latched, turn_first : Out
+    turn_first_stamp, turn_counts, turn_a_channel_idle : Out
         With `turn_valid`: the axis, and what its supervisor and its monitors show after the turn. `first_stamp` is the
         number of the clock in which the turn decided.
 
@@ -162,16 +164,18 @@ class SupervisedAxes(wiring.Component):
         self._connect(m, levels["drive_enable"])
 
         writing = Writing(self.word_axis, self.word_number, self.word_value, self.word_write & axes.word_ready)
-        words = LiveWords(pipe, first, writing)
-        for number, word in enumerate(design.words):
-            if word in design.live:
-                words.add(word, number, sampled - 1 if word.name in SAMPLE_WORDS else look)
+        words = LiveWords(pipe, first, design.words, writing)
+        for word in design.live:
+            words.add(word, sampled - 1 if word.name in SAMPLE_WORDS else look)
 
-        doors = Doors(pipe, levels, self._watches(m, writing), look)
-        waited = self._waited(pipe, levels, doors.waiting, self._turned(m, writing), look)
+        doors = Doors(pipe, levels, words.written("supervisor_causes", BITS["external_fault"]), look)
+        turned = gathered.turned(m, words.written("encoder_invert", 0), axes.commit_pending)
+        asked = gathered.Asked(self.arm, self.disarm | turned, self.acknowledge, self.acknowledged)
+        waiting = {**doors.waiting, **gathered.encoders(pipe, axes, levels, look), "referenced": self.referenced}
+        waited = gathered.looked_at(pipe, waiting, asked, look)
         monitors, supervisors = Monitors(pipe, design, words), Supervisors(pipe, design.supervisor, words)
-        sample = self._sample(pipe, sampled, first)
-        moved = pipe.later(monitors.moved(sample), look - sampled - 1)
+        sample = gathered.sample(pipe, axes, first, design.index_bits, sampled)
+        moved = pipe.later(monitors.moved(sample), look - sampled - 2)
         lost, idle = monitors.of_look(
             Looked(
                 look + 1,
@@ -184,7 +188,7 @@ class SupervisedAxes(wiring.Component):
             **{bit: pipe.taken(waited[cause.name]) for bit, cause in enumerate(CAUSES) if cause.name in waited},
             BITS["word_range"]: pipe.taken(self._out_of_range(words, look + 1)),
             **monitors.of_sample(sample, end),
-            **monitors.runaway(moved, pipe.later(first, look), supervisors.let_out, look),
+            **monitors.runaway(moved, pipe.later(first, look), supervisors.let_out, look - 1),
             **lost,
         }
         judged = supervisors.judged(
@@ -234,78 +238,6 @@ class SupervisedAxes(wiring.Component):
         # An index that was found is no reference yet: a host may have given up, and the count is what it was.
         found = self.preload & axes.index_latched
         m.d.sync += self.referenced.eq(~self.index_arm & (self.referenced | found))
-
-    def _written(self, m: Module, writing: Writing, name: str, bit: int) -> Signal:
-        """Return a bit of a word of every axis, as the host has written it last."""
-        words = self._design.words
-        number, word = next((number, word) for number, word in enumerate(words) if word.name == name)
-        axes = self._axes.spec.axes
-        written = Signal(axes, init=((1 << axes) - 1) * (word.reset >> bit & 1), name=f"written_{name}")
-        for axis in range(axes):
-            with m.If(writing.enable & (writing.number == number) & (writing.axis == axis)):
-                m.d.sync += written[axis].eq(writing.value[bit])
-        return written
-
-    def _watches(self, m: Module, writing: Writing) -> Signal:
-        """Return for every axis whether its loop of external_fault acts."""
-        return self._written(m, writing, "supervisor_causes", BITS["external_fault"])
-
-    def _turned(self, m: Module, writing: Writing) -> Value:
-        """Return for every axis whether a commit waits that will turn its encoder around, and so its wall."""
-        written, pending = self._written(m, writing, "encoder_invert", 0), self._axes.commit_pending
-        inverted = Signal.like(written)
-        m.d.sync += inverted.eq((pending & written) | (~pending & inverted))
-        return pending & (written ^ inverted)
-
-    def _waited(
-        self, pipe: Pipe, levels: dict[str, Signal], loops: dict[str, Signal], turned: Value, look: int
-    ) -> dict[str, Value]:
-        """Return what an axis's pins, decoder and host did since its last turn, by name, a stage after the look."""
-        m, axes = pipe.m, self._axes
-        kinds = Cat(kind[0] for kind in axes.edge_kind)
-        pulses = {
-            "encoder_illegal": axes.illegal,
-            "encoder_overspeed": axes.overspeed,
-            "unlike_a": levels["encoder_a"] ^ levels["encoder_a_n"],
-            "unlike_b": levels["encoder_b"] ^ levels["encoder_b_n"],
-            "edge_a": axes.stepped & ~kinds,
-            "edge_b": axes.stepped & kinds,
-            "arm": self.arm,
-            "disarm": self.disarm | turned,
-        }
-        waiting = {name: pipe.waits(pulse, look) for name, pulse in pulses.items()}
-        # One mask serves all axes: what is acknowledged later makes an acknowledgement that waits void.
-        acknowledged, acknowledges = Signal(COUNT), Signal(axes.spec.axes)
-        m.d.sync += acknowledges.eq(acknowledges & ~Cat(pipe.turns(look)))
-        with m.If(self.acknowledge.any()):
-            m.d.sync += [acknowledges.eq(self.acknowledge), acknowledged.eq(self.acknowledged)]
-        waiting |= {**loops, "acknowledge": acknowledges, "referenced": self.referenced}
-        of_axis = pipe.taken(pipe.of([Cat(bits) for bits in zip(*waiting.values(), strict=True)], look), "waited")
-        return {**dict(zip(waiting, of_axis, strict=True)), "acknowledged": pipe.taken(acknowledged)}
-
-    def _sample(self, pipe: Pipe, stage: int, first: Value) -> Sample:
-        """Return a sample with its velocity, and with the last index edge before it."""
-        m, axes = pipe.m, self._axes
-        indexed, bits = Signal(axes.spec.axes), self._design.index_bits
-        # A preload makes the count of an index edge before it void.
-        m.d.sync += indexed.eq((axes.indexed | (indexed & ~Cat(pipe.turns(0)))) & ~self.preload)
-        rows = []
-        for number, (mark, preloaded) in enumerate(zip(indexed, pipe.waits(self.preload, 0), strict=True)):
-            low = Signal(bits, name=f"index_low_{number}")
-            with m.If(axes.indexed[number]):
-                m.d.sync += low.eq(axes.count[number][:bits])
-            rows.append(Cat(preloaded, mark, low))
-        row, first = pipe.later(pipe.of(rows, 0), stage), pipe.later(first, stage)
-        return Sample(
-            stage=stage,
-            first=first,
-            fresh=row[0] | first,
-            indexed=row[1],
-            index_low=row[2:],
-            count=axes.estimated_count,
-            velocity=axes.velocity,
-            saturated=axes.saturated,
-        )
 
     def _out_of_range(self, words: LiveWords, stage: int) -> Value:
         """Return whether a word of the axis that is in a stage, or the watchdog's, is beyond its range."""

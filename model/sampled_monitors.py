@@ -3,20 +3,19 @@
 One `step` is one sample. The causes, their thresholds and the warning are those of `monitors`, which looks at every
 clock. This is what differs, and what is lost by it:
 
-    position_range,       of the counts that the samples took. An excursion between two samples is not seen, nor does the
-    position_wrap         wall see it. Both limits are compared in every sample.
+    position_range,       of the counts that the samples took. An excursion between two samples is not seen, nor does
+    position_wrap         the wall see it. Both limits are compared in every sample.
     velocity_limit        the same: it looks at estimates, of which every sample has one.
     runaway               the way is the sum of the differences of sampled counts, while the drive was at its limit on
-                          one side before the last two samples. What a handle does and undoes between two samples is not
-                          in it, and no way. At a sample after a preload the difference is 0, so the motion of one sample
-                          is lost with every preload: a host that preloads at each sample has no such monitor, nor any
-                          business to preload while ARMED.
+                          one side after the last two turns. What a handle does and undoes between two samples is no
+                          way. At a sample after a preload the difference is 0, so that the motion of one sample is lost
+                          with every preload: a host that preloads at every sample has no such monitor.
     estimator_saturated   the same: it counts samples.
-    encoder_loss          a channel equalled its complement at every clock of a rota, and of the rotas before it without
-                          a gap, for more clocks than supervisor_loss in all. It never trips sooner than `monitors`, and up to
-                          two rotas later; a loss that ends before is missed.
-    index_spacing         of index edges, the last one before each sample, with the count that it had. An edge that
-                          another follows within a rota is at most as many counts away from that as a rota has clocks.
+    encoder_loss          a channel equalled its complement at every clock of a rota, and of the rotas before it
+                          without a gap, for more clocks than supervisor_loss in all. It never trips sooner than
+                          `monitors`, and less than two rotas later; a loss that ends before is missed.
+    index_spacing         of index edges, the last one before each sample, with the count that it had. One that another
+                          follows within a rota is missed: it was at most as many counts away as a rota has clocks.
                           A preload begins anew, and forgets the last index edge.
     a_channel_idle        a hundred samples with edges of one channel alone, those without an edge left out: as many
                           edges or more.
@@ -114,7 +113,10 @@ def _index_is_wrong(params, state, inputs):
     """Return whether the index edge of a sample is neither at the last one nor a turn away."""
     if not (inputs.indexed and state.has_index) or inputs.fresh:
         return False
-    distance, tolerance = abs(wrap(inputs.index_count - state.last_index, params.count_width)), inputs.supervisor_index_tolerance
+    distance, tolerance = (
+        abs(wrap(inputs.index_count - state.last_index, params.count_width)),
+        inputs.supervisor_index_tolerance,
+    )
     return distance > tolerance and abs(distance - inputs.supervisor_turn) > tolerance
 
 

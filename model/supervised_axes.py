@@ -94,9 +94,7 @@ class Design:
             "supervisor_watchdog": WATCHDOG_MS,
         }
         width, shift = self.monitors.params
-        self.params = Params(
-            sampled_monitors.Params(width, shift, spec.clocks_per_sample), self.supervisor.params
-        )
+        self.params = Params(sampled_monitors.Params(width, shift, spec.clocks_per_sample), self.supervisor.params)
 
     @property
     def committed(self) -> tuple[Word, ...]:

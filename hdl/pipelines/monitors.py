@@ -82,18 +82,21 @@ class Monitors:
             VELOCITY_LIMIT: ~_within(sample.velocity, limit),
         }
         causes = {bit: pipe.later(wrong, stage - now) for bit, wrong in found.items()}
-        causes[ESTIMATOR_SATURATED] = pipe.later(self._saturated(sample), stage - now - 1)
+        causes[ESTIMATOR_SATURATED] = pipe.later(self._saturated(sample), stage - now - 2)
         causes[INDEX_SPACING] = pipe.later(self._index_is_wrong(sample), stage - now - 4)
         return causes
 
     def _saturated(self, sample: Sample) -> Value:
-        """Return whether the estimate has been saturated for too many samples, a stage later."""
-        pipe, limit = self._pipe, self._word("supervisor_saturated", sample.stage)
+        """Return whether the estimate has been saturated for too many samples, 2 stages later."""
+        pipe, now = self._pipe, sample.stage
+        limit = self._word("supervisor_saturated", now + 1)
         kept = pipe.kept("saturated_samples", len(limit) + 1)
-        before = Mux(sample.first, 0, kept.read(sample.stage))
-        samples = Mux(sample.saturated, before + (before <= limit), 0)[: len(limit) + 1]
-        kept.leave(sample.stage, samples)
-        return pipe.taken(samples) > pipe.taken(limit)
+        before = pipe.taken(Mux(sample.first, 0, kept.read(now)), "samples_before")
+        # What is read, compared and counted on has a stage each.
+        more, enough = pipe.taken(before <= limit, "more"), pipe.taken(before >= limit, "enough")
+        saturated = pipe.later(sample.saturated, 2)
+        kept.leave(now + 2, Mux(saturated, pipe.taken(before) + more, 0)[: len(limit) + 1])
+        return saturated & enough
 
     def _index_is_wrong(self, sample: Sample) -> Value:
         """Return whether an index edge is neither at the last one nor a turn away, 4 stages later."""
@@ -122,23 +125,29 @@ class Monitors:
         return self._pipe.taken(Mux(sample.fresh, 0, moved), "moved").as_signed()
 
     def runaway(self, moved: Value, first: Value, let_out: Kept, stage: int) -> dict[int, Value]:
-        """Return whether the handle has moved too far against a drive at its limit, by the cause's bit, 2 stages later.
+        """Return whether the handle has moved too far against a drive at its limit, by the cause's bit, 3 stages later.
 
         Args:
             moved: the counts since the axis's last sample, in that stage.
-            first: whether the sample is its axis's first one.
-            let_out: whether the drive that was let out last is at its limit, and whether it is negative.
+            first: whether the sample is its axis's first one, a stage later.
+            let_out: whether the drive that was let out last is at its limit, and whether it is negative, a stage later.
             stage: the stage.
         """
         pipe, width = self._pipe, self._width
         kept = pipe.kept("way", width + 2)
-        before, (at_limit, negative) = kept.read(stage), let_out.read(stage)
-        pressed = at_limit & ~first
-        held = pressed & before[width] & (negative == before[width + 1])
+        before, then = kept.read(stage), stage + 1
         # The way is negative, so that a sum compares it.
-        way = Mux(held, before[:width] + Mux(negative, -moved, moved), 0)[:width]
-        kept.leave(stage, Cat(way, pressed, negative & ~first))
-        longest = self._word("supervisor_runaway", stage + 1)
+        down, up = (
+            pipe.taken((before[:width] - moved)[:width], "down"),
+            pipe.taken((before[:width] + moved)[:width], "up"),
+        )
+        pressed_before, negative_before = pipe.taken(before[width:])
+        at_limit, negative = let_out.read(then)
+        pressed = at_limit & ~first
+        held = pressed & pressed_before & (negative == negative_before)
+        way = Mux(held, Mux(negative, down, up), 0)
+        kept.leave(then, Cat(way, pressed, negative))
+        longest = self._word("supervisor_runaway", then + 1)
         return {RUNAWAY: pipe.taken(longest + pipe.taken(way, "way_now").as_signed() < 0)}
 
     def of_look(self, looked: Looked) -> tuple[dict[int, Value], Value]:
@@ -148,13 +157,13 @@ class Monitors:
         wrong = []
         for channel, lost in zip("ab", looked.lost, strict=True):
             kept = pipe.kept(f"lost_{channel}", range((1 << len(longest)) + self._rota))
-            passed = Mux(looked.first, 0, kept.read(stage))
-            too_long = passed > longest
-            kept.leave(stage, Mux(lost, Mux(too_long, passed, passed + self._rota), 0))
-            wrong.append(lost & (too_long | (passed + self._rota > longest)))
+            passed = Mux(looked.first, 0, pipe.taken(kept.read(stage - 1)))
+            too_long, more = passed > longest, passed + self._rota
+            kept.leave(stage, Mux(lost, Mux(too_long, passed, more), 0))
+            wrong.append(lost & (too_long | (more > longest)))
 
         kept = pipe.kept("edges", 1 + IDLE_EDGES.bit_length())
-        before = Mux(looked.first, 0, kept.read(stage))
+        before = Mux(looked.first, 0, pipe.taken(kept.read(stage - 1)))
         channel, edges, (edge_a, edge_b) = before[0], before[1:], looked.edges
         more = Mux(channel == edge_b, Mux(edges == IDLE_EDGES, edges, edges + 1), 1)
         counted = Mux(edge_a & edge_b, 0, Mux(edge_a | edge_b, more, edges))[: len(edges)]

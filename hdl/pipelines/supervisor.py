@@ -77,7 +77,7 @@ class Supervisors:
         """Return what a turn decides, and keep it."""
         pipe, stage, then, word = self._pipe, turn.stage, turn.stage + 1, self._word
         kept = pipe.kept("state", 2)
-        state = Mux(turn.first, DISARMED, kept.read(stage))
+        state = Mux(turn.first, DISARMED, pipe.taken(kept.read(stage - 1)))
         watched = (word("supervisor_causes", stage) | REQUIRED) & (
             Const(ALWAYS, COUNT) | (state == ARMED).replicate(COUNT)
         )
@@ -87,7 +87,7 @@ class Supervisors:
         ready = pipe.taken((state == DISARMED) & ~standing.any() & allowed, "ready")
 
         trips, before = pipe.taken(standing.any(), "trips"), pipe.taken(state, "state_before")
-        standing, first = pipe.taken(standing, "standing"), pipe.taken(turn.first)
+        standing, first = pipe.taken(standing, "standing"), pipe.taken(turn.first, "first_turn")
         was_armed, tripped = before == ARMED, before == TRIPPED
         stays = pipe.taken(turn.enable & ~turn.disarm, "stays")
         drives = was_armed & stays & ~trips
@@ -115,7 +115,7 @@ class Supervisors:
         """Return the causes since the last acknowledgement, 2 stages later, and whether they are forgotten, one."""
         pipe = self._pipe
         kept = pipe.kept("latched", COUNT)
-        before = Mux(turn.first, 0, kept.read(turn.stage))
+        before = Mux(turn.first, 0, pipe.taken(kept.read(turn.stage - 1)))
         forgotten = may_forget & pipe.taken(turn.acknowledge & (turn.acknowledged == before), "named")
         latched = Mux(forgotten, 0, pipe.taken(before, "latched_before") | standing)
         kept.leave(turn.stage + 1, latched)
@@ -126,7 +126,7 @@ class Supervisors:
         pipe, stage, then = self._pipe, turn.stage, turn.stage + 1
         fraction, bits = self._design.params.ramp_fraction, self._design.limit.width
         kept = pipe.kept("ceiling", fraction + bits + 1)
-        ceiling, most = kept.read(stage), self._word("supervisor_force_limit", stage)
+        ceiling, most = pipe.taken(kept.read(stage - 1)), self._word("supervisor_force_limit", stage)
         bound = ceiling[fraction:]
         limit = pipe.taken(Mux(bound > most, most, bound)[:bits], "limit")
         raised = Cat(pipe.taken(ceiling[:fraction]), limit) + self._word("supervisor_ramp", then)
@@ -142,9 +142,7 @@ class Supervisors:
     def _first(self, stage: int, first: Value, caught: Value, trip: Value) -> Value:
         """Keep the causes and the clock of a trip; return those of the last one, a stage later."""
         kept = self._pipe.kept("first_trip", len(trip))
-        kept.write(
-            Mux(caught, trip, 0), self._pipe.axis(stage), enable=self._pipe.valid(stage) & (caught | first)
-        )
+        kept.write(Mux(caught, trip, 0), self._pipe.axis(stage), enable=self._pipe.valid(stage) & (caught | first))
         return kept.read(stage + 1)
 
     def _counts(self, stage: int, first: Value, standing: Value) -> Value:

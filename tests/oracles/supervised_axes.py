@@ -1,4 +1,4 @@
-"""Monitors, supervisors and doors of axes: from what the axes show and the host asks, what must come out at every clock."""
+"""Monitors, supervisors and doors of axes: from what the axes show and the host asks, what must come out."""
 
 from collections import defaultdict
 
@@ -35,7 +35,7 @@ class Follower:
         self._rota, self._axes, self._all = spec.clocks_per_sample, spec.axes, (1 << spec.axes) - 1
         self._end, self._sampled = spec.latency, FRONT_LATENCY + spec.pipeline.latency
         self._pins = [dict.fromkeys(PINS, 0)] * SYNCHRONISER
-        self._live_names = {word.name for word in design.live}
+        self._looked_at = {word.name for word in design.live} - set(SAMPLE_WORDS)
         self._own = tuple(word.name for word in design.supervisor.words if word.name in Turn._fields)
         self.reached = 0
         self.restart(dict.fromkeys(PINS, 0))
@@ -86,7 +86,7 @@ class Follower:
         self._clock += 1
 
     def _sample(self, given: dict[str, int], shown: dict[str, int]) -> None:
-        """Take what belongs to a sample: index and preload with its strobe, then its words, then what was made of it."""
+        """Take what belongs to a sample: index and preload with its strobe, then its words, and what was made of it."""
         strobed = 0
         if at := self._at(0):
             axis, now = at
@@ -112,7 +112,7 @@ class Follower:
             now["waited"] = {name: bits >> axis & 1 for name, bits in self._waiting.items()}
             now["waited"]["referenced"] = self.referenced >> axis & 1
             now["acknowledged"] = self._acknowledged
-            now.update({name: word for name, word in self._words[axis].items() if name in self._live_names - set(SAMPLE_WORDS)})
+            now.update({name: self._words[axis][name] for name in self._looked_at})
         if at := self._at(self._end - LOOK + 1):
             words = {**at[1], "supervisor_watchdog": given["supervisor_watchdog"]}
             ranges = self._design.ranges.items()

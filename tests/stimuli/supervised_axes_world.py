@@ -1,4 +1,4 @@
-"""The world of supervised axes: a handle, loops and a host's whims for each, and one host that writes and beats for all."""
+"""The world of supervised axes: a handle, loops and whims of a host for each, and one port and one beat for all."""
 
 import random as plain
 
@@ -42,7 +42,7 @@ class Lane(World):
         random = self.random
         self.clock += 1
         # As fast as a clock can count, for a rota of few clocks.
-        self.speed = random.choice((-1.0, 1.0)) if random.random() < 0.0003 else self.speed
+        self.speed = random.choice((-1.0, 1.0)) if random.random() < 0.001 else self.speed
         now = {**self.inputs, **dict.fromkeys(STROBES, 0), **self._pins()}
         for name in LOOPS:
             self.inputs[name] ^= int(random.random() < (0.0004 if self.inputs[name] else 0.02))
