@@ -61,7 +61,8 @@ class SupervisedAxes(wiring.Component):
     loop that opens to a drive of zero `loop_latency` clock edges, the first of which sees it. From a fault of the
     decoder, a word or the host to a drive of zero `trip_latency` clock edges at most: a rota, and the clocks of a turn.
 
-    An acknowledgement within a rota of another one takes its place: the other is void.
+    An acknowledgement within a rota of another one takes its place: the other is void. A preload of an axis that is
+    ARMED moves the count under its wall: whoever speaks for the host has to refuse it.
 
     Rounding and overflow: as in the blocks.
 
