@@ -52,7 +52,7 @@ class SupervisedAxes(wiring.Component):
     wait for a `commit`; the others act in the axis's next turn, so a lower force limit holds with its drive.
     `output_force_limit` cannot be written. A commit of another `encoder_invert` is a `disarm`. The heartbeat and its
     watchdog are those of the one host, for all axes; a word of the watchdog beyond its range is the cause word_range of
-    each.
+    each. Both, and the ranges of the words, are looked at in the turn alone: what lasts for less than a rota is missed.
 
     Causes: those of `hardwall.model.supervisor`, as `hardwall.model.sampled_monitors` sees them. strobe_busy is never
     present: the rota has a clock for every axis, and nothing can begin in it sooner.

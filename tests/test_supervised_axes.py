@@ -31,7 +31,7 @@ async def follows_models(dut):
         states = [(state.supervisor.state, state.supervisor.latched) for state in follower.states]
         given = world.act(states, ready)
         # After half of the run the axes are reset in motion, again and again.
-        reset = int(clock == 0 or (2 * clock > clocks and world.random.random() < 0.0003))
+        reset = int(clock == 0 or (2 * clock > clocks and world.random.random() < 16 / clocks))
         bench.dut.stimulus.value, bench.dut.rst.value = recorded.stimuli.pack(given), reset
         await RisingEdge(dut.clk)
         shown = recorded.records.unpack(int(record.value))

@@ -79,15 +79,17 @@ def turn_of(block: SupervisedAxes, axis: int) -> Value:
     return block.turn_valid & (block.turn_axis == axis)
 
 
-def recent(bench: Bench, value: Value, last: int, first: int) -> list[Value]:
-    """Return a value at each of the clocks from so many to so many ago."""
-    return [bench.past(value, clocks) for clocks in range(last, first + 1)]
+def turn_at(bench: Bench, block: SupervisedAxes, axis: int, after: int) -> Value:
+    """Return whether an axis is in the stage of so many clocks after its drive has changed."""
+    stage = block.design.spec.latency + after
+    return bench.inner[f"valid_{stage}"] & (bench.inner[f"axis_{stage}"] == axis)
 
 
-def waited_for_the_turn(block: SupervisedAxes) -> tuple[int, int]:
-    """Return how many clocks ago the last and the first pulses came that the turn of a changed drive has looked at."""
-    last = block.design.turn_clocks + 1
-    return last, last + block.design.spec.clocks_per_sample - 1
+def since_the_look(bench: Bench, block: SupervisedAxes, axis: int, happens: Value) -> Value:
+    """Return whether something has happened since the axis's last look, or since a reset."""
+    since = Signal()
+    bench.m.d.sync += since.eq(happens | (since & ~turn_at(bench, block, axis, -LOOK)))
+    return since
 
 
 def within_the_limit(bench: Bench) -> None:
@@ -140,37 +142,32 @@ def a_cause_in_a_turn_trips(bench: Bench) -> None:
 
 
 def armed_by_the_host_alone(bench: Bench) -> None:
-    block = axes(bench)
-    last, first = waited_for_the_turn(block)
-    before = bench.past(bench.inner["state_before"], LET_OUT - 1)
+    block, clocks = axes(bench), LOOK + LET_OUT
+    before, live = bench.past(bench.inner["state_before"], LET_OUT - 1), bench.past(block.live, LET_OUT)
+    levels = bench.inner["drive_enable_synchroniser.drive_enable_levels"]
     for axis, magnitude in enumerate(block.magnitude):
-        asked = Cat(recent(bench, block.arm[axis], last, first)).any()
-        closed = Cat(recent(bench, bench.inner["drive_enable_synchroniser.drive_enable_levels"][axis], last, first)).all()
+        asked = since_the_look(bench, block, axis, block.arm[axis])
+        opened = since_the_look(bench, block, axis, ~levels[axis])
         rose = turn_of(block, axis) & (block.turn_state == ARMED) & (before != ARMED)
-        live = bench.past(block.live, LET_OUT)
-        bench.promise(~rose | asked & closed & live & (before == DISARMED) & (magnitude == 0))
+        may = bench.past(asked & ~opened, clocks) & live & (before == DISARMED)
+        bench.promise(~rose | may & (magnitude == 0))
         # Without a turn of its own an axis keeps its state, and without having been ARMED lets nothing out.
         state, turned = bench.inner[f"state_{axis}"], bench.past(turn_at(bench, block, axis, 1))
         bench.promise(turned | (state == bench.past(state)))
         bench.promise(~(turn_of(block, axis) & (before != ARMED)) | (magnitude == 0) & ~block.armed[axis])
 
 
-def turn_at(bench: Bench, block: SupervisedAxes, axis: int, after: int) -> Value:
-    """Return whether an axis is in the stage of so many clocks after its drive has changed."""
-    stage = block.design.spec.latency + after
-    return bench.inner[f"valid_{stage}"] & (bench.inner[f"axis_{stage}"] == axis)
-
-
 def forgotten_by_acknowledgement_alone(bench: Bench) -> None:
     block = axes(bench)
-    last, first = waited_for_the_turn(block)
+    # The mask of the last acknowledgement of any axis.
+    mask = Signal.like(block.acknowledged)
+    with bench.m.If(block.acknowledge.any()):
+        bench.m.d.sync += mask.eq(block.acknowledged)
     for axis in range(NUMBER):
         latched = bench.inner[f"latched_{axis}"]
-        before = bench.past(latched)
+        before, asked = bench.past(latched), since_the_look(bench, block, axis, block.acknowledge[axis])
         # What is latched changes a clock before the drive does.
-        pulses = recent(bench, block.acknowledge[axis], last - 1, first - 1)
-        masks = recent(bench, block.acknowledged, last - 1, first - 1)
-        told = Cat(pulse & (mask == before) for pulse, mask in zip(pulses, masks, strict=True)).any()
+        told = bench.past(asked, LOOK + LET_OUT - 1) & (bench.past(mask, LOOK + LET_OUT - 1) == before)
         bench.promise(((before & ~latched) == 0) | told | bench.past(bench.inner["first_turn"]))
 
 
@@ -220,14 +217,14 @@ PROPERTIES = [
         "only the host's arm since the last look leads to ARMED, from DISARMED, with a closed loop and a live host",
         WHERE,
         armed_by_the_host_alone,
-        depth=11,
+        depth=8,
         bugs=(Bug(Supervisors.judged, "(ready & stays & pipe.taken(turn.arm))", "(ready & stays)"),),
     ),
     Property(
         "a latched cause is forgotten only when exactly the latched ones are acknowledged, since the last look",
         WHERE,
         forgotten_by_acknowledgement_alone,
-        depth=10,
+        depth=8,
         bugs=(Bug(Supervisors._latched, "(turn.acknowledged == before)", "(turn.acknowledged != 0)"),),
     ),
 ]
