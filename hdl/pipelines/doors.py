@@ -34,7 +34,7 @@ class Doors:
             "emergency_stop": ~levels["emergency_stop"],
             "external_fault": ~levels["external_fault"] & watches,
         }
-        self.waiting = {name: pipe.waits(each, look) for name, each in opened.items()}
+        self.waiting = {name: pipe.waits(name, each, look) for name, each in opened.items()}
         self._shut = [
             Cat(each[axis] for each in (*opened.values(), *self.waiting.values())).any() for axis in range(pipe.axes)
         ]

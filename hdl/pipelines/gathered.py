@@ -43,7 +43,7 @@ def encoders(pipe: Pipe, axes: Axes, levels: Mapping[str, Value], look: int) -> 
         "edge_a": axes.stepped & ~kinds,
         "edge_b": axes.stepped & kinds,
     }
-    return {name: pipe.waits(pulse, look) for name, pulse in pulses.items()}
+    return {name: pipe.waits(name, pulse, look) for name, pulse in pulses.items()}
 
 
 def looked_at(pipe: Pipe, waiting: Mapping[str, Value], asked: Asked, look: int) -> dict[str, Value]:
@@ -63,8 +63,8 @@ def looked_at(pipe: Pipe, waiting: Mapping[str, Value], asked: Asked, look: int)
         m.d.sync += [acknowledges.eq(asked.acknowledge), acknowledged.eq(asked.acknowledged)]
     bits = {
         **waiting,
-        "arm": pipe.waits(asked.arm, look),
-        "disarm": pipe.waits(asked.disarm, look),
+        "arm": pipe.waits("arm", asked.arm, look),
+        "disarm": pipe.waits("disarm", asked.disarm, look),
         "acknowledge": acknowledges,
     }
     row = pipe.taken(pipe.of([Cat(each) for each in zip(*bits.values(), strict=True)], look), "looked_at")
@@ -85,7 +85,7 @@ def sample(pipe: Pipe, axes: Axes, first: Value, index_bits: int, stage: int) ->
     # A preload makes the count of an index edge before it void.
     m.d.sync += indexed.eq((axes.indexed | (indexed & ~Cat(pipe.turns(0)))) & ~axes.preload)
     rows = []
-    for number, (mark, preloaded) in enumerate(zip(indexed, pipe.waits(axes.preload, 0), strict=True)):
+    for number, (mark, preloaded) in enumerate(zip(indexed, pipe.waits("preload", axes.preload, 0), strict=True)):
         low = Signal(index_bits, name=f"index_low_{number}")
         with m.If(axes.indexed[number]):
             m.d.sync += low.eq(axes.count[number][:index_bits])

@@ -57,14 +57,15 @@ class Pipe:
         """Return for every axis whether it is in a stage."""
         return [self.valid(stage) & (self.axis(stage) == number) for number in range(self.axes)]
 
-    def waits(self, pulses: Value, stage: int) -> Signal:
+    def waits(self, name: str, pulses: Value, stage: int) -> Signal:
         """Return for every axis whether a pulse of it came since it was in a stage; one in that very clock waits on.
 
         Args:
+            name: what waits.
             pulses: a bit for every axis.
             stage: the stage in which what waits is looked at.
         """
-        waiting = Signal(self.axes, name="waiting")
+        waiting = Signal(self.axes, name=f"waiting_{name}")
         self.m.d.sync += waiting.eq(pulses | (waiting & ~Cat(self.turns(stage))))
         return waiting
 
