@@ -78,8 +78,10 @@ class Axes(wiring.Component):
     stepped : Out(axes), edge_kind : Out(array), indexed : Out(axes)
         High for one clock with the count of a new edge, and the kind of the last edge; high for one clock with the
         count at a rising edge of Z.
-    estimated : Out(axes), velocity, saturated : Out
-        High for one clock with a sample's velocity; the velocity, and whether the estimator is saturated.
+    strobe, strobe_axis : Out
+        High in a clock in which an axis is sampled, and which one.
+    estimated : Out(axes), velocity, saturated, estimated_count : Out
+        High for one clock with a sample's velocity; the velocity, whether the estimator is saturated, and the count.
     illegal, overspeed : Out(axes), illegal_count : Out(array)
         The encoder's sticky flags, now, and the illegal transitions since the last clear; saturates.
     index_count : Out(array), index_armed, index_latched : Out(axes)
@@ -135,8 +137,11 @@ class Axes(wiring.Component):
                 "word_ready": Out(1),
                 **{name: Out(axes) for name in shown},
                 **{name: Out(ArrayLayout(each, axes)) for name, each in arrays.items()},
+                "strobe": Out(1),
+                "strobe_axis": Out(number),
                 "velocity": Out(shape(design.estimator.velocity)),
                 "saturated": Out(1),
+                "estimated_count": Out(count),
                 "stamp": Out(spec.stamp_width),
                 **{f"record_{name}": Out(each) for name, each in record.items()},
             }
@@ -161,9 +166,9 @@ class Axes(wiring.Component):
             m.d.sync += [clock.eq(0), first.eq(0), phase.eq(Mux(phase == design.output.decimation - 1, 0, phase + 1))]
         with m.Else():
             m.d.sync += clock.eq(clock + 1)
-        m.d.comb += self.word_ready.eq(~first)
         axis = clock[: Shape.cast(range(max(spec.axes, 2))).width]
-        pipe = Pipe(m, spec.axes, axis, clock < spec.axes)
+        m.d.comb += [self.word_ready.eq(~first), self.strobe.eq(clock < spec.axes), self.strobe_axis.eq(axis)]
+        pipe = Pipe(m, spec.axes, axis, self.strobe)
         strobes = pipe.turns(0)
         m.d.sync += self.commit_pending.eq(self.commit | (self.commit_pending & ~Cat(strobes)))
 
@@ -176,6 +181,7 @@ class Axes(wiring.Component):
             self.estimated.eq(Cat(pipe.turns(stage))),
             self.velocity.eq(estimate.velocity),
             self.saturated.eq(estimate.saturated.any()),
+            self.estimated_count.eq(count),
         ]
         force = wall.force(pipe, design.wall, stage, count, estimate.velocity, word)
 

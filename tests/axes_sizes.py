@@ -1,8 +1,10 @@
 """Size and speed of several axes through one pipeline, on an ECP5-25F of speed grade 6: the table of `docs/axes.md`.
 
     python tests/axes_sizes.py levant 16 --seeds 1 2 3
+    python tests/axes_sizes.py levant 16 --seeds 1 --supervised
 
-The pipeline is placed and routed alone, without pins: what it takes beside a link and supervisors is not in it.
+The pipeline is placed and routed alone, without pins, and with or without supervisors: what a link and drive stages
+take is not in it.
 """
 
 import argparse
@@ -17,6 +19,7 @@ from amaranth.lib import wiring
 from hardwall.hdl.axes import Axes
 from hardwall.hdl.export import to_verilog
 from hardwall.hdl.lead_out import lead_out
+from hardwall.hdl.supervised_axes import SupervisedAxes
 from hardwall.model.axes import PIPELINES, AxesSpec
 from hardwall.sim.boards.parts import PARTS
 from hardwall.sim.commands.terminal import show
@@ -44,10 +47,10 @@ def spec_of(estimator: str, axes: int) -> AxesSpec:
 
 
 class Alone(wiring.Component):
-    """Axes as a part of a top that has nothing else."""
+    """Axes, bare or supervised, as a part of a top that has nothing else."""
 
-    def __init__(self, spec: AxesSpec):
-        self._axes = Axes(spec)
+    def __init__(self, axes: Axes | SupervisedAxes):
+        self._axes = axes
         super().__init__(dict(self._axes.signature.members))
 
     def elaborate(self, platform) -> Module:
@@ -57,11 +60,11 @@ class Alone(wiring.Component):
         return m
 
 
-def placed(spec: AxesSpec, seeds: list[int]) -> list[dict]:
+def placed(spec: AxesSpec, supervised: bool, seeds: list[int]) -> list[dict]:
     """Return nextpnr's report for every seed."""
-    part = PARTS[DEVICE]
-    name = f"axes-{spec.estimator}-{spec.axes}"
-    netlist = flow.netlist(name, part, {"top.v": to_verilog(Alone(spec), "top")}, spec.clock_hz)
+    part, axes = PARTS[DEVICE], SupervisedAxes(spec) if supervised else Axes(spec)
+    name = f"{'supervised-' * supervised}axes-{spec.estimator}-{spec.axes}"
+    netlist = flow.netlist(name, part, {"top.v": to_verilog(Alone(axes), "top")}, spec.clock_hz)
     options = ["--freq", f"{spec.clock_hz / 1e6:g}", "--report", flow.REPORT, "--timing-allow-fail", "--out-of-context"]
 
     def place(work: Path, seed: int) -> None:
@@ -77,11 +80,12 @@ def main() -> None:
     parser.add_argument("estimator", choices=sorted(PIPELINES))
     parser.add_argument("axes", type=int, nargs="+", help="numbers of axes, 1 to 32")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3])
+    parser.add_argument("--supervised", action="store_true", help="with monitors and supervisors")
     asked = parser.parse_args()
     rows = []
     for axes in asked.axes:
         spec = spec_of(asked.estimator, axes)
-        reports = placed(spec, asked.seeds)
+        reports = placed(spec, asked.supervised, asked.seeds)
         speeds = [1e3 / timing(PARTS[DEVICE], report)[0] for report in reports]
         used = {kind: each["used"] for kind, each in reports[0]["utilization"].items()}
         fmax = statistics.median(speeds)

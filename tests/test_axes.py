@@ -152,15 +152,24 @@ def check_clocks(spec: AxesSpec, lanes: list[Lane], seen: Seen) -> None:
 
 
 def check_estimates(spec: AxesSpec, lanes: list[Lane], seen: Seen) -> None:
-    """Check the velocity of every sample, its clock, and whether the estimator was saturated."""
+    """Check the velocity of every sample, its clock, its count, and whether the estimator was saturated."""
     velocity, saturated = np.array(seen.port("velocity")), np.array(seen.port("saturated"))
+    count = np.array(seen.port("estimated_count"))
     for number, estimated in enumerate(seen.lanes("estimated")):
         came = np.flatnonzero(estimated)
         first = number + axes.FRONT_LATENCY + spec.pipeline.latency
         assert came.tolist() == list(range(first, len(velocity), spec.clocks_per_sample))
         samples = lanes[number].samples
         assert (velocity[came] == samples.velocity[: len(came)]).all()
+        assert (count[came] == samples.count[: len(came)]).all()
         assert (saturated[came] == (samples.raised[: len(came)] >> len(ENCODER_FLAGS) != 0)).all()
+
+
+def check_strobes(spec: AxesSpec, seen: Seen) -> None:
+    """Check which axis is sampled at every clock."""
+    rota = [clock % spec.clocks_per_sample for clock in range(len(seen.words))]
+    assert seen.port("strobe") == [int(place < spec.axes) for place in rota]
+    assert all(axis == place for axis, place in zip(seen.port("strobe_axis"), rota, strict=True) if place < spec.axes)
 
 
 def check_records(spec: AxesSpec, lanes: list[Lane], seen: Seen) -> None:
@@ -198,6 +207,7 @@ async def every_axis_is_a_single_one(dut):
         bench.drive(rst=0)
         lanes = [world.lane(number) for number in range(spec.axes)]
         check_clocks(spec, lanes, seen)
+        check_strobes(spec, seen)
         check_estimates(spec, lanes, seen)
         check_records(spec, lanes, seen)
         assert all(each.committed > 5 for each in lanes)

@@ -4,7 +4,7 @@ A pass is one sample of one axis on its way through the pipeline. It is in stage
 strobe, which is stage 0; a register loaded in stage s is seen in stage s + 1.
 """
 
-from amaranth.hdl import Module, Mux, Shape, Signal, Value, unsigned
+from amaranth.hdl import Cat, Module, Mux, Shape, Signal, Value, unsigned
 from amaranth.lib.memory import Memory
 
 from ..capture import NO_FIRST_CONTENTS
@@ -56,6 +56,18 @@ class Pipe:
     def turns(self, stage: int) -> list[Value]:
         """Return for every axis whether it is in a stage."""
         return [self.valid(stage) & (self.axis(stage) == number) for number in range(self.axes)]
+
+    def waits(self, name: str, pulses: Value, stage: int) -> Signal:
+        """Return for every axis whether a pulse of it came since it was in a stage; one in that very clock waits on.
+
+        Args:
+            name: what waits.
+            pulses: a bit for every axis.
+            stage: the stage in which what waits is looked at.
+        """
+        waiting = Signal(self.axes, name=f"waiting_{name}")
+        self.m.d.sync += waiting.eq(pulses | (waiting & ~Cat(self.turns(stage))))
+        return waiting
 
     def of(self, rows: list[Value], stage: int) -> Value:
         """Return the row of the axis that is in a stage, from one row of each axis."""
