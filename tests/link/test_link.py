@@ -9,7 +9,7 @@ import pytest
 from amaranth.hdl import Module, Signal
 from amaranth.lib import wiring
 from cocotb.task import bridge, resume
-from cocotb.triggers import ClockCycles, RisingEdge, Timer
+from cocotb.triggers import ClockCycles, FallingEdge, First, RisingEdge, Timer
 from cocotbext.uart import UartSink, UartSource
 from pymodbus import FramerType, ModbusException
 from pymodbus.client.base import ModbusBaseSyncClient
@@ -106,12 +106,13 @@ async def opened(dut, error: float = 0.0) -> Client:
 
 
 async def takes_commits(dut, bench: Bench) -> None:
-    """Keep every commit waiting for some clocks, as an axis does until its sample."""
+    """Keep every commit waiting for longer than a byte, as an axis does until its sample; there is no answer before."""
     while True:
         await RisingEdge(dut.commit)
         await RisingEdge(dut.clk)
         bench.drive(commit_pending=1)
-        await ClockCycles(dut.clk, 50)
+        answered = FallingEdge(dut.uart_tx)
+        assert await First(answered, ClockCycles(dut.clk, 60)) is not answered, "an answer before the sample"
         bench.drive(commit_pending=0)
 
 
@@ -209,6 +210,22 @@ async def exceptions_counters_and_identification(dut):
             client.read_holding_registers(0, count=2, device_id=9)
         assert client.diag_clear_counters(**unit).isError() is False
         assert client.diag_read_bus_message_count(**unit).message == 1
+
+    await run()
+
+
+@cocotb.test()
+async def each_pulse_is_refused_alone(dut):
+    client, registers = await opened(dut), supervised(**parameters())
+    every = (1 << len(registers.pulses)) - 1
+
+    @bridge
+    def run() -> None:
+        for bit, pulse in enumerate(registers.pulses):
+            dut.refuse.value = 1 << bit
+            assert client.write_register(pulse.address, 1, device_id=1).exception_code == 4
+            dut.refuse.value = every ^ 1 << bit
+            assert not client.write_register(pulse.address, 1, device_id=1).isError()
 
     await run()
 
