@@ -35,12 +35,14 @@ OF_THE_BENCH = {
     for name in (
         "test_typing",
         "test_board_stages",
+        "test_supervised_axes_faults",
         "testing/test_campaign",
         "link/test_mbpoll",
         "link/test_axi_link",
     )
 }
-"""Tests that simulate hardware of their own, need a program that may be absent, or see a block in a board alone."""
+"""Tests that simulate hardware of their own, need a program that may be absent, or see a block in a board alone;
+or inject faults by hand into what a block's own test covers."""
 REACHED = Point("toggle", "part.sum[0]:0->1")
 MISSED = Point("toggle", "part.sum[1]:0->1")
 

@@ -5,7 +5,7 @@ and C is the largest magnitude of its second derivative (Figure 4).
 
 The estimate has limits: seven sines cannot follow an impact, so C is less than the handle's true acceleration, and
 falls as the fitted record grows longer. Both accelerations are reported. The amplitudes are reported too: two sines of
-almost the same frequency may be metres large and cancel, so the fit is a curve and not a spectrum.
+almost the same frequency may cancel, so the fit is a curve and not a spectrum.
 """
 
 import math
