@@ -127,7 +127,7 @@ soak fuzz: PYTEST += -o faulthandler_timeout=0
 soak: $(VENV)/.test | tools ## 10^9 samples of every estimator, every digest, every loop whole, RTL and model with new seeds
 	@echo "HARDWALL_ENDURANCE=$(ENDURANCE)"
 	@HARDWALL_ENDURANCE=$(ENDURANCE) $(PYTEST) tests/test_endurance.py
-	@HARDWALL_DIGESTS=all HARDWALL_LOOPS=all $(PYTEST) tests/test_digests.py tests/loop tests/estimates tests/host/test_axis.py tests/virtual/test_virtual_board.py tests/test_faults.py tests/test_board_stages.py
+	@HARDWALL_DIGESTS=all HARDWALL_LOOPS=all $(PYTEST) tests/test_digests.py tests/loop tests/estimates tests/host/test_axis.py tests/virtual/test_virtual_board.py tests/test_faults.py tests/test_board_stages.py tests/test_axes.py tests/test_supervised_axes.py tests/walls/test_hit_axes.py
 	@for seed in $(SEEDS); do \
 	  echo "HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES); again: make soak SEEDS=$$seed SAMPLES=$(SAMPLES)"; \
 	  HARDWALL_SEED=$$seed HARDWALL_SAMPLES=$(SAMPLES) $(PYTEST) -m rtl $(ARGS); \

@@ -57,7 +57,7 @@ async def follows_models(dut):
     assert names(ALL & ~follower.reached & ~BITS["strobe_busy"]) == []
 
 
-@pytest.mark.parametrize(("axes", "estimator", "spare"), [(1, "fdm", 0), (3, "fdm", 2), (3, "window", 0)])
+@pytest.mark.parametrize(("axes", "estimator", "spare"), [(1, "fdm", 0), (3, "levant", 2), (3, "window", 0)])
 def test_rtl(axes, estimator, spare):
     simulate(__file__, make, axes=axes, estimator=estimator, spare=spare)
 

@@ -4,6 +4,7 @@ import random as plain
 
 from hardwall.hdl.supervised import COMPLEMENTS, LOOPS
 from hardwall.model.axes import AxesSpec
+from hardwall.model.estimators import levant
 from hardwall.model.supervised_axes import Design
 from hardwall.model.supervisor import TRIPPED, WATCHDOG_MS
 
@@ -16,6 +17,8 @@ FIELDS = {
     **NARROW, "sample_hz": RATE_HZ, "actuation_hz": RATE_HZ // 2, "speed_max_m_per_s": 1e-3,
     "damping_max_n_s_per_m": 200e3,
 }  # fmt: skip
+AS_SLOW = levant.Gains(1.0, 2.0)
+"""Levant's gains that samples so far apart allow; the axis's own are beyond."""
 BITS = "encoder_a", "encoder_b", "encoder_z", *COMPLEMENTS, *LOOPS, *STROBES
 """Inputs of one bit for each axis."""
 SILENT_CLOCKS_PER_MS = 80
@@ -25,7 +28,7 @@ ASKS = 4
 
 def slow(axes: int, estimator: str, spare: int = 0) -> AxesSpec:
     """Return narrow axes with that many clocks of a rota to spare, and so slow a clock that a host is soon overdue."""
-    made = {**FIELDS, "axes": axes, "estimator": estimator}
+    made = {**FIELDS, "axes": axes, "estimator": estimator, "gains": {"levant": AS_SLOW}.get(estimator)}
     slots = AxesSpec(**{**made, "clock_hz": 1_000_000}).slots
     return AxesSpec(**{**made, "clock_hz": RATE_HZ * (slots + spare)})
 
