@@ -8,6 +8,7 @@ take is not in it.
 """
 
 import argparse
+import shutil
 import statistics
 import sys
 from functools import partial
@@ -68,8 +69,11 @@ def placed(spec: AxesSpec, supervised: bool, seeds: list[int]) -> list[dict]:
     options = ["--freq", f"{spec.clock_hz / 1e6:g}", "--report", flow.REPORT, "--timing-allow-fail", "--out-of-context"]
 
     def place(work: Path, seed: int) -> None:
-        command = [*part.nextpnr, "--json", str(netlist / flow.NETLIST), "--seed", str(seed), *options]
+        # The placer may see the folder that it runs in, but not every other folder of this machine.
+        given = Path(shutil.copy(netlist / flow.NETLIST, work))
+        command = [*part.nextpnr, "--json", given.name, "--seed", str(seed), *options]
         tools.run(work, work / "nextpnr.log", command, f"place and route of {name} with seed {seed}")
+        given.unlink()
 
     return [flow.report_of(whole_folder(netlist / f"alone-{seed}", partial(place, seed=seed))) for seed in seeds]
 
