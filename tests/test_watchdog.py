@@ -27,10 +27,16 @@ def make(name: str) -> Recorded:
 
 
 def campaign(d: watchdog.Design, clocks: int) -> dict[str, np.ndarray]:
-    """Return inputs at every clock: a host that beats in bursts, and a word of every size."""
+    """Return inputs at every clock: a host that beats in bursts, and a word of every size.
+
+    Many words are a power of two and little more: if a high bit of what is left were wrong, it would soon be nothing.
+    """
     random = rng()
     changes = random.random(clocks) < np.repeat(random.choice([0.0, 0.0, 0.02, 0.5], clocks // 400 + 1), 400)[:clocks]
-    words = random.integers(0, d.word.format.max + 1, clocks) >> random.integers(0, d.word.format.width + 1, clocks)
+    width = d.word.format.width
+    words = random.integers(0, d.word.format.max + 1, clocks) >> random.integers(0, width + 1, clocks)
+    powers = (1 << random.integers(2, width, clocks)) + random.integers(0, 4, clocks)
+    words = np.where(random.random(clocks) < 0.5, powers, words)
     reset = (random.random(clocks) < 2e-4).astype(np.int64)
     reset[0] = 1
     beats = np.where(changes, random.integers(0, 1 << supervisor.BEAT_BITS, clocks), 0)
