@@ -7,11 +7,10 @@ from amaranth.lib.wiring import In, Out
 
 from hardwall.model.axes import AxesSpec
 from hardwall.model.axes_registers import AxesMap
-from hardwall.model.drive import pdm
 from hardwall.model.link import uart
 
 from .board import Board
-from .drive.pdm import Pdm
+from .drive.registry import block_of
 from .lead_out import lead_out
 from .link.axes_link import AxesLink
 from .supervised import COMPLEMENTS, LOOPS
@@ -82,8 +81,7 @@ class AxesBoard(Board):
         self.axes = SupervisedAxes(spec)
         rate = uart.usual_baud(spec.clock_hz) if baud is None else baud
         self.link = AxesLink(AxesMap(spec), rate)
-        stage = pdm.Design(spec, pdm.USUAL)
-        self.stages = [Pdm(stage) for _ in range(spec.axes)]
+        self.stages = [block_of(spec.drive) for _ in range(spec.axes)]
         wiring.Component.__init__(
             self,
             {
@@ -93,7 +91,7 @@ class AxesBoard(Board):
                 **dict.fromkeys(ENCODER, In(spec.axes)),
                 **dict.fromkeys(LOOPS, In(1)),
                 **self.link.PINS,
-                **dict.fromkeys((*stage.pins, "alive"), Out(spec.axes)),
+                **dict.fromkeys((*spec.drive.pins, "alive"), Out(spec.axes)),
                 "outputs_enable": Out(1),
             },
         )
