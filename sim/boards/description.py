@@ -101,7 +101,8 @@ class Description:
             FieldError: if it has no pins for so many.
         """
         if axes > self.most_axes:
-            most = f"at most {self.most_axes} on {self.name}" if self.most_axes else f"absent: {self.name} has one axis"
+            has_none = f"absent: {self.name} has pins for one axis"
+            most = f"at most {self.most_axes} on {self.name}" if self.most_axes else has_none
             raise FieldError("axes", f"must be {most}, not {axes!r}")
         free = iter(
             [(f"{at}{sign}", site) for at, *sites in self.pairs for sign, site in zip("+-", sites, strict=True)]

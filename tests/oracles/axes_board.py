@@ -30,20 +30,23 @@ STARTING, PATIENCE = 100, 20_000
 """Clocks in which the oscillator has seen that the clock runs; clocks after which an answer is overdue."""
 SHOWN = "magnitude", "negative", "drive_inverted", "alive"
 """What the axes inside give to stages and pins."""
+PINS = "drive_pdm", "drive_sign", "alive", "outputs_enable"
+"""What comes of it."""
 
 
 class Watched(wiring.Component):
-    """A board with its pins, and in one word what its axes let out.
+    """A board with its pins, and in one word what its axes let out and what comes of it.
 
     Attributes:
         board: the board.
-        shown: how `SHOWN` lies in `showing`.
+        shown: how `SHOWN`, and `PINS` behind `pin_`, lie in `showing`.
     """
 
     def __init__(self, axes: int):
         fields = {**NARROW, "clock_hz": CLOCK_HZ}
-        self.board = AxesBoard(AxesSpec(**fields, axes=axes, estimator="fdm"), BAUD)
-        self._ports = {name: Value.cast(getattr(self.board.axes, name)) for name in SHOWN}
+        self.board = board = AxesBoard(AxesSpec(**fields, axes=axes, estimator="fdm"), BAUD)
+        self._ports = {name: Value.cast(getattr(board.axes, name)) for name in SHOWN}
+        self._ports |= {f"pin_{name}": getattr(board, name) for name in PINS}
         self.shown = Packing({name: Shape(len(port)) for name, port in self._ports.items()})
         super().__init__({**self.board.signature.members, "showing": Out(self.shown.width)})
 
@@ -95,23 +98,21 @@ class Host:
 
     async def _follow(self) -> None:
         """Compare the pins at every clock edge with what the stages make of what the axes let out."""
-        edge, axes = RisingEdge(self.dut.clk), range(self.board.spec.axes)
-        width = self._stage.magnitude.width
+        edge, width = RisingEdge(self.dut.clk), self._stage.magnitude.width
+        mask, params = (1 << width) - 1, self._stage.params
         while True:
             await edge
             shown = self.component.shown.unpack(int(self.dut.showing.value))
             permitted = self.loops["drive_enable"] & self.loops["emergency_stop"]
             pins = [pdm.pins(self._stage, state, permitted) for state in self._states]
-            found = {name: int(getattr(self.dut, name).value) for name in ("drive_pdm", "drive_sign", "alive")}
             wanted = {name: sum(pin[name] << axis for axis, pin in enumerate(pins)) for name in self._stage.pins}
-            assert found == wanted | {"alive": shown["alive"]}, f"clock {self.compared}"
-            assert int(self.dut.outputs_enable.value) == 1
-            for axis in axes:
-                magnitude = shown["magnitude"] >> width * axis & (1 << width) - 1
-                negative = (shown["negative"] ^ shown["drive_inverted"]) >> axis & 1
-                inputs = pdm.Inputs(magnitude=magnitude, negative=negative)
-                self._states[axis] = pdm.step(self._stage.params, self._states[axis], inputs)
-                self.pulses[axis] += found["drive_pdm"] >> axis & 1
+            wanted |= {"alive": shown["alive"], "outputs_enable": 1}
+            assert {name: shown[f"pin_{name}"] for name in PINS} == wanted, f"clock {self.compared}"
+            signs = shown["negative"] ^ shown["drive_inverted"]
+            for axis, state in enumerate(self._states):
+                inputs = pdm.Inputs(shown["magnitude"] >> width * axis & mask, signs >> axis & 1)
+                self._states[axis] = pdm.step(params, state, inputs)
+                self.pulses[axis] += shown["pin_drive_pdm"] >> axis & 1
             self.compared += 1
 
     def change(self, **loops: int) -> None:
