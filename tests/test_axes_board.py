@@ -39,8 +39,8 @@ async def every_axis_has_its_bank_and_its_state(dut):
     # Who the device is, which there is once; and every word as after a reset.
     assert (await host.request(frames.read(0, 16)))[2 + 28 :] == axes.to_bytes(4, "big")
     for axis in range(axes):
-        await host.request(frames.read(BANK * axis + 0x60, 0x60))
-        await host.request(frames.read(BANK * axis + 0xC0, 0x40))
+        await host.request(frames.read(BANK * axis + registers["wall_stiffness"].address, 2))
+        await host.request(frames.read(BANK * axis + 0xC0, 0x20))
         assert (await host.look(axis))["state"] == DISARMED
     # Words of each: in use only after a commit, and only in their axis.
     for axis in range(axes):
@@ -49,7 +49,7 @@ async def every_axis_has_its_bank_and_its_state(dut):
             await host.request(frames.read(BANK * other + registers["active_wall_stiffness"].address, 2))
         await host.write(axis, commit=1)
         for other in range(axes):
-            await host.request(frames.read(BANK * other + 0x80, 0x40))
+            await host.request(frames.read(BANK * other + registers["active_wall_stiffness"].address, 2))
     # What cannot be written: nothing of the frame is done.
     refusals = {
         frames.write(BANK + registers["heartbeat"].address, [0, 1]): ABSENT,
@@ -122,6 +122,7 @@ async def a_loop_stops_every_axis(dut):
                 await host.write(axis, acknowledge=1)
             await host.look(axis, "state", "ready")
             await host.write(axis, arm=1)
+    assert host.compared > 10_000
 
 
 def test_rtl():
