@@ -16,12 +16,14 @@ from hardwall.hdl.supervised import LOOPS
 from hardwall.model.axes import AxesSpec
 from hardwall.model.axes_registers import BANK
 from hardwall.model.drive import pdm
-from hardwall.model.link import banked_file, server
+from hardwall.model.link import banked_file
 from hardwall.model.link.line import Verdict, framed
 from hardwall.testing import Bench
 from hardwall.testing.packing import Packing
 from stimuli import frames
 from stimuli.specs import NARROW
+
+from .banked_server import BankedServer
 
 CLOCK_HZ, BAUD = 12_000_000, 3_000_000
 OSCILLATOR_NS = 22
@@ -58,13 +60,6 @@ class Watched(wiring.Component):
         return m
 
 
-class Server(server.Server):
-    """The server's twin over the twin of a banked file."""
-
-    def __init__(self, design: banked_file.Design):
-        self.file: banked_file.BankedFile = banked_file.BankedFile(design)
-
-
 class Host:
     """A host on the line, encoders that rest, and the pins of every axis, compared at every clock.
 
@@ -78,7 +73,7 @@ class Host:
         self.dut, self.component = dut, Watched(axes)
         self.board, self.bench = self.component.board, Bench(dut, self.component)
         self.registers = self.board.registers
-        self.server = Server(banked_file.Design(self.registers))
+        self.server = BankedServer(banked_file.Design(self.registers))
         self.loops, self.compared, self.pulses = dict.fromkeys(LOOPS, 1), 0, [0] * axes
         self._stage, self._states = pdm.Design(self.board.spec, pdm.USUAL), [pdm.START] * axes
 
