@@ -46,6 +46,7 @@ class AxesMap(RegisterMap):
     """
 
     PRODUCT: ClassVar = b"axes"
+    spec: AxesSpec
 
     def __init__(self, spec: AxesSpec):
         if not isinstance(spec, AxesSpec):
