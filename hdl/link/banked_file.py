@@ -166,20 +166,20 @@ class BankedFile(wiring.Component):
 
     def _status(self, m: Module, asked: Signal, recorded: Signal, turned: Signal) -> Signal:
         """Return the register of a status at the host's address, as it was with the last of either signal."""
-        status, extended = Signal(CELL_BITS), {}
+        status, halves = Signal(CELL_BITS), {}
         for taken, values in zip((recorded, turned), self._taken(asked), strict=True):
             for name, value in values.items():
                 register = self._design.registers[name]
                 held = Signal(shape(register.format), name=f"held_{name}")
                 with m.If(taken):
                     m.d.sync += held.eq(value)
-                extended[register.address] = Signal(Shape(VALUE_BITS, register.format.signed), name=f"extended_{name}")
-                m.d.comb += extended[register.address].eq(held)
+                extension = (held[-1] if register.format.signed else Const(0)).replicate(VALUE_BITS - len(held))
+                whole = Cat(held, extension)
+                halves |= {register.address + 1: whole[:CELL_BITS], register.address: whole[CELL_BITS:]}
         with m.Switch(self.host.address[: (COUNTERS - 1).bit_length()]):
-            for place, value in extended.items():
-                for half in (0, 1):
-                    with m.Case(place + 1 - half):
-                        m.d.comb += status.eq(value.word_select(half, CELL_BITS))
+            for place, half in halves.items():
+                with m.Case(place):
+                    m.d.comb += status.eq(half)
         return status
 
     def _refused(self, m: Module, wanted: Value, asking: Value) -> Value:
@@ -250,8 +250,10 @@ class BankedFile(wiring.Component):
         words, commit = len(registers.words), marks[[pulse.name for pulse in registers.pulses].index("commit")]
         step, low, settling = Signal(range(BANK * banks)), Signal(), Signal(range(design.settle_clocks + 1))
         count, causes = registers["active_preload_count"].address, registers["acknowledged"].address
-        copies, walked = less(step, words), Signal(range(END))
-        m.d.comb += walked.eq(Mux(copies, WRITTEN | Cat(low, step[:4]), Mux(step == words, count, causes) | low))
+        copies, halfway = less(step, words), Signal(range(END - WRITTEN))
+        beside = Mux(step == words, count - WRITTEN, causes - WRITTEN)
+        m.d.comb += halfway.eq(Mux(copies, Cat(low, step[:4]), beside | low))
+        walked = halfway | WRITTEN
 
         area, window = Signal(Area), Signal()
         m.d.comb += [
@@ -350,7 +352,7 @@ class BankedFile(wiring.Component):
                 m.d.comb += taking["value"].eq(1)
                 m.d.sync += to.eq(here)
                 # The upper half has been written just before, and is still there.
-                with m.If(in_banks), m.Switch(place):
+                with m.Switch(place):
                     for word in registers.live:
                         with m.Case(word.address + 1):
                             give(word, here, Cat(host.value, shift))

@@ -11,7 +11,7 @@ from hardwall.model.link.register_file import Operation
 from hardwall.model.register import VALUE_BITS, Register
 from hardwall.model.registers import ACTIVE, COUNTERS, LIVE, MAP, PULSES, WRITTEN
 from hardwall.model.supervisor import ARMED
-from hardwall.testing import SEED, Bench, Recorded, parameters
+from hardwall.testing import SEED, Bench, Recorded, parameters, rng
 from stimuli.supervised_axes_world import slow
 
 PATIENCE = 20_000
@@ -42,6 +42,7 @@ class World:
 
     def __init__(self, dut):
         self.recorded, self.random = make(**parameters()), plain.Random(SEED)
+        self.draws = rng()
         self.component = self.recorded.component
         self.design, self.bench = self.component.design, Bench(dut, self.recorded)
         self.registers, self.pulses = self.design.registers, [each.name for each in self.design.registers.pulses]
