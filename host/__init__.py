@@ -1,7 +1,8 @@
 """What runs on the PC beside a board, real or virtual: `connect`, the axis in SI units, and what may go wrong."""
 
 from .axis import Axis
-from .connect import connect
+from .banks import Axes
+from .connect import connect, connect_axes
 from .errors import (
     ChangedError,
     ForeignError,
@@ -15,6 +16,7 @@ from .errors import (
 from .status import State, Status, Trip
 
 __all__ = [
+    "Axes",
     "Axis",
     "ChangedError",
     "ForeignError",
@@ -28,4 +30,5 @@ __all__ = [
     "Trip",
     "TrippedError",
     "connect",
+    "connect_axes",
 ]

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Generator, Iterator
 from contextlib import suppress
+from typing import NamedTuple
 
 from ..model.register import Kind
 from ..model.registers import TELEMETRY
@@ -27,6 +28,13 @@ LATCHED = Trip(0, (), (), {})
 """Stands for the trip that the board has when it is asked to acknowledge it."""
 
 
+class Shared(NamedTuple):
+    """What several axes on one board have in common: who beats, and the words that there are once, as last written."""
+
+    beat: Beat
+    words: dict[str, int]
+
+
 class Axis(Named):
     """An axis on a board, from `hardwall.host.connect`. A context manager that disarms and closes.
 
@@ -39,6 +47,7 @@ class Axis(Named):
     Args:
         port: the line.
         device: the device there.
+        shared: what it shares with the other axes of the device, if there are any.
 
     Attributes:
         device: what the board says of itself.
@@ -55,9 +64,9 @@ class Axis(Named):
     supervisor: Supervisor
     capture: Capture
 
-    def __init__(self, port: Port, device: Device):
+    def __init__(self, port: Port, device: Device, shared: Shared | None = None):
         self.device, self._port = device, port
-        self._words = Words(port, device)
+        self._words = Words(port, device, None if shared is None else shared.words)
         self.wall, self.supervisor = Wall(self), Supervisor(self)
         self.capture = Capture(self)
         self._status = device.of_kind(Kind.STATUS)
@@ -67,7 +76,7 @@ class Axis(Named):
         # Whether a disarming has begun since the last arming did. There is no lock, for one who ends this program must
         # not wait for a thread that is held up in `arm`.
         self._called_off = False
-        beat = Beat(port, device.registers["heartbeat"])
+        beat = Beat(port, device.registers["heartbeat"]) if shared is None else shared.beat
         self._heartbeat = Heartbeat(beat, self._words.written("supervisor_watchdog"))
 
     def __enter__(self) -> "Axis":

@@ -1,15 +1,23 @@
 """The way to a board: open its port, see what it is, and take hold of its axis."""
 
+from collections.abc import Callable
+from typing import TypeVar
+
 from .axis import Axis
-from .device import read_device
+from .banks import Axes
+from .device import Device, read_device
 from .errors import ChangedError
 from .port import ANSWER_S, BAUD, Port
+
+Held = TypeVar("Held")
 
 
 def connect(
     name: str, baud: int = BAUD, answer_s: float = ANSWER_S, identity: str | None = None, pace: float | None = None
 ) -> Axis:
     """Return the axis of the board at a port, which no other program can use meanwhile. Nothing moves.
+
+    Of a board of several axes it is the first one: `connect_axes` has them all.
 
     Args:
         name: a serial port's path, for instance of `/dev/serial/by-id`; or tcp://HOST:PORT.
@@ -27,12 +35,25 @@ def connect(
         ForeignError: if what answers is no axis that this version knows.
         ChangedError: if it has another identity.
     """
-    port = Port(name, baud, answer_s, pace)
+    return _held(Axis, Port(name, baud, answer_s, pace), identity)
+
+
+def connect_axes(
+    name: str, baud: int = BAUD, answer_s: float = ANSWER_S, identity: str | None = None, pace: float | None = None
+) -> Axes:
+    """Return all axes of the board at a port; of a board of one axis that one. Arguments and errors are `connect`'s."""
+    return _held(Axes, Port(name, baud, answer_s, pace), identity)
+
+
+def _held(hold: Callable[[Port, Device], Held], port: Port, identity: str | None) -> Held:
+    """Return what takes hold of the device at a port, which must have an identity, if one is given."""
     try:
         device = read_device(port)
         if identity not in (None, device.identity):
-            raise ChangedError(f"the board at {name} is {device.identity}, not {identity}: it has another bitstream")
-        return Axis(port, device)
+            raise ChangedError(
+                f"the board at {port.name} is {device.identity}, not {identity}: it has another bitstream"
+            )
+        return hold(port, device)
     except BaseException:
         port.close()
         raise

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from ..model.arithmetic.fixed import SQ, UQ
+from ..model.axes import AXES_MAX
 from ..model.register import Kind, Register
 from ..model.registers import CONSTANTS, LAYOUT, MAP, SPACE, TELEMETRY
 from .errors import ForeignError
@@ -16,8 +17,8 @@ TEXT_MAX = 1 << 18
 VENDOR = b"hardwall"
 COLUMNS = ["address", "name", "kind", "signed", "bits", "si_per_lsb", "unit", "least", "most", "reset"]
 """The columns of the map's table."""
-LAYOUT_AT, IDENTITY_AT, CLOCK_AT, MAP_AT, CAPTURE_AT, SAMPLE_AT = 0, 2, 6, 8, 10, 12
-"""Addresses of the constants, which every version has at the same places."""
+LAYOUT_AT, IDENTITY_AT, CLOCK_AT, MAP_AT, CAPTURE_AT, SAMPLE_AT, AXES_AT = 0, 2, 6, 8, 10, 12, 14
+"""Addresses of the constants, which every version has at the same places; the last one of several axes only."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class Device:
         registers: every register but the constants, by name.
         capture_registers: registers of its capture memory; 0 without one.
         clocks_per_sample: clocks from a sample to the next.
+        axes: the number of axes; of several, `registers` are those of the first, and each has a bank of such.
     """
 
     identity: str
@@ -37,6 +39,7 @@ class Device:
     registers: MappingProxyType[str, Register]
     capture_registers: int
     clocks_per_sample: int
+    axes: int = 1
 
     def of_kind(self, kind: Kind) -> tuple[Register, ...]:
         """Return the registers of a kind, in the order of their addresses."""
@@ -80,7 +83,11 @@ def read_device(port: Port) -> Device:
     window = b"".join(each.to_bytes(2, "big") for each in port.read(MAP, (size + 1) // 2))
     identity = f"{constant(IDENTITY_AT):08x}{constant(IDENTITY_AT + 2):08x}"
     registers = _registers(port.name, window[:size], identity)
-    last = constant(CAPTURE_AT), constant(SAMPLE_AT)
+    axes = constant(AXES_AT)
+    if axes > AXES_MAX:
+        raise ForeignError(f"the device at {port.name} must have at most {AXES_MAX} axes, not {axes}")
+    # A device of one axis has no such constant.
+    last = constant(CAPTURE_AT), constant(SAMPLE_AT), max(axes, 1)
     return Device(identity, constant(CLOCK_AT), MappingProxyType(registers), *last)
 
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from ..model.axes_registers import SHARED
 from ..model.checks import FieldError, check_number
 from ..model.register import Kind, Register
 from ..model.registers import ACTIVE, PULSES, WRITTEN
@@ -21,17 +22,20 @@ class Words:
     Args:
         port: the line.
         device: the device there.
+        once: of several axes what was written last of the words that there are once, by name; they all share it.
 
     Raises:
         HostError: if the board does not answer.
     """
 
-    def __init__(self, port: Port, device: Device):
+    def __init__(self, port: Port, device: Device, once: dict[str, int] | None = None):
         self._port, self._device = port, device
         kinds = Kind.WORD, Kind.LIVE
         words = [word for kind in kinds for word in device.of_kind(kind) if word.name not in OF_THE_HEARTBEAT]
         self._words = {word.name: word for word in words}
-        self._written = self._read()
+        self._written, self._once = self._read(), {} if once is None else once
+        if once is not None:
+            once |= {name: word for name, word in self._written.items() if name in SHARED}
         # The words of a request without an answer: it may have been carried out.
         self._tried: dict[str, int] = {}
 
@@ -48,10 +52,11 @@ class Words:
         """
         found = self._read()
         for name, word in found.items():
-            if word not in (self._written[name], self._tried.get(name, self._written[name])):
+            last = self._last(name)
+            if word not in (last, self._tried.get(name, last)):
                 raise ChangedError(
                     f"the board at {self._port.name} has {self._si(name, word):g} in {name}, and not "
-                    f"{self._si(name, self._written[name]):g} as it was written: it was reset, or another host "
+                    f"{self._si(name, last):g} as it was written: it was reset, or another host "
                     "writes to it; connect again"
                 )
         self._written, self._tried = found, {}
@@ -69,7 +74,10 @@ class Words:
 
     def written(self, name: str) -> float:
         """Return the SI value of a word as it was written last."""
-        return self._si(name, self._written[name])
+        return self._si(name, self._last(name))
+
+    def _last(self, name: str) -> int:
+        return self._once.get(name, self._written[name])
 
     def set(self, values: Mapping[str, Any]) -> None:
         """Write words in SI units: live ones first, each of which acts at once; then the others, all at one sample.
@@ -115,6 +123,7 @@ class Words:
             self._tried = {}
             raise
         self._written, self._tried = self._written | given, {}
+        self._once.update((name, word) for name, word in given.items() if name in self._once)
 
     def _read(self) -> dict[str, int]:
         """Return what is written in the board, by name; every block of words in one request."""

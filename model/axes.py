@@ -25,6 +25,9 @@ from .axis import Record, run
 from .checks import FieldError, check_int
 from .design import Timing
 from .designed import DesignedAxis
+from .drive import registry
+from .drive.pdm import USUAL
+from .drive.stage import Stage, StageDesign
 
 AXES_MAX = 32
 """The most axes of one pipeline."""
@@ -88,6 +91,16 @@ class AxesSpec(DesignedAxis):
                 f"must leave {self.slots} clocks for {self.axes} axes in turn, so at most "
                 f"{self.clock_hz // self.slots} at clock_hz {self.clock_hz}, not {self.sample_hz!r}",
             )
+
+    @property
+    def stage(self) -> Stage:
+        """The drive stage that a board gives to every axis: pulses and a sign."""
+        return USUAL
+
+    @cached_property
+    def drive(self) -> StageDesign:
+        """The design of that stage."""
+        return registry.design_of(self, self.stage)
 
     @cached_property
     def pipeline(self) -> Pipeline:

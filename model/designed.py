@@ -1,7 +1,9 @@
 """The requirements of an axis with the choice of its estimator: all that its formats, words and flags follow from."""
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 from .design import Design
 from .estimators.estimate import EstimatorGains
@@ -26,3 +28,10 @@ class DesignedAxis(AxisRequirements):
     def design(self) -> Design:
         """Every derived format, word and flag, and the latency of an axis that is alone."""
         return Design(self, self.estimator, self.gains)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Every field by name, with the gains that are in use."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)} | {
+            "gains": self.design.gains
+        }

@@ -2,6 +2,7 @@
 
 import json
 
+from .axes_registers import BANK, SHARED, AxesMap
 from .capture import DONE, RECORD_REGISTERS, Design
 from .register import Register
 from .registers import ACTIVE, CAPTURE, EVENTS, LAYOUT, MAP, WRITTEN, RegisterMap
@@ -37,6 +38,21 @@ def _window(capture: Design) -> str:
     )
 
 
+def _of_status(registers: RegisterMap) -> str:
+    """Return what is said of values that a frame reads together, and of banks if there are several."""
+    if isinstance(registers, AxesMap):
+        once = ", ".join(f"`{name}`" for name in SHARED)
+        return (
+            f"These are the registers of axis 0; those of axis k are k times 0x{BANK:04X} above them, for "
+            f"{registers.banks} axes in all. The constants, the counters and {once} there are once, here. What a frame "
+            "reads of an axis's status is of one sample; the stamps of edges are not kept, and 0."
+        )
+    return (
+        "What a frame reads of the status is of one clock, but for the stamps of edges, the counts of causes, and "
+        f"{', '.join(EVENTS)}: these are taken soon after it, each whole."
+    )
+
+
 def markdown(registers: RegisterMap) -> str:
     """Return the page `registers.md`: every register in the order of addresses, and the windows."""
     head = f"| {' | '.join(COLUMNS)} |\n|{' --- |' * len(COLUMNS)}\n"
@@ -48,9 +64,8 @@ def markdown(registers: RegisterMap) -> str:
     return (
         f"# Registers\n\nIdentity {registers.identity}, layout {LAYOUT}. Modbus RTU, unit 1. A value of two registers "
         "has the high one first; half of one can be neither read nor written. Words that are written become active "
-        f"together, by `commit`; the active word of each is at 0x{ACTIVE - WRITTEN:02X} above it. What a frame reads "
-        "of the status is of one clock, but for the stamps of edges, the counts of causes, and "
-        f"{', '.join(EVENTS)}: these are taken soon after it, each whole.\n\n"
+        f"together, by `commit`; the active word of each is at 0x{ACTIVE - WRITTEN:02X} above it. "
+        f"{_of_status(registers)}\n\n"
         + head
         + "".join(map(_row, registers.registers))
         + "\n"
@@ -69,6 +84,8 @@ def c_header(registers: RegisterMap) -> str:
         f"#define HARDWALL_MAP 0x{MAP:04X}",
         f"#define HARDWALL_CAPTURE 0x{CAPTURE:04X}",
     ]
+    if isinstance(registers, AxesMap):
+        lines += [f"#define HARDWALL_AXES {registers.banks}", f"#define HARDWALL_BANK 0x{BANK:04X}"]
     for register in registers.registers:
         name = f"HARDWALL_{register.name.upper()}"
         unit = f" in {register.unit}" if register.unit else ""
@@ -107,6 +124,7 @@ def as_json(registers: RegisterMap) -> str:
         "map_bytes": len(registers.compressed),
         "capture_address": CAPTURE,
         "capture_registers": registers.capture_registers,
+        **({"banks": registers.banks, "bank": BANK} if isinstance(registers, AxesMap) else {}),
         "registers": rows,
     }
     return json.dumps(described, indent=2) + "\n"

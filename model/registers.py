@@ -26,14 +26,18 @@ import dataclasses
 import hashlib
 import json
 import zlib
+from collections.abc import Iterable, Sequence
+from typing import ClassVar
 
 from . import capture
 from .arithmetic.fixed import SQ, UQ, Format
 from .checks import check_int, shown
 from .design import ILLEGAL_WIDTH
+from .designed import DesignedAxis
 from .register import COUNTER_BITS, VALUE_BITS, Kind, Register, narrowed, word_register
 from .spec import AxisSpec
 from .supervised import Design
+from .words import Word
 
 LAYOUT = 1
 """The version of the rule above, which is the first constant: a host that does not know it must not go on."""
@@ -55,7 +59,7 @@ CONFORMITY = 0x81
 """The identification is basic, and can be had as a stream or object by object."""
 
 
-def _telemetry(spec: AxisSpec) -> tuple[Register, ...]:
+def _telemetry(spec: DesignedAxis) -> tuple[Register, ...]:
     """Return the telemetry of an axis, in the order of its addresses.
 
     Some estimators have a velocity of more than 32 bits: its register has the upper ones, rounded down.
@@ -108,11 +112,11 @@ AXIS_PULSES = (
 """The axis's pulses, in the order of their addresses downwards."""
 
 
-def _words(design: Design) -> tuple[Register, ...]:
+def _words(spec: DesignedAxis, committed: Iterable[Word]) -> tuple[Register, ...]:
     """Return the committed words of an axis as written: the preload's count first, for every axis has it."""
-    spec, meaning = design.spec, "The pulse preload sets the count to this word once it is active."
+    meaning = "The pulse preload sets the count to this word once it is active."
     preload = Register("preload_count", Kind.WORD, SQ(spec.count_width, 0), meaning, spec.count_m, "m")
-    return preload, *map(word_register, design.committed)
+    return preload, *map(word_register, committed)
 
 
 def _placed(base: int, room: int, registers: tuple[Register, ...]) -> tuple[Register, ...]:
@@ -148,6 +152,10 @@ class RegisterMap:
         ValueError: if `capture_registers` is none that there can be, or the samples are too close for a capture.
     """
 
+    PRODUCT: ClassVar = b"axis"
+    """The product by which the device identifies itself."""
+    spec: DesignedAxis
+
     def __init__(self, spec: AxisSpec, capture_registers: int = CAPTURE_REGISTERS):
         if not isinstance(spec, AxisSpec):
             raise TypeError(f"spec must be an AxisSpec, not {shown(spec)}")
@@ -161,7 +169,16 @@ class RegisterMap:
         self.spec, self.capture_registers = spec, capture_registers
         self.capture = capture.Design(spec, records) if records else None
         design = Design(spec)
-        known = (*design.registers(), *(self.capture.registers() if self.capture else ()))
+        self._describe((*design.registers(), *(self.capture.registers() if self.capture else ())), design.committed)
+
+    def _describe(self, known: Sequence[Register], committed: Sequence[Word]) -> None:
+        """Place every register, and make of them what the device carries.
+
+        Args:
+            known: the registers of the supervisor and of what is beside it, not yet placed.
+            committed: the words that wait for a commit.
+        """
+        spec = self.spec
 
         def own(kind: Kind) -> tuple[Register, ...]:
             return tuple(register for register in known if register.kind is kind)
@@ -172,7 +189,7 @@ class RegisterMap:
         pulses += own(Kind.PULSE)
         lowest = WRITTEN - len(pulses)
         self.pulses = _placed(lowest, WRITTEN - max(lowest, PULSES), pulses[::-1])[::-1]
-        self.words = _placed(WRITTEN, ACTIVE - WRITTEN, _words(design))
+        self.words = _placed(WRITTEN, ACTIVE - WRITTEN, _words(spec, committed))
         self.live = _placed(LIVE, END - LIVE, own(Kind.LIVE))
         self.active = tuple(
             dataclasses.replace(
@@ -204,6 +221,7 @@ class RegisterMap:
             rows.append([r.address, r.name, r.kind.value, *number, r.low, r.high, r.reset])
         columns = ["address", "name", "kind", "signed", "bits", "si_per_lsb", "unit", "least", "most", "reset"]
         described = {"layout": LAYOUT, "identity": self.identity, "columns": columns, "registers": rows}
+        described |= self._more_described
         return zlib.compress(json.dumps(described, separators=(",", ":")).encode(), 9)
 
     def _constants(self) -> tuple[Register, ...]:
@@ -216,6 +234,7 @@ class RegisterMap:
             ("map_bytes", len(self.compressed), "", "The length of the compressed map in its window."),
             ("capture_registers", self.capture_registers, "", "The length of the capture memory in its window."),
             ("clocks_per_sample", self.spec.clocks_per_sample, "", "The clocks from a sample to the next."),
+            *self._more_constants,
         )
         registers = (
             Register(name, Kind.CONSTANT, UQ(VALUE_BITS, 0), meaning, 1.0, unit, reset=value)
@@ -224,13 +243,23 @@ class RegisterMap:
         return _placed(CONSTANTS, TELEMETRY - CONSTANTS, tuple(registers))
 
     @property
+    def _more_constants(self) -> tuple[tuple[str, int, str, str], ...]:
+        """Constants behind those that every device has: name, value, unit and meaning."""
+        return ()
+
+    @property
+    def _more_described(self) -> dict[str, int]:
+        """What the map that the device carries says beside the registers."""
+        return {}
+
+    @property
     def identification(self) -> dict[tuple[bool, int], bytes]:
         """The ends of the answers that identify the device, by whether one object is asked for, and by the first one.
 
         An end has the conformity level, no more to follow, the number of objects, and the objects, each with its number
         and its length: vendor, product, and the build's identity as its revision. All have an even length.
         """
-        texts = b"hardwall", b"axis", self.identity.encode()
+        texts = b"hardwall", self.PRODUCT, self.identity.encode()
         objects = [bytes([number, len(text)]) + text for number, text in enumerate(texts)]
         streams = {(False, first): objects[first:] for first in range(len(objects))}
         single = {(True, first): [each] for first, each in enumerate(objects)}

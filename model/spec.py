@@ -1,6 +1,5 @@
 """One axis, specified: its requirements, the estimator that it has, and the design that follows from both."""
 
-import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -45,8 +44,7 @@ class AxisSpec(DesignedAxis):
     @property
     def facts(self) -> dict[str, Any]:
         """Every field by name, with the gains that are in use; without the stage if that is the usual one."""
-        facts = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        facts["gains"] = self.design.gains
+        facts = super().facts
         if self.stage == USUAL:
             del facts["stage"]
         return facts

@@ -1,7 +1,10 @@
 """An axis with its supervisor: every run-time word, and what the words of the axis alone are then fixed to."""
 
+from collections.abc import Mapping, Sequence
+
 from . import monitors, supervisor
 from .arithmetic.fixed import UQ
+from .designed import DesignedAxis
 from .register import VALUE_BITS, Kind, Register, word_register
 from .spec import AxisSpec
 from .supervisor import BEAT_BITS, CAUSES, COUNT, COUNT_BITS, WATCHDOG_MS
@@ -46,37 +49,50 @@ class Design:
 
     def registers(self) -> tuple[Register, ...]:
         """Return what a host sees of the supervisor and the monitors, and what it asks of them, as registers."""
-        spec, causes = self.spec, ", ".join(f"bit {bit} {cause.name}" for bit, cause in enumerate(CAUSES))
-        per_value = VALUE_BITS // COUNT_BITS
-        status = [
-            ("state", UQ(2, 0), "The state of the supervisor: 0 DISARMED, 1 ARMED, 2 TRIPPED."),
-            ("live", UQ(1, 0), "The host's heartbeat is not overdue."),
-            ("ready", UQ(1, 0), "The axis can be armed."),
-            ("referenced", UQ(1, 0), "The count was preloaded since the index was found."),
-            ("latched", UQ(COUNT, 0), f"The causes since the last acknowledgement: {causes}."),
-            ("first", UQ(COUNT, 0), "The causes of the clock that led to the last trip."),
-            ("a_channel_idle", UQ(1, 0), "A warning: the last edges were all of one channel."),
-            *(
-                (
-                    f"counts_{first // per_value}",
-                    UQ(COUNT_BITS * min(per_value, COUNT - first), 0),
-                    f"The occurrences of {min(per_value, COUNT - first)} causes, from bit {first} on.",
-                )
-                for first in range(0, COUNT, per_value)
-            ),
-        ]
-        pulses = [
-            ("arm", "The axis is armed; refused unless ready."),
-            ("disarm", "The axis is disarmed."),
-            ("acknowledge", "The causes in acknowledged are acknowledged, if they are those latched."),
-        ]
-        second = 1 / spec.clock_hz
-        return (
-            *(Register(name, Kind.STATUS, fmt, meaning) for name, fmt, meaning in status),
-            Register("first_stamp", Kind.STATUS, UQ(spec.stamp_width, 0), "The number of that clock.", second, "s"),
-            Register("driven", Kind.STATUS, spec.force, "The drive that is let out.", spec.force_resolution_n, "N"),
-            *(Register(name, Kind.PULSE, UQ(1, 0), meaning) for name, meaning in pulses),
-            Register("heartbeat", Kind.LIVE, UQ(BEAT_BITS, 0), "A word that the host changes again and again."),
-            Register("acknowledged", Kind.LIVE, UQ(COUNT, 0), "The causes that the host has read."),
-            *(word_register(word, Kind.LIVE, *self.ranges.get(word.name, ())) for word in self.live),
-        )
+        return registers_of(self.spec, self.live, self.ranges)
+
+
+def registers_of(
+    spec: DesignedAxis, live: Sequence[Word], ranges: Mapping[str, tuple[int, int]]
+) -> tuple[Register, ...]:
+    """Return what a host sees of the supervisor and the monitors of an axis, and what it asks of them, as registers.
+
+    Args:
+        spec: the axis, alone or one of several.
+        live: its words that need no commit.
+        ranges: the least and the largest of those that may not have every value of their formats.
+    """
+    causes = ", ".join(f"bit {bit} {cause.name}" for bit, cause in enumerate(CAUSES))
+    per_value = VALUE_BITS // COUNT_BITS
+    status = [
+        ("state", UQ(2, 0), "The state of the supervisor: 0 DISARMED, 1 ARMED, 2 TRIPPED."),
+        ("live", UQ(1, 0), "The host's heartbeat is not overdue."),
+        ("ready", UQ(1, 0), "The axis can be armed."),
+        ("referenced", UQ(1, 0), "The count was preloaded since the index was found."),
+        ("latched", UQ(COUNT, 0), f"The causes since the last acknowledgement: {causes}."),
+        ("first", UQ(COUNT, 0), "The causes of the clock that led to the last trip."),
+        ("a_channel_idle", UQ(1, 0), "A warning: the last edges were all of one channel."),
+        *(
+            (
+                f"counts_{first // per_value}",
+                UQ(COUNT_BITS * min(per_value, COUNT - first), 0),
+                f"The occurrences of {min(per_value, COUNT - first)} causes, from bit {first} on.",
+            )
+            for first in range(0, COUNT, per_value)
+        ),
+    ]
+    pulses = [
+        ("arm", "The axis is armed; refused unless ready."),
+        ("disarm", "The axis is disarmed."),
+        ("acknowledge", "The causes in acknowledged are acknowledged, if they are those latched."),
+    ]
+    second = 1 / spec.clock_hz
+    return (
+        *(Register(name, Kind.STATUS, fmt, meaning) for name, fmt, meaning in status),
+        Register("first_stamp", Kind.STATUS, UQ(spec.stamp_width, 0), "The number of that clock.", second, "s"),
+        Register("driven", Kind.STATUS, spec.force, "The drive that is let out.", spec.force_resolution_n, "N"),
+        *(Register(name, Kind.PULSE, UQ(1, 0), meaning) for name, meaning in pulses),
+        Register("heartbeat", Kind.LIVE, UQ(BEAT_BITS, 0), "A word that the host changes again and again."),
+        Register("acknowledged", Kind.LIVE, UQ(COUNT, 0), "The causes that the host has read."),
+        *(word_register(word, Kind.LIVE, *ranges.get(word.name, ())) for word in live),
+    )

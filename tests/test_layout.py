@@ -33,11 +33,13 @@ FLOORS = (
 )
 # Modules of hdl that are no blocks of the data path and have no arithmetic of their own to model.
 NOT_TWINNED = {
+    "axes_board": "supervised axes behind a link, with stages; its pins are in tests/oracles/axes_board.py",
     "block": "the base class of blocks",
     "board": "the supervised axis behind a link; its twin, clock by clock, is in tests/oracles/board.py",
     "estimators/levant_edge_signals": "the registers of levant_edge by name; that block's twin has their values",
     "export": "text of the hardware",
     "lead_out": "wires",
+    "link/axes_link": "the blocks of the link and a banked file, joined; each of them has its twin",
     "link/axi_link": "the subordinate of a bus and the register file, joined; each of them has its twin",
     "link/link": "the blocks of the link, joined; each of them has its twin",
     "link/requests": "wires",

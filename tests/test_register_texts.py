@@ -4,8 +4,10 @@ import json
 import subprocess
 
 from hardwall.model import register_texts
+from hardwall.model.axes_registers import AxesMap
 from hardwall.model.registers import MAP
 from stimuli.supervised import CAPTURE_REGISTERS, supervised
+from stimuli.supervised_axes_world import slow
 
 REGISTERS = supervised("mhz")
 
@@ -38,3 +40,15 @@ def test_a_compiler_reads_the_header(tmp_path):
     subprocess.run(["c++", "-Wall", "-Werror", "-x", "c++", "main.c", "-o", "main"], cwd=tmp_path, check=True)
     done = subprocess.run(["./main"], cwd=tmp_path, check=True, capture_output=True, text=True)
     assert [int(line) for line in done.stdout.split()] == [register.address for register in REGISTERS.registers]
+
+
+def test_the_texts_of_several_axes_say_where_their_banks_are():
+    registers = AxesMap(slow(3, "fdm"))
+    page = register_texts.markdown(registers)
+    assert "those of axis k are k times 0x0100 above them, for 3 axes in all" in page
+    assert "`heartbeat`, `supervisor_watchdog`" in page
+    header = register_texts.c_header(registers).splitlines()
+    assert {"#define HARDWALL_AXES 3", "#define HARDWALL_BANK 0x0100"} <= set(header)
+    described = json.loads(register_texts.as_json(registers))
+    assert (described["banks"], described["bank"]) == (3, 256)
+    assert "banks" not in json.loads(register_texts.as_json(REGISTERS))

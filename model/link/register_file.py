@@ -208,6 +208,11 @@ class RegisterFile:
         """Return whether the other half of a value is missing: it begins at an even address and ends at an odd one."""
         return self.design.wide(address) and ((first and address % 2 == 1) or (last and address % 2 == 0))
 
+    def _refuses(self, address: int) -> bool:
+        """Return whether there is a pulse at an address that the device refuses now."""
+        is_pulse = self.design.first_pulse <= address < WRITTEN
+        return is_pulse and self.design.registers.pulses[WRITTEN - 1 - address].name in self.refusing
+
     def check_read(self, address: int, first: bool, last: bool) -> None:
         """Find out whether a register can be read, as the first or the last of a frame or neither.
 
@@ -224,8 +229,7 @@ class RegisterFile:
         the halves above it are equal to the bound's.
         """
         self.absent |= not self.design.writable(address) or self._half(address, first, last)
-        if self.design.first_pulse <= address < WRITTEN and value & 1:
-            self.refused |= self.design.registers.pulses[WRITTEN - 1 - address].name in self.refusing
+        self.refused |= bool(value & 1) and self._refuses(address)
         top = not self.design.wide(address) or address % 2 == 0
         flip = EXTENDED if top else 0
         for k, area in enumerate((Area.LEAST, Area.MOST)):

@@ -1,5 +1,7 @@
 """Files of pins for the placers, written from a description: .lpf for the ECP5, .pcf for the iCE40, .cst for Gowin."""
 
+from collections.abc import Iterable
+
 from .description import Description, Pin
 from .signals import USUAL, Signal, signals_of
 
@@ -9,6 +11,11 @@ DRIVE_MA = 4
 
 def constraints(board: Description, stage: str = USUAL) -> str:
     """Return the text of the file of pins of a board with a drive stage."""
+    return constraints_of(board, signals_of(stage))
+
+
+def constraints_of(board: Description, signals: Iterable[Signal]) -> str:
+    """Return the text of the file of pins of a board with some signals."""
     write = WRITERS[board.part.suffixes.pins]
     head, line, mark = write["head"], write["line"], write["comment"]
     about = [
@@ -17,7 +24,7 @@ def constraints(board: Description, stage: str = USUAL) -> str:
         *board.sources,
     ]
     lines = [*(f"{mark} {each}" for each in about), "", *head]
-    for signal in signals_of(stage):
+    for signal in signals:
         pin = board.pins[signal.name]
         lines += [f"{mark} {signal.name}: {pin.at}", *line(signal, pin)]
     return "\n".join(lines) + "\n"

@@ -8,6 +8,7 @@ A file describes a board and its variants, which differ in the part alone:
     power_up: what the pins do until the part is configured.
     notes: what else to know before anything is connected.
     [parts]: the part of every variant, by the variant's name, which `hardwall board` takes.
+    [axes]: the pairs of pins that several axes have, if the board has room for them.
     [scene]: the scene that the board runs if none is given, and the changes of its keys.
     [serial]: which of the USB bridge's serial ports is the line; its name in /dev/serial/by-id; the bridge's USB ids.
     [pins.SIGNAL]: for each of `EVERY` the FPGA's pin (`site`), where that is (`at`: the header and the position, or
@@ -16,13 +17,14 @@ A file describes a board and its variants, which differ in the part alone:
 """
 
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from typing import Any, Literal
 
+from ...model.checks import FieldError
 from .parts import PARTS, Part
 from .pll import Setting
-from .signals import EVERY
+from .signals import EVERY, OF_AXIS, SHARED_LOOPS
 
 Pull = Literal["up", "down", "none"]
 Memory = Literal["sram", "flash"]
@@ -85,6 +87,32 @@ class Description:
     serial: Serial
     pins: dict[str, Pin] = field(hash=False)
     headers: tuple[Header, ...]
+    pairs: tuple[tuple[str, str, str], ...] = ()
+
+    @property
+    def most_axes(self) -> int:
+        """The most axes that it has pins for; 0 if it has pins for one axis only."""
+        return max((2 * len(self.pairs) - len(SHARED_LOOPS)) // len(OF_AXIS), 0)
+
+    def of_axes(self, axes: int) -> "Description":
+        """Return the board with the pins of several axes: six for each, in pairs, and the loops behind the last.
+
+        Raises:
+            FieldError: if it has no pins for so many.
+        """
+        if axes > self.most_axes:
+            has_none = f"absent: {self.name} has pins for one axis"
+            most = f"at most {self.most_axes} on {self.name}" if self.most_axes else has_none
+            raise FieldError("axes", f"must be {most}, not {axes!r}")
+        free = iter(
+            [(f"{at}{sign}", site) for at, *sites in self.pairs for sign, site in zip("+-", sites, strict=True)]
+        )
+        names = [(f"{name}_{axis}", name) for axis in range(axes) for name in OF_AXIS]
+        pins = {name: self.pins[name] for name in ("clk", "rst", "uart_rx", "uart_tx")}
+        for name, alone in (*names, *((loop, loop) for loop in SHARED_LOOPS)):
+            at, site = next(free)
+            pins[name] = Pin(site, at, self.pins[alone].pull)
+        return replace(self, pins=pins)
 
     @property
     def part(self) -> Part:
@@ -103,10 +131,12 @@ class Description:
 def _read(family: str, text: str) -> dict[str, Description]:
     """Return the variants of a board from the text of its file."""
     table = tomllib.loads(text)
+    pairs = table.pop("axes", {"pairs": []})["pairs"]
     parts, scene = table.pop("parts"), table.pop("scene")
     common = {
         **table,
         **{key: tuple(table[key]) for key in ("sources", "loads", "notes")},
+        "pairs": tuple(map(tuple, pairs)),
         "scene": scene["name"],
         "changes": scene["changes"],
         "serial": Serial(**table["serial"]),

@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from typing import cast
 
+from ...model.axes import AxesSpec
 from ...model.drive import dac, pwm
 from ...model.drive.stage import Amplifier, StageDesign
 from ...model.spec import AxisSpec
 
 
-def drive(spec: AxisSpec) -> str:
-    """Return the lines of Markdown about the drive stage of an axis."""
+def drive(spec: AxisSpec | AxesSpec) -> str:
+    """Return the lines of Markdown about the drive stage of an axis, or of each of several."""
     design = spec.drive
     clocks = f"{design.safe_latency} clock{'s' * (design.safe_latency > 1)}"
     lines = [
@@ -50,14 +51,14 @@ def _amplifier(amplifier: Amplifier) -> str:
     return said
 
 
-def _pdm(_: AxisSpec) -> str:
+def _pdm(_: AxisSpec | AxesSpec) -> str:
     return (
         "Pulses at `drive_pdm` and a sign at `drive_sign`. On a scope `drive_pdm` is low at rest; while ARMED in the "
         "wall, pulses of one clock come the denser the larger the force."
     )
 
 
-def _pwm(spec: AxisSpec) -> str:
+def _pwm(spec: AxisSpec | AxesSpec) -> str:
     design = cast(pwm.Design, spec.drive)
     dead_ns = 1e9 * design.dead / spec.clock_hz
     return (
@@ -68,7 +69,7 @@ def _pwm(spec: AxisSpec) -> str:
     )
 
 
-def _dac(spec: AxisSpec) -> str:
+def _dac(spec: AxisSpec | AxesSpec) -> str:
     design = cast(dac.Design, spec.drive)
     stage = design.stage
     setup = f" Behind every arming {len(stage.setup)} frames of setup go first." if stage.setup else ""
@@ -82,5 +83,5 @@ def _dac(spec: AxisSpec) -> str:
     )
 
 
-WHAT: dict[str, Callable[[AxisSpec], str]] = {"pdm": _pdm, "pwm": _pwm, "dac": _dac}
+WHAT: dict[str, Callable[[AxisSpec | AxesSpec], str]] = {"pdm": _pdm, "pwm": _pwm, "dac": _dac}
 """What a stage is and what to see of it, by its name."""

@@ -1,6 +1,6 @@
 """The signals of `top`, the same on every board: what each is, and what it is to be connected to."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 Outside = Literal["", "1 kΩ to ground", "10 kΩ to 3.3 V"]
@@ -68,6 +68,10 @@ OF_STAGE = {
 """The pins of each drive stage, the one that is safe first."""
 USUAL = "pdm"
 """The stage of a scene that has none."""
+OF_AXIS = "encoder_a", "encoder_b", "encoder_z", "alive", "drive_pdm", "drive_sign"
+"""The signals that each of several axes has."""
+SHARED_LOOPS = "drive_enable", "external_fault", "emergency_stop"
+"""The loops, of which there is one set for all axes."""
 EVERY = (*_BEFORE, *(signal for signals in OF_STAGE.values() for signal in signals), *_BEHIND)
 """All signals that any board of ours has."""
 
@@ -75,3 +79,11 @@ EVERY = (*_BEFORE, *(signal for signals in OF_STAGE.values() for signal in signa
 def signals_of(stage: str) -> tuple[Signal, ...]:
     """Return the signals of a board with a drive stage, in the order of the tables."""
     return (*_BEFORE, *OF_STAGE[stage], *_BEHIND)
+
+
+def signals_of_axes(axes: int) -> tuple[Signal, ...]:
+    """Return the signals of a board with several axes, those of an axis with its number at the end."""
+    alone = {signal.name: signal for signal in signals_of(USUAL)}
+    theirs = [replace(alone[name], name=f"{name}_{axis}") for axis in range(axes) for name in OF_AXIS]
+    once = [alone[name] for name in ("clk", "rst", *SHARED_LOOPS)]
+    return (*once, *theirs, alone["uart_rx"], alone["uart_tx"])

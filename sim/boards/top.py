@@ -1,7 +1,10 @@
 """The Verilog around `board` on a part: its clock from the board's oscillator, the internal one, and the pads."""
 
+from collections.abc import Iterable
+from typing import NamedTuple
+
 from .description import Description
-from .signals import OF_STAGE, USUAL, signals_of
+from .signals import OF_AXIS, OF_STAGE, SHARED_LOOPS, USUAL, Signal, signals_of, signals_of_axes
 
 MODULE = "top"
 INSIDE = {"oscillator", "outputs_enable"}
@@ -23,7 +26,50 @@ def top_verilog(board: Description, clock_hz: int, stage: str = USUAL) -> str:
     Raises:
         ClockError: if the board cannot make the clock.
     """
-    setting, pads, names = board.setting(clock_hz), pads_of(stage), [signal.name for signal in signals_of(stage)]
+    pads, names = pads_of(stage), [signal.name for signal in signals_of(stage)]
+    held = "pull-downs" if stage == USUAL else "resistors"
+    return _verilog(Top(board, clock_hz, signals_of(stage), pads, {name: name for name in names} | pads, held))
+
+
+def top_of_axes(board: Description, clock_hz: int, axes: int) -> str:
+    """Return the Verilog of `top` with several axes, and of the two modules that make its clocks.
+
+    Raises:
+        ClockError: if the board cannot make the clock.
+    """
+    wires = {"drive_pdm": "pdm", "drive_sign": "sign", "alive": "pump"}
+    pads = {f"{name}_{axis}": f"{wire}_{axis}" for axis in range(axes) for name, wire in wires.items()}
+    connected = {name: name for name in ("uart_rx", "uart_tx", *SHARED_LOOPS)}
+    for name in OF_AXIS:
+        pins = (f"{name}_{axis}" for axis in reversed(range(axes)))
+        connected[name] = f"{{{', '.join(pads.get(pin, pin) for pin in pins)}}}"
+    return _verilog(Top(board, clock_hz, signals_of_axes(axes), pads, connected, "pull-downs"))
+
+
+class Top(NamedTuple):
+    """What `top` is made of.
+
+    Attributes:
+        board: the board.
+        clock_hz: the clock of `board`.
+        signals: its pins.
+        pads: pins with buffers, and the wires behind these.
+        connected: what the ports of `board` are connected to, but for clock, reset and what is inside.
+        held: what holds the pins of the drive outside.
+    """
+
+    board: Description
+    clock_hz: int
+    signals: tuple[Signal, ...]
+    pads: dict[str, str]
+    connected: dict[str, str]
+    held: str
+
+
+def _verilog(top: Top) -> str:
+    """Return the Verilog of a top."""
+    board, clock_hz, pads, held = top.board, top.clock_hz, top.pads, top.held
+    setting = board.setting(clock_hz)
     made = f"{board.title}: the clock of `board` is {clock_hz} Hz"
     if setting is None:
         how, cell = f"{made}, the oscillator's own.", WITHOUT_PLL
@@ -31,15 +77,14 @@ def top_verilog(board: Description, clock_hz: int, stage: str = USUAL) -> str:
         dividers = ", ".join(f"{name} {number}" for name, number in setting.dividers)
         how = f"{made}, from {board.oscillator_hz} Hz by {dividers}; VCO {setting.vco / 1_000_000} MHz."
         cell = board.part.pll.cell(board.oscillator_hz, setting)
-    held = "pull-downs" if stage == USUAL else "resistors"
-    connected = {"clk": "clock", "rst": "rst | ~locked", "oscillator": "oscillator", "outputs_enable": "outputs_enable"}
-    connected = {name: name for name in names} | pads | connected
+    own = {"clk": "clock", "rst": "rst | ~locked", "oscillator": "oscillator", "outputs_enable": "outputs_enable"}
+    connected = top.connected | own
     return f"""\
 // {how}
 // Generated; the pins are in the file of constraints beside it, and what to connect to them in WIRING.md.
 
 module top (
-{_ports(stage)}
+{_ports(top.signals)}
 );
     wire clock, locked, oscillator, outputs_enable, {", ".join(pads.values())};
 
@@ -64,8 +109,8 @@ module internal_oscillator (output oscillator);
 """
 
 
-def _ports(stage: str) -> str:
-    return ",\n".join(f"    {'output' if signal.out else 'input'} {signal.name}" for signal in signals_of(stage))
+def _ports(signals: Iterable[Signal]) -> str:
+    return ",\n".join(f"    {'output' if signal.out else 'input'} {signal.name}" for signal in signals)
 
 
 def _connections(connected: dict[str, str]) -> str:

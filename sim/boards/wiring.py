@@ -1,9 +1,12 @@
 """What to connect to a board, as a page of Markdown: every signal, its pins, its level, and what to see of it."""
 
+from collections.abc import Iterable
+
+from ...model.axes import AxesSpec
 from ...model.spec import AxisSpec
 from .description import Description
 from .drive import drive
-from .signals import Signal, signals_of
+from .signals import Signal, signals_of, signals_of_axes
 
 PULLS = {"up": "up", "down": "down", "none": ""}
 RECEIVERS = """\
@@ -28,6 +31,21 @@ RECEIVERS = """\
 
 def wiring(board: Description, spec: AxisSpec, picture: str) -> str:
     """Return the page for an axis on a board; `picture` is the name of the picture's file beside it."""
+    shown = f"![The headers with the signals and the FPGA's pins]({picture})"
+    return _page(board, shown, table(board, spec.stage.name), drive(spec))
+
+
+def wiring_of_axes(board: Description, spec: AxesSpec) -> str:
+    """Return the page for several axes on a board, which is that with their pins."""
+    said = (
+        f"{spec.axes} axes, each with six pins that end in its number. The loops are there once, for all of them, and "
+        "there are no pins for complements: leave the cause `encoder_loss` off."
+    )
+    return _page(board, said, table_of(board, signals_of_axes(spec.axes)), drive(spec))
+
+
+def _page(board: Description, shown: str, signals: str, drives: str) -> str:
+    """Return the page of a board with what is shown of it, the table of its signals, and what is said of its drive."""
     notes = "\n".join(f"- {note}" for note in (f"At power-up {board.power_up}.", *board.notes))
     sources = "\n".join(f"- {source}" for source in board.sources)
     return f"""\
@@ -36,14 +54,14 @@ def wiring(board: Description, spec: AxisSpec, picture: str) -> str:
 Generated from the description of the board. **It was not tried on real hardware**: before anything is connected, hold
 it against the board's own papers, and follow the checklist of the page *Boards*.
 
-![The headers with the signals and the FPGA's pins]({picture})
+{shown}
 
 All levels are LVCMOS of 3.3 V. "Pull" is the resistor inside the part, tens of kΩ, which comes with the configuration.
 
-{table(board, spec.stage.name)}
+{signals}
 ## The drive
 
-{drive(spec)}
+{drives}
 ## Before anything is connected
 
 {notes}
@@ -59,11 +77,16 @@ All levels are LVCMOS of 3.3 V. "Pull" is the resistor inside the part, tens of 
 
 def table(board: Description, stage: str) -> str:
     """Return the table of every signal of a board with a drive stage."""
+    return table_of(board, signals_of(stage))
+
+
+def table_of(board: Description, signals: Iterable[Signal]) -> str:
+    """Return the table of some signals of a board."""
     lines = [
         "| signal | direction | where | FPGA pin | pull | outside | what it is | at rest |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for signal in signals_of(stage):
+    for signal in signals:
         pin = board.pins[signal.name]
         cells = (f"`{signal.name}`", _direction(signal), pin.at, pin.site, PULLS[pin.pull], signal.outside)
         lines.append(f"| {' | '.join((*cells, signal.what, signal.rest))} |")

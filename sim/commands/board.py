@@ -5,16 +5,18 @@ from typing import Annotated
 
 import typer
 
+from ...model.axes import AxesSpec
 from ...model.checks import shown
+from ...model.spec import AxisSpec
 from ..boards.description import BOARDS, Description, Memory
 from ..jobs.named_folder import foreign
 from ..jobs.result import Values
 from ..rtl.bitstream import Order, build
 from ..rtl.loader import load as load_into
-from ..scene.case import Case
 from ..scene.load import load
+from ..scene.schema import Scene
 from .errors import BadInput, one_line
-from .options import EstimatorOption, SceneOfBoardArgument
+from .options import AxesOption, EstimatorOption, SceneOfBoardArgument
 from .study import StudyOptions, study
 from .terminal import log
 
@@ -33,6 +35,7 @@ def command(
     ],
     scene: SceneOfBoardArgument = None,
     estimator: EstimatorOption = None,
+    axes: AxesOption = None,
     seeds: Annotated[int, typer.Option(min=1, max=99, help="most placements until one reaches the clock")] = 5,
     program: Annotated[Memory | None, typer.Option(help="put the bitstream into the board that is connected")] = None,
 ) -> None:
@@ -43,7 +46,7 @@ def command(
         raise BadInput(f"--program must be one of {', '.join(on.loads)} for {on.name}, not {program!r}")
     of = scene_on(on, options, scene, estimator)
     path = _free(folder)
-    order = Order(on, of.name, of.spec, of.glitch_clocks, seeds)
+    order = Order(on, of.name, spec_on(of, axes), of.glitch_clocks, seeds)
     with log.status(f"{on.name}: Yosys, then nextpnr until a seed reaches {of.spec.clock_hz / 1e6:g} MHz"):
         report = build(order, path)
     options.finish(Values(report))
@@ -54,10 +57,24 @@ def command(
             load_into(on, path / report["bitstream"], program)
 
 
-def scene_on(board: Description, options: StudyOptions, scene: str | None, estimator: str | None) -> Case:
+def scene_on(board: Description, options: StudyOptions, scene: str | None, estimator: str | None) -> Scene:
     """Return the scene that a board is to run: its own, at a clock that it makes, if none is given."""
     changes = options.changes(controller__estimator=estimator)
     return load(scene, changes) if scene is not None else load(board.scene, board.changes | changes)
+
+
+def spec_on(scene: Scene, axes: int | None) -> AxisSpec | AxesSpec:
+    """Return the axis of a scene, or several with its requirements, each with the pulses that a board gives it.
+
+    Raises:
+        BadInput: if the scene has a drive stage of its own, which no axis of several has.
+        FieldError: if the axes cannot be.
+    """
+    if axes is None:
+        return scene.spec
+    if scene.drive is not None:
+        raise BadInput(f"--axes must be absent for a scene with a drive stage, not {axes}")
+    return AxesSpec(axes=axes, **scene.requirements)
 
 
 def _free(folder: str) -> Path:

@@ -56,6 +56,10 @@ EstimatorsOption = Annotated[
 BackendOption = Annotated[Backend, typer.Option(help="float64 algorithm, bit-accurate model, or the Verilated RTL")]
 ModelOption = Annotated[Literal["float", "fixed"], typer.Option(help="float64 algorithm, or bit-accurate model")]
 DeviceOption = Annotated[PartName, typer.Option(help="the part to place and route for")]
+AxesOption = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="several axes, each at the scene's rates", show_default="one alone"),
+]
 SeedsOption = Annotated[int, typer.Option(min=1, max=99, help="number of placements; fmax is their median")]
 RateOption = Annotated[float, typer.Option(metavar="HZ", help="sample rate")]
 

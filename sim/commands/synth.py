@@ -3,8 +3,8 @@
 from ..boards.description import board_of
 from ..jobs.result import Values
 from ..rtl.synthesis import synthesise
-from .board import scene_on
-from .options import DeviceOption, EstimatorOption, SceneOfBoardArgument, SeedsOption
+from .board import scene_on, spec_on
+from .options import AxesOption, DeviceOption, EstimatorOption, SceneOfBoardArgument, SeedsOption
 from .study import StudyOptions, study
 from .terminal import log
 
@@ -16,8 +16,9 @@ def command(
     device: DeviceOption = "ecp5-25k",
     seeds: SeedsOption = 3,
     estimator: EstimatorOption = None,
+    axes: AxesOption = None,
 ) -> None:
     of = scene_on(board_of(device), options, scene, estimator)
     with log.status(f"{device}: Yosys, then nextpnr with {seeds} seeds"):
-        report = synthesise(of.spec, device, range(1, seeds + 1), of.glitch_clocks)
+        report = synthesise(spec_on(of, axes), device, range(1, seeds + 1), of.glitch_clocks)
     options.finish(Values({"scene": of.name} | report))

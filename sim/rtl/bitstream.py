@@ -9,10 +9,11 @@ from functools import partial
 from pathlib import Path
 
 from ...model import register_texts
+from ...model.axes import AxesSpec
 from ...model.spec import AxisSpec
 from ..boards.description import Description
 from ..boards.picture import picture
-from ..boards.wiring import wiring
+from ..boards.wiring import wiring, wiring_of_axes
 from ..jobs.named_folder import write_folder
 from ..jobs.result import text_of
 from . import flow, tools
@@ -34,14 +35,14 @@ class Order:
     Attributes:
         board: the board.
         scene: the name of the scene, for the report.
-        spec: its axis.
+        spec: its axis, or several with its requirements.
         glitch_clocks: the decoder's glitch filter, which is part of the latency.
         seeds: the most seeds that are tried until one reaches the clock.
     """
 
     board: Description
     scene: str
-    spec: AxisSpec
+    spec: AxisSpec | AxesSpec
     glitch_clocks: int
     seeds: int
 
@@ -64,6 +65,7 @@ def build(order: Order, folder: Path) -> dict:
         bitstream, sha256: the name of the bitstream's file, and its digest.
 
     Raises:
+        FieldError: if the board has no pins for so many axes.
         ClockError: if the board cannot make the clock.
         TimingError: if no seed reaches the clock.
         DoesNotFitError: if the part has too few cells.
@@ -98,7 +100,7 @@ def _until_met(design: Design, most: int) -> Iterator[Placed]:
 
 def _fill(order: Order, design: Design, runs: list[Placed], report: dict, work: Path) -> None:
     """Write every file of a board's folder, and what there is to report."""
-    board, names = order.board, Files.of(order.board)
+    board, names = design.board, Files.of(design.board)
     for name in ("board.v", "top.v", names.pins):
         shutil.copyfile(design.folder / name, work / name)
     pack(board, runs[-1].folder, work)
@@ -108,13 +110,19 @@ def _fill(order: Order, design: Design, runs: list[Placed], report: dict, work: 
         "registers.md": register_texts.markdown(registers),
         "registers.h": register_texts.c_header(registers),
         "registers.json": register_texts.as_json(registers),
-        "WIRING.md": wiring(board, order.spec, PICTURE),
-        PICTURE: picture(board, order.spec.stage.name),
+        **_pages(board, order.spec),
         "report.json": json.dumps(report, indent=2) + "\n",
         "report.txt": "".join(f"{key}: {text_of(value)}\n" for key, value in report.items()),
     }
     for name, text in texts.items():
         (work / name).write_text(text, encoding="utf-8", newline="\n")
+
+
+def _pages(board: Description, spec: AxisSpec | AxesSpec) -> dict[str, str]:
+    """Return what says what to connect: a page, and for an axis alone a picture."""
+    if isinstance(spec, AxesSpec):
+        return {"WIRING.md": wiring_of_axes(board, spec)}
+    return {"WIRING.md": wiring(board, spec, PICTURE), PICTURE: picture(board, spec.stage.name)}
 
 
 def pack(board: Description, run: Path, work: Path) -> None:
@@ -137,7 +145,7 @@ def pack(board: Description, run: Path, work: Path) -> None:
 
 
 def _report(order: Order, design: Design, runs: list[Placed], bitstream: bytes) -> dict:
-    board, top = order.board, design.top
+    board, top = design.board, design.top
     setting = board.setting(order.spec.clock_hz)
     return {
         "board": board.name,

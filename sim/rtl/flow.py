@@ -13,14 +13,17 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from ...hdl.axes_board import AxesBoard
 from ...hdl.board import Board
 from ...hdl.export import to_verilog
+from ...model.axes import AxesSpec
 from ...model.build_folder import build_dir
 from ...model.spec import AxisSpec
-from ..boards.constraints import constraints
+from ..boards.constraints import constraints, constraints_of
 from ..boards.description import Description
 from ..boards.parts import Part
-from ..boards.top import MODULE, top_verilog
+from ..boards.signals import signals_of_axes
+from ..boards.top import MODULE, top_of_axes, top_verilog
 from ..jobs.whole_folder import whole_folder
 from . import tools
 from .tools import SynthesisError
@@ -62,16 +65,17 @@ class Files:
 
 
 def sources(board: Description, top: Board) -> dict[str, str]:
-    """Return the text of every file for an axis on a board: two of Verilog, and the pins.
+    """Return the text of every file for an axis, or several, on a board: two of Verilog, and the pins.
 
     Raises:
         ClockError: if the board cannot make the clock of the axis.
     """
-    return {
-        "board.v": to_verilog(top, "board"),
-        "top.v": top_verilog(board, top.spec.clock_hz, top.spec.stage.name),
-        Files.of(board).pins: constraints(board, top.spec.stage.name),
-    }
+    spec = top.spec
+    if isinstance(spec, AxesSpec):
+        around = top_of_axes(board, spec.clock_hz, spec.axes), constraints_of(board, signals_of_axes(spec.axes))
+    else:
+        around = top_verilog(board, spec.clock_hz, spec.stage.name), constraints(board, spec.stage.name)
+    return {"board.v": to_verilog(top, "board"), "top.v": around[0], Files.of(board).pins: around[1]}
 
 
 def netlist(name: str, part: Part, texts: Mapping[str, str], clock_hz: int) -> Path:
@@ -107,10 +111,10 @@ def cells_of(folder: Path) -> dict[str, dict]:
 
 @dataclass(frozen=True)
 class Design:
-    """An axis on a board, synthesised.
+    """An axis on a board, or several, synthesised.
 
     Attributes:
-        board: the board.
+        board: the board, with the pins of what is on it.
         top: the hardware.
         folder: the folder of the netlist.
     """
@@ -125,14 +129,17 @@ class Design:
         return cells_of(self.folder)
 
 
-def synthesised(board: Description, spec: AxisSpec) -> Design:
-    """Return an axis on a board, synthesised.
+def synthesised(board: Description, spec: AxisSpec | AxesSpec) -> Design:
+    """Return an axis on a board, or several, synthesised.
 
     Raises:
+        FieldError: if the board has no pins for so many axes.
         ClockError: if the board cannot make the clock of the axis.
         SynthesisError: if a tool is missing or fails.
     """
-    top = Board(spec)
+    if isinstance(spec, AxesSpec):
+        board = board.of_axes(spec.axes)
+    top = AxesBoard(spec) if isinstance(spec, AxesSpec) else Board(spec)
     return Design(board, top, netlist(board.device, board.part, sources(board, top), spec.clock_hz))
 
 

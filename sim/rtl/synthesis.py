@@ -9,6 +9,7 @@ from typing import NamedTuple
 from ...hdl.estimators.registry import block_of
 from ...hdl.export import to_verilog
 from ...model import quadrature
+from ...model.axes import AxesSpec
 from ...model.spec import AxisSpec
 from ..boards.description import board_of
 from ..boards.parts import PARTS
@@ -84,11 +85,13 @@ def _every(design: Design, seeds: Sequence[int]) -> list[Placed]:
     return runs
 
 
-def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), glitch_clocks: int = 0) -> dict:
-    """Return size and speed of an axis, as the top of the part's board.
+def synthesise(
+    spec: AxisSpec | AxesSpec, device: str, seeds: Sequence[int] = (1, 2, 3), glitch_clocks: int = 0
+) -> dict:
+    """Return size and speed of an axis, or several, as the top of the part's board.
 
     Args:
-        spec: the axis, and its clock.
+        spec: the axis or the axes, and their clock.
         device: one of `PARTS`.
         seeds: the placer's seeds, one run for each; `PROCESSES` runs go at a time.
         glitch_clocks: the decoder's glitch filter, which is part of the latency.
@@ -97,7 +100,7 @@ def synthesise(spec: AxisSpec, device: str, seeds: Sequence[int] = (1, 2, 3), gl
         What `summary` returns; `folder` is that of netlist, logs and reports.
 
     Raises:
-        ValueError: if there is no such part, or no seed.
+        ValueError: if there is no such part, or no seed, or the part's board has no pins for so many axes.
         ClockError: if the board cannot make the axis's clock.
         DoesNotFitError: if the part has too few cells.
         SynthesisError: if a tool is missing or fails.
@@ -121,16 +124,19 @@ def summary(design: Design, runs: Sequence[Placed], glitch_clocks: int) -> dict:
         lut4, ff, dsp, bram: cells in use; available: cells of the part (flip-flops: at most one a LUT4).
         untimed: types of cells in use whose delays are not known; the paths of these are not in fmax.
         clocks_per_sample, interval_clocks: the fewest clocks from a sample to the next; max_sample_hz: the sample rate
-            that follows at fmax_mhz.
+            that follows at fmax_mhz, of each axis if there are several.
         latency_clocks: clock edges from the first that sees a pin changed to the one that changes the drive that the
             supervisor lets out, both included, if the sample is taken as soon as the decoder has counted the edge;
             pin_to_force_ns: the longest time that follows at fmax_mhz, for the pin may change just behind an edge.
         critical_path: the longest path with the slowest seed.
+        axes: how many axes there are, of several.
     """
     spec, part = design.top.spec, design.board.part
     fmax = statistics.median(run.fmax_mhz for run in runs)
     slack = 1e9 / spec.clock_hz - 1e3 / fmax
-    interval, latency = spec.design.interval, quadrature.latency(glitch_clocks) + design.top.drive_latency
+    several = {"axes": spec.axes} if isinstance(spec, AxesSpec) else {}
+    interval = spec.slots if isinstance(spec, AxesSpec) else spec.design.interval
+    latency = quadrature.latency(glitch_clocks) + design.top.drive_latency
     slowest = max(runs, key=lambda run: (run.longest, run.path))
     return {
         "estimator": spec.estimator,
@@ -148,4 +154,5 @@ def summary(design: Design, runs: Sequence[Placed], glitch_clocks: int) -> dict:
         "latency_clocks": latency,
         "pin_to_force_ns": round(latency * 1e3 / fmax, 1),
         "critical_path": f"{slowest.path}, {slowest.longest:.1f} ns",
+        **several,
     }

@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from hardwall.sim.boards.constraints import constraints
+from hardwall.sim.boards.constraints import constraints, constraints_of
 from hardwall.sim.boards.description import BOARDS
-from hardwall.sim.boards.signals import OF_STAGE, signals_of
+from hardwall.sim.boards.signals import OF_STAGE, signals_of, signals_of_axes
 
 PLACED = {
     ".lpf": r'^LOCATE COMP "(\w+)" SITE "(\w+)";$',
@@ -35,6 +35,12 @@ def test_every_signal_is_placed_once_with_its_pull(board, stage):
         else:
             (said,) = re.findall(PULLED[suffix].format(signal.name), text, re.MULTILINE)
             assert (said or "NONE").lower() == pull
+
+
+def test_every_signal_of_several_axes_is_placed_once():
+    board, signals = BOARDS["ulx3s-25f"].of_axes(8), signals_of_axes(8)
+    placed = re.findall(PLACED[".lpf"], constraints_of(board, signals), re.MULTILINE)
+    assert placed == [(signal.name, board.pins[signal.name].site) for signal in signals]
 
 
 @pytest.mark.parametrize("stage", OF_STAGE)

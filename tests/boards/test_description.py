@@ -3,17 +3,21 @@
 import re
 
 import pytest
+from amaranth.hdl import Value
 from amaranth_boards.icebreaker import ICEBreakerPlatform
 from amaranth_boards.tang_nano_9k import TangNano9kPlatform
 from amaranth_boards.ulx3s import ULX3S_12F_Platform, ULX3S_25F_Platform, ULX3S_45F_Platform, ULX3S_85F_Platform
 
+from hardwall.hdl.axes_board import AxesBoard
 from hardwall.hdl.board import Board
+from hardwall.model.axes import AxesSpec
 from hardwall.sim.boards import description
 from hardwall.sim.boards.description import BOARDS, board_of
 from hardwall.sim.boards.parts import PARTS
-from hardwall.sim.boards.signals import EVERY, OF_STAGE, signals_of
+from hardwall.sim.boards.signals import EVERY, OF_STAGE, signals_of, signals_of_axes
 from hardwall.sim.boards.top import INSIDE
 from hardwall.sim.scene.load import load
+from stimuli.specs import MHZ
 from stimuli.stages import axis
 
 every_stage = pytest.mark.parametrize("stage", OF_STAGE)
@@ -27,7 +31,7 @@ THEIRS = {
     "tangnano9k": TangNano9kPlatform,
 }
 """The platforms of amaranth-boards."""
-CONNECTORS = {"J1": ("gpio", 0), "PMOD1A": ("pmod", 0), "PMOD1B": ("pmod", 1), "PMOD2": ("pmod", 2)}
+CONNECTORS = {"J1": ("gpio", 0), "J2": ("gpio", 0), "PMOD1A": ("pmod", 0), "PMOD1B": ("pmod", 1), "PMOD2": ("pmod", 2)}
 """Its connectors, by the names of our headers."""
 
 
@@ -79,6 +83,37 @@ def test_pins_on_headers_are_those_of_amaranth_boards(board):
         elif name == "J6":
             assert position == pin.site
     assert bool(connectors) == (board.family != "tangnano9k")
+
+
+def test_every_axis_of_several_has_pins_of_its_own():
+    for board in BOARDS.values():
+        axes = board.most_axes
+        assert axes == (8 if board.family == "ulx3s" else 0)
+        if axes:
+            several = board.of_axes(axes)
+            names = [signal.name for signal in signals_of_axes(axes)]
+            assert sorted(several.pins) == sorted(names)
+            assert len({pin.site for pin in several.pins.values()}) == len(names) == 4 + 3 + 6 * axes
+            test_pins_on_headers_are_those_of_amaranth_boards(several)
+            # The board's ESP32 can drive these.
+            assert not {pin.at[3:-1] for pin in several.pins.values()} & {"11", "12"}
+            for signal in signals_of_axes(axes):
+                pin, alone = several.pins[signal.name], board.pins[re.sub(r"_\d$", "", signal.name)]
+                assert (pin.pull, signal.outside == "1 kΩ to ground") == (alone.pull, signal.outside != "")
+
+
+def test_every_signal_of_several_axes_is_a_port_of_their_board():
+    axes = AxesBoard(AxesSpec(**MHZ, axes=2, estimator="fdm"))
+    ports = {name: len(Value.cast(getattr(axes, name))) for name in axes.signature.members if name not in INSIDE}
+    names = [re.sub(r"_\d$", "", signal.name) for signal in signals_of_axes(2)]
+    assert {name: names.count(name) for name in names} == ports
+
+
+def test_more_axes_than_pins_are_refused():
+    with pytest.raises(ValueError, match=r"^axes must be at most 8 on ulx3s-85f, not 9$"):
+        BOARDS["ulx3s-85f"].of_axes(9)
+    with pytest.raises(ValueError, match=r"^axes must be absent: icebreaker has pins for one axis, not 2$"):
+        BOARDS["icebreaker"].of_axes(2)
 
 
 @every_board

@@ -7,16 +7,19 @@ import re
 import shutil
 import subprocess
 from functools import cache
+from pathlib import Path
 
 import pytest
 
+from hardwall.hdl.axes_board import AxesBoard
 from hardwall.hdl.board import Board
 from hardwall.hdl.export import to_verilog
+from hardwall.model.axes import AxesSpec
 from hardwall.model.spec import AxisSpec
 from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.boards.pll import ClockError
-from hardwall.sim.boards.signals import OF_STAGE, signals_of
-from hardwall.sim.boards.top import pads_of, top_verilog
+from hardwall.sim.boards.signals import OF_STAGE, signals_of, signals_of_axes
+from hardwall.sim.boards.top import pads_of, top_of_axes, top_verilog
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from stimuli.clock_cells import MODELS
 from stimuli.specs import SPECS
@@ -101,7 +104,18 @@ STAGED = [
 
 @pytest.mark.parametrize(("name", "clock_hz", "stage"), STAGED)
 def test_no_warning_of_verilator(name, clock_hz, stage, tmp_path):
-    (tmp_path / "top.v").write_text(verilog(name, clock_hz, stage))
+    lint(verilog(name, clock_hz, stage), tmp_path)
+
+
+def test_no_warning_of_verilator_with_several_axes(tmp_path):
+    given = {key: value for key, value in SPECS["mhz"].items() if key != "gains"}
+    board = AxesBoard(AxesSpec(**given, axes=3, estimator="fdm"))
+    lint(top_of_axes(BOARDS["ulx3s-25f"], given["clock_hz"], 3) + to_verilog(board, "board"), tmp_path)
+
+
+def lint(text: str, tmp_path: Path) -> None:
+    """Assert that Verilator finds nothing in the Verilog of a board."""
+    (tmp_path / "top.v").write_text(text)
     (tmp_path / "cells.v").write_text(BODY.sub(r"\1 endmodule", MODELS.replace("`OSCILLATOR_MHZ", "1")))
     # Of the cells only the ports are read; and outputs of a PLL that nothing needs are left open.
     waived = '`verilator_config\nlint_off -file "*/cells.v"\nlint_off -rule PINCONNECTEMPTY\n'
@@ -142,6 +156,16 @@ def test_the_clock_is_the_one_asked_for_and_outputs_wait_for_its_lock(name, cloc
     assert said[-1] == "unlocked driven 0 pdm 0 reset 1"
     driven = [line for line in said if line.startswith("driven 1")]
     assert driven == ["driven 1 locked 1 reset 0"] * 2
+
+
+def test_the_pads_and_the_ports_of_several_axes_are_in_the_order_of_their_numbers():
+    text = top_of_axes(BOARDS["ulx3s-25f"], 50_000_000, 3)
+    pads = [signal.name for signal in signals_of_axes(3) if signal.out and signal.name != "uart_tx"]
+    assert sorted(re.findall(r"assign (\w+) = driven \?", text)) == sorted(pads)
+    assert ".encoder_z({encoder_z_2, encoder_z_1, encoder_z_0})," in text
+    for pin, wire in (("drive_pdm", "pdm"), ("drive_sign", "sign"), ("alive", "pump")):
+        assert f".{pin}({{{wire}_2, {wire}_1, {wire}_0}})," in text
+        assert f"assign {pin}_1 = driven ? {wire}_1 : 1'bz;" in text
 
 
 @pytest.mark.parametrize("stage", OF_STAGE)

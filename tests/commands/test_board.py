@@ -32,6 +32,36 @@ def test_a_scene_becomes_a_bitstream_in_one_command(calls, monkeypatch, capsys):
     assert LOADER not in calls.read_text()
 
 
+def test_several_axes_have_the_rates_of_the_scene(calls, monkeypatch, capsys):
+    code, out, err = call(monkeypatch, capsys, "board", "ulx3s-25f", "mhz", "--axes", "8", "-o", "out", "--json")
+    assert code == 0, err
+    check_text("board", out)
+    assert (json.loads(out)["axes"], json.loads(out)["stage"]) == (8, "pdm")
+    code, out, err = call(monkeypatch, capsys, "synth", "mhz", "--axes", "3", "--seeds", "1", "--json")
+    assert code == 0, err
+    check_text("synth", out)
+    assert (json.loads(out)["axes"], json.loads(out)["scene"]) == (3, "mhz")
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (("synth", "mhz", "--axes", "9"), "the scene's axes must be at most 8 on ulx3s-25f, not 9"),
+        (("synth", "mhz", "--axes", "0"), "the scene's axes must be 1 to 32, not 0"),
+        (("board", "icebreaker", "--axes", "2", "-o", "out"),
+         "the scene's axes must be absent: icebreaker has pins for one axis, not 2"),
+        (("synth", "mhz", "--axes", "2", "--estimator", "kalman"),
+         "the scene's estimator must be one of fdm, levant, window, not 'kalman'"),
+        (("synth", "mhz", "--axes", "2", "--set", "drive={stage='pdm', newtons_per_volt=2.0, full_scale_v=24.0}"),
+         "--axes must be absent for a scene with a drive stage, not 2"),
+    ],
+)  # fmt: skip
+def test_axes_that_cannot_be_are_one_line(calls, monkeypatch, capsys, command, message):
+    code, out, err = call(monkeypatch, capsys, *command)
+    assert (code, out, err) == (2, "", f"hardwall: error: {message}\n")
+    assert not calls.exists()
+
+
 def test_without_a_scene_the_board_runs_its_own(calls, monkeypatch, capsys):
     changed = ("--set", "controller.sample_hz=250000", "--set", "controller.actuation_hz=250000")
     code, out, err = call(monkeypatch, capsys, "board", "ulx3s-25f", "-o", "out", "--json", *changed)

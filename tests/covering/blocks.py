@@ -51,9 +51,11 @@ BLOCKS = (
     Block("link/uart", ("component.receiver", "component.transmitter")),
     Block("link/line", ("component.line",)),
     Block("link/register_file"),
+    Block("link/banked_file", RECORDED),
     Block("link/server", ("component.server",)),
     Block("link/link", ("component.link",)),
     Block("link/axi", ("component.link.subordinate",)),
     Block("link/axi_link", ("component.link",), tested_with="link/axi"),
     Block("board", ("component.board",)),
+    Block("axes_board", ("component.board",)),
 )

@@ -19,6 +19,7 @@ class TwinBoard:
 
     Args:
         registers: its registers.
+        server: its link, if that is not one of an axis.
 
     Attributes:
         server: the link, whose register file has the axis's inputs.
@@ -28,8 +29,8 @@ class TwinBoard:
         name: its port.
     """
 
-    def __init__(self, registers: RegisterMap):
-        self.server, self.requests = Server(register_file.Design(registers)), []
+    def __init__(self, registers: RegisterMap, server: Server | None = None):
+        self.server, self.requests = server or Server(register_file.Design(registers)), []
         self.late_s, self.lost, self.spoilt = 0.0, 0, 0
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.name = f"tcp://127.0.0.1:{self._listener.getsockname()[1]}"

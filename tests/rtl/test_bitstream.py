@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 from hardwall.hdl.board import Board
+from hardwall.model.axes import AxesSpec
+from hardwall.model.axes_registers import AxesMap
 from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.jobs.whole_folder import LIST
 from hardwall.sim.rtl import bitstream, flow
@@ -54,6 +56,18 @@ def test_the_folder_has_all_that_a_user_needs(calls, tmp_path):
     said = (folder / "report.txt").read_text()
     assert [line.partition(":")[0] for line in said.splitlines()] == list(report)
     assert "fmax_mhz: 50\n" in said
+
+
+def test_a_folder_of_several_axes_has_no_picture(calls, tmp_path):
+    scene = load("mhz")
+    spec = AxesSpec(axes=8, **scene.requirements)
+    report = build(Order(BOARDS["ulx3s-25f"], "mhz", spec, scene.glitch_clocks, 5), tmp_path / "out")
+    check("board", report)
+    assert (report["axes"], report["identity"]) == (8, AxesMap(spec).identity)
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted({LIST, *FILES} - {"wiring.svg"})
+    page = (tmp_path / "out/WIRING.md").read_text()
+    assert page.count("| `encoder_a_") == page.count("| `alive_") == 8
+    assert "| `emergency_stop` | in | J2 27+ | D13 |" in page
 
 
 def test_the_first_seed_that_reaches_the_clock_is_packed(calls, tmp_path):

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from hardwall.hdl.axes_board import AxesBoard
 from hardwall.hdl.board import Board
 from hardwall.model import quadrature
+from hardwall.model.axes import AxesSpec
 from hardwall.sim.boards.description import board_of
 from hardwall.sim.boards.parts import PARTS
 from hardwall.sim.boards.pll import ClockError
@@ -66,6 +68,18 @@ def test_report_of_a_part_that_nextpnr_knows(calls):
         assert sorted(path.name for path in (folder / seed).iterdir()) == [
             LIST, "nextpnr.log", "report.json", "routed.config"
         ]  # fmt: skip
+
+
+def test_report_of_several_axes(calls):
+    scene = load("mhz")
+    spec = AxesSpec(axes=3, **scene.requirements)
+    report = synthesise(spec, "ecp5-25k", (6,), scene.glitch_clocks)
+    check("synth", {"scene": "mhz"} | report)
+    assert (report["axes"], report["interval_clocks"]) == (3, spec.slots)
+    assert report["max_sample_hz"] == round(60e6 / spec.slots)
+    assert report["latency_clocks"] == quadrature.latency(2) + AxesBoard(spec).drive_latency
+    with pytest.raises(ValueError, match=r"^axes must be absent: icebreaker has pins for one axis, not 3$"):
+        synthesise(spec, "ice40-up5k", (6,))
 
 
 def test_multipliers_without_registers_are_part_of_a_path(calls):

@@ -1,0 +1,418 @@
+"""The registers of several axes: a bank of cells an axis, words that go out by number, and a snapshot of one axis."""
+
+from amaranth.hdl import Cat, Const, Module, Mux, Shape, ShapeLike, Signal, Value
+from amaranth.lib import wiring
+from amaranth.lib.data import ArrayLayout
+from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import In, Member, Out
+
+from hardwall.model.axes_registers import BANK, SHARED
+from hardwall.model.link.banked_file import Design
+from hardwall.model.link.register_file import CELL_BITS, Area, Operation
+from hardwall.model.register import VALUE_BITS, Register
+from hardwall.model.registers import ACTIVE, COUNTERS, END, LIVE, MAP, PULSES, SUPERVISOR, TELEMETRY, WRITTEN
+from hardwall.model.supervisor import ARMED, COUNT, COUNT_BITS
+
+from ..arithmetic.fixed import less, shape
+from .line import UNMIXED
+from .requests import Requests
+
+RECORD = "count", "velocity", "wall_force", "drive", "flags"
+"""What the axes show of a sample, behind `record_`."""
+TURN = "state", "ready", "latched", "first", "first_stamp", "counts", "a_channel_idle"
+"""What they show of a turn, behind `turn_`."""
+WITH_RECORD = "illegal_count", "index_count", "index_armed", "index_latched"
+"""What they show of every axis at every clock, of which an axis's is taken with its record."""
+
+
+def _shown(design: Design) -> dict[str, ShapeLike]:
+    """Return the shapes of what `SupervisedAxes` shows of samples, turns and axes, by the names of its members."""
+    spec, registers = design.registers.spec, design.registers
+    axes, number, flags = spec.axes, range(max(spec.axes, 2)), spec.design.flags
+    count, force = shape(registers["count"].format), shape(spec.force)
+    record = {
+        "valid": 1,
+        "axis": number,
+        **dict(zip(RECORD, (count, shape(spec.design.estimator.velocity), force, force, len(flags)), strict=True)),
+    }
+    bits = (2, 1, COUNT, COUNT, spec.stamp_width, COUNT * COUNT_BITS, 1)
+    turn = {"valid": 1, "axis": number, **dict(zip(TURN, bits, strict=True))}
+    return {
+        **{f"record_{name}": each for name, each in record.items()},
+        **{f"turn_{name}": each for name, each in turn.items()},
+        "illegal_count": ArrayLayout(shape(registers["illegal_count"].format), axes),
+        "index_count": ArrayLayout(count, axes),
+        "magnitude": ArrayLayout(shape(design.axes.supervisor.limit), axes),
+        **dict.fromkeys(("index_armed", "index_latched", "referenced", "negative"), axes),
+        "stamp": spec.stamp_width,
+        "live": 1,
+        "word_ready": 1,
+    }
+
+
+def _given(design: Design) -> dict[str, ShapeLike]:
+    """Return the shapes of what it is given beside pulses, by the names of its members."""
+    registers, words = design.registers, design.axes.words
+    return {
+        "word_write": 1,
+        "word_axis": range(max(design.banks, 2)),
+        "word_number": range(len(words)),
+        "word_value": max(word.format.width for word in words),
+        **{name: shape(registers[name].format) for name in ("preload_count", "acknowledged", *SHARED)},
+    }
+
+
+class BankedFile(wiring.Component):
+    """A memory of cells of 16 bits, a bank for each axis, and what joins it to `SupervisedAxes`.
+
+    Equation: the model's, word for word. Operations, by `host.operation`:
+
+    - CHECK_READ, CHECK_WRITE: raise `absent`, `outside` or `refused` if the register cannot be read, or written with
+      `host.value`, or not now. The halves of a value are checked in the order of their addresses, one after the other.
+      `arm` is refused unless the last turn of its axis was `ready`, and `preload` if it was ARMED. A CHECK_READ of a
+      status lets the next SNAPSHOT take that axis's.
+    - READ: give the register; of a status, in whichever bank, that of the last snapshot.
+    - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. A live word goes to its axis
+      with its lower half, which is written after the upper one. Only what was checked is written.
+    - COUNT: add 1 to a counter, which wraps.
+    - FINISH: if `commit` is marked, copy every written word of the bank of the last WRITE to its active one, and write
+      it to that axis. Then all marked pulses are high for one clock, the same one, with `preload_count` and
+      `acknowledged`, which stay. `done` comes when every axis has had a turn since: so what is read back as active is
+      in use, what is read of a status is of a sample behind the pulses, what is refused is known, and no
+      acknowledgement takes another one's place.
+    - SNAPSHOT: take the status of the axis that CHECK_READ was asked for, if any: all of one sample, the next one, with
+      the stamp of the clock of its record.
+
+    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ; 2 for READ; 3 for WRITE and COUNT; 4 for
+    CHECK_WRITE; for SNAPSHOT 1, or 1 more than it takes until the axis's next record and the turn behind that; for
+    FINISH 1, or `finish_clocks` if anything is marked. After a reset the first `start` may come at once; it waits for
+    `boot_clocks`, and for `word_ready`.
+
+    Rounding and overflow: a value of fewer bits than its registers is extended by its sign or by zeros; one of more
+    bits, a velocity, gives its upper ones.
+
+    Reset: every cell is as after a reset when the first operation is done, and no pulse is marked.
+
+    Parameters
+    ----------
+    design : hardwall.model.link.banked_file.Design
+        The registers.
+
+    Members
+    -------
+    host : In(Requests)
+        The operations.
+    the outputs of `SupervisedAxes` that show samples, turns, and what else is status of an axis : In
+        As there.
+    its inputs but for the pins : Out
+        As there: those to write words, the host's own, and a pulse for each axis.
+
+    Raises
+    ------
+    TypeError
+        If `design` is not a Design.
+    """
+
+    def __init__(self, design: Design):
+        if not isinstance(design, Design):
+            raise TypeError(f"design must be a banked_file.Design, not {design!r}")
+        self._design = design
+        registers = design.registers
+        first = {name: registers[name].reset for name in SHARED}
+        super().__init__(
+            {
+                "host": In(Requests()),
+                **{name: In(each) for name, each in _shown(design).items()},
+                **{name: Out(each, init=first.get(name, 0)) for name, each in _given(design).items()},
+                **{pulse.name: Out(design.banks) for pulse in registers.pulses},
+            }
+        )
+
+    @property
+    def design(self) -> Design:
+        return self._design
+
+    @property
+    def ports(self) -> dict[str, Member]:
+        """The members to the axes: all but `host`."""
+        return {name: member for name, member in self.signature.members.items() if name != "host"}
+
+    @property
+    def boot_clocks(self) -> int:
+        """Clocks after a reset until an operation begins, if words can be written by then."""
+        return 3 * BANK * self._design.banks + 1
+
+    @property
+    def finish_clocks(self) -> dict[bool, int]:
+        """Clocks from `start` of a FINISH with marks to `done`, by whether `commit` is marked."""
+        walked = {True: len(self._design.registers.words) + 2, False: 2}
+        return {commits: 2 * 3 * words + 3 + self._design.settle_clocks for commits, words in walked.items()}
+
+    def _taken(self, asked: Signal) -> tuple[dict[str, Value], dict[str, Value]]:
+        """Return the status of an axis by name: what comes with its record, and what comes with its turn."""
+        registers, banks = self._design.registers, self._design.banks
+        record = {name: getattr(self, f"record_{name}") for name in RECORD}
+        record |= {name: _of(getattr(self, name), asked, banks) for name in WITH_RECORD}
+        record["velocity"] >>= max(len(self.record_velocity) - registers["velocity"].format.width, 0)
+        turn = {name: getattr(self, f"turn_{name}") for name in TURN if name != "counts"}
+        values = range(-(-len(self.turn_counts) // VALUE_BITS))
+        turn |= {f"counts_{value}": self.turn_counts.word_select(value, VALUE_BITS) for value in values}
+        magnitude, negative = (_of(getattr(self, name), asked, banks) for name in ("magnitude", "negative"))
+        driven = Mux(negative, -magnitude, magnitude)
+        return (
+            record | {"stamp": self.stamp},
+            turn | {"referenced": _of(self.referenced, asked, banks), "live": self.live, "driven": driven},
+        )
+
+    def _status(self, m: Module, asked: Signal, recorded: Signal, turned: Signal) -> Signal:
+        """Return the register of a status at the host's address, as it was with the last of either signal."""
+        status, halves = Signal(CELL_BITS), {}
+        for taken, values in zip((recorded, turned), self._taken(asked), strict=True):
+            for name, value in values.items():
+                register = self._design.registers[name]
+                held = Signal(shape(register.format), name=f"held_{name}")
+                with m.If(taken):
+                    m.d.sync += held.eq(value)
+                extension = (held[-1] if register.format.signed else Const(0)).replicate(VALUE_BITS - len(held))
+                whole = Cat(held, extension)
+                halves |= {register.address + 1: whole[:CELL_BITS], register.address: whole[CELL_BITS:]}
+        with m.Switch(self.host.address[: (COUNTERS - 1).bit_length()]):
+            for place, half in halves.items():
+                with m.Case(place):
+                    m.d.comb += status.eq(half)
+        return status
+
+    def _refused(self, m: Module, wanted: Value, asking: Value) -> Value:
+        """Return whether a pulse that is wanted of an axis is refused, after what its last turn has shown."""
+        banks = self._design.banks
+        ready, armed = Signal(banks), Signal(banks)
+        for axis in range(banks):
+            with m.If(self.turn_valid & (self.turn_axis == axis)):
+                m.d.sync += [ready[axis].eq(self.turn_ready), armed[axis].eq(self.turn_state == ARMED)]
+        refusing = {"arm": ~_of(ready, asking, banks), "preload": _of(armed, asking, banks)}
+        names = [pulse.name for pulse in self._design.registers.pulses]
+        return Cat(wanted[bit] & refusing[name] for bit, name in enumerate(names) if name in refusing).any()
+
+    def elaborate(self, platform):
+        m = Module()
+        design, registers, host = self._design, self._design.registers, self.host
+        banks = design.banks
+        # Cells of all banks; and what never changes: the areas of one bank, and behind them the window to the map.
+        within = (max(len(design.book), len(design.map_cells)) - 1).bit_length()
+        book = design.book + [0] * ((1 << within) - len(design.book)) + design.map_cells
+        depth = 1 << (BANK * banks - 1).bit_length()
+        m.submodules.cells = cells = Memory(shape=CELL_BITS, depth=depth, init=[], attrs=UNMIXED)
+        m.submodules.book = fixed = Memory(shape=CELL_BITS, depth=2 << within, init=book, attrs=UNMIXED)
+        cell, write, text = cells.read_port(), cells.write_port(), fixed.read_port()
+
+        # What there is at the address.
+        address = host.address
+        place, bank = address[: (END - 1).bit_length()], address[(END - 1).bit_length() : (depth - 1).bit_length()]
+        in_banks, in_map = less(address, BANK * banks), address[14:] == MAP >> 14
+        in_map &= less(address[:14], len(design.map_cells))
+        # Counters and pulses have one register.
+        wide = in_banks & (place[5:] != COUNTERS >> 5)
+        is_pulse = in_banks & (place[4:] == PULSES >> 4)
+        is_status = in_banks & Cat(place[5:] == block >> 5 for block in (TELEMETRY, SUPERVISOR)).any()
+        half = wide & ((host.first & place[0]) | (host.last & ~place[0]))
+        marks = Signal(len(registers.pulses))
+        wanted = Signal.like(marks)
+        for bit, pulse in enumerate(registers.pulses):
+            m.d.comb += wanted[bit].eq(is_pulse & (place[:4] == pulse.address % 16) & host.value[0])
+
+        # The axis at the address, the one that a frame writes to, and the one whose status it reads, if any.
+        here, to, asked = (Signal(range(max(banks, 2)), name=name) for name in ("here", "to", "asked"))
+        asks = Signal()
+        m.d.comb += here.eq(bank)
+        refused = self._refused(m, wanted, here)
+        with m.If(host.clear):
+            m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0), asks.eq(0)]
+
+        # What `shift` takes: a cell, a text, a status, or the host's value. What it had goes to `upper`.
+        shift, upper = Signal(CELL_BITS), Signal(CELL_BITS)
+        recorded, turned = Signal(), Signal()
+        status = self._status(m, asked, recorded, turned)
+        takes = {"cell": cell.data, "text": text.data, "status": status, "value": host.value}
+        taking = {name: Signal(name=f"taking_{name}") for name in takes}
+        for name, taken in taking.items():
+            with m.If(taken):
+                m.d.sync += [shift.eq(takes[name]), upper.eq(shift)]
+
+        # One subtraction compares a bound with a value: signed at the top of a value, and only as long as all above
+        # it was equal.
+        top, tied, difference = ~wide | ~place[0], Signal(2, init=3), Signal(CELL_BITS + 1)
+        bound, value = (Cat(each[:-1], each[-1] ^ top) for each in (shift, host.value))
+        m.d.comb += [difference.eq(bound - value), host.data.eq(shift)]
+        equal = ~difference.any()
+
+        # A walk through cells: all of them after a reset; and at a FINISH the words of a bank, and behind them the
+        # count of a preload and the causes that the host has read.
+        words, commit = len(registers.words), marks[[pulse.name for pulse in registers.pulses].index("commit")]
+        step, low, settling = Signal(range(BANK * banks)), Signal(), Signal(range(design.settle_clocks + 1))
+        count, causes = registers["active_preload_count"].address, registers["acknowledged"].address
+        copies, halfway = less(step, words), Signal(range(END - WRITTEN))
+        beside = Mux(step == words, count - WRITTEN, causes - WRITTEN)
+        m.d.comb += halfway.eq(Mux(copies, Cat(low, step[:4]), beside | low))
+        walked = halfway | WRITTEN
+
+        area, window = Signal(Area), Signal()
+        m.d.comb += [
+            text.addr.eq(Cat(place, Mux(window, address[len(place) : within], area), window)),
+            cell.addr.eq(Cat(place, bank)),
+            write.addr.eq(Cat(place, bank)),
+            write.data.eq(shift),
+        ]
+        m.d.sync += [self.word_write.eq(0), *(getattr(self, pulse.name).eq(0) for pulse in registers.pulses)]
+
+        def give(word: Register, axis: Value, value: Value):
+            """Give a word that is whole to its port, or to the axis."""
+            if word.name in SHARED:
+                m.d.sync += getattr(self, word.name).eq(value)
+            elif (number := design.numbers.get(word.address + 1)) is not None:
+                m.d.sync += [self.word_write.eq(1), self.word_axis.eq(axis), self.word_number.eq(number)]
+                m.d.sync += self.word_value.eq(value)
+
+        with m.FSM():
+            with m.State("BOOT"):
+                m.d.comb += text.addr.eq(Cat(step[: len(place)], Const(Area.RESET, Shape.cast(Area))))
+                m.next = "BOOT_TAKE"
+            with m.State("BOOT_TAKE"):
+                m.d.comb += taking["text"].eq(1)
+                m.next = "BOOT_STORE"
+            with m.State("BOOT_STORE"):
+                begun = step[: len(place)]
+                once = less(begun, TELEMETRY) | Cat(begun == own for own in sorted(design.own_places)).any()
+                m.d.comb += [write.addr.eq(step), write.en.eq(1)]
+                with m.If(once & step[len(place) :].any()):
+                    m.d.comb += write.data.eq(0)
+                m.d.sync += step.eq(step + 1)
+                m.next = "BOOT"
+                with m.If(step == BANK * banks - 1):
+                    m.next = "BEGIN"
+            with m.State("BEGIN"), m.If(self.word_ready):
+                m.next = "IDLE"
+            with m.State("IDLE"):
+                m.d.comb += window.eq(address[14])
+                m.d.sync += low.eq(0)
+                with m.If(host.start), m.Switch(host.operation):
+                    with m.Case(Operation.CHECK_READ):
+                        with m.If(~(in_banks | in_map) | half):
+                            m.d.sync += host.absent.eq(1)
+                        with m.If(is_status):
+                            m.d.sync += [asks.eq(1), asked.eq(here)]
+                        m.next = "DONE"
+                    with m.Case(Operation.CHECK_WRITE):
+                        m.d.comb += [area.eq(Area.LEAST), window.eq(0)]
+                        word = ~less(place, design.first_pulse) & less(place, design.last_word)
+                        live = ~less(place, LIVE) & less(place, design.last_live)
+                        own = Cat(place == each for each in sorted(design.own_places)).any() & bank.any()
+                        with m.If(~in_banks | ~(word | live) | own | half):
+                            m.d.sync += host.absent.eq(1)
+                        with m.If(refused):
+                            m.d.sync += host.refused.eq(1)
+                        m.next = "LEAST"
+                    with m.Case(Operation.READ):
+                        m.next = "READ"
+                    with m.Case(Operation.WRITE):
+                        m.next = "TAKE"
+                        m.d.sync += marks.eq(marks | wanted)
+                    with m.Case(Operation.COUNT):
+                        m.next = "COUNT"
+                    with m.Case(Operation.FINISH):
+                        m.d.sync += step.eq(Mux(commit, 0, words))
+                        m.next = "DONE"
+                        with m.If(marks.any()):
+                            m.next = "WALK"
+                    with m.Case(Operation.SNAPSHOT):
+                        m.next = "DONE"
+                        with m.If(asks):
+                            m.next = "RECORD"
+            with m.State("READ"):
+                m.d.comb += [
+                    taking["status"].eq(is_status),
+                    taking["cell"].eq(in_banks & ~is_status),
+                    taking["text"].eq(~in_banks),
+                ]
+                m.next = "DONE"
+            with m.State("LEAST"):
+                m.d.comb += [area.eq(Area.MOST), taking["text"].eq(1)]
+                m.next = "ABOVE"
+            with m.State("ABOVE"):
+                m.d.comb += taking["text"].eq(1)
+                m.d.sync += tied[0].eq((top | tied[0]) & equal)
+                with m.If((top | tied[0]) & ~difference[-1] & ~equal):
+                    m.d.sync += host.outside.eq(1)
+                m.next = "BELOW"
+            with m.State("BELOW"):
+                m.d.sync += tied[1].eq((top | tied[1]) & equal)
+                with m.If((top | tied[1]) & difference[-1]):
+                    m.d.sync += host.outside.eq(1)
+                m.next = "DONE"
+            with m.State("TAKE"):
+                m.d.comb += taking["value"].eq(1)
+                m.d.sync += to.eq(here)
+                # The upper half has been written just before, and is still there.
+                with m.Switch(place):
+                    for word in registers.live:
+                        with m.Case(word.address + 1):
+                            give(word, here, Cat(host.value, shift))
+                m.next = "KEEP"
+            with m.State("KEEP"):
+                m.d.comb += write.en.eq(~is_pulse)
+                m.next = "DONE"
+            with m.State("COUNT"):
+                m.d.comb += taking["cell"].eq(1)
+                m.next = "COUNTED"
+            with m.State("COUNTED"):
+                m.d.comb += [write.data.eq(shift + 1), write.en.eq(1)]
+                m.next = "DONE"
+
+            # The high half of a value first, and then both are there.
+            with m.State("WALK"):
+                m.d.comb += cell.addr.eq(Cat(walked, to))
+                m.next = "WALKED"
+            with m.State("WALKED"):
+                m.d.comb += taking["cell"].eq(1)
+                m.next = "WALK_STORE"
+            with m.State("WALK_STORE"):
+                m.d.comb += [write.addr.eq(Cat(walked ^ (ACTIVE ^ WRITTEN), to)), write.en.eq(copies)]
+                m.d.sync += [low.eq(~low), step.eq(step + low)]
+                m.next = "WALK"
+                with m.If(low), m.Switch(step):
+                    for at, word in enumerate(registers.words):
+                        with m.Case(at):
+                            give(word, to, Cat(shift, upper))
+                    with m.Case(words):
+                        m.d.sync += self.preload_count.eq(Cat(shift, upper))
+                    with m.Case(words + 1):
+                        m.d.sync += [self.acknowledged.eq(Cat(shift, upper)), step.eq(0)]
+                        m.next = "PULSE"
+            with m.State("PULSE"):
+                for bit, pulse in enumerate(registers.pulses):
+                    m.d.sync += getattr(self, pulse.name).eq(Mux(marks[bit], Const(1) << to, 0))
+                m.d.sync += [marks.eq(0), settling.eq(design.settle_clocks)]
+                m.next = "SETTLE"
+            with m.State("SETTLE"):
+                m.d.sync += settling.eq(settling - 1)
+                with m.If(settling == 0):
+                    m.next = "DONE"
+
+            with m.State("RECORD"):
+                m.d.comb += recorded.eq(self.record_valid & (self.record_axis == asked))
+                with m.If(recorded):
+                    m.next = "TURN"
+            with m.State("TURN"):
+                m.d.comb += turned.eq(self.turn_valid & (self.turn_axis == asked))
+                m.d.sync += asks.eq(0)
+                with m.If(turned):
+                    m.next = "DONE"
+            with m.State("DONE"):
+                m.d.comb += host.done.eq(1)
+                m.next = "IDLE"
+        return m
+
+
+def _of(values: Value, axis: Value, axes: int) -> Value:
+    """Return the word of an axis, of all axes' words."""
+    values = Value.cast(values)
+    return values.word_select(axis, len(values) // axes)

@@ -1,0 +1,122 @@
+"""Several axes on one board: a port to the bank of each, and all of them behind the one line."""
+
+from collections.abc import Callable, Iterator
+
+from ..model.axes_registers import BANK, SHARED
+from ..model.registers import COUNTERS, END, PULSES, TELEMETRY
+from .axis import Axis, Shared
+from .device import Device
+from .heartbeat import Beat
+from .port import Port
+
+
+class BankPort(Port):
+    """A port to the bank of one of several axes, by the addresses of an axis that is alone.
+
+    What there is once for all axes, the constants, the counters of the link and the words of the host itself, is read
+    and written where it is.
+
+    Args:
+        port: the line.
+        device: the device there.
+        axis: the number of the axis.
+
+    Attributes:
+        name: the name of the line.
+    """
+
+    def __init__(self, port: Port, device: Device, axis: int):
+        self._line, self._base, self.name = port, BANK * axis, port.name
+        words = (device.registers[name] for name in SHARED)
+        blocks = [(0, TELEMETRY), (COUNTERS, PULSES), *((word.address, word.address + word.size) for word in words)]
+        self._once = {address for first, end in blocks for address in range(first, end)}
+
+    @property
+    def pace(self) -> float:
+        """That of the line."""
+        return self._line.pace
+
+    def read(self, address: int, count: int) -> tuple[int, ...]:
+        """Return successive registers; what there is once takes another request. Errors are those of `Port.read`."""
+        places = range(address, address + count)
+        if not self._base or address >= END:
+            return self._line.read(address, count)
+        once = [place for place in places if place in self._once]
+        registers = dict(zip(places, self._line.read(self._base + address, count), strict=True))
+        if once:
+            first, size = once[0], once[-1] + 1 - once[0]
+            found = zip(range(first, first + size), self._line.read(first, size), strict=True)
+            registers |= {place: word for place, word in found if place in self._once}
+        return tuple(registers[place] for place in places)
+
+    def write(
+        self, address: int, registers: tuple[int, ...], once: bool = False, check: Callable[[], None] | None = None
+    ) -> None:
+        """Write successive registers, all in one request; the arguments and the errors are those of `Port.write`."""
+        self._line.write(address + (0 if address in self._once else self._base), registers, once, check)
+
+    def identify(self) -> dict[int, bytes]:
+        """Return the objects by which the device identifies itself."""
+        return self._line.identify()
+
+    def close(self) -> None:
+        """Leave the line open, for the other axes."""
+
+
+class Axes:
+    """All axes on a board, from `hardwall.host.connect_axes`. A context manager that disarms each, and closes.
+
+    Each is an `Axis`, with words, states and acts of its own. The board hears one heartbeat: it goes on while the lease
+    of any of them lasts. `supervisor_watchdog` is one word for all.
+
+    Args:
+        port: the line.
+        device: the device there.
+
+    Attributes:
+        device: what the board says of itself.
+
+    Raises:
+        HostError: if the board does not answer.
+    """
+
+    def __init__(self, port: Port, device: Device):
+        self.device, self._port = device, port
+        shared, self._axes = Shared(Beat(port, device.registers["heartbeat"]), {}), list[Axis]()
+        try:
+            for axis in range(device.axes):
+                self._axes.append(Axis(BankPort(port, device, axis), device, shared))
+        except BaseException:
+            self._close_axes()
+            raise
+
+    def __enter__(self) -> "Axes":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def __len__(self) -> int:
+        return len(self._axes)
+
+    def __getitem__(self, axis: int) -> Axis:
+        return self._axes[axis]
+
+    def __iter__(self) -> Iterator[Axis]:
+        return iter(self._axes)
+
+    def close(self) -> None:
+        """Disarm every axis, if the board can still be reached, and close the port."""
+        try:
+            self._close_axes()
+        finally:
+            self._port.close()
+
+    def _close_axes(self) -> None:
+        """Close the axes, each though another cannot be."""
+        try:
+            if self._axes:
+                self._axes.pop().close()
+        finally:
+            if self._axes:
+                self._close_axes()

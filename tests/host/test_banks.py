@@ -1,0 +1,135 @@
+"""A host of several axes: words and acts reach one axis alone, and what there is once is there once."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from hardwall.host import Axes, ChangedError, ForeignError, NotReadyError, State, connect, connect_axes
+from hardwall.host.device import AXES_AT
+from hardwall.model.axes import AxesSpec
+from hardwall.model.axes_registers import BANK, AxesMap
+from hardwall.model.link import banked_file
+from hardwall.model.registers import RegisterMap
+from hardwall.model.spec import AxisSpec
+from hardwall.model.supervisor import ARMED, CAUSES, DISARMED, TRIPPED
+from host.twin_board import TwinBoard
+from oracles.banked_server import BankedServer
+from stimuli.specs import MHZ
+
+FAULT = 1 << [cause.name for cause in CAUSES].index("external_fault")
+AXES = 3
+
+
+class Board(TwinBoard):
+    """A board of several axes whose supervisors do what they are asked for, while they may."""
+
+    def __init__(self):
+        registers = AxesMap(AxesSpec(**MHZ, axes=AXES, estimator="fdm"))
+        super().__init__(registers, BankedServer(banked_file.Design(registers)))
+        for axis in range(AXES):
+            self.show_of(axis, ready=1, live=1)
+
+    def show_of(self, axis: int, **words: int) -> None:
+        """Let an axis show words of its status, and refuse what it then does."""
+        status = self.server.file.statuses[axis]
+        status |= words
+        refused = {"arm": not status["ready"], "preload": status["state"] == ARMED}
+        self.server.file.refused_of[axis] = frozenset(name for name, is_so in refused.items() if is_so)
+
+    def react(self, pulses: tuple[str, ...]) -> None:
+        axis, file = self.server.file.bank, self.server.file
+        if "arm" in pulses:
+            self.show_of(axis, state=ARMED, ready=0)
+        if "disarm" in pulses and file.statuses[axis]["state"] == ARMED:
+            self.show_of(axis, state=DISARMED, ready=1)
+        if "acknowledge" in pulses and file.acknowledged == file.statuses[axis]["latched"]:
+            self.show_of(axis, state=DISARMED, latched=0, ready=1)
+
+    def trip(self, axis: int) -> None:
+        self.show_of(axis, state=TRIPPED, latched=FAULT, first=FAULT, ready=0)
+
+
+@pytest.fixture
+def board() -> Iterator[Board]:
+    with Board() as found:
+        yield found
+
+
+@pytest.fixture
+def axes(board) -> Iterator[Axes]:
+    with connect_axes(board.name, answer_s=0.2) as found:
+        yield found
+
+
+def states(axes: Axes) -> list[State]:
+    return [axis.status.state for axis in axes]
+
+
+def test_words_reach_one_axis_alone(board, axes):
+    assert len(axes) == axes.device.axes == AXES
+    for number, axis in enumerate(axes):
+        axis.set(wall_stiffness=1e3 * (1 + number), supervisor_force_limit=1.0 + number)
+    for number, axis in enumerate(axes):
+        assert axis.get("wall_stiffness") == pytest.approx(1e3 * (1 + number), rel=1e-2)
+        assert axis.get("supervisor_force_limit") == pytest.approx(1.0 + number, rel=1e-2)
+    board.show_of(2, count=700)
+    assert [axis.status.position_m for axis in axes] == pytest.approx([0.0, 0.0, 700e-6])
+    assert 0 < axes[1].counters["link_requests"] < axes[2].counters["link_requests"]
+
+
+def test_one_axis_trips_and_is_mended_while_the_others_are_armed(board, axes):
+    for axis in axes:
+        axis.arm()
+    board.trip(1)
+    assert states(axes) == [State.ARMED, State.TRIPPED, State.ARMED]
+    assert axes[1].trip.first == ("external_fault",)
+    axes[1].acknowledge()
+    assert states(axes) == [State.ARMED, State.DISARMED, State.ARMED]
+    with pytest.raises(NotReadyError):
+        axes[0].preload(0.0)
+    axes[1].preload(0.0)
+    axes[0].disarm()
+    assert states(axes) == [State.DISARMED, State.DISARMED, State.ARMED]
+
+
+def test_the_words_of_the_host_are_there_once(board, axes):
+    axes[2].set(supervisor_watchdog=0.1)
+    file = board.server.file
+    assert [axis.get("supervisor_watchdog") for axis in axes] == [0.1] * AXES
+    assert file.supervisor_watchdog == 100
+    # The others take it for theirs, and beat as often.
+    for axis in axes:
+        axis.arm()
+    place = file.design.registers["heartbeat"].address
+    assert file.heartbeat == file.live[place + 1] > 0
+    assert [file.live[BANK * axis + place + 1] for axis in (1, 2)] == [0, 0]
+    # Another host is found out by whichever axis.
+    file.live[place + 1] += 5
+    axes[0].disarm()
+    with pytest.raises(ChangedError):
+        axes[0].arm()
+
+
+def test_all_are_disarmed_at_the_end(board):
+    with connect_axes(board.name, answer_s=0.2) as axes:
+        for axis in axes:
+            axis.arm()
+    assert [status["state"] for status in board.server.file.statuses] == [DISARMED] * AXES
+
+
+def test_the_first_axis_is_had_alone_and_one_axis_is_several(board):
+    with connect(board.name, answer_s=0.2) as axis:
+        axis.set(wall_stiffness=5e3)
+    file = board.server.file
+    place = file.design.registers["active_wall_stiffness"].address + 1
+    assert [file.live[BANK * number + place] > 0 for number in range(AXES)] == [True, False, False]
+    with TwinBoard(RegisterMap(AxisSpec(**MHZ))) as alone, connect_axes(alone.name, answer_s=0.2) as found:
+        assert (len(found), found.device.axes) == (1, 1)
+        found[0].set(wall_stiffness=5e3)
+        assert found[0].get("wall_stiffness") == pytest.approx(5e3, rel=1e-2)
+
+
+def test_too_many_axes_are_none_of_ours(board):
+    board.server.file.live[AXES_AT + 1] = 33
+    with pytest.raises(ForeignError, match="must have at most 32 axes, not 33"):
+        connect_axes(board.name, answer_s=0.2)

@@ -1,0 +1,153 @@
+"""The register file of several axes: every output at every clock against the model, at the clocks promised."""
+
+import cocotb
+import pytest
+from banked_world import World, make
+
+from hardwall.hdl.link.banked_file import BankedFile
+from hardwall.model.axes_registers import BANK, SHARED, AxesMap
+from hardwall.model.link import banked_file as model
+from hardwall.model.link.register_file import Operation
+from hardwall.model.registers import COUNTERS, MAP, RegisterMap
+from hardwall.testing import SAMPLES, simulate
+from stimuli.restless import Restless
+from stimuli.specs import spec
+from stimuli.supervised_axes_world import slow
+
+
+async def write_words(world: World) -> None:
+    """Write a word and pulses of an axis, and finish."""
+    random, registers = world.random, world.registers
+    bank = random.randrange(world.design.banks)
+    theirs = [each for each in registers.live if bank == 0 or each.name not in SHARED]
+    register = random.choice((*registers.words, *theirs))
+    await world.write_word(register, bank, random.randint(register.low, register.high))
+    for pulse in random.sample(registers.pulses, random.randrange(4)):
+        await world.write_word(pulse, bank, int(random.random() < 0.7))
+    await world.finish()
+    world.pulsed |= {(world.twin.bank, name) for name in world.twin.pulses}
+
+
+async def read_status(world: World) -> None:
+    """Take a snapshot of an axis, and read half of its status."""
+    random = world.random
+    base, half = BANK * random.randrange(world.design.banks), random.randrange(2)
+    await world.check_read(base + random.choice(world.registers.status).address, 1)
+    await world.do(Operation.SNAPSHOT)
+    for each in world.registers.status:
+        await world.read(base + each.address + half)
+    world.snapshots += 1
+
+
+async def check_anything(world: World) -> None:
+    random = world.random
+    first, last = random.randrange(2), random.randrange(2)
+    if random.random() < 0.4:
+        await world.check_read(world.place(), first, last)
+    else:
+        await world.check_write(world.place(), random.getrandbits(16), first, last)
+
+
+async def count(world: World) -> None:
+    address = COUNTERS + world.random.randrange(8)
+    world.twin.count(address)
+    await world.do(Operation.COUNT, address)
+
+
+async def clear(world: World) -> None:
+    await world.clear()
+    await world.edge()
+
+
+ACTS = (check_anything, write_words, count, read_status, clear)
+
+
+@cocotb.test()
+async def follows_the_model_at_every_clock(dut):
+    world = World(dut)
+    cells = BANK * world.design.banks
+    for waits in (world.component.boot_clocks + 20, 0):
+        await world.begin(waits)
+        for _ in range(SAMPLES // 600):
+            await world.random.choices(ACTS, (0.35, 0.3, 0.05, 0.2, 0.1))[0](world)
+        for address in (*range(cells), MAP, MAP + len(world.design.map_cells) - 1):
+            await world.read(address)
+    assert world.compared > SAMPLES // 10
+    assert world.snapshots > 20
+    assert world.pulsed == {(bank, name) for bank in range(world.design.banks) for name in world.pulses}
+
+
+@cocotb.test()
+async def every_bit_of_every_word(dut):
+    world = World(dut)
+    await world.begin(0)
+    banks, registers, given = world.design.banks, world.registers, 0
+    restless = {word.name: Restless(word, world.draws) for word in (*registers.words, *registers.live)}
+    for number in range(8):
+        bank = number % banks
+        for word in (*registers.words, *registers.live):
+            if bank == 0 or word.name not in SHARED:
+                await world.write_word(word, bank, restless[word.name].next())
+                given += len(world.twin.writes)
+        for pulse in registers.pulses:
+            await world.write_word(pulse, bank, 1)
+        await world.finish()
+        given += len(world.twin.writes)
+    # Committed words go out at a commit, all but the preload's count; live ones at once, but for those of the host.
+    assert given == 8 * (len(registers.words) - 1 + len(registers.live) - len(SHARED) - 1)
+
+
+@cocotb.test()
+async def every_bound_of_every_word_in_the_last_bank(dut):
+    world = World(dut)
+    await world.begin(0)
+    bank, outside = world.design.banks - 1, 0
+    for register in (*world.registers.words, *world.registers.live, *world.registers.pulses):
+        span = 16 * register.size
+        tried = {register.low, register.high, register.low - 1, register.high + 1, 0, -1, 1, 1 << 16, -(1 << 16)}
+        tried |= {(1 << span - 1) - 1, -(1 << span - 1), register.low ^ 1 << 16, register.high ^ 1 << 15}
+        for value in {each & (1 << span) - 1 for each in tried}:
+            await world.clear()
+            for k in range(register.size):
+                half = value >> 16 * (register.size - 1 - k) & 0xFFFF
+                await world.check_write(BANK * bank + register.address + k, half, k == 0, k == register.size - 1)
+            await world.edge()
+            signed = value - (1 << span) if value >> span - 1 else value
+            assert world.twin.outside == (not register.low <= signed <= register.high)
+            assert world.twin.absent == (bank > 0 and register.name in SHARED)
+            outside += world.twin.outside
+    assert outside > 50
+
+
+@pytest.mark.parametrize("axes", [1, 3])
+def test_rtl(axes):
+    simulate(__file__, make, axes=axes)
+
+
+def test_cells_after_a_reset():
+    design = model.Design(AxesMap(slow(3, "fdm")))
+    file, registers = model.BankedFile(design), design.registers
+    for bank in range(3):
+        for register in registers.registers:
+            halves = tuple(file.live[BANK * bank + register.address + k] for k in range(register.size))
+            once = bank and (register.address < 0x20 or register.name in SHARED)
+            assert register.from_registers(halves) == (0 if once else register.reset), register.name
+
+
+def test_no_frame_writes_to_two_banks_or_reads_the_status_of_two():
+    design = model.Design(AxesMap(slow(3, "fdm")))
+    most_written, most_read = 123, 125
+    written = [address for address in range(3 * BANK) if design.writable(address)]
+    runs = [address for address in written if address - 1 not in written]
+    assert all(max(a for a in range(run, run + most_written) if a in written) // BANK == run // BANK for run in runs)
+    status = [address for address in range(3 * BANK) if design.shows(address)]
+    for address in range(3 * BANK):
+        frame = {each // BANK for each in status if address <= each < address + most_read}
+        assert len(frame) <= 1
+
+
+def test_wrong_parameters_are_refused():
+    with pytest.raises(TypeError, match=r"^design must be a banked_file.Design, not 3$"):
+        BankedFile(3)
+    with pytest.raises(TypeError, match=r"^registers must be an AxesMap, not <"):
+        model.Design(RegisterMap(spec("mhz")))

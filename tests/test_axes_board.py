@@ -1,0 +1,136 @@
+"""The board of several axes, spoken to over its line: words, states and pulses of each, at every clock of its pins."""
+
+import cocotb
+import pytest
+
+from hardwall.hdl.axes_board import AxesBoard
+from hardwall.model.axes_registers import BANK
+from hardwall.model.link.server import ABSENT, FAILURE, VALUE
+from hardwall.model.supervisor import ARMED, CAUSES, DISARMED, REQUIRED, TRIPPED
+from hardwall.testing import parameters, simulate
+from oracles.axes_board import Host, Watched
+from stimuli import frames
+
+BITS = {cause.name: 1 << bit for bit, cause in enumerate(CAUSES)}
+
+
+def make(axes: int) -> Watched:
+    return Watched(axes)
+
+
+async def drive(host: Host, axis: int, invert: int = 0) -> None:
+    """Put the handle of an axis deep into a stiff wall, and arm it."""
+    registers = host.registers
+    await host.write(axis, supervisor_ramp=registers["supervisor_ramp"].high)
+    await host.write(axis, drive_invert=invert)
+    words = {word.name: word.reset for word in registers.words}
+    words |= {"wall_position": 1 + registers["wall_position"].low, "wall_stiffness": registers["wall_stiffness"].high}
+    await host.write(axis, commit=1, **words)
+    assert (await host.look(axis))["ready"]
+    await host.write(axis, arm=1)
+    assert (await host.look(axis))["state"] == ARMED
+
+
+@cocotb.test()
+async def every_axis_has_its_bank_and_its_state(dut):
+    host = Host(dut, **parameters())
+    registers, axes = host.registers, host.board.spec.axes
+    await host.reset()
+    # Who the device is, which there is once; and every word as after a reset.
+    assert (await host.request(frames.read(0, 16)))[2 + 28 :] == axes.to_bytes(4, "big")
+    for axis in range(axes):
+        await host.request(frames.read(BANK * axis + registers["wall_stiffness"].address, 2))
+        await host.request(frames.read(BANK * axis + 0xC0, 0x20))
+        assert (await host.look(axis))["state"] == DISARMED
+    # Words of each: in use only after a commit, and only in their axis.
+    for axis in range(axes):
+        await host.write(axis, wall_stiffness=3 + axis)
+        for other in range(axes):
+            await host.request(frames.read(BANK * other + registers["active_wall_stiffness"].address, 2))
+        await host.write(axis, commit=1)
+        for other in range(axes):
+            await host.request(frames.read(BANK * other + registers["active_wall_stiffness"].address, 2))
+    # What cannot be written: nothing of the frame is done.
+    refusals = {
+        frames.write(BANK + registers["heartbeat"].address, [0, 1]): ABSENT,
+        frames.write(BANK - 2, [0] * 4): ABSENT,
+        frames.write(BANK * axes + registers["arm"].address, [1]): ABSENT,
+        frames.write(BANK + registers["encoder_invert"].address, [0, 2]): VALUE,
+        frames.write(BANK + registers["wall_stiffness"].address, [0]): ABSENT,
+        frames.write(BANK + registers["arm"].address, [1]): FAILURE,
+        frames.read(BANK * axes, 2): ABSENT,
+    }
+    for refused, exception in refusals.items():
+        assert (await host.request(refused))[1] == exception
+    assert host.compared > 10_000
+    assert host.pulses == [0] * axes
+
+
+@cocotb.test()
+async def one_axis_trips_while_the_other_drives_on(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    await host.write(0, heartbeat=1)
+    await drive(host, 0)
+    await drive(host, 1, invert=1)
+    assert await host.pulsing(200) == [True, True]
+    driven = [(await host.look(axis))["driven"] for axis in (0, 1)]
+    assert driven == [-host.board.spec.force_limit_word] * 2
+    # A host that speaks of one axis does not move the other.
+    assert (await host.request(frames.write(host.registers["preload"].address, [1])))[1] == FAILURE
+    await host.write(1, supervisor_causes=REQUIRED | BITS["position_range"])
+    await host.write(1, supervisor_position_low=1)
+    status = await host.look(1)
+    assert (status["state"], status["first"], status["driven"]) == (TRIPPED, BITS["position_range"], 0)
+    assert (await host.look(0))["state"] == ARMED
+    assert await host.pulsing(200) == [True, False]
+    assert (await host.request(frames.write(BANK + host.registers["arm"].address, [1])))[1] == FAILURE
+    # Others than were read cannot be acknowledged.
+    await host.write(1, supervisor_position_low=host.registers["supervisor_position_low"].low)
+    for causes, state in ((status["latched"] ^ BITS["runaway"], TRIPPED), (status["latched"], DISARMED)):
+        await host.write(1, acknowledged=causes)
+        await host.write(1, acknowledge=1)
+        assert (await host.look(1))["state"] == state
+    assert await host.pulsing(200) == [True, False]
+    await host.write(1, arm=1)
+    assert await host.pulsing(200) == [True, True]
+    await host.write(0, disarm=1)
+    assert await host.pulsing(200) == [False, True]
+    assert ((await host.look(0))["state"], (await host.look(1))["state"]) == (DISARMED, ARMED)
+    assert host.compared > 10_000
+
+
+@cocotb.test()
+async def a_loop_stops_every_axis(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    await host.write(0, heartbeat=1)
+    for axis in (0, 1):
+        await host.write(axis, supervisor_causes=REQUIRED | BITS["external_fault"])
+        await drive(host, axis)
+    for loop in ("external_fault", "drive_enable", "emergency_stop"):
+        assert await host.pulsing(200) == [True, True]
+        host.change(**{loop: 0})
+        await host.edges(2 + host.board.safe_latency)
+        assert await host.pulsing(200) == [False, False]
+        host.change(**{loop: 1})
+        assert await host.pulsing(200) == [False, False]
+        for axis in (0, 1):
+            if latched := (await host.look(axis))["latched"]:
+                assert latched == BITS[loop]
+                await host.write(axis, acknowledged=latched)
+                await host.write(axis, acknowledge=1)
+            await host.look(axis, "state", "ready")
+            await host.write(axis, arm=1)
+    assert host.compared > 10_000
+
+
+def test_rtl():
+    simulate(__file__, make, axes=2)
+
+
+def test_wrong_parameters_are_refused():
+    with pytest.raises(TypeError, match=r"^spec must be an AxesSpec, not 3$"):
+        AxesBoard(3)
+    with pytest.raises(ValueError, match=r"baud must be 115200 to 3000000, not 9600$"):
+        AxesBoard(Watched(1).board.spec, 9600)

@@ -1,0 +1,62 @@
+"""The map of several axes: a bank is the map of one axis, at its place; what it says beside; what is refused."""
+
+import json
+import zlib
+
+import pytest
+
+from hardwall.model.axes import AXES_MAX, AxesSpec
+from hardwall.model.axes_registers import BANK, SHARED, AxesMap
+from hardwall.model.register import Kind
+from hardwall.model.registers import MAP, RegisterMap
+from hardwall.model.spec import AxisSpec
+from stimuli.supervised_axes_world import FIELDS, slow
+
+
+@pytest.mark.parametrize("estimator", ["fdm", "window"])
+def test_a_bank_is_the_map_of_one_axis(estimator):
+    fields = {**FIELDS, "clock_hz": 1_000_000, "estimator": estimator}
+    one, several = RegisterMap(AxisSpec(**fields), 0), AxesMap(AxesSpec(**fields, axes=3))
+    alike = [each for each in several.registers if each.kind is not Kind.CONSTANT]
+    assert alike == [each for each in one.registers if each.kind is not Kind.CONSTANT]
+    constants = {each.name: each.address for each in one.registers if each.kind is Kind.CONSTANT} | {"axes": 14}
+    assert {each.name: each.address for each in several.registers if each.kind is Kind.CONSTANT} == constants
+
+
+def test_every_axis_has_its_place_and_the_banks_end_before_the_map():
+    registers = AxesMap(slow(AXES_MAX, "fdm"))
+    assert AXES_MAX * BANK <= MAP
+    for axis in (0, 1, AXES_MAX - 1):
+        assert registers.of_axis("arm", axis).address == registers["arm"].address + 0x100 * axis
+    assert {name: registers.of_axis(name, 0).address for name in SHARED} == {
+        name: registers[name].address for name in SHARED
+    }
+
+
+def test_the_map_in_the_device_has_one_bank_and_their_number():
+    registers = AxesMap(slow(5, "fdm"))
+    described = json.loads(zlib.decompress(registers.compressed))
+    assert (described["banks"], described["identity"]) == (5, registers.identity)
+    assert [row[1] for row in described["registers"]] == [
+        each.name for each in registers.registers if each.kind is not Kind.CONSTANT
+    ]
+    assert (registers["axes"].reset, registers["capture_registers"].reset) == (5, 0)
+    assert registers.identification[True, 1][-4:] == b"axes"
+
+
+def test_every_number_of_axes_has_its_identity():
+    identities = {AxesMap(slow(axes, "fdm")).identity for axes in (1, 2, 3, 32)}
+    assert len(identities | {AxesMap(slow(2, "window")).identity}) == 5
+    assert AxesMap(slow(2, "fdm")).identity in identities
+
+
+def test_what_cannot_be_is_refused():
+    with pytest.raises(TypeError, match=r"^spec must be an AxesSpec, not 3$"):
+        AxesMap(3)
+    registers = AxesMap(slow(2, "fdm"))
+    with pytest.raises(ValueError, match=r"^axis must be 0 to 1, not 2$"):
+        registers.of_axis("arm", 2)
+    with pytest.raises(ValueError, match=r"^axis must be 0 for heartbeat, which there is once for all axes, not 1$"):
+        registers.of_axis("heartbeat", 1)
+    with pytest.raises(KeyError, match="register must be one of layout, "):
+        registers.of_axis("nothing", 0)
