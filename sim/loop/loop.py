@@ -10,9 +10,10 @@ sample whose drive changes, and a model leaves the edges in between to the next 
 
 from ...model.compiled import compiled
 from ...model.design import change_of, overlap_of, strobe_of
-from ..world.advance import Interval, Moment, advance, advance_quietly
+from ..world.advance import Interval, Moment
 from .actuation import actuated
 from .controllers import sample, sample_quietly, taken_off
+from .onwards import onwards
 from .sweep import sweep, sweeps
 from .values import Progress
 
@@ -29,7 +30,7 @@ def run(world, controller, state, progress, memory, until):
         until: number of the first sample not to take, within the arrays' length. The run stops early if edges were
             lost.
     """
-    plant, timing, edges = world.plant, world.timing, memory.edges
+    timing, edges = world.timing, memory.edges
     overlap = overlap_of(timing)
     first, moment, force_n, at = progress
     k = first
@@ -39,8 +40,7 @@ def run(world, controller, state, progress, memory, until):
 
         # From the strobe until the drive changes, the old force acts.
         interval = Interval(world.after, strobe, changed - strobe)
-        after, quiet = advance_quietly(plant, moment, force_n, interval)
-        moment = after if quiet else advance(plant, world.encoder, moment, force_n, interval, edges)
+        moment = onwards(world, memory, moment, force_n, interval)
 
         if moment.n_edges > 0:
             state, taken = sample(controller, state, edges, moment.n_edges, strobe_of(timing, k))
@@ -55,8 +55,7 @@ def run(world, controller, state, progress, memory, until):
             )
         changed = change_of(timing, k)
         interval = Interval(world.before, changed, strobe_of(timing, k + 1 + overlap) - changed)
-        after, quiet = advance_quietly(plant, moment, force_n, interval)
-        moment = after if quiet else advance(plant, world.encoder, moment, force_n, interval, edges)
+        moment = onwards(world, memory, moment, force_n, interval)
         k += 1
         newest = now if overlap else moment.motion
         at = at[1:] + (newest,)  # noqa: RUF005  (Numba joins tuples, and unpacks none)

@@ -19,12 +19,14 @@ from cocotb.triggers import ClockCycles, ReadOnly, Timer
 from ...model.design import change_of, overlap_of, strobe_of
 from ...model.stamped import room_for
 from ..loop.controllers import taken_off
-from ..loop.values import EDGE_CAPACITY
+from ..loop.onwards import onwards
+from ..loop.values import EDGE_CAPACITY, Memory
 from ..scene.build import start_of, world_of
 from ..scene.case import Case
-from ..world.advance import Interval, advance
+from ..world.advance import Interval
 from ..world.converter import converted
 from ..world.encoder import level
+from ..world.lines import waiting
 
 PERIOD_NS = 10
 """The period of the simulated clock; only the number of cycles matters."""
@@ -39,7 +41,10 @@ async def closed_loop(dut):
     world, edges = world_of(scene), room_for(EDGE_CAPACITY)
     timing, overlap = world.timing, overlap_of(world.timing)
     _, moment, force_n, _ = start_of(scene, world)
-    await _open(dut, scene, int(level(moment.cell.number)))
+    start_level, nothing = int(level(moment.cell.number)), np.zeros(0)
+    kept = waiting(world.encoder.lines, start_level, EDGE_CAPACITY)
+    memory = Memory(edges, None, None, None, nothing, nothing, kept)
+    await _open(dut, scene, start_level)
     # `_open` has run clock 0. Half a period later, pins change between two rising edges: in clock n, before edge n.
     await Timer(PERIOD_NS // 2, "ns")
 
@@ -50,7 +55,7 @@ async def closed_loop(dut):
     for k in range(order["samples"]):
         strobe, until = strobe_of(timing, k + overlap), change_of(timing, k)
         interval = Interval(world.after, strobe, until - strobe)
-        moment = advance(world.plant, world.encoder, moment, force_n, interval, edges)
+        moment = onwards(world, memory, moment, force_n, interval)
         taken = 0
         while taken < moment.n_edges and edges.clocks[taken] < until:
             if edges.clocks[taken] > now:
@@ -70,7 +75,7 @@ async def closed_loop(dut):
         remaining = strobe_of(timing, k + 1 + overlap) - until
         if remaining:
             interval = Interval(world.before, until, remaining)
-            moment = advance(world.plant, world.encoder, moment, force_n, interval, edges)
+            moment = onwards(world, memory, moment, force_n, interval)
     seconds = time.perf_counter() - began
     actuations = np.array(words[:: scene.spec.samples_per_actuation], "<i4")
     report = {"seconds": seconds, "force_sha256": hashlib.sha256(actuations.tobytes()).hexdigest()}

@@ -21,6 +21,7 @@ from ..loop.values import EDGE_CAPACITY, Memory
 from ..scene.build import output_step_n, start_of, sweep_of, work_of, world_of
 from ..scene.schema import Scene
 from ..world.encoder import level
+from ..world.lines import waiting
 from .tally import Tally
 
 CHUNK = 1 << 16
@@ -198,6 +199,7 @@ class Loop:
             detail=detail,
             positions=np.zeros(self.chunk),
             drives=np.zeros(self.chunk, number),
+            waiting=waiting(self.world.encoder.lines, self.start_level, EDGE_CAPACITY),
         )
 
     def run(self, axis: Opened, marks: Marks, progress: Callable[[int], None] | None) -> Hit:
