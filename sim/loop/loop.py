@@ -10,10 +10,10 @@ sample whose drive changes, and a model leaves the edges in between to the next 
 
 from ...model.compiled import compiled
 from ...model.design import change_of, overlap_of, strobe_of
-from ..world.advance import Interval, Moment
+from ..world.advance import Interval, Moment, advance, advance_quietly
 from .actuation import actuated
 from .controllers import sample, sample_quietly, taken_off
-from .onwards import onwards
+from .pins import shown
 from .sweep import sweep, sweeps
 from .values import Progress
 
@@ -30,7 +30,7 @@ def run(world, controller, state, progress, memory, until):
         until: number of the first sample not to take, within the arrays' length. The run stops early if edges were
             lost.
     """
-    timing, edges = world.timing, memory.edges
+    plant, encoder, timing, edges = world.plant, world.encoder, world.timing, memory.edges
     overlap = overlap_of(timing)
     first, moment, force_n, at = progress
     k = first
@@ -40,7 +40,9 @@ def run(world, controller, state, progress, memory, until):
 
         # From the strobe until the drive changes, the old force acts.
         interval = Interval(world.after, strobe, changed - strobe)
-        moment = onwards(world, memory, moment, force_n, interval)
+        after, quiet = advance_quietly(plant, moment, force_n, interval)
+        after = after if quiet else advance(plant, encoder, moment, force_n, interval, edges)
+        moment = shown(memory.waiting, encoder.lines, encoder.clock_hz, moment.n_edges, after, interval)
 
         if moment.n_edges > 0:
             state, taken = sample(controller, state, edges, moment.n_edges, strobe_of(timing, k))
@@ -55,7 +57,9 @@ def run(world, controller, state, progress, memory, until):
             )
         changed = change_of(timing, k)
         interval = Interval(world.before, changed, strobe_of(timing, k + 1 + overlap) - changed)
-        moment = onwards(world, memory, moment, force_n, interval)
+        after, quiet = advance_quietly(plant, moment, force_n, interval)
+        after = after if quiet else advance(plant, encoder, moment, force_n, interval, edges)
+        moment = shown(memory.waiting, encoder.lines, encoder.clock_hz, moment.n_edges, after, interval)
         k += 1
         newest = now if overlap else moment.motion
         at = at[1:] + (newest,)  # noqa: RUF005  (Numba joins tuples, and unpacks none)

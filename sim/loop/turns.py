@@ -11,12 +11,20 @@ from ...model.compiled import compiled, inlined
 from ...model.design import change_of, overlap_of, strobe_of
 from ..rtl.c_function import call
 from ..rtl.verilated import RtlState
-from ..world.advance import Interval, Moment
+from ..world.advance import Interval, Moment, advance, advance_quietly
 from .actuation import actuated
-from .onwards import onwards
+from .pins import shown
 
 # The values that `axes_read` of sim/rtl/axes_library.cpp returns, by number.
 READ_VELOCITY, READ_FLAGS = 0, 1
+
+
+@inlined
+def _advanced(world, memory, moment, force_n, interval):
+    encoder = world.encoder
+    after, quiet = advance_quietly(world.plant, moment, force_n, interval)
+    after = after if quiet else advance(world.plant, encoder, moment, force_n, interval, memory.edges)
+    return shown(memory.waiting, encoder.lines, encoder.clock_hz, moment.n_edges, after, interval)
 
 
 @inlined
@@ -54,7 +62,7 @@ def turns(world, controller, progress, memory, flags, samples):
     while k < samples:
         # As in `loop.run`: from the strobe until the drive changes the old force acts, then the new one.
         strobe, changed, now = strobe_of(timing, k + overlap), change_of(timing, k), moment.motion
-        moment = onwards(world, memory, moment, force_n, Interval(world.after, strobe, changed - strobe))
+        moment = _advanced(world, memory, moment, force_n, Interval(world.after, strobe, changed - strobe))
         if moment.n_edges < 0:
             return
         moment = _give(controller, moment, edges)
@@ -63,7 +71,7 @@ def turns(world, controller, progress, memory, flags, samples):
         flags[0] = state.flags
         force_n = actuated(world, memory, k % room, k, at[0], state)
         interval = Interval(world.before, changed, strobe_of(timing, k + 1 + overlap) - changed)
-        moment = onwards(world, memory, moment, force_n, interval)
+        moment = _advanced(world, memory, moment, force_n, interval)
         newest = now if overlap else moment.motion
         at = at[1:] + (newest,)  # noqa: RUF005  (Numba joins tuples, and unpacks none)
         k += 1

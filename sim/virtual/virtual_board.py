@@ -89,7 +89,7 @@ class VirtualBoard:
         self._edges, self._push_n = room_for(EDGE_CAPACITY), 0.0
         self._cell, self.positions_m = self._progress.moment.cell, np.zeros(0)
         self._number = self._cell.number
-        self._waiting = waiting(self._world.encoder.lines, int(level(self._number)), EDGE_CAPACITY)
+        self._waiting = waiting(self._world.encoder.lines, int(level(self._number)), self._edges)
 
     def __enter__(self) -> "VirtualBoard":
         self.hardware.__enter__()

@@ -192,14 +192,15 @@ class Loop:
         if traces:
             overview = record.overview(spec, number, scene.samples, OVERVIEW_POINTS)
             detail = record.detail(spec, number, DETAIL_FROM_M, round(DETAIL_S * spec.sample_hz))
+        edges = stamped.room_for(EDGE_CAPACITY)
         self.memory = Memory(
-            edges=stamped.room_for(EDGE_CAPACITY),
+            edges=edges,
             delay=np.zeros(scene.delay_samples, number) if scene.delay_samples else None,
             overview=overview,
             detail=detail,
             positions=np.zeros(self.chunk),
             drives=np.zeros(self.chunk, number),
-            waiting=waiting(self.world.encoder.lines, self.start_level, EDGE_CAPACITY),
+            waiting=waiting(self.world.encoder.lines, self.start_level, edges),
         )
 
     def run(self, axis: Opened, marks: Marks, progress: Callable[[int], None] | None) -> Hit:

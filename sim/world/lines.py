@@ -40,6 +40,7 @@ class Lines(NamedTuple):
 class Waiting(NamedTuple):
     """What a loop keeps of its lines from interval to interval, in arrays that `carry` writes to."""
 
+    edges: Edges  # those of the loop: in go the edges that the handle passes, out come those of the pins
     toggles: Edges  # the clocks and lines of the toggles to come, in order
     marks: np.ndarray  # int64: how many these are, the level of the handle's cell, that of the pins, glitches so far
     next_s: np.ndarray  # float64: the beginning of the next glitch
@@ -91,17 +92,17 @@ def _lives(lines, line, clock, clock_hz):
     return clock < dead_s * clock_hz
 
 
-def waiting(lines: Lines | None, level: int, room: int) -> Waiting | None:
+def waiting(lines: Lines | None, level: int, edges: Edges) -> Waiting | None:
     """Return what a loop keeps of lines at the start; None without lines.
 
     Args:
         lines: the lines.
         level: the level of the pins, a | b << 1.
-        room: how many toggles may be under way.
+        edges: the arrays of the loop's edges; as many toggles may be under way.
     """
     if lines is None:
         return None
-    return Waiting(room_for(room), np.array([0, level, level, 0]), np.array([gap_s(lines, 0)]))
+    return Waiting(edges, room_for(len(edges.clocks)), np.array([0, level, level, 0]), np.array([gap_s(lines, 0)]))
 
 
 @compiled
@@ -135,9 +136,9 @@ def _take_glitches(lines, kept, until, clock_hz):
 
 
 @compiled
-def _show(lines, kept, edges, n_edges, until, clock_hz):
+def _show(lines, kept, n_edges, until, clock_hz):
     """Append the toggles up to clock `until` as edges of the pins; return their number, -1 if there is no room."""
-    toggles, marks = kept.toggles, kept.marks
+    edges, toggles, marks = kept.edges, kept.toggles, kept.marks
     room, taken = min(len(edges.clocks), len(edges.levels)), 0
     while taken < marks[PENDING] and toggles.clocks[taken] <= until:
         clock, line = toggles.clocks[taken], toggles.levels[taken]
@@ -157,14 +158,14 @@ def _show(lines, kept, edges, n_edges, until, clock_hz):
 
 
 @compiled
-def carry(lines, kept, edges, before, n_edges, interval, clock_hz):
+def carry(lines, kept, before, n_edges, interval, clock_hz):
     """Turn the edges that the handle passed in an interval into what the pins show up to its end.
 
     Args:
         lines: the `Lines`.
         kept: the loop's `Waiting`.
-        edges: the `Edges`; the handle's are those from `before` on, and are replaced.
-        before, n_edges: how many edges there were before the interval, and with those of the handle.
+        before, n_edges: how many edges there were before the interval, and with those of the handle, which are
+            replaced.
         interval: the `Interval`.
         clock_hz: frequency of the clock.
 
@@ -174,14 +175,14 @@ def carry(lines, kept, edges, before, n_edges, interval, clock_hz):
     if n_edges < 0:
         return n_edges
     for i in range(before, n_edges):
-        line = edges.levels[i] ^ kept.marks[TRUE]
-        kept.marks[TRUE] = edges.levels[i]
-        if not _insert(kept, edges.clocks[i], line):
+        line = kept.edges.levels[i] ^ kept.marks[TRUE]
+        kept.marks[TRUE] = kept.edges.levels[i]
+        if not _insert(kept, kept.edges.clocks[i], line):
             return -1
     until = interval.clock + interval.clocks
     if not _take_glitches(lines, kept, until, clock_hz):
         return -1
-    return _show(lines, kept, edges, before, until, clock_hz)
+    return _show(lines, kept, before, until, clock_hz)
 
 
 @compiled
