@@ -59,7 +59,8 @@ def command(
     encoder = _encoder(assignments, encoder_phase_error)
     if not known and (rates is not None or encoder or acceleration_max is not None):
         raise BadInput(
-            "--rates, --encoder-phase-error and --acceleration-max are for known motions: a recording has its own"
+            "--rates, --encoder-phase-error and --acceleration-max are for known motions, as is --set: a recording has "
+            "its own"
         )
     if acceleration_max is not None:
         within(acceleration_max, "--acceleration-max", *ACCELERATIONS_M_PER_S2, "m/s^2")

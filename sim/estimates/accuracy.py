@@ -72,6 +72,12 @@ def errors_of(encoder: dict[str, Any] | None) -> Errors:
     return load(SCENE, FASTEST | encoder).encoder.errors
 
 
+def _said_by_row(encoder: dict[str, Any]) -> dict[str, Any]:
+    """Return what a row of `measure` says of its encoder: the phase error, and the others if there are any."""
+    others = {key.removeprefix("encoder."): value for key, value in encoder.items() if key != PHASE}
+    return {"encoder_phase_error_counts": encoder.get(PHASE, 0.0)} | ({"encoder": others} if others else {})
+
+
 def encoder_of(row: dict[str, Any]) -> dict[str, Any]:
     """Return the errors of the encoder of a row of `measure`, as its argument."""
     others = {f"encoder.{key}": value for key, value in row.get("encoder", {}).items()}
@@ -177,9 +183,7 @@ def measure(
     )
     begin = math.ceil(known.judged_from_s * sample_hz)
     judge, raised = judged(known, spec, output, backend, encoder)
-    others = dict(encoder or {})
-    phase = others.pop(PHASE, 0.0)
-    row = {
+    return {
         "estimator": estimator,
         "output": output,
         "backend": backend,
@@ -193,12 +197,11 @@ def measure(
         "chatter_mm_s": judge.chatter * 1e3,
         "clock_hz": spec.clock_hz,
         "velocity_bits": spec.design.estimator.velocity.width,
-        "encoder_phase_error_counts": phase,
+        **_said_by_row(encoder or {}),
         "acceleration_max_mm_s2": spec.acceleration_max_m_per_s2 * 1e3,
         "gains": asdict(spec.design.gains),
         "flags": spec.design.flag_names(raised),
     }
-    return row | ({"encoder": {key.removeprefix("encoder."): value for key, value in others.items()}} if others else {})
 
 
 def judged(

@@ -8,9 +8,14 @@ from hardwall.sim.scene.tables import load_any
 from hardwall.sim.studies.bench import under_cocotb
 from hardwall.sim.walls import hit, hit_axes
 from stimuli.lengths import LONG
-from stimuli.scenes import CABLE, ONE_SECOND
+from stimuli.scenes import CABLE, ONE_SECOND, SHORT_OF_AXES
 
-NEAR = ONE_SECOND | {"protocol.start_m": -2e-4, "controller.clock_hz": 1_000_000}
+NEAR = ONE_SECOND | {
+    "protocol.start_m": -2e-4,
+    "controller.clock_hz": 1_000_000,
+    "controller.speed_max_m_per_s": 0.02,
+    "controller.glitch_clocks": 1,
+}
 SCALE = {
     "encoder.edge_error_counts": 0.05,
     "encoder.cycles": [{"edges": 16, "error_counts": 0.05}, {"edges": 20, "error_counts": 0.02, "phase": 0.5}],
@@ -20,13 +25,12 @@ SCALE = {
     "encoder.phase_error_counts": 0.05,
 }
 LINES = {"encoder.jitter_s": 2e-6, "encoder.glitches_hz": 300.0, "encoder.glitch_s": 2e-6}
-SLOW = {"controller.speed_max_m_per_s": 0.02, "controller.glitch_clocks": 1}
 DIES = {"encoder.dead": "a", "encoder.dead_s": 0.6}
 ERRORS = {
     "scale": SCALE,
-    "lines": LINES | SLOW,
-    "all": SCALE | LINES | SLOW | DIES,
-    "cable": SCALE | LINES | SLOW | CABLE,
+    "lines": LINES,
+    "all": SCALE | LINES | DIES,
+    "cable": SCALE | LINES | CABLE,
 }
 ESTIMATORS = ("levant", "kalman", "period", "levant-edge") if LONG else ("levant", "levant-edge")
 
@@ -47,9 +51,8 @@ def same_words(changes: dict) -> hit.Hit:
 def test_rtl_gives_the_models_force_words_with_errors_of_scale_and_lines(estimator, name):
     changes = NEAR | ERRORS[name] | {"controller.estimator": estimator, "controller.output": None}
     result = same_words(changes)
-    perfect = hit.run(
-        load("seed-2011", changes | dict.fromkeys(ERRORS[name].keys() - SLOW.keys() - CABLE.keys())), "fixed"
-    )
+    absent = dict.fromkeys(ERRORS[name].keys() - CABLE.keys())
+    perfect = hit.run(load("seed-2011", changes | absent), "fixed")
     assert result.force_sha256 != perfect.force_sha256
 
 
@@ -62,14 +65,13 @@ def test_the_loop_under_cocotb_sees_the_same_pins():
 
 
 def test_axes_of_one_pipeline_have_errors_of_their_own():
-    brief = {"protocol.settle_s": 4e-3, "protocol.mean_s": 1e-3, "protocol.measure_s": 2e-3}
     own = {f"axis.elbow.{key}": value for key, value in SCALE.items()}
     own |= {
         "axis.elbow.encoder.jitter_s": 1e-8,
         "axis.elbow.encoder.glitches_hz": 2e4,
         "axis.elbow.encoder.glitch_s": 1e-7,
     }
-    scene = load_any("eight-axes", brief | own)
+    scene = load_any("eight-axes", SHORT_OF_AXES | own)
     fixed, rtl = (hit_axes.run(scene, backend) for backend in ("fixed", "rtl"))
     for name, each in fixed.hits.items():
         assert each.force_sha256 == rtl.hits[name].force_sha256, name
