@@ -37,7 +37,7 @@ def test_rows_as_json_and_as_a_table(monkeypatch, capsys):
 
 
 def test_the_errors_of_the_encoder_are_in_rows_and_beside_the_table(monkeypatch, capsys):
-    arguments = ["accuracy", "--estimators", "fdm", "--rates", "1e4", "--signal", "stop", "--workers", 1]
+    arguments = ["accuracy", "--estimators", "fdm", "--rates", "1e4", "--signal", "steady:10", "--workers", 1]
     own = ["--set", "encoder.edge_error_counts=0.15", "--set", "encoder.hysteresis_counts=0.5"]
     row = json.loads(call(monkeypatch, capsys, *arguments, *own, "--json")[1])["rows"][0]
     assert row["encoder"] == {"edge_error_counts": 0.15, "hysteresis_counts": 0.5}
