@@ -2,19 +2,26 @@
 
 import hashlib
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ..estimates import figures, recording, signals
-from ..estimates.accuracy import COARSEN, measure, measure_recording, spec_of
+from ..estimates.accuracy import COARSEN, PHASE, errors_of, measure, measure_recording, spec_of
 from ..estimates.replay import ReplayError, check_length, plan
 from ..jobs.store import Store
 from ..studies import accuracy
 from ..walls.methods import Curve
-from ..world.encoder import offsets
 from .errors import BadInput
-from .options import BackendOption, EstimatorsOption, curves_of, rates_of, within
+from .options import (
+    BackendOption,
+    EncoderSetOption,
+    EstimatorsOption,
+    curves_of,
+    encoder_of,
+    rates_of,
+    within,
+)
 from .study import StudyOptions, study
 
 ACCELERATIONS_M_PER_S2 = 1e-9, 1e6
@@ -43,14 +50,17 @@ def command(
         float | None,
         typer.Option(metavar="C", help="acceleration that sets the gains, m/s^2", show_default="the signal's own"),
     ] = None,
+    assignments: EncoderSetOption = None,
 ) -> None:
     if figure and signal:
         raise BadInput(f"--figure {figure} has a signal of its own: give it or --signal, not both")
     curves = figures.curves(figure) if wanted is None and figure else curves_of(wanted)
     known, recorded = _signals(list(dict.fromkeys(signal or ["paper"])))
-    if not known and (rates is not None or encoder_phase_error or acceleration_max is not None):
+    encoder = _encoder(assignments, encoder_phase_error)
+    if not known and (rates is not None or encoder or acceleration_max is not None):
         raise BadInput(
-            "--rates, --encoder-phase-error and --acceleration-max are for known motions: a recording has its own"
+            "--rates, --encoder-phase-error and --acceleration-max are for known motions, as is --set: a recording has "
+            "its own"
         )
     if acceleration_max is not None:
         within(acceleration_max, "--acceleration-max", *ACCELERATIONS_M_PER_S2, "m/s^2")
@@ -59,13 +69,15 @@ def command(
         raise BadInput("--plot draws error against rate for one signal that is no recording: give one --signal")
     if options.plot and figure == 1 and (len(at) > 1 or at[0] > DRAWN_HZ_MAX):
         raise BadInput(f"--figure 1 is drawn at one rate of at most {DRAWN_HZ_MAX:g} Hz, not {rates!r}")
-    of_all = {"backend": backend, "phase_error_counts": encoder_phase_error}
+    of_all: dict[str, Any] = {"backend": backend}
+    if encoder:
+        of_all["encoder"] = encoder
     if acceleration_max is not None:
         of_all["acceleration_max_m_per_s2"] = acceleration_max
     labelled = accuracy.jobs(curves, known, at, of_all)
     labels, jobs = [label for label, _ in labelled], [job for _, job in labelled]
     try:
-        offsets(encoder_phase_error)
+        errors_of(encoder)
         # Invalid input is reported before anything long begins.
         for job in jobs:
             spec_of(job)
@@ -75,6 +87,14 @@ def command(
     except (ValueError, recording.RecordingError, ReplayError) as error:
         raise BadInput(str(error)) from None
     options.finish(accuracy.Accuracy(figure, curves, rows, labels))
+
+
+def _encoder(assignments: list[str] | None, phase_error_counts: float) -> dict[str, Any]:
+    """Return the errors of the encoder, as for `measure`."""
+    encoder = encoder_of(assignments)
+    if phase_error_counts and PHASE in encoder:
+        raise BadInput(f"--encoder-phase-error must be absent beside --set {PHASE}, which is the same")
+    return encoder | ({PHASE: phase_error_counts} if phase_error_counts else {})
 
 
 def _signals(names: list[str]) -> tuple[list[str], list[tuple[str, str]]]:

@@ -5,7 +5,17 @@ from ..jobs.store import Store
 from ..studies import choose
 from .costs import costs_of
 from .errors import BadInput
-from .options import BackendOption, DeviceOption, EstimatorsOption, RateOption, SeedsOption, curves_of, rates_of
+from .options import (
+    BackendOption,
+    DeviceOption,
+    EncoderSetOption,
+    EstimatorsOption,
+    RateOption,
+    SeedsOption,
+    curves_of,
+    encoder_of,
+    rates_of,
+)
 from .study import StudyOptions, study
 
 
@@ -17,13 +27,15 @@ def command(
     backend: BackendOption = "fixed",
     device: DeviceOption = "ecp5-25k",
     seeds: SeedsOption = 3,
+    assignments: EncoderSetOption = None,
 ) -> None:
     (sample_hz,) = rates_of(str(rate), "--rate")
     pairs = [(curve.estimator, curve.output) for curve in curves_of(wanted)]
-    jobs = choose.jobs(pairs, sample_hz, backend)
+    situations = choose.situations_with(encoder_of(assignments))
+    jobs = choose.jobs(pairs, sample_hz, backend, situations)
     try:
         measured = options.results(f"situations, {backend}", measure, jobs, Store("accuracy"))
     except ValueError as error:
         raise BadInput(str(error)) from None
     costs = costs_of(options, list(dict.fromkeys(name for name, _ in pairs)), device, seeds)
-    options.finish(choose.Choice(choose.table(pairs, measured, costs)))
+    options.finish(choose.Choice(choose.table(pairs, measured, costs, situations), situations))

@@ -12,8 +12,9 @@ import typer
 from ...model.checks import shown
 from ...model.estimators import registry
 from ..boards.parts import PARTS
-from ..estimates.accuracy import RATES_HZ, outputs
-from ..scene.load import names, toml_of
+from ..estimates.accuracy import FASTEST, RATES_HZ, SCENE, outputs
+from ..scene.errors import SceneError
+from ..scene.load import load, names, toml_of
 from ..walls.methods import Curve, label
 from .errors import BadInput
 
@@ -74,6 +75,10 @@ SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="change a key of the scene; an empty value takes it out"),
 ]
+EncoderSetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="encoder.KEY=VALUE", help="give the encoder an error: a key of a scene's encoder"),
+]
 PlotOption = Annotated[Path | None, typer.Option(metavar="FILE", help="draw the result: .png, .svg or .pdf")]
 JsonOption = Annotated[bool, typer.Option("--json", help="print JSON on stdout, and nothing else")]
 
@@ -90,6 +95,20 @@ def changes_of(assignments: list[str] | None, **options: Any) -> dict[str, Any]:
         if value is not None:
             key = name.replace("__", ".")
             _change(changes, f"--{key.rpartition('.')[2].partition('_')[0]}", key, value)
+    return changes
+
+
+def encoder_of(assignments: list[str] | None) -> dict[str, Any]:
+    """Return the errors of the encoder that is measured, by their keys of a scene, from `--set`."""
+    changes = changes_of(assignments)
+    for key in changes:
+        if not key.startswith("encoder.") or key == "encoder.count_m":
+            raise BadInput(f"--set must be of an error of the encoder, encoder.KEY=VALUE, not {shown(key)}")
+    if changes:
+        try:
+            load(SCENE, FASTEST | changes)
+        except SceneError as error:
+            raise BadInput(str(error)) from None
     return changes
 
 

@@ -8,6 +8,7 @@ path. Above 1 MHz the clock is faster than that of a real part, so the stamps ar
 import math
 from dataclasses import asdict, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ...model.compiled import compiled
 from ...model.estimators import registry
 from ...model.spec import AxisSpec
 from ..scene.load import load
-from ..world.encoder import offsets
+from ..world.encoder import Errors, offsets
 from . import recording, signals
 from .judge import Judge
 from .motions import velocity
@@ -28,6 +29,11 @@ RATES_HZ = (1_000, 10_000_000)
 CLOCK_HZ = 50_000_000
 CLOCKS = 50
 DELAY_MAX_S = 0.1
+SCENE = "mhz"
+"""The scene whose device is measured, and whose encoder is given errors."""
+FASTEST = {"controller.speed_max_m_per_s": 0.4}
+"""The speed up to which the errors of an encoder must leave edges their order: more than the paper's signal has."""
+PHASE = "encoder.phase_error_counts"
 COARSEN = 16
 """The factor by which a recording's counts are made coarser; the full counts are the reference."""
 
@@ -47,8 +53,41 @@ def outputs(text: str) -> list[tuple[str, str]]:
 
 @cache
 def _device() -> AxisSpec:
-    """Return the axis of the scene `mhz`."""
-    return load("mhz").spec
+    """Return the axis of the scene."""
+    return load(SCENE).spec
+
+
+def errors_of(encoder: dict[str, Any] | None) -> Errors:
+    """Return the errors of an encoder, given as changes of the scene's keys `encoder.KEY`.
+
+    A phase error alone may be as large as the order of edges allows, for the axis has no glitch filter; together with
+    other errors it has the limits of a scene.
+
+    Raises:
+        ValueError: if the errors are not valid.
+    """
+    encoder = encoder or {}
+    if encoder.keys() <= {PHASE}:
+        return Errors(offsets(encoder.get(PHASE, 0.0)))
+    return load(SCENE, FASTEST | encoder).encoder.errors
+
+
+def _said_by_row(encoder: dict[str, Any]) -> dict[str, Any]:
+    """Return what a row of `measure` says of its encoder: the phase error, and the others if there are any."""
+    others = {key.removeprefix("encoder."): value for key, value in encoder.items() if key != PHASE}
+    return {"encoder_phase_error_counts": encoder.get(PHASE, 0.0)} | ({"encoder": others} if others else {})
+
+
+def encoder_of(row: dict[str, Any]) -> dict[str, Any]:
+    """Return the errors of the encoder of a row of `measure`, as its argument."""
+    others = {f"encoder.{key}": value for key, value in row.get("encoder", {}).items()}
+    phase = row["encoder_phase_error_counts"]
+    return others | ({PHASE: phase} if phase else {})
+
+
+def said_of(encoder: dict[str, Any]) -> str:
+    """Return the errors of an encoder in words, such as "edge_error_counts 0.05, seed 3"; empty for none."""
+    return ", ".join(f"{key.removeprefix('encoder.')} {value}" for key, value in encoder.items())
 
 
 def axis_spec(
@@ -110,7 +149,7 @@ def measure(
     signal: str,
     sample_hz: int,
     backend: str = "float",
-    phase_error_counts: float = 0.0,
+    encoder: dict[str, Any] | None = None,
     acceleration_max_m_per_s2: float | None = None,
     gains: dict[str, float] | None = None,
     bits_dropped: int = 0,
@@ -122,7 +161,7 @@ def measure(
         signal: name of the signal, as for `signals.load`.
         sample_hz: sample rate of the estimator.
         backend: `float`, `fixed` or `rtl`.
-        phase_error_counts: the distance, in counts, by which the encoder's channel B is late.
+        encoder: errors of the encoder, as for `errors_of`; None for none.
         acceleration_max_m_per_s2: C for the default gains; None for the signal's own.
         gains: gains to use instead, by the names of the estimator's `Gains`.
         bits_dropped: number of fraction bits taken from the estimator's words.
@@ -143,7 +182,7 @@ def measure(
         }
     )
     begin = math.ceil(known.judged_from_s * sample_hz)
-    judge, raised = judged(known, spec, output, backend, phase_error_counts)
+    judge, raised = judged(known, spec, output, backend, encoder)
     return {
         "estimator": estimator,
         "output": output,
@@ -158,7 +197,7 @@ def measure(
         "chatter_mm_s": judge.chatter * 1e3,
         "clock_hz": spec.clock_hz,
         "velocity_bits": spec.design.estimator.velocity.width,
-        "encoder_phase_error_counts": phase_error_counts,
+        **_said_by_row(encoder or {}),
         "acceleration_max_mm_s2": spec.acceleration_max_m_per_s2 * 1e3,
         "gains": asdict(spec.design.gains),
         "flags": spec.design.flag_names(raised),
@@ -166,14 +205,14 @@ def measure(
 
 
 def judged(
-    known: signals.Signal, spec: AxisSpec, output: str, backend: str, phase_error_counts: float = 0.0
+    known: signals.Signal, spec: AxisSpec, output: str, backend: str, encoder: dict[str, Any] | None = None
 ) -> tuple[Judge, int]:
     """Return the judge of an estimate of a signal, from the time on that the signal is judged from, and all flags.
 
     Args:
         known: the signal.
         spec: the axis.
-        output, backend, phase_error_counts: as for `measure`.
+        output, backend, encoder: as for `measure`.
 
     Raises:
         RuntimeError: if the RTL could not be built.
@@ -181,7 +220,7 @@ def judged(
     sample_hz = spec.sample_hz
     begin = math.ceil(known.judged_from_s * sample_hz)
     judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
-    for first, words, flags in velocities(known, spec, output, backend, offsets(phase_error_counts)):
+    for first, words, flags in velocities(known, spec, output, backend, *errors_of(encoder)):
         raised |= flags
         estimate = words[max(begin - first, 0) :]
         since = first + len(words) - len(estimate)

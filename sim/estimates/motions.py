@@ -11,7 +11,8 @@ import numpy as np
 
 from ...model.compiled import by_type, compiled
 from ...model.stamped import Edges
-from ..world.encoder import Cell, Encoder, edge, level, locate
+from ..world.encoder import Encoder, level, locate, next_cell
+from ..world.lines import carried, jittered_s
 
 BISECTIONS = 200
 """The largest number of halvings in the search for a turn or a passage, which ends earlier at float64's resolution."""
@@ -210,9 +211,8 @@ def _edges(motion, encoder, step_s, steps, room):
                 if passages == room:
                     return times, cells, room + 1
                 since_s = _passage(motion, since_s, end_s, cell.upper_m if upwards else cell.lower_m, upwards)
-                number = cell.number + (1 if upwards else -1)
-                cell = Cell(number, edge(encoder, number), edge(encoder, number + 1))
-                times[passages], cells[passages] = since_s, number
+                cell = next_cell(encoder, cell, upwards)
+                times[passages], cells[passages] = since_s, cell.number
                 passages += 1
             begin_s = end_s
     return times, cells, passages
@@ -236,7 +236,7 @@ def encoded(motion, encoder: Encoder, seconds: float, step_s: float, offset_cloc
     """Return the edges of a motion from time 0 on, in order of time.
 
     An edge that is passed at time t is stamped ceil(t clock_hz) + offset_clocks moving up, floor(t clock_hz) + 1 +
-    offset_clocks moving down, as everywhere (`sim.world.encoder`).
+    offset_clocks moving down, as everywhere (`sim.world.encoder`); with lines by the time at which it is shown.
 
     Args:
         motion: one of this module's motions.
@@ -254,7 +254,11 @@ def encoded(motion, encoder: Encoder, seconds: float, step_s: float, offset_cloc
     times, cells = times[:passages], cells[:passages]
     start = locate(encoder, position(motion, 0.0)).number
     upwards = np.diff(cells, prepend=start) > 0
-    at = times * encoder.clock_hz
-    clocks = np.where(upwards, np.ceil(at), np.floor(at) + 1).astype(np.int64) + offset_clocks
+    lines, clock_hz, start_level = encoder.lines, encoder.clock_hz, int(level(start))
+    at = clock_hz * (times if lines is None else jittered_s(lines, cells + ~upwards, upwards, times, clock_hz))
+    clocks = np.where(upwards, np.ceil(at), np.floor(at) + 1).astype(np.int64)
     quarter = (cells + 1) & 3
-    return Encoded(Edges(clocks, quarter ^ (quarter >> 1)), int(level(start)), int(start))
+    edges = Edges(clocks, quarter ^ (quarter >> 1))
+    if lines is not None:
+        edges = carried(lines, edges, start_level, seconds, clock_hz)
+    return Encoded(Edges(edges.clocks + offset_clocks, edges.levels), start_level, int(start))

@@ -2,7 +2,7 @@
 
 The edges are placed so that the count at the strobe of sample k is exactly that of the position at time k / sample_hz.
 The decoder's latency is left out, because it is the same for every estimator. A stamp is the clock in which its edge
-was decoded. Its pins have no glitches, and `accuracy.axis_spec` has no filter.
+was decoded. The pins have no glitches but those that are asked for, and `accuracy.axis_spec` has no filter.
 """
 
 from collections.abc import Iterator
@@ -16,11 +16,16 @@ from ...model.stamped import Edges
 from ..loop.backends import is_exact, number_of, opened
 from ..loop.controllers import sample, sample_quietly
 from ..world.encoder import Encoder
+from ..world.lines import Lines
+from ..world.scale import Scale
 from .motions import Encoded, encoded
 from .signals import Signal
 from .through_pins import DECODER_CLOCKS
 
 CHUNK = 1 << 18
+
+Offsets = tuple[float, float, float, float]
+"""The errors of the four kinds of edges, in counts, from `sim.world.encoder.offsets`."""
 
 
 @compiled
@@ -39,15 +44,23 @@ def _take(controller, state, timing, edges, taken, first, velocity):
     return state, taken
 
 
-def encoded_signal(signal: Signal, spec: AxisSpec, offsets: tuple[float, float, float, float]) -> Encoded:
-    """Return the edges of a signal at the pins of an axis, from an encoder with these errors (counts)."""
-    encoder = Encoder(spec.count_m, float(spec.clock_hz), offsets)
+def encoded_signal(
+    signal: Signal, spec: AxisSpec, offsets: Offsets, scale: Scale | None = None, lines: Lines | None = None
+) -> Encoded:
+    """Return the edges of a signal at the pins of an axis, from an encoder with these errors: see `Encoder`."""
+    encoder = Encoder(spec.count_m, float(spec.clock_hz), offsets, scale, lines)
     lead = spec.clocks_per_sample - 1 - DECODER_CLOCKS
     return encoded(signal.motion, encoder, signal.seconds, signal.turns_apart_s, lead)
 
 
 def velocities(
-    signal: Signal, spec: AxisSpec, output: str, backend: str, offsets: tuple[float, float, float, float]
+    signal: Signal,
+    spec: AxisSpec,
+    output: str,
+    backend: str,
+    offsets: Offsets,
+    scale: Scale | None = None,
+    lines: Lines | None = None,
 ) -> Iterator[tuple[int, np.ndarray, int]]:
     """Yield the chunks of a signal, each as (first sample, velocities in m/s, sticky flags).
 
@@ -56,12 +69,12 @@ def velocities(
         spec: specification of the axis.
         output: the estimator's output.
         backend: one of `backends.BACKENDS`.
-        offsets: errors of the encoder, in counts, from `sim.world.encoder.offsets`.
+        offsets, scale, lines: errors of the encoder: see `sim.world.encoder.Encoder`.
 
     Raises:
         RuntimeError: if the RTL could not be built.
     """
-    passed, parameters = encoded_signal(signal, spec, offsets), spec.design.estimator.choose(output)
+    passed, parameters = encoded_signal(signal, spec, offsets, scale, lines), spec.design.estimator.choose(output)
     unit = spec.velocity_unit_m_per_s * (spec.design.estimator.velocity.lsb if is_exact(backend) else 1.0)
     samples, taken = int(signal.seconds * spec.sample_hz), 0
     with opened(spec, backend, parameters, passed.start_level) as axis:

@@ -13,6 +13,7 @@ from ...model.design import change_of, overlap_of, strobe_of
 from ..world.advance import Interval, Moment, advance, advance_quietly
 from .actuation import actuated
 from .controllers import sample, sample_quietly, taken_off
+from .pins import shown
 from .sweep import sweep, sweeps
 from .values import Progress
 
@@ -29,7 +30,7 @@ def run(world, controller, state, progress, memory, until):
         until: number of the first sample not to take, within the arrays' length. The run stops early if edges were
             lost.
     """
-    plant, timing, edges = world.plant, world.timing, memory.edges
+    plant, encoder, timing, edges = world.plant, world.encoder, world.timing, memory.edges
     overlap = overlap_of(timing)
     first, moment, force_n, at = progress
     k = first
@@ -40,7 +41,8 @@ def run(world, controller, state, progress, memory, until):
         # From the strobe until the drive changes, the old force acts.
         interval = Interval(world.after, strobe, changed - strobe)
         after, quiet = advance_quietly(plant, moment, force_n, interval)
-        moment = after if quiet else advance(plant, world.encoder, moment, force_n, interval, edges)
+        after = after if quiet else advance(plant, encoder, moment, force_n, interval, edges)
+        moment = shown(memory.waiting, encoder.lines, encoder.clock_hz, moment.n_edges, after, interval)
 
         if moment.n_edges > 0:
             state, taken = sample(controller, state, edges, moment.n_edges, strobe_of(timing, k))
@@ -56,7 +58,8 @@ def run(world, controller, state, progress, memory, until):
         changed = change_of(timing, k)
         interval = Interval(world.before, changed, strobe_of(timing, k + 1 + overlap) - changed)
         after, quiet = advance_quietly(plant, moment, force_n, interval)
-        moment = after if quiet else advance(plant, world.encoder, moment, force_n, interval, edges)
+        after = after if quiet else advance(plant, encoder, moment, force_n, interval, edges)
+        moment = shown(memory.waiting, encoder.lines, encoder.clock_hz, moment.n_edges, after, interval)
         k += 1
         newest = now if overlap else moment.motion
         at = at[1:] + (newest,)  # noqa: RUF005  (Numba joins tuples, and unpacks none)

@@ -13,15 +13,18 @@ from ..rtl.c_function import call
 from ..rtl.verilated import RtlState
 from ..world.advance import Interval, Moment, advance, advance_quietly
 from .actuation import actuated
+from .pins import shown
 
 # The values that `axes_read` of sim/rtl/axes_library.cpp returns, by number.
 READ_VELOCITY, READ_FLAGS = 0, 1
 
 
 @inlined
-def _advanced(world, moment, force_n, interval, edges):
+def _advanced(world, memory, moment, force_n, interval):
+    encoder = world.encoder
     after, quiet = advance_quietly(world.plant, moment, force_n, interval)
-    return after if quiet else advance(world.plant, world.encoder, moment, force_n, interval, edges)
+    after = after if quiet else advance(world.plant, encoder, moment, force_n, interval, memory.edges)
+    return shown(memory.waiting, encoder.lines, encoder.clock_hz, moment.n_edges, after, interval)
 
 
 @inlined
@@ -59,7 +62,7 @@ def turns(world, controller, progress, memory, flags, samples):
     while k < samples:
         # As in `loop.run`: from the strobe until the drive changes the old force acts, then the new one.
         strobe, changed, now = strobe_of(timing, k + overlap), change_of(timing, k), moment.motion
-        moment = _advanced(world, moment, force_n, Interval(world.after, strobe, changed - strobe), edges)
+        moment = _advanced(world, memory, moment, force_n, Interval(world.after, strobe, changed - strobe))
         if moment.n_edges < 0:
             return
         moment = _give(controller, moment, edges)
@@ -68,7 +71,7 @@ def turns(world, controller, progress, memory, flags, samples):
         flags[0] = state.flags
         force_n = actuated(world, memory, k % room, k, at[0], state)
         interval = Interval(world.before, changed, strobe_of(timing, k + 1 + overlap) - changed)
-        moment = _advanced(world, moment, force_n, interval, edges)
+        moment = _advanced(world, memory, moment, force_n, interval)
         newest = now if overlap else moment.motion
         at = at[1:] + (newest,)  # noqa: RUF005  (Numba joins tuples, and unpacks none)
         k += 1

@@ -1,6 +1,7 @@
 """The values that a run of the closed loop takes, writes to and returns.
 
-A part that a scene lacks (`converter`, `sweep`, `delay`, what is kept) is None, and then has no machine code.
+A part that a scene lacks (`converter`, `sweep`, `delay`, `waiting`, what is kept) is None, and then has no machine
+code.
 """
 
 from typing import NamedTuple
@@ -14,6 +15,7 @@ from ..world.converter import Converter
 from ..world.encoder import Encoder
 from ..world.euler import Stepped
 from ..world.linear import State
+from ..world.lines import Waiting
 from ..world.rigid import Motion, Rigid, Span
 from ..world.taylor import Train
 from .record import Kept
@@ -72,3 +74,4 @@ class Memory(NamedTuple):
     detail: Kept | None
     positions: np.ndarray  # float64: the position (m) at each sample of a call
     drives: np.ndarray  # the drive (force LSB) after each
+    waiting: Waiting | None = None  # what is on its way over the encoder's lines

@@ -5,12 +5,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..estimates import signals
-from ..estimates.accuracy import axis_spec, exact_velocity
+from ..estimates.accuracy import axis_spec, encoder_of, errors_of, exact_velocity, said_of
 from ..estimates.figures import lower_bound_m_per_s, window_floor_m_per_s
 from ..estimates.playback import velocities
 from ..studies.accuracy import Accuracy
 from ..walls.methods import Curve
-from ..world.encoder import offsets
 from .labels import label_right
 from .style import LABEL_PT, MARK, THEORY, TRUTH, ink, looks, name_above, new_figure, page
 
@@ -47,7 +46,7 @@ def _figure_1(curves: list[Curve], rows: list[dict]) -> Figure:
     styles = looks([(curve.estimator, curve.output) for curve in curves])
     for index, (curve, row, style) in enumerate(zip(curves, rows, styles, strict=True)):
         spec = axis_spec(row["estimator"], sample_hz, row["acceleration_max_mm_s2"] / 1e3, row["gains"])
-        parts = velocities(signal, spec, row["output"], backend, offsets(row["encoder_phase_error_counts"]))
+        parts = velocities(signal, spec, row["output"], backend, *errors_of(encoder_of(row)))
         estimate = np.concatenate([part for _, part, _ in parts]) * 1e3
         # The first curve is on top, as a chattering curve would hide a lagging curve; the others are translucent.
         line = {"color": style["color"], "lw": 0.9, "zorder": 3 - index / len(curves), "alpha": 0.5 if index else 1.0}
@@ -94,6 +93,8 @@ def _against_rate(rows: list[dict], labels: list[str]) -> Figure:
     first = rows[0]
     phase = first["encoder_phase_error_counts"]
     encoder = f", encoder out of phase by {phase:g} counts" if phase else ""
+    if "encoder" in first:
+        encoder = f",\nencoder with {said_of(encoder_of(first))}"
     title = f'RMS error on the signal "{first["signal"]}", counts of 1 µm, {first["backend"]}{encoder}'
     picture = new_figure(6.0, title)
     axes = picture.subplots()

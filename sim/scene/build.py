@@ -95,7 +95,7 @@ def world_of(scene: Scene) -> World:
             plant = stepped(plant, parts.transmission is not None, scene.solver.step_s)
     return World(
         plant=plant,
-        encoder=Encoder(spec.count_m, float(spec.clock_hz), scene.encoder.offsets),
+        encoder=Encoder(spec.count_m, float(spec.clock_hz), *scene.encoder.errors),
         converter=_converter(scene),
         push_n=scene.protocol.push_n,
         force_lsb_n=spec.force_resolution_n,
@@ -108,18 +108,18 @@ def world_of(scene: Scene) -> World:
 def sweep_of(scene: Scene, world: World, controller: object) -> Sweep | None:
     """Return what the loop needs to sweep over samples; None if it cannot: see `sim.loop.sweep`.
 
-    Only a model can be given a count, a rigid handle alone has a motion of one sign, and the estimator must not look at
-    stamps. The edges before a changed drive must be counted at the strobe after the next.
+    Only a model can be given a count, a rigid handle alone has a motion of one sign, the estimator must not look at
+    stamps, and the pins must be those of the handle's place. The edges before a changed drive must be counted at the
+    strobe after the next.
     """
     spec, timing = scene.spec, world.timing
     if not isinstance(controller, Controller) or not isinstance(world.plant, Rigid):
         return None
-    if spec.design.estimator.uses_stamps():
+    if spec.design.estimator.uses_stamps() or scene.encoder.depends_on_the_way:
         return None
     latency = quadrature.latency(controller.glitch_clocks)
     clocks = timing.clocks_per_sample - timing.latency - latency
-    offsets = scene.encoder.offsets
-    closest_m = min(1 + offsets[(kind + 1) % 4] - offsets[kind] for kind in range(4)) * spec.count_m
+    closest_m = scene.encoder.closest_counts * spec.count_m
     # An edge that is decoded before the next one has been seen is the only one under way; and edge by edge, a sample
     # would not have so many that some are lost.
     apart_s = max((latency + 1) / spec.clock_hz, 4 / EDGE_CAPACITY / spec.sample_hz)

@@ -16,8 +16,6 @@ SAMPLES_MAX = 10**9
 """The most samples in a run's settling or measuring: a minute or two with the model, hours with the RTL."""
 STEPS_MAX = 10_000
 """The most steps of a map in either direction, and the most steps of a fixed-step solver in a sample."""
-ERROR_MAX_COUNTS = 0.5
-"""The distance of an edge from its ideal place from which the decoder promises nothing."""
 DELAY_SAMPLES_MAX = 10**6
 """The most drives that a late amplifier holds."""
 
@@ -47,7 +45,8 @@ def _key_of(field: str, scene: Scene) -> str:
 
 def check(scene: Scene) -> None:
     """Raise ValueError for errors that the sections of a `Scene` cannot see alone; the message begins with the key."""
-    _check_encoder(scene)
+    scene.encoder.check()
+    scene.encoder.check_at(scene.edges_hz, scene.controller.sample_hz)
     if scene.drive is not None:
         scene.drive.check()
     _check_axis(scene)
@@ -61,18 +60,6 @@ def check(scene: Scene) -> None:
         _check_map(scene)
 
 
-def _check_encoder(scene: Scene) -> None:
-    try:
-        error_counts = scene.encoder.error_counts
-    except ValueError as error:
-        raise ValueError(f"encoder.{error}") from None
-    if not error_counts < ERROR_MAX_COUNTS:
-        raise ValueError(
-            f"encoder.phase_error_counts and duty_error_counts must move each edge by less than {ERROR_MAX_COUNTS:g} "
-            f"counts, not {error_counts:g}"
-        )
-
-
 def _check_axis(scene: Scene) -> None:
     try:
         spec, outputs = scene.spec, scene.spec.design.estimator.outputs
@@ -84,7 +71,8 @@ def _check_axis(scene: Scene) -> None:
         _check_words(scene)
     except FieldError as error:
         raise ValueError(f"{_key_of(error.field, scene)} {error.message}") from None
-    fastest = spec.count_m * max_edge_rate(spec.clock_hz, scene.glitch_clocks, scene.encoder.error_counts)
+    error_counts = scene.encoder.error_counts_at(scene.edges_hz)
+    fastest = spec.count_m * max_edge_rate(spec.clock_hz, scene.glitch_clocks, error_counts)
     if spec.speed_max_m_per_s > fastest:
         raise ValueError(
             f"controller.speed_max_m_per_s must be at most {fastest:g}, the decoder's limit at this clock, count size, "

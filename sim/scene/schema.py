@@ -13,16 +13,15 @@ from ...model.design import Timing
 from ...model.designed import DesignedAxis
 from ...model.drive import pdm
 from ...model.estimators import registry
-from ...model.quadrature_speed import GLITCH_CLOCKS_MAX, glitch_clocks_for
+from ...model.quadrature_speed import GLITCH_CLOCKS_MAX, SPEED_MARGIN, glitch_clocks_for
 from ...model.spec import AxisSpec
-from ..world.encoder import offsets
 from .drive import DriveSection
+from .encoder_section import EncoderSection
 from .quantities import (
     Acceleration,
     Bandwidth,
     Current,
     Damping,
-    EdgeError,
     Force,
     Gain,
     Inductance,
@@ -51,24 +50,6 @@ class HandleSection(Section):
     mass_kg: Mass
     viscous_n_s_per_m: or_none(Damping) = 0.0
     coulomb_n: or_none(Force) | None = None
-
-
-class EncoderSection(Section):
-    """The scale; without errors its edges are where they should be."""
-
-    count_m: Length
-    phase_error_counts: EdgeError | Annotated[list[EdgeError], Field(min_length=4, max_length=4)] = 0.0
-    duty_error_counts: EdgeError = 0.0
-
-    @cached_property
-    def offsets(self) -> tuple[float, float, float, float]:
-        """The distances of the four kinds of edges from their ideal positions, counts."""
-        return offsets(self.phase_error_counts, self.duty_error_counts)
-
-    @property
-    def error_counts(self) -> float:
-        """The largest of these distances, either way."""
-        return max(map(abs, self.offsets))
 
 
 def _gains_section(name: str) -> type[Section]:
@@ -233,13 +214,18 @@ class Scene(Section):
         return self.spec.design.timing
 
     @property
+    def edges_hz(self) -> float:
+        """The rate of edges at the largest speed."""
+        return self.controller.speed_max_m_per_s / self.encoder.count_m
+
+    @property
     def glitch_clocks(self) -> int:
         """The glitch filter: the scene's own, or the longest that its speed and the errors of its encoder leave."""
         given = self.controller.glitch_clocks
         if given is not None:
             return given
-        edges_hz = self.controller.speed_max_m_per_s / self.encoder.count_m
-        return glitch_clocks_for(edges_hz / self.controller.clock_hz, self.encoder.error_counts)
+        error_counts = self.encoder.error_counts_at(SPEED_MARGIN * self.edges_hz)
+        return glitch_clocks_for(self.edges_hz / self.controller.clock_hz, error_counts)
 
     @property
     def estimator_output(self) -> str:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from ..estimates.accuracy import encoder_of, said_of
 from ..jobs.result import Table, table_of
 from ..walls.methods import Curve
 
@@ -34,7 +35,9 @@ class Accuracy:
         return [_table(rows, unit) for unit, rows in by_unit.items() if rows]
 
     def notes(self) -> list[str]:
-        return []
+        """Return what is wrong with the encoder, the same in all rows."""
+        said = {said_of(encoder_of(row)) for row in self.rows if "encoder_phase_error_counts" in row}
+        return [f"encoder: {errors}" for errors in sorted(filter(None, said))]
 
 
 def _table(rows: list[dict[str, Any]], unit: str) -> Table:

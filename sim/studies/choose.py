@@ -4,39 +4,54 @@ The gains follow from the bound C on the acceleration of the impact: a device ke
 are RMS, in mm/s.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from ...model.estimators import registry
 from ..estimates import signals
+from ..estimates.accuracy import said_of
 from ..jobs.result import Table, table_of
 
 PHASE_ERROR_COUNTS = 0.25
-SITUATIONS = {
+EDGE_ERROR_COUNTS = 0.05
+Situations = dict[str, dict[str, Any]]
+"""Arguments of `accuracy.measure`, by the name of the situation."""
+
+SITUATIONS: Situations = {
     "slow": {"signal": "steady:1.037"},
     "fast": {"signal": "steady:301.7"},
     "moving": {"signal": "paper"},
     "impact": {"signal": "hit"},
     "standstill": {"signal": "flicker"},
-    "bad encoder": {"signal": "paper", "phase_error_counts": PHASE_ERROR_COUNTS},
+    "bad encoder": {"signal": "paper", "encoder": {"encoder.phase_error_counts": PHASE_ERROR_COUNTS}},
+    "single edges": {"signal": "paper", "encoder": {"encoder.edge_error_counts": EDGE_ERROR_COUNTS}},
 }
 """Motions of a handle: about 1 and 300 mm/s (not round speeds, whose counts lock to the samples), the paper's swing, a
-hit of a wall, a count that flickers, and the swing seen by a bad encoder."""
+hit of a wall, a count that flickers, and the swing seen by two bad encoders: the errors of the one repeat every four
+edges, those of the other are each edge's own."""
+OWN = "own encoder"
+"""The situation of an encoder that the user describes: the swing, too."""
+
+
+def situations_with(encoder: dict[str, Any]) -> Situations:
+    """Return the situations, and `OWN` if an encoder is given, as for `accuracy.measure`."""
+    return SITUATIONS | ({OWN: {"signal": "paper", "encoder": encoder}} if encoder else {})
 
 
 @dataclass(frozen=True)
 class Choice:
-    """The table to choose by: rows of `table`."""
+    """The table to choose by: rows of `table`, and the situations that they are of."""
 
     rows: list[dict[str, Any]]
+    situations: Situations = field(default_factory=lambda: SITUATIONS)
 
     def report(self) -> dict[str, Any]:
-        """Return the rows, units in the keys."""
-        return {"rows": self.rows}
+        """Return the rows and the situations, units in the keys."""
+        return {"rows": self.rows, "situations": self.situations}
 
     def tables(self) -> list[Table]:
         """Return the table of errors and the table of costs."""
-        names = list(SITUATIONS)
+        names = list(self.situations)
         best = {name: min(row["rms_mm_s"][name] for row in self.rows) for name in names}
         errors, costs = [], []
         for row in self.rows:
@@ -54,33 +69,37 @@ class Choice:
         ]
 
     def notes(self) -> list[str]:
-        """Return the meaning of a star."""
-        return ["*: the least error"]
+        """Return the meaning of a star, and what is wrong with each encoder that has errors."""
+        encoders = {name: situation.get("encoder", {}) for name, situation in self.situations.items()}
+        return ["*: the least error", *(f"{name}: {said_of(keys)}" for name, keys in encoders.items() if keys)]
 
 
-def jobs(pairs: list[tuple[str, str]], sample_hz: int, backend: str) -> list[dict]:
+def jobs(pairs: list[tuple[str, str]], sample_hz: int, backend: str, situations: Situations = SITUATIONS) -> list[dict]:
     """Return the arguments of `accuracy.measure` for every situation of every (estimator, output) pair."""
     bound = signals.load("hit").acceleration_max_m_per_s2
     common = {"sample_hz": sample_hz, "backend": backend, "acceleration_max_m_per_s2": bound}
     return [
         {"estimator": estimator, "output": output, **common, **situation}
         for estimator, output in pairs
-        for situation in SITUATIONS.values()
+        for situation in situations.values()
     ]
 
 
-def table(pairs: list[tuple[str, str]], measured: list[dict], costs: list[dict]) -> list[dict]:
+def table(
+    pairs: list[tuple[str, str]], measured: list[dict], costs: list[dict], situations: Situations = SITUATIONS
+) -> list[dict]:
     """Return a row for every (estimator, output) pair: its errors by situation, its delay and its cost.
 
     Args:
         pairs: estimators and their outputs.
         measured: results of `accuracy.measure` for `jobs`, in the same order.
         costs: results of `costs.cost`, one for every estimator.
+        situations: those of `jobs`.
     """
     by_name = {row["estimator"]: row for row in costs}
-    rows, situations = [], len(SITUATIONS)
+    rows, each = [], len(situations)
     for index, (estimator, output) in enumerate(pairs):
-        own = dict(zip(SITUATIONS, measured[index * situations : (index + 1) * situations], strict=True))
+        own = dict(zip(situations, measured[index * each : (index + 1) * each], strict=True))
         cost = by_name[estimator]
         rows.append(
             {

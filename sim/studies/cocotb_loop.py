@@ -19,12 +19,14 @@ from cocotb.triggers import ClockCycles, ReadOnly, Timer
 from ...model.design import change_of, overlap_of, strobe_of
 from ...model.stamped import room_for
 from ..loop.controllers import taken_off
+from ..loop.pins import shown
 from ..loop.values import EDGE_CAPACITY
 from ..scene.build import start_of, world_of
 from ..scene.case import Case
 from ..world.advance import Interval, advance
 from ..world.converter import converted
 from ..world.encoder import level
+from ..world.lines import waiting
 
 PERIOD_NS = 10
 """The period of the simulated clock; only the number of cycles matters."""
@@ -39,7 +41,9 @@ async def closed_loop(dut):
     world, edges = world_of(scene), room_for(EDGE_CAPACITY)
     timing, overlap = world.timing, overlap_of(world.timing)
     _, moment, force_n, _ = start_of(scene, world)
-    await _open(dut, scene, int(level(moment.cell.number)))
+    start_level = int(level(moment.cell.number))
+    kept = waiting(world.encoder.lines, start_level, edges)
+    await _open(dut, scene, start_level)
     # `_open` has run clock 0. Half a period later, pins change between two rising edges: in clock n, before edge n.
     await Timer(PERIOD_NS // 2, "ns")
 
@@ -50,7 +54,7 @@ async def closed_loop(dut):
     for k in range(order["samples"]):
         strobe, until = strobe_of(timing, k + overlap), change_of(timing, k)
         interval = Interval(world.after, strobe, until - strobe)
-        moment = advance(world.plant, world.encoder, moment, force_n, interval, edges)
+        moment = _advanced(world, kept, edges, moment, force_n, interval)
         taken = 0
         while taken < moment.n_edges and edges.clocks[taken] < until:
             if edges.clocks[taken] > now:
@@ -70,11 +74,18 @@ async def closed_loop(dut):
         remaining = strobe_of(timing, k + 1 + overlap) - until
         if remaining:
             interval = Interval(world.before, until, remaining)
-            moment = advance(world.plant, world.encoder, moment, force_n, interval, edges)
+            moment = _advanced(world, kept, edges, moment, force_n, interval)
     seconds = time.perf_counter() - began
     actuations = np.array(words[:: scene.spec.samples_per_actuation], "<i4")
     report = {"seconds": seconds, "force_sha256": hashlib.sha256(actuations.tobytes()).hexdigest()}
     Path(order["report"]).write_text(json.dumps(report))
+
+
+def _advanced(world, kept, edges, moment, force_n, interval):
+    """Return the `Moment` after an interval, with the edges that the pins show."""
+    encoder, before = world.encoder, moment.n_edges
+    moment = advance(world.plant, encoder, moment, force_n, interval, edges)
+    return shown(kept, encoder.lines, encoder.clock_hz, before, moment, interval)
 
 
 async def _open(dut, scene, start_level: int) -> None:

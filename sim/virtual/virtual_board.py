@@ -16,7 +16,8 @@ from ..rtl.board_library import BoardHardware
 from ..scene.build import start_of, world_of
 from ..scene.errors import SceneError
 from ..scene.schema import Scene
-from ..world.encoder import number_at
+from ..world.encoder import level, numbers_from
+from ..world.lines import waiting
 
 TURN_M = 4e-3
 """The distance of two pulses of the encoder's index."""
@@ -86,7 +87,9 @@ class VirtualBoard:
         self.hardware = BoardHardware(scene.spec, self._progress.moment.cell.number, turn_counts, baud, family)
         self.hand, self.reversed = Hand(scene.protocol.start_m), False
         self._edges, self._push_n = room_for(EDGE_CAPACITY), 0.0
-        self._number, self.positions_m = self._progress.moment.cell.number, np.zeros(0)
+        self._cell, self.positions_m = self._progress.moment.cell, np.zeros(0)
+        self._number = self._cell.number
+        self._waiting = waiting(self._world.encoder.lines, int(level(self._number)), self._edges)
 
     def __enter__(self) -> "VirtualBoard":
         self.hardware.__enter__()
@@ -99,12 +102,12 @@ class VirtualBoard:
     def run(self) -> bool:
         """Let `GRASP_S` pass, or a sample; return whether the encoder could follow the handle."""
         samples = max(round(self.scene.spec.sample_hz * GRASP_S), 1)
-        motion = self._progress.moment.motion
+        motion, self._cell = self._progress.moment.motion, self._progress.moment.cell
         room = np.zeros(samples), np.zeros(samples, np.int64)
         self._push_n = self.hand.force_n(self.scene.handle.mass_kg, motion[0], motion[1])
         given_n = -self.hardware.given_n if self.reversed else self.hardware.given_n
         world = self._world._replace(push_n=self._push_n, force_lsb_n=given_n)
-        memory = Memory(self._edges, None, None, None, *room)
+        memory = Memory(self._edges, None, None, None, *room, self._waiting)
         until = self._progress.sample + samples
         controller = self.hardware.controller
         self._state, self._progress = loop.run(world, controller, self._state, self._progress, memory, until)
@@ -113,8 +116,11 @@ class VirtualBoard:
 
     @property
     def counts(self) -> np.ndarray:
-        """The counts of the encoder at the strobes of the last `run`; the board has each a few clocks later."""
-        return number_at(self._world.encoder, self.positions_m) - self._number
+        """The counts of the encoder at the strobes of the last `run`; the board has each a few clocks later.
+
+        They are those of its scale: what its lines do to edges is for the board alone to see.
+        """
+        return numbers_from(self._world.encoder, self._cell, self.positions_m) - self._number
 
     @property
     def handle(self) -> Handle:

@@ -21,6 +21,7 @@ from ..loop.values import EDGE_CAPACITY, Memory
 from ..scene.build import output_step_n, start_of, sweep_of, work_of, world_of
 from ..scene.schema import Scene
 from ..world.encoder import level
+from ..world.lines import waiting
 from .tally import Tally
 
 CHUNK = 1 << 16
@@ -191,13 +192,15 @@ class Loop:
         if traces:
             overview = record.overview(spec, number, scene.samples, OVERVIEW_POINTS)
             detail = record.detail(spec, number, DETAIL_FROM_M, round(DETAIL_S * spec.sample_hz))
+        edges = stamped.room_for(EDGE_CAPACITY)
         self.memory = Memory(
-            edges=stamped.room_for(EDGE_CAPACITY),
+            edges=edges,
             delay=np.zeros(scene.delay_samples, number) if scene.delay_samples else None,
             overview=overview,
             detail=detail,
             positions=np.zeros(self.chunk),
             drives=np.zeros(self.chunk, number),
+            waiting=waiting(self.world.encoder.lines, self.start_level, edges),
         )
 
     def run(self, axis: Opened, marks: Marks, progress: Callable[[int], None] | None) -> Hit:

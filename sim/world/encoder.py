@@ -3,11 +3,16 @@
 Edge n stands at (n + offset[n mod 4]) counts, and cell n is the half-open stretch from edge n to edge n + 1. Moving
 up, edge n raises A, raises B, lowers A, lowers B for n mod 4 = 0, 1, 2, 3, so the levels (A, B) go
 00 -> 10 -> 11 -> 01 -> 00 and each edge is one count of +1; a count's number is the number of its cell. The offsets
-are the errors of a real scale: B out of its quarter period (phase), and high longer than low (duty).
+are the errors of a real scale: B out of its quarter period (phase), and high longer than low (duty). A `Scale` has the
+errors that do not repeat every four edges, and `Lines` what happens on the way to the pins; None is neither, and then
+nothing of them is compiled.
 
 An edge carries the number of the clock at which a register at the pin first holds the new level. At clock n the
 register sees the position at time n / clock_hz, so an edge passed at time t upwards is stamped ceil(t clock_hz), and
 downwards floor(t clock_hz) + 1: at the very edge the position belongs to the upper cell.
+
+With hysteresis h cell n begins h/2 below its lower edge and ends h/2 above its upper one: cells overlap, and the one
+that the handle is in is left at an end of it.
 """
 
 import math
@@ -15,7 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...model.compiled import compiled
+from ...model.compiled import compiled, inlined
+from .lines import Lines, shown_s
+from .scale import Scale, displacement, near
 
 # The least distance (counts) from one edge to the next: a closer pair is a glitch rather than quadrature.
 MARGIN = 0.05
@@ -27,6 +34,16 @@ class Encoder(NamedTuple):
     count_m: float  # distance from one edge to the next on an ideal scale, > 0
     clock_hz: float  # > 0
     offsets: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)  # counts: A rise, B rise, A fall, B fall
+    scale: Scale | None = None
+    lines: Lines | None = None
+
+
+class Errors(NamedTuple):
+    """The errors of an encoder: fields of `Encoder`, in its order."""
+
+    offsets: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    scale: Scale | None = None
+    lines: Lines | None = None
 
 
 class Cell(NamedTuple):
@@ -65,30 +82,85 @@ def offsets(phase_error_counts=0.0, duty_error_counts: float = 0.0) -> tuple[flo
     return result
 
 
+@inlined
+def _displaced(scale, number, place):
+    """Return the place (counts) of an edge that would be at `place` without the errors of the scale."""
+    if scale is None:
+        return place
+    return place + displacement(scale, number)
+
+
 @compiled
 def edge(encoder, number):
     """Return the position (m) of edge `number`."""
-    return (number + encoder.offsets[number & 3]) * encoder.count_m
+    return _displaced(encoder.scale, number, number + encoder.offsets[number & 3]) * encoder.count_m
+
+
+@inlined
+def _guess(scale, counts):
+    """Return the number of a cell near a place (counts)."""
+    if scale is None:
+        return math.floor(counts)
+    return near(scale, counts)
+
+
+@inlined
+def _slack_m(scale, count_m):
+    """Return how far a cell goes on beyond each of its edges (m)."""
+    if scale is None:
+        return 0.0
+    return 0.5 * scale.hysteresis * count_m
 
 
 @compiled
-def locate(encoder, position_m):
-    """Return the `Cell` that holds a position."""
-    number = math.floor(position_m / encoder.count_m - encoder.offsets[0])
+def _number(encoder, position_m):
+    """Return the number of the cell that holds a position, without hysteresis."""
+    number = _guess(encoder.scale, position_m / encoder.count_m - encoder.offsets[0])
     while position_m < edge(encoder, number):
         number -= 1
     while position_m >= edge(encoder, number + 1):
         number += 1
-    return Cell(number, edge(encoder, number), edge(encoder, number + 1))
+    return number
+
+
+@compiled
+def _cell(encoder, number):
+    """Return the `Cell` of a number."""
+    slack_m = _slack_m(encoder.scale, encoder.count_m)
+    return Cell(number, edge(encoder, number) - slack_m, edge(encoder, number + 1) + slack_m)
+
+
+@compiled
+def locate(encoder, position_m):
+    """Return the `Cell` that holds a position; with hysteresis, the one that would hold it without."""
+    return _cell(encoder, _number(encoder, position_m))
+
+
+@compiled
+def numbers_from(encoder, cell, positions):
+    """Return the numbers of the cells of an array of positions (m) that a handle meets in this order, from a cell on.
+
+    With hysteresis a cell depends on the way; a turn between two of the positions is not seen.
+    """
+    numbers = np.zeros(len(positions), np.int64)
+    slack_m = _slack_m(encoder.scale, encoder.count_m)
+    for k in range(len(positions)):
+        position_m = positions[k]
+        if position_m >= cell.upper_m:
+            cell = _cell(encoder, _number(encoder, position_m - slack_m))
+        elif position_m < cell.lower_m:
+            cell = _cell(encoder, _number(encoder, position_m + slack_m))
+        numbers[k] = cell.number
+    return numbers
 
 
 @compiled
 def number_at(encoder, positions):
-    """Return the numbers of the cells that hold an array of positions (m): the counts that an encoder has there."""
-    numbers = np.zeros(len(positions), np.int64)
-    for k in range(len(positions)):
-        numbers[k] = locate(encoder, positions[k]).number
-    return numbers
+    """Return the numbers of the cells that hold an array of positions (m): the counts that an encoder has there.
+
+    With hysteresis the positions are met in this order, and the first cell is the one that would hold it without.
+    """
+    return numbers_from(encoder, locate(encoder, positions[0] if len(positions) else 0.0), positions)
 
 
 @compiled
@@ -98,19 +170,36 @@ def level(number):
     return quarter ^ (quarter >> 1)
 
 
-@compiled
-def next_cell(encoder, cell, upwards):
-    """Return the cell above if `upwards`, else the cell below."""
+@inlined
+def _stepped(encoder, scale, cell, upwards):
+    """Return the cell above if `upwards`, else the cell below; without a scale one of its edges is known."""
+    if scale is not None:
+        return _cell(encoder, cell.number + 1 if upwards else cell.number - 1)
     if upwards:
         return Cell(cell.number + 1, cell.upper_m, edge(encoder, cell.number + 2))
     return Cell(cell.number - 1, edge(encoder, cell.number - 1), cell.lower_m)
 
 
 @compiled
-def stamp(encoder, upwards, at_s, clocks):
-    """Return the clock of an edge passed `at_s` into an interval, counted from the interval's first: 1 to `clocks`.
+def next_cell(encoder, cell, upwards):
+    """Return the cell above if `upwards`, else the cell below."""
+    return _stepped(encoder, encoder.scale, cell, upwards)
 
-    The result is clamped to that range, because rounding may put it outside.
+
+@inlined
+def _clamped(lines, clock, clocks):
+    """Return a clock of an interval within 1 to `clocks`, against rounding; lines may show an edge later than that."""
+    if lines is None:
+        return min(max(clock, 1), clocks)
+    return max(clock, 1)
+
+
+@compiled
+def stamp(encoder, cell, upwards, at_s, interval):
+    """Return the clock at which the pins show that a cell is left upwards or downwards, `at_s` into an interval.
+
+    It is within the interval, unless the encoder has lines, which show edges later: `lines.carry` puts them in order.
     """
-    at = at_s * encoder.clock_hz
-    return min(max(math.ceil(at) if upwards else math.floor(at) + 1, 1), clocks)
+    passed = cell.number + 1 if upwards else cell.number
+    at = shown_s(encoder.lines, interval.clock, passed, upwards, at_s) * encoder.clock_hz
+    return interval.clock + _clamped(encoder.lines, math.ceil(at) if upwards else math.floor(at) + 1, interval.clocks)

@@ -145,7 +145,7 @@ def _stretch(plant, encoder, moment, command_n, since_s, until_s, interval, edge
             upwards = after_m >= cell.upper_m
             edge_m = cell.upper_m if upwards else cell.lower_m
             at_s = begin_s + seconds * (edge_m - before_m) / (after_m - before_m)
-            edges.clocks[n_edges] = interval.clock + stamp(encoder, upwards, at_s, interval.clocks)
+            edges.clocks[n_edges] = stamp(encoder, cell, upwards, at_s, interval)
             cell = next_cell(encoder, cell, upwards)
             edges.levels[n_edges] = level(cell.number)
             n_edges += 1

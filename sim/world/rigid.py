@@ -216,8 +216,8 @@ def _advance(plant, encoder, moment, force_n, interval, edges):
             upwards = end.position_m >= cell.upper_m
             travel_m = (cell.upper_m if upwards else cell.lower_m) - start.position_m
             at_s = since_s + reach(handle, start, net_n, until_s - since_s, travel_m)
+            edges.clocks[n_edges] = stamp(encoder, cell, upwards, at_s, interval)
             cell = next_cell(encoder, cell, upwards)
-            edges.clocks[n_edges] = interval.clock + stamp(encoder, upwards, at_s, interval.clocks)
             edges.levels[n_edges] = level(cell.number)
             n_edges += 1
         if not cell.lower_m <= end.position_m < cell.upper_m:

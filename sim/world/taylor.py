@@ -120,7 +120,7 @@ def _emit(train, encoder, cell, n_edges, leg, interval, edges):
         upwards = seen_m >= cell.upper_m
         passed = root(series, SEEN, cell.upper_m if upwards else cell.lower_m, passed)
         at_s = now_s + min(passed, end) * seconds
-        edges.clocks[n_edges] = interval.clock + stamp(encoder, upwards, at_s, interval.clocks)
+        edges.clocks[n_edges] = stamp(encoder, cell, upwards, at_s, interval)
         cell = next_cell(encoder, cell, upwards)
         edges.levels[n_edges] = level(cell.number)
         n_edges += 1

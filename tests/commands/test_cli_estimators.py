@@ -36,6 +36,19 @@ def test_rows_as_json_and_as_a_table(monkeypatch, capsys):
     assert "mm/s" in out
 
 
+def test_the_errors_of_the_encoder_are_in_rows_and_beside_the_table(monkeypatch, capsys):
+    arguments = ["accuracy", "--estimators", "fdm", "--rates", "1e4", "--signal", "steady:10", "--workers", 1]
+    own = ["--set", "encoder.edge_error_counts=0.15", "--set", "encoder.hysteresis_counts=0.5"]
+    row = json.loads(call(monkeypatch, capsys, *arguments, *own, "--json")[1])["rows"][0]
+    assert row["encoder"] == {"edge_error_counts": 0.15, "hysteresis_counts": 0.5}
+    assert row["encoder_phase_error_counts"] == 0
+    _, out, err = call(monkeypatch, capsys, *arguments, *own, "--encoder-phase-error", "0.1")
+    assert "encoder: edge_error_counts 0.15, hysteresis_counts 0.5, phase_error_counts 0.1" in out + err
+    plain = json.loads(call(monkeypatch, capsys, *arguments, "--json")[1])["rows"][0]
+    assert "encoder" not in plain
+    assert plain["rms_mm_s"] != row["rms_mm_s"]
+
+
 def test_fixed_is_rtl(monkeypatch, capsys):
     arguments = ["accuracy", "--estimators", "fdm", "--rates", "1e4", "--signal", "hit", "--workers", 1, "--json"]
     fixed, rtl = (
@@ -74,6 +87,14 @@ def test_figures_are_drawn(monkeypatch, capsys, tmp_path, figure):
         (["accuracy", "--rates", ""], "--rates must be whole numbers of 1000 to 1e+07 Hz, not ''"),
         (["accuracy", "--rates", "nan"], "--rates must be whole numbers of 1000 to 1e+07 Hz, not 'nan'"),
         (["accuracy", "--encoder-phase-error", "2"], "phase_error_counts and duty_error_counts must leave each edge"),
+        (
+            ["accuracy", "--encoder-phase-error", "0.1", "--set", "encoder.phase_error_counts=0.1"],
+            "--encoder-phase-error must be absent beside --set encoder.phase_error_counts, which is the same",
+        ),
+        (["accuracy", "--set", "handle.mass_kg=1"], "--set must be of an error of the encoder, encoder.KEY=VALUE, not"),
+        (["accuracy", "--set", "encoder.count_m=1e-5"], "--set must be of an error of the encoder, encoder.KEY=VALUE,"),
+        (["accuracy", "--set", "encoder.cycles=[{edges=1,error_counts=0.1}]"], "mhz: encoder.cycles[0].edges must be"),
+        (["choose", "--set", "encoder.dead=a"], "mhz: encoder.dead_s is missing, which encoder.dead needs"),
         (["accuracy", "--acceleration-max", "0"], "--acceleration-max must be 1e-09 to 1e+06 m/s^2"),
         (["accuracy", "--acceleration-max", "nan"], "--acceleration-max must be 1e-09 to 1e+06 m/s^2"),
         (["accuracy", "--acceleration-max", "1e-9", *SHORT], "levant at 2000 Hz with C 1e-09 m/s^2: "),

@@ -8,6 +8,7 @@ import pytest
 from hardwall.sim.estimates import figures, signals
 from hardwall.sim.estimates.accuracy import (
     COARSEN,
+    PHASE,
     axis_spec,
     exact_velocity,
     judged,
@@ -76,7 +77,7 @@ def test_the_figures_of_a_row(estimator, output):
 
 
 def test_an_encoder_out_of_phase_is_seen():
-    plain, late = (measure("levant", "u1", "paper", 100_000, phase_error_counts=error) for error in (0.0, 0.25))
+    plain, late = (measure("levant", "u1", "paper", 100_000, encoder={PHASE: error}) for error in (0.0, 0.25))
     assert late["rms_mm_s"] > 1.02 * plain["rms_mm_s"]
     assert late["encoder_phase_error_counts"] == 0.25
 

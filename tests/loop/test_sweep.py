@@ -129,6 +129,26 @@ def test_whatever_the_hit(number):
     compare(scene, "fixed", ends)
 
 
+ON_A_POOR_SCALE = {
+    "edges of their own": {"encoder.edge_error_counts": 0.1},
+    "cycles": {"encoder.cycles": [{"edges": 16, "error_counts": 0.2}, {"edges": 3, "error_counts": 0.1}]},
+    "a disk out of its centre": {"encoder.counts_per_turn": 400, "encoder.eccentricity_counts": 12.0},
+    "all": {
+        "encoder.edge_error_counts": 0.05,
+        "encoder.cycles": [{"edges": 16, "error_counts": 0.1, "phase": 0.3}],
+        "encoder.counts_per_turn": 4000,
+        "encoder.eccentricity_counts": 10.0,
+        "encoder.phase_error_counts": 0.1,
+    },
+}
+
+
+@pytest.mark.parametrize("name", ON_A_POOR_SCALE)
+def test_a_hit_on_a_scale_with_errors_is_the_same(name):
+    scene = load("seed-2011", NEAR | ON_A_POOR_SCALE[name] | {"protocol.push_n": 2.0})
+    compare(scene, "fixed", [700, scene.samples])
+
+
 FREE = {"wall.stiffness_n_per_m": 0.0, "protocol.push_n": 2.0}
 
 
@@ -273,6 +293,15 @@ def test_what_cannot_be_swept_has_no_sweep():
     assert constants({}, "rtl") is None
     assert constants({"controller.estimator": "levant-edge"}) is None
     assert constants(HAND) is None
+    # The pins are not those of the place: the way there, or the time, counts.
+    assert constants({"encoder.edge_error_counts": 0.05}) is not None
+    for keys in (
+        {"hysteresis_counts": 0.2},
+        {"jitter_s": 1e-8},
+        {"glitches_hz": 1.0, "glitch_s": 1e-6},
+        {"dead": "a", "dead_s": 3.0},
+    ):
+        assert constants({f"encoder.{key}": value for key, value in keys.items()}) is None
     close = {"controller.sample_hz": 100_000, "controller.actuation_hz": 100_000, "controller.glitch_clocks": 2}
     close |= {"controller.speed_max_m_per_s": 0.1}
     latency = load("seed-2011", close | {"controller.clock_hz": 4_000_000}).spec.design.latency_to_drive

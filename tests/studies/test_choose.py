@@ -24,6 +24,21 @@ def test_every_error_is_in_its_own_place():
         assert row["impact_delay_s"] == -row["rms_mm_s"]["impact"]
 
 
+def test_an_encoder_of_ones_own_is_another_situation():
+    encoder = {"encoder.edge_error_counts": 0.02, "encoder.seed": 3}
+    situations = choose.situations_with(encoder)
+    assert situations.keys() - choose.SITUATIONS.keys() == {choose.OWN}
+    jobs = choose.jobs([("fdm", "u")], 1000, "fixed", situations)
+    assert jobs[-1]["encoder"] == encoder
+    measured = [{"rms_mm_s": float(number), "delay_s": None} for number, _ in enumerate(jobs)]
+    rows = choose.table([("fdm", "u")], measured, [COST | {"estimator": "fdm"}], situations)
+    chosen = choose.Choice(rows, situations)
+    check("choose", chosen.report())
+    assert rows[0]["rms_mm_s"][choose.OWN] == len(jobs) - 1
+    assert "own encoder: edge_error_counts 0.02, seed 3" in chosen.notes()
+    assert "single edges: edge_error_counts 0.05" in chosen.notes()
+
+
 def test_a_board_that_does_not_fit_has_no_rate():
     measured = [{"rms_mm_s": 1.0, "delay_s": None}] * len(choose.SITUATIONS)
     rows = choose.table([("fdm", "u")], measured, [COST | {"estimator": "fdm", "board": None}])

@@ -1,0 +1,222 @@
+"""The two lines from an encoder to the pins, and what happens to edges on them in time.
+
+An edge that the handle passes at time t is shown at t + late + jitter: the jitter is normally distributed and cut at
+4 sigma, and `late` is those 4 sigma, for no edge is shown before it is passed. Each line has its own order of edges. A
+glitch is a pulse that turns one line over for its length; glitches come at random times, independently of each other. A
+line that dies keeps its level from then on.
+
+Every change is a *toggle*: a clock and the line, 1 for A and 2 for B, whose level it turns over. So edges and glitches
+that overtake each other need no more than an order in time. `carry` gives a loop the toggles of one interval after the
+other, and `carried` those of a whole record.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ...model.compiled import compiled, inlined
+from ...model.stamped import Edges, room_for
+from .chance import normal, uniform
+from .scale import CUT_SIGMAS
+
+JITTER, GAPS, CHANNELS = 2, 3, 4
+"""The streams of random numbers: of the jitter, of the times between glitches, and of the lines that they are on."""
+A, B = 1, 2
+
+
+class Lines(NamedTuple):
+    """What happens on the lines; times in seconds, infinite for never."""
+
+    jitter_s: float  # sigma
+    late_s: float
+    glitch_gap_s: float  # the mean time from a glitch to the next one, on both lines together
+    glitch_s: float  # the length of a glitch
+    dead_a_s: float  # when the line dies
+    dead_b_s: float
+    seed: int
+
+
+class Waiting(NamedTuple):
+    """What a loop keeps of its lines from interval to interval, in arrays that `carry` writes to."""
+
+    edges: Edges  # those of the loop: in go the edges that the handle passes, out come those of the pins
+    toggles: Edges  # the clocks and lines of the toggles to come, in order
+    marks: np.ndarray  # int64: how many these are, the level of the handle's cell, that of the pins, glitches so far
+    next_s: np.ndarray  # float64: the beginning of the next glitch
+
+
+PENDING, TRUE, SHOWN, GLITCHES = range(4)
+"""The elements of `Waiting.marks`."""
+
+
+@inlined
+def shown_s(lines, clock, number, upwards, at_s):
+    """Return when an edge is shown (s) that is passed at `at_s`, from the same zero of time.
+
+    Args:
+        lines: the `Lines`; None for none, and the edge is shown as it is passed.
+        clock, number, upwards: from which clock on the time is counted, which edge it is, and in which direction it is
+            passed; the jitter is a function of the three.
+        at_s: the time (s).
+    """
+    if lines is None:
+        return at_s
+    return _jittered_s(lines, clock, number, upwards, at_s)
+
+
+@compiled
+def _jittered_s(lines, clock, number, upwards, at_s):
+    if lines.jitter_s == 0.0:
+        return at_s
+    drawn = normal(lines.seed, JITTER, clock, 2 * number + int(upwards))
+    return at_s + lines.late_s + lines.jitter_s * min(max(drawn, -CUT_SIGMAS), CUT_SIGMAS)
+
+
+@compiled
+def gap_s(lines, number):
+    """Return the time (s) from the glitch before to the beginning of glitch `number`, counted from 0."""
+    return -lines.glitch_gap_s * math.log(uniform(lines.seed, GAPS, number, 0))
+
+
+@compiled
+def line_of(lines, number):
+    """Return the line of glitch `number`, `A` or `B`."""
+    return A if uniform(lines.seed, CHANNELS, number, 0) < 0.5 else B
+
+
+@compiled
+def _lives(lines, line, clock, clock_hz):
+    """Return whether a line still follows its level at a clock."""
+    dead_s = lines.dead_a_s if line == A else lines.dead_b_s
+    return clock < dead_s * clock_hz
+
+
+def waiting(lines: Lines | None, level: int, edges: Edges) -> Waiting | None:
+    """Return what a loop keeps of lines at the start; None without lines.
+
+    Args:
+        lines: the lines.
+        level: the level of the pins, a | b << 1.
+        edges: the arrays of the loop's edges; as many toggles may be under way.
+    """
+    if lines is None:
+        return None
+    return Waiting(edges, room_for(len(edges.clocks)), np.array([0, level, level, 0]), np.array([gap_s(lines, 0)]))
+
+
+@compiled
+def _insert(kept, clock, line):
+    """Put a toggle among those to come, behind those of its clock; return whether there was room."""
+    clocks, lines, count = kept.toggles.clocks, kept.toggles.levels, kept.marks[PENDING]
+    if count == len(clocks):
+        return False
+    place = count
+    while place > 0 and clocks[place - 1] > clock:
+        clocks[place], lines[place] = clocks[place - 1], lines[place - 1]
+        place -= 1
+    clocks[place], lines[place] = clock, line
+    kept.marks[PENDING] = count + 1
+    return True
+
+
+@compiled
+def _take_glitches(lines, kept, until, clock_hz):
+    """Take the glitches that begin up to clock `until`; return whether there was room for them."""
+    while kept.next_s[0] * clock_hz <= until:
+        number, begin_s = kept.marks[GLITCHES], kept.next_s[0]
+        first, behind = math.ceil(begin_s * clock_hz), math.ceil((begin_s + lines.glitch_s) * clock_hz)
+        line = line_of(lines, number)
+        # A pulse that begins and ends between two clocks is seen by none.
+        if first < behind and not (_insert(kept, first, line) and _insert(kept, behind, line)):
+            return False
+        kept.marks[GLITCHES] = number + 1
+        kept.next_s[0] = begin_s + gap_s(lines, number + 1)
+    return True
+
+
+@compiled
+def _show(lines, kept, n_edges, until, clock_hz):
+    """Append the toggles up to clock `until` as edges of the pins; return their number, -1 if there is no room."""
+    edges, toggles, marks = kept.edges, kept.toggles, kept.marks
+    room, taken = min(len(edges.clocks), len(edges.levels)), 0
+    while taken < marks[PENDING] and toggles.clocks[taken] <= until:
+        clock, line = toggles.clocks[taken], toggles.levels[taken]
+        taken += 1
+        if not _lives(lines, line, clock, clock_hz):
+            continue
+        if n_edges == room:
+            return -1
+        marks[SHOWN] ^= line
+        edges.clocks[n_edges], edges.levels[n_edges] = clock, marks[SHOWN]
+        n_edges += 1
+    remaining = marks[PENDING] - taken
+    for i in range(remaining):
+        toggles.clocks[i], toggles.levels[i] = toggles.clocks[taken + i], toggles.levels[taken + i]
+    marks[PENDING] = remaining
+    return n_edges
+
+
+@compiled
+def carry(lines, kept, before, n_edges, interval, clock_hz):
+    """Turn the edges that the handle passed in an interval into what the pins show up to its end.
+
+    Args:
+        lines: the `Lines`.
+        kept: the loop's `Waiting`.
+        before, n_edges: how many edges there were before the interval, and with those of the handle, which are
+            replaced.
+        interval: the `Interval`.
+        clock_hz: frequency of the clock.
+
+    Returns:
+        The new number of edges; -1 if edges were lost, or are lost now because there is no more room.
+    """
+    if n_edges < 0:
+        return n_edges
+    for i in range(before, n_edges):
+        line = kept.edges.levels[i] ^ kept.marks[TRUE]
+        kept.marks[TRUE] = kept.edges.levels[i]
+        if not _insert(kept, kept.edges.clocks[i], line):
+            return -1
+    until = interval.clock + interval.clocks
+    if not _take_glitches(lines, kept, until, clock_hz):
+        return -1
+    return _show(lines, kept, before, until, clock_hz)
+
+
+@compiled
+def jittered_s(lines, numbers, upwards, times, clock_hz):
+    """Return when edges are shown (s) that are passed at the given times (s), in the order of a record."""
+    shown = np.empty(len(times))
+    for i in range(len(times)):
+        clock = math.floor(times[i] * clock_hz)
+        shown[i] = _jittered_s(lines, clock, numbers[i], upwards[i], times[i])
+    return shown
+
+
+def carried(lines: Lines, edges: Edges, level: int, seconds: float, clock_hz: float) -> Edges:
+    """Return what the pins show of a whole record.
+
+    Args:
+        lines: the lines.
+        edges: the edges of the handle in the order in which they are passed, stamped when they are shown.
+        level: the level of the pins at the start, a | b << 1.
+        seconds: length of the record.
+        clock_hz: frequency of the clock.
+    """
+    before = np.concatenate([[level], edges.levels])[:-1]
+    clocks, toggled = [edges.clocks], [edges.levels ^ before]
+    begin_s, number = gap_s(lines, 0), 0
+    while begin_s < seconds:
+        pulse = [math.ceil(begin_s * clock_hz), math.ceil((begin_s + lines.glitch_s) * clock_hz)]
+        if pulse[0] < pulse[1]:
+            clocks.append(np.array(pulse))
+            toggled.append(np.full(2, line_of(lines, number)))
+        number += 1
+        begin_s += gap_s(lines, number)
+    at, line = np.concatenate(clocks), np.concatenate(toggled)
+    dead = np.where(line == A, lines.dead_a_s, lines.dead_b_s) * clock_hz
+    order = np.argsort(at, kind="stable")
+    order = order[at[order] < dead[order]]
+    return Edges(at[order], level ^ np.bitwise_xor.accumulate(line[order]))
