@@ -40,6 +40,13 @@ def campaign(d: watchdog.Design, clocks: int) -> dict[str, np.ndarray]:
     reset = (random.random(clocks) < 2e-4).astype(np.int64)
     reset[0] = 1
     beats = np.where(changes, random.integers(0, 1 << supervisor.BEAT_BITS, clocks), 0)
+    # At the end the host falls silent until it is overdue, for words that are one more than a power of two: a bit that
+    # is wrongly toggled with that power is so once, and not back again.
+    tick = d.params.pump_clocks * d.params.tick_turns
+    for word in (17, 33, 65):
+        silence = (word + 2) * tick
+        words, reset = np.append(words, np.full(silence, word)), np.append(reset, np.zeros(silence, np.int64))
+        beats = np.append(beats, [1, *[0] * (silence - 1)])
     return {"reset": reset, "heartbeat": np.bitwise_xor.accumulate(beats), "supervisor_watchdog": words}
 
 
