@@ -3,13 +3,14 @@
 import time
 from collections.abc import Generator, Iterator
 from contextlib import suppress
+from functools import partial
 from typing import NamedTuple
 
 from ..model.register import Kind
 from ..model.registers import TELEMETRY
 from .capture import Capture
 from .device import Device, read_identity
-from .errors import ChangedError, HostError, NotReadyError, RefusedError, TrippedError
+from .errors import ChangedError, HostError, NotReadyError, RefusedError, SilentError, TrippedError
 from .groups import Named, Supervisor, Wall
 from .heartbeat import LEASE_S, Beat, Heartbeat
 from .homing import REST_S, Homed, homing
@@ -29,10 +30,24 @@ LATCHED = Trip(0, (), (), {})
 
 
 class Shared(NamedTuple):
-    """What several axes on one board have in common: who beats, and the words that there are once, as last written."""
+    """What several axes on one board have in common: who beats, the words that there are once, as last written, and
+    the axes themselves."""
 
     beat: Beat
     words: dict[str, int]
+    axes: list["Axis"]
+
+    def send(self, axis: "Axis") -> None:
+        """Send a beat for an axis, unless it would keep another one ARMED that nobody lets be.
+
+        Raises:
+            SilentError: if the lease of another axis that is ARMED has ended: the board trips.
+            HostError: if the beat does not reach the board.
+        """
+        for number, other in enumerate(self.axes):
+            if other is not axis and other.is_left_armed:
+                raise SilentError(f"axis {number} is ARMED and its lease has ended: no axis of the board beats")
+        self.beat()
 
 
 class Axis(Named):
@@ -76,7 +91,8 @@ class Axis(Named):
         # Whether a disarming has begun since the last arming did. There is no lock, for one who ends this program must
         # not wait for a thread that is held up in `arm`.
         self._called_off = False
-        beat = Beat(port, device.registers["heartbeat"]) if shared is None else shared.beat
+        self._disarming = False
+        beat = Beat(port, device.registers["heartbeat"]) if shared is None else partial(shared.send, self)
         self._heartbeat = Heartbeat(beat, self._words.written("supervisor_watchdog"))
 
     def __enter__(self) -> "Axis":
@@ -179,6 +195,18 @@ class Axis(Named):
             raise self._heartbeat.lost
 
     @property
+    def is_left_armed(self) -> bool:
+        """Whether the axis is ARMED without a lease, or though it is not wanted; one that is being disarmed is not.
+
+        Raises:
+            HostError: if the board is not reached.
+        """
+        let = self._heartbeat.beats and not self._unwanted
+        if let or self._disarming or not (self._may_drive or self._unwanted):
+            return False
+        return self.status.state is State.ARMED
+
+    @property
     def _lease_s(self) -> float:
         return LEASE_S / self._port.pace
 
@@ -269,11 +297,14 @@ class Axis(Named):
             HostError: if the board is not reached. Its watchdog then makes the drive 0, or the next act of this
                 program that would let the heartbeat go on disarms it first.
         """
-        self._called_off = True
-        self._heartbeat.rest()
-        self._unwanted = True
-        self.pulse("disarm")
-        self._may_drive = self._unwanted = False
+        self._called_off = self._disarming = True
+        try:
+            self._heartbeat.rest()
+            self._unwanted = True
+            self.pulse("disarm")
+            self._may_drive = self._unwanted = False
+        finally:
+            self._disarming = False
 
     def acknowledge(self, trip: Trip | None = LATCHED) -> None:
         """Acknowledge a trip, exactly as it was read, and clear the flags: the axis is DISARMED, unless a cause stands.

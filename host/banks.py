@@ -66,8 +66,9 @@ class BankPort(Port):
 class Axes:
     """All axes on a board, from `hardwall.host.connect_axes`. A context manager that disarms each, and closes.
 
-    Each is an `Axis`, with words, states and acts of its own. The board hears one heartbeat: it goes on while the lease
-    of any of them lasts. `supervisor_watchdog` is one word for all.
+    Each is an `Axis`, with words, states and acts of its own. The board hears one heartbeat. It goes on while the lease
+    of any of them lasts, but not beside one that is ARMED and whose lease has ended, or that an earlier host left so:
+    disarm that, or renew its lease. `supervisor_watchdog` is one word for all.
 
     Args:
         port: the line.
@@ -82,7 +83,8 @@ class Axes:
 
     def __init__(self, port: Port, device: Device):
         self.device, self._port = device, port
-        shared, self._axes = Shared(Beat(port, device.registers["heartbeat"]), {}), list[Axis]()
+        self._axes = list[Axis]()
+        shared = Shared(Beat(port, device.registers["heartbeat"]), {}, self._axes)
         try:
             for axis in range(device.axes):
                 self._axes.append(Axis(BankPort(port, device, axis), device, shared))

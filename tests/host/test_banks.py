@@ -1,10 +1,21 @@
 """A host of several axes: words and acts reach one axis alone, and what there is once is there once."""
 
+import time
 from collections.abc import Iterator
 
 import pytest
 
-from hardwall.host import Axes, ChangedError, ForeignError, NotReadyError, State, connect, connect_axes
+from hardwall.host import (
+    Axes,
+    Axis,
+    ChangedError,
+    ForeignError,
+    NotReadyError,
+    SilentError,
+    State,
+    connect,
+    connect_axes,
+)
 from hardwall.host.device import AXES_AT
 from hardwall.model.axes import AxesSpec
 from hardwall.model.axes_registers import BANK, AxesMap
@@ -108,6 +119,38 @@ def test_the_words_of_the_host_are_there_once(board, axes):
     axes[0].disarm()
     with pytest.raises(ChangedError):
         axes[0].arm()
+
+
+def test_no_axis_beats_beside_one_that_is_left_armed(board, axes, monkeypatch):
+    monkeypatch.setattr(Axis, "_lease_s", 0.05)
+    file = board.server.file
+    axes[1].arm()
+    time.sleep(0.1)
+    # The lease of axis 1 has ended: nothing that axis 0 does beats for it.
+    beaten = file.heartbeat
+    with pytest.raises(SilentError, match=r"axis 1 is ARMED and its lease has ended"):
+        axes[0].renew()
+    assert file.heartbeat == beaten
+    # One that has tripped, or is disarmed, or lives again, is in nobody's way.
+    board.trip(1)
+    axes[0].renew()
+    assert file.heartbeat != beaten
+    axes[1].acknowledge()
+    for mend in (axes[1].disarm, axes[1].renew):
+        axes[1].arm()
+        time.sleep(0.1)
+        mend()
+        axes[0].renew()
+
+
+def test_an_axis_that_an_earlier_host_has_left_armed_is_in_the_way_until_it_is_disarmed(board):
+    board.show_of(2, state=ARMED, ready=0)
+    with connect_axes(board.name, answer_s=0.2) as axes:
+        with pytest.raises(SilentError, match="axis 2"):
+            axes[0].arm()
+        axes[2].disarm()
+        axes[0].arm()
+        assert states(axes) == [State.ARMED, State.DISARMED, State.DISARMED]
 
 
 def test_all_are_disarmed_at_the_end(board):
