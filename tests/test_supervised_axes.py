@@ -11,7 +11,7 @@ from hardwall.model.supervisor import ALL, ARMED, DISARMED, TRIPPED, names
 from hardwall.testing import SAMPLES, SEED, Bench, Recorded, parameters, simulate
 from oracles.supervised import BITS
 from oracles.supervised_axes import Follower
-from stimuli.lengths import long_form
+from stimuli.lengths import LONG, long_form
 from stimuli.supervised_axes_world import AxesWorld, slow
 
 
@@ -57,7 +57,9 @@ async def follows_models(dut):
     assert names(ALL & ~follower.reached & ~BITS["strobe_busy"]) == []
 
 
-@pytest.mark.parametrize(("axes", "estimator", "spare"), [(1, "fdm", 0), (3, "levant", 2), (3, "window", 0)])
+@pytest.mark.parametrize(
+    ("axes", "estimator", "spare"), [(1, "fdm", 0), (3, "levant", 2), *([(3, "window", 0)] if LONG else [])]
+)
 def test_rtl(axes, estimator, spare):
     simulate(__file__, make, axes=axes, estimator=estimator, spare=spare)
 

@@ -102,9 +102,9 @@ PARTS = {
 }
 ON_RTL = {
     "one sample overlaps": {"controller.clock_hz": 16_000_000, "controller.actuation_hz": 500_000},
-    "three samples overlap": FDM | {"controller.clock_hz": 4_000_000},
 }
 IN_LONG = {
+    "three samples overlap": FDM | {"controller.clock_hz": 4_000_000},
     "no overlap": {"controller.clock_hz": 40_000_000},
     "a window": FDM | {"controller.estimator": "window", "controller.clock_hz": 9_000_000},
 }
