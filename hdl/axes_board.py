@@ -1,18 +1,17 @@
 """Several axes for real packages: the pins of their encoders, one set of loops, a link, and drives for amplifiers."""
 
-from amaranth.hdl import ClockDomain, Module, Signal
+from amaranth.hdl import Module
 from amaranth.lib import wiring
-from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.axes import AxesSpec
 from hardwall.model.axes_registers import AxesMap
 from hardwall.model.link import uart
 
-from .board import Board
+from .board_clocks import board_clocks
 from .drive.registry import block_of
 from .lead_out import lead_out
-from .link.axes_link import AxesLink
+from .link.link import Link
 from .supervised import COMPLEMENTS, LOOPS
 from .supervised_axes import SupervisedAxes
 
@@ -20,7 +19,7 @@ ENCODER = "encoder_a", "encoder_b", "encoder_z"
 """Pins of every encoder."""
 
 
-class AxesBoard(Board):
+class AxesBoard(wiring.Component):
     """Supervised axes behind their pins: `SupervisedAxes`, their link and a stage of pulses for each.
 
     A host reads and writes the registers of `registers`, a bank for each axis; what it asks of an axis in one frame
@@ -80,10 +79,9 @@ class AxesBoard(Board):
     def __init__(self, spec: AxesSpec, baud: int | None = None):
         self.axes = SupervisedAxes(spec)
         rate = uart.usual_baud(spec.clock_hz) if baud is None else baud
-        self.link = AxesLink(AxesMap(spec), rate)
+        self.link = Link(AxesMap(spec), rate)
         self.stages = [block_of(spec.drive) for _ in range(spec.axes)]
-        wiring.Component.__init__(
-            self,
+        super().__init__(
             {
                 "clk": In(1),
                 "rst": In(1),
@@ -93,12 +91,16 @@ class AxesBoard(Board):
                 **self.link.PINS,
                 **dict.fromkeys((*spec.drive.pins, "alive"), Out(spec.axes)),
                 "outputs_enable": Out(1),
-            },
+            }
         )
 
     @property
     def spec(self) -> AxesSpec:
         return self.axes.design.spec
+
+    @property
+    def registers(self) -> AxesMap:
+        return self.link.registers
 
     @property
     def drive_latency(self) -> int:
@@ -118,12 +120,7 @@ class AxesBoard(Board):
     def elaborate(self, platform):
         m = Module()
         m.submodules.axes, m.submodules.link = axes, link = self.axes, self.link
-        m.domains.sync = domain = ClockDomain()
-        m.d.comb += domain.clk.eq(self.clk)
-        reset = Signal(init=1)
-        m.submodules.rst_synchroniser = FFSynchronizer(self.rst, reset, init=1)
-        m.d.comb += domain.rst.eq(reset)
-        running = self._watch_clock(m)
+        running, reset = board_clocks(m, self)
 
         loops = {"drive_enable": self.drive_enable & running}
         m.d.comb += lead_out(axes, self, ENCODER)

@@ -1,19 +1,17 @@
 """An axis for real packages: the pins of an encoder, three loops, a link, and a drive that an amplifier can take."""
 
-from amaranth.hdl import Cat, ClockDomain, DomainRenamer, Module, Signal, Value
+from amaranth.hdl import Cat, Module, Signal, Value
 from amaranth.lib import wiring
-from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
-from hardwall.model import clock_monitor
 from hardwall.model.link import uart
 from hardwall.model.register import VALUE_BITS
 from hardwall.model.registers import EDGE_STAMPS, RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervisor import ARMED
 
+from .board_clocks import board_clocks
 from .capture import Capture
-from .clock_monitor import ClockMonitor
 from .drive.registry import block_of
 from .lead_out import lead_out
 from .link.axi_link import AxiLink
@@ -139,13 +137,7 @@ class Board(wiring.Component):
         m = Module()
         m.submodules.axis = axis = self.axis
         m.submodules.link = link = self.link
-        m.domains.sync = domain = ClockDomain()
-        m.d.comb += domain.clk.eq(self.clk)
-        reset = Signal(init=1)
-        m.submodules.rst_synchroniser = FFSynchronizer(self.rst, reset, init=1)
-        m.d.comb += domain.rst.eq(reset)
-
-        running = self._watch_clock(m)
+        running, reset = board_clocks(m, self)
         m.d.comb += lead_out(axis, self, (*ENCODER, "external_fault", "emergency_stop"))
         m.d.comb += [axis.drive_enable.eq(self.drive_enable & running), self.outputs_enable.eq(running & ~reset)]
         m.d.comb += lead_out(link, self, link.PINS)
@@ -205,16 +197,3 @@ class Board(wiring.Component):
             m.d.sync += actuated.eq(axis.actuated)
         m.d.comb += [getattr(stage, name).eq(value) for name, value in given.items() if name in stage.signature.members]
         m.d.comb += lead_out(stage, self, stage.design.pins)
-
-    def _watch_clock(self, m: Module) -> Signal:
-        """Return whether the clock runs, as the oscillator has found."""
-        design = clock_monitor.Design(self.spec.clock_hz)
-        m.domains.oscillator = domain = ClockDomain(reset_less=True)
-        m.d.comb += domain.clk.eq(self.oscillator)
-        monitor = ClockMonitor(design)
-        m.submodules.clock_monitor = DomainRenamer("oscillator")(monitor)
-        # The clock runs while a reset lasts, too.
-        beat = Signal(design.beat_clocks.bit_length(), reset_less=True)
-        m.d.sync += beat.eq(beat + 1)
-        m.d.comb += monitor.beat.eq(beat[-1])
-        return monitor.running

@@ -2,8 +2,10 @@
 
 import cocotb
 import pytest
+from cocotb.triggers import ClockCycles, RisingEdge
 
 from hardwall.hdl.axes_board import AxesBoard
+from hardwall.model import clock_monitor
 from hardwall.model.axes_registers import BANK
 from hardwall.model.link.server import ABSENT, FAILURE, VALUE
 from hardwall.model.supervisor import ARMED, CAUSES, DISARMED, REQUIRED, TRIPPED
@@ -123,6 +125,31 @@ async def a_loop_stops_every_axis(dut):
             await host.look(axis, "state", "ready")
             await host.write(axis, arm=1)
     assert host.compared > 10_000
+
+
+@cocotb.test()
+async def a_clock_that_stops_makes_every_output_low_and_all_come_back_disarmed(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    await host.write(0, heartbeat=1)
+    for axis in (0, 1):
+        await drive(host, axis)
+    outputs, both = [dut.drive_pdm, dut.alive, dut.outputs_enable], 0b11
+    while [int(output.value) for output in outputs] != [both, both, 1]:
+        await host.edges(1)
+    host.leave()
+    host.bench.clock.stop()
+    # The clocks of an oscillator of 1 Hz are its seconds; one more, for an edge sees what was before it.
+    await ClockCycles(dut.oscillator, 1 + int(clock_monitor.Design(host.board.spec.clock_hz).stop_latency_s(1.0)))
+    assert not any(int(output.value) for output in outputs)
+    host.bench.clock.start()
+    await RisingEdge(dut.outputs_enable)
+    assert not any(int(output.value) for output in outputs[:2])
+    # Two turns of the axes, after which all that is shown of them is of the clock that came back.
+    await ClockCycles(dut.clk, 2 * host.board.spec.clocks_per_sample)
+    assert not any(int(output.value) for output in outputs[:2])
+    for axis in (0, 1):
+        assert (await host.look(axis))["state"] == DISARMED
 
 
 def test_rtl():

@@ -2,52 +2,20 @@
 
 from amaranth.hdl import Cat, Const, Module, Mux, Shape, ShapeLike, Signal, Value
 from amaranth.lib import wiring
-from amaranth.lib.data import ArrayLayout
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.axes_registers import BANK, SHARED
 from hardwall.model.link.banked_file import Design
 from hardwall.model.link.register_file import CELL_BITS, Area, Operation
-from hardwall.model.register import VALUE_BITS, Register
+from hardwall.model.register import Register
 from hardwall.model.registers import ACTIVE, COUNTERS, END, LIVE, MAP, PULSES, SUPERVISOR, TELEMETRY, WRITTEN
-from hardwall.model.supervisor import ARMED, COUNT, COUNT_BITS
+from hardwall.model.supervisor import ARMED
 
 from ..arithmetic.fixed import less, shape
+from .axis_status import held_status, shown, word_of
 from .line import UNMIXED
 from .requests import Requests
-
-RECORD = "count", "velocity", "wall_force", "drive", "flags"
-"""What the axes show of a sample, behind `record_`."""
-TURN = "state", "ready", "latched", "first", "first_stamp", "counts", "a_channel_idle"
-"""What they show of a turn, behind `turn_`."""
-WITH_RECORD = "illegal_count", "index_count", "index_armed", "index_latched"
-"""What they show of every axis at every clock, of which an axis's is taken with its record."""
-
-
-def _shown(design: Design) -> dict[str, ShapeLike]:
-    """Return the shapes of what `SupervisedAxes` shows of samples, turns and axes, by the names of its members."""
-    spec, registers = design.registers.spec, design.registers
-    axes, number, flags = spec.axes, range(max(spec.axes, 2)), spec.design.flags
-    count, force = shape(registers["count"].format), shape(spec.force)
-    record = {
-        "valid": 1,
-        "axis": number,
-        **dict(zip(RECORD, (count, shape(spec.design.estimator.velocity), force, force, len(flags)), strict=True)),
-    }
-    bits = (2, 1, COUNT, COUNT, spec.stamp_width, COUNT * COUNT_BITS, 1)
-    turn = {"valid": 1, "axis": number, **dict(zip(TURN, bits, strict=True))}
-    return {
-        **{f"record_{name}": each for name, each in record.items()},
-        **{f"turn_{name}": each for name, each in turn.items()},
-        "illegal_count": ArrayLayout(shape(registers["illegal_count"].format), axes),
-        "index_count": ArrayLayout(count, axes),
-        "magnitude": ArrayLayout(shape(design.axes.supervisor.limit), axes),
-        **dict.fromkeys(("index_armed", "index_latched", "referenced", "negative"), axes),
-        "stamp": spec.stamp_width,
-        "live": 1,
-        "word_ready": 1,
-    }
 
 
 def _given(design: Design) -> dict[str, ShapeLike]:
@@ -122,7 +90,7 @@ class BankedFile(wiring.Component):
         super().__init__(
             {
                 "host": In(Requests()),
-                **{name: In(each) for name, each in _shown(design).items()},
+                **{name: In(each) for name, each in shown(design).items()},
                 **{name: Out(each, init=first.get(name, 0)) for name, each in _given(design).items()},
                 **{pulse.name: Out(design.banks) for pulse in registers.pulses},
             }
@@ -148,40 +116,6 @@ class BankedFile(wiring.Component):
         walked = {True: len(self._design.registers.words) + 2, False: 2}
         return {commits: 2 * 3 * words + 3 + self._design.settle_clocks for commits, words in walked.items()}
 
-    def _taken(self, asked: Signal) -> tuple[dict[str, Value], dict[str, Value]]:
-        """Return the status of an axis by name: what comes with its record, and what comes with its turn."""
-        registers, banks = self._design.registers, self._design.banks
-        record = {name: getattr(self, f"record_{name}") for name in RECORD}
-        record |= {name: _of(getattr(self, name), asked, banks) for name in WITH_RECORD}
-        record["velocity"] >>= max(len(self.record_velocity) - registers["velocity"].format.width, 0)
-        turn = {name: getattr(self, f"turn_{name}") for name in TURN if name != "counts"}
-        values = range(-(-len(self.turn_counts) // VALUE_BITS))
-        turn |= {f"counts_{value}": self.turn_counts.word_select(value, VALUE_BITS) for value in values}
-        magnitude, negative = (_of(getattr(self, name), asked, banks) for name in ("magnitude", "negative"))
-        driven = Mux(negative, -magnitude, magnitude)
-        return (
-            record | {"stamp": self.stamp},
-            turn | {"referenced": _of(self.referenced, asked, banks), "live": self.live, "driven": driven},
-        )
-
-    def _status(self, m: Module, asked: Signal, recorded: Signal, turned: Signal) -> Signal:
-        """Return the register of a status at the host's address, as it was with the last of either signal."""
-        status, halves = Signal(CELL_BITS), {}
-        for taken, values in zip((recorded, turned), self._taken(asked), strict=True):
-            for name, value in values.items():
-                register = self._design.registers[name]
-                held = Signal(shape(register.format), name=f"held_{name}")
-                with m.If(taken):
-                    m.d.sync += held.eq(value)
-                extension = (held[-1] if register.format.signed else Const(0)).replicate(VALUE_BITS - len(held))
-                whole = Cat(held, extension)
-                halves |= {register.address + 1: whole[:CELL_BITS], register.address: whole[CELL_BITS:]}
-        with m.Switch(self.host.address[: (COUNTERS - 1).bit_length()]):
-            for place, half in halves.items():
-                with m.Case(place):
-                    m.d.comb += status.eq(half)
-        return status
-
     def _refused(self, m: Module, wanted: Value, asking: Value) -> Value:
         """Return whether a pulse that is wanted of an axis is refused, after what its last turn has shown."""
         banks = self._design.banks
@@ -189,7 +123,7 @@ class BankedFile(wiring.Component):
         for axis in range(banks):
             with m.If(self.turn_valid & (self.turn_axis == axis)):
                 m.d.sync += [ready[axis].eq(self.turn_ready), armed[axis].eq(self.turn_state == ARMED)]
-        refusing = {"arm": ~_of(ready, asking, banks), "preload": _of(armed, asking, banks)}
+        refusing = {"arm": ~word_of(ready, asking, banks), "preload": word_of(armed, asking, banks)}
         names = [pulse.name for pulse in self._design.registers.pulses]
         return Cat(wanted[bit] & refusing[name] for bit, name in enumerate(names) if name in refusing).any()
 
@@ -231,7 +165,7 @@ class BankedFile(wiring.Component):
         # What `shift` takes: a cell, a text, a status, or the host's value. What it had goes to `upper`.
         shift, upper = Signal(CELL_BITS), Signal(CELL_BITS)
         recorded, turned = Signal(), Signal()
-        status = self._status(m, asked, recorded, turned)
+        status = held_status(m, self, asked, recorded, turned)
         takes = {"cell": cell.data, "text": text.data, "status": status, "value": host.value}
         taking = {name: Signal(name=f"taking_{name}") for name in takes}
         for name, taken in taking.items():
@@ -410,9 +344,3 @@ class BankedFile(wiring.Component):
                 m.d.comb += host.done.eq(1)
                 m.next = "IDLE"
         return m
-
-
-def _of(values: Value, axis: Value, axes: int) -> Value:
-    """Return the word of an axis, of all axes' words."""
-    values = Value.cast(values)
-    return values.word_select(axis, len(values) // axes)

@@ -1,4 +1,4 @@
-"""The link: Modbus RTU on a UART, from the pins of the line to the ports of an axis."""
+"""The link: Modbus RTU on a UART, from the pins of the line to the ports of an axis, or of several."""
 
 from typing import ClassVar
 
@@ -6,11 +6,13 @@ from amaranth.hdl import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out, connect
 
-from hardwall.model.link import register_file, uart
+from hardwall.model.axes_registers import AxesMap
+from hardwall.model.link import banked_file, register_file, uart
 from hardwall.model.link.line import GAP_S
 from hardwall.model.registers import RegisterMap
 
 from ..lead_out import lead_out
+from .banked_file import BankedFile
 from .line import Line
 from .register_file import RegisterFile
 from .server import Server
@@ -18,20 +20,22 @@ from .uart import Receiver, Transmitter
 
 
 class Link(wiring.Component):
-    """The registers of an axis behind the two pins of a serial line.
+    """The registers of an axis, or of several, behind the two pins of a serial line.
 
     Unit 1 answers the functions 3, 4, 6, 16 and 23 (registers), 8 (counters) and 43/14 (identification) in frames of at
-    most 256 bytes; `hardwall.model.registers` has the addresses. The line's idle level is high.
+    most 256 bytes; `hardwall.model.registers` has the addresses, and `hardwall.model.axes_registers`. The line's idle
+    level is high.
 
     Latency: an answer begins when the request has been carried out: less than 6000 clocks after its last byte, and for
-    a commit up to a sample period more. A pulse is at its port before the answer begins.
+    a commit up to a sample period more; of several axes, what a `BankedFile` waits for. A pulse is at its port before
+    the answer begins.
 
     Rounding and overflow: as in the blocks.
 
     Parameters
     ----------
     registers : hardwall.model.registers.RegisterMap
-        The registers; its spec has the clock.
+        The registers, of several axes an AxesMap; its spec has the clock.
     baud : int
         Rate of the line, bits a second.
 
@@ -41,8 +45,8 @@ class Link(wiring.Component):
         Line from the host; asynchronous.
     uart_tx : Out(1)
         Line to the host.
-    the members of `RegisterFile` without `host` : In and Out
-        The ports to the axis.
+    the members of `RegisterFile` without `host`, of several axes those of `BankedFile` : In and Out
+        The ports to the axis, or the axes.
 
     Raises
     ------
@@ -58,10 +62,11 @@ class Link(wiring.Component):
     PINS: ClassVar = {"uart_rx": In(1, init=1), "uart_tx": Out(1, init=1)}
 
     def __init__(self, registers: RegisterMap, baud: int = uart.BAUD):
-        design = register_file.Design(registers)
+        several = isinstance(registers, AxesMap)
+        design = banked_file.Design(registers) if several else register_file.Design(registers)
         self._registers = registers
         self._uart = uart.Design(registers.spec.clock_hz, baud)
-        self._file, self._server = RegisterFile(design), Server(design)
+        self._file, self._server = BankedFile(design) if several else RegisterFile(design), Server(design)
         super().__init__({**self.PINS, **self._file.ports})
 
     @property

@@ -64,7 +64,7 @@ class Files:
         return [word.format(**named) for word in command]
 
 
-def sources(board: Description, top: Board) -> dict[str, str]:
+def sources(board: Description, top: Board | AxesBoard) -> dict[str, str]:
     """Return the text of every file for an axis, or several, on a board: two of Verilog, and the pins.
 
     Raises:
@@ -120,7 +120,7 @@ class Design:
     """
 
     board: Description
-    top: Board
+    top: Board | AxesBoard
     folder: Path
 
     @cached_property

@@ -4,7 +4,8 @@ import random as plain
 
 from cocotb.triggers import RisingEdge
 
-from hardwall.hdl.link.banked_file import WITH_RECORD, BankedFile
+from hardwall.hdl.link.axis_status import WITH_RECORD
+from hardwall.hdl.link.banked_file import BankedFile
 from hardwall.model.axes_registers import BANK, SHARED, AxesMap
 from hardwall.model.link import banked_file as model
 from hardwall.model.link.register_file import Operation

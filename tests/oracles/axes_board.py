@@ -117,6 +117,10 @@ class Host:
                 self.pulses[axis] += shown["pin_drive_pdm"] >> axis & 1
             self.compared += 1
 
+    def leave(self) -> None:
+        """Compare nothing from now on."""
+        self._following.cancel()
+
     def change(self, **loops: int) -> None:
         """Open or close loops."""
         self.loops |= loops

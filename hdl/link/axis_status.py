@@ -1,0 +1,94 @@
+"""The status of one of several axes: taken from what all of them show of samples and turns, and held for the host."""
+
+from amaranth.hdl import Cat, Const, Module, Mux, ShapeLike, Signal, Value
+from amaranth.lib import wiring
+from amaranth.lib.data import ArrayLayout
+
+from hardwall.model.link.banked_file import Design
+from hardwall.model.link.register_file import CELL_BITS
+from hardwall.model.register import VALUE_BITS
+from hardwall.model.registers import COUNTERS
+from hardwall.model.supervisor import COUNT, COUNT_BITS
+
+from ..arithmetic.fixed import shape
+
+RECORD = "count", "velocity", "wall_force", "drive", "flags"
+"""What the axes show of a sample, behind `record_`."""
+TURN = "state", "ready", "latched", "first", "first_stamp", "counts", "a_channel_idle"
+"""What they show of a turn, behind `turn_`."""
+WITH_RECORD = "illegal_count", "index_count", "index_armed", "index_latched"
+"""What they show of every axis at every clock, of which an axis's is taken with its record."""
+
+
+def shown(design: Design) -> dict[str, ShapeLike]:
+    """Return the shapes of what `SupervisedAxes` shows of samples, turns and axes, by the names of its members."""
+    spec, registers = design.registers.spec, design.registers
+    axes, number, flags = spec.axes, range(max(spec.axes, 2)), spec.design.flags
+    count, force = shape(registers["count"].format), shape(spec.force)
+    record = {
+        "valid": 1,
+        "axis": number,
+        **dict(zip(RECORD, (count, shape(spec.design.estimator.velocity), force, force, len(flags)), strict=True)),
+    }
+    bits = (2, 1, COUNT, COUNT, spec.stamp_width, COUNT * COUNT_BITS, 1)
+    turn = {"valid": 1, "axis": number, **dict(zip(TURN, bits, strict=True))}
+    return {
+        **{f"record_{name}": each for name, each in record.items()},
+        **{f"turn_{name}": each for name, each in turn.items()},
+        "illegal_count": ArrayLayout(shape(registers["illegal_count"].format), axes),
+        "index_count": ArrayLayout(count, axes),
+        "magnitude": ArrayLayout(shape(design.axes.supervisor.limit), axes),
+        **dict.fromkeys(("index_armed", "index_latched", "referenced", "negative"), axes),
+        "stamp": spec.stamp_width,
+        "live": 1,
+        "word_ready": 1,
+    }
+
+
+def word_of(values: Value, axis: Value, axes: int) -> Value:
+    """Return the word of an axis, of all axes' words."""
+    values = Value.cast(values)
+    return values.word_select(axis, len(values) // axes)
+
+
+def _taken(file: wiring.Component, asked: Signal) -> tuple[dict[str, Value], dict[str, Value]]:
+    """Return the status of an axis by name: what comes with its record, and what comes with its turn."""
+    registers, banks = file.design.registers, file.design.banks
+    record = {name: getattr(file, f"record_{name}") for name in RECORD}
+    record |= {name: word_of(getattr(file, name), asked, banks) for name in WITH_RECORD}
+    record["velocity"] >>= max(len(file.record_velocity) - registers["velocity"].format.width, 0)
+    turn = {name: getattr(file, f"turn_{name}") for name in TURN if name != "counts"}
+    values = range(-(-len(file.turn_counts) // VALUE_BITS))
+    turn |= {f"counts_{value}": file.turn_counts.word_select(value, VALUE_BITS) for value in values}
+    magnitude, negative = (word_of(getattr(file, name), asked, banks) for name in ("magnitude", "negative"))
+    driven = Mux(negative, -magnitude, magnitude)
+    return (
+        record | {"stamp": file.stamp},
+        turn | {"referenced": word_of(file.referenced, asked, banks), "live": file.live, "driven": driven},
+    )
+
+
+def held_status(m: Module, file: wiring.Component, asked: Signal, recorded: Signal, turned: Signal) -> Signal:
+    """Return the register of a status at the host's address, as it was with the last of either signal.
+
+    Args:
+        m: the module.
+        file: the `BankedFile`, whose inputs are those of `shown`.
+        asked: the axis whose status is asked for.
+        recorded, turned: high when its record, and when its turn, is shown and to be taken.
+    """
+    status, halves = Signal(CELL_BITS), {}
+    for taken, values in zip((recorded, turned), _taken(file, asked), strict=True):
+        for name, value in values.items():
+            register = file.design.registers[name]
+            held = Signal(shape(register.format), name=f"held_{name}")
+            with m.If(taken):
+                m.d.sync += held.eq(value)
+            extension = (held[-1] if register.format.signed else Const(0)).replicate(VALUE_BITS - len(held))
+            whole = Cat(held, extension)
+            halves |= {register.address + 1: whole[:CELL_BITS], register.address: whole[CELL_BITS:]}
+    with m.Switch(file.host.address[: (COUNTERS - 1).bit_length()]):
+        for place, half in halves.items():
+            with m.Case(place):
+                m.d.comb += status.eq(half)
+    return status
