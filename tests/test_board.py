@@ -13,8 +13,9 @@ from hardwall.model.link.server import FAILURE
 from hardwall.model.registers import CAPTURE, RegisterMap
 from hardwall.model.supervisor import ALL, ARMED, CAUSES, DISARMED, REQUIRED, TRIPPED
 from hardwall.testing import SAMPLES, parameters, simulate
-from oracles.board import RECORDS, SYNCHRONISER, make
+from oracles.board import RECORDS, make
 from oracles.board_host import Host
+from oracles.supervised import SYNCHRONISER
 from stimuli import frames
 from stimuli.restless import Restless
 from stimuli.specs import spec

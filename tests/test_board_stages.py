@@ -8,8 +8,9 @@ from hardwall.hdl.supervised import LOOPS
 from hardwall.model import clock_monitor
 from hardwall.model.supervisor import ARMED, DISARMED
 from hardwall.testing import parameters, simulate
-from oracles.board import STAGES, SYNCHRONISER, make
+from oracles.board import STAGES, make
 from oracles.board_host import Host
+from oracles.supervised import SYNCHRONISER
 from stimuli.lengths import LONG
 
 SAFE = {

@@ -1,14 +1,9 @@
 """A board of several axes, a host on its line, and what its pins must be at every clock, by the model of the stage."""
 
-import logging
-
-import cocotb
 from amaranth.hdl import Cat, Module, Shape, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
-from cocotb.clock import Clock
-from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
-from cocotbext.uart import UartSink, UartSource
+from cocotb.triggers import RisingEdge
 
 from hardwall.hdl.axes_board import AxesBoard
 from hardwall.hdl.lead_out import lead_out
@@ -24,12 +19,10 @@ from stimuli import frames
 from stimuli.specs import NARROW
 
 from .banked_server import BankedServer
+from .on_a_line import BAUD, CLOCK_HZ, OnALine
 
-CLOCK_HZ, BAUD = 12_000_000, 3_000_000
-OSCILLATOR_NS = 22
-"""Where the clock's period is 10 ns."""
-STARTING, PATIENCE = 100, 20_000
-"""Clocks in which the oscillator has seen that the clock runs; clocks after which an answer is overdue."""
+PATIENCE = 20_000
+"""Clocks after which an answer is overdue."""
 SHOWN = "magnitude", "negative", "drive_inverted", "alive"
 """What the axes inside give to stages and pins."""
 PINS = "drive_pdm", "drive_sign", "alive", "outputs_enable"
@@ -60,7 +53,7 @@ class Watched(wiring.Component):
         return m
 
 
-class Host:
+class Host(OnALine):
     """A host on the line, encoders that rest, and the pins of every axis, compared at every clock.
 
     Attributes:
@@ -70,26 +63,16 @@ class Host:
     """
 
     def __init__(self, dut, axes: int):
-        self.dut, self.component = dut, Watched(axes)
-        self.board, self.bench = self.component.board, Bench(dut, self.component)
+        self.component = Watched(axes)
+        super().__init__(Bench(dut, self.component), PATIENCE)
+        self.board = self.component.board
         self.registers = self.board.registers
         self.server = BankedServer(banked_file.Design(self.registers))
         self.loops, self.compared, self.pulses = dict.fromkeys(LOOPS, 1), 0, [0] * axes
         self._stage, self._states = pdm.Design(self.board.spec, pdm.USUAL), [pdm.START] * axes
 
     async def reset(self) -> None:
-        await self.bench.reset()
-        self.bench.drive(uart_rx=1, rst=1, **self.loops)
-        Clock(self.dut.oscillator, OSCILLATOR_NS, "ns", impl="gpi").start()
-        await ClockCycles(self.dut.clk, STARTING)
-        assert int(self.dut.outputs_enable.value) == 0
-        self.bench.drive(rst=0)
-        bit_ns = self.bench.period_ns * CLOCK_HZ / BAUD
-        self.source, self.sink = UartSource(self.dut.uart_rx, 1e9 / bit_ns), UartSink(self.dut.uart_tx, 1e9 / bit_ns)
-        for end in (self.source, self.sink):
-            end.log.setLevel(logging.WARNING)
-        await ClockCycles(self.dut.clk, 3)
-        self._following = cocotb.start_soon(self._follow())
+        await self._start(self.loops)
 
     async def _follow(self) -> None:
         """Compare the pins at every clock edge with what the stages make of what the axes let out."""
@@ -117,20 +100,10 @@ class Host:
                 self.pulses[axis] += shown["pin_drive_pdm"] >> axis & 1
             self.compared += 1
 
-    def leave(self) -> None:
-        """Compare nothing from now on."""
-        self._following.cancel()
-
     def change(self, **loops: int) -> None:
         """Open or close loops."""
         self.loops |= loops
         self.bench.drive(**loops)
-
-    async def edges(self, count: int) -> None:
-        """Let `count` clock edges pass."""
-        await ClockCycles(self.dut.clk, count)
-        if self._following.done():
-            await self._following
 
     async def pulsing(self, clocks: int) -> list[bool]:
         """Return for every axis whether there are pulses in the next clocks."""
@@ -140,24 +113,11 @@ class Host:
 
     async def request(self, pdu: bytes, shows: bool = False) -> bytes:
         """Return the answer without unit and CRC; it must be the twin's, unless it `shows` status."""
-        frame = framed(b"\1" + pdu)
-        await self.source.write(frame)
-        await self.source.wait()
+        frame = await self._send(pdu)
         answer = await self._answer(frame)
         expected = framed(self.server.take(Verdict.REQUEST, frame))
         assert len(answer) == len(expected) if shows else answer == expected
         return answer[1:-2]
-
-    async def _answer(self, frame: bytes) -> bytes:
-        """Return the bytes that the board sends until it has been silent for two bytes, CRC included."""
-        timeout = Timer(PATIENCE * self.bench.period_ns, "ns")
-        first = cocotb.start_soon(self.sink.wait())
-        assert await First(first.complete, timeout) is not timeout, f"no answer to {frame.hex(' ')}"
-        got = b""
-        while not self.sink.empty():
-            got += bytes(self.sink.read_nowait())
-            await self.edges(20 * CLOCK_HZ // BAUD)
-        return got
 
     async def look(self, axis: int, first: str = "drive", last: str = "driven") -> dict[str, int]:
         """Return the status of an axis, from one register to another, and let the twin refuse what the board does."""

@@ -22,13 +22,9 @@ from hardwall.testing.packing import Packing
 from stimuli.specs import spec
 
 from .axis import AxisTwin
+from .on_a_line import BAUD, CLOCK_HZ
 from .supervised import Follower
 
-BAUD = 3_000_000
-"""4 clocks a bit at `CLOCK_HZ`."""
-CLOCK_HZ = 12_000_000
-SYNCHRONISER = 2
-"""Clock edges from a change of a pin to the last edge that does not act on it."""
 IDLE = (*LOOPS, "encoder_a_n", "encoder_b_n")
 """Pins that are high while the handle rests at its origin and all is well."""
 SEEN = (

@@ -1,12 +1,8 @@
 """A host that talks to the board under test, a turning encoder and loops, and the twin, compared at every edge."""
 
-import logging
 from collections import deque
 
-import cocotb
-from cocotb.clock import Clock
-from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
-from cocotbext.uart import UartSink, UartSource
+from cocotb.triggers import RisingEdge
 
 from hardwall.hdl.board import ENCODER
 from hardwall.hdl.link.register_file import RegisterFile
@@ -18,12 +14,9 @@ from hardwall.model.register import Kind
 from hardwall.testing import Bench, rng
 from stimuli import frames
 
-from .board import BAUD, CLOCK_HZ, IDLE, SYNCHRONISER, Twin, make
+from .board import IDLE, Twin, make
+from .on_a_line import OnALine
 
-OSCILLATOR_NS = 22
-"""Where the clock's period is 10 ns."""
-STARTING = 100
-"""Clocks in which the oscillator has seen that the clock runs."""
 COUNT_CLOCKS = 20
 """Clocks from one edge of a turning encoder to the next."""
 PATIENCE = 60_000
@@ -36,7 +29,7 @@ def unlike(found: dict[str, int], wanted: dict[str, int]) -> str:
     return ", ".join(f"{name} of the board is {found[name]}, of the twin {wanted[name]}" for name in different)
 
 
-class Host:
+class Host(OnALine):
     """The world around the board: a host on the line, a turning encoder, loops, and the twin, compared at every edge.
 
     Attributes:
@@ -50,9 +43,9 @@ class Host:
 
     def __init__(self, dut, name: str, estimator: str, stage: str = "pdm"):
         self.component = make(name, estimator, stage)
-        self.dut, self.board, self.random = dut, self.component.board, rng()
-        self.registers = self.board.registers
-        self.bench, self.twin = Bench(dut, self.component), Twin(self.board)
+        super().__init__(Bench(dut, self.component), PATIENCE)
+        self.board, self.random = self.component.board, rng()
+        self.registers, self.twin = self.board.registers, Twin(self.board)
         self.pins = {name: int(name in IDLE) for name in (*ENCODER, *LOOPS)}
         self.phase, self.rate, self.illegal_rate, self.open_rate = 0, 0.0, 0.0, 0.0
         self.pulses: list[tuple[int, ...]] = []
@@ -64,19 +57,7 @@ class Host:
         self.shifted: list[dict[str, int]] = []
 
     async def reset(self) -> None:
-        await self.bench.reset()
-        self.bench.drive(uart_rx=1, rst=1, **self.pins)
-        Clock(self.dut.oscillator, OSCILLATOR_NS, "ns", impl="gpi").start()
-        await ClockCycles(self.dut.clk, STARTING)
-        assert int(self.dut.outputs_enable.value) == 0
-        self.bench.drive(rst=0)
-        bit_ns = self.bench.period_ns * CLOCK_HZ / BAUD
-        self.source, self.sink = UartSource(self.dut.uart_rx, 1e9 / bit_ns), UartSink(self.dut.uart_tx, 1e9 / bit_ns)
-        for end in (self.source, self.sink):
-            end.log.setLevel(logging.WARNING)
-        # The reset is seen inside for as long as this; the first edge without it is the twin's first.
-        await ClockCycles(self.dut.clk, SYNCHRONISER)
-        self._following = cocotb.start_soon(self._follow())
+        await self._start(self.pins)
 
     def _turn(self) -> None:
         """Move the encoder at random by one edge, seldom by two at once, and open or close a loop."""
@@ -136,10 +117,6 @@ class Host:
             twin.edge(self.pins, asked, found)
             self._turn()
 
-    def leave(self) -> None:
-        """Compare nothing from now on."""
-        self._following.cancel()
-
     def shown(self) -> dict[str, int]:
         """Return what the axis inside shows now."""
         return self.component.shown.unpack(int(self.dut.showing.value))
@@ -150,19 +127,10 @@ class Host:
         axis = self.twin.spec
         return (axis.samples_per_actuation + 2) * axis.clocks_per_sample + self.board.latency + 4
 
-    async def edges(self, count: int) -> None:
-        """Let `count` clock edges pass."""
-        await ClockCycles(self.dut.clk, count)
-        if self._following.done():
-            await self._following
-
     async def request(self, pdu: bytes) -> bytes:
         """Return the answer to a request without unit and CRC; it must be the twin's, and the words of the link too."""
-        frame = framed(b"\1" + pdu)
-        await self.source.write(frame)
-        await self.source.wait()
-        begun = len(self.pulses)
-        answer = bytes(await self._answer(frame))
+        frame, begun = await self._send(pdu), len(self.pulses)
+        answer = await self._answer(frame)
         await self.edges(1)
         shown = [each for _, each in list(self.history)[begun - len(self.pulses) :]]
         states = [each[2] for each in shown]
@@ -190,17 +158,6 @@ class Host:
     def _refusing(answer: bytes, possible: list[frozenset[str]]) -> frozenset[str]:
         """Return what the board refused, if its state changed meanwhile: more, if it answered that it refused."""
         return max(possible, key=len) if answer[1:3] == bytes([0x90, server.FAILURE]) else min(possible, key=len)
-
-    async def _answer(self, frame: bytes) -> bytes:
-        """Return the bytes that the board sends until it has been silent for two bytes, CRC included."""
-        timeout = Timer(PATIENCE * self.bench.period_ns, "ns")
-        first = cocotb.start_soon(self.sink.wait())
-        assert await First(first.complete, timeout) is not timeout, f"no answer to {frame.hex(' ')}"
-        got = b""
-        while not self.sink.empty():
-            got += bytes(self.sink.read_nowait())
-            await ClockCycles(self.dut.clk, 20 * CLOCK_HZ // BAUD)
-        return got
 
     def _snapshot(self, pdu: bytes, answer: bytes) -> dict[str, int]:
         """Return the status that the board must have shown when it took each, from when it took its own stamp."""

@@ -8,6 +8,7 @@ from hardwall.model.supervised import FROM_AXIS, FROM_OUTSIDE, Design
 from hardwall.model.supervisor import CAUSES
 
 SYNCHRONISER = 2
+"""Clock edges from a change of a pin to the last edge that does not act on it."""
 PINS = ("encoder_a", "encoder_b", *COMPLEMENTS, *LOOPS)
 BITS = {cause.name: 1 << bit for bit, cause in enumerate(CAUSES)}
 SHOWING = attrgetter(*SHOWN)

@@ -11,7 +11,8 @@ from hardwall.model.supervised import FIXED
 from hardwall.model.supervised_axes import LOOK, SAMPLE_WORDS, Design, Turn
 from hardwall.model.supervisor import ARMED
 
-SYNCHRONISER = 2
+from .supervised import SYNCHRONISER
+
 PINS = ("encoder_a", "encoder_b", *COMPLEMENTS, *LOOPS)
 FAULT = BITS["external_fault"]
 TURN = "state", "ready", "latched", "first", "first_stamp", "counts"
