@@ -4,18 +4,18 @@ import time
 from collections.abc import Generator, Iterator
 from contextlib import suppress
 from functools import partial
-from typing import NamedTuple
 
 from ..model.register import Kind
 from ..model.registers import TELEMETRY
 from .capture import Capture
 from .device import Device, read_identity
-from .errors import ChangedError, HostError, NotReadyError, RefusedError, SilentError, TrippedError
+from .errors import ChangedError, HostError, NotReadyError, RefusedError, TrippedError
 from .groups import Named, Supervisor, Wall
 from .heartbeat import LEASE_S, Beat, Heartbeat
 from .homing import REST_S, Homed, homing
 from .port import Port
 from .seconds import check_seconds
+from .shared import Shared
 from .status import State, Status, Trip, status_of
 from .words import Words
 
@@ -27,27 +27,6 @@ TWICE = "disarm", "acknowledge"
 """Pulses that may come twice: without an answer they are asked for again."""
 LATCHED = Trip(0, (), (), {})
 """Stands for the trip that the board has when it is asked to acknowledge it."""
-
-
-class Shared(NamedTuple):
-    """What several axes on one board have in common: who beats, the words that there are once, as last written, and
-    the axes themselves."""
-
-    beat: Beat
-    words: dict[str, int]
-    axes: list["Axis"]
-
-    def send(self, axis: "Axis") -> None:
-        """Send a beat for an axis, unless it would keep another one ARMED that nobody lets be.
-
-        Raises:
-            SilentError: if the lease of another axis that is ARMED has ended: the board trips.
-            HostError: if the beat does not reach the board.
-        """
-        for number, other in enumerate(self.axes):
-            if other is not axis and other.is_left_armed:
-                raise SilentError(f"axis {number} is ARMED and its lease has ended: no axis of the board beats")
-        self.beat()
 
 
 class Axis(Named):

@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterator
 
 from ..model.axes_registers import BANK, SHARED
 from ..model.registers import COUNTERS, END, PULSES, TELEMETRY
-from .axis import Axis, Shared
+from .axis import Axis
 from .device import Device
 from .heartbeat import Beat
 from .port import Port
+from .shared import Shared
 
 
 class BankPort(Port):

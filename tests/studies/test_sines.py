@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hardwall.sim.studies.sines import Sines, fit
+from hardwall.testing import SEED
 
 TIMES = np.linspace(0, 1, 401)
 
@@ -42,6 +43,21 @@ def test_more_sines_leave_less():
     values = np.maximum(TIMES - 0.5, 0) ** 2
     left = [np.abs(fit(TIMES, values, count).derivative(TIMES) - values).max() for count in (1, 3, 7)]
     assert left[0] > left[1] > left[2]
+
+
+@pytest.mark.parametrize(
+    "values",
+    [np.maximum(TIMES - 0.5, 0) ** 2, np.exp(-8 * TIMES) * np.sin(60 * TIMES)],
+    ids=["kink", "decay"],
+)
+def test_the_last_bit_of_a_record_changes_nothing(values):
+    found = fit(TIMES, values)
+    # Sines that cancel are a million times the record, and which of them there are is chosen by the last bit.
+    assert np.abs([found.sine, found.cosine]).max() <= 4 * np.abs(values).max()
+    largest = np.abs(found.derivative(TIMES, 2)).max()
+    signs = np.where(np.random.default_rng(SEED).random(TIMES.size) < 0.5, -1, 1)
+    other = fit(TIMES, values * (1 + np.finfo(float).eps * signs))
+    assert np.abs(other.derivative(TIMES, 2)).max() == pytest.approx(largest, rel=1e-5)
 
 
 def test_a_record_too_short_is_refused():
