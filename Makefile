@@ -13,6 +13,8 @@ SHELL := /bin/bash
 MAKEFLAGS += --no-builtin-rules --no-builtin-variables --no-print-directory
 # Verilator calls make itself, and that make must not take itself for a part of this run.
 unexport MAKEFLAGS MFLAGS MAKELEVEL
+# Containers like to set it; the tests start a thousand Pythons, and each would compile what it imports.
+unexport PYTHONDONTWRITEBYTECODE
 .DELETE_ON_ERROR:
 .DEFAULT_GOAL := all
 

@@ -5,20 +5,20 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
 
 ROOT = Path(__file__).absolute().parent.parent
 SEED = os.environ.setdefault("HARDWALL_SEED", "1")
 SAMPLES = os.environ.get("HARDWALL_SAMPLES", "the default number of")
 
-# The first example of a kernel includes its compilation, and every failure must come again with the same seed.
-settings.register_profile("hardwall", deadline=None, database=None, print_blob=True)
-settings.load_profile("hardwall")
-
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_configure(config: pytest.Config) -> None:
-    """Give Hypothesis the suite's seed, unless the command line sets another."""
+    """Give Hypothesis the suite's settings and its seed, unless the command line sets another."""
+    from hypothesis import settings  # noqa: PLC0415  (every simulator loads this file, and has no use for Hypothesis)
+
+    # The first example of a kernel includes its compilation, and every failure must come again with the same seed.
+    settings.register_profile("hardwall", deadline=None, database=None, print_blob=True)
+    settings.load_profile("hardwall")
     if config.getoption("--hypothesis-seed") is None:
         config.option.hypothesis_seed = SEED
 

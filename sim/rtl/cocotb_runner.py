@@ -219,6 +219,8 @@ def _run(model: _Model, job: Job, trace_to: Path | None = None) -> None:
                     "PYTHONPATH": os.pathsep.join([str(job.folder), *filter(None, sys.path)]),
                     # By default every module that a test imports, even NumPy and Numba, is parsed at every start.
                     "COCOTB_REWRITE_ASSERTION_FILES": f"{job.module}.py",
+                    # Of pytest it takes the assertions alone; plugins would take longer to load than all else.
+                    "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
                 },
             )
             ended = 0
