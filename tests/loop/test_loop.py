@@ -25,10 +25,11 @@ ESTIMATORS = {
 CORE = ("levant u", "levant u1", "fdm u")
 WHOLE = tuple(ESTIMATORS) if LONG else ("levant u",)
 """These run whole in both walls, by `make soak` all; the others run for two seconds in one wall."""
-ALIKE = "butterworth", "period-count", "levant-semi-implicit", "levant-implicit", "window"
-LOOPS = tuple(ESTIMATORS) if LONG else tuple(name for name in ESTIMATORS if name.split()[0] not in ALIKE)
-"""Those that stand beside one of another kind are left to the long form; their blocks are held to the model anyway."""
-IMPERFECT = tuple(ESTIMATORS) if LONG else ("levant u", "kalman u", "period u", "levant-edge u")
+KINDS = "levant", "fdm", "kalman", "levant-edge"
+LOOPS = tuple(name for name in ESTIMATORS if LONG or name.split()[0] in KINDS)
+"""One of each kind: by its clocks a sample, with state of its own or without, from counts or from the stamps of edges.
+The others are left to the long form; their blocks are held to the model anyway."""
+IMPERFECT = tuple(ESTIMATORS) if LONG else ("levant u", "levant-edge u")
 """These have an encoder with errors."""
 QUICK = (*CORE, "levant-edge u") if LONG else ("levant-edge u",)
 """These run at 1 MHz, and Levant's in a wall that throws the handle back."""

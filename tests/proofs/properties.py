@@ -4,6 +4,7 @@ from . import (
     of_arithmetic,
     of_axes,
     of_axis,
+    of_banked_file,
     of_capture,
     of_drive,
     of_line,
@@ -33,5 +34,6 @@ PROPERTIES = [
     *of_line.PROPERTIES,
     *of_server.PROPERTIES,
     *of_register_file.PROPERTIES,
+    *of_banked_file.PROPERTIES,
     *of_widths.PROPERTIES,
 ]
