@@ -76,18 +76,20 @@ def words_go_where_they_were_written(bench: Bench) -> None:
     host, registers = block.host, block.design.registers
     committing = bench.inner["marks"][[pulse.name for pulse in registers.pulses].index("commit")]
     bank, (place, there) = _bank_written_to(bench, host), _at(host)
-    bench.promise(~(bench.state(*WALK) & (bench.inner["step"] < len(registers.words))) | committing)
-    live, told = Signal(), bench.past(bench.state("TAKE") & _begins(host, Operation.WRITE) & ~bench.reset)
+    step, words = bench.inner["step"], len(registers.words)
+    bench.promise(~bench.state(*WALK) | (step < words + 2) & (committing | (step >= words)))
+    live, before = Signal(), bench.past(place)
+    told = bench.past(bench.state("TAKE") & _begins(host, Operation.WRITE) & ~bench.reset)
     with bench.m.Switch(block.word_number):
         for address, number in block.design.numbers.items():
             with bench.m.Case(number):
-                bench.m.d.comb += live.eq(told & bench.past(place == address))
+                bench.m.d.comb += live.eq(told & (before == address))
     walked = bench.past(bench.state("WALK_STORE") & committing & _begins(host, Operation.FINISH) & ~bench.reset)
     by_write = live & (block.word_axis == bench.past(there))
     bench.promise(~block.word_write | by_write | walked & (block.word_axis == bench.past(bank)))
     for name in SHARED:
         word, port = registers[name], getattr(block, name)
-        written = told & bench.past(place == word.address + 1) | bench.past(bench.reset)
+        written = told & (before == word.address + 1) | bench.past(bench.reset)
         bench.promise(written | (port == bench.past(port, init=word.reset)))
 
 
@@ -166,7 +168,7 @@ def every_operation_ends(bench: Bench) -> None:
     bench.promise(~bench.past(bench.reset, init=1) | bench.state("BOOT") & (left == block.boot_clocks))
 
 
-NO_BOOT = ('m.next = "BOOT_TAKE"', 'm.next = "BEGIN"')
+NO_BOOT = ('m.next = "BOOT_TAKE"', 'm.next = "IDLE"')
 """A reset writes no cell, so that a bug behind it shows in the first clocks."""
 PROPERTIES = [
     Property(
