@@ -32,12 +32,18 @@ async def write_words(world: World) -> None:
 
 
 async def read_status(world: World) -> None:
-    """Take a snapshot of an axis, and read half of its status."""
+    """Take a snapshot of an axis, and read half of its status, at any pace; or take none, for none is asked for."""
     random = world.random
     base, half = BANK * random.randrange(world.design.banks), random.randrange(2)
+    if random.random() < 0.3:
+        await world.clear()
+        await world.check_read(base + random.choice(world.registers.words).address)
+        await world.do(Operation.SNAPSHOT)
     await world.check_read(base + random.choice(world.registers.status).address, 1)
     await world.do(Operation.SNAPSHOT)
     for each in world.registers.status:
+        if random.random() < 0.5:
+            await world.edge()
         await world.read(base + each.address + half)
     world.snapshots += 1
 
