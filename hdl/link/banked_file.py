@@ -143,7 +143,7 @@ class BankedFile(wiring.Component):
         address = host.address
         place, bank = address[: (END - 1).bit_length()], address[(END - 1).bit_length() : (depth - 1).bit_length()]
         in_map = (address[14:] == MAP >> 14) & less(address[:14], len(design.map_cells))
-        # Each is a signal of its own: an expression would be written out wherever it is asked for, once for every pulse.
+        # Each is a signal of its own: an expression would be written out wherever it is asked for.
         in_banks, wide, is_pulse, is_status = Signal(), Signal(), Signal(), Signal()
         status_places = Cat(place[5:] == block >> 5 for block in (TELEMETRY, SUPERVISOR)).any()
         m.d.comb += [
