@@ -77,7 +77,7 @@ def project_key() -> str:
 
 
 @functools.cache
-def _imported(content: bytes, package: str) -> tuple[str, ...]:
+def imported(content: bytes, package: str) -> tuple[str, ...]:
     """Return the names of all modules that a source imports, of their packages, and of what it takes from them."""
     found = []
     for node in ast.walk(ast.parse(content)):
@@ -120,7 +120,7 @@ def _outside(name: str) -> dict[Path, bytes]:
             continue
         found[path] = _source(path)[1]
         if path.suffix == ".py":
-            waiting += _imported(_source(path)[0], module.__package__ or "")
+            waiting += imported(_source(path)[0], module.__package__ or "")
     return dict(sorted(found.items()))
 
 

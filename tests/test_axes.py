@@ -60,6 +60,10 @@ class World:
     def _orders(self) -> None:
         """Give orders to write all words of an axis in any order, and to commit them."""
         number, words = int(self.random.integers(self.spec.axes)), random_words(self.spec.design, self.random)
+        if self.random.random() < 0.25:
+            # Of a wall that is all damper, the lowest bit of a velocity decides.
+            most = next(word.format.max for word in self.spec.design.words if word.name == "wall_damping")
+            words |= {"wall_damping": most, "wall_stiffness": 0, "wall_forbid_pull": 0}
         self.orders += [(number, name, words[name]) for name in self.random.permutation(list(words)).tolist()]
         self.orders.append((number, "", 0))
 

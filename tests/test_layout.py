@@ -81,6 +81,7 @@ BROAD = {
     "test_layout": "the tree",
     "test_makefile": "the tasks",
     "test_mutate": "mutants of hardware, and the means",
+    "test_mutation_sources": "what the fates of mutants come from",
     "test_proofs": "what is proven of the hardware, and the means",
     "test_readme": "the README",
     "test_supervised_axes_faults": "every cause of supervised axes, injected alone",

@@ -4,6 +4,7 @@ import cocotb
 import pytest
 from cocotb.triggers import RisingEdge
 
+from hardwall.hdl.supervised import COMPLEMENTS, LOOPS
 from hardwall.hdl.supervised_axes import SupervisedAxes
 from hardwall.model import supervised_axes
 from hardwall.model.axes import AXES_MAX
@@ -19,42 +20,116 @@ def make(**given) -> Recorded:
     return Recorded(SupervisedAxes(slow(**given)))
 
 
+class Run:
+    """Axes in the simulator, whose outputs are compared with the models' at every clock.
+
+    Attributes:
+        design: the axes' design.
+        inputs: the names of their inputs.
+        follower: the models.
+        compared: the clocks that were compared.
+        ready: whether words can be written.
+    """
+
+    def __init__(self, dut):
+        self._recorded = make(**parameters())
+        self.design, self._bench = self._recorded.component.design, Bench(dut, self._recorded)
+        self.follower = Follower(self.design)
+        self.inputs = tuple(self._recorded.stimuli.shapes)
+        self.compared = self.ready = 0
+
+    async def begin(self, given: dict[str, int]) -> None:
+        """Reset the axes, with inputs."""
+        await self._bench.reset()
+        await self.edge(given, 1)
+
+    async def edge(self, given: dict[str, int], reset: int = 0) -> dict[str, int]:
+        """Go on by a clock with inputs; return the outputs in it."""
+        dut = self._bench.dut
+        dut.stimulus.value, dut.rst.value = self._recorded.stimuli.pack(given), reset
+        await RisingEdge(dut.clk)
+        shown = self._recorded.records.unpack(int(dut.record.value))
+        self.ready = shown["word_ready"]
+        if self.compared or not reset:
+            wanted = self.follower.wanted()
+            assert {name: shown[name] for name in wanted} == wanted, f"clock {self.compared}"
+            self.compared += 1
+        if reset:
+            self.follower.restart(given)
+        else:
+            self.follower.edge(given, shown)
+        return shown
+
+    @property
+    def supervisors(self) -> list:
+        """The states of all supervisors."""
+        return [state.supervisor for state in self.follower.states]
+
+
 @cocotb.test()
 async def follows_models(dut):
-    recorded = make(**parameters())
-    design, bench = recorded.component.design, Bench(dut, recorded)
-    await bench.reset()
-    world, follower = AxesWorld(design, SEED), Follower(design)
-    record, seen_states, compared, turns, resets, apart = bench.dut.record, set(), 0, 0, 0, 0
-    clocks, ready = SAMPLES // (2 if design.spec.axes == 1 else 4), 0
-    for clock in range(clocks):
-        states = [(state.supervisor.state, state.supervisor.latched) for state in follower.states]
-        given = world.act(states, ready)
+    run = Run(dut)
+    design, world, seen_states, turns, resets, apart = run.design, AxesWorld(run.design, SEED), set(), 0, 0, 0
+    clocks = SAMPLES // (2 if design.spec.axes == 1 else 4)
+    await run.begin(world.act([(state.state, state.latched) for state in run.supervisors], 0))
+    for clock in range(1, clocks):
+        given = world.act([(state.state, state.latched) for state in run.supervisors], run.ready)
         # After half of the run the axes are reset in motion, again and again.
-        reset = int(clock == 0 or (2 * clock > clocks and world.random.random() < 16 / clocks))
-        bench.dut.stimulus.value, bench.dut.rst.value = recorded.stimuli.pack(given), reset
-        await RisingEdge(dut.clk)
-        shown = recorded.records.unpack(int(record.value))
-        ready = shown["word_ready"]
-        if clock:
-            wanted = follower.wanted()
-            assert {name: shown[name] for name in wanted} == wanted, f"clock {clock}"
-            compared, turns = compared + 1, turns + shown["turn_valid"]
+        reset = int(2 * clock > clocks and world.random.random() < 16 / clocks)
+        shown = await run.edge(given, reset)
+        turns += shown["turn_valid"]
         if reset:
-            follower.restart(given)
             world.restart()
             resets += 1
-        else:
-            follower.edge(given, shown)
-        now = {(state.supervisor.state, state.supervisor.driven != 0) for state in follower.states}
+        now = {(state.state, state.driven != 0) for state in run.supervisors}
         apart += {(TRIPPED, False), (ARMED, True)} <= now
         seen_states |= now
-    assert compared == clocks - 1
+    assert run.compared == clocks - 1
     assert turns > clocks // design.spec.clocks_per_sample * design.spec.axes * 0.9
-    assert resets > 1
+    assert resets
     assert seen_states == {(DISARMED, False), (TRIPPED, False), (ARMED, False), (ARMED, True)}
     assert (apart > 100) == (design.spec.axes > 1)
-    assert names(ALL & ~follower.reached & ~BITS["strobe_busy"]) == []
+    assert names(ALL & ~run.follower.reached & ~BITS["strobe_busy"]) == []
+
+
+def around(ends: tuple[int, int], width: int) -> list[int]:
+    """Return words of so many bits at the ends of a range, beside these, and unlike these in one bit."""
+    changed = {end ^ 1 << bit for end in ends for bit in range(width)}
+    near = {end + step for end in ends for step in (-1, 0, 1)}
+    return sorted({word & (1 << width) - 1 for word in near | changed})
+
+
+@cocotb.test()
+async def every_word_around_an_end_of_its_range(dut):
+    """Each is taken by an axis that is DISARMED, or trips it; of the one watchdog, every axis."""
+    run, verdicts = Run(dut), set()
+    axes, turn = run.design.spec.axes, 2 * run.design.spec.clocks_per_sample + run.design.latency
+    everyone, words = (1 << axes) - 1, [word.name for word in run.design.words]
+    watchdog = run.design.watchdog.word
+    formats = {word.name: word.format for word in (watchdog, *run.design.words)}
+    rest = dict.fromkeys(run.inputs, 0) | dict.fromkeys((*COMPLEMENTS, *LOOPS), everyone)
+    rest |= {watchdog.name: run.design.ranges[watchdog.name][0]}
+    await run.begin(rest)
+    # Loops are open in the first clocks.
+    for _ in range(turn):
+        await run.edge(rest)
+    await run.edge(rest | {"acknowledge": everyone, "acknowledged": run.supervisors[0].latched})
+    for _ in range(turn):
+        await run.edge(rest)
+    for name, ends in run.design.ranges.items():
+        for place, word in enumerate(around(ends, formats[name].width)):
+            axis, states = place % axes, []
+            port = {"word_write": 1, "word_axis": axis, "word_number": words.index(name)} if name in words else {}
+            for each in (word, ends[1], None):
+                acknowledged = {"acknowledge": everyone, "acknowledged": run.supervisors[axis].latched}
+                given = acknowledged if each is None else port | {"word_value": each} if port else {name: each}
+                await run.edge(rest | given)
+                for _ in range(turn):
+                    await run.edge(rest if port or each is None else rest | given)
+                states.append(run.supervisors[axis].state)
+            verdicts.add((name, ends[0] <= word <= ends[1], *states))
+    came = {True: (DISARMED,) * 3, False: (TRIPPED, TRIPPED, DISARMED)}
+    assert verdicts == {(name, fits, *came[fits]) for name in run.design.ranges for fits in came}
 
 
 @pytest.mark.parametrize(

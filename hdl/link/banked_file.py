@@ -142,12 +142,17 @@ class BankedFile(wiring.Component):
         # What there is at the address.
         address = host.address
         place, bank = address[: (END - 1).bit_length()], address[(END - 1).bit_length() : (depth - 1).bit_length()]
-        in_banks, in_map = less(address, BANK * banks), address[14:] == MAP >> 14
-        in_map &= less(address[:14], len(design.map_cells))
-        # Counters and pulses have one register.
-        wide = in_banks & (place[5:] != COUNTERS >> 5)
-        is_pulse = in_banks & (place[4:] == PULSES >> 4)
-        is_status = in_banks & Cat(place[5:] == block >> 5 for block in (TELEMETRY, SUPERVISOR)).any()
+        in_map = (address[14:] == MAP >> 14) & less(address[:14], len(design.map_cells))
+        # Each is a signal of its own: an expression would be written out wherever it is asked for.
+        in_banks, wide, is_pulse, is_status = Signal(), Signal(), Signal(), Signal()
+        status_places = Cat(place[5:] == block >> 5 for block in (TELEMETRY, SUPERVISOR)).any()
+        m.d.comb += [
+            in_banks.eq(less(address, BANK * banks)),
+            # Counters and pulses have one register.
+            wide.eq(in_banks & (place[5:] != COUNTERS >> 5)),
+            is_pulse.eq(in_banks & (place[4:] == PULSES >> 4)),
+            is_status.eq(in_banks & status_places),
+        ]
         half = wide & ((host.first & place[0]) | (host.last & ~place[0]))
         marks = Signal(len(registers.pulses))
         wanted = Signal.like(marks)
@@ -184,7 +189,8 @@ class BankedFile(wiring.Component):
         words, commit = len(registers.words), marks[[pulse.name for pulse in registers.pulses].index("commit")]
         step, low, settling = Signal(range(BANK * banks)), Signal(), Signal(range(design.settle_clocks + 1))
         count, causes = registers["active_preload_count"].address, registers["acknowledged"].address
-        copies, halfway = less(step, words), Signal(range(END - WRITTEN))
+        copies, halfway = Signal(), Signal(range(END - WRITTEN))
+        m.d.comb += copies.eq(less(step, words))
         beside = Mux(step == words, count - WRITTEN, causes - WRITTEN)
         m.d.comb += halfway.eq(Mux(copies, Cat(low, step[:4]), beside | low))
         walked = halfway | WRITTEN

@@ -8,11 +8,14 @@ from hardwall.hdl.link.banked_file import BankedFile
 from hardwall.model.axes_registers import BANK, SHARED, AxesMap
 from hardwall.model.link import banked_file as model
 from hardwall.model.link.register_file import Operation
-from hardwall.model.registers import COUNTERS, MAP, RegisterMap
+from hardwall.model.registers import COUNTERS, LIVE, MAP, PULSES, TELEMETRY, WRITTEN, RegisterMap
 from hardwall.testing import SAMPLES, simulate
 from stimuli.restless import Restless
 from stimuli.specs import spec
 from stimuli.supervised_axes_world import slow
+
+CHANGES = 0, *(1 << bit for bit in range(17))
+"""Nothing, or a bit of an address: one more than 16, for a frame's last address may lie behind the last one."""
 
 
 async def write_words(world: World) -> None:
@@ -29,12 +32,18 @@ async def write_words(world: World) -> None:
 
 
 async def read_status(world: World) -> None:
-    """Take a snapshot of an axis, and read half of its status."""
+    """Take a snapshot of an axis, and read half of its status, at any pace; or take none, for none is asked for."""
     random = world.random
     base, half = BANK * random.randrange(world.design.banks), random.randrange(2)
+    if random.random() < 0.3:
+        await world.clear()
+        await world.check_read(base + random.choice(world.registers.words).address)
+        await world.do(Operation.SNAPSHOT)
     await world.check_read(base + random.choice(world.registers.status).address, 1)
     await world.do(Operation.SNAPSHOT)
     for each in world.registers.status:
+        if random.random() < 0.5:
+            await world.edge()
         await world.read(base + each.address + half)
     world.snapshots += 1
 
@@ -49,7 +58,11 @@ async def check_anything(world: World) -> None:
 
 
 async def count(world: World) -> None:
-    address = COUNTERS + world.random.randrange(8)
+    random = world.random
+    address = COUNTERS + random.randrange(8)
+    if random.random() < 0.5:
+        # None is read so often that it comes to its upper bits.
+        await world.write(address, random.choice((0xFFFF, random.getrandbits(16))))
     world.twin.count(address)
     await world.do(Operation.COUNT, address)
 
@@ -117,6 +130,30 @@ async def every_bound_of_every_word_in_the_last_bank(dut):
             assert world.twin.absent == (bank > 0 and register.name in SHARED)
             outside += world.twin.outside
     assert outside > 50
+
+
+@cocotb.test()
+async def every_bit_of_an_address(dut):
+    """What is asked for is where something begins or ends, or at an address that differs from such a one in one bit."""
+    world = World(dut)
+    await world.begin(0)
+    random, end, pulses, refused = world.random, BANK * world.design.banks, world.registers.pulses, 0
+    places = [0, TELEMETRY, COUNTERS, PULSES, WRITTEN, LIVE, end - 1, end]
+    places += [MAP - 1, MAP, MAP + len(world.design.map_cells) - 1, MAP + len(world.design.map_cells)]
+    for address in (place ^ change for place in places for change in CHANGES):
+        first, last = random.randrange(2), random.randrange(2)
+        await world.clear()
+        await world.check_read(address, first, last)
+        await world.clear()
+        await world.check_write(address, 1, first, last)
+    # What one pulse is refused for stays when others of the frame are not.
+    for place in (BANK * bank + pulse.address for bank in range(world.design.banks) for pulse in pulses):
+        for address in (place ^ change for change in CHANGES):
+            await world.check_write(address, int(random.random() < 0.9))
+            refused += world.twin.refused
+            if random.random() < 0.5:
+                await world.clear()
+    assert refused
 
 
 @pytest.mark.parametrize("axes", [1, 3])

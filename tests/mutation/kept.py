@@ -1,7 +1,7 @@
 """What came of a block's mutants, kept: a run that was ended goes on where it was.
 
-It is of no use any more where something that it came from has changed: the block's Verilog in a size, its own tests,
-what all tests share, the model, the seed, or the number of mutants.
+It is of no use any more where something that it came from has changed: the block's Verilog in a size, its own tests
+and what these import, what draws and tests mutants, the seed, or the number of mutants or of samples.
 """
 
 import hashlib
@@ -10,27 +10,27 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from covering.blocks import TESTS, Block
+from covering.blocks import Block
 
-from hardwall import model
 from hardwall.hdl.export import to_verilog
 from hardwall.model.build_folder import build_dir
-from hardwall.testing import SEED
+from hardwall.testing import SAMPLES, SEED
+from hardwall.testing.harness import SEQUENCER
 
 from .fates import Fate
 from .netlist import BLOCK
 from .sizes import Size
+from .sources import TREE, sources_of
 
-MODEL = Path(next(iter(model.__path__)))
+OWN = Path(__file__).parent
 
 
 def digest_of(block: Block, sizes: Sequence[Size], count: int) -> str:
     """Return a digest of all that a block's mutants and their fates come from."""
-    shared = (file for file in TESTS.rglob("*.py") if not file.name.startswith("test_"))
-    files = [block.test, *sorted(shared), *sorted(MODEL.rglob("*.py"))]
-    texts = [to_verilog(size.component(), BLOCK) for size in sizes]
-    texts += [file.read_text(encoding="utf-8") for file in files]
-    parts = [block.modules, [size.name for size in sizes], SEED, count, texts]
+    sources = {str(file): (TREE / file).read_bytes() for file in sources_of(block.test)}
+    means = [file.read_bytes() for file in (SEQUENCER, *sorted(OWN.glob("*.py")))]
+    verilog = [to_verilog(size.component(), BLOCK) for size in sizes]
+    parts = [block.modules, [size.name for size in sizes], SEED, SAMPLES, count, verilog, sources, means]
     return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 

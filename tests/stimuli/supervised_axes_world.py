@@ -39,6 +39,7 @@ class Lane(World):
     def __init__(self, design: Design, seed: int):
         super().__init__(design, seed)
         self.formats[design.watchdog.word.name] = design.watchdog.word.format
+        self.round, self.spins = 1 << design.spec.count_width, 0
 
     def act_of(self, state: int, latched: int, asks: float) -> dict[str, int]:
         """Return the inputs of a clock; words beyond their ranges stay until the host takes its usual ones."""
@@ -46,6 +47,7 @@ class Lane(World):
         self.clock += 1
         # As fast as a clock can count, for a rota of few clocks.
         self.speed = random.choice((-1.0, 1.0)) if random.random() < 0.001 else self.speed
+        self._spin()
         now = {**self.inputs, **dict.fromkeys(STROBES, 0), **self._pins()}
         for name in LOOPS:
             self.inputs[name] ^= int(random.random() < (0.0004 if self.inputs[name] else 0.02))
@@ -53,7 +55,26 @@ class Lane(World):
             self._settle()
         if random.random() < 0.0005:
             self.inputs |= self._near_an_end()
+        if random.random() < 0.0004:
+            # The handle is within a count of where it may be, so that every bit of a limit decides.
+            limit = random.choice(("supervisor_position_low", "supervisor_position_high"))
+            near, half = int(self.position // 1) + random.randint(-1, 1), self.round // 2
+            self.inputs[limit] = (near + half) % self.round - half
         return now | (self._awaited(state, latched) or (self._asked() if random.random() < asks else {}))
+
+    def _spin(self) -> None:
+        """Let the handle go round as fast as a clock can count, at times for as long as the estimate may be saturated.
+
+        A count goes round with it: what follows is as near to the limits as before.
+        """
+        random, name = self.random, "supervisor_saturated"
+        if not self.spins and random.random() < 0.0002:
+            self.inputs[name] = random.getrandbits(self.formats[name].width) >> random.randrange(4)
+            self.spins = (self.inputs[name] + 4) * self.design.spec.clocks_per_sample
+        if self.spins:
+            self.spins -= 1
+            self.speed, self.reach = 1.0, self.round
+            self.position = (self.position + self.round / 2) % self.round - self.round / 2
 
 
 class AxesWorld:
