@@ -35,6 +35,8 @@ COLUMNS = {
     "without": "right",
     "result": "left",
 }
+LONGEST_TEST_S = 3600
+"""The longest that a test may take: it counts every point, which must be compiled, too, perhaps beside other work."""
 
 
 def measure(block: Block, folder: Path) -> Coverage | None:
@@ -42,11 +44,13 @@ def measure(block: Block, folder: Path) -> Coverage | None:
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     command = [sys.executable, "-m", "pytest", "-q", "-n", str(os.cpu_count()), "-m", "rtl", str(block.test)]
+    # The suite's own limit ends the process of a test that takes longer, as if it had crashed.
+    command += ["-o", f"faulthandler_timeout={LONGEST_TEST_S}"]
     done = subprocess.run(
         command, env={**os.environ, COVERAGE: str(folder)}, capture_output=True, text=True, check=False
     )
     if done.returncode:
-        print(done.stdout, end="", file=sys.stderr)
+        print(done.stdout, done.stderr, sep="", end="", file=sys.stderr)
         return None
     return Coverage(block.name, merged(sorted(folder.glob("*.dat")), block.modules), reasons_for(block.name, REASONS))
 

@@ -23,6 +23,10 @@ from stimuli.specs import MHZ
 PINS = clocked.Pins._fields
 LEVELS, PULSES = ("encoder_a", "encoder_b", "encoder_z", "drive_enable"), ("preload", "index_arm", "clear_flags")
 """The inputs of one bit for each axis besides `commit`."""
+CHANCES = {"commit": 0.004, "preload": 0.004, "index_arm": 0.02, "clear_flags": 0.01}
+"""The chances of a pulse in a clock."""
+STIFFEST = "wall_stiffness", "output_force_limit", "output_slew_limit"
+"""The words whose largest make the largest drive."""
 RECORD = "count", "velocity", "wall_force", "drive", "flags"
 """The words of the record of a sample, and of `Samples`."""
 
@@ -42,7 +46,7 @@ class World:
     def __init__(self, spec: AxesSpec, random: np.random.Generator):
         self.spec, self.random, self.given, self.writes = spec, random, [], []
         self.levels = dict.fromkeys(LEVELS, 0) | {"drive_enable": (1 << spec.axes) - 1}
-        habits = handle.Habits(illegal=0.001)
+        habits = handle.Habits(illegal=0.01, index=0.1)
         self.moves = [
             handle.edges(np.random.default_rng(seed), habits) for seed in random.integers(1 << 32, size=spec.axes)
         ]
@@ -60,10 +64,14 @@ class World:
     def _orders(self) -> None:
         """Give orders to write all words of an axis in any order, and to commit them."""
         number, words = int(self.random.integers(self.spec.axes)), random_words(self.spec.design, self.random)
-        if self.random.random() < 0.25:
+        kind = self.random.random()
+        if kind < 0.25:
             # Of a wall that is all damper, the lowest bit of a velocity decides.
             most = next(word.format.max for word in self.spec.design.words if word.name == "wall_damping")
             words |= {"wall_damping": most, "wall_stiffness": 0, "wall_forbid_pull": 0}
+        elif kind < 0.45:
+            # The stiffest wall, and nothing that limits its force but the axis.
+            words |= {each.name: each.format.max for each in self.spec.design.words if each.name in STIFFEST}
         self.orders += [(number, name, words[name]) for name in self.random.permutation(list(words)).tolist()]
         self.orders.append((number, "", 0))
 
@@ -83,8 +91,8 @@ class World:
                 acts["commit"] = 1 << number
         act, number = random.random(), int(random.integers(spec.axes))
         half = 1 << spec.count_width - 1
-        for name in ("commit", *PULSES):
-            if random.random() < 0.004:
+        for name, chance in CHANCES.items():
+            if random.random() < chance:
                 acts[name] |= 1 << number
                 acts["preload_count"] = int(random.integers(-half, half))
         if act < 0.01:

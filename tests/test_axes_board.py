@@ -10,7 +10,7 @@ from hardwall.model.axes_registers import BANK
 from hardwall.model.link.server import ABSENT, FAILURE, VALUE
 from hardwall.model.supervisor import ARMED, CAUSES, DISARMED, REQUIRED, TRIPPED
 from hardwall.testing import parameters, simulate
-from oracles.axes_board import Host, Watched
+from oracles.axes_board import COUNT_CLOCKS, Host, Watched
 from stimuli import frames
 
 BITS = {cause.name: 1 << bit for bit, cause in enumerate(CAUSES)}
@@ -76,8 +76,13 @@ async def one_axis_trips_while_the_other_drives_on(dut):
     await drive(host, 0)
     await drive(host, 1, invert=1)
     assert await host.pulsing(200) == [True, True]
-    driven = [(await host.look(axis))["driven"] for axis in (0, 1)]
-    assert driven == [-host.board.spec.force_limit_word] * 2
+    most = host.board.spec.force_limit_word
+    assert [(await host.look(axis, "state"))["driven"] for axis in (0, 1)] == [-most] * 2
+    # A limit of the force is that of its axis.
+    await host.write(0, supervisor_force_limit=most // 2)
+    assert [(await host.look(axis, "state"))["driven"] for axis in (0, 1)] == [-(most // 2), -most]
+    await host.write(1, supervisor_force_limit=most // 2)
+    assert (await host.look(1, "state"))["driven"] == -(most // 2)
     # A host that speaks of one axis does not move the other.
     assert (await host.request(frames.write(host.registers["preload"].address, [1])))[1] == FAILURE
     await host.write(1, supervisor_causes=REQUIRED | BITS["position_range"])
@@ -99,7 +104,42 @@ async def one_axis_trips_while_the_other_drives_on(dut):
     await host.write(0, disarm=1)
     assert await host.pulsing(200) == [False, True]
     assert ((await host.look(0))["state"], (await host.look(1))["state"]) == (DISARMED, ARMED)
+    await host.write(1, disarm=1)
+    assert await host.pulsing(200) == [False, False]
     assert host.compared > 10_000
+
+
+@cocotb.test()
+async def every_encoder_turns_its_own_axis(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    names = "count", "illegal_count", "index_count", "index_armed", "index_latched", "referenced"
+    wanted = [dict.fromkeys(names, 0) for _ in range(2)]
+
+    async def both_are(axis: int, **changed: int) -> None:
+        wanted[axis] |= changed
+        for each in (0, 1):
+            assert (await host.look(each, "count", "referenced")).items() >= wanted[each].items(), each
+
+    # An index that is asked for is where Z rises, and a reference once the host has placed it.
+    for axis, far, place in ((0, 6, -1), (1, -7, 4), (0, -7, 3), (1, 6, -3)):
+        await host.write(axis, index_arm=1)
+        way = far - wanted[axis]["count"]
+        await host.turn(axis, abs(way), way // abs(way))
+        assert (await host.look(axis, "count", "referenced"))["index_armed"] == 1
+        for level in (1, 0):
+            host.level(axis, encoder_z=level)
+            await host.edges(COUNT_CLOCKS)
+        await both_are(axis, count=far, index_latched=1, index_count=far, referenced=0)
+        await host.write(axis, preload=1, clear_flags=0, commit=1, preload_count=place)
+        wanted[axis] |= {"count": place, "referenced": 1}
+    # Edges of both channels at once are counted until the counter is full, and forgotten when the host says so.
+    for axis, steps in ((0, 260), (1, 200)):
+        await host.turn(axis, steps, 2)
+        await both_are(axis, illegal_count=min(steps, 255))
+    for axis in (1, 0):
+        await host.write(axis, clear_flags=1)
+        await both_are(axis, illegal_count=0)
 
 
 @cocotb.test()
@@ -109,7 +149,7 @@ async def a_loop_stops_every_axis(dut):
     await host.write(0, heartbeat=1)
     for axis in (0, 1):
         await host.write(axis, supervisor_causes=REQUIRED | BITS["external_fault"])
-        await drive(host, axis)
+        await drive(host, axis, invert=1 - axis)
     for loop in ("external_fault", "drive_enable", "emergency_stop"):
         assert await host.pulsing(200) == [True, True]
         host.change(**{loop: 0})

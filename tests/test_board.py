@@ -197,13 +197,14 @@ async def a_capture_around_a_trip_is_read_by_the_line(dut):
 async def a_capture_begins_with_the_count_that_passes_its_level(dut):
     host = Host(dut, **parameters())
     await host.reset()
-    await host.write(capture_sources=1 << SOURCES.index("fall"), capture_level=-1, capture_before=0)
+    await host.write(capture_sources=1 << SOURCES.index("fall"), capture_level=-1, capture_before=RECORDS // 4)
     await host.write(capture_start=1)
     # A count that is the level has not passed it.
     for states in ({WAITING}, {WAITING}, {TRIGGERED, DONE}):
         await host.edges(host.settling)
-        assert (await host.look(*SHOWN))["capture_state"] in states
+        assert (status := await host.look(*SHOWN))["capture_state"] in states
         await host.turn(-1)
+    assert status["capture_place"] == RECORDS // 4
 
 
 @cocotb.test()

@@ -8,6 +8,7 @@ from hardwall.hdl.supervised import COMPLEMENTS, LOOPS
 from hardwall.hdl.supervised_axes import SupervisedAxes
 from hardwall.model import supervised_axes
 from hardwall.model.axes import AXES_MAX
+from hardwall.model.monitors import IDLE_EDGES
 from hardwall.model.supervisor import ALL, ARMED, DISARMED, TRIPPED, names
 from hardwall.testing import SAMPLES, SEED, Bench, Recorded, parameters, simulate
 from oracles.supervised import BITS
@@ -130,6 +131,38 @@ async def every_word_around_an_end_of_its_range(dut):
             verdicts.add((name, ends[0] <= word <= ends[1], *states))
     came = {True: (DISARMED,) * 3, False: (TRIPPED, TRIPPED, DISARMED)}
     assert verdicts == {(name, fits, *came[fits]) for name in run.design.ranges for fits in came}
+
+
+@cocotb.test()
+async def an_encoder_that_ails(dut):
+    """A channel that rests while the other has edges is shown; for the longest loss, nothing trips until it is over."""
+    run = Run(dut)
+    spec, words = run.design.spec, {word.name: number for number, word in enumerate(run.design.words)}
+    everyone, longest = (1 << spec.axes) - 1, 255
+    rest = dict.fromkeys(run.inputs, 0) | dict.fromkeys((*COMPLEMENTS, *LOOPS), everyone)
+    rest |= {run.design.watchdog.word.name: run.design.ranges[run.design.watchdog.word.name][0]}
+    await run.begin(rest)
+    while not run.ready:
+        await run.edge(rest)
+    for axis in range(spec.axes):
+        for name, word in (("supervisor_loss", longest), ("supervisor_causes", ALL)):
+            port = {"word_write": 1, "word_axis": axis, "word_number": words[name], "word_value": word}
+            await run.edge(rest | port)
+    shown = []
+    # No rota is without an edge of the channel, and none has two.
+    for clock in range((IDLE_EDGES + 8) * spec.clocks_per_sample):
+        level = everyone * (clock // spec.clocks_per_sample & 1)
+        seen = await run.edge(rest | {"encoder_a": level, "encoder_a_n": level ^ everyone})
+        shown += [seen["turn_a_channel_idle"]] * seen["turn_valid"]
+    assert shown == sorted(shown)
+    assert shown[-1] == 1
+    lost = rest | dict.fromkeys(COMPLEMENTS, 0)
+    for _ in range(longest):
+        await run.edge(lost)
+    assert not any(each.latched & BITS["encoder_loss"] for each in run.supervisors)
+    for _ in range(2 * spec.clocks_per_sample + run.design.latency):
+        await run.edge(lost)
+    assert all(each.latched & BITS["encoder_loss"] for each in run.supervisors)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from hardwall.hdl.estimators.finite_difference import Estimator
 from hardwall.model.estimators.finite_difference import START
-from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model
 from stimuli.specs import spec
 
@@ -32,6 +32,19 @@ async def follows_model(dut):
     restarts = (random.random(len(counts)) < 0.01).tolist()
     expected = await follow(dut, component, zip(counts, restarts, strict=True), START)
     assert expected["saturated"].any()
+
+
+@cocotb.test()
+async def reset_mid_stream_starts_afresh(dut):
+    bench = Bench(dut, make(**parameters()))
+    velocity = bench.reader("velocity")
+    await bench.reset()
+    for count in (0, 1):
+        await bench.transact("strobe", "valid", seen__count=count)
+    assert velocity() == 1
+    await bench.reset()
+    await bench.transact("strobe", "valid", seen__count=-1)
+    assert velocity() == 0
 
 
 @pytest.mark.parametrize("name", ["paper", "narrow"])

@@ -16,8 +16,9 @@ from stimuli.papers_signal import RATES, axis_at, piece
 from stimuli.seeded import seeded
 from stimuli.specs import spec
 
-WINDOWS = {"mhz": None, "narrow": None, "paper": 3.0}
-"""Windows in s, or None for the default; 3 s at 10 kHz are more samples than the memory holds."""
+WINDOWS = {"mhz": None, "narrow": 750e-6, "paper": 3.0}
+"""Windows in s, or None for the default; 750 us have an odd number of samples from tap to tap, and 3 s at 10 kHz are
+more samples than the memory holds."""
 
 
 def design(name: str) -> foaw.Design:

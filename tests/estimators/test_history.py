@@ -37,7 +37,9 @@ def rows(d: history.Design, samples: int):
         elif k % 50 == 0:
             count = random.choice([-half, half - 1, 0])
         age = random.choice([1, 2, oldest - 1, oldest, random.randint(1, oldest)])
-        yield (count + half) % (2 * half) - half, int(random.random() < 0.001), max(age, 1)
+        # A memory that is thinned out has a long time without restarts, in which it fills.
+        restart = random.random() < 0.001 and (d.every == 1 or k % 40_000 < 3_000)
+        yield (count + half) % (2 * half) - half, int(restart), max(age, 1)
 
 
 @compiled
@@ -52,9 +54,9 @@ async def follows_model(dut):
     component = make(**parameters())
     d, bench = component.design, Bench(dut, component)
     await bench.reset()
-    # The change is ready with the earliest next strobe; one more row strobes for the last.
+    # The change is ready with the earliest next strobe; one more row strobes for the last, which forgets everything.
     later = bench.monitor("strobe", "change")
-    every = (*rows(d, SAMPLES // 5), (0, 0, 1))
+    every = (*rows(d, SAMPLES // 5), (0, 1, 1), (0, 0, 1))
     inputs, outputs = await bench.campaign(
         "strobe",
         "valid",

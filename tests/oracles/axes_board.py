@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 from cocotb.triggers import RisingEdge
 
-from hardwall.hdl.axes_board import AxesBoard
+from hardwall.hdl.axes_board import ENCODER, AxesBoard
 from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.supervised import LOOPS
 from hardwall.model.axes import AxesSpec
@@ -21,6 +21,8 @@ from stimuli.specs import NARROW
 from .banked_server import BankedServer
 from .on_a_line import BAUD, CLOCK_HZ, OnALine
 
+COUNT_CLOCKS = 20
+"""Clocks from one edge of a turning encoder to the next."""
 PATIENCE = 20_000
 """Clocks after which an answer is overdue."""
 SHOWN = "magnitude", "negative", "drive_inverted", "alive"
@@ -54,7 +56,7 @@ class Watched(wiring.Component):
 
 
 class Host(OnALine):
-    """A host on the line, encoders that rest, and the pins of every axis, compared at every clock.
+    """A host on the line, encoders that are turned, and the pins of every axis, compared at every clock.
 
     Attributes:
         pulses: for every axis the clocks with a pulse so far.
@@ -69,6 +71,7 @@ class Host(OnALine):
         self.registers = self.board.registers
         self.server = BankedServer(banked_file.Design(self.registers))
         self.loops, self.compared, self.pulses = dict.fromkeys(LOOPS, 1), 0, [0] * axes
+        self._phases, self._levels = [0] * axes, dict.fromkeys(ENCODER, 0)
         self._stage, self._states = pdm.Design(self.board.spec, pdm.USUAL), [pdm.START] * axes
 
     async def reset(self) -> None:
@@ -104,6 +107,19 @@ class Host(OnALine):
         """Open or close loops."""
         self.loops |= loops
         self.bench.drive(**loops)
+
+    def level(self, axis: int, **pins: int) -> None:
+        """Set pins of an axis's encoder."""
+        self._levels |= {name: self._levels[name] & ~(1 << axis) | level << axis for name, level in pins.items()}
+        self.bench.drive(**self._levels)
+
+    async def turn(self, axis: int, steps: int, counts: int = 1) -> None:
+        """Turn the handle of an axis in steps of so many counts, as slowly as a decoder follows; 2 are illegal."""
+        for _ in range(steps):
+            self._phases[axis] += counts
+            a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[self._phases[axis] % 4]
+            self.level(axis, encoder_a=a, encoder_b=b)
+            await self.edges(COUNT_CLOCKS)
 
     async def pulsing(self, clocks: int) -> list[bool]:
         """Return for every axis whether there are pulses in the next clocks."""
