@@ -210,7 +210,7 @@ CASES = {
     "tracking-loop": Case(
         partial(estimator, "tracking-loop"),
         MOVED,
-        Bug(tracking_loop.Estimator.elaborate, "signed(design.lead.width + 1)", "signed(design.lead.width)"),
+        Bug(tracking_loop.Estimator.elaborate, "_bandwidth)))", "_bandwidth) - 1))"),
     ),
     "window": Case(partial(estimator, "window"), (*HISTORY, *DIGITS), FAST, past),
     "foaw": Case(
