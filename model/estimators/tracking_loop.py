@@ -109,7 +109,7 @@ def bandwidth_max_hz(axis: AxisRequirements) -> float:
 class Params(NamedTuple):
     """Words and shifts of the integer kernel; see `Design` for the formats."""
 
-    index: int
+    h: int
     position_shift: int
     velocity_shift: int
     count_width: int
@@ -132,7 +132,7 @@ class State(NamedTuple):
 
 
 class FloatParams(NamedTuple):
-    index: float
+    h: float
     count_width: int
 
 
@@ -203,7 +203,7 @@ class Design(EstimatorDesign):
 
     def params(self, words: Mapping[str, int]) -> Params:
         return Params(
-            index=words["tracking_loop_bandwidth"],
+            h=words["tracking_loop_bandwidth"],
             position_shift=self.shifts[0],
             velocity_shift=self.shifts[1],
             count_width=self.count_width,
@@ -245,8 +245,8 @@ def step(params, state, seen, restart):
     d = saturate(moved, -params.step_max, params.step_max)
     distance = lead + (v >> params.reach) - (d << params.fraction)
     lead = saturate(distance, -params.lead_max, params.lead_max)
-    pull = shift_floor(params.index * (lead >> params.operand_shift), params.position_shift)
-    far_v = v - shift_floor(params.index * pull, params.velocity_shift)
+    pull = shift_floor(params.h * (lead >> params.operand_shift), params.position_shift)
+    far_v = v - shift_floor(params.h * pull, params.velocity_shift)
     v = saturate(far_v, -params.v_max, params.v_max)
 
     flags = int(d != moved) | int(lead != distance) << 1 | int(v != far_v) << 2
@@ -263,6 +263,6 @@ def float_step(params, state, seen, restart):
     v = 0.0 if fresh else state.v
 
     lead += v - d
-    pull = params.index * lead
-    v -= params.index * pull
+    pull = params.h * lead
+    v -= params.h * pull
     return State(1, seen.count, lead - 2 * pull, v), v, 0

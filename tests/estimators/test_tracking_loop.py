@@ -245,7 +245,7 @@ def test_fixed_is_float_within_the_derived_bound(sample_hz, share):
     params = d.float_params(axis.design.gains, "u", {WORD: d.words[0].to_si(held.words[WORD])})
     _, as_rounded, _ = run(params, FLOAT_START, counts)
 
-    errors = rounding(params.index, d.v.f - d.lead.f, d.lead.f - d.operand.f)
+    errors = rounding(params.h, d.v.f - d.lead.f, d.lead.f - d.operand.f)
     assert np.abs(fixed.velocity * d.velocity.lsb - as_rounded).max() <= errors * d.lead.lsb + d.velocity.lsb / 2
     assert not fixed.flags.any()
     judged = slice(len(counts) // 5, None)
@@ -274,7 +274,7 @@ def test_no_input_overflows(name):
     reached = 0.0
     for index in (d.least, math.sqrt(d.least * d.most), d.most):
         params = params_at(d, index)
-        h = params.index * d.words[0].format.lsb
+        h = params.h * d.words[0].format.lsb
         states = impulse(*system(h), int(20 / h) + 100)
         lead = np.concatenate([[-1], np.array([1, 1]) @ states])
         for response in (lead, states[1]):
@@ -343,7 +343,7 @@ def test_default_bandwidth_has_half_the_minimax_window_for_delay():
     # A host sets a bandwidth in Hz.
     host = Axis(axis, floating=True, **{WORD: 300.0})
     other = Axis(axis_at("tracking-loop", 1_000_000, gains=Gains(300.0)), floating=True)
-    assert host.params.estimator.index == pytest.approx(other.params.estimator.index)
+    assert host.params.estimator.h == pytest.approx(other.params.estimator.h)
 
 
 @pytest.mark.parametrize("bandwidth_hz", [-1.0, math.nan, math.inf, 0.0, 796.0, 1e-12, "1"])
