@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from itertools import product
 
 import cocotb
 import numpy as np
@@ -12,15 +13,22 @@ from hardwall.hdl.estimators.tracking_loop import Estimator
 from hardwall.model.axis import Axis
 from hardwall.model.estimators import tracking_loop
 from hardwall.model.estimators.tracking_loop import FLOAT_START, INDEX_MAX, START, Design, Gains, State
+from hardwall.model.quadrature import seen_count
+from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import RATES, axis_at, swing
 from stimuli.seeded import seeded
-from stimuli.specs import spec
+from stimuli.specs import PAPER, spec
 
 AXES = ("paper", "mhz", "narrow", "wide")
 INDICES = np.concatenate([2.0 ** -np.arange(2.0, 13), np.linspace(0.05, INDEX_MAX, 40)])
 WORD = "tracking_loop_bandwidth"
+WIDEST = AxisSpec(
+    **PAPER | {"sample_hz": 1_000, "travel_m": 0.5, "count_m": 1e-9, "stiffness_max_n_per_m": 1e6},
+    estimator="tracking-loop",
+)
+"""An axis whose counts have 32 bits, and may move by half of their range in a sample."""
 
 
 def design(name: str) -> Design:
@@ -363,6 +371,25 @@ def test_the_ends_of_the_range_are_accepted_and_beyond_them_it_is_told(name):
     for bandwidth_hz in (0.99 * d.bandwidth_min_hz, 1.01 * d.bandwidth_max_hz):
         with pytest.raises(ValueError, match=told.replace("+", r"\+")):
             Design(axis, Gains(bandwidth_hz))
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("name", [*AXES, "widest"])
+def test_int64_holds_every_intermediate(name, share):
+    """From the corners of the states, the kernel gives what Python's own integers give, at any design and word."""
+    axis = WIDEST if name == "widest" else spec(name, "tracking-loop")
+    least, most = (getattr(axis.design.estimator, f"bandwidth_{end}_hz") for end in ("min", "max"))
+    d = Design(axis, Gains(least * (most / least) ** share))
+    half, top = 1 << (d.count_width - 1), d.words[0].format.max
+    for word, lead, v, count in product((0, 1, top), (-1, 1), (-1, 1), (-half, half - 1)):
+        params = d.params({WORD: word})
+        state = State(1, 0, lead * d.lead.max, v * params.v_max)
+        exact = tracking_loop.step.py_func(params, state, seen_count(count), 0)
+        assert tracking_loop.step(params, state, seen_count(count), 0) == exact
+        # What the kernel passes on must fit, too.
+        assert abs(params.h * state.lead) >> d.lead.f - d.operand.f < 1 << 62
+        assert abs(exact[0].v) <= params.v_max
+        assert abs(exact[0].lead) <= d.lead.max
 
 
 def test_wrong_design_is_refused():
