@@ -64,13 +64,14 @@ def stimulus(name: str, samples: int):
         for chosen in (reset, word_at(d, d.least), top, 1, 0):
             for k in range(samples // 200):
                 yield (-half, half // 2 - 1, half - 1)[k // period % 3], 0, chosen
-    # Long runs with words too small to follow, until the position is out of its range; then the largest takes it in.
+    # Long runs with words too small to follow, until the position is out of its range. Then the largest word leads the
+    # velocity to its end, small ones press on by a few LSB, and the largest takes the position in.
     longest = min(samples // 8, 3 * d.lead.max // (2 * d.step_max << d.lead.f))
-    for chosen, sign in ((0, 1), (1, -1), (word_at(d, d.least / 4), 1)):
+    for chosen, sign in ((0, 1), (0, -1), (1, -1), (word_at(d, d.least / 4), 1)):
         for k in range(longest):
             yield sign * k * d.step_max, 0, chosen
-        for k in range(50):
-            yield sign * (longest - k) * d.step_max, 0, top
+        for word in (top, *(1 << bit for bit in range(2, 8)), *[top] * 50):
+            yield sign * longest * d.step_max, 0, word
     # A random walk with jumps and restarts, with any bandwidth.
     count, chosen = 0, reset
     for _ in range(samples // 2):
