@@ -36,6 +36,7 @@ OUTPUTS = {
     "levant": ("u", "u1"),
     "butterworth": ("u",),
     "kalman": ("u",),
+    "tracking-loop": ("u",),
     "period": ("u",),
     "period-count": ("u",),
     "levant-edge": ("u",),

@@ -1,6 +1,6 @@
 """The finite difference behind a second-order Butterworth low pass."""
 
-from amaranth.hdl import Module, Mux, Signal, signed
+from amaranth.hdl import Module, Signal, signed
 
 from hardwall.model.estimators.butterworth import Design
 
@@ -43,8 +43,6 @@ class Estimator(EstimatorBlock):
         drop = state.f - design.operand.f
         state_max = velocity.max << (state.f - velocity.f)
 
-        running = Signal()
-        last = Signal.like(self.seen.count)
         moved = Signal.like(self.seen.count)
         d, d1, d2 = (Signal(range(-design.step_max, design.step_max + 1), name=name) for name in ("d", "d1", "d2"))
         four_x = Signal(signed(len(d) + 2))
@@ -88,21 +86,10 @@ class Estimator(EstimatorBlock):
             "LIMIT Y": [y.eq(held), self.saturated[1].eq(self.saturated[1] | (held != total))],
             "OUTPUT": [self.velocity.eq(shift_round_half_up(y, state.f - velocity.f)), self.valid.eq(1)],
         }
-        following = [*list(sequence)[1:], "SAMPLE"]
-        with m.FSM():
-            with m.State("SAMPLE"), m.If(self.strobe):
-                fresh = self.restart | ~running
-                # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
-                m.d.sync += [
-                    moved.eq(Mux(fresh, 0, (self.seen.count - last)[: len(moved)].as_signed())),
-                    last.eq(self.seen.count),
-                    running.eq(1),
-                ]
-                with m.If(fresh):
-                    m.d.sync += [d1.eq(0), d2.eq(0), w.eq(0), y.eq(0)]
-                m.next = "DIFFERENCE"
-            for (name, statements), after in zip(sequence.items(), following, strict=True):
-                with m.State(name):
-                    m.d.sync += statements
-                    m.next = after
+
+        def forget(fresh):
+            with m.If(fresh):
+                m.d.sync += [d1.eq(0), d2.eq(0), w.eq(0), y.eq(0)]
+
+        self._step_by_step(m, moved, forget, sequence)
         return m

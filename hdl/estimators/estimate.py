@@ -1,5 +1,8 @@
 """The members that every velocity estimator has in hardware, with the bus from the decoder."""
 
+from collections.abc import Callable
+
+from amaranth.hdl import Module, Mux, Signal, Value
 from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.estimators.estimate import EstimatorDesign
@@ -51,3 +54,33 @@ class EstimatorBlock(Block):
             "saturated": Out(len(design.flags)),
             "valid": Out(1),
         }
+
+    def _step_by_step(
+        self, m: Module, moved: Signal, forget: Callable[[Value], None], sequence: dict[str, list]
+    ) -> None:
+        """Describe a machine that takes the count with the strobe, and then goes through a sequence, a step a clock.
+
+        Args:
+            m: the block's module.
+            moved: takes the difference from the last count: 0 at the first sample and with `restart`.
+            forget: called with the condition that there is no past; describes what is done with the strobe then.
+            sequence: the statements of every step, by its name.
+        """
+        running = Signal()
+        last = Signal.like(self.seen.count)
+        following = [*list(sequence)[1:], "SAMPLE"]
+        with m.FSM():
+            with m.State("SAMPLE"), m.If(self.strobe):
+                fresh = self.restart | ~running
+                # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
+                m.d.sync += [
+                    moved.eq(Mux(fresh, 0, (self.seen.count - last)[: len(moved)].as_signed())),
+                    last.eq(self.seen.count),
+                    running.eq(1),
+                ]
+                forget(fresh)
+                m.next = next(iter(sequence))
+            for (name, statements), after in zip(sequence.items(), following, strict=True):
+                with m.State(name):
+                    m.d.sync += statements
+                    m.next = after

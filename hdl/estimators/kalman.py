@@ -1,6 +1,6 @@
 """All-integrator Kalman filter with steady-state gains."""
 
-from amaranth.hdl import Module, Mux, Signal, signed
+from amaranth.hdl import Module, Signal, signed
 
 from hardwall.model.estimators.kalman import Design
 
@@ -41,13 +41,12 @@ class Estimator(EstimatorBlock):
         design = self._design
         velocity, v_max = design.velocity, design.velocity.max << (design.v.f - design.velocity.f)
 
-        running = Signal()
-        last = Signal.like(self.seen.count)
         moved = Signal.like(self.seen.count)
         d = Signal(range(-design.step_max, design.step_max + 1))
         # With a gain just below 2, lead may change to its own negative and slightly beyond.
         lead = Signal(signed(design.lead.width + 1))
-        v, a = Signal(shape(design.v)), Signal(shape(design.a))
+        v = Signal(shape(design.v))
+        a = Signal(shape(design.a))
         predicted = Signal(signed(max(len(v), len(a) - design.a.f + design.v.f) + 1))
         twice_moved = Signal(signed(len(predicted) + 1))
         behind = Signal(signed(max(len(lead), len(d) + design.lead.f) + 1))
@@ -95,23 +94,12 @@ class Estimator(EstimatorBlock):
                 self.valid.eq(1),
             ],
         }
-        following = [*list(sequence)[1:], "SAMPLE"]
-        with m.FSM():
-            with m.State("SAMPLE"), m.If(self.strobe):
-                fresh = self.restart | ~running
-                # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
-                m.d.sync += [
-                    moved.eq(Mux(fresh, 0, (self.seen.count - last)[: len(moved)].as_signed())),
-                    last.eq(self.seen.count),
-                    running.eq(1),
-                ]
-                with m.If(fresh):
-                    m.d.sync += [lead.eq(0), v.eq(0)]
-                with m.If(fresh | (self.kalman_acceleration == 0)):
-                    m.d.sync += a.eq(0)
-                m.next = "DIFFERENCE"
-            for (name, statements), after in zip(sequence.items(), following, strict=True):
-                with m.State(name):
-                    m.d.sync += statements
-                    m.next = after
+
+        def forget(fresh):
+            with m.If(fresh):
+                m.d.sync += [lead.eq(0), v.eq(0)]
+            with m.If(fresh | (self.kalman_acceleration == 0)):
+                m.d.sync += a.eq(0)
+
+        self._step_by_step(m, moved, forget, sequence)
         return m

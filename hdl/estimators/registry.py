@@ -14,6 +14,7 @@ from . import (
     levant_semi_implicit,
     period,
     period_count,
+    tracking_loop,
     window,
 )
 from .estimate import EstimatorBlock
@@ -23,6 +24,7 @@ ESTIMATORS: dict[str, type[EstimatorBlock]] = {
     "levant": levant.Estimator,
     "butterworth": butterworth.Estimator,
     "kalman": kalman.Estimator,
+    "tracking-loop": tracking_loop.Estimator,
     "period": period.Estimator,
     "period-count": period_count.Estimator,
     "levant-edge": levant_edge.Estimator,

@@ -56,7 +56,7 @@ from ..checks import FieldError
 from ..compiled import compiled
 from ..requirements import AxisRequirements
 from ..words import GAIN_BITS, Word
-from .estimate import EstimatorDesign, EstimatorGains, estimate
+from .estimate import EstimatorDesign, EstimatorGains, estimate, fraction_bits, largest_step
 
 CUTOFF_MAX = 0.4
 """Highest cutoff, as a fraction of the sampling rate."""
@@ -157,19 +157,17 @@ class Design(EstimatorDesign):
     def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         self._sample_hz = axis.sample_hz
-        # Two counts differ by at most half of their range.
-        self.step_max = min(math.floor(2 * axis.speed_max_counts_per_sample) + 2, 1 << (axis.count_width - 1))
+        self.step_max = largest_step(axis)
         self.coefficient = UQ(1, GAIN_BITS - 1)
         self.cutoff_max_hz = CUTOFF_MAX * axis.sample_hz
         i = 1 + bits_for(STATE_NORM * self.step_max + 1)
-        root = math.sqrt(axis.acceleration_max_m_per_s2 / axis.count_m) / axis.sample_hz
 
         # The widest sums have three bits more than a state: 63 with the sign.
         room = 60 - i - GUARD_BITS
         least = 2.0**-room * axis.sample_hz / (2 * math.pi)
         self.cutoff_min_hz = least
         self._check(gains.cutoff_hz)
-        f = min(max(RESOLUTION_BITS - math.floor(math.log2(root)), 0), 62 - GAIN_BITS - GUARD_BITS - 1 - i)
+        f = min(fraction_bits(axis, RESOLUTION_BITS), 62 - GAIN_BITS - GUARD_BITS - 1 - i)
         needed = self._reach(gains.cutoff_hz)
         wanted = self._reach(min(_default_hz(axis) / 2**RANGE_BITS, gains.cutoff_hz))
         reach = max(needed, min(wanted, room - f))

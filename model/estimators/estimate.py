@@ -5,6 +5,7 @@ two variants, one for the integer words of the hardware and one for the same alg
 see `registry`.
 """
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -111,6 +112,25 @@ class EstimatorDesign(ABC):
         if output not in cls.outputs:
             raise ValueError(f"output of {cls.name} must be one of {', '.join(cls.outputs)}, not {output!r}")
         return {cls.output_word(): cls.outputs.index(output)} if len(cls.outputs) > 1 else {}
+
+
+def largest_step(axis: AxisRequirements) -> int:
+    """Return the largest difference of two counts that a filter of counts takes.
+
+    That is what twice the largest speed moves in a sample, begun within a count, and one count for an edge out of
+    place; at most half of the count's range, for two counts differ by no more.
+    """
+    return min(math.floor(2 * axis.speed_max_counts_per_sample) + 2, 1 << (axis.count_width - 1))
+
+
+def fraction_bits(axis: AxisRequirements, resolution_bits: int) -> int:
+    """Return the fraction bits of a velocity whose LSB is at most sqrt(C') 2**-resolution_bits.
+
+    C' is the axis's bound on the acceleration in counts a sample^2; sqrt(C') is half of the minimax bound of a velocity
+    from counts, 2 sqrt(C eps), with eps a count.
+    """
+    root = math.sqrt(axis.acceleration_max_m_per_s2 / axis.count_m) / axis.sample_hz
+    return max(resolution_bits - math.floor(math.log2(root)), 0)
 
 
 @by_type

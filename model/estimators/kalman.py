@@ -63,7 +63,7 @@ from ..checks import FieldError
 from ..compiled import compiled
 from ..requirements import AxisRequirements
 from ..words import GAIN_BITS, Word, gain_format
-from .estimate import EstimatorDesign, EstimatorGains, estimate
+from .estimate import EstimatorDesign, EstimatorGains, estimate, fraction_bits, largest_step
 from .riccati import steady_state
 
 RESOLUTION_BITS = 11
@@ -180,8 +180,7 @@ class Design(EstimatorDesign):
     def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         self._axis = axis
-        # Two counts differ by at most half of their range.
-        self.step_max = most = min(math.floor(2 * axis.speed_max_counts_per_sample) + 2, 1 << (axis.count_width - 1))
+        self.step_max = most = largest_step(axis)
         index = gains.index(axis)
         h = min(index, 1.0)
         norm_v, norm_a, norm_lead = norms(index)
@@ -203,8 +202,7 @@ class Design(EstimatorDesign):
                 "acceleration_rms_m_per_s2",
                 f"must be at least {least:g} at these rates, not {gains.acceleration_rms_m_per_s2!r}",
             )
-        root = math.sqrt(axis.acceleration_max_m_per_s2 / axis.count_m) / axis.sample_hz
-        f = axis.shrunk(min(max(RESOLUTION_BITS - math.floor(math.log2(root)), 0), room))
+        f = axis.shrunk(min(fraction_bits(axis, RESOLUTION_BITS), room))
         fine = f + GUARD_BITS
         self.velocity = SQ(i, f)
         self.lead, self.v, self.a = SQ(i_lead, fine), SQ(i, fine + reach), SQ(i_a, fine + 2 * reach)

@@ -18,6 +18,7 @@ from . import (
     levant_semi_implicit,
     period,
     period_count,
+    tracking_loop,
     window,
 )
 from .estimate import EstimatorDesign
@@ -27,6 +28,7 @@ ESTIMATORS: dict[str, type[EstimatorDesign]] = {
     "levant": levant.Design,
     "butterworth": butterworth.Design,
     "kalman": kalman.Design,
+    "tracking-loop": tracking_loop.Design,
     "period": period.Design,
     "period-count": period_count.Design,
     "levant-edge": levant_edge.Design,

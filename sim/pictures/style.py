@@ -57,6 +57,7 @@ COLOURS = {
     "levant": "#D55E00",
     "butterworth": "#0072B2",
     "kalman": "#009E73",
+    "tracking-loop": "#117733",
     "period": "#999933",
     "period-count": "#B08900",
     "levant-edge": "#E69F00",
@@ -66,7 +67,7 @@ COLOURS = {
     "window": "#CC79A7",
     "foaw": "#3FA7D6",
 }
-MARKERS = dict(zip(COLOURS, "ovsD<>^phXP*", strict=True))
+MARKERS = dict(zip(COLOURS, "ovsDd<>^phXP*", strict=True))
 OTHER = {"color": "#000000", "marker": "."}
 """The style of an estimator that has no colour here yet."""
 FADED = 0.5

@@ -19,6 +19,7 @@ from hardwall.hdl.estimators import (
     kalman,
     levant,
     levant_semi_implicit,
+    tracking_loop,
 )
 from hardwall.hdl.estimators.cycle_times import CycleTimes
 from hardwall.hdl.estimators.estimate import EstimatorBlock
@@ -205,6 +206,11 @@ CASES = {
         MOVED,
         Bug(kalman.Estimator.elaborate, "signed(len(operand) + len(gain))", "signed(len(operand) + len(gain) - 1)"),
         axes=("mhz", "narrow"),
+    ),
+    "tracking-loop": Case(
+        partial(estimator, "tracking-loop"),
+        MOVED,
+        Bug(tracking_loop.Estimator.elaborate, "_bandwidth)))", "_bandwidth) - 1))"),
     ),
     "window": Case(partial(estimator, "window"), (*HISTORY, *DIGITS), FAST, past),
     "foaw": Case(
