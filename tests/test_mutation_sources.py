@@ -38,7 +38,9 @@ import_module("conftest")
 import_module(stem)
 files = [getattr(module, "__file__", None) for module in [*sys.modules.values()]]
 files = [Path(file).resolve() for file in files if isinstance(file, str)]
-print(json.dumps([str(file.relative_to(tree)) for file in files if file.is_relative_to(tree)]))
+files = [file.relative_to(tree) for file in files if file.is_relative_to(tree)]
+# The virtual environment is a folder of the project, too.
+print(json.dumps([str(file) for file in files if not file.parts[0].startswith(".")]))
 """
 """Imports a test as the simulator does, without what runs that, and prints all of the project that came with it."""
 SOURCES = {
