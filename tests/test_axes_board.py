@@ -10,7 +10,8 @@ from hardwall.model.axes_registers import BANK
 from hardwall.model.link.server import ABSENT, FAILURE, VALUE
 from hardwall.model.supervisor import ARMED, CAUSES, DISARMED, REQUIRED, TRIPPED
 from hardwall.testing import parameters, simulate
-from oracles.axes_board import COUNT_CLOCKS, Host, Watched
+from oracles.axes_board import Host, Watched
+from oracles.supervised import SYNCHRONISER
 from stimuli import frames
 
 BITS = {cause.name: 1 << bit for bit, cause in enumerate(CAUSES)}
@@ -20,13 +21,14 @@ def make(axes: int) -> Watched:
     return Watched(axes)
 
 
-async def drive(host: Host, axis: int, invert: int = 0) -> None:
-    """Put the handle of an axis deep into a stiff wall, and arm it."""
+async def drive(host: Host, axis: int, invert: int = 0, left: int = 0) -> None:
+    """Put the handle of an axis deep into a stiff wall on a side of it, and arm it."""
     registers = host.registers
     await host.write(axis, supervisor_ramp=registers["supervisor_ramp"].high)
     await host.write(axis, drive_invert=invert)
     words = {word.name: word.reset for word in registers.words}
-    words |= {"wall_position": 1 + registers["wall_position"].low, "wall_stiffness": registers["wall_stiffness"].high}
+    words |= {"wall_position": registers["wall_position"].high if left else 1 + registers["wall_position"].low}
+    words |= {"wall_stiffness": registers["wall_stiffness"].high, "wall_left": left}
     await host.write(axis, commit=1, **words)
     assert (await host.look(axis))["ready"]
     await host.write(axis, arm=1)
@@ -76,13 +78,8 @@ async def one_axis_trips_while_the_other_drives_on(dut):
     await drive(host, 0)
     await drive(host, 1, invert=1)
     assert await host.pulsing(200) == [True, True]
-    most = host.board.spec.force_limit_word
-    assert [(await host.look(axis, "state"))["driven"] for axis in (0, 1)] == [-most] * 2
-    # A limit of the force is that of its axis.
-    await host.write(0, supervisor_force_limit=most // 2)
-    assert [(await host.look(axis, "state"))["driven"] for axis in (0, 1)] == [-(most // 2), -most]
-    await host.write(1, supervisor_force_limit=most // 2)
-    assert (await host.look(1, "state"))["driven"] == -(most // 2)
+    driven = [(await host.look(axis))["driven"] for axis in (0, 1)]
+    assert driven == [-host.board.spec.force_limit_word] * 2
     # A host that speaks of one axis does not move the other.
     assert (await host.request(frames.write(host.registers["preload"].address, [1])))[1] == FAILURE
     await host.write(1, supervisor_causes=REQUIRED | BITS["position_range"])
@@ -104,42 +101,82 @@ async def one_axis_trips_while_the_other_drives_on(dut):
     await host.write(0, disarm=1)
     assert await host.pulsing(200) == [False, True]
     assert ((await host.look(0))["state"], (await host.look(1))["state"]) == (DISARMED, ARMED)
-    await host.write(1, disarm=1)
-    assert await host.pulsing(200) == [False, False]
     assert host.compared > 10_000
 
 
+async def check_status(host: Host, axis: int, **shown: int) -> None:
+    """Check that an axis shows that, and zeros beside it; when a sample was, no host on a line can tell."""
+    status = await host.look(axis)
+    wanted = dict.fromkeys(status, 0) | {"live": 1} | shown
+    unlike = {name: (status[name], word) for name, word in wanted.items() if status[name] != word}
+    assert {name: pair for name, pair in unlike.items() if name not in ("stamp", "first_stamp")} == {}, f"axis {axis}"
+
+
+async def prepare(host: Host, axis: int) -> None:
+    """Give an axis a spring of a force LSB a count, which begins at the count 0, on a side of its own."""
+    words = {word.name: word.reset for word in host.registers.words}
+    stiffness = 1 << host.registers["wall_stiffness"].format.f
+    words |= {"wall_stiffness": stiffness, "wall_left": axis, "encoder_glitch_clocks": 1, "preload_count": 9}
+    await host.write(axis, commit=1, **words)
+    await host.write(axis, supervisor_ramp=host.registers["supervisor_ramp"].high)
+    await host.write(axis, supervisor_causes=REQUIRED | BITS["encoder_loss"])
+
+
 @cocotb.test()
-async def every_encoder_turns_its_own_axis(dut):
+async def every_status_is_of_its_axis(dut):
     host = Host(dut, **parameters())
     await host.reset()
-    names = "count", "illegal_count", "index_count", "index_armed", "index_latched", "referenced"
-    wanted = [dict.fromkeys(names, 0) for _ in range(2)]
+    # The largest watchdog is none of a range's outside.
+    await host.write(0, heartbeat=1)
+    await host.write(0, supervisor_watchdog=host.registers["supervisor_watchdog"].high)
+    for axis in (0, 1):
+        await prepare(host, axis)
+    await host.turn(7, -5)
+    ready = {"state": DISARMED, "ready": 1}
+    await check_status(host, 0, count=7, wall_force=-7, drive=-7, **ready)
+    await check_status(host, 1, count=-5, wall_force=5, drive=5, **ready)
+    # What a host asks of one axis does not come to the other, whichever is first.
+    await host.write(1, arm=1)
+    await host.write(1, index_arm=1)
+    await host.turn(9, -10, index=0b11)
+    await check_status(host, 0, count=9, wall_force=-9, drive=-9, **ready)
+    found = {"index_latched": 1, "index_count": -10}
+    await check_status(host, 1, count=-10, wall_force=10, drive=10, driven=10, state=ARMED, **found)
+    await host.write(0, index_arm=1)
+    await check_status(host, 0, count=9, wall_force=-9, drive=-9, index_armed=1, **ready)
+    await host.turn(9, -10, index=0b01)
+    await host.write(0, preload=1)
+    found = {"index_latched": 1, "index_count": 9, "referenced": 1}
+    await check_status(host, 0, count=9, wall_force=-9, drive=-9, **found, **ready)
+    await host.jump(1, 101)
+    illegal = {"state": TRIPPED, "latched": BITS["encoder_illegal"], "first": BITS["encoder_illegal"]}
+    # The output stage asks for nothing while the count may be wrong.
+    illegal |= {"flags": 1, "counts_0": 1, "drive": 0}
+    await check_status(host, 0, count=9, wall_force=-9, illegal_count=2, **found, **illegal)
+    await host.write(0, clear_flags=1)
+    assert [(await host.look(axis))["illegal_count"] for axis in (0, 1)] == [0, 202]
+    await host.write(1, clear_flags=1)
+    for axis in (0, 1):
+        latched = (await host.look(axis))["latched"]
+        assert latched & BITS["encoder_illegal"]
+        await host.write(axis, acknowledged=latched)
+        await host.write(axis, acknowledge=1)
+        assert (await host.look(axis))["state"] == DISARMED
 
-    async def both_are(axis: int, **changed: int) -> None:
-        wanted[axis] |= changed
-        for each in (0, 1):
-            assert (await host.look(each, "count", "referenced")).items() >= wanted[each].items(), each
 
-    # An index that is asked for is where Z rises, and a reference once the host has placed it.
-    for axis, far, place in ((0, 6, -1), (1, -7, 4), (0, -7, 3), (1, 6, -3)):
-        await host.write(axis, index_arm=1)
-        way = far - wanted[axis]["count"]
-        await host.turn(axis, abs(way), way // abs(way))
-        assert (await host.look(axis, "count", "referenced"))["index_armed"] == 1
-        for level in (1, 0):
-            host.level(axis, encoder_z=level)
-            await host.edges(COUNT_CLOCKS)
-        await both_are(axis, count=far, index_latched=1, index_count=far, referenced=0)
-        await host.write(axis, preload=1, clear_flags=0, commit=1, preload_count=place)
-        wanted[axis] |= {"count": place, "referenced": 1}
-    # Edges of both channels at once are counted until the counter is full, and forgotten when the host says so.
-    for axis, steps in ((0, 260), (1, 200)):
-        await host.turn(axis, steps, 2)
-        await both_are(axis, illegal_count=min(steps, 255))
-    for axis in (1, 0):
-        await host.write(axis, clear_flags=1)
-        await both_are(axis, illegal_count=0)
+@cocotb.test()
+async def the_stamp_of_a_status_is_the_clock_of_its_sample(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    begun, rota, stamps = host.bench.clock_number(), host.board.spec.clocks_per_sample, []
+    for _ in range(8):
+        asked = host.bench.clock_number() - begun
+        stamps.append((await host.look(0, "stamp", "stamp"))["stamp"])
+        assert asked <= stamps[-1] <= host.bench.clock_number() - begun
+    # A rota apart, or several: odd numbers of them, and even ones.
+    apart = [stamp - stamps[0] for stamp in stamps]
+    assert not any(clocks % rota for clocks in apart)
+    assert {clocks // rota % 2 for clocks in apart} == {0, 1}
 
 
 @cocotb.test()
@@ -149,7 +186,8 @@ async def a_loop_stops_every_axis(dut):
     await host.write(0, heartbeat=1)
     for axis in (0, 1):
         await host.write(axis, supervisor_causes=REQUIRED | BITS["external_fault"])
-        await drive(host, axis, invert=1 - axis)
+        # Pushed to the other side than elsewhere, and the other axis inverted.
+        await drive(host, axis, invert=1 - axis, left=1)
     for loop in ("external_fault", "drive_enable", "emergency_stop"):
         assert await host.pulsing(200) == [True, True]
         host.change(**{loop: 0})
@@ -190,6 +228,9 @@ async def a_clock_that_stops_makes_every_output_low_and_all_come_back_disarmed(d
     assert not any(int(output.value) for output in outputs[:2])
     for axis in (0, 1):
         assert (await host.look(axis))["state"] == DISARMED
+    host.bench.drive(rst=1)
+    await ClockCycles(dut.clk, 2 * SYNCHRONISER)
+    assert not int(dut.outputs_enable.value)
 
 
 def test_rtl():

@@ -5,7 +5,7 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 from cocotb.triggers import RisingEdge
 
-from hardwall.hdl.axes_board import ENCODER, AxesBoard
+from hardwall.hdl.axes_board import AxesBoard
 from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.supervised import LOOPS
 from hardwall.model.axes import AxesSpec
@@ -13,6 +13,7 @@ from hardwall.model.axes_registers import BANK
 from hardwall.model.drive import pdm
 from hardwall.model.link import banked_file
 from hardwall.model.link.line import Verdict, framed
+from hardwall.model.supervisor import ARMED
 from hardwall.testing import Bench
 from hardwall.testing.packing import Packing
 from stimuli import frames
@@ -21,8 +22,11 @@ from stimuli.specs import NARROW
 from .banked_server import BankedServer
 from .on_a_line import BAUD, CLOCK_HZ, OnALine
 
-COUNT_CLOCKS = 20
-"""Clocks from one edge of a turning encoder to the next."""
+QUARTERS = (0, 0), (1, 0), (1, 1), (0, 1)
+"""The channels of an encoder at every fourth count."""
+STEP = 30
+"""Clocks for which a handle that turns stays at a count: longer than the largest filter, and than a rota."""
+
 PATIENCE = 20_000
 """Clocks after which an answer is overdue."""
 SHOWN = "magnitude", "negative", "drive_inverted", "alive"
@@ -56,22 +60,23 @@ class Watched(wiring.Component):
 
 
 class Host(OnALine):
-    """A host on the line, encoders that are turned, and the pins of every axis, compared at every clock.
+    """A host on the line, handles that it turns, and the pins of every axis, compared at every clock.
 
     Attributes:
         pulses: for every axis the clocks with a pulse so far.
         compared: the clocks at which pins were compared.
         server: the twin of the link.
+        places: the counts of the handles.
     """
 
     def __init__(self, dut, axes: int):
+        self.places = [0] * axes
         self.component = Watched(axes)
         super().__init__(Bench(dut, self.component), PATIENCE)
         self.board = self.component.board
         self.registers = self.board.registers
         self.server = BankedServer(banked_file.Design(self.registers))
         self.loops, self.compared, self.pulses = dict.fromkeys(LOOPS, 1), 0, [0] * axes
-        self._phases, self._levels = [0] * axes, dict.fromkeys(ENCODER, 0)
         self._stage, self._states = pdm.Design(self.board.spec, pdm.USUAL), [pdm.START] * axes
 
     async def reset(self) -> None:
@@ -108,18 +113,26 @@ class Host(OnALine):
         self.loops |= loops
         self.bench.drive(**loops)
 
-    def level(self, axis: int, **pins: int) -> None:
-        """Set pins of an axis's encoder."""
-        self._levels |= {name: self._levels[name] & ~(1 << axis) | level << axis for name, level in pins.items()}
-        self.bench.drive(**self._levels)
+    async def turn(self, *places: int, index: int = 0) -> None:
+        """Turn the handles to counts; there, the axes with a bit in `index` see a pulse of their index."""
+        while self.places != [*places]:
+            self.places = [at + (to > at) - (to < at) for at, to in zip(self.places, places, strict=True)]
+            await self._show(0)
+        await self._show(index)
+        await self._show(0)
 
-    async def turn(self, axis: int, steps: int, counts: int = 1) -> None:
-        """Turn the handle of an axis in steps of so many counts, as slowly as a decoder follows; 2 are illegal."""
-        for _ in range(steps):
-            self._phases[axis] += counts
-            a, b = ((0, 0), (1, 0), (1, 1), (0, 1))[self._phases[axis] % 4]
-            self.level(axis, encoder_a=a, encoder_b=b)
-            await self.edges(COUNT_CLOCKS)
+    async def _show(self, index: int, jumping: int = 0) -> None:
+        """Show for a while where the handles are, the axes with a bit in `jumping` half a cycle further."""
+        quarters = [QUARTERS[(at + 2 * (jumping >> axis & 1)) % 4] for axis, at in enumerate(self.places)]
+        channels = [sum(quarter[k] << axis for axis, quarter in enumerate(quarters)) for k in (0, 1)]
+        self.bench.drive(encoder_a=channels[0], encoder_b=channels[1], encoder_z=index)
+        await self.edges(STEP)
+
+    async def jump(self, *pairs: int) -> None:
+        """Let both channels of encoders change at once, twice, so many times for each."""
+        for k in range(max(pairs)):
+            await self._show(0, sum((k < pair) << axis for axis, pair in enumerate(pairs)))
+            await self._show(0)
 
     async def pulsing(self, clocks: int) -> list[bool]:
         """Return for every axis whether there are pulses in the next clocks."""
@@ -142,8 +155,9 @@ class Host(OnALine):
         cells = [int.from_bytes(data[k : k + 2], "big") for k in range(0, len(data), 2)]
         read = [r for r in self.registers.status if begin <= r.address < end]
         status = {r.name: r.from_registers(tuple(cells[r.address - begin : r.address - begin + 2])) for r in read}
-        refused = {"arm": not status["ready"], "preload": status["state"] == 1}
-        self.server.file.refused_of[axis] = frozenset(name for name, is_so in refused.items() if is_so)
+        if {"ready", "state"} <= set(status):
+            refused = {"arm": not status["ready"], "preload": status["state"] == ARMED}
+            self.server.file.refused_of[axis] = frozenset(name for name, is_so in refused.items() if is_so)
         return status
 
     async def write(self, axis: int, **values: int) -> bytes:
