@@ -163,6 +163,8 @@ async def an_encoder_that_ails(dut):
     for _ in range(2 * spec.clocks_per_sample + run.design.latency):
         await run.edge(lost)
     assert all(each.latched & BITS["encoder_loss"] for each in run.supervisors)
+    for _ in range(2 * spec.clocks_per_sample + run.design.latency):
+        await run.edge(rest)
 
 
 @pytest.mark.parametrize(
