@@ -5,6 +5,8 @@ import numpy as np
 from hardwall.model.compiled import compiled
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.quadrature import seen_count
+from hardwall.testing import Bench
+from hardwall.testing.estimators import model
 
 SECONDS = {1_000: 5.0, 10_000: 5.0, 100_000: 2.0, 1_000_000: 1.25, 10_000_000: 0.5}
 """The length of the paper's signal that is run at each rate, s; the first fifth is not judged."""
@@ -28,6 +30,28 @@ def run(params, state, counts: np.ndarray):
     velocity = np.zeros(len(wrapped), np.float64 if isinstance(params[0], float) else np.int64)
     flags = np.zeros(len(wrapped), np.int64)
     return _run(params, state, wrapped, velocity, flags), velocity, flags
+
+
+async def starts_afresh(dut, component, words: dict[str, int]) -> None:
+    """Reset an estimator amid a motion; from then on it must know nothing of it."""
+    bench = Bench(dut, component)
+    await bench.reset()
+    for count in (0, 1, 2):
+        await bench.transact("strobe", "valid", seen__count=count, **words)
+    assert bench.reader("velocity")() != 0
+    await bench.reset()
+    for _ in range(3):
+        await bench.transact("strobe", "valid", seen__count=-1, **words)
+        assert bench.reader("velocity")() == 0
+
+
+def equals(oracle, d, rows, start) -> None:
+    """Hold the model to an oracle, which yields velocity and flags; counts of the rows wrap."""
+    half = 1 << (d.count_width - 1)
+    rows = [((count + half) % (2 * half) - half, *rest) for count, *rest in rows]
+    seen = model(d, rows, start)
+    for k, (velocity, flags) in enumerate(oracle(d, rows)):
+        assert (velocity, flags) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {rows[k]}"
 
 
 def impulse(a: np.ndarray, b, samples: int) -> np.ndarray:

@@ -6,14 +6,14 @@ from fractions import Fraction
 import cocotb
 import numpy as np
 import pytest
-from filters import SECONDS, impulse, norms, rms, run
+from filters import SECONDS, equals, impulse, norms, rms, run, starts_afresh
 from scipy.signal import butter, sosfilt
 
 from hardwall.hdl.estimators.butterworth import Estimator
 from hardwall.model.axis import Axis
 from hardwall.model.estimators import butterworth
 from hardwall.model.estimators.butterworth import CUTOFF_MAX, FLOAT_START, START, Design, Gains, State, coefficients
-from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import RATES, axis_at, swing
 from stimuli.seeded import seeded
@@ -76,16 +76,8 @@ async def follows_model(dut):
 
 @cocotb.test()
 async def reset_mid_stream_starts_afresh(dut):
-    bench, d = Bench(dut, make(**parameters())), design(**parameters())
-    reset = words(d, d.cutoff_max_hz)
-    await bench.reset()
-    for count in (0, 1, 2):
-        await bench.transact("strobe", "valid", seen__count=count, **reset)
-    assert bench.reader("velocity")() != 0
-    await bench.reset()
-    for _ in range(3):
-        await bench.transact("strobe", "valid", seen__count=-1, **reset)
-        assert bench.reader("velocity")() == 0
+    d = design(**parameters())
+    await starts_afresh(dut, make(**parameters()), words(d, d.cutoff_max_hz))
 
 
 @pytest.mark.parametrize("name", ["mhz", "narrow"])
@@ -116,12 +108,7 @@ def oracle(d: Design, rows):
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
 def test_model_is_the_exact_equation_rounded_as_documented(name):
-    d = design(name)
-    half = 1 << (d.count_width - 1)
-    rows = [((c + half) % (2 * half) - half, *rest) for c, *rest in stimulus(name, 8_000)]
-    seen = model(d, rows, START)
-    for k, (velocity, flags) in enumerate(oracle(d, rows)):
-        assert (velocity, flags) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {rows[k]}"
+    equals(oracle, design(name), stimulus(name, 8_000), START)
 
 
 @pytest.mark.parametrize("sample_hz", RATES)

@@ -7,7 +7,7 @@ import cocotb
 import numpy as np
 import pytest
 from brink import BRINKS, brink
-from filters import SECONDS, impulse, norms, rms, run
+from filters import SECONDS, equals, impulse, norms, rms, run, starts_afresh
 from scipy.linalg import solve_discrete_are
 
 from hardwall.hdl.estimators.kalman import Estimator
@@ -15,7 +15,7 @@ from hardwall.model.axis import Axis
 from hardwall.model.estimators import kalman
 from hardwall.model.estimators.kalman import FLOAT_START, START, Design, Gains, State, steady_state
 from hardwall.model.estimators.riccati import INDEX_MAX
-from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import BOUND, RATES, axis_at, swing
 from stimuli.seeded import seeded
@@ -85,16 +85,10 @@ async def follows_model(dut):
 
 @cocotb.test()
 async def reset_mid_stream_starts_afresh(dut):
-    bench, d = Bench(dut, make(**parameters())), design(**parameters())
-    reset = dict(zip((word.name for word in d.words), reset_words(d), strict=True))
-    await bench.reset()
-    for count in (0, 1, 2):
-        await bench.transact("strobe", "valid", seen__count=count, **reset)
-    assert bench.reader("velocity")() != 0
-    await bench.reset()
-    for _ in range(3):
-        await bench.transact("strobe", "valid", seen__count=-1, **reset)
-        assert bench.reader("velocity")() == 0
+    d = design(**parameters())
+    await starts_afresh(
+        dut, make(**parameters()), dict(zip((word.name for word in d.words), reset_words(d), strict=True))
+    )
 
 
 @pytest.mark.parametrize("name", ["mhz", "narrow"])
@@ -143,12 +137,7 @@ def oracle(d: Design, rows):
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
 def test_model_is_the_exact_equation_rounded_as_documented(name):
-    d = design(name)
-    half = 1 << (d.count_width - 1)
-    rows = [((c + half) % (2 * half) - half, *rest) for c, *rest in stimulus(name, 8_000)]
-    seen = model(d, rows, START)
-    for k, (velocity, flags) in enumerate(oracle(d, rows)):
-        assert (velocity, flags) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {rows[k]}"
+    equals(oracle, design(name), stimulus(name, 8_000), START)
 
 
 @pytest.mark.parametrize("index", 2.0 ** np.arange(-8, 7, 2))

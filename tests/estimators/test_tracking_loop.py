@@ -7,7 +7,7 @@ from itertools import product
 import cocotb
 import numpy as np
 import pytest
-from filters import SECONDS, impulse, norms, rms, run
+from filters import SECONDS, equals, impulse, norms, rms, run, starts_afresh
 
 from hardwall.hdl.estimators.tracking_loop import Estimator
 from hardwall.model.axis import Axis
@@ -15,7 +15,7 @@ from hardwall.model.estimators import tracking_loop
 from hardwall.model.estimators.tracking_loop import FLOAT_START, INDEX_MAX, START, Design, Gains, State
 from hardwall.model.quadrature import seen_count
 from hardwall.model.spec import AxisSpec
-from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
+from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
 from stimuli.papers_signal import RATES, axis_at, swing
 from stimuli.seeded import seeded
@@ -94,16 +94,7 @@ async def follows_model(dut):
 
 @cocotb.test()
 async def reset_mid_stream_starts_afresh(dut):
-    bench, d = Bench(dut, make(**parameters())), design(**parameters())
-    word = {WORD: d.words[0].format.max}
-    await bench.reset()
-    for count in (0, 1, 2):
-        await bench.transact("strobe", "valid", seen__count=count, **word)
-    assert bench.reader("velocity")() != 0
-    await bench.reset()
-    for _ in range(3):
-        await bench.transact("strobe", "valid", seen__count=-1, **word)
-        assert bench.reader("velocity")() == 0
+    await starts_afresh(dut, make(**parameters()), {WORD: design(**parameters()).words[0].format.max})
 
 
 @pytest.mark.parametrize("name", ["mhz", "narrow"])
@@ -136,12 +127,7 @@ def oracle(d: Design, rows):
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
 def test_model_is_the_exact_equation_rounded_as_documented(name):
-    d = design(name)
-    half = 1 << (d.count_width - 1)
-    rows = [((c + half) % (2 * half) - half, *rest) for c, *rest in stimulus(name, 8_000)]
-    seen = model(d, rows, START)
-    for k, (velocity, flags) in enumerate(oracle(d, rows)):
-        assert (velocity, flags) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {rows[k]}"
+    equals(oracle, design(name), stimulus(name, 8_000), START)
 
 
 @pytest.mark.parametrize("bandwidth_hz", [1000 / (2 * math.pi), None], ids=["1000 rad/s", "default"])

@@ -1,6 +1,7 @@
 """A host on the serial line of a board that has its own clocks, and what watches the board's pins meanwhile."""
 
 import logging
+from abc import ABC, abstractmethod
 
 import cocotb
 from cocotb.clock import Clock
@@ -20,7 +21,7 @@ STARTING = 100
 """Clocks in which the oscillator has seen that the clock runs."""
 
 
-class OnALine:
+class OnALine(ABC):
     """A host on the line of a board, and a task that looks at every clock edge.
 
     Attributes:
@@ -48,9 +49,9 @@ class OnALine:
         await ClockCycles(self.dut.clk, SYNCHRONISER)
         self._following = cocotb.start_soon(self._follow())
 
+    @abstractmethod
     async def _follow(self) -> None:
         """Look at every clock edge, and fail where it is not as it must be."""
-        raise NotImplementedError
 
     def leave(self) -> None:
         """Look no more from now on."""

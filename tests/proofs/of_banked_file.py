@@ -12,7 +12,7 @@ from stimuli.specs import NARROW
 
 from .bench import Bench
 from .bugs import Bug
-from .of_register_file import only_checks_find
+from .of_register_file import each_takes, only_checks_find
 from .property import Property
 
 WHERE = "banked file narrow, 3 axes"
@@ -162,9 +162,7 @@ def every_operation_ends(bench: Bench) -> None:
         Operation.SNAPSHOT: Mux(inner["asks"], 3, 1),
         Operation.FINISH: Mux(marks.any(), finish, 1),
     }
-    for operation, latency in latencies.items():
-        begun = bench.past(idle & host.start & (host.operation == operation) & ~bench.reset)
-        bench.promise(~begun | (left == bench.past(latency)))
+    each_takes(bench, host, left, latencies)
     bench.promise(~bench.past(bench.reset, init=1) | bench.state("BOOT") & (left == block.boot_clocks))
 
 

@@ -56,6 +56,13 @@ def only_checks_find(bench: Bench, host: PureInterface) -> Value:
     return bench.past(bench.reset) | ~(rises & ~checked | falls & ~cleared | forgotten)
 
 
+def each_takes(bench: Bench, host: PureInterface, left: Value, latencies: dict[Operation, Value | int]) -> None:
+    """Promise that behind the beginning of an operation as many clocks are left as its latency was then."""
+    for operation, latency in latencies.items():
+        begun = bench.past(bench.state("IDLE") & host.start & (host.operation == operation) & ~bench.reset)
+        bench.promise(~begun | (left == bench.past(latency)))
+
+
 def checks_alone_find(bench: Bench) -> None:
     host = register_file(bench).host
     checks = (host.operation == Operation.CHECK_READ) | (host.operation == Operation.CHECK_WRITE)
@@ -163,9 +170,7 @@ def every_operation_ends(bench: Bench) -> None:
         Operation.SNAPSHOT: block.snapshot_clocks,
         Operation.FINISH: Mux(shifts, block.shift_clocks, 0) + sends,
     }
-    for operation, latency in latencies.items():
-        begun = bench.past(idle & host.start & (host.operation == operation) & ~bench.reset)
-        bench.promise(~begun | (left == bench.past(latency)))
+    each_takes(bench, host, left, latencies)
     bench.promise(~idle | bench.past(idle | boots | host.done | bench.reset))
     bench.promise(~bench.past(bench.reset, init=1) | boots & (left == block.boot_clocks))
 
