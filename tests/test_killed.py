@@ -18,7 +18,7 @@ import pytest
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs import ending
 from hardwall.testing import rng
-from stimuli.processes import HARDWALL, ended, session, started, wait_until
+from stimuli.processes import HARDWALL, ended, session, started, stored, wait_until
 
 KILLS = int(os.environ.get("HARDWALL_KILLS", "0"))
 """The number of runs that are ended; 0 for one run of every quick command."""
@@ -66,13 +66,6 @@ def environment(folder: Path) -> dict[str, str]:
     return {"HARDWALL_BUILD": str(build)}
 
 
-def stored(folder: Path) -> list[str]:
-    """Return the stored results, line by line."""
-    return [
-        line for file in (folder / "build").glob("results/*.jsonl") for line in file.read_text().split("\n") if line
-    ]
-
-
 def hears(process: subprocess.Popen) -> bool:
     """Return whether a process handles SIGTERM, and so every signal of `ending`."""
     status = Path(f"/proc/{process.pid}/status").read_text()
@@ -118,7 +111,7 @@ def test_what_is_ended_goes_on(whole, tmp_path_factory, name):
         else:
             assert found == code, err
             assert err.count("error") <= 1
-        kept = stored(folder)
+        kept = stored(folder / "build")
         assert report_of(RUNS[name], environ) == report
-        assert set(kept) <= set(stored(folder)), "nothing is lost"
-        assert len(set(stored(folder))) == len(stored(folder)), "nothing is computed again"
+        assert set(kept) <= set(stored(folder / "build")), "nothing is lost"
+        assert len(set(stored(folder / "build"))) == len(stored(folder / "build")), "nothing is computed again"

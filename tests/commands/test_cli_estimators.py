@@ -8,7 +8,7 @@ import pytest
 
 from hardwall.model.build_folder import build_dir
 from stimuli.command_line import call
-from stimuli.processes import HARDWALL, ended_by, session, started, wait_until
+from stimuli.processes import HARDWALL, ended_by, session, started, stored, wait_until
 
 KEYS = {
     "estimator", "output", "backend", "sample_hz", "signal", "rms_mm_s", "max_mm_s", "delay_s", "chatter_mm_s",
@@ -146,13 +146,11 @@ def test_a_recording_that_cannot_be_taken_is_refused_before_any_work(
 def test_an_interrupted_run_loses_nothing_and_ends_its_workers(tmp_path):
     command = [HARDWALL, "accuracy", "--estimators", "fdm,levant", "--rates", "1e3,1e4,1e5,1e6,1e7", "--workers", "2"]
     (tmp_path / "numba").symlink_to(build_dir() / "numba")
-    results = tmp_path / "results"
     with started(*command, HARDWALL_BUILD=str(tmp_path)) as run:
-        wait_until(lambda: results.exists() and any(path.stat().st_size for path in results.iterdir()))
+        wait_until(lambda: len(stored(tmp_path)) > 1)
         run.send_signal(signal.SIGTERM)
         out, before, remark = ended_by("SIGTERM", run)
         wait_until(lambda: session(run) == [])
     assert (out, "Traceback" in before) == ("", False)
     assert remark.endswith(" kept, and the same command goes on from there")
-    (kept,) = results.iterdir()
-    assert all(len(json.loads(line)) == 3 for line in kept.read_text().split("\n") if line)
+    assert all(len(json.loads(line)) == 3 for line in stored(tmp_path))

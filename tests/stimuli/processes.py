@@ -71,6 +71,14 @@ def session(process: subprocess.Popen) -> list[int]:
     return found
 
 
+def stored(build: Path) -> list[str]:
+    """Return the results that processes have stored in a folder for generated files, as lines of JSON.
+
+    A result is counted after it was stored, so of two that are here one is counted for sure.
+    """
+    return [line for file in build.glob("results/*.jsonl") for line in file.read_text().split("\n") if line]
+
+
 def wait_until(happens: Callable[[], object]) -> None:
     """Wait until a function returns something true."""
     deadline = time.monotonic() + PATIENCE_S

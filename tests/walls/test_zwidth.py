@@ -5,7 +5,6 @@ import os
 import re
 import signal
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from distributed import LocalCluster
@@ -20,7 +19,7 @@ from hardwall.sim.walls import hit, methods, zwidth
 from hardwall.sim.walls.boundary import BoundaryPoint
 from stimuli import results
 from stimuli.command_line import call
-from stimuli.processes import HARDWALL, ended_by, session, started, wait_until
+from stimuli.processes import HARDWALL, ended_by, session, started, stored, wait_until
 
 pytestmark = pytest.mark.usefixtures("fresh")
 
@@ -234,18 +233,13 @@ def test_a_scene_of_a_file_need_not_be_there_any_more(tmp_path, map_of_one_threa
 def test_an_interrupted_map_says_how_to_go_on(tmp_path, workers, number):
     (tmp_path / "numba").symlink_to(build_dir() / "numba")
     with started(HARDWALL, "zwidth", "--workers", workers, "--json", HARDWALL_BUILD=str(tmp_path)) as process:
-        wait_until(lambda: kept(tmp_path))
+        wait_until(lambda: len(stored(tmp_path)) > 1)
         # An interrupt of the terminal goes to all processes of its group.
         os.killpg(process.pid, signal.Signals[number])
         out, before, remark = ended_by(number, process)
         wait_until(lambda: session(process) == [])
     assert (out, "Traceback" in before) == ("", False)
     assert re.fullmatch(r"; (1 new result is|\d+ new results are) kept, and --resume goes on from there", remark)
-
-
-def kept(build: Path) -> list[str]:
-    """Return the verdicts in a folder for generated files, as lines of JSON."""
-    return [line for path in build.glob("results/zwidth-*.jsonl") for line in path.read_text().split("\n") if line]
 
 
 def test_the_columns_of_the_table_that_need_it_are_explained():
