@@ -120,7 +120,7 @@ def _hits() -> Iterator[Case]:
             for backend in ("float", "fixed", "rtl"):
                 if backend == "rtl" and scene != "seed-2011" and (estimator, output) != ("levant", "u"):
                     continue  # every one needs its own build, and its words equal those of `fixed`
-                own = scene == "seed-2011" and (backend == "fixed" or (estimator in FEW and backend == "float"))
+                own = scene == "seed-2011" and estimator in FEW and backend != "rtl"
                 short = own or (estimator, output, backend) == ("levant", "u", "fixed")
                 short = short or (scene, estimator, output, backend) == ("seed-2011", "levant", "u", "rtl")
                 name = f"hit/{scene}/{estimator}:{output}/{backend}"

@@ -73,8 +73,8 @@ def test_what_is_quick_has_every_kind():
     assert {name.split("/")[0] for name in quick} | {"drop"} == {name.split("/")[0] for name in CASES}
     scenes = {name.split("/")[1] for name in quick if name.startswith("hit/")}
     assert scenes >= set(digests.SCENES)
-    for estimator, outputs in digests.OUTPUTS.items():
-        assert {f"hit/seed-2011/{estimator}:{output}/fixed" for output in outputs} <= quick
+    for estimator in digests.FEW:
+        assert {f"hit/seed-2011/{estimator}:{output}/fixed" for output in digests.OUTPUTS[estimator]} <= quick
 
 
 @pytest.mark.parametrize(

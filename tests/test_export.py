@@ -56,8 +56,13 @@ def verilog_ports(text: str, module: str) -> dict[str, tuple[str, int]]:
     return ports
 
 
-@pytest.mark.parametrize("top", TOPS)
-@pytest.mark.parametrize(("name", "estimator"), [("paper", "levant"), ("mhz", "fdm"), ("narrow", "levant")])
+@pytest.mark.parametrize(
+    ("top", "name", "estimator"),
+    [
+        *(("axis", *axis) for axis in (("paper", "levant"), ("mhz", "fdm"), ("narrow", "levant"))),
+        *(("board", "narrow", "levant"), ("axi", "mhz", "fdm")),
+    ],
+)
 def test_table_and_verilog_have_the_same_ports(name, estimator, top):
     component = TOPS[top](spec(name, estimator))
     table = rows(port_table(component))

@@ -40,7 +40,7 @@ def netlist_of(case: Case) -> Netlist:
 
 def test_products_and_memories_are_those_of_their_cells():
     """The models of cells that are ours have the product and the memory of plain Verilog."""
-    outcome = compared(CELLS, netlist_of(CELLS), 5_000)
+    outcome = compared(CELLS, netlist_of(CELLS), 2_000)
     assert (outcome.netlist.cells["dsp"], outcome.netlist.cells["bram"]) == (4, 20)
     assert outcome.ok, outcome.explanation
 

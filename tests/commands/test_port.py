@@ -14,6 +14,7 @@ from hardwall.host.errors import HostError
 from hardwall.host.status import State
 from hardwall.model.registers import RegisterMap
 from hardwall.sim.scene.load import load
+from stimuli.command_line import call
 from stimuli.processes import HARDWALL, ended, started, wait_until
 from stimuli.reports import check_text
 from stimuli.virtual_boards import PACE, SCENE, VirtualBoard, running
@@ -160,15 +161,13 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual):
         (["connect", "/dev/hardwall-absent"], 1, "cannot be opened: there is none of that name"),
     ],
 )
-def test_what_cannot_be_is_one_line(virtual, words, code, message):
-    given = [HARDWALL, *(virtual.path if word == "PORT" else word for word in words)]
-    given += [] if "--pace" in words else AT
-    done = subprocess.run(list(map(str, given)), capture_output=True, text=True, check=False, timeout=300)
-    assert done.returncode == code
-    assert done.stdout == ""
-    assert done.stderr.startswith("hardwall: error: ")
-    assert len(done.stderr.splitlines()) == 1
-    assert message in done.stderr
+def test_what_cannot_be_is_one_line(virtual, monkeypatch, capsys, words, code, message):
+    given = [virtual.path if word == "PORT" else word for word in words]
+    ended_with, out, err = call(monkeypatch, capsys, *given, *([] if "--pace" in words else AT))
+    assert (ended_with, out) == (code, "")
+    assert err.startswith("hardwall: error: ")
+    assert len(err.splitlines()) == 1
+    assert message in err
 
 
 def test_a_contact_is_captured_into_a_file_and_a_picture(virtual, tmp_path):

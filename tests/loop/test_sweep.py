@@ -88,10 +88,11 @@ NO_STAMPS = [
     for name, output in EVERY_OUTPUT
     if not load("seed-2011", {"controller.estimator": name}).spec.design.estimator.uses_stamps()
 ]
+EVERY = [(*estimator, backend) for estimator in NO_STAMPS for backend in ("fixed", "float")]
+FEW = [("levant", "u1", "fixed"), ("levant", "u1", "float"), ("foaw", "best-fit", "fixed")]
 
 
-@pytest.mark.parametrize("backend", ["fixed", "float"])
-@pytest.mark.parametrize(("estimator", "output"), NO_STAMPS if LONG else [("levant", "u1"), ("foaw", "best-fit")])
+@pytest.mark.parametrize(("estimator", "output", "backend"), EVERY if LONG else FEW)
 def test_a_hit_is_the_same(estimator, output, backend):
     scene = load("seed-2011", NEAR | {"controller.estimator": estimator, "controller.output": output})
     compare(scene, backend, [scene.samples])

@@ -24,6 +24,9 @@ from hardwall.testing import rng
 from stimuli.lengths import LONG
 from stimuli.specs import spec
 
+SKIPPING = tuple(registry.ESTIMATORS) if LONG else ("levant", "levant-edge")
+SLACK = (0, 3, 4, 5, 200) if LONG else (0, 4, 200)
+"""Clocks a sample beyond those of the way to the drive: with the fewest nothing rests after the first sample."""
 STOP = 9
 Describe = Callable[[Module, "Clockwork"], None]
 
@@ -215,7 +218,7 @@ def test_an_output_that_is_looked_at_and_shows_a_counter_is_found():
         check(netlist, ("seen", "other"), ("divider", "stamp"))
 
 
-@pytest.mark.parametrize("estimator", registry.ESTIMATORS)
+@pytest.mark.parametrize("estimator", SKIPPING)
 def test_in_an_axis_the_divider_and_the_stamp_may_run(estimator):
     for name in ("mhz", "seed-2011"):
         axis = load(name, {"controller.estimator": estimator}).spec
@@ -274,7 +277,7 @@ def _stimulus(axis, random: np.random.Generator, edges: int) -> tuple[np.ndarray
     return clocks, np.array([0, 1, 3, 2])[np.cumsum(np.where(np.arange(edges) < half, ways, wild)) % 4]
 
 
-@pytest.mark.parametrize("estimator", registry.ESTIMATORS if LONG else ("levant", "levant-edge"))
+@pytest.mark.parametrize("estimator", SKIPPING)
 def test_what_is_evaluated_is_the_way_to_the_drive_and_through_the_decoder(estimator):
     axis = load("seed-2011", {"controller.estimator": estimator}).spec
     every, words = axis.clocks_per_sample, Model(axis).words
@@ -290,12 +293,8 @@ def test_what_is_evaluated_is_the_way_to_the_drive_and_through_the_decoder(estim
     assert evaluated[2] <= evaluated[1] + 300 * (decoder_clocks + 4)
 
 
-SLACK = (0, 3, 4, 5, 200)
-"""Clocks a sample beyond those of the way to the drive: with the fewest nothing rests after the first sample."""
-
-
 @pytest.mark.parametrize("slack", SLACK)
-@pytest.mark.parametrize("estimator", registry.ESTIMATORS if LONG else ("levant", "levant-edge"))
+@pytest.mark.parametrize("estimator", SKIPPING)
 def test_an_axis_that_skips_gives_the_words_of_one_that_does_not(estimator, slack):
     """They are read after runs of any length: in the middle of rests, at strobes, in between, and while edges come."""
     changes: dict = {"controller.estimator": estimator}

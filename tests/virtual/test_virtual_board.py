@@ -135,7 +135,7 @@ def test_a_clock_that_stands_leaves_no_drive(board, host):
     assert host.read("state") == DISARMED
 
 
-@pytest.fixture(params=STAGES if LONG else ["pwm", "dac"])
+@pytest.fixture(params=STAGES if LONG else ["pwm"])
 def staged(request):
     with VirtualBoard(load("seed-2011", SCENE | FINE | STAGES[request.param])) as virtual:
         yield virtual

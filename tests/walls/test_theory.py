@@ -7,6 +7,7 @@ import scipy
 from hardwall.model.quadrature import latency
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls import hit, theory
+from stimuli.lengths import LONG
 from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND
 
 # No dry friction, fine counts, a threshold of fifty counts; slow enough for the decoder, long enough for growth.
@@ -49,7 +50,11 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+QUICK = "fdm, soft", "samples overlap", "cable, encoder at the motor", "all of them"
+"""Every part is in one of these, the filter and the overlap, too; `make soak` has each alone."""
+
+
+@pytest.mark.parametrize("case", CASES if LONG else QUICK)
 def test_the_simulation_turns_unstable_within_2_percent_of_the_linear_limit(case):
     name, gains, damping, others = CASES[case]
     changes = LINEAR | others | {"controller.estimator": name, "wall.damping_n_s_per_m": damping}
