@@ -17,7 +17,7 @@ from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from oracles.axes import Lane, Write, lane
 from stimuli import handle
 from stimuli.axes import random_words, rota
-from stimuli.lengths import LONG, long_form
+from stimuli.lengths import LONG, REACHING, long_form
 from stimuli.specs import MHZ
 
 PINS = clocked.Pins._fields
@@ -205,7 +205,7 @@ def check_records(spec: AxesSpec, lanes: list[Lane], seen: Seen) -> None:
 async def every_axis_is_a_single_one(dut):
     spec, random = rota(**parameters()), rng()
     bench = Bench(dut, Axes(spec))
-    clocks, rose, drives = SAMPLES // 200 * spec.clocks_per_sample, 0, []
+    clocks, rose, drives = max(SAMPLES, REACHING) // 200 * spec.clocks_per_sample, 0, []
     await bench.reset()
     # The second run begins with a reset amid the first.
     for _ in range(2):

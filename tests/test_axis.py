@@ -16,6 +16,7 @@ from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from oracles.axis import AxisTwin
 from stimuli import handle
 from stimuli.axes import busy, fastest, random_words
+from stimuli.lengths import REACHING
 
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
 LATE_BIT = 20
@@ -132,7 +133,7 @@ async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Gen
 async def follows_model(dut):
     spec = make(**parameters()).spec
     # Every estimator has its own campaign; this one tests the wiring.
-    samples, random = SAMPLES // (5 if spec.estimator in ("levant", "fdm") else 20), rng()
+    samples, random = max(SAMPLES, REACHING) // (5 if spec.estimator in ("levant", "fdm") else 20), rng()
     bench = Bench(dut, Axis(spec))
     await bench.reset()
     bench.drive(**dict.fromkeys(PINS, 0), commit=0)

@@ -17,6 +17,7 @@ from hardwall.model.quadrature import seen_count
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
+from stimuli.lengths import REACHING
 from stimuli.papers_signal import RATES, axis_at, swing
 from stimuli.seeded import seeded
 from stimuli.specs import PAPER, spec
@@ -85,7 +86,7 @@ def stimulus(name: str, samples: int):
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     name = parameters()["name"]
-    samples = SAMPLES if name == "mhz" else SAMPLES // 10
+    samples = SAMPLES if name == "mhz" else max(SAMPLES, REACHING) // 10
     expected = await follow(dut, make(name), stimulus(name, samples), START)
     # The campaign must reach every saturation, and the quiet track too.
     assert 0 in expected["saturated"]

@@ -10,6 +10,7 @@ from hardwall.model.link import banked_file as model
 from hardwall.model.link.register_file import Operation
 from hardwall.model.registers import COUNTERS, LIVE, MAP, PULSES, TELEMETRY, WRITTEN, RegisterMap
 from hardwall.testing import SAMPLES, simulate
+from stimuli.lengths import REACHING
 from stimuli.restless import Restless
 from stimuli.specs import spec
 from stimuli.supervised_axes_world import slow
@@ -81,11 +82,11 @@ async def follows_the_model_at_every_clock(dut):
     cells = BANK * world.design.banks
     for waits in (world.component.boot_clocks + 20, 0):
         await world.begin(waits)
-        for _ in range(SAMPLES // 600):
+        for _ in range(max(SAMPLES, REACHING) // 600):
             await world.random.choices(ACTS, (0.35, 0.3, 0.05, 0.2, 0.1))[0](world)
         for address in (*range(cells), MAP, MAP + len(world.design.map_cells) - 1):
             await world.read(address)
-    assert world.compared > SAMPLES // 10
+    assert world.compared > max(SAMPLES, REACHING) // 10
     assert world.snapshots > 20
     assert world.pulsed == {(bank, name) for bank in range(world.design.banks) for name in world.pulses}
 
