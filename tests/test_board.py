@@ -17,11 +17,12 @@ from oracles.board import RECORDS, make
 from oracles.board_host import Host
 from oracles.supervised import SYNCHRONISER
 from stimuli import frames
+from stimuli.lengths import REACHING
 from stimuli.restless import Restless
 from stimuli.specs import spec
 
-CLOCKS, LONGEST = 3 * SAMPLES // 10, 10
-"""Clocks of the campaign; and how often as many are, at most, for the cases that are still not reached."""
+CLOCKS, LONGEST = 3 * SAMPLES // 10, 3 * max(SAMPLES, REACHING)
+"""Clocks of the campaign; and the most of them, for the cases that are still not reached."""
 SHOWN = "stamp", "capture_stamp"
 """The first and the last status that a host of a capture looks at."""
 LOOKS = ("drive", "capture_stamp"), ("index_latched", "first")
@@ -89,7 +90,7 @@ async def a_random_host_at_a_random_handle(dut):
     random, seen = host.random, []
     ramp, stiffness = host.registers["supervisor_ramp"], host.registers["wall_stiffness"]
     await host.write(supervisor_ramp=ramp.high, supervisor_watchdog=2000, supervisor_causes=REQUIRED)
-    while host.twin.clocks < CLOCKS or (lacks(host, seen) and host.twin.clocks < LONGEST * CLOCKS):
+    while host.twin.clocks < CLOCKS or (lacks(host, seen) and host.twin.clocks < LONGEST):
         host.rate = float(random.choice((0.0, 0.005, 0.02)))
         host.illegal_rate = float(random.choice((0.0, 0.05), p=(0.8, 0.2)))
         host.open_rate = float(random.choice((0.0, 1e-3), p=(0.8, 0.2)))
