@@ -15,6 +15,8 @@ from oracles.supervised import SYNCHRONISER
 from stimuli import frames
 
 BITS = {cause.name: 1 << bit for bit, cause in enumerate(CAUSES)}
+PLACES = -3, 11
+"""The counts that a host gives the axes of a board of two by a preload."""
 
 
 def make(axes: int) -> Watched:
@@ -123,7 +125,7 @@ async def prepare(host: Host, axis: int) -> None:
     """Give an axis a spring of a force LSB a count, which begins at the count 0, on a side of its own."""
     words = {word.name: word.reset for word in host.registers.words}
     stiffness = 1 << host.registers["wall_stiffness"].format.f
-    words |= {"wall_stiffness": stiffness, "wall_left": axis, "encoder_glitch_clocks": 1, "preload_count": -3}
+    words |= {"wall_stiffness": stiffness, "wall_left": axis, "encoder_glitch_clocks": 1, "preload_count": PLACES[axis]}
     await host.write(axis, commit=1, **words)
     await host.write(axis, supervisor_ramp=host.registers["supervisor_ramp"].high)
     await host.write(axis, supervisor_causes=REQUIRED | BITS["encoder_loss"])
@@ -145,20 +147,21 @@ async def every_status_is_of_its_axis(dut):
     # What a host asks of one axis does not come to the other, whichever is first.
     await host.write(1, arm=1)
     await host.write(1, index_arm=1)
-    await host.turn(9, -10, index=0b11)
+    await host.turn(9, -7, index=0b11)
     await check_status(host, 0, count=9, wall_force=-9, drive=-9, **ready)
-    found = {"index_latched": 1, "index_count": -10}
-    await check_status(host, 1, count=-10, wall_force=10, drive=10, driven=10, state=ARMED, **found)
+    found = {"index_latched": 1, "index_count": -7}
+    await check_status(host, 1, count=-7, wall_force=7, drive=7, driven=7, state=ARMED, **found)
     await host.write(0, index_arm=1)
     await check_status(host, 0, count=9, wall_force=-9, drive=-9, index_armed=1, **ready)
-    await host.turn(-3, -10, index=0b01)
+    await host.turn(6, -7, index=0b01)
     await host.write(0, preload=1)
-    await check_status(host, 1, count=-10, wall_force=10, drive=10, driven=10, state=ARMED, **found)
-    found = {"index_latched": 1, "index_count": -3, "referenced": 1}
-    await check_status(host, 0, count=-3, **found, **ready)
-    await host.jump(1, 101)
+    await check_status(host, 1, count=-7, wall_force=7, drive=7, driven=7, state=ARMED, **found)
+    found = {"index_latched": 1, "index_count": 6, "referenced": 1}
+    await check_status(host, 0, count=PLACES[0], **found, **ready)
+    # Edges of both channels at once are counted until the counter is full, and forgotten when the host says so.
+    await host.jump(130, 101)
     illegal = {"state": TRIPPED, "latched": BITS["encoder_illegal"], "first": BITS["encoder_illegal"]}
-    await check_status(host, 0, count=-3, flags=1, counts_0=1, illegal_count=2, **found, **illegal)
+    await check_status(host, 0, count=PLACES[0], flags=1, counts_0=1, illegal_count=255, **found, **illegal)
     await host.write(0, clear_flags=1)
     assert [(await host.look(axis))["illegal_count"] for axis in (0, 1)] == [0, 202]
     await host.write(1, clear_flags=1)
@@ -168,6 +171,22 @@ async def every_status_is_of_its_axis(dut):
         await host.write(axis, acknowledged=latched)
         await host.write(axis, acknowledge=1)
         assert (await host.look(axis))["state"] == DISARMED
+    await find_another_index(host)
+
+
+async def find_another_index(host: Host) -> None:
+    """Let both axes find an index where they have not been, and the host place the one it has not placed."""
+    for axis, count in ((0, PLACES[0]), (1, -7)):
+        await host.write(axis, index_arm=1)
+        status = await host.look(axis, "count", "referenced")
+        assert status.items() >= {"count": count, "index_armed": 1, "index_latched": 0, "referenced": 0}.items(), axis
+    # That is 4 counts below the place of the one, and at the count 6 of the other.
+    await host.turn(2, 6, index=0b11)
+    await host.write(1, preload=1)
+    for axis, counts in enumerate(((PLACES[0] - 4, PLACES[0] - 4), (PLACES[1], 6))):
+        wanted = dict(zip(("count", "index_count"), counts, strict=True))
+        wanted |= {"index_armed": 0, "index_latched": 1, "referenced": axis, "illegal_count": 0}
+        assert (await host.look(axis, "count", "referenced")).items() >= wanted.items(), axis
 
 
 @cocotb.test()
@@ -183,38 +202,6 @@ async def the_stamp_of_a_status_is_the_clock_of_its_sample(dut):
     apart = [stamp - stamps[0] for stamp in stamps]
     assert not any(clocks % rota for clocks in apart)
     assert {clocks // rota % 2 for clocks in apart} == {0, 1}
-
-
-@cocotb.test()
-async def every_encoder_turns_its_own_axis(dut):
-    host = Host(dut, **parameters())
-    await host.reset()
-    names = "count", "illegal_count", "index_count", "index_armed", "index_latched", "referenced"
-    wanted = [dict.fromkeys(names, 0) for _ in range(2)]
-
-    async def both_are(axis: int, **changed: int) -> None:
-        wanted[axis] |= changed
-        for each in (0, 1):
-            assert (await host.look(each, "count", "referenced")).items() >= wanted[each].items(), each
-
-    # An index that is asked for is where Z rises, and a reference once the host has placed it.
-    for axis, far, place in ((0, 6, -1), (1, -7, 4), (0, -7, 3), (1, 6, -3)):
-        await host.write(axis, index_arm=1)
-        places = [*host.places]
-        places[axis] += far - wanted[axis]["count"]
-        await host.turn(*places)
-        assert (await host.look(axis, "count", "referenced"))["index_armed"] == 1
-        await host.turn(*places, index=1 << axis)
-        await both_are(axis, count=far, index_latched=1, index_count=far, referenced=0)
-        await host.write(axis, preload=1, clear_flags=0, commit=1, preload_count=place)
-        wanted[axis] |= {"count": place, "referenced": 1}
-    # Edges of both channels at once are counted until the counter is full, and forgotten when the host says so.
-    for axis, pairs in ((0, 130), (1, 100)):
-        await host.jump(*(pairs * (each == axis) for each in (0, 1)))
-        await both_are(axis, illegal_count=min(2 * pairs, 255))
-    for axis in (1, 0):
-        await host.write(axis, clear_flags=1)
-        await both_are(axis, illegal_count=0)
 
 
 @cocotb.test()

@@ -176,6 +176,27 @@ def test_what_differs_in_no_state_that_is_reached_is_equivalent(number, known):
     assert known_of(Netlist(Answer(), LEVEL, (BLOCK,), [Mutant(number, "planted")]), [number]) == {number: known}
 
 
+KEPT = """
+module block(input clk, input [1:0] at, input [1:0] word, input [15:0] mutant, output shown);
+  reg [1:0] kept [3:0];
+  reg [1:0] taken = 0;
+  always @(posedge clk) begin
+    kept[at] <= word ^ mutant[1:0];
+    taken <= kept[at] & {mutant[2], 1'b1};
+  end
+  assign shown = |taken;
+endmodule
+"""
+"""Keeps words of two bits and shows the lower one; it has mutants that keep others, and one that shows both."""
+
+
+@pytest.mark.parametrize(("number", "equal"), [(2, True), (1, False), (4, False)])
+def test_a_bit_of_a_memory_that_nothing_reads_may_be_any(number, equal):
+    verilog = KEPT if number == 4 else KEPT.replace("mutant[2]", "1'b0")
+    known = known_of(Netlist(Answer(), verilog, (BLOCK,), [Mutant(number, "planted")]), [number])
+    assert (known[number] == EQUIVALENT) == equal
+
+
 def test_tests_that_fail_without_a_mutant_say_nothing(monkeypatch):
     """A first campaign may be too short for the tests themselves; the whole one may not."""
     asked, whole = [], "too few samples"

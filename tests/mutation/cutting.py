@@ -7,6 +7,8 @@ from .netlist import SELECTOR
 START, FIRST = "START", "FIRST"
 """The ports of the first values of registers that have none of their own, and of the clock at which these hold."""
 TO_MEMORY = ("RD_ADDR", "RD_EN", "WR_ADDR", "WR_DATA", "WR_EN")
+TO_EVERY_BIT = "WR_DATA", "WR_EN"
+"""Those that have a bit for every bit of a word, for one write port after the other."""
 OWN = {"RD_CLK": "clk", "WR_CLK": "clk", "RD_ARST": "rst", "RD_SRST": "rst"}
 """What else goes to a memory, and the input of the module that it must be, if it is not left at 0."""
 
@@ -59,18 +61,33 @@ def cut(module: dict, kept: set[Bit], free: bool) -> dict[str, list[Bit]]:
 def part_from_memories(module: dict) -> None:
     """Put ports of the module in the place of its memories: their contents are equal while equal writes go there.
 
+    A bit of a word that nothing reads is written for nobody, and so is no output.
+
     Raises:
         ValueError: if a memory's clock or reset is not the module's: two of them may then not be equal.
     """
     memories = [name for name, cell in module["cells"].items() if cell["type"] == "$mem_v2"]
+    read = _read(module)
     for number, name in enumerate(memories):
-        pins = module["cells"].pop(name)["connections"]
+        cell = module["cells"].pop(name)
+        pins, width = cell["connections"], int(cell["parameters"]["WIDTH"], 2)
+        unread = [place for place in range(width) if read.isdisjoint(pins["RD_DATA"][place::width])]
+        for port in TO_EVERY_BIT:
+            pins[port] = [bit for place, bit in enumerate(pins[port]) if place % width not in unread]
         for port, own in OWN.items():
             if not set(pins[port]) <= {"0", *module["ports"].get(own, {"bits": []})["bits"]}:
                 raise ValueError(f"{port} of the memory {name} must be the module's input {own}, or 0")
         for port in (*TO_MEMORY, "RD_DATA"):
             direction = "output" if port in TO_MEMORY else "input"
             module["ports"][f"M_{number}_{port}"] = {"direction": direction, "bits": pins[port]}
+
+
+def _read(module: dict) -> set[int | str]:
+    """Return the bits that a cell or an output of a module takes."""
+    taken = [port["bits"] for port in module["ports"].values() if port["direction"] == "output"]
+    for cell in module["cells"].values():
+        taken += [cell["connections"][port] for port, way in cell["port_directions"].items() if way == "input"]
+    return {bit for bits in taken for bit in bits}
 
 
 def first_values(module: dict) -> dict[int, str]:

@@ -41,8 +41,14 @@ from .netlist import BLOCK, Netlist, run_yosys
 EQUIVALENT = "equivalent"
 ROUNDS, STEPS, STEPS_IN_COMMON = 8, 20, 16
 """The most searches of bits that differ, and the most clocks of the induction, with no bit and with some in common."""
-FLAT = "flatten; memory_collect; memory_map -rom-only; dffunmap; setundef -zero; opt_clean"
-"""Registers and memories in the simplest form. What has no value is 0, which the simulation takes it for, too."""
+FLAT = (
+    "flatten; memory_collect; memory_map -rom-only; dffunmap; setundef -zero; opt_expr -fine; opt_clean; splitcells;"
+    " opt_clean"
+)
+"""Registers and memories in the simplest form, without the bits that nothing reads.
+
+What has no value is 0, which the simulation takes it for, too.
+"""
 BETWEEN = "___"
 """What joins the names of a module inside and of its port."""
 PROVEN, DIFFERS = "SUCCESS", "base case: FAIL"
