@@ -11,7 +11,7 @@ from hardwall.model import clock_monitor
 from hardwall.model.capture import DONE, RECORD_REGISTERS, SOURCES, TRIGGERED, WAITING
 from hardwall.model.link.server import FAILURE
 from hardwall.model.registers import CAPTURE, RegisterMap
-from hardwall.model.supervisor import ALL, ARMED, CAUSES, DISARMED, REQUIRED, TRIPPED
+from hardwall.model.supervisor import ALL, ARMED, CAUSES, DISARMED, REQUIRED, TRIPPED, names
 from hardwall.testing import SAMPLES, parameters, simulate
 from oracles.board import RECORDS, make
 from oracles.board_host import Host
@@ -144,10 +144,11 @@ async def an_open_loop_stops_the_pulses(dut):
     most, words = host.twin.spec.force_limit_word, {"wall_stiffness": host.registers["wall_stiffness"].high}
     await host.write(supervisor_ramp=host.registers["supervisor_ramp"].high)
     await host.write(commit=1, wall_position=1 + host.registers["wall_position"].low, **words)
-    for loop in LOOPS:
+    for loop, limit in zip(LOOPS, (most, 2 * most // 3 | 1, most // 3 | 1), strict=True):
+        await host.write(supervisor_force_limit=limit)
         await host.arm()
         await host.edges(host.settling)
-        assert host.shown()["driven"] == -most
+        assert host.shown()["driven"] == -limit
         while not int(dut.drive_pdm.value):
             await host.edges(1)
         # The pin falls between two edges, and the pulse with it; a fault of the amplifier comes through the supervisor.
@@ -224,6 +225,41 @@ async def what_trips_first_is_shown(dut):
         await host.turn(4)
         status = await host.look("stamp", "first_stamp")
         assert (status["state"], status["first"]) == (TRIPPED, 1 << causes.index(cause))
+
+
+@cocotb.test()
+async def the_limits_of_the_position_are_those_of_the_host(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    half = 1 << host.twin.spec.count_width - 1
+    low, high = -(2 * half // 3) - 1, 2 * half // 3
+    await host.write(supervisor_position_low=low, supervisor_position_high=high)
+    outside, wraps = ["position_range"], ["position_range", "position_wrap"]
+    for place, causes in {low: [], high: [], low - 1: outside, high + 1: outside, -half: wraps}.items():
+        await host.write(preload=1, commit=1, preload_count=place)
+        await host.arm()
+        await host.edges(host.settling)
+        assert names(host.shown()["first"]) == causes, place
+        if not causes:
+            # A host of an axis that is ARMED may not move its count.
+            assert (await host.write(preload=1))[1] == FAILURE
+            await host.write(disarm=1)
+    await host.look("stamp", "counts_0")
+
+
+@cocotb.test()
+async def an_index_that_is_not_where_it_was_trips(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    tolerance, cause = 6, next(1 << bit for bit, cause in enumerate(CAUSES) if cause.name == "index_spacing")
+    await host.write(supervisor_turn=host.registers["supervisor_turn"].high, supervisor_index_tolerance=tolerance)
+    await host.write(supervisor_causes=REQUIRED | cause)
+    for counts, trips in ((0, False), (tolerance, False), (tolerance + 1, True)):
+        await host.turn(counts)
+        for level in (1, 0):
+            host.change(encoder_z=level)
+            await host.edges(host.settling)
+        assert bool(host.shown()["latched"] & cause) == trips
 
 
 @cocotb.test()

@@ -39,6 +39,7 @@ class Host(OnALine):
         history: what the twin showed at the last edges, by stamp.
         refused: exceptions that were answered.
         shifted: what the link asked for at every pulse that words belong to.
+        pulsed: the pulses that the link gave since the last request.
     """
 
     def __init__(self, dut, name: str, estimator: str, stage: str = "pdm"):
@@ -55,6 +56,7 @@ class Host(OnALine):
         self.refused: list[int] = []
         self.taken_clocks = RegisterFile(self.server.file.design).taken_clocks
         self.shifted: list[dict[str, int]] = []
+        self.pulsed: list[str] = []
 
     async def reset(self) -> None:
         await self._start(self.pins)
@@ -97,6 +99,7 @@ class Host(OnALine):
         drive = [self.bench.reader(name) for name in self.board.spec.drive.pins]
         alive, enable = map(self.bench.reader, ("alive", "outputs_enable"))
         component, twin, last, asked = self.component, self.twin, -1, {}
+        pulses = [pulse.name for pulse in self.registers.pulses]
         while True:
             await edge
             pins, word = tuple(pin() for pin in drive), int(asking.value)
@@ -112,6 +115,7 @@ class Host(OnALine):
             assert found.items() <= wanted.items(), f"edge {twin.clocks}: {unlike(found, wanted)}"
             self.pulses.append(pins)
             self.history.append((twin.decoder.stamp, twin.shown()))
+            self.pulsed += [name for name in pulses if asked[name]]
             if asked["commit"] or asked["preload"]:
                 self.shifted.append(asked)
             twin.edge(self.pins, asked, found)
@@ -149,6 +153,8 @@ class Host(OnALine):
             self.refused.append(answer[2])
         file, found = self.server.file, self.component.asked.unpack(int(self.dut.asking.value))
         assert {word.name: found[word.name] for word in self.registers.live}.items() <= file.active.items()
+        assert sorted(self.pulsed) == sorted(file.pulses)
+        self.pulsed.clear()
         shifted = {"commit", "preload"} & set(file.pulses)
         assert [{name: each[name] for name in file.active} for each in self.shifted] == [file.active] * bool(shifted)
         self.shifted.clear()
