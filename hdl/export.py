@@ -13,14 +13,18 @@ from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 
 from hardwall.model import register_texts
+from hardwall.model.axes import AxesSpec
+from hardwall.model.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.model.whole_file import whole_file
 
+from .axes import Axes
+from .axes_board import AxesBoard
 from .axis import Axis
 from .board import Board
 from .capture import NO_FIRST_CONTENTS
 from .link.axi_link import AxiLink
-from .ports import port_table
+from .ports import Described, port_table
 
 SYNCHRONISER = {"ASYNC_REG": "TRUE", "keep": "true"}
 """Attributes of every stage of a synchroniser: place the stages side by side, and neither merge nor move them."""
@@ -93,51 +97,97 @@ def to_netlist(component: wiring.Component, name: str) -> _nir.Netlist:
     return _ir.build_netlist(Fragment.get(component, _AnyPart()), ports, name=name)
 
 
-def _facts(spec: AxisSpec) -> list[str]:
+def _facts(spec: AxisSpec | AxesSpec) -> list[str]:
     """Return the fields of the spec, one line each, with the gains that are in use."""
     return [f"{name} = {value!r}" for name, value in spec.facts.items()]
 
 
-def _source(component: Axis | Board, name: str, what: str) -> str:
+def _source(component: Described, name: str, what: str) -> str:
     head = [what, "Generated from the following; ports.md says what each port is.", "", *_facts(component.spec)]
     return "".join(f"// {line}".rstrip() + "\n" for line in head) + "\n" + to_verilog(component, name)
 
 
-def write(spec: AxisSpec, folder: Path) -> tuple[Path, ...]:
-    """Write the Verilog, its ports and its registers into `folder`, which is made if it is missing; return the paths.
+def _registers(registers: RegisterMap) -> dict[str, str]:
+    """Return the files of a register map, by name."""
+    return {
+        "registers.md": register_texts.markdown(registers),
+        "registers.h": register_texts.c_header(registers),
+        "registers.json": register_texts.as_json(registers),
+    }
 
-    `axis.v`, `board.v` and `axi.v` have their ports in `ports.md`; the registers of the last two are in `registers.md`,
-    `registers.h` for C, and `registers.json`. The text depends only on the spec and on the versions of this project and
-    its Yosys.
 
-    Raises:
-        TypeError: if `spec` is not an AxisSpec.
-        OSError: if a file cannot be written.
-    """
+FORMATS = "A word of the format SQ(i, f) is signed, UQ(i, f) unsigned, of i + f bits; f of them are the fraction."
+
+
+def _line(board: Board | AxesBoard) -> str:
+    """Return what is said of a board's serial line."""
+    return (
+        f"The serial line has {board.link.baud} baud, 8 data bits, no parity and one stop bit. It speaks Modbus "
+        "RTU as unit 1; registers.md has the registers.\n"
+    )
+
+
+def _files(spec: AxisSpec) -> dict[str, str]:
+    """Return the files of one axis, by name."""
     axis, board = Axis(spec), Board(spec)
     axi = Board(spec, AxiLink(board.registers))
     facts = "".join(f"    {line}\n" for line in _facts(spec))
-    files = {
+    return {
         "axis.v": _source(axis, "axis", "One axis of hardwall, encoder pins to drive: every parameter is a port."),
         "axi.v": _source(axi, "axi", "One supervised axis of hardwall behind an AXI4-Lite bus, for a processor."),
         "board.v": _source(board, "board", "One supervised axis of hardwall behind a dozen pins, with a serial line."),
         "ports.md": (
             f"# Ports\n\nOf the axis\n\n{facts}\n"
             f"A sample every {spec.clocks_per_sample} clocks; the drive changes {axis.latency} clocks after it is "
-            "taken. A word of the format SQ(i, f) is signed, UQ(i, f) unsigned, of i + f bits; f of them are the "
-            "fraction.\n\n"
+            f"taken. {FORMATS}\n\n"
             f"## axis.v\n\n{port_table(axis)}\n"
-            f"## board.v\n\n{port_table(board)}\n"
-            f"The serial line has {board.link.baud} baud, 8 data bits, no parity and one stop bit. It speaks Modbus "
-            "RTU as unit 1; registers.md has the registers.\n\n"
+            f"## board.v\n\n{port_table(board)}\n{_line(board)}\n"
             f"## axi.v\n\n{port_table(axi)}\n"
             "The word at the byte address 2 A of the bus has the registers A, in its upper half, and A + 1: a value of "
             "32 bits is one word.\n"
         ),
-        "registers.md": register_texts.markdown(board.registers),
-        "registers.h": register_texts.c_header(board.registers),
-        "registers.json": register_texts.as_json(board.registers),
+        **_registers(board.registers),
     }
+
+
+def _files_of_axes(spec: AxesSpec) -> dict[str, str]:
+    """Return the files of several axes, by name."""
+    axes, board = Axes(spec), AxesBoard(spec)
+    facts = "".join(f"    {line}\n" for line in _facts(spec))
+    words = "".join(
+        f"| {number} | `{word.name}` | {word.format} | {word.reset} | {word.doc} |\n"
+        for number, word in enumerate(spec.design.words)
+    )
+    several = f"{spec.axes} {'axis' if spec.axes == 1 else 'axes'} of hardwall"
+    return {
+        "axes.v": _source(axes, "axes", f"{several} in one pipeline, encoder pins to drives."),
+        "board.v": _source(board, "board", f"{several}, each supervised, behind their pins, with a serial line."),
+        "ports.md": (
+            f"# Ports\n\nOf the axes\n\n{facts}\n"
+            f"A sample of every axis in each rota of {spec.clocks_per_sample} clocks; its drive changes {axes.latency} "
+            f"clocks after it is taken. {FORMATS} A port of one bit for each axis has that of axis i in bit i; a port "
+            "of N x a format has the word of axis 0 in the lowest bits.\n\n"
+            f"## axes.v\n\n{port_table(axes)}\n"
+            "The words that word_number counts:\n\n"
+            f"| number | word | format | reset | what it is |\n| --- | --- | --- | --- | --- |\n{words}\n"
+            f"## board.v\n\n{port_table(board)}\n{_line(board)}"
+        ),
+        **_registers(board.registers),
+    }
+
+
+def write(spec: AxisSpec | AxesSpec, folder: Path) -> tuple[Path, ...]:
+    """Write the Verilog, its ports and its registers into `folder`, which is made if it is missing; return the paths.
+
+    Of an axis, `axis.v`, `board.v` and `axi.v` have their ports in `ports.md`; the registers of the last two are in
+    `registers.md`, `registers.h` for C, and `registers.json`. Of several axes there are `axes.v` and `board.v`, and the
+    same pages of both. The text depends only on the spec and on the versions of this project and its Yosys.
+
+    Raises:
+        TypeError: if `spec` is neither an AxisSpec nor an AxesSpec.
+        OSError: if a file cannot be written.
+    """
+    files = _files_of_axes(spec) if isinstance(spec, AxesSpec) else _files(spec)
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():

@@ -5,11 +5,15 @@ from typing import NamedTuple
 
 from amaranth.hdl import Shape
 from amaranth.lib import wiring
+from amaranth.lib.data import ArrayLayout
 
 from hardwall.model.arithmetic.fixed import SQ, UQ, Format
+from hardwall.model.axes import AxesSpec
 from hardwall.model.design import ILLEGAL_WIDTH
 from hardwall.model.spec import AxisSpec
 
+from .axes import Axes
+from .axes_board import AxesBoard
 from .axis import Axis
 from .board import Board
 
@@ -92,6 +96,31 @@ MEANINGS = {
     "outputs_enable": "enable of the buffers of the drive's pins and alive: both clocks run, the reset has ended",
 }
 """The meaning of every port; a run-time word has its own text."""
+OF_SEVERAL = {
+    "commit": "pulse: the words of the axis's shadow act together from its next sample on",
+    "commit_pending": "the words of the axis's shadow wait for its next sample",
+    "word_write": "write word_value into the shadow of the word word_number of the axis word_axis, while word_ready",
+    "word_axis": "the axis of the word that is written",
+    "word_number": "the number of the word that is written: see the words below",
+    "word_value": "what is written; a signed word modulo its width",
+    "word_ready": "words can be written: the first rota after a reset is over",
+    "strobe": "an axis is sampled in this clock",
+    "strobe_axis": "the axis that is sampled in this clock",
+    "velocity": "estimate of the axis that is estimated",
+    "estimated_count": "the count of the sample of which the velocity is",
+    "record_valid": "high for one clock, a clock after the end of every sample of any axis, with its record",
+    "record_axis": "the axis of the record",
+    "record_count": "the count of the sample",
+    "record_velocity": "the velocity that was made of it",
+    "record_wall_force": "the wall's force that was made of it",
+    "record_drive": "the drive of the axis at the end of the sample",
+    "record_flags": "the flags of the axis at the end of the sample",
+}
+"""The meaning of the ports that several axes have otherwise, or alone."""
+
+
+Described = Axis | Axes | Board | AxesBoard
+"""The components whose ports can be described."""
 
 
 class Quantity(NamedTuple):
@@ -103,33 +132,39 @@ class Quantity(NamedTuple):
     reset: int | None = None
 
 
-def _quantities(spec: AxisSpec) -> dict[str, Quantity]:
-    """Return the quantities of an axis's ports that carry numbers, by name; all other ports are bits."""
+def _quantities(spec: AxisSpec | AxesSpec) -> dict[str, Quantity]:
+    """Return the quantities of the ports that carry numbers, by name; all other ports are bits."""
     count = Quantity(SQ(spec.count_width, 0), spec.count_m, "m")
     force = Quantity(spec.force, spec.force_resolution_n, "N")
     stamp = Quantity(UQ(spec.stamp_width, 0), 1 / spec.clock_hz, "s")
+    velocity = Quantity(spec.design.estimator.velocity, spec.velocity_unit_m_per_s, "m/s")
+    counts = ("count", "sampled_count", "preload_count", "index_count", "estimated_count", "record_count")
     return {
-        **dict.fromkeys(("count", "sampled_count", "preload_count", "index_count"), count),
-        **dict.fromkeys(("drive", "wall_force"), force),
+        **dict.fromkeys(counts, count),
+        **dict.fromkeys(("drive", "wall_force", "record_drive", "record_wall_force"), force),
         **dict.fromkeys(("stamp", "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall"), stamp),
         "edge_kind": Quantity(UQ(2, 0), 1.0, ""),
         "illegal_count": Quantity(UQ(ILLEGAL_WIDTH, 0), 1.0, ""),
-        "velocity": Quantity(spec.design.estimator.velocity, spec.velocity_unit_m_per_s, "m/s"),
+        **dict.fromkeys(("velocity", "record_velocity"), velocity),
         **{word.name: Quantity(word.format, word.si_per_unit, word.unit, word.reset) for word in spec.design.words},
     }
 
 
-def _rows(component: Axis | Board) -> Iterable[tuple[str, ...]]:
+def _rows(component: Described) -> Iterable[tuple[str, ...]]:
     spec = component.spec
     quantities = _quantities(spec)
     meanings = MEANINGS | {word.name: word.doc for word in spec.design.words}
+    if isinstance(spec, AxesSpec):
+        meanings |= OF_SEVERAL
     meanings["flags"] += ": " + ", ".join(f"bit {bit} {name}" for bit, name in enumerate(spec.design.flags))
-    members = {name: (member.flow, Shape.cast(member.shape)) for name, member in component.signature.members.items()}
-    for name, (flow, shape) in ({"clk": (wiring.In, Shape(1)), "rst": (wiring.In, Shape(1))} | members).items():
-        numbers = (
-            _number(quantities[name]) if name in quantities else ("bit" if shape.width == 1 else "bits", "", "", "")
+    members = {name: (member.flow, member.shape) for name, member in component.signature.members.items()}
+    for name, (flow, shape) in ({"clk": (wiring.In, 1), "rst": (wiring.In, 1)} | members).items():
+        width = Shape.cast(shape).width
+        kind, *numbers = (
+            _number(quantities[name]) if name in quantities else ("bit" * (width == 1) or "bits", "", "", "")
         )
-        yield f"`{name}`", "in" if flow is wiring.In else "out", str(shape.width), *numbers, meanings[name]
+        each = f"{shape.length} x " if isinstance(shape, ArrayLayout) else ""
+        yield f"`{name}`", "in" if flow is wiring.In else "out", str(width), each + kind, *numbers, meanings[name]
 
 
 def _number(quantity: Quantity) -> tuple[str, str, str, str]:
@@ -146,12 +181,12 @@ def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def port_table(component: Axis | Board) -> str:
+def port_table(component: Described) -> str:
     """Return a Markdown table of every port of the component's Verilog, `clk` and `rst` included.
 
     Raises:
-        TypeError: if `component` is neither an Axis nor a Board.
+        TypeError: if `component` is none of `Described`.
     """
-    if not isinstance(component, Axis | Board):
-        raise TypeError(f"component must be an Axis or a Board, not {component!r}")
+    if not isinstance(component, Described):
+        raise TypeError(f"component must be an Axis, Axes or a board of these, not {component!r}")
     return _table(COLUMNS, _rows(component))

@@ -11,11 +11,12 @@ from hardwall.hdl.axis import Axis
 from hardwall.hdl.board import Board
 from hardwall.hdl.export import SYNCHRONISER, to_verilog, write
 from hardwall.hdl.link.axi_link import AxiLink
-from hardwall.hdl.ports import COLUMNS, port_table
+from hardwall.hdl.ports import port_table
 from hardwall.model import register_texts
 from hardwall.model.registers import RegisterMap
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from stimuli.specs import spec
+from stimuli.tables import rows, verilog_ports
 
 TOPS = {"axis": Axis, "board": Board, "axi": lambda axis: Board(axis, AxiLink(RegisterMap(axis)))}
 WRITTEN = ("axis.v", "axi.v", "board.v", "ports.md", "registers.md", "registers.h", "registers.json")
@@ -37,23 +38,6 @@ axi_awaddr axi_awprot axi_awvalid axi_awready axi_wdata axi_wstrb axi_wvalid axi
 axi_araddr axi_arprot axi_arvalid axi_arready axi_rdata axi_rresp axi_rvalid axi_rready drive_pdm drive_sign alive
 outputs_enable
 """
-
-
-def rows(table: str) -> list[dict[str, str]]:
-    """Return the rows of a Markdown table, with their cells by column."""
-    lines = [[cell.strip() for cell in line.strip("|\n").split(" | ")] for line in table.splitlines()]
-    assert tuple(lines[0]) == COLUMNS
-    assert set(lines[1]) == {"---"}
-    return [dict(zip(COLUMNS, line, strict=True)) for line in lines[2:]]
-
-
-def verilog_ports(text: str, module: str) -> dict[str, tuple[str, int]]:
-    """Return direction and width of every port of a module, by name."""
-    names, body = re.search(rf"^module {module}\((.*?)\);(.*?)^endmodule", text, re.S | re.M).groups()
-    declared = re.findall(r"^  (input|output) (?:\[(\d+):0\] )?(\S+?) ?;", body, re.M)
-    ports = {name.lstrip("\\"): (way.removesuffix("put"), int(top or 0) + 1) for way, top, name in declared}
-    assert sorted(ports) == sorted(name.strip().lstrip("\\") for name in names.split(","))
-    return ports
 
 
 @pytest.mark.parametrize(
@@ -96,7 +80,7 @@ def test_rows_tell_the_words():
 
 
 def test_other_components_are_refused():
-    with pytest.raises(TypeError, match=r"^component must be an Axis or a Board, not 3$"):
+    with pytest.raises(TypeError, match=r"^component must be an Axis, Axes or a board of these, not 3$"):
         port_table(3)
 
 

@@ -74,6 +74,7 @@ BROAD = {
     "test_digests": "whatever the program computes",
     "test_docs": "the pages",
     "test_endurance": "every estimator",
+    "test_export_axes": "the written Verilog of several axes and their board",
     "test_faults": "faults injected into the board in the closed loop, and the means",
     "test_fuzz": "every command, called as no one would",
     "test_gates": "netlists beside their RTL, and the means",

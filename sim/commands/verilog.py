@@ -8,8 +8,9 @@ import typer
 from ...model.checks import shown
 from ..rtl.sources import write_verilog
 from ..scene.load import load
+from .board import spec_on
 from .errors import BadInput
-from .options import EstimatorOption, SceneArgument, SetOption, changes_of
+from .options import AxesOption, EstimatorOption, SceneArgument, SetOption, changes_of
 
 
 def command(
@@ -18,9 +19,10 @@ def command(
         str, typer.Option("-o", "--output-folder", metavar="DIR", help="folder for the files, made if absent")
     ] = ".",
     estimator: EstimatorOption = None,
+    axes: AxesOption = None,
     set_: SetOption = None,
 ) -> None:
-    spec = load(scene, changes_of(set_, controller__estimator=estimator)).spec
+    spec = spec_on(load(scene, changes_of(set_, controller__estimator=estimator)), axes)
     if not folder:
         raise BadInput("-o must be a folder, not ''")
     try:
