@@ -45,16 +45,21 @@ def test_two_registers_of_any_value_are_never_taken_for_one(other, equal, tmp_pa
 
 def test_memories_become_ports_if_their_clocks_and_resets_are_the_modules_own():
     def module(**other: list[int | str]) -> dict:
+        # The memory's words have two bits, of which the module's output shows the lower one alone.
         ports = {"clk": {"direction": "input", "bits": [2]}, "rst": {"direction": "input", "bits": [3]}}
-        pins = {port: [number] for number, port in enumerate((*TO_MEMORY, "RD_DATA"), 10)}
+        ports["shown"] = {"direction": "output", "bits": [15]}
+        pins = {port: [number, 10 + number] for number, port in enumerate((*TO_MEMORY, "RD_DATA"), 10)}
         pins |= {"RD_CLK": ["0"], "WR_CLK": [2], "RD_ARST": ["0"], "RD_SRST": [3], **other}
-        return {"ports": ports, "cells": {"cells": {"type": "$mem_v2", "connections": pins}}}
+        ways = {port: "output" if port == "RD_DATA" else "input" for port in pins}
+        memory = {"type": "$mem_v2", "parameters": {"WIDTH": "10"}, "port_directions": ways, "connections": pins}
+        return {"ports": ports, "cells": {"cells": memory}}
 
     parted = module()
     part_from_memories(parted)
     assert parted["cells"] == {}
     assert parted["ports"]["M_0_WR_DATA"] == {"direction": "output", "bits": [13]}
-    assert parted["ports"]["M_0_RD_DATA"] == {"direction": "input", "bits": [15]}
+    assert parted["ports"]["M_0_WR_ADDR"] == {"direction": "output", "bits": [12, 22]}
+    assert parted["ports"]["M_0_RD_DATA"] == {"direction": "input", "bits": [15, 25]}
     for port, own in OWN.items():
         # A bit of the module, and the module's other input.
         for bit in (9, 2 if own == "rst" else 3):

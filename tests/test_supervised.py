@@ -14,6 +14,7 @@ from hardwall.model.supervisor import ALL, ARMED, CAUSES, DISARMED, TRIPPED, nam
 from hardwall.testing import SAMPLES, SEED, Bench, Recorded, parameters, simulate
 from oracles.axis import AxisTwin
 from oracles.supervised import BITS, Follower
+from stimuli.lengths import REACHING
 from stimuli.specs import spec
 from stimuli.supervised_world import World
 
@@ -42,10 +43,11 @@ async def follows_models(dut):
     follower, axis = Follower(design), AxisTwin(design)
     states, compared, resets = set(), 0, 0
     shown = {"state": DISARMED, "latched": 0, "live": 0}
-    for clock in range(SAMPLES):
+    clocks = max(SAMPLES, REACHING)
+    for clock in range(clocks):
         given = world.act(shown["state"], shown["latched"], shown["live"])
         # First the counts of the causes fill; then the axis is reset in motion, again and again.
-        reset = int(clock == 0 or (2 * clock > SAMPLES and random.random() < 0.0003))
+        reset = int(clock == 0 or (2 * clock > clocks and random.random() < 0.0003))
         bench.dut.stimulus.value, bench.dut.rst.value = recorded.stimuli.pack(given), reset
         await RisingEdge(dut.clk)
         seen = recorded.records.unpack(int(record.value))
@@ -62,7 +64,7 @@ async def follows_models(dut):
             axis.advance(given, follower.level("drive_enable"))
             follower.edge(given, shown)
         states.add((follower.supervisor.state, follower.supervisor.driven != 0))
-    assert compared == SAMPLES - 1
+    assert compared == clocks - 1
     assert resets > 1
     assert states == {(DISARMED, False), (TRIPPED, False), (ARMED, False), (ARMED, True)}
     missed = names(ALL & ~follower.reached & ~BITS["strobe_busy"])

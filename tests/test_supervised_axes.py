@@ -14,7 +14,7 @@ from hardwall.testing import SAMPLES, SEED, Bench, Recorded, parameters, simulat
 from oracles.axes import Seen, Write, check, lanes_of
 from oracles.supervised import BITS
 from oracles.supervised_axes import Follower
-from stimuli.lengths import LONG, long_form
+from stimuli.lengths import LONG, REACHING, long_form
 from stimuli.supervised_axes_world import AxesWorld, slow
 from stimuli.supervised_world import QUARTERS
 
@@ -99,7 +99,7 @@ class Run:
 async def follows_models(dut):
     run = Run(dut)
     design, world, seen_states, turns, resets, apart = run.design, AxesWorld(run.design, SEED), set(), 0, 0, 0
-    clocks = SAMPLES // (2 if design.spec.axes == 1 else 4)
+    clocks = max(SAMPLES, REACHING) // (2 if design.spec.axes == 1 else 4)
     await run.begin(world.act([(state.state, state.latched) for state in run.supervisors], 0))
     for clock in range(1, clocks):
         given = world.act([(state.state, state.latched) for state in run.supervisors], run.ready)
