@@ -39,8 +39,8 @@ import numpy as np
 from .arithmetic.fixed import SQ, UQ
 from .checks import FieldError, check_int
 from .compiled import compiled
+from .designed import DesignedAxis
 from .register import Kind, Register, narrowed, word_register
-from .spec import AxisSpec
 from .supervisor import TRIPPED
 from .words import Word
 
@@ -126,7 +126,7 @@ class Design:
     """Formats and run-time words of the capture memory of an axis.
 
     Args:
-        spec: the axis.
+        spec: the axis, alone or one of several.
         records: records of the ring, a power of two.
 
     Attributes:
@@ -136,46 +136,57 @@ class Design:
         flags: names of a record's flags, bit 0 first.
         stamp_clocks: clocks from a sample to the stamp of its record.
         words: run-time words; all act at the next clock.
+        ranges: the least and the largest of those that may not have every value of their formats; None for the
+            format's.
 
     Raises:
         TypeError: if `records` is not an int.
         ValueError: if there cannot be so many records, or the samples follow each other too closely.
     """
 
-    def __init__(self, spec: AxisSpec, records: int):
+    def __init__(self, spec: DesignedAxis, records: int):
         check_int("records", records, 2, RECORDS_MAX)
         if records & (records - 1):
             raise ValueError(f"records must be a power of two, not {records}")
-        axis = spec.design
-        # The next velocity comes before the next drive, and the next force of the wall in between.
-        behind = axis.latency_to_drive - axis.estimator.latency
-        # The ring is frozen a clock behind its last record, before another begins.
-        fewest = max(
-            behind + TAKEN_AT["velocity"] + 1, axis.output.latency + TAKEN_AT["flags"] + 1, RECORD_REGISTERS + 1
-        )
+        self.spec, self.records, self.params = spec, records, Params(records)
+        fewest = self.fewest_clocks
         if spec.clocks_per_sample < fewest:
             raise FieldError(
                 "sample_hz",
                 f"must leave {fewest} clocks for a sample that is captured, so at most {spec.clock_hz // fewest} at "
                 f"clock_hz {spec.clock_hz}, not {spec.sample_hz!r}",
             )
-        self.spec, self.records, self.params = spec, records, Params(records)
-        self.count, self.velocity, self.force = SQ(spec.count_width, 0), narrowed(axis.estimator.velocity), spec.force
-        self.flags = (*STATE_FLAGS, *axis.flags)
-        self.stamp_clocks = axis.latency_to_drive + TAKEN_AT["flags"]
+        self.count, self.force = SQ(spec.count_width, 0), spec.force
+        self.velocity = narrowed(spec.design.estimator.velocity)
+        self.flags = (*STATE_FLAGS, *spec.design.flags)
+        self.stamp_clocks = self.sampled_clocks + TAKEN_AT["flags"]
         sources = ", ".join(f"bit {bit} {name}" for bit, name in enumerate(SOURCES))
         self.place = UQ((records - 1).bit_length(), 0)
-        self.words = (
+        self.words: tuple[Word, ...] = (
             Word("capture_sources", UQ(len(SOURCES), 0), 1.0, "", 0, f"what triggers a capture: {sources}"),
             Word("capture_level", self.count, spec.count_m, "m", 0, "level of the count whose passing triggers"),
             Word("capture_before", self.place, 1.0, "", 0, "records that are wanted before the trigger"),
             Word("capture_decimation", UQ(DECIMATION_BITS, 0), 1.0, "", 1, "samples from a record to the next"),
         )
+        self.ranges: dict[str, tuple[int | None, int | None]] = {"capture_decimation": (1, None)}
+
+    @property
+    def sampled_clocks(self) -> int:
+        """Clocks from a sample to the one in which the memory hears of it, which is that of the changed drive."""
+        return self.spec.design.latency_to_drive
+
+    @property
+    def fewest_clocks(self) -> int:
+        """The fewest clocks from a sample to the next with which all values of a record are of one sample."""
+        axis = self.spec.design
+        # The next velocity comes before the next drive, and the next force of the wall in between.
+        behind = axis.latency_to_drive - axis.estimator.latency
+        # The ring is frozen a clock behind its last record, before another begins.
+        return max(behind + TAKEN_AT["velocity"] + 1, axis.output.latency + TAKEN_AT["flags"] + 1, RECORD_REGISTERS + 1)
 
     def registers(self) -> tuple[Register, ...]:
         """Return what a host sees of the capture memory, but for its window, and what it asks of it, as registers."""
         states = ", ".join(f"{number} {name}" for number, name in enumerate(STATES))
-        least = {"capture_decimation": 1}
         stamp = UQ(self.spec.stamp_width, 0)
         pulses = (
             ("capture_start", "A capture begins, whatever was before; its memory cannot be read until it is done."),
@@ -193,7 +204,7 @@ class Design:
                 "s",
             ),
             *(Register(name, Kind.PULSE, UQ(1, 0), meaning) for name, meaning in pulses),
-            *(word_register(word, Kind.LIVE, least.get(word.name)) for word in self.words),
+            *(word_register(word, Kind.LIVE, *self.ranges.get(word.name, ())) for word in self.words),
         )
 
     def memory(self) -> np.ndarray:

@@ -131,6 +131,22 @@ def _placed(base: int, room: int, registers: tuple[Register, ...]) -> tuple[Regi
     return tuple(places)
 
 
+def records_in(capture_registers: int) -> int:
+    """Return the records of a capture memory of so many registers.
+
+    Raises:
+        ValueError: if there can be none of so many.
+    """
+    check_int("capture_registers", capture_registers, 0, SPACE - CAPTURE)
+    records, more = divmod(capture_registers, capture.RECORD_REGISTERS)
+    if more or records == 1 or records & (records - 1):
+        raise ValueError(
+            f"capture_registers must be 0, or {capture.RECORD_REGISTERS} times a power of two from 2 on, "
+            f"not {capture_registers}"
+        )
+    return records
+
+
 class RegisterMap:
     """The registers of a supervised axis, placed, with the identity of the build and the map that the device carries.
 
@@ -155,17 +171,12 @@ class RegisterMap:
     PRODUCT: ClassVar = b"axis"
     """The product by which the device identifies itself."""
     spec: DesignedAxis
+    capture: capture.Design | None
 
     def __init__(self, spec: AxisSpec, capture_registers: int = CAPTURE_REGISTERS):
         if not isinstance(spec, AxisSpec):
             raise TypeError(f"spec must be an AxisSpec, not {shown(spec)}")
-        check_int("capture_registers", capture_registers, 0, SPACE - CAPTURE)
-        records, more = divmod(capture_registers, capture.RECORD_REGISTERS)
-        if more or records == 1 or records & (records - 1):
-            raise ValueError(
-                f"capture_registers must be 0, or {capture.RECORD_REGISTERS} times a power of two from 2 on, "
-                f"not {capture_registers}"
-            )
+        records = records_in(capture_registers)
         self.spec, self.capture_registers = spec, capture_registers
         self.capture = capture.Design(spec, records) if records else None
         design = Design(spec)
