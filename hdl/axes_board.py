@@ -5,9 +5,10 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.axes import AxesSpec
-from hardwall.model.axes_registers import AxesMap
+from hardwall.model.axes_registers import OF_CAPTURE, AxesMap
 from hardwall.model.link import uart
 
+from .axes_capture import AxesCapture
 from .board_clocks import board_clocks
 from .drive.registry import block_of
 from .lead_out import lead_out
@@ -20,7 +21,7 @@ ENCODER = "encoder_a", "encoder_b", "encoder_z"
 
 
 class AxesBoard(wiring.Component):
-    """Supervised axes behind their pins: `SupervisedAxes`, their link and a stage of pulses for each.
+    """Supervised axes behind their pins: `SupervisedAxes`, their link, a capture memory and a stage of pulses for each.
 
     A host reads and writes the registers of `registers`, a bank for each axis; what it asks of an axis in one frame
     happens at one clock. It is refused an `arm` of an axis that is not `ready`, and a `preload` of one that is ARMED.
@@ -50,6 +51,8 @@ class AxesBoard(wiring.Component):
         The axes.
     baud : int, optional
         Rate of the serial line; 921 600 baud if it is not given, or what the clock allows of that.
+    capture_registers : int, optional
+        Registers of the capture memory, as of `AxesMap`.
 
     Members
     -------
@@ -73,13 +76,15 @@ class AxesBoard(wiring.Component):
     TypeError
         If `spec` is not an AxesSpec, or `baud` is not an int.
     ValueError
-        If the clock is too slow for a serial line.
+        If the clock is too slow for a serial line, or there can be no such capture memory.
     """
 
-    def __init__(self, spec: AxesSpec, baud: int | None = None):
+    def __init__(self, spec: AxesSpec, baud: int | None = None, capture_registers: int | None = None):
         self.axes = SupervisedAxes(spec)
         rate = uart.usual_baud(spec.clock_hz) if baud is None else baud
-        self.link = Link(AxesMap(spec), rate)
+        registers = AxesMap(spec, capture_registers)
+        self.link = Link(registers, rate)
+        self.capture = AxesCapture(registers.capture) if registers.capture else None
         self.stages = [block_of(spec.drive) for _ in range(spec.axes)]
         super().__init__(
             {
@@ -129,10 +134,15 @@ class AxesBoard(wiring.Component):
         m.d.comb += [getattr(axes, name).eq(~getattr(axes, name[:-2])) for name in COMPLEMENTS]
         for name in LOOPS:
             m.d.comb += getattr(axes, name).eq(loops.get(name, getattr(self, name)).replicate(self.spec.axes))
+        parts = {False: axes}
+        if self.capture:
+            m.submodules.capture = parts[True] = capture = self.capture
+            shown = (name for name in capture.signature.members if not name.startswith(OF_CAPTURE))
+            m.d.comb += [getattr(capture, name).eq(getattr(axes, name)) for name in shown]
         for name, member in link.signature.members.items():
             if name in link.PINS:
                 continue
-            ours, theirs = getattr(link, name), getattr(axes, name)
+            ours, theirs = getattr(link, name), getattr(parts[name.startswith(OF_CAPTURE)], name)
             m.d.comb += theirs.eq(ours) if member.flow == Out else ours.eq(theirs)
         permitted = self.drive_enable & self.emergency_stop & running
         for number, stage in enumerate(self.stages):

@@ -29,7 +29,7 @@ LET = "magnitude", "negative", "armed", "alive", "drive_inverted"
 """Outputs of the doors."""
 TURN = "state", "ready", "latched", "first", "first_stamp", "counts"
 """What a turn shows of its supervisor."""
-HIDDEN = "drive", "strobe", "strobe_axis", "sampled", "actuated"
+HIDDEN = "drive", "sampled", "actuated"
 """Outputs of the axes that do not leave: the drive that nobody has let out, and what says when it changed."""
 
 

@@ -42,6 +42,7 @@ class Axis(Named):
         port: the line.
         device: the device there.
         shared: what it shares with the other axes of the device, if there are any.
+        number: the number of the axis on the device.
 
     Attributes:
         device: what the board says of itself.
@@ -58,11 +59,11 @@ class Axis(Named):
     supervisor: Supervisor
     capture: Capture
 
-    def __init__(self, port: Port, device: Device, shared: Shared | None = None):
+    def __init__(self, port: Port, device: Device, shared: Shared | None = None, number: int = 0):
         self.device, self._port = device, port
         self._words = Words(port, device, None if shared is None else shared.words)
         self.wall, self.supervisor = Wall(self), Supervisor(self)
-        self.capture = Capture(self)
+        self.capture = Capture(self, number)
         self._status = device.of_kind(Kind.STATUS)
         # Whether it may be ARMED by this program; and whether it may be, though this program does not want it: a host
         # that has gone left it so, or an answer was lost. It is disarmed before the heartbeat goes on.

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 
-from ..model.axes_registers import BANK, SHARED
+from ..model.axes_registers import BANK, is_shared
 from ..model.registers import COUNTERS, END, PULSES, TELEMETRY
 from .axis import Axis
 from .device import Device
@@ -14,8 +14,8 @@ from .shared import Shared
 class BankPort(Port):
     """A port to the bank of one of several axes, by the addresses of an axis that is alone.
 
-    What there is once for all axes, the constants, the counters of the link and the words of the host itself, is read
-    and written where it is.
+    What there is once for all axes, the constants, the counters of the link, the words of the host itself and those of
+    the capture memory, is read and written where it is.
 
     Args:
         port: the line.
@@ -28,7 +28,7 @@ class BankPort(Port):
 
     def __init__(self, port: Port, device: Device, axis: int):
         self._line, self._base, self.name = port, BANK * axis, port.name
-        words = (device.registers[name] for name in SHARED)
+        words = filter(is_shared, device.registers.values())
         blocks = [(0, TELEMETRY), (COUNTERS, PULSES), *((word.address, word.address + word.size) for word in words)]
         self._once = {address for first, end in blocks for address in range(first, end)}
 
@@ -69,7 +69,8 @@ class Axes:
 
     Each is an `Axis`, with words, states and acts of its own. The board hears one heartbeat. It goes on while the lease
     of any of them lasts, but not beside one that is ARMED and whose lease has ended, or that an earlier host left so:
-    disarm that, or renew its lease. `supervisor_watchdog` is one word for all.
+    disarm that, or renew its lease. `supervisor_watchdog` is one word for all, and there is one capture memory, which
+    takes the axis whose `capture` was started last.
 
     Args:
         port: the line.
@@ -88,7 +89,7 @@ class Axes:
         shared = Shared(Beat(port, device.registers["heartbeat"]), {}, self._axes)
         try:
             for axis in range(device.axes):
-                self._axes.append(Axis(BankPort(port, device, axis), device, shared))
+                self._axes.append(Axis(BankPort(port, device, axis), device, shared, axis))
         except BaseException:
             self._close_axes()
             raise

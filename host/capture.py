@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..model.capture import DONE, RECORD_REGISTERS, SOURCES, STATE_FLAGS, STATES
+from ..model.capture import DONE, IDLE, RECORD_REGISTERS, SOURCES, STATE_FLAGS, STATES
 from ..model.checks import FieldError, check_int
 from ..model.registers import CAPTURE
 from ..model.whole_file import whole_file
@@ -22,6 +22,8 @@ PART_RECORDS = 15
 """Records that are read by one request."""
 VALUES = "count", "velocity", "driven"
 """The status whose formats the values of a record have, in their order."""
+TAKEN = "capture_axis"
+"""The word of the axis that is captured, which a board of several axes has."""
 LOOK_S = 0.02
 """The time between two looks at the state of a capture."""
 
@@ -96,29 +98,32 @@ class Board(Protocol):
 
 
 class Capture:
-    """The capture memory of a board.
+    """The capture memory of a board, for one of its axes.
+
+    Several axes have one memory, which takes the axis that was started last; for the others there is no capture then.
 
     Args:
         board: the axis.
+        axis: its number on the board.
 
     Attributes:
         records: records that it has; 0 for a board without one.
     """
 
-    def __init__(self, board: Board):
-        self._board = board
+    def __init__(self, board: Board, axis: int = 0):
+        self._board, self._axis = board, axis
         self.records = board.device.capture_registers // RECORD_REGISTERS
 
     @property
     def state(self) -> str:
-        """IDLE, FILLING, WAITING, TRIGGERED or DONE.
+        """IDLE, FILLING, WAITING, TRIGGERED or DONE; IDLE if another axis of the board is captured.
 
         Raises:
             NotReadyError: if the board has no capture memory.
             HostError: if the board is not reached.
         """
         self._check()
-        return STATES[self._board.read("capture_state")]
+        return STATES[self._board.read("capture_state") if self._taken == self._axis else IDLE]
 
     def start(
         self,
@@ -127,7 +132,7 @@ class Capture:
         decimation: int = 1,
         level_m: float = 0.0,
     ) -> None:
-        """Begin a capture, whatever was before.
+        """Begin a capture of this axis, whatever was before, and of whichever axis.
 
         Args:
             sources: what triggers it, one or several, besides `trigger`: `contact`, `trip`, and the position that
@@ -153,6 +158,7 @@ class Capture:
             capture_level=level_m,
             capture_before=wanted,
             capture_decimation=decimation,
+            **({TAKEN: self._axis} if self._several else {}),
         )
         self._board.pulse("capture_start")
 
@@ -160,9 +166,12 @@ class Capture:
         """Trigger a capture by hand.
 
         Raises:
-            HostError: if the board is not reached, or has no capture memory.
+            NotReadyError: if the board has no capture memory, or another axis of it is captured.
+            HostError: if the board is not reached.
         """
         self._check()
+        if (taken := self._taken) != self._axis:
+            raise NotReadyError(f"the capture is of axis {taken}, and not of axis {self._axis}: start one of this axis")
         self._board.pulse("capture_trigger")
 
     def until(self, wanted: str, seconds: float) -> None:
@@ -242,6 +251,15 @@ class Capture:
             place=place,
             identity=device.identity,
         )
+
+    @property
+    def _several(self) -> bool:
+        return TAKEN in self._board.device.registers
+
+    @property
+    def _taken(self) -> int:
+        """The axis that is captured."""
+        return self._board.read(TAKEN) if self._several else self._axis
 
     def _check(self) -> None:
         if not self.records:

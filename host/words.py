@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from ..model.axes_registers import SHARED
+from ..model.axes_registers import is_shared
 from ..model.checks import FieldError, check_number
 from ..model.register import Kind, Register
 from ..model.registers import ACTIVE, PULSES, WRITTEN
@@ -35,7 +35,7 @@ class Words:
         self._words = {word.name: word for word in words}
         self._written, self._once = self._read(), {} if once is None else once
         if once is not None:
-            once |= {name: word for name, word in self._written.items() if name in SHARED}
+            once |= {name: word for name, word in self._written.items() if is_shared(self._words[name])}
         # The words of a request without an answer: it may have been carried out.
         self._tried: dict[str, int] = {}
 

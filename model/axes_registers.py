@@ -7,26 +7,38 @@ What there is once for all axes is in the bank of axis 0, and reads 0 in the oth
 
 - the constants, to which `axes` is added;
 - the counters of the link;
-- `heartbeat` and `supervisor_watchdog`, for there is one host.
+- `heartbeat` and `supervisor_watchdog`, for there is one host;
+- the words and pulses of the capture memory, of which there is one (`hardwall.model.axes_capture`), with the word
+  `capture_axis` in addition. Its state can be read in every bank.
 
-The map that the device carries in its window has the registers of axis 0, and the number of banks. There is no capture
-memory: the constant `capture_registers` is 0. The stamps of edges stay 0, for no axis of several keeps them.
+The map that the device carries in its window has the registers of axis 0, and the number of banks.
 """
 
 import dataclasses
 from typing import ClassVar
 
 from .axes import AxesSpec
+from .axes_capture import ROTA_LEAST
+from .axes_capture import Design as Capture
 from .checks import check_int, shown
-from .register import Register
-from .registers import END, RegisterMap
+from .register import Kind, Register
+from .registers import CAPTURE_REGISTERS, END, RegisterMap, records_in
 from .supervised import registers_of
 from .supervised_axes import Design
 
-SHARED = "heartbeat", "supervisor_watchdog"
-"""Live words that there are once for all axes."""
+OF_THE_HOST = "heartbeat", "supervisor_watchdog"
+"""Live words that there are once, for there is one host."""
+OF_CAPTURE = "capture_"
+"""How the names of what there is of the capture memory begin."""
 BANK = END
 """The addresses from the bank of an axis to that of the next one."""
+
+
+def is_shared(register: Register) -> bool:
+    """Return whether a live word or a pulse is there once for all axes; no other register is one of these."""
+    if register.kind not in (Kind.LIVE, Kind.PULSE):
+        return False
+    return register.name in OF_THE_HOST or register.name.startswith(OF_CAPTURE)
 
 
 class AxesMap(RegisterMap):
@@ -34,6 +46,8 @@ class AxesMap(RegisterMap):
 
     Args:
         spec: the axes.
+        capture_registers: registers of the capture memory, 8 for each of its records; 0 for none. If it is not given:
+            those of a board, or none where a rota is shorter than a record.
 
     Attributes:
         spec: as given.
@@ -43,20 +57,25 @@ class AxesMap(RegisterMap):
 
     Raises:
         TypeError: if `spec` is not an AxesSpec.
+        ValueError: if `capture_registers` is none that there can be, or a rota is shorter than a record.
     """
 
     PRODUCT: ClassVar = b"axes"
     spec: AxesSpec
 
-    def __init__(self, spec: AxesSpec):
+    def __init__(self, spec: AxesSpec, capture_registers: int | None = None):
         if not isinstance(spec, AxesSpec):
             raise TypeError(f"spec must be an AxesSpec, not {shown(spec)}")
         self.spec, self.banks = spec, spec.axes
-        self.capture_registers, self.capture = 0, None
+        if capture_registers is None:
+            capture_registers = CAPTURE_REGISTERS if spec.clocks_per_sample >= ROTA_LEAST else 0
+        records = records_in(capture_registers)
+        self.capture_registers, self.capture = capture_registers, Capture(spec, records) if records else None
         design = Design(spec)
         # The same words in the same order as those of a single axis: the watchdog is among them.
         live = (*design.supervisor.words, *design.monitors.words, design.live[-1])
-        self._describe(registers_of(spec, live, design.ranges), design.committed)
+        known = registers_of(spec, live, design.ranges)
+        self._describe((*known, *(self.capture.registers() if self.capture else ())), design.committed)
 
     @property
     def _more_constants(self) -> tuple[tuple[str, int, str, str], ...]:
@@ -65,6 +84,11 @@ class AxesMap(RegisterMap):
     @property
     def _more_described(self) -> dict[str, int]:
         return {"banks": self.banks}
+
+    @property
+    def shared(self) -> tuple[Register, ...]:
+        """The live words and pulses that there are once for all axes."""
+        return tuple(each for each in (*self.live, *self.pulses) if is_shared(each))
 
     def of_axis(self, name: str, axis: int) -> Register:
         """Return the register of a name in the bank of an axis.
@@ -76,6 +100,6 @@ class AxesMap(RegisterMap):
         """
         check_int("axis", axis, 0, self.banks - 1)
         register = self[name]
-        if axis and name in SHARED:
+        if axis and is_shared(register):
             raise ValueError(f"axis must be 0 for {name}, which there is once for all axes, not {axis!r}")
         return dataclasses.replace(register, address=register.address + BANK * axis)

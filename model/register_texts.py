@@ -2,7 +2,8 @@
 
 import json
 
-from .axes_registers import BANK, SHARED, AxesMap
+from .axes_capture import Design as OfAxes
+from .axes_registers import BANK, AxesMap
 from .capture import DONE, RECORD_REGISTERS, Design
 from .register import Register
 from .registers import ACTIVE, CAPTURE, EVENTS, LAYOUT, MAP, WRITTEN, RegisterMap
@@ -29,11 +30,12 @@ def _row(register: Register) -> str:
 def _window(capture: Design) -> str:
     """Return what is said of the window to the capture memory."""
     flags = ", ".join(f"bit {bit} {name}" for bit, name in enumerate(capture.flags))
+    several = "It takes the axis that capture_axis names at capture_start. " if isinstance(capture, OfAxes) else ""
     return (
         f"The capture memory of {RECORD_REGISTERS * capture.records} registers begins at 0x{CAPTURE:04X} with the "
         f"oldest of {capture.records} records. A record has two registers each of count, velocity and driven, as the "
         f"status of these names, then one of flags ({flags}), and one with the lower bits of the number of the clock "
-        f"{capture.stamp_clocks} clocks behind its sample. It can be read while capture_state is {DONE}; "
+        f"{capture.stamp_clocks} clocks behind its sample. {several}It can be read while capture_state is {DONE}; "
         "before it is refused.\n"
     )
 
@@ -41,11 +43,11 @@ def _window(capture: Design) -> str:
 def _of_status(registers: RegisterMap) -> str:
     """Return what is said of values that a frame reads together, and of banks if there are several."""
     if isinstance(registers, AxesMap):
-        once = ", ".join(f"`{name}`" for name in SHARED)
+        once = ", ".join(f"`{each.name}`" for each in registers.shared)
         return (
             f"These are the registers of axis 0; those of axis k are k times 0x{BANK:04X} above them, for "
             f"{registers.banks} axes in all. The constants, the counters and {once} there are once, here. What a frame "
-            "reads of an axis's status is of one sample; the stamps of edges are not kept, and 0."
+            "reads of an axis's status is of one sample; the stamps of edges are those of the last edges in its count."
         )
     return (
         "What a frame reads of the status is of one clock, but for the stamps of edges, the counts of causes, and "

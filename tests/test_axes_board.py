@@ -6,17 +6,26 @@ from cocotb.triggers import ClockCycles, RisingEdge
 
 from hardwall.hdl.axes_board import AxesBoard
 from hardwall.model import clock_monitor
+from hardwall.model.axes_capture import SAMPLED
 from hardwall.model.axes_registers import BANK
+from hardwall.model.capture import DONE, RECORD_REGISTERS, SOURCES, WAITING
 from hardwall.model.link.server import ABSENT, FAILURE, VALUE
+from hardwall.model.quadrature import latency
+from hardwall.model.registers import CAPTURE
 from hardwall.model.supervisor import ARMED, CAUSES, DISARMED, REQUIRED, TRIPPED
 from hardwall.testing import parameters, simulate
-from oracles.axes_board import Host, Watched
+from oracles.axes_board import RECORDS, Host, Sample, Watched
 from oracles.supervised import SYNCHRONISER
 from stimuli import frames
 
 BITS = {cause.name: 1 << bit for bit, cause in enumerate(CAUSES)}
 PLACES = -3, 11
 """The counts that a host gives the axes of a board of two by a preload."""
+TRIP, FALL = (1 << SOURCES.index(name) for name in ("trip", "fall"))
+LOOKS = 10
+GLITCH_CLOCKS = 1
+STAMPED = latency(GLITCH_CLOCKS) - 1
+"""Clocks from the one that begins with a change of a pin to the one that decodes it, which ends with its count."""
 
 
 def make(axes: int) -> Watched:
@@ -114,9 +123,13 @@ async def one_axis_trips_while_the_other_drives_on(dut):
 
 
 async def check_status(host: Host, axis: int, **shown: int) -> None:
-    """Check that an axis shows that, and zeros beside it; when a sample was, no host on a line can tell."""
+    """Check that an axis shows that, the stamps of its edges, and zeros beside it.
+
+    When a sample was, no host on a line can tell.
+    """
     status = await host.look(axis)
-    wanted = dict.fromkeys(status, 0) | {"live": 1} | shown
+    stamps = {name: clock - host.begun + STAMPED for name, clock in host.turned[axis].items()}
+    wanted = dict.fromkeys(status, 0) | {"live": 1} | stamps | shown
     unlike = {name: (status[name], word) for name, word in wanted.items() if status[name] != word}
     assert {name: pair for name, pair in unlike.items() if name not in ("stamp", "first_stamp")} == {}, f"axis {axis}"
 
@@ -125,7 +138,8 @@ async def prepare(host: Host, axis: int) -> None:
     """Give an axis a spring of a force LSB a count, which begins at the count 0, on a side of its own."""
     words = {word.name: word.reset for word in host.registers.words}
     stiffness = 1 << host.registers["wall_stiffness"].format.f
-    words |= {"wall_stiffness": stiffness, "wall_left": axis, "encoder_glitch_clocks": 1, "preload_count": PLACES[axis]}
+    words |= {"wall_stiffness": stiffness, "wall_left": axis, "encoder_glitch_clocks": GLITCH_CLOCKS}
+    words |= {"preload_count": PLACES[axis]}
     await host.write(axis, commit=1, **words)
     await host.write(axis, supervisor_ramp=host.registers["supervisor_ramp"].high)
     await host.write(axis, supervisor_causes=REQUIRED | BITS["encoder_loss"])
@@ -193,8 +207,10 @@ async def find_another_index(host: Host) -> None:
 async def the_stamp_of_a_status_is_the_clock_of_its_sample(dut):
     host = Host(dut, **parameters())
     await host.reset()
-    begun, rota, stamps = host.bench.clock_number(), host.board.spec.clocks_per_sample, []
-    for _ in range(8):
+    begun, rota, stamps = host.begun, host.board.spec.clocks_per_sample, []
+    for number in range(8):
+        # All looks take as long, which is an even number of rotas.
+        await host.edges(number % 2 * rota)
         asked = host.bench.clock_number() - begun
         stamps.append((await host.look(0, "stamp", "stamp"))["stamp"])
         assert asked <= stamps[-1] <= host.bench.clock_number() - begun
@@ -202,6 +218,89 @@ async def the_stamp_of_a_status_is_the_clock_of_its_sample(dut):
     apart = [stamp - stamps[0] for stamp in stamps]
     assert not any(clocks % rota for clocks in apart)
     assert {clocks // rota % 2 for clocks in apart} == {0, 1}
+
+
+async def start(host: Host, **words: int) -> None:
+    """Begin a capture, with words of it."""
+    for name, word in words.items():
+        await host.write(0, **{f"capture_{name}": word})
+    await host.write(0, capture_start=1)
+    host.samples, host.server.file.capture = [[] for _ in range(host.board.spec.axes)], None
+    # Nothing of it can be read yet.
+    assert (await host.request(frames.read(CAPTURE, RECORD_REGISTERS)))[1] == FAILURE
+
+
+async def until(host: Host, state: int) -> dict[str, int]:
+    """Look until the capture memory is in a state, for as long as that takes at most; return what it shows."""
+    for _ in range(LOOKS):
+        status = await host.look(0, "capture_state", "capture_stamp")
+        if status["capture_state"] == state:
+            return status
+    raise AssertionError(f"the capture memory never comes to {state}: {status}")
+
+
+async def captured(host: Host, axis: int, decimation: int) -> tuple[list[Sample], dict[str, int]]:
+    """Wait for the end of a capture, and read it: all of it must be samples of an axis as they were.
+
+    Returns:
+        The samples of the axis, from the first to the last that has a record, and the state of the memory.
+    """
+    size, status = RECORD_REGISTERS * RECORDS, await until(host, DONE)
+    # It is that of the device, whichever bank it is read in.
+    assert await host.look(1, "capture_state", "capture_stamp") == status
+    host.server.file.capture = [0] * size
+    data = (await host.request(frames.read(CAPTURE, RECORD_REGISTERS), shows=True))[2:]
+    stamps = [sample.registers()[-1] for sample in host.samples[axis]]
+    first = stamps.index(int.from_bytes(data[-2:], "big"))
+    samples = host.samples[axis][first::decimation][:RECORDS]
+    host.server.file.capture = [cell for sample in samples for cell in sample.registers()]
+    # From now on every answer is compared with the twin's, which has these.
+    for begin in range(0, size, size // 2):
+        await host.request(frames.read(CAPTURE + begin, size // 2))
+    behind = samples[-1].number
+    return [sample for sample in host.samples[axis][first:] if sample.number <= behind], status
+
+
+@cocotb.test()
+async def a_capture_has_the_samples_of_the_axis_that_was_chosen(dut):
+    host = Host(dut, **parameters())
+    registers = host.registers
+    await host.reset()
+    for refused, exception in {
+        frames.write(BANK + registers["capture_axis"].address, [0, 0]): ABSENT,
+        frames.write(BANK + registers["capture_start"].address, [1]): ABSENT,
+        frames.write(registers["capture_axis"].address, [0, 2]): VALUE,
+        frames.read(CAPTURE + RECORD_REGISTERS * RECORDS, 1): ABSENT,
+    }.items():
+        assert (await host.request(refused))[1] == exception
+    await host.write(0, heartbeat=1)
+    await host.write(0, supervisor_watchdog=registers["supervisor_watchdog"].high)
+    for axis in (0, 1):
+        await prepare(host, axis)
+        await host.write(axis, arm=1)
+    # The handle of axis 1 falls below its level, while that of axis 0 goes the other way, and past its own.
+    words = {"axis": 1, "sources": FALL, "before": 5, "decimation": 3, "level": -4}
+    await start(host, **words)
+    # Another axis is taken by another start alone.
+    await host.write(0, capture_axis=0)
+    await host.turn(8, -9)
+    samples, status = await captured(host, 1, words["decimation"])
+    counts = [sample.count for sample in samples]
+    assert len(set(counts)) > 5
+    fell = next(k for k, count in enumerate(counts) if count < words["level"] <= counts[k - 1])
+    assert status["capture_stamp"] == samples[fell].number + SAMPLED
+    assert status["capture_place"] == words["before"] == -(-fell // words["decimation"])
+    assert len({sample.driven for sample in samples}) > 3
+    # Axis 0 trips while axis 1 drives on.
+    await start(host, sources=TRIP, before=RECORDS - 1, decimation=1)
+    await until(host, WAITING)
+    await host.write(0, supervisor_causes=REQUIRED | BITS["position_range"])
+    await host.turn(9, -6)
+    await host.write(0, supervisor_position_high=7)
+    samples, status = await captured(host, 0, 1)
+    assert [sample.state for sample in samples] == [ARMED] * (RECORDS - 1) + [TRIPPED]
+    assert [sample.driven != 0 for sample in samples] == [True] * (RECORDS - 1) + [False]
+    assert (await host.look(1))["state"] == ARMED
 
 
 @cocotb.test()

@@ -6,19 +6,24 @@ import zlib
 import pytest
 
 from hardwall.model.axes import AXES_MAX, AxesSpec
-from hardwall.model.axes_registers import BANK, SHARED, AxesMap
+from hardwall.model.axes_registers import BANK, AxesMap
 from hardwall.model.register import Kind
-from hardwall.model.registers import MAP, RegisterMap
+from hardwall.model.registers import CAPTURE_REGISTERS, MAP, RegisterMap
 from hardwall.model.spec import AxisSpec
 from stimuli.supervised_axes_world import FIELDS, slow
 
 
-@pytest.mark.parametrize("estimator", ["fdm", "window"])
-def test_a_bank_is_the_map_of_one_axis(estimator):
+@pytest.mark.parametrize(("estimator", "registers"), [("fdm", 0), ("fdm", CAPTURE_REGISTERS), ("window", 128)])
+def test_a_bank_is_the_map_of_one_axis(estimator, registers):
     fields = {**FIELDS, "clock_hz": 1_000_000, "estimator": estimator}
-    one, several = RegisterMap(AxisSpec(**fields), 0), AxesMap(AxesSpec(**fields, axes=3))
-    alike = [each for each in several.registers if each.kind is not Kind.CONSTANT]
+    one, several = RegisterMap(AxisSpec(**fields), registers), AxesMap(AxesSpec(**fields, axes=3), registers)
+    mine = several.registers[: len(several.registers) - (registers > 0)]
+    alike = [each for each in mine if each.kind is not Kind.CONSTANT]
     assert alike == [each for each in one.registers if each.kind is not Kind.CONSTANT]
+    # The capture memory has a word in addition, which is the last of all.
+    assert [(each.name, each.low, each.high) for each in several.registers[len(mine) :]] == (
+        [("capture_axis", 0, 2)] if registers else []
+    )
     constants = {each.name: each.address for each in one.registers if each.kind is Kind.CONSTANT} | {"axes": 14}
     assert {each.name: each.address for each in several.registers if each.kind is Kind.CONSTANT} == constants
 
@@ -28,9 +33,12 @@ def test_every_axis_has_its_place_and_the_banks_end_before_the_map():
     assert AXES_MAX * BANK <= MAP
     for axis in (0, 1, AXES_MAX - 1):
         assert registers.of_axis("arm", axis).address == registers["arm"].address + 0x100 * axis
-    assert {name: registers.of_axis(name, 0).address for name in SHARED} == {
-        name: registers[name].address for name in SHARED
-    }
+    assert registers.capture
+    assert {each.name for each in registers.shared if each.kind is Kind.PULSE} == {"capture_start", "capture_trigger"}
+    for each in registers.shared:
+        assert registers.of_axis(each.name, 0) == each
+        with pytest.raises(ValueError, match=f"^axis must be 0 for {each.name}, which there is once"):
+            registers.of_axis(each.name, 1)
 
 
 def test_the_map_in_the_device_has_one_bank_and_their_number():
@@ -50,9 +58,22 @@ def test_every_number_of_axes_has_its_identity():
     assert AxesMap(slow(2, "fdm")).identity in identities
 
 
+@pytest.mark.parametrize(("spare", "records"), [(4, 0), (5, 2048)])
+def test_a_rota_that_is_shorter_than_a_record_has_no_capture_memory(spare, records):
+    spec = slow(3, "fdm", spare)
+    assert spec.clocks_per_sample == 4 + spare
+    assert AxesMap(spec)["capture_registers"].reset == 8 * records
+    assert AxesMap(spec, 0).capture is None
+    if not records:
+        with pytest.raises(ValueError, match=r"^sample_hz must leave 9 clocks for a sample that is captured, so at mo"):
+            AxesMap(spec, 128)
+
+
 def test_what_cannot_be_is_refused():
     with pytest.raises(TypeError, match=r"^spec must be an AxesSpec, not 3$"):
         AxesMap(3)
+    with pytest.raises(ValueError, match=r"^capture_registers must be 0, or 8 times a power of two from 2 on, not 9$"):
+        AxesMap(slow(2, "fdm", 5), 9)
     registers = AxesMap(slow(2, "fdm"))
     with pytest.raises(ValueError, match=r"^axis must be 0 to 1, not 2$"):
         registers.of_axis("arm", 2)

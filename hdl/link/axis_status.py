@@ -1,5 +1,7 @@
 """The status of one of several axes: taken from what all of them show of samples and turns, and held for the host."""
 
+from typing import NamedTuple
+
 from amaranth.hdl import Cat, Const, Module, Mux, ShapeLike, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.data import ArrayLayout
@@ -7,7 +9,7 @@ from amaranth.lib.data import ArrayLayout
 from hardwall.model.link.banked_file import Design
 from hardwall.model.link.register_file import CELL_BITS
 from hardwall.model.register import VALUE_BITS
-from hardwall.model.registers import COUNTERS
+from hardwall.model.registers import COUNTERS, EDGE_STAMPS
 from hardwall.model.supervisor import COUNT, COUNT_BITS
 
 from ..arithmetic.fixed import shape
@@ -18,6 +20,14 @@ TURN = "state", "ready", "latched", "first", "first_stamp", "counts", "a_channel
 """What they show of a turn, behind `turn_`."""
 WITH_RECORD = "illegal_count", "index_count", "index_armed", "index_latched"
 """What they show of every axis at every clock, of which an axis's is taken with its record."""
+OF_CAPTURE = "capture_state", "capture_place", "capture_stamp"
+"""What the capture memory shows, if there is one: the same in every bank, taken with the turn."""
+EDGE_KIND_BITS = (len(EDGE_STAMPS) - 1).bit_length()
+
+
+def captured(design: Design) -> tuple[str, ...]:
+    """Return the names of the status of the capture memory; none without one."""
+    return OF_CAPTURE if design.registers.capture else ()
 
 
 def shown(design: Design) -> dict[str, ShapeLike]:
@@ -35,6 +45,10 @@ def shown(design: Design) -> dict[str, ShapeLike]:
     return {
         **{f"record_{name}": each for name, each in record.items()},
         **{f"turn_{name}": each for name, each in turn.items()},
+        "strobe": 1,
+        "strobe_axis": number,
+        "stepped": axes,
+        "edge_kind": ArrayLayout(EDGE_KIND_BITS, axes),
         "illegal_count": ArrayLayout(shape(registers["illegal_count"].format), axes),
         "index_count": ArrayLayout(count, axes),
         "magnitude": ArrayLayout(shape(design.axes.supervisor.limit), axes),
@@ -42,6 +56,7 @@ def shown(design: Design) -> dict[str, ShapeLike]:
         "stamp": spec.stamp_width,
         "live": 1,
         "word_ready": 1,
+        **{name: shape(registers[name].format) for name in captured(design)},
     }
 
 
@@ -51,9 +66,26 @@ def word_of(values: Value, axis: Value, axes: int) -> Value:
     return values.word_select(axis, len(values) // axes)
 
 
-def _taken(file: wiring.Component, asked: Signal) -> tuple[dict[str, Value], dict[str, Value]]:
-    """Return the status of an axis by name: what comes with its record, and what comes with its turn."""
+def _edge_stamps(m: Module, file: wiring.Component) -> dict[str, Value]:
+    """Return the stamps of the last edges of all axes, by name; they show an edge a clock behind its count.
+
+    An edge is decoded a clock before its count is there, and has the number of that clock.
+    """
+    before, stamps = Signal.like(file.stamp, name="stamp_before"), {}
+    m.d.sync += before.eq(file.stamp)
+    for kind, name in enumerate(EDGE_STAMPS):
+        last = [Signal.like(file.stamp, name=f"{name}_{axis}") for axis in range(file.design.registers.banks)]
+        for axis, stamp in enumerate(last):
+            with m.If(file.stepped[axis] & (file.edge_kind[axis] == kind)):
+                m.d.sync += stamp.eq(before)
+        stamps[name] = Cat(last)
+    return stamps
+
+
+def _taken(m: Module, file: wiring.Component, asked: Signal) -> tuple[dict[str, Value], ...]:
+    """Return the status of an axis by name: what comes with its strobe, with its record, and with its turn."""
     registers, banks = file.design.registers, file.design.banks
+    strobed = {name: word_of(stamps, asked, banks) for name, stamps in _edge_stamps(m, file).items()}
     record = {name: getattr(file, f"record_{name}") for name in RECORD}
     record |= {name: word_of(getattr(file, name), asked, banks) for name in WITH_RECORD}
     record["velocity"] >>= max(len(file.record_velocity) - registers["velocity"].format.width, 0)
@@ -61,24 +93,36 @@ def _taken(file: wiring.Component, asked: Signal) -> tuple[dict[str, Value], dic
     values = range(-(-len(file.turn_counts) // VALUE_BITS))
     turn |= {f"counts_{value}": file.turn_counts.word_select(value, VALUE_BITS) for value in values}
     magnitude, negative = (word_of(getattr(file, name), asked, banks) for name in ("magnitude", "negative"))
-    driven = Mux(negative, -magnitude, magnitude)
-    return (
-        record | {"stamp": file.stamp},
-        turn | {"referenced": word_of(file.referenced, asked, banks), "live": file.live, "driven": driven},
-    )
+    turn |= {"driven": Mux(negative, -magnitude, magnitude), "live": file.live}
+    turn |= {"referenced": word_of(file.referenced, asked, banks)}
+    turn |= {name: getattr(file, name) for name in captured(file.design)}
+    return strobed, record | {"stamp": file.stamp}, turn
 
 
-def held_status(m: Module, file: wiring.Component, asked: Signal, recorded: Signal, turned: Signal) -> Signal:
-    """Return the register of a status at the host's address, as it was with the last of either signal.
+class Moments(NamedTuple):
+    """When the status of an axis is taken: signals, each high for one clock.
+
+    Attributes:
+        strobed: the clock before was that of a strobe of the axis.
+        recorded, turned: the record of that sample, and then its turn, is shown.
+    """
+
+    strobed: Signal
+    recorded: Signal
+    turned: Signal
+
+
+def held_status(m: Module, file: wiring.Component, asked: Signal, moments: Moments) -> Signal:
+    """Return the register of a status at the host's address, as it was at the last moments.
 
     Args:
         m: the module.
         file: the `BankedFile`, whose inputs are those of `shown`.
         asked: the axis whose status is asked for.
-        recorded, turned: high when its record, and when its turn, is shown and to be taken.
+        moments: when it is taken.
     """
     status, halves = Signal(CELL_BITS), {}
-    for taken, values in zip((recorded, turned), _taken(file, asked), strict=True):
+    for taken, values in zip(moments, _taken(m, file, asked), strict=True):
         for name, value in values.items():
             register = file.design.registers[name]
             held = Signal(shape(register.format), name=f"held_{name}")

@@ -5,28 +5,42 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Member, Out
 
-from hardwall.model.axes_registers import BANK, SHARED
+from hardwall.model.axes_registers import BANK, is_shared
 from hardwall.model.link.banked_file import Design
 from hardwall.model.link.register_file import CELL_BITS, Area, Operation
-from hardwall.model.register import Register
-from hardwall.model.registers import ACTIVE, COUNTERS, END, LIVE, MAP, PULSES, SUPERVISOR, TELEMETRY, WRITTEN
+from hardwall.model.register import Kind, Register
+from hardwall.model.registers import (
+    ACTIVE,
+    CAPTURE,
+    COUNTERS,
+    END,
+    LIVE,
+    MAP,
+    PULSES,
+    SUPERVISOR,
+    TELEMETRY,
+    WRITTEN,
+)
 from hardwall.model.supervisor import ARMED
 
 from ..arithmetic.fixed import less, shape
-from .axis_status import held_status, shown, word_of
+from .axis_status import Moments, held_status, shown, word_of
 from .line import UNMIXED
 from .requests import Requests
 
 
 def _given(design: Design) -> dict[str, ShapeLike]:
-    """Return the shapes of what it is given beside pulses, by the names of its members."""
+    """Return the shapes of what comes out beside the answers, by the names of the members."""
     registers, words = design.registers, design.axes.words
     return {
         "word_write": 1,
         "word_axis": range(max(design.banks, 2)),
         "word_number": range(len(words)),
         "word_value": max(word.format.width for word in words),
-        **{name: shape(registers[name].format) for name in ("preload_count", "acknowledged", *SHARED)},
+        **{name: shape(registers[name].format) for name in ("preload_count", "acknowledged")},
+        **{word.name: shape(word.format) for word in registers.shared if word.kind is Kind.LIVE},
+        **{pulse.name: 1 if is_shared(pulse) else design.banks for pulse in registers.pulses},
+        **({"capture_address": 15} if registers.capture else {}),
     }
 
 
@@ -37,8 +51,8 @@ class BankedFile(wiring.Component):
 
     - CHECK_READ, CHECK_WRITE: raise `absent`, `outside` or `refused` if the register cannot be read, or written with
       `host.value`, or not now. The halves of a value are checked in the order of their addresses, one after the other.
-      `arm` is refused unless the last turn of its axis was `ready`, and `preload` if it was ARMED. A CHECK_READ of a
-      status lets the next SNAPSHOT take that axis's.
+      `arm` is refused unless the last turn of its axis was `ready`, and `preload` if it was ARMED; the capture memory,
+      unless it is done. A CHECK_READ of a status lets the next SNAPSHOT take that axis's.
     - READ: give the register; of a status, in whichever bank, that of the last snapshot.
     - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. A live word goes to its axis
       with its lower half, which is written after the upper one. Only what was checked is written.
@@ -49,12 +63,13 @@ class BankedFile(wiring.Component):
       in use, what is read of a status is of a sample behind the pulses, what is refused is known, and no
       acknowledgement takes another one's place.
     - SNAPSHOT: take the status of the axis that CHECK_READ was asked for, if any: all of one sample, the next one, with
-      the stamp of the clock of its record.
+      the stamp of the clock of its record. The stamps of edges are those of the last edges in that sample's count, each
+      0 until there was one: they are remembered here, for every axis.
 
-    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ; 2 for READ; 3 for WRITE and COUNT; 4 for
-    CHECK_WRITE; for SNAPSHOT 1, or 1 more than it takes until the axis's next record and the turn behind that; for
-    FINISH 1, or `finish_clocks` if anything is marked. After a reset the first `start` may come at once; it waits for
-    `boot_clocks`, and for `word_ready`.
+    Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ; 2 for READ, 3 of the capture memory; 3 for
+    WRITE and COUNT; 4 for CHECK_WRITE; for SNAPSHOT 1, or 1 more than it takes until the axis's next strobe, the record
+    of that sample and the turn behind that; for FINISH 1, or `finish_clocks` if anything is marked. After a reset the
+    first `start` may come at once; it waits for `boot_clocks`, and for `word_ready`.
 
     Rounding and overflow: a value of fewer bits than its registers is extended by its sign or by zeros; one of more
     bits, a velocity, gives its upper ones.
@@ -74,6 +89,8 @@ class BankedFile(wiring.Component):
         As there.
     its inputs but for the pins : Out
         As there: those to write words, the host's own, and a pulse for each axis.
+    the inputs and outputs of `AxesCapture` that begin with `capture_`, if there is a capture memory : In and Out
+        As there.
 
     Raises
     ------
@@ -86,13 +103,13 @@ class BankedFile(wiring.Component):
             raise TypeError(f"design must be a banked_file.Design, not {design!r}")
         self._design = design
         registers = design.registers
-        first = {name: registers[name].reset for name in SHARED}
+        first = {word.name: word.reset for word in registers.shared}
         super().__init__(
             {
                 "host": In(Requests()),
                 **{name: In(each) for name, each in shown(design).items()},
+                **({"capture_data": In(CELL_BITS), "capture_done": In(1)} if registers.capture else {}),
                 **{name: Out(each, init=first.get(name, 0)) for name, each in _given(design).items()},
-                **{pulse.name: Out(design.banks) for pulse in registers.pulses},
             }
         )
 
@@ -142,7 +159,7 @@ class BankedFile(wiring.Component):
         # What there is at the address.
         address = host.address
         place, bank = address[: (END - 1).bit_length()], address[(END - 1).bit_length() : (depth - 1).bit_length()]
-        in_map = (address[14:] == MAP >> 14) & less(address[:14], len(design.map_cells))
+        in_map, in_capture = (address[14:] == MAP >> 14) & less(address[:14], len(design.map_cells)), Const(0)
         # Each is a signal of its own: an expression would be written out wherever it is asked for.
         in_banks, wide, is_pulse, is_status = Signal(), Signal(), Signal(), Signal()
         status_places = Cat(place[5:] == block >> 5 for block in (TELEMETRY, SUPERVISOR)).any()
@@ -169,9 +186,15 @@ class BankedFile(wiring.Component):
 
         # What `shift` takes: a cell, a text, a status, or the host's value. What it had goes to `upper`.
         shift, upper = Signal(CELL_BITS), Signal(CELL_BITS)
-        recorded, turned = Signal(), Signal()
-        status = held_status(m, self, asked, recorded, turned)
+        moments = Moments(*(Signal(name=name) for name in Moments._fields))
+        status = held_status(m, self, asked, moments)
         takes = {"cell": cell.data, "text": text.data, "status": status, "value": host.value}
+        if registers.capture:
+            in_capture = (address[15:] == CAPTURE >> 15) & less(address[:15], registers.capture_registers)
+            # That memory is large, and far away: what it gives has a register of its own first.
+            takes["capture"] = arrived = Signal(CELL_BITS)
+            m.d.comb += self.capture_address.eq(address)
+            m.d.sync += arrived.eq(self.capture_data & self.capture_done.replicate(CELL_BITS))
         taking = {name: Signal(name=f"taking_{name}") for name in takes}
         for name, taken in taking.items():
             with m.If(taken):
@@ -206,7 +229,7 @@ class BankedFile(wiring.Component):
 
         def give(word: Register, axis: Value, value: Value):
             """Give a word that is whole to its port, or to the axis."""
-            if word.name in SHARED:
+            if is_shared(word):
                 m.d.sync += getattr(self, word.name).eq(value)
             elif (number := design.numbers.get(word.address + 1)) is not None:
                 m.d.sync += [self.word_write.eq(1), self.word_axis.eq(axis), self.word_number.eq(number)]
@@ -236,8 +259,11 @@ class BankedFile(wiring.Component):
                 m.d.sync += low.eq(0)
                 with m.If(host.start), m.Switch(host.operation):
                     with m.Case(Operation.CHECK_READ):
-                        with m.If(~(in_banks | in_map) | half):
+                        with m.If(~(in_banks | in_map | in_capture) | half):
                             m.d.sync += host.absent.eq(1)
+                        if registers.capture:
+                            with m.If(in_capture & ~self.capture_done):
+                                m.d.sync += host.refused.eq(1)
                         with m.If(is_status):
                             m.d.sync += [asks.eq(1), asked.eq(here)]
                         m.next = "DONE"
@@ -266,7 +292,7 @@ class BankedFile(wiring.Component):
                     with m.Case(Operation.SNAPSHOT):
                         m.next = "DONE"
                         with m.If(asks):
-                            m.next = "RECORD"
+                            m.next = "STROBE"
             with m.State("READ"):
                 m.d.comb += [
                     taking["status"].eq(is_status),
@@ -274,6 +300,13 @@ class BankedFile(wiring.Component):
                     taking["text"].eq(~in_banks),
                 ]
                 m.next = "DONE"
+                if registers.capture:
+                    with m.If(address[15]):
+                        m.next = "READ_CAPTURE"
+            if registers.capture:
+                with m.State("READ_CAPTURE"):
+                    m.d.comb += taking["capture"].eq(1)
+                    m.next = "DONE"
             with m.State("LEAST"):
                 m.d.comb += [area.eq(Area.MOST), taking["text"].eq(1)]
                 m.next = "ABOVE"
@@ -329,6 +362,7 @@ class BankedFile(wiring.Component):
                         m.next = "PULSE"
             with m.State("PULSE"):
                 for bit, pulse in enumerate(registers.pulses):
+                    # One of all axes has a single bit, which is that of the only bank that it is written to in.
                     m.d.sync += getattr(self, pulse.name).eq(Mux(marks[bit], Const(1) << to, 0))
                 m.d.sync += [marks.eq(0), settling.eq(design.settle_clocks)]
                 m.next = "SETTLE"
@@ -337,14 +371,23 @@ class BankedFile(wiring.Component):
                 with m.If(settling == 0):
                     m.next = "DONE"
 
+            # Samples of the axis may be under way already: the record that counts comes as late as it takes.
+            with m.State("STROBE"), m.If(self.strobe & (self.strobe_axis == asked)):
+                m.next = "STROBED"
+            with m.State("STROBED"):
+                m.d.comb += moments.strobed.eq(1)
+                m.d.sync += settling.eq(design.axes.spec.latency - 1)
+                m.next = "RECORD"
             with m.State("RECORD"):
-                m.d.comb += recorded.eq(self.record_valid & (self.record_axis == asked))
-                with m.If(recorded):
+                m.d.sync += settling.eq(settling - settling.any())
+                shows = self.record_valid & (self.record_axis == asked)
+                m.d.comb += moments.recorded.eq(shows & (settling == 0))
+                with m.If(moments.recorded):
                     m.next = "TURN"
             with m.State("TURN"):
-                m.d.comb += turned.eq(self.turn_valid & (self.turn_axis == asked))
+                m.d.comb += moments.turned.eq(self.turn_valid & (self.turn_axis == asked))
                 m.d.sync += asks.eq(0)
-                with m.If(turned):
+                with m.If(moments.turned):
                     m.next = "DONE"
             with m.State("DONE"):
                 m.d.comb += host.done.eq(1)

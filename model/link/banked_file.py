@@ -6,14 +6,15 @@ bank; then every written word of the bank becomes active and goes, by its number
 frame go out at one clock. A live word goes to its axis as soon as its lower half is written.
 
 The status of the axes is not in cells. A snapshot takes one axis's: all that its next sample shows, and all that its
-supervisor shows of that sample. Every value of a frame is so of one sample, which was taken when the pulses of every
-frame before it, and of its own, had acted.
+supervisor shows of that sample. The stamps of edges, which are remembered here, are those of the last edges that the
+sample's count has, each 0 until there was one. Every value of a frame is so of one sample, which was taken when the
+pulses of every frame before it, and of its own, had acted.
 
 No frame can write to two banks, and none can read the status of two: between them lies what cannot be written, and more
 than a frame can read.
 """
 
-from ..axes_registers import BANK, SHARED, AxesMap
+from ..axes_registers import BANK, AxesMap, is_shared
 from ..register import Register
 from ..registers import ACTIVE, COUNTERS, END, PULSES, TELEMETRY, WRITTEN
 from ..supervised_axes import Design as Axes
@@ -32,7 +33,7 @@ class Design(register_file.Design):
         registers: the map.
         axes: the design of the axes.
         numbers: the number by which an axis knows a word, by the address of its lower half in a bank.
-        own_places: addresses of live words that only the bank of axis 0 has.
+        own_places: addresses of live words and pulses that only the bank of axis 0 has.
         settle_clocks: clocks from pulses until a sample of every axis, and a turn of its supervisor, has seen them.
 
     Raises:
@@ -49,7 +50,7 @@ class Design(register_file.Design):
         known = {word.name: number for number, word in enumerate(self.axes.words)}
         words = (*registers.words, *registers.live)
         self.numbers = {word.address + 1: known[word.name] for word in words if word.name in known}
-        self.own_places = frozenset(registers[name].address + half for name in SHARED for half in (0, 1))
+        self.own_places = frozenset(each.address + half for each in registers.shared for half in range(each.size))
         self.settle_clocks = registers.spec.clocks_per_sample + self.axes.latency
 
     @property
@@ -89,7 +90,7 @@ class BankedFile(register_file.RegisterFile):
         pulses: names of the pulses that went out at the last FINISH, and `bank`, the axis that they were for.
         writes: every word that was written to an axis since the list was emptied: axis, number, word.
         preload_count, acknowledged: what came with the last pulses.
-        heartbeat, supervisor_watchdog: as the host wrote them last.
+        active: the live words that there are once for all axes, as the host wrote them last, by name.
         statuses: for every axis the word of every status now, by name.
         refused_of: for every axis the names of the pulses that the device refuses now.
     """
@@ -101,7 +102,7 @@ class BankedFile(register_file.RegisterFile):
         self.live = [design.reset_of(bank, place) for bank in range(design.banks) for place in range(BANK)]
         self.bank, self.writes = 0, list[tuple[int, int, int]]()
         self.preload_count = self.acknowledged = 0
-        self.heartbeat, self.supervisor_watchdog = (design.registers[name].reset for name in SHARED)
+        self.active = {word.name: word.reset for word in design.registers.live if is_shared(word)}
         self.statuses = [dict(self.status) for _ in range(design.banks)]
         self.refused_of: list[frozenset[str]] = [frozenset()] * design.banks
         self._shown = [0] * BANK
@@ -142,8 +143,8 @@ class BankedFile(register_file.RegisterFile):
 
     def _give(self, word: Register, value: int) -> None:
         """Give a word to its port, or to the axis of the bank."""
-        if word.name in SHARED:
-            setattr(self, word.name, value)
+        if is_shared(word):
+            self.active[word.name] = value
         elif (number := self.design.numbers.get(word.address + 1)) is not None:
             self.writes.append((self.bank, number, value))
 

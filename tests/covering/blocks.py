@@ -44,6 +44,7 @@ BLOCKS = (
     Block("watchdog", RECORDED),
     *(Block(f"drive/{name}", RECORDED) for name in ("scale", "pdm", "pwm", "dac")),
     Block("capture", RECORDED),
+    Block("axes_capture", RECORDED),
     Block("axis"),
     Block("axes"),
     Block("supervised", RECORDED),

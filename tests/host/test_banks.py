@@ -19,12 +19,14 @@ from hardwall.host import (
 from hardwall.host.device import AXES_AT
 from hardwall.model.axes import AxesSpec
 from hardwall.model.axes_registers import BANK, AxesMap
+from hardwall.model.capture import DONE, TRIGGERED, WAITING
 from hardwall.model.link import banked_file
 from hardwall.model.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervisor import ARMED, CAUSES, DISARMED, TRIPPED
 from host.twin_board import TwinBoard
 from oracles.banked_server import BankedServer
+from stimuli.captures import records, window
 from stimuli.specs import MHZ
 
 FAULT = 1 << [cause.name for cause in CAUSES].index("external_fault")
@@ -37,8 +39,14 @@ class Board(TwinBoard):
     def __init__(self):
         registers = AxesMap(AxesSpec(**MHZ, axes=AXES, estimator="fdm"))
         super().__init__(registers, BankedServer(banked_file.Design(registers)))
+        self.registers, self.started = registers, []
         for axis in range(AXES):
             self.show_of(axis, ready=1, live=1)
+
+    def show_capture(self, state: int, **words: int) -> None:
+        """Let the one capture memory show its state, in every bank."""
+        for axis in range(AXES):
+            self.show_of(axis, capture_state=state, **words)
 
     def show_of(self, axis: int, **words: int) -> None:
         """Let an axis show words of its status, and refuse what it then does."""
@@ -53,6 +61,11 @@ class Board(TwinBoard):
             self.show_of(axis, state=ARMED, ready=0)
         if "disarm" in pulses and file.statuses[axis]["state"] == ARMED:
             self.show_of(axis, state=DISARMED, ready=1)
+        if "capture_start" in pulses:
+            self.started.append(dict(file.active))
+            self.show_capture(WAITING)
+        if "capture_trigger" in pulses:
+            self.show_capture(TRIGGERED)
         if "acknowledge" in pulses and file.acknowledged == file.statuses[axis]["latched"]:
             self.show_of(axis, state=DISARMED, latched=0, ready=1)
 
@@ -107,12 +120,12 @@ def test_the_words_of_the_host_are_there_once(board, axes):
     axes[2].set(supervisor_watchdog=0.1)
     file = board.server.file
     assert [axis.get("supervisor_watchdog") for axis in axes] == [0.1] * AXES
-    assert file.supervisor_watchdog == 100
+    assert file.active["supervisor_watchdog"] == 100
     # The others take it for theirs, and beat as often.
     for axis in axes:
         axis.arm()
     place = file.design.registers["heartbeat"].address
-    assert file.heartbeat == file.live[place + 1] > 0
+    assert file.active["heartbeat"] == file.live[place + 1] > 0
     assert [file.live[BANK * axis + place + 1] for axis in (1, 2)] == [0, 0]
     # Another host is found out by whichever axis.
     file.live[place + 1] += 5
@@ -127,14 +140,14 @@ def test_no_axis_beats_beside_one_that_is_left_armed(board, axes, monkeypatch):
     axes[1].arm()
     time.sleep(0.1)
     # The lease of axis 1 has ended: nothing that axis 0 does beats for it.
-    beaten = file.heartbeat
+    beaten = file.active["heartbeat"]
     with pytest.raises(SilentError, match=r"axis 1 is ARMED and its lease has ended"):
         axes[0].renew()
-    assert file.heartbeat == beaten
+    assert file.active["heartbeat"] == beaten
     # One that has tripped, or is disarmed, or lives again, is in nobody's way.
     board.trip(1)
     axes[0].renew()
-    assert file.heartbeat != beaten
+    assert file.active["heartbeat"] != beaten
     axes[1].acknowledge()
     for mend in (axes[1].disarm, axes[1].renew):
         axes[1].arm()
@@ -151,6 +164,43 @@ def test_an_axis_that_an_earlier_host_has_left_armed_is_in_the_way_until_it_is_d
         axes[2].disarm()
         axes[0].arm()
         assert states(axes) == [State.ARMED, State.DISARMED, State.DISARMED]
+
+
+def test_a_capture_takes_the_axis_that_was_started(board, axes):
+    words = records(board.registers, 2)
+    assert [axis.capture.state for axis in axes] == ["IDLE"] * AXES
+    axes[2].capture.start("fall", before=3, decimation=2, level_m=-2e-3)
+    wanted = {"capture_axis": 2, "capture_sources": 0b1000, "capture_before": 3, "capture_decimation": 2}
+    assert board.started[0].items() >= {**wanted, "capture_level": -2000}.items()
+    # For the others there is none: neither can they trigger it, nor read it.
+    assert [axis.capture.state for axis in axes] == ["IDLE", "IDLE", "WAITING"]
+    with pytest.raises(NotReadyError, match="the capture is of axis 2, and not of axis 0"):
+        axes[0].capture.trigger()
+    axes[2].capture.trigger()
+    assert axes[2].capture.state == "TRIGGERED"
+    board.server.file.capture = window(words)
+    board.show_capture(DONE, capture_place=3)
+    found = axes[2].capture.read()
+    assert found.position_m.tolist() == (words["count"] * board.registers["count"].lsb).tolist()
+    assert found.place == 3
+    with pytest.raises(NotReadyError, match="the capture is IDLE"):
+        axes[0].capture.read()
+    # What was written for one is no other host's writing to another.
+    for axis in axes:
+        axis.arm()
+    axes[0].capture.start()
+    assert (len(board.started), board.started[1]["capture_axis"]) == (2, 0)
+    assert [axis.capture.state for axis in axes] == ["WAITING", "IDLE", "IDLE"]
+
+
+def test_who_has_the_first_axis_alone_captures_that(board, axes):
+    axes[1].capture.start()
+    axes.close()
+    with connect(board.name, answer_s=0.2) as axis:
+        assert axis.capture.state == "IDLE"
+        axis.capture.start()
+        assert [started["capture_axis"] for started in board.started] == [1, 0]
+        assert axis.capture.state == "WAITING"
 
 
 def test_all_are_disarmed_at_the_end(board):

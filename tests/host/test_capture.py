@@ -10,34 +10,14 @@ from hardwall.model.capture import DONE, STATE_FLAGS, WAITING
 from hardwall.model.checks import FieldError
 from hardwall.model.registers import RegisterMap
 from host.twin_board import TwinBoard
+from stimuli.captures import records, window
 
 PLACE = 100
 
 
-def records(registers: RegisterMap, decimation: int) -> dict[str, np.ndarray]:
-    """Return the words of a capture, its values from end to end of their formats."""
-    count = registers.capture.records
-    rng = np.random.default_rng(1)
-    words = {
-        name: rng.integers(form.min, form.max, count, endpoint=True)
-        for name, form in (
-            ("count", registers.capture.count),
-            ("velocity", registers.capture.velocity),
-            ("driven", registers.capture.force),
-        )
-    }
-    for name, form in (("count", registers.capture.count), ("velocity", registers.capture.velocity)):
-        words[name][:2] = form.min, form.max
-    words["flags"] = rng.integers(0, 1 << len(registers.capture.flags), count)
-    words["stamp"] = 65_000 + np.arange(count) * decimation * registers.spec.clocks_per_sample & 0xFFFF
-    return words
-
-
 def hold(board: TwinBoard, words: dict[str, np.ndarray]) -> None:
     """Let a board hold records, and show that they are done."""
-    cells = [words[name] >> shift & 0xFFFF for name in ("count", "velocity", "driven") for shift in (16, 0)]
-    cells += [words["flags"], words["stamp"]]
-    board.server.file.capture = np.stack(cells, axis=1).ravel().tolist()
+    board.server.file.capture = window(words)
     board.show(capture_state=DONE, capture_place=PLACE)
 
 

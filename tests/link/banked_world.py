@@ -1,21 +1,25 @@
 """A server and axes around the register file of several axes, which show anything at every clock, and its twin."""
 
 import random as plain
+from collections import deque
 
 from cocotb.triggers import RisingEdge
 
-from hardwall.hdl.link.axis_status import WITH_RECORD
+from hardwall.hdl.link.axis_status import OF_CAPTURE, WITH_RECORD
 from hardwall.hdl.link.banked_file import BankedFile
-from hardwall.model.axes_registers import BANK, SHARED, AxesMap
+from hardwall.model.axes_registers import BANK, AxesMap, is_shared
 from hardwall.model.link import banked_file as model
 from hardwall.model.link.register_file import Operation
 from hardwall.model.register import VALUE_BITS, Register
-from hardwall.model.registers import ACTIVE, COUNTERS, LIVE, MAP, PULSES, WRITTEN
+from hardwall.model.registers import ACTIVE, CAPTURE, COUNTERS, EDGE_STAMPS, LIVE, MAP, PULSES, WRITTEN
 from hardwall.model.supervisor import ARMED
 from hardwall.testing import SEED, Bench, Recorded, parameters, rng
+from stimuli.supervised import CAPTURE_REGISTERS
 from stimuli.supervised_axes_world import slow
 
 PATIENCE = 20_000
+SPARE = 5
+"""Clocks of a rota that are added, so that it has as many as a capture memory needs."""
 CLOCKS = {
     Operation.CHECK_READ: 1,
     Operation.CHECK_WRITE: 4,
@@ -25,11 +29,18 @@ CLOCKS = {
 }
 HOST = "start", "operation", "address", "first", "last", "value", "clear"
 ANSWERS = "done", "data", "absent", "outside", "refused"
+ADDRESS = "capture_address"
+"""This output follows the host at once."""
 WORD = "word_write", "word_axis", "word_number", "word_value"
 
 
-def make(axes: int) -> Recorded:
-    return Recorded(BankedFile(model.Design(AxesMap(slow(axes, "fdm")))))
+def map_of(axes: int, captures: int = 1) -> AxesMap:
+    """Return the registers of axes with a rota that has time for a capture memory, with one if wanted."""
+    return AxesMap(slow(axes, "fdm", SPARE), CAPTURE_REGISTERS * captures)
+
+
+def make(axes: int, captures: int = 1) -> Recorded:
+    return Recorded(BankedFile(model.Design(map_of(axes, captures))))
 
 
 class World:
@@ -39,6 +50,7 @@ class World:
         wanted: every output that is no answer, as it must be at the next edge.
         coming: what these become, by the number of the edge.
         compared: how many edges all of them were compared at.
+        stamps: for every axis the stamps of its last edges, by name.
     """
 
     def __init__(self, dut):
@@ -49,7 +61,7 @@ class World:
         self.registers, self.pulses = self.design.registers, [each.name for each in self.design.registers.pulses]
         self.records, self._edge = self.recorded.records, RisingEdge(dut.clk)
         self._done = self.records.bit("done")
-        own = [name for name in self.recorded.outputs if name not in ANSWERS]
+        own = [name for name in self.recorded.outputs if name not in (*ANSWERS, ADDRESS)]
         self._mask, self._own = sum(map(self.records.mask, own)), own
         self._free: int | None = None
         self.clock = self.compared = self.snapshots = 0
@@ -66,16 +78,22 @@ class World:
         dut.rst.value = 0
         self.twin = model.BankedFile(self.design)
         self.host = dict.fromkeys(HOST, 0)
-        self.wanted = dict.fromkeys(self._own, 0) | {name: getattr(self.twin, name) for name in SHARED}
+        self.wanted = dict.fromkeys(self._own, 0) | self.twin.active
         self._wanted_bits, self._momentary = self.records.pack(self.wanted), {}
         self.coming: dict[int, dict[str, int]] = {}
         self.begun = self.clock
+        self.stamps = [dict.fromkeys(EDGE_STAMPS, 0) for _ in range(self.design.banks)]
+        self._stamp_before = 0
+        # What the capture memory has shown at the last clocks of a READ but the first.
+        self._captured: deque[int] = deque(maxlen=CLOCKS[Operation.READ] + 1)
 
     def _shows(self) -> tuple[int, dict[str, int]]:
         """Return all inputs in a word, with anything as what the axes show; and what of it is not anything."""
         random, banks = self.random, self.design.banks
         given = {
             **self.host,
+            "strobe": random.random() < 0.3,
+            "strobe_axis": random.randrange(banks),
             "record_valid": random.random() < 0.3,
             "record_axis": random.randrange(banks),
             "turn_valid": random.random() < 0.3,
@@ -83,6 +101,7 @@ class World:
             "turn_state": random.randrange(3),
             "turn_ready": random.randrange(2),
             "word_ready": self.ready,
+            **({"capture_done": self.twin.capture is not None} if self.registers.capture else {}),
         }
         stimuli = self.recorded.stimuli
         if self._free is None:
@@ -99,16 +118,31 @@ class World:
             self._momentary = self.coming.pop(self.clock, {})
             self.wanted |= dict.fromkeys(("word_write", *self.pulses), 0) | self._momentary
             self._wanted_bits = self.records.pack(self.wanted)
+        if self.registers.capture:
+            address = self.records.pack({ADDRESS: self.host["address"]})
+            assert seen & self.records.mask(ADDRESS) == address, f"edge {self.clock}"
         # The outputs are taken apart only to be told: most clocks have nothing new.
         assert seen & self._mask == self._wanted_bits, f"edge {self.clock}: {self._unlike(seen)}"
         if not self.host["start"]:
             answers = [bool(seen & self.records.mask(name)) for name in ANSWERS if name != "data"]
             assert answers == [False, *self.found()], f"edge {self.clock}"
         self.clock, self.compared = self.clock + 1, self.compared + 1
+        self._step(bits)
         if given["turn_valid"]:
             refused = {"arm": not given["turn_ready"], "preload": given["turn_state"] == ARMED}
             self.twin.refused_of[given["turn_axis"]] = frozenset(name for name, is_so in refused.items() if is_so)
         return seen
+
+    def _step(self, bits: int) -> None:
+        """Remember the stamps of edges, which are those of the clock before, and what the capture memory shows."""
+        stimuli = self.recorded.stimuli
+        stepped, kinds, stamp = (stimuli.column(name, [bits])[0] for name in ("stepped", "edge_kind", "stamp"))
+        for axis, stamps in enumerate(self.stamps):
+            if stepped >> axis & 1:
+                stamps[EDGE_STAMPS[kinds >> 2 * axis & 3]] = self._stamp_before
+        self._stamp_before = stamp
+        if self.registers.capture:
+            self._captured.append(stimuli.column("capture_data", [bits])[0])
 
     def _unlike(self, seen: int) -> str:
         """Return the outputs that differ from what they must be."""
@@ -126,18 +160,22 @@ class World:
         twin = self.twin
         asked = twin.asked if operation is Operation.SNAPSHOT else None
         taken: dict[str, int] = {}
+        comes = None
         while True:
             word = await self.edge()
             clocks = self.clock - 1 - begun
             if word & self._done:
                 break
             assert clocks < PATIENCE, "the register file hangs"
-            # A snapshot begins with the first record behind its start, and ends with the first turn behind that.
+            # A snapshot begins with the first strobe behind its start, and ends with the first turn behind the record
+            # that comes for it.
             if asked is not None and clocks and waits is None:
                 seen = self.records.unpack(word)
-                if not taken and seen["record_valid"] and seen["record_axis"] == asked:
+                if comes is None and seen["strobe"] and seen["strobe_axis"] == asked:
+                    taken, comes = dict(self.stamps[asked]), clocks + self.design.axes.spec.latency + 1
+                elif "stamp" not in taken and self._shown(seen, "record", asked) and comes and clocks >= comes:
                     taken |= self._with_record(seen, asked)
-                elif taken and seen["turn_valid"] and seen["turn_axis"] == asked:
+                elif "stamp" in taken and self._shown(seen, "turn", asked):
                     taken |= self._with_turn(seen, asked)
                     waits = clocks + 1
         self.host["start"] = 0
@@ -147,8 +185,14 @@ class World:
                 twin.statuses[asked] |= taken
             twin.snapshot()
         elif operation is not Operation.FINISH:
-            assert clocks == CLOCKS[operation], operation.name
+            captured = operation is Operation.READ and self._in_capture(address)
+            assert clocks == CLOCKS[operation] + captured, operation.name
         return self.records.unpack(word)["data"], clocks
+
+    @staticmethod
+    def _shown(seen: dict[str, int], what: str, axis: int) -> bool:
+        """Return whether a record, or a turn, of an axis is shown."""
+        return bool(seen[f"{what}_valid"]) and seen[f"{what}_axis"] == axis
 
     def _of(self, seen: dict[str, int], name: str, axis: int, register: str = "") -> int:
         """Return the word of an axis of an output that has one for each."""
@@ -183,7 +227,7 @@ class World:
             **{name: seen[f"turn_{name}"] for name in named},
             **{name: word for name, word in counts.items() if any(each.name == name for each in self.registers.status)},
             "referenced": self._of(seen, "referenced", axis),
-            "live": seen["live"],
+            **{name: seen[name] for name in ("live", *OF_CAPTURE) if name in seen},
             "driven": driven,
         }
 
@@ -201,6 +245,9 @@ class World:
         await self.do(Operation.CHECK_WRITE, address, value, first, last)
 
     async def check_read(self, address: int, first: int = 0, last: int = 0) -> None:
+        if self.random.random() < 0.3:
+            # A capture is done, or another one begins.
+            self.twin.capture = None if self.twin.capture is not None else ()
         self.twin.check_read(address, bool(first), bool(last))
         await self.do(Operation.CHECK_READ, address, 0, first, last)
 
@@ -211,7 +258,7 @@ class World:
         twin.write(address, value)
         for written in twin.writes:
             self._gives(self.clock + 2, written)
-        self._comes(self.clock + 2, **{name: getattr(twin, name) for name in SHARED})
+        self._comes(self.clock + 2, **twin.active)
         await self.do(Operation.WRITE, address, value)
 
     async def write_word(self, register: Register, bank: int, word: int) -> None:
@@ -233,14 +280,25 @@ class World:
         if twin.pulses:
             self._comes(behind + 7, preload_count=twin.preload_count)
             self._comes(behind + 13, acknowledged=twin.acknowledged)
-            self._comes(behind + 14, **dict.fromkeys(twin.pulses, 1 << twin.bank))
+            self._comes(behind + 14, **{name: 1 << self.place_of(name) for name in twin.pulses})
         _, clocks = await self.do(Operation.FINISH)
         assert clocks == (self.component.finish_clocks[commits] if twin.pulses else 1)
         return twin.pulses
 
+    def place_of(self, pulse: str) -> int:
+        """Return the bit of a pulse of the last frame's bank: one of all axes has a single bit."""
+        return 0 if is_shared(self.registers[pulse]) else self.twin.bank
+
+    def _in_capture(self, address: int) -> bool:
+        """Return whether an address is one of the capture memory."""
+        return CAPTURE <= address < CAPTURE + self.registers.capture_registers
+
     async def read(self, address: int) -> None:
         data, _ = await self.do(Operation.READ, address)
-        assert data == self.twin.read(address), hex(address)
+        if self._in_capture(address):
+            assert data == (0 if self.twin.capture is None else self._captured[0]), hex(address)
+        else:
+            assert data == self.twin.read(address), hex(address)
 
     async def clear(self) -> None:
         """Forget what was found, in one clock, which shows it no more."""
@@ -254,7 +312,8 @@ class World:
         random = self.random
         near = random.choice((0, 0x20, 0x60, PULSES + 8, WRITTEN, ACTIVE, LIVE, BANK - 4)) + random.randrange(24)
         end = BANK * self.design.banks
-        far = random.choice((end, MAP - 20, MAP, MAP + len(self.design.map_cells) - 20, 0x8000, 0x10000))
+        far = [end, MAP - 20, MAP, MAP + len(self.design.map_cells) - 20, CAPTURE, 0x10000]
+        far = random.choice((*far, CAPTURE + self.registers.capture_registers - 20))
         if random.random() < 0.15:
             return far + random.randrange(40)
         return BANK * random.randrange(self.design.banks) + near

@@ -2,31 +2,35 @@
 
 import cocotb
 import pytest
-from banked_world import World, make
+from banked_world import World, make, map_of
 
 from hardwall.hdl.link.banked_file import BankedFile
-from hardwall.model.axes_registers import BANK, SHARED, AxesMap
+from hardwall.model.axes_registers import BANK, is_shared
 from hardwall.model.link import banked_file as model
 from hardwall.model.link.register_file import Operation
-from hardwall.model.registers import COUNTERS, LIVE, MAP, PULSES, TELEMETRY, WRITTEN, RegisterMap
+from hardwall.model.register import Register
+from hardwall.model.registers import CAPTURE, COUNTERS, LIVE, MAP, PULSES, TELEMETRY, WRITTEN, RegisterMap
 from hardwall.testing import SAMPLES, simulate
 from stimuli.lengths import REACHING
 from stimuli.restless import Restless
 from stimuli.specs import spec
-from stimuli.supervised_axes_world import slow
 
 CHANGES = 0, *(1 << bit for bit in range(17))
 """Nothing, or a bit of an address: one more than 16, for a frame's last address may lie behind the last one."""
+
+
+def in_bank(registers: tuple[Register, ...], bank: int) -> list[Register]:
+    """Return those of live words or pulses that a bank has."""
+    return [each for each in registers if bank == 0 or not is_shared(each)]
 
 
 async def write_words(world: World) -> None:
     """Write a word and pulses of an axis, and finish."""
     random, registers = world.random, world.registers
     bank = random.randrange(world.design.banks)
-    theirs = [each for each in registers.live if bank == 0 or each.name not in SHARED]
-    register = random.choice((*registers.words, *theirs))
+    register = random.choice((*registers.words, *in_bank(registers.live, bank)))
     await world.write_word(register, bank, random.randint(register.low, register.high))
-    for pulse in random.sample(registers.pulses, random.randrange(4)):
+    for pulse in random.sample(in_bank(registers.pulses, bank), random.randrange(4)):
         await world.write_word(pulse, bank, int(random.random() < 0.7))
     await world.finish()
     world.pulsed |= {(world.twin.bank, name) for name in world.twin.pulses}
@@ -84,11 +88,13 @@ async def follows_the_model_at_every_clock(dut):
         await world.begin(waits)
         for _ in range(max(SAMPLES, REACHING) // 600):
             await world.random.choices(ACTS, (0.35, 0.3, 0.05, 0.2, 0.1))[0](world)
-        for address in (*range(cells), MAP, MAP + len(world.design.map_cells) - 1):
+        captured = (CAPTURE + at for at in (0, 1, world.registers.capture_registers - 1) if world.registers.capture)
+        for address in (*range(cells), MAP, MAP + len(world.design.map_cells) - 1, *captured):
             await world.read(address)
     assert world.compared > max(SAMPLES, REACHING) // 10
     assert world.snapshots > 20
-    assert world.pulsed == {(bank, name) for bank in range(world.design.banks) for name in world.pulses}
+    banks = range(world.design.banks)
+    assert world.pulsed == {(bank, each.name) for bank in banks for each in in_bank(world.registers.pulses, bank)}
 
 
 @cocotb.test()
@@ -99,16 +105,17 @@ async def every_bit_of_every_word(dut):
     restless = {word.name: Restless(word, world.draws) for word in (*registers.words, *registers.live)}
     for number in range(8):
         bank = number % banks
-        for word in (*registers.words, *registers.live):
-            if bank == 0 or word.name not in SHARED:
-                await world.write_word(word, bank, restless[word.name].next())
-                given += len(world.twin.writes)
-        for pulse in registers.pulses:
+        for word in (*registers.words, *in_bank(registers.live, bank)):
+            await world.write_word(word, bank, restless[word.name].next())
+            given += len(world.twin.writes)
+        for pulse in in_bank(registers.pulses, bank):
             await world.write_word(pulse, bank, 1)
         await world.finish()
         given += len(world.twin.writes)
-    # Committed words go out at a commit, all but the preload's count; live ones at once, but for those of the host.
-    assert given == 8 * (len(registers.words) - 1 + len(registers.live) - len(SHARED) - 1)
+    # Committed words go out at a commit, all but the preload's count; live ones at once, but for those of the host and
+    # of the capture memory.
+    shared = sum(map(is_shared, registers.live))
+    assert given == 8 * (len(registers.words) - 1 + len(registers.live) - shared - 1)
 
 
 @cocotb.test()
@@ -128,7 +135,7 @@ async def every_bound_of_every_word_in_the_last_bank(dut):
             await world.edge()
             signed = value - (1 << span) if value >> span - 1 else value
             assert world.twin.outside == (not register.low <= signed <= register.high)
-            assert world.twin.absent == (bank > 0 and register.name in SHARED)
+            assert world.twin.absent == (bank > 0 and is_shared(register))
             outside += world.twin.outside
     assert outside > 50
 
@@ -141,6 +148,8 @@ async def every_bit_of_an_address(dut):
     random, end, pulses, refused = world.random, BANK * world.design.banks, world.registers.pulses, 0
     places = [0, TELEMETRY, COUNTERS, PULSES, WRITTEN, LIVE, end - 1, end]
     places += [MAP - 1, MAP, MAP + len(world.design.map_cells) - 1, MAP + len(world.design.map_cells)]
+    behind = CAPTURE + world.registers.capture_registers
+    places += [CAPTURE, behind - 1, behind]
     for address in (place ^ change for place in places for change in CHANGES):
         first, last = random.randrange(2), random.randrange(2)
         await world.clear()
@@ -157,23 +166,23 @@ async def every_bit_of_an_address(dut):
     assert refused
 
 
-@pytest.mark.parametrize("axes", [1, 3])
-def test_rtl(axes):
-    simulate(__file__, make, axes=axes)
+@pytest.mark.parametrize(("axes", "captures"), [(1, 1), (3, 1), (2, 0)])
+def test_rtl(axes, captures):
+    simulate(__file__, make, axes=axes, captures=captures)
 
 
 def test_cells_after_a_reset():
-    design = model.Design(AxesMap(slow(3, "fdm")))
+    design = model.Design(map_of(3))
     file, registers = model.BankedFile(design), design.registers
     for bank in range(3):
         for register in registers.registers:
             halves = tuple(file.live[BANK * bank + register.address + k] for k in range(register.size))
-            once = bank and (register.address < 0x20 or register.name in SHARED)
+            once = bank and (register.address < 0x20 or is_shared(register))
             assert register.from_registers(halves) == (0 if once else register.reset), register.name
 
 
 def test_no_frame_writes_to_two_banks_or_reads_the_status_of_two():
-    design = model.Design(AxesMap(slow(3, "fdm")))
+    design = model.Design(map_of(3))
     most_written, most_read = 123, 125
     written = [address for address in range(3 * BANK) if design.writable(address)]
     runs = [address for address in written if address - 1 not in written]

@@ -1,5 +1,7 @@
 """A board of several axes, a host on its line, and what its pins must be at every clock, by the model of the stage."""
 
+from typing import NamedTuple
+
 from amaranth.hdl import Cat, Module, Shape, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
@@ -9,10 +11,13 @@ from hardwall.hdl.axes_board import AxesBoard
 from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.supervised import LOOPS
 from hardwall.model.axes import AxesSpec
+from hardwall.model.axes_capture import SAMPLED
 from hardwall.model.axes_registers import BANK
+from hardwall.model.capture import RECORD_REGISTERS, TAKEN_AT
 from hardwall.model.drive import pdm
 from hardwall.model.link import banked_file
 from hardwall.model.link.line import Verdict, framed
+from hardwall.model.registers import EDGE_STAMPS
 from hardwall.model.supervisor import ARMED
 from hardwall.testing import Bench
 from hardwall.testing.packing import Packing
@@ -33,6 +38,13 @@ SHOWN = "magnitude", "negative", "drive_inverted", "alive"
 """What the axes inside give to stages and pins."""
 PINS = "drive_pdm", "drive_sign", "alive", "outputs_enable"
 """What comes of it."""
+SAMPLES = (
+    "record_valid", "record_axis", "record_count", "record_velocity", "record_wall_force", "record_flags",
+    "turn_valid", "turn_axis", "turn_state", "live",
+)  # fmt: skip
+"""What the axes inside show of samples and turns, of which the capture memory takes those of one axis."""
+RECORDS = 16
+"""Records of the capture memory."""
 
 
 class Watched(wiring.Component):
@@ -41,22 +53,48 @@ class Watched(wiring.Component):
     Attributes:
         board: the board.
         shown: how `SHOWN`, and `PINS` behind `pin_`, lie in `showing`.
+        sampled: how `SAMPLES` lie in `sampling`.
     """
 
     def __init__(self, axes: int):
         fields = {**NARROW, "clock_hz": CLOCK_HZ}
-        self.board = board = AxesBoard(AxesSpec(**fields, axes=axes, estimator="fdm"), BAUD)
+        spec = AxesSpec(**fields, axes=axes, estimator="fdm")
+        self.board = board = AxesBoard(spec, BAUD, RECORD_REGISTERS * RECORDS)
         self._ports = {name: Value.cast(getattr(board.axes, name)) for name in SHOWN}
         self._ports |= {f"pin_{name}": getattr(board, name) for name in PINS}
         self.shown = Packing({name: Shape(len(port)) for name, port in self._ports.items()})
-        super().__init__({**self.board.signature.members, "showing": Out(self.shown.width)})
+        self._samples = [getattr(board.axes, name) for name in SAMPLES]
+        shapes = (Shape.cast(port.shape()) for port in self._samples)
+        self.sampled = Packing(dict(zip(SAMPLES, shapes, strict=True)))
+        inside = {"showing": Out(self.shown.width), "sampling": Out(self.sampled.width)}
+        super().__init__({**self.board.signature.members, **inside})
 
     def elaborate(self, platform):
         m = Module()
         m.submodules.board = self.board
         m.d.comb += lead_out(self.board, self, self.board.signature.members)
-        m.d.comb += self.showing.eq(Cat(self._ports.values()))
+        m.d.comb += [self.showing.eq(Cat(self._ports.values())), self.sampling.eq(Cat(self._samples))]
         return m
+
+
+class Sample(NamedTuple):
+    """A sample of an axis: the values of its record, those of its turn, and the number of the record's clock."""
+
+    number: int
+    count: int  # type: ignore[assignment]  # a tuple has a method of this name
+    velocity: int
+    wall_force: int
+    flags: int
+    driven: int = 0
+    state: int = 0
+    live: int = 0
+
+    def registers(self) -> list[int]:
+        """Return what the capture memory makes of it."""
+        flags = self.state | (self.wall_force != 0) << 2 | self.live << 3 | self.flags << 4
+        stamp = self.number + SAMPLED + TAKEN_AT["flags"] & 0xFFFF
+        values = (self.count, self.velocity, self.driven)
+        return [*(word >> shift & 0xFFFF for word in values for shift in (16, 0)), flags, stamp]
 
 
 class Host(OnALine):
@@ -67,20 +105,28 @@ class Host(OnALine):
         compared: the clocks at which pins were compared.
         server: the twin of the link.
         places: the counts of the handles.
+        begun: the clock edge behind which the board has the number 0.
+        turned: for every axis the clock edges behind which its last edges came to the pins, by the names of their
+            stamps.
+        samples: the samples of every axis since it was set to empty lists.
     """
 
     def __init__(self, dut, axes: int):
         self.places = [0] * axes
+        self.turned: list[dict[str, int]] = [{} for _ in range(axes)]
+        self._channels = [QUARTERS[0]] * axes
         self.component = Watched(axes)
         super().__init__(Bench(dut, self.component), PATIENCE)
         self.board = self.component.board
         self.registers = self.board.registers
         self.server = BankedServer(banked_file.Design(self.registers))
+        self.samples: list[list[Sample]] | None = None
         self.loops, self.compared, self.pulses = dict.fromkeys(LOOPS, 1), 0, [0] * axes
         self._stage, self._states = pdm.Design(self.board.spec, pdm.USUAL), [pdm.START] * axes
 
     async def reset(self) -> None:
         await self._start(self.loops)
+        self.begun = self.bench.clock_number()
 
     async def _follow(self) -> None:
         """Compare the pins at every clock edge with what the stages make of what the axes let out."""
@@ -89,6 +135,8 @@ class Host(OnALine):
         while True:
             await edge
             word = int(self.dut.showing.value)
+            if self.samples is not None:
+                self._sample(self.component.sampled.unpack(int(self.dut.sampling.value)), word)
             # Stages without a drive do nothing more once their last pulse is out.
             still = still + 1 if word == last else 0
             last = word
@@ -108,6 +156,20 @@ class Host(OnALine):
                 self.pulses[axis] += shown["pin_drive_pdm"] >> axis & 1
             self.compared += 1
 
+    def _sample(self, shown: dict[str, int], word: int) -> None:
+        """Take the record of a sample, or complete that of an axis by its turn."""
+        if shown["record_valid"]:
+            # What is seen at an edge is of the clock before it.
+            number = self.bench.clock_number() - self.begun - 1
+            words = {name: shown[f"record_{name}"] for name in ("count", "velocity", "wall_force", "flags")}
+            self.samples[shown["record_axis"]].append(Sample(number, **words))
+        of_axis = self.samples[shown["turn_axis"]]
+        if shown["turn_valid"] and of_axis:
+            doors, width = self.component.shown.unpack(word), self._stage.magnitude.width
+            magnitude = doors["magnitude"] >> width * shown["turn_axis"] & (1 << width) - 1
+            driven = -magnitude if doors["negative"] >> shown["turn_axis"] & 1 else magnitude
+            of_axis[-1] = of_axis[-1]._replace(driven=driven, state=shown["turn_state"], live=shown["live"])
+
     def change(self, **loops: int) -> None:
         """Open or close loops."""
         self.loops |= loops
@@ -125,6 +187,12 @@ class Host(OnALine):
         """Show for a while where the handles are, the axes with a bit in `jumping` half a cycle further."""
         quarters = [QUARTERS[(at + 2 * (jumping >> axis & 1)) % 4] for axis, at in enumerate(self.places)]
         channels = [sum(quarter[k] << axis for axis, quarter in enumerate(quarters)) for k in (0, 1)]
+        for turned, before, now in zip(self.turned, self._channels, quarters, strict=True):
+            # Edges of both channels at once are illegal, and have no stamps.
+            if (before[0] != now[0]) != (before[1] != now[1]):
+                rises, of_b = now > before, before[1] != now[1]
+                turned[EDGE_STAMPS[of_b + 2 * (not rises)]] = self.bench.clock_number()
+        self._channels = quarters
         self.bench.drive(encoder_a=channels[0], encoder_b=channels[1], encoder_z=index)
         await self.edges(STEP)
 

@@ -1,11 +1,11 @@
 """What the registers of several axes promise: words and pulses go to the axis whose bank they were written to."""
 
-from amaranth.hdl import Mux, Signal, Value
+from amaranth.hdl import Cat, Mux, Signal, Value
 from amaranth.lib.wiring import PureInterface
 
 from hardwall.hdl.link.banked_file import BankedFile
 from hardwall.model.axes import AxesSpec
-from hardwall.model.axes_registers import BANK, SHARED, AxesMap
+from hardwall.model.axes_registers import BANK, AxesMap, is_shared
 from hardwall.model.link.banked_file import Design
 from hardwall.model.link.register_file import Operation
 from stimuli.specs import NARROW
@@ -25,8 +25,11 @@ def banked_file(bench: Bench) -> BankedFile:
     block = bench.block(BankedFile(Design(AxesMap(axes))))
     host = block.host
     bench.assume(bench.kept((host.start, host.operation, host.address, host.value), host.start & ~host.done))
-    # Only what was checked is written, and a check refuses what is beyond the banks.
-    bench.assume(~_begins(host, Operation.WRITE) | (host.address < BANK * block.design.banks))
+    # Only what was checked is written, and a check refuses what is beyond the banks, or in bank 0 alone.
+    place, there = _at(host)
+    own = Cat(place == each for each in sorted(block.design.own_places)).any()
+    within = (host.address < BANK * block.design.banks) & (~own | (there == 0))
+    bench.assume(~_begins(host, Operation.WRITE) | within)
     return block
 
 
@@ -67,7 +70,8 @@ def pulses_are_asked_for(bench: Bench) -> None:
             m.d.sync += asked.eq(0)
         bench.promise(~marks[number] | asked.bit_select(bank, 1))
         finishing = bench.past(bench.state("PULSE") & _begins(host, Operation.FINISH) & ~bench.reset)
-        for axis in range(banks):
+        # One of all axes has a single bit, and is written to in the bank of axis 0.
+        for axis in range(len(sent)):
             bench.promise(~sent[axis] | finishing & bench.past(asked[axis]) & ~bench.past(sent[axis]))
 
 
@@ -87,8 +91,8 @@ def words_go_where_they_were_written(bench: Bench) -> None:
     walked = bench.past(bench.state("WALK_STORE") & committing & _begins(host, Operation.FINISH) & ~bench.reset)
     by_write = live & (block.word_axis == bench.past(there))
     bench.promise(~block.word_write | by_write | walked & (block.word_axis == bench.past(bank)))
-    for name in SHARED:
-        word, port = registers[name], getattr(block, name)
+    for word in filter(is_shared, registers.live):
+        port = getattr(block, word.name)
         written = told & (before == word.address + 1) | bench.past(bench.reset)
         bench.promise(written | (port == bench.past(port, init=word.reset)))
 
@@ -107,16 +111,18 @@ def every_operation_ends(bench: Bench) -> None:
     bench.promise(~bench.state("BOOT", "BOOT_TAKE", "BOOT_STORE") | (step < cells))
     bench.promise(~bench.state(*WALK) | (step < walks))
     # The high half of a word's place is walked first, and then the low one.
-    bench.promise(bench.state(*WALK, "READ", "DONE", "IDLE") | ~low)
+    bench.promise(bench.state(*WALK, "READ", "READ_CAPTURE", "DONE", "IDLE") | ~low)
+    captured = host.address[15]
     boot, walk = (cells - 1 - step)[: len(step)] * 3, ((walks - 1 - step)[: len(step)] * 2 + ~low) * 3
-    sends = 3 + design.settle_clocks
+    sends, latency = 3 + design.settle_clocks, design.axes.spec.latency
     left_in = {
         "BOOT": boot + 4,
         "BOOT_TAKE": boot + 3,
         "BOOT_STORE": boot + 2,
         "BEGIN": 1,
         "IDLE": 0,
-        "READ": 2,
+        "READ": 2 + captured,
+        "READ_CAPTURE": 2,
         "LEAST": 4,
         "ABOVE": 3,
         "BELOW": 2,
@@ -129,7 +135,9 @@ def every_operation_ends(bench: Bench) -> None:
         "WALK_STORE": walk + 1 + sends,
         "PULSE": sends,
         "SETTLE": inner["settling"] + 2,
-        "RECORD": 3,
+        "STROBE": latency + 4,
+        "STROBED": latency + 3,
+        "RECORD": inner["settling"] + 3,
         "TURN": 2,
         "DONE": 1,
     }
@@ -138,8 +146,11 @@ def every_operation_ends(bench: Bench) -> None:
         with bench.m.If(bench.state(name)):
             bench.m.d.comb += left.eq(clocks)
     bench.promise(~bench.state("SETTLE") | (inner["settling"] <= design.settle_clocks))
+    bench.promise(~bench.state("RECORD") | (inner["settling"] < latency))
     waits = bench.state("BEGIN") & ~block.word_ready
-    waits |= bench.state("RECORD") & ~(block.record_valid & (block.record_axis == inner["asked"]))
+    waits |= bench.state("STROBE") & ~(block.strobe & (block.strobe_axis == inner["asked"]))
+    recorded = block.record_valid & (block.record_axis == inner["asked"])
+    waits |= bench.state("RECORD") & (inner["settling"] == 0) & ~recorded
     waits |= bench.state("TURN") & ~(block.turn_valid & (block.turn_axis == inner["asked"]))
     idle = bench.state("IDLE")
     bench.falls(
@@ -155,11 +166,11 @@ def every_operation_ends(bench: Bench) -> None:
     finish = Mux(commits, *(block.finish_clocks[commits] for commits in (True, False)))
     latencies = {
         Operation.CHECK_READ: 1,
-        Operation.READ: 2,
+        Operation.READ: 2 + captured,
         Operation.WRITE: 3,
         Operation.COUNT: 3,
         Operation.CHECK_WRITE: 4,
-        Operation.SNAPSHOT: Mux(inner["asks"], 3, 1),
+        Operation.SNAPSHOT: Mux(inner["asks"], latency + 4, 1),
         Operation.FINISH: Mux(marks.any(), finish, 1),
     }
     each_takes(bench, host, left, latencies)
