@@ -188,13 +188,15 @@ class BankedFile(wiring.Component):
         shift, upper = Signal(CELL_BITS), Signal(CELL_BITS)
         moments = Moments(*(Signal(name=name) for name in Moments._fields))
         status = held_status(m, self, asked, moments)
-        takes = {"cell": cell.data, "text": text.data, "status": status, "value": host.value}
+        takes = {"value": host.value, "status": status}
         if registers.capture:
             in_capture = (address[15:] == CAPTURE >> 15) & less(address[:15], registers.capture_registers)
             # That memory is large, and far away: what it gives has a register of its own first.
             takes["capture"] = arrived = Signal(CELL_BITS)
             m.d.comb += self.capture_address.eq(address)
             m.d.sync += arrived.eq(self.capture_data & self.capture_done.replicate(CELL_BITS))
+        # A memory is slow, and the last of these has the shortest way.
+        takes |= {"text": text.data, "cell": cell.data}
         taking = {name: Signal(name=f"taking_{name}") for name in takes}
         for name, taken in taking.items():
             with m.If(taken):
