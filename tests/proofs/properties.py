@@ -3,6 +3,7 @@
 from . import (
     of_arithmetic,
     of_axes,
+    of_axes_capture,
     of_axis,
     of_banked_file,
     of_capture,
@@ -31,6 +32,7 @@ PROPERTIES = [
     *of_supervised_axes.PROPERTIES,
     *of_drive.PROPERTIES,
     *of_capture.PROPERTIES,
+    *of_axes_capture.PROPERTIES,
     *of_line.PROPERTIES,
     *of_server.PROPERTIES,
     *of_register_file.PROPERTIES,
