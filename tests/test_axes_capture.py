@@ -57,23 +57,24 @@ class World:
         self.counts, self.forces = [0] * self.axes, [0] * self.axes
         self.width = AxesCapture.members(design)["magnitude"].shape.elem_shape.width
         self.magnitude = self.negative = self.stamp = 0
-        self.live = 1
+        self.live, self.pulsed = 1, False
         self.words = {word.name: word.reset for word in design.words}
 
     def _value(self, fmt) -> int:
         return self.random.choice((fmt.min, fmt.max, 0, -1, self.random.randint(fmt.min, fmt.max)))
 
-    def _choose(self) -> None:
-        """Change some words of the host."""
+    def _choose(self, starts: bool) -> None:
+        """Change some words of the host, which may start a capture."""
         random, words, most = self.random, self.words, self.design.records - 1
         drawn = {
             "capture_axis": random.randrange(self.axes),
             "capture_sources": random.choice((0, CONTACT, TRIP, RISE, FALL, random.randrange(16))),
             "capture_level": random.choice((0, self.counts[words["capture_axis"]], self._value(self.design.count))),
             "capture_before": random.choice((0, 1, most, random.randint(0, most))),
-            "capture_decimation": random.choice((1, 1, 2, 3)),
         }
         words.update({name: word for name, word in drawn.items() if random.random() < 0.6})
+        # A record that is many samples away would never come.
+        words["capture_decimation"] = random.choice((1, random.randint(1, 3 if starts else 4095)))
 
     def _record(self) -> dict[str, int]:
         """Return what the axes show of a sample."""
@@ -106,7 +107,7 @@ class World:
         axis = axis if axis < self.axes else random.randrange(self.axes)
         mask = (1 << self.width) - 1
         for other in {axis} if valid else {random.randrange(self.axes)} if random.random() < 0.1 else ():
-            word = random.choice((0, mask >> 1, random.getrandbits(self.width - 1))) if valid else 0
+            word = random.choice((0, mask, random.getrandbits(self.width))) if valid else 0
             self.magnitude = self.magnitude & ~(mask << self.width * other) | word << self.width * other
             self.negative = self.negative & ~(1 << other) | random.getrandbits(1) << other
         state = random.choice((DISARMED, TRIPPED)) if random.random() < 0.1 else ARMED
@@ -120,19 +121,21 @@ class World:
         pulses = {"capture_start": 0, "capture_trigger": 0}
         starts = {IDLE: 0.1, DONE: 0.2, WAITING: 0.02}.get(state, 0.01) * samples
         if random.random() < starts:
-            self._choose()
+            self._choose(True)
             pulses["capture_start"] = 1
         if random.random() < (0.4 if pulses["capture_start"] else 0.03 * samples):
             pulses["capture_trigger"] = 1
         if random.random() < 0.02 * samples:
             # What a host writes meanwhile is taken by the next start, the axis among it.
-            self._choose()
+            self._choose(state not in (IDLE, DONE))
         width = self.design.spec.stamp_width
         self.stamp = random.getrandbits(width) if random.random() < 0.01 else (self.stamp + 1) % (1 << width)
         self.live ^= int(random.random() < 0.01)
         address = random.randrange(RECORD_REGISTERS * self.design.records)
         given = {**self._record(), **self._turn(), **self.words, **pulses, "live": self.live, "stamp": self.stamp}
-        return given | {"capture_address": address, "reset": int(random.random() < 0.0003)}
+        # What is on its way is lost.
+        resets, self.pulsed = 0.1 if self.pulsed else 0.0003, any(pulses.values()) or random.random() < samples / 10
+        return given | {"capture_address": address, "reset": int(random.random() < resets)}
 
 
 def inputs_of(design: Design, width: int, given: dict[str, int]) -> Inputs:
