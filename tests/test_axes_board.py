@@ -278,6 +278,12 @@ async def a_capture_has_the_samples_of_the_axis_that_was_chosen(dut):
     for axis in (0, 1):
         await prepare(host, axis)
         await host.write(axis, arm=1)
+    # By hand, with both handles at rest.
+    await start(host, axis=0, sources=0, before=1, decimation=1)
+    await until(host, WAITING)
+    await host.write(0, capture_trigger=1)
+    samples, status = await captured(host, 0, 1)
+    assert (status["capture_place"], {sample.count for sample in samples}) == (1, {0})
     # The handle of axis 1 falls below its level, while that of axis 0 goes the other way, and past its own.
     words = {"axis": 1, "sources": FALL, "before": 5, "decimation": 3, "level": -4}
     await start(host, **words)
