@@ -91,12 +91,15 @@ class Case:
         arguments: the arguments of the command line.
         entries: the function that makes entries of the text on stdout, by the rest of their name; "" for a single one.
         short: whether every `make test` checks it.
+        fitted: whether LAPACK solves a part of it, whose last bits differ among processors that Numba takes for one
+            kind. Its floats are compared as those of another kind of machine.
     """
 
     name: str
     arguments: tuple[str, ...]
     entries: Callable[[str], dict[str, Any]]
     short: bool = False
+    fitted: bool = False
 
     def run(self) -> dict[str, Any]:
         """Run the program and return its entries by name."""
@@ -155,7 +158,7 @@ def _walls() -> Iterator[Case]:
     workers = ("--workers", "1", "--json")
     for scene in ("seed-2011", "drive-2011"):
         short = scene == "seed-2011"
-        yield Case(f"lipschitz/{scene}", ("lipschitz", scene, *SHORT, "--json"), whole, short)
+        yield Case(f"lipschitz/{scene}", ("lipschitz", scene, *SHORT, "--json"), whole, short, fitted=True)
         for backend in ("float", "fixed"):
             options = ("--backend", backend, *MAPPED, *GRID, *workers)
             yield Case(f"zwidth/{scene}/{backend}", ("zwidth", scene, *options), parts, short and backend == "fixed")

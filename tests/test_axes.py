@@ -15,7 +15,7 @@ from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from oracles.axes import Seen, Write, check, lanes_of
 from stimuli import handle
 from stimuli.axes import random_words, rota
-from stimuli.lengths import LONG, REACHING, long_form
+from stimuli.lengths import LONG, REACHING, WHOLE, long_form
 from stimuli.specs import MHZ
 
 LEVELS, PULSES = ("encoder_a", "encoder_b", "encoder_z", "drive_enable"), ("preload", "index_arm", "clear_flags")
@@ -145,7 +145,7 @@ async def every_axis_is_a_single_one(dut):
         (number, spare, estimator)
         for number, spare in ((1, 0), (3, 2), (16, 0))
         for estimator in axes.PIPELINES
-        if LONG or number == 3 or (number, estimator) == (1, "fdm")
+        if LONG or (WHOLE and number == 3) or (number, estimator) in [(1, "fdm"), (3, "levant")]
     ],
 )
 def test_rtl(number, spare, estimator):

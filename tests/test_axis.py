@@ -16,7 +16,7 @@ from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from oracles.axis import AxisTwin
 from stimuli import handle
 from stimuli.axes import busy, fastest, random_words
-from stimuli.lengths import REACHING
+from stimuli.lengths import REACHING, some_of
 
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
 LATE_BIT = 20
@@ -210,8 +210,10 @@ async def late_edges_have_late_stamps(dut):
 
 
 # One estimator on the count and one on the stamps. `test_loop` runs all estimators.
-@pytest.mark.parametrize("overlaps", [False, True])
-@pytest.mark.parametrize("estimator", ["levant", "levant-edge"])
+SIZES = [("levant", False), ("levant", True), ("levant-edge", False), ("levant-edge", True)]
+
+
+@pytest.mark.parametrize(("estimator", "overlaps"), some_of(SIZES, 1, 2))
 def test_rtl(estimator, overlaps):
     simulate(__file__, make, estimator=estimator, overlaps=overlaps)
 

@@ -8,6 +8,7 @@ from cocotb.triggers import ClockCycles, RisingEdge
 from hardwall.hdl.arithmetic.divide import Divide
 from hardwall.model.arithmetic.divide import divide
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from stimuli.lengths import some_of
 
 WIDTHS = [(1, 1, 1), (3, 5, 2), (24, 10, 14), (20, 26, 20)]
 
@@ -84,7 +85,10 @@ async def a_new_start_abandons_the_old_one(dut):
     assert quotients.rows == [(1, 0)] * (component.latency - 1)
 
 
-@pytest.mark.parametrize("widths", [*((*widths, 1) for widths in WIDTHS), (24, 10, 14, 2), (5, 3, 9, 3)], ids=str)
+SIZES = [*((*widths, 1) for widths in WIDTHS), (24, 10, 14, 2), (5, 3, 9, 3)]
+
+
+@pytest.mark.parametrize("widths", some_of(SIZES, 0, 3, 4), ids=str)
 def test_rtl(widths):
     names = ("dividend_width", "divisor_width", "quotient_width", "bits_per_clock")
     simulate(__file__, Divide, **dict(zip(names, widths, strict=True)))

@@ -8,6 +8,7 @@ from hardwall.model.drive import pdm
 from hardwall.model.drive.pdm import START, Design, Inputs
 from hardwall.model.drive.stage import Amplifier
 from hardwall.testing import SAMPLES, Recorded, check, parameters, play, simulate
+from stimuli.lengths import some_of
 from stimuli.stages import axis, drives
 
 NAMES = ["pdm", "pdm narrow", "pdm scaled"]
@@ -39,7 +40,7 @@ async def follows_model(dut):
     assert all(set(levels) == {0, 1} for levels in expected.values())
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", some_of(NAMES, 0, 2))
 def test_rtl(name):
     simulate(__file__, make, name=name)
 

@@ -12,6 +12,7 @@ from hardwall.model.axis import Axis
 from hardwall.model.estimators import foaw
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words
+from stimuli.lengths import some_of
 from stimuli.papers_signal import RATES, axis_at, piece
 from stimuli.seeded import seeded
 from stimuli.specs import spec
@@ -83,7 +84,7 @@ async def reset_mid_stream_starts_afresh(dut):
         assert bench.reader("velocity")() == 0
 
 
-@pytest.mark.parametrize("name", WINDOWS)
+@pytest.mark.parametrize("name", some_of(WINDOWS, 0, 1))
 def test_rtl(name):
     simulate(__file__, make, name=name)
 

@@ -13,6 +13,7 @@ from hardwall.model.estimators.levant import START
 from hardwall.model.quadrature import seen_count
 from hardwall.testing import simulate
 from hardwall.testing.estimators import model
+from stimuli.lengths import some_of
 from stimuli.specs import spec
 
 
@@ -31,7 +32,7 @@ def words(name: str, **changed: int) -> dict[str, int]:
 follows_model, reset_mid_stream_starts_afresh = levants.campaign(make, START, fewer=())
 
 
-@pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])
+@pytest.mark.parametrize("name", some_of(["paper", "mhz", "narrow"], 1, 2))
 def test_rtl(name):
     simulate(__file__, make, name=name)
 

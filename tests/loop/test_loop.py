@@ -91,7 +91,7 @@ CLOSE = [
     (estimator, overlap)
     for estimator in ("levant u", "fdm u", "levant-edge u")
     for overlap in ("all", "no slack", "some", "none")
-    if LONG or (estimator, overlap) in [("levant u", "all"), ("levant-edge u", "all")]
+    if LONG or (estimator, overlap) == ("levant u", "all")
 ]
 
 
