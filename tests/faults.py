@@ -1,6 +1,6 @@
-"""Faults injected into the board in the closed loop, and what came of each.
+"""Faults injected into boards in the closed loop, and what came of each.
 
-    make faults                     inject everything, with each drive stage
+    make faults                     inject everything, with each drive stage and into several axes
     make faults ONLY="the host"     only the faults whose names begin so
 
 Prints a table and one last line for a script; exits with 1 if any fault does not come to what is promised of it.

@@ -2,97 +2,18 @@
 
 import cocotb
 import pytest
-from cocotb.triggers import RisingEdge
 
-from hardwall.hdl.supervised import COMPLEMENTS, LOOPS
+from hardwall.hdl.supervised import COMPLEMENTS
 from hardwall.hdl.supervised_axes import SupervisedAxes
 from hardwall.model import supervised_axes
 from hardwall.model.axes import AXES_MAX
 from hardwall.model.monitors import IDLE_EDGES
 from hardwall.model.supervisor import ALL, ARMED, DISARMED, TRIPPED, names
-from hardwall.testing import SAMPLES, SEED, Bench, Recorded, parameters, simulate
-from oracles.axes import Seen, Write, check, lanes_of
+from hardwall.testing import SAMPLES, SEED, simulate
+from oracles.followed_axes import Run, Spin, Still, make
 from oracles.supervised import BITS
-from oracles.supervised_axes import Follower
 from stimuli.lengths import LONG, REACHING, long_form
 from stimuli.supervised_axes_world import AxesWorld, slow
-from stimuli.supervised_world import QUARTERS
-
-AXES_CLOCKS = 10_000
-"""Clocks at most in which the axes inside are held to their own model."""
-
-
-def make(**given) -> Recorded:
-    return Recorded(SupervisedAxes(slow(**given)))
-
-
-class Run:
-    """Axes in the simulator, whose outputs are compared with the models' at every clock.
-
-    Attributes:
-        design: the axes' design.
-        inputs: the names of their inputs.
-        follower: the models.
-        compared: the clocks that were compared.
-        ready: whether words can be written.
-        given, seen: the inputs and outputs of the first clocks, up to a reset.
-    """
-
-    def __init__(self, dut):
-        self._recorded = make(**parameters())
-        self.design, self._bench = self._recorded.component.design, Bench(dut, self._recorded)
-        self.follower = Follower(self.design)
-        self.inputs = tuple(self._recorded.stimuli.shapes)
-        self.compared = self.ready = 0
-        self.given: list[dict[str, int]] = []
-        self.seen = Seen(self._recorded.records, self.design.spec)
-
-    async def begin(self, given: dict[str, int]) -> None:
-        """Reset the axes, with inputs."""
-        await self._bench.reset()
-        await self.edge(given, 1)
-        self._first = given
-
-    async def edge(self, given: dict[str, int], reset: int = 0) -> dict[str, int]:
-        """Go on by a clock with inputs; return the outputs in it."""
-        dut = self._bench.dut
-        dut.stimulus.value, dut.rst.value = self._recorded.stimuli.pack(given), reset
-        await RisingEdge(dut.clk)
-        word = int(dut.record.value)
-        shown = self._recorded.records.unpack(word)
-        self.ready = shown["word_ready"]
-        if self.compared or not reset:
-            wanted = self.follower.wanted()
-            assert {name: shown[name] for name in wanted} == wanted, f"clock {self.compared}"
-            self.compared += 1
-        if not reset and len(self.given) == self.compared - 1 < AXES_CLOCKS:
-            self.given.append(given)
-            self.seen.words.append(word)
-        if reset:
-            self.follower.restart(given)
-        else:
-            self.follower.edge(given, shown)
-        return shown
-
-    def check_axes(self) -> None:
-        """Check what the axes inside showed in the first clocks, up to a reset, against their own model."""
-        spec, words = self.design.spec, self.design.words
-        # The loop of their enable is open in the clocks of a synchroniser.
-        loops = [each["drive_enable"] for each in ({"drive_enable": 0}, self._first, *self.given)]
-        given = [each | {"drive_enable": loop} for each, loop in zip(self.given, loops, strict=False)]
-        writes = [
-            Write(clock, each["word_axis"], words[each["word_number"]].name, each["word_value"])
-            for clock, each in enumerate(self.given)
-            if each["word_write"] and words[each["word_number"]] in self.design.committed
-        ]
-        lanes = lanes_of(spec, given, writes)
-        check(spec, lanes, self.seen)
-        assert all(each.committed > 5 for each in lanes)
-
-    @property
-    def supervisors(self) -> list:
-        """The states of all supervisors."""
-        return [state.supervisor for state in self.follower.states]
 
 
 @cocotb.test()
@@ -133,12 +54,9 @@ def around(ends: tuple[int, int], width: int) -> list[int]:
 async def every_word_around_an_end_of_its_range(dut):
     """Each is taken by an axis that is DISARMED, or trips it; of the one watchdog, every axis."""
     run, verdicts = Run(dut), set()
-    axes, turn = run.design.spec.axes, 2 * run.design.spec.clocks_per_sample + run.design.latency
-    everyone, words = (1 << axes) - 1, [word.name for word in run.design.words]
-    watchdog = run.design.watchdog.word
+    axes, turn, rest = run.design.spec.axes, run.turn, run.rest
+    everyone, words, watchdog = run.everyone, [word.name for word in run.design.words], run.design.watchdog.word
     formats = {word.name: word.format for word in (watchdog, *run.design.words)}
-    rest = dict.fromkeys(run.inputs, 0) | dict.fromkeys((*COMPLEMENTS, *LOOPS), everyone)
-    rest |= {watchdog.name: run.design.ranges[watchdog.name][0]}
     await run.begin(rest)
     # Loops are open in the first clocks.
     for _ in range(turn):
@@ -149,7 +67,7 @@ async def every_word_around_an_end_of_its_range(dut):
     for name, ends in run.design.ranges.items():
         for place, word in enumerate(around(ends, formats[name].width)):
             axis, states = place % axes, []
-            port = {"word_write": 1, "word_axis": axis, "word_number": words.index(name)} if name in words else {}
+            port = run.port(axis, name, 0) if name in words else {}
             for each in (word, ends[1], None):
                 acknowledged = {"acknowledge": everyone, "acknowledged": run.supervisors[axis].latched}
                 given = acknowledged if each is None else port | {"word_value": each} if port else {name: each}
@@ -166,17 +84,11 @@ async def every_word_around_an_end_of_its_range(dut):
 async def an_encoder_that_ails(dut):
     """A channel that rests while the other has edges is shown; for the longest loss, nothing trips until it is over."""
     run = Run(dut)
-    spec, words = run.design.spec, {word.name: number for number, word in enumerate(run.design.words)}
-    everyone, longest = (1 << spec.axes) - 1, 255
-    rest = dict.fromkeys(run.inputs, 0) | dict.fromkeys((*COMPLEMENTS, *LOOPS), everyone)
-    rest |= {run.design.watchdog.word.name: run.design.ranges[run.design.watchdog.word.name][0]}
-    await run.begin(rest)
-    while not run.ready:
-        await run.edge(rest)
+    spec, rest, everyone, longest = run.design.spec, run.rest, run.everyone, 255
+    await run.until_ready()
     for axis in range(spec.axes):
         for name, word in (("supervisor_loss", longest), ("supervisor_causes", ALL)):
-            port = {"word_write": 1, "word_axis": axis, "word_number": words[name], "word_value": word}
-            await run.edge(rest | port)
+            await run.edge(rest | run.port(axis, name, word))
     shown = []
     # No rota is without an edge of the channel, and none has two.
     for clock in range((IDLE_EDGES + 8) * spec.clocks_per_sample):
@@ -196,60 +108,22 @@ async def an_encoder_that_ails(dut):
         await run.edge(rest)
 
 
-class Spin:
-    """Handles that all go round, at twice the counts of a sample that their estimates are made for.
-
-    Attributes:
-        clocks: how many they have gone so far.
-    """
-
-    def __init__(self, run: Run, rest: dict[str, int]):
-        self._run, self._rest, self.clocks = run, rest, 0
-        self._everyone = (1 << run.design.spec.axes) - 1
-
-    async def edge(self, **more: int) -> int:
-        """Go on by a clock; return the count of the first axis in it."""
-        spec = self._run.design.spec
-        a, b = QUARTERS[self.clocks // (spec.clocks_per_sample // 2) % 4]
-        self.clocks += 1
-        channels = {"encoder_a": a * self._everyone, "encoder_b": b * self._everyone}
-        shown = await self._run.edge(self._rest | channels | {"heartbeat": self.clocks} | more)
-        half = 1 << spec.count_width - 1
-        return (shown["count"] + half) % (2 * half) - half
-
-    async def until_all(self, state: int) -> None:
-        """Go on until all axes are in a state."""
-        last = self.clocks + 20 * self._run.design.spec.clocks_per_sample
-        while any(each.state != state for each in self._run.supervisors):
-            await self.edge()
-            assert self.clocks < last, f"state {state}"
-
-
 @cocotb.test()
 async def an_estimate_that_is_saturated_for_too_long(dut):
     """That is no cause until the axis is ARMED, but its samples are counted before."""
     run = Run(dut)
-    spec, words = run.design.spec, {word.name: number for number, word in enumerate(run.design.words)}
-    everyone, longest, cause = (1 << spec.axes) - 1, 127, BITS["estimator_saturated"]
-    rest = dict.fromkeys(run.inputs, 0) | dict.fromkeys((*COMPLEMENTS, *LOOPS), everyone)
-    rest |= {run.design.watchdog.word.name: run.design.ranges[run.design.watchdog.word.name][0]}
-
-    def port(axis: int, name: str, word: int) -> dict[str, int]:
-        return {"word_write": 1, "word_axis": axis, "word_number": words[name], "word_value": word}
-
-    await run.begin(rest)
-    while not run.ready:
-        await run.edge(rest)
+    spec, rest, everyone, longest, cause = run.design.spec, run.rest, run.everyone, 127, BITS["estimator_saturated"]
+    await run.until_ready()
     for axis in range(spec.axes):
         for name, word in (("encoder_glitch_clocks", 0), ("supervisor_causes", cause)):
-            await run.edge(rest | port(axis, name, word))
+            await run.edge(rest | run.port(axis, name, word))
     # The filter is off before the handles turn.
     for wait in range(2 * spec.clocks_per_sample):
         await run.edge(rest | {"commit": everyone * (not wait)})
-    spin, trips, behind = Spin(run, rest), [], run.design.latency // spec.clocks_per_sample
+    spin, trips, behind = Spin(run), [], run.design.latency // spec.clocks_per_sample
     while not trips or trips[-1] < longest // 2:
         for axis in range(spec.axes):
-            await spin.edge(**port(axis, "supervisor_saturated", longest))
+            await spin.edge(**run.port(axis, "supervisor_saturated", longest))
         await spin.edge(acknowledge=everyone, acknowledged=run.supervisors[0].latched)
         await spin.until_all(DISARMED)
         # From here on it is the longest until the count is about to wrap; a turn is of a sample some time ago.
@@ -260,10 +134,67 @@ async def an_estimate_that_is_saturated_for_too_long(dut):
         await spin.until_all(ARMED)
         trips.append(run.follower.states[0].monitors.samples + behind + 1 + len(trips) % 3)
         for axis in range(spec.axes):
-            await spin.edge(**port(axis, "supervisor_saturated", trips[-1]))
+            await spin.edge(**run.port(axis, "supervisor_saturated", trips[-1]))
         await spin.until_all(TRIPPED)
         assert {each.latched for each in run.supervisors} == {cause}
     assert len(trips) > 2
+    # They are counted on, up to one more than the longest.
+    for axis in range(spec.axes):
+        await spin.edge(**run.port(axis, "supervisor_saturated", longest))
+    last = spin.clocks + 2 * longest * spec.clocks_per_sample
+    while any(each.monitors.samples <= longest for each in run.follower.states):
+        await spin.edge()
+        assert spin.clocks < last
+    ended: set[int] = set()
+    for _ in range(10 * run.turn):
+        await run.edge(rest)
+        ended |= {axis for axis, each in enumerate(run.follower.states) if not each.monitors.samples}
+    assert len(ended) == spec.axes
+
+
+@cocotb.test()
+async def handles_within_a_count_of_their_limits(dut):
+    """At a limit of its position an axis is ARMED, and a count beyond it trips, whichever bits the limit has."""
+    run = Run(dut)
+    handles, half = Still(run), 1 << run.design.spec.count_width - 1
+    await run.until_ready()
+    await handles.write(supervisor_causes=BITS["position_range"])
+    # Closer to the ends of its range a count is about to wrap.
+    for place in range(1 - 3 * half // 4, 3 * half // 4 - 1):
+        for limit, beyond in (("supervisor_position_low", 1), ("supervisor_position_high", -1)):
+            for at, state in ((0, ARMED), (beyond, TRIPPED)):
+                await handles.write(supervisor_position_low=-half, supervisor_position_high=half - 1)
+                await handles.arm_at(place)
+                await handles.write(**{limit: place + at})
+                await handles.go_on(run.turn)
+                assert handles.states == {state}, (limit, place, at)
+
+
+@cocotb.test()
+async def handles_that_run_away_by_a_count_too_many(dut):
+    """By as many counts as `supervisor_runaway` says, an axis is ARMED, and one more trips, whatever the way."""
+    run = Run(dut)
+    handles, half = Still(run), 1 << run.design.spec.count_width - 1
+    words = {word.name: word.format for word in run.design.words}
+    most = 3 * half // 4 - 1
+    await run.until_ready()
+    stiffest = {"encoder_glitch_clocks": 0, "wall_stiffness": words["wall_stiffness"].max}
+    await handles.write(supervisor_causes=BITS["runaway"], supervisor_ramp=words["supervisor_ramp"].max, **stiffest)
+    await handles.write(supervisor_force_limit=1)
+    for left, way in ((0, 1), (1, -1)):
+        await handles.write(wall_left=left, wall_position=-way * (most + 1))
+        await handles.go_on(run.turn, commit=run.everyone)
+        # Deeper than half of the range of a count there is no wall.
+        for longest in range(half - 1):
+            await handles.write(supervisor_runaway=longest)
+            await handles.arm_at(-way * most)
+            await handles.go_on(2 * run.turn)
+            assert {each.at_limit for each in run.supervisors} == {1}
+            for _ in range(longest):
+                await handles.step(way)
+            assert handles.states == {ARMED}, (way, longest)
+            await handles.step(way)
+            assert handles.states == {TRIPPED}, (way, longest)
 
 
 @pytest.mark.parametrize(

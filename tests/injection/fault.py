@@ -14,6 +14,10 @@ async def nothing(rig) -> None:
     """Repair nothing: the fault is over."""
 
 
+class NotSteadyError(AssertionError):
+    """The contact is not what a fault must find."""
+
+
 @dataclass(frozen=True)
 class Expected:
     """What a page promises of a fault.
@@ -73,6 +77,7 @@ class Fault:
         offset: the count at the mark.
         oscillator_ns: the period of the oscillator, in the time of the simulation.
         rearms: whether the axis can then be armed again.
+        common: of several axes, all of them see the fault, and must come to the same.
     """
 
     name: str
@@ -87,6 +92,7 @@ class Fault:
     offset: int = 0
     oscillator_ns: int = OSCILLATOR_NS
     rearms: bool = True
+    common: bool = False
 
     @property
     def words(self) -> dict[str, int]:

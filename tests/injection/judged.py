@@ -6,19 +6,29 @@ import numpy as np
 
 from hardwall.model.supervisor import ARMED, DISARMED, TRIPPED, names
 from hardwall.testing import SEED
+from oracles.supervised import BITS
 
-from .fault import STATES, Expected, Fault, Outcome
-from .rig import NotSteadyError, Rig
+from .fault import STATES, UNCHANGED, Expected, Fault, NotSteadyError, Outcome, nothing
+from .rig import Rig
 from .scene import CLOCKS_PER_MS, SPEC, STEP_CLOCKS, TREMOR_N
 
+UNDISTURBED = Fault("", nothing, UNCHANGED, masked=BITS["external_fault"])
+"""What another axis is written while the fault is not its own: it takes no part in the loop of `external_fault`."""
 REST_MS = 0.2
 """How long the drive is watched after every act of the host on the way back."""
 
 
 async def judged(rig: Rig, fault: Fault) -> Outcome:
-    """Inject a fault into a steady contact; return what came of it."""
+    """Inject a fault into a steady contact; return what came of it.
+
+    What comes of a fault that is common must come of the other axes as well; otherwise they go on undisturbed to the
+    end, in a contact of their own.
+    """
+    others = rig.beside
     try:
-        await rig.contact(fault.words, fault.committed, fault.offset)
+        for each in (rig, *others):
+            alike = fault if each is rig or fault.common else UNDISTURBED
+            await each.contact(alike.words, alike.committed, alike.offset)
     except NotSteadyError as error:
         return Outcome(fault.name, fault.expected.text, "", None, 0.0, 0.0, 0.0, (str(error),))
     # The fault comes at any clock of a sample, the same one for the same seed.
@@ -29,12 +39,26 @@ async def judged(rig: Rig, fault: Fault) -> Outcome:
     except NotSteadyError as error:
         rig.claim(False, str(error))
     await rig.run(fault.observed_ms)
-    drives = _drives(rig)
-    outcome = _outcome(rig, fault, drives)
-    wrong = _shortcomings(rig, fault.expected, outcome, drives)
+    outcome, wrong = _found(rig, fault.expected, fault.name)
+    stop_too = others if fault.common else ()
+    for each in stop_too:
+        each.wrong += _found(each, fault.expected, fault.name)[1]
     if not fault.expected.stopped:
-        await _way_back(rig, fault)
+        for each in (rig, *stop_too):
+            await _way_back(each, fault)
+    for each in others:
+        if not fault.common:
+            each.wrong += _found(each, UNCHANGED, fault.name)[1]
+            each.claim(each.see("latched") == 0, f"{' + '.join(names(each.see('latched')))} is latched")
+        rig.wrong += [f"axis {each.axis}: {what}" for what in each.wrong]
     return replace(outcome, wrong=(*wrong, *rig.wrong))
+
+
+def _found(rig: Rig, expected: Expected, name: str) -> tuple[Outcome, list[str]]:
+    """Return what came of a fault of that name so far, and what is not as expected."""
+    drives = _drives(rig)
+    outcome = _outcome(rig, expected, name, drives)
+    return outcome, _shortcomings(rig, expected, outcome, drives)
 
 
 async def _way_back(rig: Rig, fault: Fault) -> None:
@@ -72,16 +96,15 @@ def _drives(rig: Rig) -> list[tuple[int, float]]:
     return [(rig.began, rig.before_n), *after]
 
 
-def _outcome(rig: Rig, fault: Fault, drives: list[tuple[int, float]]) -> Outcome:
+def _outcome(rig: Rig, expected: Expected, name: str, drives: list[tuple[int, float]]) -> Outcome:
     """Return what was measured, without the verdict."""
-    expected = fault.expected
     down = next((clock for k, (clock, _) in enumerate(drives) if _is_down(expected, drives[k:])), None)
     largest = max(rig.largest_n, *(abs(driven) for _, driven in drives))
     clocks = rig.given_clocks if expected.stopped else None if down is None else down - rig.began
     tripped = rig.sees(TRIPPED)
     came = " + ".join(names(rig.see("first"))) if tripped else STATES[rig.see("state")]
     return Outcome(
-        name=fault.name,
+        name=name,
         expected=expected.text,
         came="no clock" if expected.stopped else came,
         clocks=clocks,

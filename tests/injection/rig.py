@@ -10,21 +10,22 @@ from cocotb.triggers import Timer, ValueChange
 from hardwall.hdl.supervised import LOOPS
 from hardwall.model.supervisor import ARMED, names
 
-from .damaged import INSIDE, LIVE
+from .fault import NotSteadyError
 from .handle import Grasped
 from .scene import (
     CLOCK_HZ,
     CLOCK_NS,
     CLOCKS_PER_MS,
     DAMPING_N_S_PER_M,
-    DEPTH,
     PUSH_N,
     REGISTERS,
     REST,
+    SOFTER_N_PER_M,
     SPEC,
     START,
     STEP_CLOCKS,
     STIFFNESS_N_PER_M,
+    depth,
     words,
 )
 from .serial_host import SerialHost
@@ -38,15 +39,12 @@ STEADY_N, STEADY_M_PER_S = 0.3, 2e-3
 """How far force and speed of a steady contact are from the hand's push and from rest, at most."""
 
 
-class NotSteadyError(AssertionError):
-    """The contact is not what a fault must find."""
-
-
 class Rig:
-    """The board in its loop, with the clock as the time.
+    """The board in its loop, with the clock as the time; of several axes, one of them in its loop.
 
     Attributes:
         stage: the board's drive stage.
+        axis: the number of the axis.
         handle: the plant.
         host: the host.
         swapped: whether the wires of the motor are swapped.
@@ -54,17 +52,19 @@ class Rig:
         began: the clock after whose edge the fault is there; before_n: the drive of that clock.
         turns: clocks and words of every change of the drive that is let out.
         wrong: what the fault itself has found to be wrong.
+        beside: the loops of the other axes.
         largest_n: the largest force of the amplifier while it keeps one: of a DAC, or without a clock.
     """
 
-    def __init__(self, dut, stage: Staged):
-        self.dut, self.stage = dut, stage
+    def __init__(self, dut, stage: Staged, axis: int = 0):
+        self.dut, self.stage, self.axis = dut, stage, axis
         self.handle = Grasped()
         self.swapped = False
         self.on_count: Callable[[int], None] = lambda number: None
         self.began, self.before_n = 0, 0.0
         self.turns: list[tuple[int, int]] = []
         self.wrong: list[str] = []
+        self.beside: tuple[Rig, ...] = ()
         self.largest_n = self._drive_n = 0.0
         self._stopped: list[Clock] = []
         self._number = START
@@ -86,6 +86,10 @@ class Rig:
         return self.see("state") == state
 
     @property
+    def _all(self) -> tuple["Rig", ...]:
+        return (self, *self.beside)
+
+    @property
     def driven_n(self) -> float:
         return self.see("driven") * SPEC.force_resolution_n
 
@@ -97,12 +101,10 @@ class Rig:
             oscillator_ns: the period of the oscillator, which begins anew.
         """
         dut = self.dut
-        for name in LOOPS:
-            getattr(dut, name).value = 1
-        for name in (*LIVE, *INSIDE):
-            getattr(dut, f"upset_{name}").value = 0
+        self.pins(**dict.fromkeys(LOOPS, 1), **{f"upset_{name}": 0 for name in self.stage.upsets})
         dut.uart_rx.value = dut.rst.value = 1
-        self.wire()
+        for rig in self._all:
+            rig.wire()
         if clocks is None:
             self.clock = Clock(dut.clk, CLOCK_NS, "ns", impl="gpi")
             self.clock.start()
@@ -117,10 +119,18 @@ class Rig:
         await Timer(RESET_CLOCKS * CLOCK_NS, "ns")
         dut.rst.value = 0
         await Timer(RESET_CLOCKS * CLOCK_NS, "ns")
-        self._given = self.see("given")
         self.host = SerialHost(dut)
-        self._tasks = [cocotb.start_soon(each) for each in (self._turn(), self._watch_drive())]
+        for rig in self._all:
+            rig._go(self)
         return self.clock, self.oscillator
+
+    def _go(self, first: "Rig") -> None:
+        """Close the loop; the device is that of the rig of its first axis."""
+        if self is not first:
+            self.clock, self.oscillator, self._stopped = first.clock, first.oscillator, first._stopped
+            self.host = SerialHost(self.dut, self.axis, first.host)
+        self._given = self.see("given")
+        self._tasks = [cocotb.start_soon(each) for each in (self._turn(), self._watch_drive())]
 
     def close(self) -> None:
         """End the loop."""
@@ -173,7 +183,8 @@ class Rig:
     def stop_clock(self) -> None:
         """Stop the board's clock."""
         self._stop(self.clock)
-        self._keep()
+        for rig in self._all:
+            rig._keep()
 
     def stop_oscillator(self) -> None:
         """Stop the clock that watches the board's."""
@@ -197,6 +208,10 @@ class Rig:
 
     def begin(self) -> None:
         """Take it that the fault is there from now on."""
+        for rig in self._all:
+            rig._begin()
+
+    def _begin(self) -> None:
         self.began, self.before_n, self._given_before = self.now, self.driven_n, self.see("given")
         self.largest_n = 0.0
         self._keep()
@@ -257,11 +272,11 @@ class Rig:
         Raises:
             NotSteadyError: if force or speed is not that of a steady contact.
         """
-        host, handle = self.host, self.handle
+        host, handle, stiffness_n_per_m = self.host, self.handle, STIFFNESS_N_PER_M - SOFTER_N_PER_M * self.axis
         wall = words(
-            wall_stiffness=STIFFNESS_N_PER_M,
+            wall_stiffness=stiffness_n_per_m,
             wall_damping=DAMPING_N_S_PER_M,
-            wall_position=(REST - START + offset - DEPTH) * SPEC.count_m,
+            wall_position=(REST - START + offset - depth(stiffness_n_per_m)) * SPEC.count_m,
         )
         await host.write(supervisor_ramp=REGISTERS["supervisor_ramp"].high, **live)
         await host.commit(**wall, **committed)

@@ -13,8 +13,9 @@ from hardwall.testing import SEED
 from proofs.bugs import Bug
 
 from .damaged import Damaged
+from .damaged_axes import DamagedAxes
 from .fault import Fault, Outcome
-from .staged import STAGED
+from .staged import DEVICES, StagedAxes
 
 IN_SIMULATOR = Path(__file__).with_name("faults_in_simulator.py")
 
@@ -33,8 +34,10 @@ def run(stage: str, faults: Sequence[Fault], bug: Bug | None = None) -> list[Out
     environ = {"HARDWALL_PARAMETERS": json.dumps({"stage": stage, "names": names, "report": str(report)})}
     amplifiers = AMPLIFIERS.read_text(encoding="utf-8")
     job = cocotb_runner.Job(IN_SIMULATOR.stem, IN_SIMULATOR.parent, environ, SEED, log=log, more=amplifiers)
+    device = DEVICES[stage]
     with bug.seeded() if bug else nullcontext():
-        cocotb_runner.simulate(Damaged(STAGED[stage]), "damaged", job)
+        damaged = DamagedAxes(device) if isinstance(device, StagedAxes) else Damaged(device)
+        cocotb_runner.simulate(damaged, "damaged", job)
     rows = [json.loads(line) for line in report.read_text(encoding="utf-8").splitlines()]
     if [row["name"] for row in rows] != names:
         raise RuntimeError(f"{len(rows)} of {len(faults)} faults have an outcome: see {log}")

@@ -25,8 +25,18 @@ START, MARK, REST = -5, 0, 100
 """Counts: the handle starts at the first, its index is at the second, and the hand holds it at the third."""
 TREMOR_N = 0.5
 """How far the force of a contact that no fault disturbs is from the hand's push, at most."""
-DEPTH = round(PUSH_N / STIFFNESS_N_PER_M / SPEC.count_m)
-"""Counts in the wall at which its spring holds the hand."""
+
+
+def depth(stiffness_n_per_m: float) -> int:
+    """Return the counts in a wall at which its spring holds the hand."""
+    return round(PUSH_N / stiffness_n_per_m / SPEC.count_m)
+
+
+DEPTH = depth(STIFFNESS_N_PER_M)
+AXES, WRONG = 3, 1
+"""The number of axes on the board of several, and the one that something is wrong with."""
+SOFTER_N_PER_M = 500.0
+"""How much softer the wall of an axis is than that of the one before it."""
 TURN = 4000
 GLITCH = SPEC.glitch_clocks_at_reset
 

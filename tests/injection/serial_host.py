@@ -6,6 +6,7 @@ import cocotb
 from cocotb.simtime import get_sim_time
 from cocotb.triggers import FallingEdge, First, Lock, Timer
 
+from hardwall.model.axes_registers import BANK, is_shared
 from hardwall.model.link.line import framed
 from hardwall.model.register import Kind
 from stimuli import frames
@@ -30,19 +31,22 @@ def bits(data: bytes) -> list[int]:
 class SerialHost:
     """A host that knows the words it wrote.
 
+    It speaks of axis `axis`: of another one than the first, `first` is the host that has the line and the heartbeat.
+
     Attributes:
         beats: whether the heartbeat goes on; `repeats`: whether it always says the same.
         words: every word as it was written last.
         sent: called when the last bit of a frame is on the line.
     """
 
-    def __init__(self, dut):
-        self._dut, self._lock = dut, Lock()
+    def __init__(self, dut, axis: int = 0, first: "SerialHost | None" = None):
+        self._dut, self._lock = dut, first._lock if first else Lock()
+        self._first, self._bank = first, axis * BANK
         self.beats, self.repeats, self.beat = True, False, 0
         self.words = {each.name: each.reset for each in (*REGISTERS.words, *REGISTERS.live)}
         self.sent: Callable[[], None] = lambda: None
-        self._got = bytearray()
-        self._tasks = [cocotb.start_soon(self._listen()), cocotb.start_soon(self._beat())]
+        self._got = first._got if first else bytearray()
+        self._tasks = [] if first else [cocotb.start_soon(self._listen()), cocotb.start_soon(self._beat())]
 
     def close(self) -> None:
         """End the host's tasks."""
@@ -69,8 +73,9 @@ class SerialHost:
 
     async def heartbeat(self) -> None:
         """Write the heartbeat, a new one unless the host repeats itself."""
-        self.beat += not self.repeats
-        await self.write(heartbeat=self.beat)
+        host = self._first or self
+        host.beat += not host.repeats
+        await host.write(heartbeat=host.beat)
 
     async def send(self, levels: list[int]) -> None:
         """Put levels on the line, a bit's time each; the line rests afterwards."""
@@ -116,10 +121,20 @@ class SerialHost:
             if min(places) <= register.address <= max(places):
                 old = 0 if register.kind is Kind.PULSE else self.words[register.name]
                 cells += register.to_registers(values.get(register.name, old))
-        return frames.write(min(places), cells)
+        return frames.write(self._bank + min(places), cells)
 
     async def write(self, **values: int) -> bytes:
-        """Write registers in one frame; return the answer."""
+        """Write registers in one frame; return the answer.
+
+        Of an axis but the first, it is a frame for each where something that the axes share lies between, and the last
+        answer: that cannot be written there.
+        """
+        places = [REGISTERS[name].address for name in values]
+        between = (register for register in REGISTERS.registers if min(places) <= register.address <= max(places))
+        if self._first and any(map(is_shared, between)):
+            for name, value in values.items():
+                answer = await self.request(self.writing(**{name: value}))
+            return answer
         return await self.request(self.writing(**values))
 
     async def commit(self, **words: int) -> None:
@@ -130,7 +145,7 @@ class SerialHost:
     async def read(self, name: str) -> int:
         """Return the value of a register, as the board answers it."""
         register = REGISTERS[name]
-        data = (await self.request(frames.read(register.address, register.size)))[2:]
+        data = (await self.request(frames.read(self._bank + register.address, register.size)))[2:]
         return register.from_registers(tuple(int.from_bytes(data[k : k + 2], "big") for k in range(0, len(data), 2)))
 
     async def acknowledge(self, causes: int) -> None:

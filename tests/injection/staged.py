@@ -4,15 +4,24 @@ import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 
+from hardwall.hdl.axes_board import AxesBoard
 from hardwall.hdl.board import Board
 from hardwall.hdl.link.link import Link
+from hardwall.model.axes import AxesSpec
 from hardwall.model.drive import dac
 from hardwall.model.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.sim.rtl.board_library import of_dac
 from oracles.board import STAGES
 
-from .scene import BAUD, PUSH_N, SPEC, STEP_CLOCKS, TREMOR_N
+from .scene import AXES, BAUD, PUSH_N, SPEC, STEP_CLOCKS, TREMOR_N
+
+LIVE = ("supervisor_force_limit", "supervisor_ramp", "supervisor_watchdog")
+"""Live words that have a range, between the link and the axis."""
+INSIDE = ("strobe_busy",)
+"""Outputs of the bare axis that no motion and no host can make high."""
+OF_AXES = ("supervisor_watchdog", "word_value")
+"""What several axes have of the link: the live word that they share, and each word of one of them as it is written."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +42,16 @@ class Staged:
     moments: dict[str, int]
     resting: str
     brief: bool = False
+
+    @property
+    def axes(self) -> int:
+        """The number of axes."""
+        return 1
+
+    @property
+    def upsets(self) -> tuple[str, ...]:
+        """What can be made wrong inside."""
+        return (*LIVE, *INSIDE)
 
     @property
     def acting(self) -> str:
@@ -72,16 +91,31 @@ class Staged:
         return self.board().safe_latency - 1
 
 
+class StagedAxes(Staged):
+    """Several axes under fault, each with a stage of pulses."""
+
+    @property
+    def axes(self) -> int:
+        return self.spec.axes
+
+    @property
+    def upsets(self) -> tuple[str, ...]:
+        return OF_AXES
+
+    @cached_property
+    def spec(self) -> AxesSpec:
+        shared = {each.name for each in dataclasses.fields(AxesSpec)} - {"axes"}
+        return AxesSpec(axes=AXES, **{name: getattr(SPEC, name) for name in shared})
+
+    def board(self) -> AxesBoard:
+        return AxesBoard(self.spec, BAUD, 0)
+
+
+PULSES = (("drive_pdm", 1), {"while the drive's pin is high": 0}, "while the drive's pin is low", True)
 STAGED = {
     each.name: each
     for each in (
-        Staged(
-            "pdm",
-            ("drive_pdm", 1),
-            {"while the drive's pin is high": 0},
-            "while the drive's pin is low",
-            brief=True,
-        ),
+        Staged("pdm", *PULSES),
         # The force of the contact is negative.
         Staged("pwm", ("steps", -1), {"within a pulse": STEP_CLOCKS // 12}, "between two pulses"),
         # A frame of 24 bits, two clocks each: the last bit is taken one clock before the chip select rises.
@@ -94,3 +128,6 @@ STAGED = {
     )
 }
 """The stages by their names."""
+SEVERAL = StagedAxes("pdm", *PULSES)
+DEVICES: dict[str, Staged] = {**STAGED, f"{AXES} axes": SEVERAL}
+"""What faults are injected into: an axis with each of the stages, and several axes."""

@@ -4,7 +4,7 @@ Yosys lists small changes of the netlist before any optimisation: a bit of a cel
 inverted where another bit of that port is low or high. Three kinds are left out:
 
 - **Outputs of registers.** A change of a register's input is the same a clock later, and leaves its initial value.
-- **Clocks.** A mutant has the clock that its tests give it.
+- **Clocks**, of registers and of modules inside. A mutant has the clock that its tests give it.
 - **First contents of memories.** They are constants of the netlist, and no input can choose them.
 """
 
@@ -63,7 +63,9 @@ class Netlist:
 def _taken(line: str) -> bool:
     """Return whether a listed change is none of those left out."""
     options = dict(_OPTION.findall(line))
-    return options["port"] != "CLK" and not (options["cell"].startswith("$procdff") and options["port"] == "Q")
+    return options["port"] not in ("CLK", "clk") and not (
+        options["cell"].startswith("$procdff") and options["port"] == "Q"
+    )
 
 
 def _described(line: str, source: list[str]) -> str:
