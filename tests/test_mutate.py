@@ -12,7 +12,6 @@ from amaranth.lib.wiring import In, Out
 from cocotb.triggers import RisingEdge
 from covering.blocks import BLOCKS, TESTS, Block
 from reasons import Reason, reasons_for
-from stimuli.lengths import some_of
 
 from hardwall.testing import SEED, Bench
 from mutation import run
@@ -21,6 +20,7 @@ from mutation.fates import REASONS, Fate, Result
 from mutation.netlist import BLOCK, Mutant, Netlist, mutated
 from mutation.run import fates_of, modules_of
 from mutation.sizes import Size, sizes_of
+from stimuli.lengths import some_of
 
 CLOCKS = 3
 """From a start to its answer."""
