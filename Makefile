@@ -187,12 +187,15 @@ $(VENV)/.made: $(if $(STALE),FORCE) | tools
 	@printf '%s\n' "$(PYTHON)" >$(VENV)/.python
 	@printf '%s\n' "$(CURDIR)" >$@
 
-# Only one pip runs at a time, even in a parallel make; of its output, only the names of the packages are shown.
+# Only one pip runs at a time, even in a parallel make; of its output, only the names of the packages are shown. Yosys and
+# the placers compile themselves when they run first, into a file of the user's which all runs read: two first runs at a
+# time would break each other, so they have theirs here.
 SAYS := s/^Collecting \([^ ]*\).*/  \1/p; s/^Installing collected packages.*/  unpacking all of these/p
 define install
 @echo "Installing into $(VENV), once: $(2) ..."; began=$$SECONDS; \
   flock $(VENV)/.made $(RUN) pip install --disable-pip-version-check --progress-bar off --editable '.[$(1)]' \
     | sed -un '$(SAYS)'; \
+  $(foreach tool,$(3),flock $(VENV)/.made $(VENV)/bin/yowasp-$(tool) --version >/dev/null 2>&1;) \
   echo "  done in $$((SECONDS - began)) s"
 @touch $@
 endef
@@ -201,16 +204,16 @@ $(VENV)/.sim: pyproject.toml $(VENV)/.made | tools
 	$(call install,sim,the model and the loop)
 
 $(VENV)/.test: pyproject.toml $(VENV)/.sim | tools
-	$(call install,sim$(comma)host$(comma)panel$(comma)test,the tests' tools)
+	$(call install,sim$(comma)host$(comma)panel$(comma)test,the tests' tools,yosys)
 
 $(VENV)/.panel: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)host$(comma)panel,the page)
 
 $(VENV)/.prove: pyproject.toml $(VENV)/.sim | tools
-	$(call install,sim$(comma)prove,the solver)
+	$(call install,sim$(comma)prove,the solver,yosys)
 
 $(VENV)/.synth: pyproject.toml $(VENV)/.sim | tools
-	$(call install,sim$(comma)synth,place and route)
+	$(call install,sim$(comma)synth,place and route,yosys nextpnr-ecp5 nextpnr-ice40 nextpnr-himbaechel-gowin)
 
 $(VENV)/.docs: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)host$(comma)panel$(comma)docs,the tools of the pages)
