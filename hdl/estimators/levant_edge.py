@@ -24,9 +24,9 @@ class Estimator(EstimatorBlock):
         v <- v + a T - min(|E| / T, lambda sqrt(|E| 2**L)) sign(E)
         a <- a - min(|E| / T / 2**L, alpha 2**L) sign(E)
 
-    and at every sample, s clocks after that edge, velocity = v + a s, held within the bound for no further edge; 0 at
-    rest. The places of the four edges of a cycle are learnt from E. `hardwall.model.estimators.levant_edge` has the
-    whole law.
+    (where |E| >= D, without the limit by lambda), and at every sample, s clocks after that edge, velocity = v + a s,
+    held within the bound for no further edge; 0 at rest. The places of the four edges of a cycle are learnt from E.
+    `hardwall.model.estimators.levant_edge` has the whole law.
 
     Start: at the first sample, and with `restart`, v = a = 0 and no edge is known; the first edge to come is the
     anchor, the second gives a velocity.
@@ -101,6 +101,7 @@ class Estimator(EstimatorBlock):
         few = Signal(range(max(d.mantissa - first, 0) + 1))
         halves = Signal(range(max((d.mantissa >> 1) - (first >> 1), 0) + 1))
         m.d.sync += [
+            s.lost.eq(magnitude >= p.lost),
             more.eq(s.length - first),
             few.eq(s.length - first),
             halves.eq((s.length >> 1) - (first >> 1)),
@@ -224,7 +225,7 @@ class Estimator(EstimatorBlock):
             m.next = "CHANGE"
         with m.State("CHANGE"):
             limited = s.e_cut == 0
-            change = Mux(limited & (s.limit < s.slope), s.limit, s.slope)
+            change = Mux(limited & ~s.lost & (s.limit < s.slope), s.limit, s.slope)
             bend = Mux(limited & (s.relay < s.bent), s.relay, s.bent)
             m.d.sync += [
                 s.change.eq(Mux(s.correct, change, 0)),
@@ -250,7 +251,7 @@ class Estimator(EstimatorBlock):
             ]
             with m.If(s.anchor):
                 m.d.sync += [s.number.eq(s.to), s.stamp.eq(s.at), s.kind.eq(s.to_kind)]
-            with m.If(s.correct & s.full_run & (s.to_kind != s.kind)):
+            with m.If(s.correct & s.full_run & ~s.lost & (s.to_kind != s.kind)):
                 m.d.sync += [s.places[s.to_kind].eq(s.next_here), s.places[s.kind].eq(s.next_there)]
             m.next = "LINE PRODUCT"
 

@@ -43,6 +43,7 @@ class Signals:
         bits = max(d.distance.width + d.clocks.bit_length() + d.place.f, d.place.width + 1) + 1
         self.way, self.moved = Signal(signed(bits)), Signal(shape(d.error))
         self.e, self.e_cut = Signal(shape(d.error)), Signal.like(self.cut)
+        self.lost = Signal()
         self.start, self.solved, self.root = Signal(), Signal(), Signal(d.root.width)
         self.root_product = Signal(d.lambda_.width + d.root.width)
         self.slope, self.far_slope, self.limit = Signal(d.velocity.width - 1), Signal(), Signal(d.velocity.width - 1)

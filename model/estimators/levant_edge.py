@@ -6,22 +6,24 @@ a sample, v in counts a sample, a in counts a sample per clock, T and s in clock
 (2**(L-1) <= T < 2**L), and n the edges passed (0 if the same edge is crossed back), at every edge in use:
 
     E = (v + a T/2) T - (n D + place[this edge] - place[last edge])
-    v <- v + a T - min(|E| / T, lambda sqrt(|E| 2**L)) sign(E)
+    v <- v + a T - min(|E| / T, lambda sqrt(|E| 2**L)) sign(E)            |E| >= D: without the limit by lambda
     a <- a - min(|E| / T / 2**L, alpha 2**L) sign(E)                      |a| <= 2**ACCELERATION_BITS C, or next above
 
-and at every sample, s clocks after that edge (the anchor), u = v + a s; this line is the output, `u`.
+and at every sample, s clocks after that edge (the anchor), u = v + a s; this line is the output, `u`. Which edges are
+in use is said in `levant_edge_anchor`.
 
 The two minima are the sliding mode: the square root and the sign of the error, or, where those would pass the surface
 E = 0, the step that ends on it (the implicit discretisation: no chatter at any rate). |E| / T alone gives
 v = n D / T + a T/2: the mean velocity of the interval, extrapolated by half of it. In a, division by 2**L instead of T
 needs no second division, and it stabilises the loop: for constant T and g = T / 2**L in (1/2, 1],
-z^2 - (1 - g/2) z + g/2 = 0, |z| <= 0.71. In an interval of more than `mantissa` bits the limits do not apply: no error
-that an axis makes reaches them.
+z^2 - (1 - g/2) z + g/2 = 0, |z| <= 0.71.
 
-Edges in use. A stamp is off by up to a clock, so the velocity over T is off by speed / T: intervals of less than
-2**shortest clocks are not used. 2**shortest is the T at which, at the largest speed, that error equals the change of
-velocity by C over T: sqrt(speed / (clock C)); but at most a quarter of the time in which C moves a count, sqrt(q / C).
-An edge too close to the anchor that stays the last edge for twice as long becomes the anchor, without a correction.
+Lost. lambda limits the correction of errors of less than a count, |E| < D: no more comes from edges that are half a
+count out of place. A larger error says that the estimate has lost the motion, whose acceleration is beyond the gains or
+beyond the format of a. Then v begins anew on the surface, from the mean velocity between these two edges, and no place
+is learnt from E. Limited, it would be left behind; and v, which takes in a T at every edge, would go to its format's
+end, where lambda is too low to hold it. In an interval of more than `mantissa` bits neither limit applies: no error
+that an axis makes reaches them.
 
 The places of edges. On a real scale the four kinds of edges (by pin and polarity, in the upward sense) are out of
 place by up to half a count. `place` holds the displacements, times D. After a full cycle in one direction, an edge
@@ -41,9 +43,11 @@ stamp, since slower edges cannot be distinguished from rest. A stop from constan
 times the time of a count (plus two of the shortest intervals, if a count takes less), and at the latest after 16
 intervals; until then it reads the old speed.
 
-Guarantee. For |f''| <= C, place errors up to p counts and E on the surface, |u - f'| <= (C + |a|)(T/2 + s) + 2 p D / T
-with T the last interval in use; the motion is reached within a few edges, as every step takes at least the share of
-lambda or alpha. (|a| is near the true value, so this is far from tight; but no a within the format breaks the bound.)
+Guarantee. For any gains, any |f''| <= A and errors of the learnt places up to p counts, s clocks after a correction
+over T: |u - f'| <= (1 + 2 p) D / T + (A + |a|) (T/2 + s), with the larger of |a| before and after it; or, in a silence
+shorter than T, D / s + A s/2 where that is more. The first term is for |E| < D; on the surface, which is reached within
+a few edges in any motion that the gains allow, it is 2 p D / T. (For a near the true one the bound is far from tight,
+but no a within the format breaks it, so it holds beyond C, too.)
 
 Measured RMS error in mm/s. Paper: 50 exp(-t) sin(2 pi t) mm, t in [1, 5] s, 1 um, 1 MHz, gains for C = 12 m/s^2,
 50 MHz stamps; hit: 0.35 kg at 0.3 m/s on 10 kN/m and 20 N s/m (up to 68 m/s^2); late: the same with B late by
@@ -85,12 +89,23 @@ causes no transient. An interval of half the stamp's range or more only sets a n
 import math
 
 from ..arithmetic.divide import divide
-from ..arithmetic.fixed import saturate, shift_floor, shift_round_half_up, wrap
+from ..arithmetic.fixed import saturate, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import isqrt
 from ..compiled import compiled
-from ..quadrature import RUN_MAX, stamp_of
+from ..quadrature import RUN_MAX
 from .estimate import estimate
 from .levant import sign_of
+from .levant_edge_anchor import (
+    CARRIED,
+    FIRST,
+    LOOSE,
+    TIMED,
+    anchored,
+    kind_of,
+    length_of,
+    meet,
+    started,
+)
 from .levant_edge_design import LEARN_SHIFT, Design, FloatParams, Gains, Params, State
 
 __all__ = ["Design", "Gains"]
@@ -98,62 +113,6 @@ REST_BITS = 3
 """An axis is at rest after 2**REST_BITS times the last interval, rounded up to a power of two, without an edge."""
 LEFT_MAX = 46
 """Largest left shift of a gain word, beyond which every result saturates anyway: 16 + 46 bits fit int64."""
-ANCHOR, FIRST, TIMED, CARRIED, LOOSE = range(5)
-"""The last edge is: the anchor itself; the first known edge; an edge to correct by; an edge too close to the anchor,
-which has long stayed the last and becomes the anchor; an edge that is still too close."""
-
-
-@compiled
-def _length(value):
-    """Return the number of bits of a word: the least n with value < 2**n."""
-    n = 0
-    while value >> n:
-        n += 1
-    return n
-
-
-@compiled
-def _number(params, seen):
-    """Return the number of the last edge on the scale."""
-    return wrap(seen.count + seen.down, params.count_width)
-
-
-@compiled
-def _kind(seen):
-    """Return the kind that the last edge has in upward motion, one of the four in a cycle of the scale."""
-    return seen.edge ^ seen.down << 1
-
-
-@compiled
-def _started(params, seen, zero):
-    """Return the state at a first sample: time and position count from its last edge, whose arrival was not seen."""
-    number, stamp, kind = _number(params, seen), stamp_of(seen, seen.edge), _kind(seen)
-    return State(1, 0, number, stamp, kind, 0, zero, zero, (zero, zero, zero, zero))
-
-
-@compiled
-def _met(params, state, seen):
-    """Return (what the last edge is, ANCHOR to LOOSE; clocks from the anchor to it; edges from the anchor to it)."""
-    mask = (1 << params.stamp_width) - 1
-    interval = (stamp_of(seen, seen.edge) - state.stamp) & mask
-    passed = wrap(_number(params, seen) - state.number, params.count_width)
-    if interval == 0 and passed == 0:
-        return ANCHOR, interval, passed
-    if not state.known or interval >> (params.stamp_width - 1):
-        return FIRST, interval, passed
-    if interval >> params.shortest:
-        return TIMED, interval, passed
-    waited = ((seen.stamp - state.stamp) & mask) >> (params.shortest + 1)
-    return (CARRIED if waited else LOOSE), interval, passed
-
-
-@compiled
-def _anchor(params, state, seen, met):
-    """Return (number, stamp, kind) of the anchor from this sample on, and the clocks since that anchor."""
-    number, stamp, kind = state.number, state.stamp, state.kind
-    if met not in (ANCHOR, LOOSE):
-        number, stamp, kind = _number(params, seen), stamp_of(seen, seen.edge), _kind(seen)
-    return number, stamp, kind, (seen.stamp - stamp) & ((1 << params.stamp_width) - 1)
 
 
 @compiled
@@ -184,7 +143,7 @@ def _fitted(value, most):
 @compiled
 def _turn(params, acceleration, time):
     """Return the change of velocity over `time` clocks in velocity LSB, rounded down, with one bit more of range."""
-    shift = max(_length(time) - params.mantissa, 0)
+    shift = max(length_of(time) - params.mantissa, 0)
     coarse = shift_floor(acceleration * (time >> shift), params.turn_shift)
     return _fitted(shift_floor(coarse, params.turn_span - shift), 2 * params.velocity_max + 1)
 
@@ -193,8 +152,8 @@ def _turn(params, acceleration, time):
 def _correct(params, state, seen, interval, passed):
     """Return (velocity, acceleration, places, flags) at the new edge, `interval` clocks and `passed` edges later."""
     velocity, acceleration, places = state.velocity, state.acceleration, state.places
-    kind = _kind(seen)
-    length = _length(interval)
+    kind = kind_of(seen)
+    length = length_of(interval)
     shift = max(length - params.mantissa, 0)
     time = interval >> shift
     most, steepest = params.velocity_max, params.acceleration_max
@@ -209,14 +168,15 @@ def _correct(params, state, seen, interval, passed):
     slope = divide(size << params.error_shift, time, params.quotient_width)
     change, bend = slope, min(shift_floor(slope, params.slope_shift + length), steepest)
     if shift == 0:
-        radicand = shift_floor(size, params.radicand_shift) << (length & 1)
-        change = min(change, shift_floor(params.lambda_ * isqrt(radicand), params.limit_shift - (length >> 1)))
         bend = min(bend, shift_floor(params.alpha, max(params.alpha_shift - length, -LEFT_MAX)))
+        if size < params.lost:
+            radicand = shift_floor(size, params.radicand_shift) << (length & 1)
+            change = min(change, shift_floor(params.lambda_ * isqrt(radicand), params.limit_shift - (length >> 1)))
 
     far_velocity = velocity + turn - sign * change
     velocity = _fitted(far_velocity, most)
     acceleration = _fitted(acceleration - sign * bend, steepest)
-    if seen.run == RUN_MAX:
+    if seen.run == RUN_MAX and size < params.lost:
         by = shift_round_half_up(_fitted(error, params.learn_max), params.learn_shift)
         places = _shifted(places, kind, state.kind, by, ~params.place_max, params.place_max)
     flags = int(distance != passed or size << params.error_shift >= time << params.quotient_width)
@@ -228,21 +188,21 @@ def _correct(params, state, seen, interval, passed):
 @compiled
 def step(params, state, seen, restart):
     if restart or not state.running:
-        state = _started(params, seen, 0)
-    met, interval, passed = _met(params, state, seen)
+        state = started(params, seen, 0)
+    met, interval, passed = meet(params, state, seen)
     known, length = state.known, state.length
     velocity, acceleration, places = state.velocity, state.acceleration, state.places
     most, flags = params.velocity_max, 0
     if met == FIRST:
         known, velocity, acceleration = 1, 0, 0
     elif met == TIMED:
-        length = _length(interval)
+        length = length_of(interval)
         velocity, acceleration, places, flags = _correct(params, state, seen, interval, passed)
     elif met == CARRIED:
         moved = velocity + _turn(params, acceleration, interval)
         velocity = _fitted(moved, most)
         flags = int(moved != velocity) << 1
-    number, stamp, kind, age = _anchor(params, state, seen, met)
+    number, stamp, kind, age = anchored(params, state, seen, met)
 
     gone = age >> (params.stamp_width - 1)
     if met != LOOSE and (gone or age >> (length + REST_BITS)):
@@ -252,27 +212,28 @@ def step(params, state, seen, restart):
     line = _fitted(straight, most)
     flags |= int(line != straight) << 1
     if met != LOOSE:
-        line = _within(line, velocity, min(params.bound >> max(_length(age) - 1, 0), most))
+        line = _within(line, velocity, min(params.bound >> max(length_of(age) - 1, 0), most))
     return State(1, known, number, stamp, kind, length, velocity, acceleration, places), line, flags
 
 
 @compiled
 def _float_correct(params, state, seen, interval, passed):
     velocity, acceleration, places = state.velocity, state.acceleration, state.places
-    kind = _kind(seen)
-    scale = 2.0 ** _length(interval)
+    kind = kind_of(seen)
+    scale = 2.0 ** length_of(interval)
     turn = acceleration * interval
     place = passed * params.clocks + places[kind] - places[state.kind]
     error = (velocity + turn / 2) * interval - place
     sign, slope = sign_of(error), abs(error) / interval
     change, bend = slope, slope / scale
     if interval >> params.mantissa == 0:
-        change = min(change, params.lambda_ * math.sqrt(abs(error) * scale))
         bend = min(bend, params.alpha * scale)
+        if abs(error) < params.clocks:
+            change = min(change, params.lambda_ * math.sqrt(abs(error) * scale))
     velocity = velocity + turn - sign * change
     acceleration = saturate(acceleration - sign * bend, -params.steepest, params.steepest)
-    if seen.run == RUN_MAX:
-        coarse = error * 2.0 ** -max(_length(interval) - params.mantissa, 0)
+    coarse = error * 2.0 ** -max(length_of(interval) - params.mantissa, 0)
+    if seen.run == RUN_MAX and abs(coarse) < params.clocks:
         by = saturate(coarse, -params.learn_max, params.learn_max) * 2.0**-LEARN_SHIFT
         places = _shifted(places, kind, state.kind, by, -params.place_max, params.place_max)
     return velocity, acceleration, places
@@ -283,18 +244,18 @@ def _float_correct(params, state, seen, interval, passed):
 def float_step(params, state, seen, restart):
     """Take one sample in float64, unsaturated: the same algorithm, as a reference for the cost of fixed point."""
     if restart or not state.running:
-        state = _started(params, seen, 0.0)
-    met, interval, passed = _met(params, state, seen)
+        state = started(params, seen, 0.0)
+    met, interval, passed = meet(params, state, seen)
     known, length = state.known, state.length
     velocity, acceleration, places = state.velocity, state.acceleration, state.places
     if met == FIRST:
         known, velocity, acceleration = 1, 0.0, 0.0
     elif met == TIMED:
-        length = _length(interval)
+        length = length_of(interval)
         velocity, acceleration, places = _float_correct(params, state, seen, interval, passed)
     elif met == CARRIED:
         velocity = velocity + acceleration * interval
-    number, stamp, kind, age = _anchor(params, state, seen, met)
+    number, stamp, kind, age = anchored(params, state, seen, met)
 
     gone = age >> (params.stamp_width - 1)
     if met != LOOSE and (gone or age >> (length + REST_BITS)):
@@ -302,5 +263,5 @@ def float_step(params, state, seen, restart):
         known = int(known and not gone)
     line = velocity + acceleration * age
     if met != LOOSE:
-        line = _within(line, velocity, 2.5 * params.clocks * 2.0 ** -max(_length(age) - 1, 0))
+        line = _within(line, velocity, 2.5 * params.clocks * 2.0 ** -max(length_of(age) - 1, 0))
     return State(1, known, number, stamp, kind, length, velocity, acceleration, places), line, 0

@@ -91,6 +91,7 @@ class Params(NamedTuple):
     learn_shift: int
     learn_max: int
     place_max: int
+    lost: int
     bound: int
     velocity_max: int
     acceleration_max: int
@@ -256,6 +257,7 @@ class Design(EstimatorDesign):
             learn_shift=e_f - self.place.f + LEARN_SHIFT,
             learn_max=(1 << bits_for(self.clocks / 4) + e_f) - 1,
             place_max=self.place.max,
+            lost=shift_floor(self.clocks, -e_f),
             bound=shift_floor(5 * self.clocks, 1 - f),
             velocity_max=self.velocity.max,
             acceleration_max=self.acceleration.max,

@@ -1,0 +1,69 @@
+"""Edges in use of `levant_edge`: which of the edges that samples see correct its velocity, and which one is the anchor.
+
+A stamp is off by up to a clock, so the velocity over T is off by speed / T: intervals of less than 2**shortest clocks
+are not used. 2**shortest is the T at which, at the largest speed, that error equals the change of
+velocity by C over T: sqrt(speed / (clock C)); but at most a quarter of the time in which C moves a count, sqrt(q / C).
+An edge too close to the anchor that stays the last edge for twice as long becomes the anchor, without a correction.
+"""
+
+from ..arithmetic.fixed import wrap
+from ..compiled import compiled
+from ..quadrature import stamp_of
+from .levant_edge_design import State
+
+ANCHOR, FIRST, TIMED, CARRIED, LOOSE = range(5)
+"""The last edge is: the anchor itself; the first known edge; an edge to correct by; an edge too close to the anchor,
+which has long stayed the last and becomes the anchor; an edge that is still too close."""
+
+
+@compiled
+def length_of(value):
+    """Return the number of bits of a word: the least n with value < 2**n."""
+    n = 0
+    while value >> n:
+        n += 1
+    return n
+
+
+@compiled
+def number_of(params, seen):
+    """Return the number of the last edge on the scale."""
+    return wrap(seen.count + seen.down, params.count_width)
+
+
+@compiled
+def kind_of(seen):
+    """Return the kind that the last edge has in upward motion, one of the four in a cycle of the scale."""
+    return seen.edge ^ seen.down << 1
+
+
+@compiled
+def started(params, seen, zero):
+    """Return the state at a first sample: time and position count from its last edge, whose arrival was not seen."""
+    number, stamp, kind = number_of(params, seen), stamp_of(seen, seen.edge), kind_of(seen)
+    return State(1, 0, number, stamp, kind, 0, zero, zero, (zero, zero, zero, zero))
+
+
+@compiled
+def meet(params, state, seen):
+    """Return (what the last edge is, ANCHOR to LOOSE; clocks from the anchor to it; edges from the anchor to it)."""
+    mask = (1 << params.stamp_width) - 1
+    interval = (stamp_of(seen, seen.edge) - state.stamp) & mask
+    passed = wrap(number_of(params, seen) - state.number, params.count_width)
+    if interval == 0 and passed == 0:
+        return ANCHOR, interval, passed
+    if not state.known or interval >> (params.stamp_width - 1):
+        return FIRST, interval, passed
+    if interval >> params.shortest:
+        return TIMED, interval, passed
+    waited = ((seen.stamp - state.stamp) & mask) >> (params.shortest + 1)
+    return (CARRIED if waited else LOOSE), interval, passed
+
+
+@compiled
+def anchored(params, state, seen, met):
+    """Return (number, stamp, kind) of the anchor from this sample on, and the clocks since that anchor."""
+    number, stamp, kind = state.number, state.stamp, state.kind
+    if met not in (ANCHOR, LOOSE):
+        number, stamp, kind = number_of(params, seen), stamp_of(seen, seen.edge), kind_of(seen)
+    return number, stamp, kind, (seen.stamp - stamp) & ((1 << params.stamp_width) - 1)
