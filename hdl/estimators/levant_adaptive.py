@@ -2,14 +2,14 @@
 
 from amaranth.hdl import Mux, Signal, Value, signed
 
-from hardwall.model.estimators.levant_adaptive import LOST, Design
+from hardwall.model.estimators.levant_adaptive import LOST, RAISED, Design
 
 from ..arithmetic.fixed import shift_floor, shift_round_half_up
 from . import levant_semi_implicit
 
 
 class Estimator(levant_semi_implicit.Estimator):
-    """Levant's differentiator without numerical chatter, with gains adapted between 1 and 2**-levels of the axis's.
+    """Levant's differentiator without numerical chatter, with gains from 2**RAISED to 2**-levels of the axis's.
 
     Equation, per sample, in counts and sample periods, at level j:
 
@@ -19,7 +19,8 @@ class Estimator(levant_semi_implicit.Estimator):
         x  <- x + u
 
     As soon as |b| is more than quantisation explains, j falls to the level that the time since the last change of b's
-    sign requires; it rises by one after a time of calm. The design's module has the law.
+    sign requires, and if |b| doubles, further, below 0 too; it rises by one after a time of calm. The design's module
+    has the law.
 
     Start: at the first sample, and with `restart`, x = count, u1 = 0 and j = 0, so u = 0: a start from rest has no
     transient.
@@ -42,12 +43,13 @@ class Estimator(levant_semi_implicit.Estimator):
     design_class = Design
 
     def elaborate(self, platform):
-        self._level = Signal(range(max(self.design.levels, 1) + 1))
-        self._slowed = Signal(len(super()._alpha()))
+        # The level is counted from the least, -RAISED, an even number.
+        self._level = Signal(range(RAISED + max(self.design.levels, 1) + 1), init=RAISED)
+        self._scaled = Signal(len(super()._alpha()) + RAISED)
         return super().elaborate(platform)
 
     def _alpha(self):
-        return self._slowed
+        return self._scaled
 
     def _radicand(self, beyond):
         # At odd levels the radicand is halved, which divides the root by sqrt(2).
@@ -55,18 +57,18 @@ class Estimator(levant_semi_implicit.Estimator):
         return Mux(self._level[0], shift_floor(beyond, shift + 1), shift_floor(beyond, shift))
 
     def _correction(self, product):
-        slowed = (product << self.design.spare) >> (self._level >> 1)
-        return shift_round_half_up(slowed, self.design.product + self.design.spare - self.design.velocity.f)
+        scaled = (product << self.design.spare + RAISED // 2) >> (self._level >> 1)
+        return shift_round_half_up(scaled, self.design.product + self.design.spare - self.design.velocity.f)
 
     def _adapt(self, m, first, negative, size):
         design, level = self.design, self._level
         whole = size[design.velocity.f :]
-        # Time thresholds in whole samples, by level: to reach the next level, and to leave the level.
+        # Time thresholds in whole samples, by level: to reach the next level from 0 on, and to leave any level.
         reach = [design.reach_samples(n + 1) for n in range(design.levels)]
-        hold = [design.hold_samples(n) for n in range(design.levels)]
+        hold = [design.hold_samples(n) for n in range(-RAISED, design.levels)]
         side = Signal(signed(2))
         elapsed, calm = Signal(range(max(reach, default=0) + 1)), Signal(range(max(hold, default=0) + 1))
-        reached = Signal.like(level)
+        reached = Signal(range(max(design.levels, 1) + 1))
         limit = Signal(len(whole) + 2, init=LOST)
 
         with m.State("SIDE"):
@@ -74,7 +76,7 @@ class Estimator(levant_semi_implicit.Estimator):
             with m.If(first | (size != 0) & (sign != side)):
                 m.d.sync += [side.eq(sign), elapsed.eq(0), reached.eq(0), limit.eq(LOST)]
             with m.If(first):
-                m.d.sync += [level.eq(0), calm.eq(0)]
+                m.d.sync += [level.eq(RAISED), calm.eq(0)]
             m.next = "REACH"
         with m.State("REACH"):
             longer = elapsed + 1
@@ -82,20 +84,23 @@ class Estimator(levant_semi_implicit.Estimator):
                 m.d.sync += [elapsed.eq(longer), reached.eq(reached + (longer >= _choose(m, reached, reach)))]
             m.next = "LEVEL"
         with m.State("LEVEL"):
-            lower = Mux(limit == LOST, level, Mux(level < 2, 0, level - 2))
+            least = Mux(limit == 2 * LOST, RAISED, 0)
+            two_less = Mux(level < least + 2, least, level - 2)
+            lower = Mux((limit == LOST) | (two_less > level), level, two_less)
+            required = reached + RAISED
             with m.If(whole >= limit):
-                m.d.sync += [level.eq(Mux(lower < reached, lower, reached)), limit.eq(limit << 1)]
+                m.d.sync += [level.eq(Mux(lower < required, lower, required)), limit.eq(limit << 1)]
             m.next = "CALM"
         with m.State("CALM"):
             longer = calm + 1
             with m.If(whole >= LOST):
                 m.d.sync += calm.eq(0)
-            with m.Elif(level < design.levels):
+            with m.Elif(level < design.levels + RAISED):
                 risen = longer >= _choose(m, level, hold)
                 m.d.sync += [calm.eq(Mux(risen, 0, longer)), level.eq(level + risen)]
             m.next = "SHIFT"
         with m.State("SHIFT"):
-            m.d.sync += self._slowed.eq(super()._alpha() >> level)
+            m.d.sync += self._scaled.eq((super()._alpha() << RAISED) >> level)
             m.next = "BAND"
         return "SIDE"
 

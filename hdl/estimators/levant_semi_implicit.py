@@ -77,7 +77,7 @@ class Estimator(EstimatorBlock):
 
         distance, negative = distance_of(self.design), Signal()
         size, near, beyond, rest = (Signal(error.width - 1) for _ in range(4))
-        difference = Signal(signed(max(len(size), self.design.alpha.width) + 1))
+        difference = Signal(signed(max(len(size), len(self._alpha())) + 1))
         far_u1, far_u = (Signal(signed(max(len(size), len(u1)) + 2)) for _ in range(2))
         next_u1 = Signal.like(u1)
         # `near` is ready long before u1 is used.

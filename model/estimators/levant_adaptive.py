@@ -1,19 +1,22 @@
 """Levant's differentiator with gains that adapt to the signal, in fixed point.
 
-The algorithm is `levant_semi_implicit` with gains that depend on a level j of 0 to `levels`: with L_max = alpha / 1.1,
+The algorithm is `levant_semi_implicit` with gains that depend on a level j of -RAISED to `levels`: with
+L_max = alpha / 1.1,
 
     L = L_max 2**-j,     alpha_j = alpha 2**-j,     lambda_j = lambda 2**(-j/2)
 
 Level 0 is the fixed-gain estimator for the axis's bound C; every further level reduces the noise of a count, about
-sqrt(L q), by sqrt(2), and makes the estimator slower. All times below are in samples, all lengths in counts:
+sqrt(L q), by sqrt(2), and makes the estimator slower; the levels below 0 are for an impact beyond C. All times below
+are in samples, all lengths in counts:
 
 1. *Time on one side*: t counts the samples since b last changed its sign (`elapsed`), and `reached` is the last level
    whose L explains an excursion of LOST counts in t: L >= EXCESS LOST / t^2. It starts again at 0 with every change.
 2. *Lost*: |b| >= LOST, more than quantisation of one count can cause. Then j falls at once to `reached`, if j is above.
    If |b| grows to twice as much, and every time it has doubled again, j falls to `reached` or by two, whichever is
-   lower: two levels multiply L by 4 and lambda by 2.
+   lower: two levels multiply L by 4 and lambda by 2. The first doubling leads no further than level 0, which any
+   acceleration up to C may need; those after it down to -RAISED.
 3. *Calm*: if |b| < LOST for HOLD windows of 2 / sqrt(L), with L of the present level, j rises by one: from level 0 to
-   the last level in less than 3.5 times the hold of the last.
+   the last level in less than 3.5 times the hold of the last. From -RAISED to 0 it takes less than 2 holds of level 0.
 
 The law needs no divider and no table: levels are a factor of 2 apart, so alpha_j is a shift, and lambda_j is a shift
 and, for odd j, the root of half the radicand. The time thresholds are two constants, shifted, with TIME_BITS fraction
@@ -28,30 +31,36 @@ EXCESS LOST / (2 (LOST + 1)) A = 2.7 A or more, which is enough. At the loss u s
 its error may become lambda_j sqrt(LOST + 1) on the other side: at most the error that the fixed gains of level 0 can
 always make.
 
+*Beyond C.* For A up to 4^m 1.1 L_max, with 1 <= m < RAISED / 2, level -2m is reached once |b| is B = LOST 2^(m+1). Up
+to there the error of u is at most sqrt(2 (B + 1) A q), as above. There alpha_j >= A, so that it falls with sqrt(|b|) at
+the rate lambda_j, and u steps by half of lambda_j sqrt(B); in these terms, with lambda_j >= 0.95 sqrt(A) and B >= 8, it
+is at most 1.02 sqrt(B A q) after that step, and 0.63 when |b| has doubled, which the next step, of 1.35, turns round.
+So |b| <= 2 B, and *the error of u is at most sqrt(2 (B + 1) A q), or, on the other side, the whole
+lambda_j sqrt(2 B + 1) of level j = -2m - 2*, each a sample longer. For A = 4.4 C, the largest error of an impact of
+51 m/s^2 with C = 12, that is 30 and 57 mm/s, and 27 was measured (25 impacts from 0.01 to 0.6 m/s, 1 MHz); with the
+gains of level 0 the error grows until the motion ends, to 237 mm/s then. With m = RAISED / 2, up to 17.6 C, there is no
+further level, and |b| may come to 4.2 B; 57 mm/s was measured at 190 m/s^2.
+
 *Limitations.* (a) The transient above, up to sqrt(2) times that of fixed gains, is the price. (b) Out of rest the sign
-often changes with the first count, not with the acceleration; then t is too short, L too large, and u overshoots:
-6.6 sqrt(A q) at A = 1 m/s^2 with C = 12 (measured, largest of 24 steps out of rest and slow motion, 100 kHz; fixed
-gains: 4.0). (c) If b was on the side of the acceleration long before, t is too long, and only the doublings raise L.
-(d) A signal that is calm and lost in turn, such as a sine whose |f''| passes 0, keeps changing L, and u1, which
-carries the excursions, may be worse than with fixed gains (table): so u is the default. (e) |f''| > L_max is not
-followed, as with fixed gains. (f) Below about sqrt(L_max / q) samples a second, an acceleration moves b by more than
-LOST counts in a sample: the additional sample is then the main part of the bounds. (g) Noise of LOST counts keeps L
-large.
+often changes with the first count, not with the acceleration; then t is too short, L too large, and u overshoots: 6.6
+sqrt(A q) at A = 1 m/s^2 with C = 12 (measured, largest of 24 steps out of rest and slow motion, 100 kHz; fixed gains:
+4.0). (c) If b was on the side of the acceleration long before, t is too long, and only the doublings raise L. (d) A
+signal that is calm and lost in turn, such as a sine whose |f''| passes 0, keeps changing L, and u1, which carries the
+excursions, may be worse than with fixed gains (table): so u is the default. (e) |f''| > 2**RAISED L_max is not
+followed, as |f''| > L_max with fixed gains. (f) Below about sqrt(L_max / q) samples a second, an acceleration moves b
+by more than LOST counts in a sample: the additional sample is then the main part of the bounds. (g) Noise of LOST
+counts keeps L large.
 
 Laws compared: RMS (largest) error of u, mm/s, at 100 kHz in float64, q = 1 um. Paper's signal over 1 to 3 s; a hit at
 0.3 m/s on 10 kN/m with 0.35 kg, deceleration up to 51 m/s^2, C = 55; a step of 10 m/s^2 after 0.5 s of rest, C = 12:
 
     law                                      paper, C 1.68  C 12      hit        step       0.1, 1, 10 mm/s, C 12
     fixed gains: `levant`                    0.64 (2)       1.71 (4)  2.34 (9)   1.17 (4)   0.68 1.94 1.71
-    lost: to level 0; L in steps of 4        0.45 (2)       0.77 (6)  0.93 (12)  1.47 (7)   0.03 0.03 0.03
     lost: L by 4 each time |b| doubles       0.32 (3)       0.31 (2)  4.06 (30)  2.32 (23)  0.03 0.03 0.03
-    lost: L from t; steps of 4               0.41 (3)       0.41 (3)  0.90 (11)  1.47 (7)   0.03 0.03 0.03
-    L from t and doubling, steps of 2,
-      explicit sign                          0.30 (2)       0.31 (2)  0.84 (11)  1.30 (7)   0.03 0.03 0.03
-    the same, implicit sign: as above        0.30 (2)       0.32 (2)  0.80 (10)  1.29 (7)   0.03 0.03 0.03
+    L from t and doubling, steps of 2         0.30 (2)       0.32 (2)  0.80 (10)  1.29 (7)   0.03 0.03 0.03
 
-u1 of the last law: 0.41, 0.39, 1.47, 2.82; of `levant`: 0.15, 0.36, 1.39, 1.62. With the explicit sign the law locks up
-at 1 kHz, where the chatter alone is LOST counts: 1.97 and 13.98 on the paper's signal, against 0.41 and 0.39.
+u1 of the last law: 0.41, 0.39, 1.47, 2.82; of `levant`: 0.15, 0.36, 1.39, 1.62. With an explicit sign it locks up at
+1 kHz, where the chatter alone is LOST counts: 1.97 and 13.98 on the paper's signal, against 0.41 and 0.39.
 
 Source: the paper leaves adaptation open. Levant and Livne (2012, 2018) show that a differentiator of variable gain
 keeps its accuracy; the law is this project's.
@@ -77,17 +86,20 @@ from typing import NamedTuple
 
 from ..arithmetic.fixed import bits_for, saturate, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import isqrt
+from ..checks import FieldError
 from ..compiled import compiled
 from ..requirements import AxisRequirements
 from . import levant, levant_semi_implicit
 from .estimate import estimate
-from .levant import POSITION_BUDGET, Gains, arrive, sign_of
+from .levant import HEADROOM_BITS, POSITION_BUDGET, Gains, arrive, sign_of
 from .levant_semi_implicit import band, float_settle, settle
 
 STEPS = 15
 """Clocks of the sequence besides the root: see `hardwall.hdl.estimators.levant_adaptive`."""
 LEVELS = 12
 """Largest number of halvings of L: noise, which is proportional to sqrt(L), then spans a factor of 64."""
+RAISED = 4
+"""Number of doublings of L beyond the axis's, 16 C: for an impact. It is even, so that a shift makes lambda of it."""
 LOST = 2
 """Counts of |b| at which sliding is lost: quantisation explains one count, and tracking may use one more."""
 EXCESS = 8
@@ -134,7 +146,7 @@ class State(NamedTuple):
     count: int  # type: ignore[assignment]  # a tuple has a method of this name
     lead: float
     u1: float
-    level: int
+    level: int  # from -RAISED on
     side: int  # the last sign of b that was not 0
     elapsed: int  # samples since that sign changed; stops when `reached` is the last level
     reached: int
@@ -159,6 +171,7 @@ class Design(levant_semi_implicit.Design):
 
     def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
+        self._check_raised(gains)
         most = gains.alpha_m_per_s2 / RATIO / axis.sample_hz**2 / axis.count_m
         self.reach = _times(math.sqrt(EXCESS * LOST / most))
         self.hold = _times(HOLD * 2 / math.sqrt(most))
@@ -177,6 +190,14 @@ class Design(levant_semi_implicit.Design):
         while self.levels and bits(self.levels) > f_max:
             self.levels -= 1
         return bits(self.levels)
+
+    def _check_raised(self, gains: Gains) -> None:
+        """Refuse gains that fit int64 at level 0 alone: alpha, and the step of u before its limit."""
+        limits = self.root.i + RAISED // 2, RAISED
+        for word, (name, value), bits in zip(self.words, vars(gains).items(), limits, strict=False):
+            most = 2.0 ** (61 - HEADROOM_BITS - self.velocity.f - bits) * word.si_per_unit
+            if value > most:
+                raise FieldError(name, f"must be at most {most:g} at these rates, not {value!r}")
 
     @property
     def spare(self) -> int:
@@ -213,7 +234,7 @@ def _times(first: float) -> tuple[int, int]:
 
 @compiled
 def _threshold(even, odd, level):
-    return (odd if level & 1 else even) << (level >> 1)
+    return shift_floor(odd if level & 1 else even, -(level >> 1))
 
 
 @compiled
@@ -234,7 +255,10 @@ def adapt(law, state, restart, sign, whole):
         if elapsed << TIME_BITS >= _threshold(law.reach_even, law.reach_odd, reached + 1):
             reached += 1
     if whole >= limit:
-        level = max(min(level if limit == LOST else level - 2, reached), 0)
+        if limit > LOST:
+            # The first doubling leads down to level 0 at most, which an acceleration of C needs.
+            level = min(level, max(level - 2, -RAISED if limit > 2 * LOST else 0))
+        level = min(level, reached)
         limit *= 2
     if whole >= LOST:
         calm = 0
@@ -255,9 +279,9 @@ def step(params, state, seen, restart):
     error = saturate(distance, -family.error_max, family.error_max)
     adapted = adapt(params.law, state, restart, sign_of(error), abs(error) >> family.fraction)
     level = adapted[0]
-    sign, near, beyond = band(error, family.alpha >> level)
+    sign, near, beyond = band(error, shift_floor(family.alpha, level))
     root = isqrt(shift_floor(beyond, family.radicand_shift + (level & 1)))
-    product = (family.lambda_ * (2 * root + 1) << params.spare) >> (level >> 1)
+    product = shift_floor(family.lambda_ * (2 * root + 1) << params.spare, level >> 1)
     correction = min(shift_round_half_up(product, family.product_shift + params.spare), beyond)
     lead, u1, velocity, far = settle(family, u1, sign, near, beyond, correction)
     return State(1, seen.count, lead, u1, *adapted), velocity, int(error != distance) | far << 1

@@ -13,7 +13,7 @@ from hardwall.hdl.estimators.levant_adaptive import Estimator
 from hardwall.model.compiled import compiled
 from hardwall.model.estimators import levant_adaptive
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.estimators.levant_adaptive import LOST, START
+from hardwall.model.estimators.levant_adaptive import LOST, RAISED, START
 from hardwall.model.quadrature import seen_count
 from hardwall.testing import rng, simulate
 from hardwall.testing.estimators import model, reset_words
@@ -99,7 +99,7 @@ def test_the_campaign_sees_every_level():
     d = design("paper")
     counts = [row[0] for row in stimulus(d, 100_000)]
     levels = [state.level for state in visit(d, counts)]
-    assert set(levels) == set(range(d.levels + 1)) == set(range(13))
+    assert set(levels) == set(range(-RAISED, d.levels + 1)) == set(range(-4, 13))
     falls = {a - b for a, b in itertools.pairwise(levels) if b < a}
     assert {1, 2, d.levels} <= falls
 
@@ -125,7 +125,8 @@ class Law:
             explained = sum(samples <= len(self.sizes) for samples in self.reach)
             self.reached = min(self.reached + 1, explained)
         if abs(b) >= self.lost * 2**self.doublings:
-            self.level = max(0, min(self.reached, self.level - (2 if self.doublings else 0)))
+            falls = {0: [], 1: [max(self.level - 2, 0)]}.get(self.doublings, [max(self.level - 2, -RAISED)])
+            self.level = min(self.level, self.reached, *falls)
             self.doublings += 1
         self.calm = self.calm + 1 if abs(b) < self.lost and self.level < self.d.levels else 0
         if self.level < self.d.levels and self.calm >= self.d.hold_samples(self.level):
@@ -142,10 +143,13 @@ def test_model_is_the_exact_equation_rounded_as_documented(name):
         if first:
             law.start()
         level = law.level_after(b)
-        near = min(abs(b), alpha // 2**level)
+        # Powers of the level from the least on, which is even, are whole.
+        raised, halves = 2**RAISED, 2 ** (RAISED // 2)
+        near = min(abs(b), alpha * raised // 2 ** (level + RAISED))
         beyond = abs(b) - near
         twice_root = 2 * math.isqrt(beyond * scale**2 // (one * 2 ** (level % 2))) + 1
-        return near, min(levants.half_up(lam * twice_root * one, unit * 2 * scale * 2 ** (level // 2)), beyond)
+        divisor = unit * 2 * scale * 2 ** ((level + RAISED) // 2)
+        return near, min(levants.half_up(lam * twice_root * one * halves, divisor), beyond)
 
     rows = levants.wrapped(d, stimulus(d, 10_000))
     seen = model(d, rows, START)
@@ -169,7 +173,7 @@ def test_rounding_is_a_small_change_of_position(rate):
         b = (lead.lead - (moved << d.velocity.f)) * d.velocity.lsb
         lead, velocity, _ = estimate(params, lead, seen_count(count), 0)
         lam = d.lambda_.to_real(d.words[0].reset) * 2.0 ** (-level / 2)
-        near = min(abs(b), (d.words[1].reset >> level) * d.velocity.lsb)
+        near = min(abs(b), math.floor(d.words[1].reset * 2.0**-level) * d.velocity.lsb)
         beyond, g = abs(b) - near, math.copysign(1, b) * (lead.u1 - velocity) * d.velocity.lsb
         # At odd levels the root is taken of half the radicand.
         delta = lam * 2.0 ** -(d.root.f + 1) * math.sqrt(1 + level % 2) + 2.0 ** -(d.velocity.f + 1)
@@ -244,12 +248,59 @@ def test_a_hit_is_followed():
     assert rms(NAME, rate, 55.0, counts, truth, round(0.5 * rate)) == 0
 
 
+def impact(rate: int, acceleration: float, speed: float, late: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return (times, velocities): a constant speed that a wall brakes as a quarter of a sine; it begins by 0.1 s."""
+    omega = acceleration / speed
+    t = np.arange(round(0.2 * rate)) / rate - 0.1 + late / rate
+    braked = np.clip(t, 0, np.pi / 2 / omega)
+    truth = np.where(t < 0, speed, speed * np.cos(omega * braked))
+    return speed * np.minimum(t, 0) + speed / omega * np.sin(omega * braked), np.where(omega * t > np.pi / 2, 0, truth)
+
+
+@pytest.mark.parametrize("acceleration", [24.0, 51.0])
+@pytest.mark.parametrize("rate", [100_000, 500_000])
+def test_an_impact_beyond_the_axis_s_acceleration_is_caught_within_the_derived_error(rate, acceleration):
+    """With C = 12 the raised level -2 is enough, so |b| is at most twice the error that leads there."""
+    axis_spec, random = axis_at(NAME, rate, 12.0), rng()
+    at = LOST * 2**2
+    before = math.sqrt(2 * (at + 1) * acceleration * COUNT_M)
+    after = math.sqrt(2**RAISED * 12.0 * (2 * at + 1) * COUNT_M)
+    speeds = [0.3, *10 ** random.uniform(-2, -0.2, 20)]
+    largest = []
+    for speed in speeds:
+        path, truth = impact(rate, acceleration, speed, random.random())
+        counts = np.floor(path / COUNT_M + random.random()).astype(np.int64)
+        error = levants.axis(axis_spec).run(counts).velocity_m_per_s - truth
+        largest.append(np.abs(error[round(0.09 * rate) :]).max())
+    assert max(largest) <= max(before, after) + acceleration / rate
+
+
+def test_levels_below_that_of_the_axis_are_left_after_a_calm():
+    d = design("mhz")
+    jump = [0] * 10 + [LOST << 5] * 20
+    levels = [state.level for state in visit(d, [*jump, *jump[-1:] * 5 * d.hold_samples(0)])]
+    raised = max(k for k, level in enumerate(levels) if level == -RAISED)
+    assert levels[raised:].index(0) <= 2 * d.hold_samples(0)
+
+
+@pytest.mark.parametrize(
+    ("gains", "named"),
+    [
+        ({"lambda_sqrt_m_per_s": 1e-12, "alpha_m_per_s2": 4.9e5}, "alpha_m_per_s2"),
+        ({"lambda_sqrt_m_per_s": 600.0, "alpha_m_per_s2": 1e-8}, "lambda_sqrt_m_per_s"),
+    ],
+)
+def test_gains_that_raised_fit_no_word_are_refused(gains, named):
+    with pytest.raises(ValueError, match=f"^{named} must be at most .* at these rates, not"):
+        levant_adaptive.Design(spec("narrow", NAME), levant_adaptive.Gains(**gains))
+
+
 def test_the_counters_of_the_law_are_bounded():
     for name in ("paper", "narrow"):
         d = design(name)
         rows = levants.wrapped(d, stimulus(d, 20_000))
         for state in visit(d, [row[0] for row in rows]):
-            assert 0 <= state.level <= d.levels
+            assert -RAISED <= state.level <= d.levels
             assert 0 <= state.reached <= d.levels
             assert 0 <= state.elapsed <= d.reach_samples(d.levels)
             assert 0 <= state.calm < max(d.hold_samples(d.levels - 1), 1)

@@ -30,6 +30,7 @@ from hardwall.hdl.output import Output
 from hardwall.hdl.quadrature import Quadrature
 from hardwall.hdl.wall import Wall
 from hardwall.model.estimators.foaw import TAPS
+from hardwall.model.estimators.levant_adaptive import RAISED
 from hardwall.model.quadrature import START
 from stimuli.specs import spec
 
@@ -90,7 +91,7 @@ def adaptive(bench: Bench, block: wiring.Component) -> None:
     """Promise that the counters of the law stop before their next threshold, too."""
     levants(bench, block)
     levels, inner = block.design.levels, bench.inner
-    bench.within(reached=(0, levels), _level=(0, levels), calm=(0, block.design.hold_samples(levels - 1) - 1))
+    bench.within(reached=(0, levels), _level=(0, RAISED + levels), calm=(0, block.design.hold_samples(levels - 1) - 1))
     for level in range(levels):
         bench.promise((inner["reached"] != level) | (inner["elapsed"] < block.design.reach_samples(level + 1)))
 
