@@ -56,8 +56,10 @@ def setting(section: str, **values: Any) -> list[str]:
     return [word for key, value in values.items() for word in ("--set", f"{section}.{key}={value}")]
 
 
-SHORT = setting("protocol", start_m=-0.002, settle_s=0.3, mean_s=0.05, measure_s=0.1)
-SHORTEST = setting("protocol", start_m=-0.001, settle_s=0.2, mean_s=0.03, measure_s=0.05, threshold_mm=0.02)
+SHORT = setting("protocol", start_m=-0.002, settle_s=0.3, mean_s=0.05, measure_s=0.1, verdict="literal")
+SHORTEST = setting(
+    "protocol", start_m=-0.001, settle_s=0.2, mean_s=0.03, measure_s=0.05, threshold_mm=0.02, verdict="literal"
+)
 # Stable and unstable walls, judged before the handle has quite come to rest.
 MAPPED = setting("protocol", start_m=-0.002, settle_s=0.5, mean_s=0.05, measure_s=0.1, threshold_mm=0.02)
 GRID = setting(

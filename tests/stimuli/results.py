@@ -34,7 +34,17 @@ def hit(rms_m: float = 0.0, reached: bool = True) -> Hit:
         return Trace(times + 0.5, position, velocity, velocity + noise, -1e4 * np.maximum(position, 0))
 
     contact = trace(np.arange(-10, 300) * 1e-4 if reached else np.zeros(0))
-    run = {"samples": 60_000, "seconds": 1.0, "mean_m": 3e-5, "touched": reached, "max_force_n": 10.0}
+    judged = "stable" if rms_m < 3e-6 else "unstable"
+    run = {
+        "offset_m": 0.0,
+        "drift_m_per_s": 0.0,
+        "judged": judged,
+        "samples": 60_000,
+        "seconds": 1.0,
+        "mean_m": 3e-5,
+        "touched": reached,
+        "max_force_n": 10.0,
+    }
     whole = trace(np.linspace(-0.5, 5.5, 500))
     wrong = whole.estimate_m_per_s - whole.velocity_m_per_s
     overview = Overview(*vars(whole).values(), wrong - 0.02, wrong + 0.02, whole.force_n, whole.force_n)
