@@ -167,14 +167,13 @@ class ProtocolSection(Section):
 
 
 class ZWidthSection(Section):
-    """Steps of a map of stable walls, and the number of walls hit below its edge: see `hardwall.sim.walls.boundary`."""
+    """Steps of a map of stable walls: see `hardwall.sim.walls.boundary`."""
 
     stiffness_step_n_per_m: Stiffness
     stiffness_to_n_per_m: Stiffness
     damping_from_n_s_per_m: or_none(Damping)
     damping_to_n_s_per_m: or_none(Damping)
     damping_step_n_s_per_m: Damping
-    walls_below: Annotated[int, Field(ge=0, le=1000)] = 0
 
 
 class Scene(Section):
@@ -260,10 +259,16 @@ class Scene(Section):
         """The run-time parameters as the hardware's words."""
         return self.spec.design.encode(**self.parameters)
 
-    def hitting(self, stiffness_n_per_m: float, damping_n_s_per_m: float, start_m: float) -> "Scene":
-        """Return the scene with another wall and start; the axis depends on neither, and is not derived again."""
+    def hitting(
+        self, stiffness_n_per_m: float, damping_n_s_per_m: float, start: tuple[float, float] | None = None
+    ) -> "Scene":
+        """Return the scene with another wall, and with another start (place and phase) if one is given.
+
+        The axis depends on neither, and is not derived again.
+        """
         wall = {"stiffness_n_per_m": stiffness_n_per_m, "damping_n_s_per_m": damping_n_s_per_m}
-        protocol = self.protocol.model_copy(update={"start_m": start_m})
+        changes = {} if start is None else dict(zip(("start_counts", "start_periods"), start, strict=True))
+        protocol = self.protocol.model_copy(update=changes)
         return self.model_copy(update={"wall": self.wall.model_copy(update=wall), "protocol": protocol})
 
     @property

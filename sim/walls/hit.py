@@ -23,8 +23,9 @@ from ..scene.schema import Scene
 from ..world.encoder import level
 from ..world.lines import waiting
 from . import repetition
-from .tally import STABLE, UNSTABLE, Tally
+from .tally import STABLE, UNDECIDED, UNSTABLE, Tally
 
+VERDICTS = STABLE, UNSTABLE, UNDECIDED
 CHUNK = 1 << 16
 """Most samples in one call of the loop, which keeps them all; fewer if a sample takes long."""
 LOOKS = 100

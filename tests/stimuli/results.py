@@ -63,6 +63,12 @@ def hit_axes() -> AxesHit:
     return AxesHit(scene, "fixed", 1.0, made)
 
 
+def verdict(stable: bool) -> dict:
+    """Return a verdict on a wall, as that of `hardwall.sim.walls.zwidth`."""
+    said = {"verdict": "stable" if stable else "unstable", "in_place": stable}
+    return said | dict.fromkeys(("rms_mm", "offset_mm", "drift_mm_per_s", "run_s", "seconds"), 0.0)
+
+
 def map_of(method: str, stiffest_n_per_m: float, last_n_s_per_m: float, case: Case | None = None) -> Map:
     """Return the map of a method on seed-2011, whose K rises and falls over B."""
     if case is None:

@@ -203,7 +203,7 @@ EARLY = [
     ("foaw", "fixed", "detrended", 0),
     ("period", "fixed", "detrended", 0),
 ]
-"""Estimator, backend, verdict, and how many hits at least end early: none where the state has a long cycle, or stamps."""
+"""Estimator, backend, verdict, and how many hits at least end early: none with a long cycle in the state, or stamps."""
 
 
 @pytest.mark.parametrize(("estimator", "backend", "verdict", "least"), EARLY)
