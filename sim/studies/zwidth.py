@@ -13,7 +13,7 @@ from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls import theory
 from ..walls.boundary import UNDECIDED
-from ..walls.figure_5 import Fact, facts
+from ..walls.figure_5 import Fact, with_shares
 from ..walls.grid import grid_of
 from ..walls.methods import Curve, methods
 from ..walls.starts import start
@@ -68,8 +68,8 @@ class ZWidth:
         numbers = (*areas, "largest K (kN/m)", "to B (N s/m)", "islands", "undecided", "hits", "s")
         tables = [table_of(("method",), numbers, rows)]
         if self.facts:
-            lines = [[fact.text, "held" if fact.held else "not held", fact.numbers] for fact in self.facts]
-            tables.append(table_of(("the paper's Figure 5", "here", "numbers"), (), lines))
+            lines = [[fact.text, _held(fact), fact.numbers] for fact in self.facts]
+            tables.append(table_of(("the paper's Figure 5", "here, and in draws of the starts", "numbers"), (), lines))
         return tables
 
     def notes(self) -> list[str]:
@@ -120,8 +120,13 @@ def study(case: Case, curves: list[Curve] | None, mapper: Mapper) -> ZWidth:
     papers = methods(scene)
     cases = [case.changed(curve.changes, curve.label) for curve in (papers.values() if curves is None else curves)]
     maps = mapper(f"{scene.name} Z-width", cases)
-    shown = facts(dict(zip(papers, maps, strict=True))) if curves is None else []
+    shown = with_shares(dict(zip(papers, maps, strict=True))) if curves is None else []
     return ZWidth(scene, maps, shown, mapper.effort())
+
+
+def _held(fact: Fact) -> str:
+    """Return whether a fact is held, and in which part of the draws of the starts it is."""
+    return ("held" if fact.held else "not held") + ("" if fact.share is None else f", {fact.share:.0%}")
 
 
 def _linear_limits(scene: Scene) -> list[float] | None:

@@ -64,6 +64,11 @@ class Map:
             return np.full((2, 1), self.area)
         return np.trapezoid(self.drawn, [point.damping_n_s_per_m for point in self.boundary], axis=1)
 
+    def draw(self, number: int) -> "Map":
+        """Return the map of one bootstrap, with undecided hits taken for unstable."""
+        heights = zip(self.boundary, self.drawn[0, :, number].tolist(), strict=True)
+        return replace(self, boundary=[replace(point, stable_n_per_m=height) for point, height in heights])
+
     @property
     def area_interval(self) -> tuple[float, float]:
         """The ends of the interval of the area, N^2 s/m^2."""
