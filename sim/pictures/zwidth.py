@@ -38,13 +38,14 @@ def draw(found: ZWidth) -> Figure:
     picture = new_figure(5.2, title)
     axes = picture.subplots()
     styles = looks([(scene.controller.estimator, scene.estimator_output) for scene in scenes])
-    boundaries = [[(point.damping_n_s_per_m, point.stable_n_per_m / 1e3) for point in each.boundary] for each in maps]
+    boundaries = [_until_it_ends(each) for each in maps]
     limits = found.linear_limits
     for each, boundary, limit, style in zip(maps, boundaries, limits, styles, strict=True):
         label = f"{each.case.label}: {each.area / 1e3:.0f}"
         axes.plot(*zip(*boundary, strict=True), label=label, **style | {"ms": 3.5})
         low, high = np.array(each.intervals).T / 1e3
-        axes.fill_between([damping for damping, _ in boundary], low, high, color=style["color"], alpha=BAND, lw=0)
+        dampings = [point.damping_n_s_per_m for point in each.boundary]
+        axes.fill_between(dampings, low, high, color=style["color"], alpha=BAND, lw=0)
         if limit:
             axes.plot(grid.dampings, np.array(limit) / 1e3, color=style["color"], ls=":", lw=1.1)
     axes.set_xlabel("damping B of the wall (N s/m)")
@@ -68,6 +69,13 @@ def draw(found: ZWidth) -> Figure:
         lay_out(picture)
         label_points(axes, labels, lines=[*dotted, border])
     return picture
+
+
+def _until_it_ends(each: Map) -> list[tuple[float, float]]:
+    """Return the boundary as (B, K in kN/m), to the first B behind the last stable wall."""
+    points = [(point.damping_n_s_per_m, point.stable_n_per_m / 1e3) for point in each.boundary]
+    stable = [number for number, (_, stiffness) in enumerate(points) if stiffness]
+    return points[: max(stable, default=0) + 2]
 
 
 def _border(axes: Axes, grid: Grid) -> list[tuple[float, float]]:

@@ -90,8 +90,9 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         assert each["rests_n_s_per_m"] == tried[tried < 100].max()
         assert each["stable_n_s_per_m"] == tried[tried < stiffness / 100].max()
     kalman, adjusted = report["methods"]["kalman"], report["methods"]["adjusted"]
-    # In steps of 24 N s/m from 6 on, the last stable B are 198 and 78; the next step has no stable wall.
-    assert adjusted["area_n2_s_per_m2"] == pytest.approx((78 - 6) * 40e3 + 24 * 20e3)
+    # In steps of 24 N s/m from 6 on, the last stable B are 198 and 78; the next step has no stable wall. In steps of 4
+    # kN/m, the edge is halfway to 44.
+    assert adjusted["area_n2_s_per_m2"] == pytest.approx((78 - 6 + 12) * 42e3)
     assert kalman["of_papers_best"] == pytest.approx((198 - 6 + 12) / (78 - 6 + 12))
     assert kalman["before_the_end"] == 1.0
     wanted = {
