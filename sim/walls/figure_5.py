@@ -32,8 +32,10 @@ Judged = tuple[bool, float, str]
 
 @dataclass(frozen=True)
 class Fact:
-    """A fact of the paper's figure, whether the maps show it, their shortfall from 0 to 1, the numbers, and the share of
-    the draws of the starts that show it; None if that was not asked for."""
+    """A fact of the paper's figure, whether the maps show it, their shortfall from 0 to 1, and the numbers.
+
+    `share` is that of the draws of the starts that show it; None if that was not asked for.
+    """
 
     text: str
     held: bool
