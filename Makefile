@@ -38,7 +38,7 @@ BOARDS := ulx3s-25f icebreaker tangnano9k
 comma := ,
 # Every estimator on one map; it is larger than the paper's because the best estimators leave that one.
 ALL_ON_THE_MAP := --estimators all $(addprefix --set zwidth., \
-  stiffness_to_n_per_m=150e3 stiffness_step_n_per_m=2e3 damping_step_n_s_per_m=12.0 walls_below=8)
+  stiffness_to_n_per_m=150e3 stiffness_step_n_per_m=2e3 damping_step_n_s_per_m=12.0)
 MAPPED := seed-2011 fit-2011 drive-2011
 STUDIES := cutoff gains rates drop trade
 

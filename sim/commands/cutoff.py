@@ -7,8 +7,9 @@ import typer
 from ..scene.case import Case
 from ..scene.load import names
 from ..studies import cutoff
+from ..walls.zwidth import STARTS
 from .maps import Maps
-from .options import ModelOption, refuse_for_maps
+from .options import ModelOption, StartsOption, refuse_for_maps
 from .study import StudyOptions, study
 
 
@@ -21,9 +22,10 @@ def command(
             metavar="SCENE...", help=f"some of {', '.join(names())}, or .toml files", show_default="three devices"
         ),
     ] = None,
+    starts: StartsOption = STARTS,
     backend: ModelOption = "fixed",
 ) -> None:
     changes = options.changes()
     refuse_for_maps(changes, "it is what is searched")
     cases = [Case.of(scene, changes) for scene in dict.fromkeys(scenes or cutoff.SCENES)]
-    options.finish(cutoff.study(cases, Maps(options, backend)))
+    options.finish(cutoff.study(cases, Maps(options, backend, starts)))

@@ -9,7 +9,7 @@ from ..studies import fit
 from ..walls.methods import methods
 from .drop import refuse_methods_and_walls
 from .maps import MapsOfOneCrew
-from .options import ModelOption, SceneArgument, refuse
+from .options import ModelOption, SceneArgument, StartsOption, refuse
 from .study import StudyOptions, study
 from .terminal import progress
 
@@ -26,13 +26,14 @@ def command(
     ] = None,
     evaluations: Annotated[int, typer.Option(min=1, max=10**9, help="approximate number of trials of a search")] = 576,
     seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="seed of the searches")] = 1,
+    starts: StartsOption = 3,
     backend: ModelOption = "fixed",
 ) -> None:
     changes, fits = options.changes(), []
     refuse_methods_and_walls(changes)
     refuse(changes, ("zwidth",), "its maps go a little beyond the paper's axes")
     case = Case.of(scene, changes)
-    with MapsOfOneCrew(options, backend, len(methods())) as maps:
+    with MapsOfOneCrew(options, backend, starts, len(methods())) as maps:
         for each in [reading] if reading else fit.READINGS:
             with progress(f"{case.scene.name}, B axis {each}", evaluations) as advance:
                 fits.append(fit.study(case, each, evaluations, seed, maps, advance))

@@ -37,9 +37,9 @@ def check_cluster(options: StudyOptions) -> None:
 class Maps:
     """A `zwidth.Mapper` that makes maps as the options say, and records their effort."""
 
-    def __init__(self, options: StudyOptions, backend: str):
+    def __init__(self, options: StudyOptions, backend: str, starts: int):
         check_cluster(options)
-        self._options, self._backend = options, backend
+        self._options, self._backend, self._starts = options, backend, starts
         self._hits, self._began = 0, time.perf_counter()
 
     def __call__(self, title: str, cases: list[Case]) -> list[Map]:
@@ -56,8 +56,8 @@ class Maps:
 
     def _made(self, title: str, cases: list[Case]) -> list[Map]:
         known = Store("zwidth", self._options.resume)
-        with self._crew(len(cases)) as crew, progress(title, len(cases)) as advance:
-            return zwidth.run(cases, self._backend, known, crew, advance)
+        with self._crew(len(cases) * self._starts) as crew, progress(title, len(cases)) as advance:
+            return zwidth.run(cases, self._backend, known, crew, advance, self._starts)
 
     def effort(self) -> Effort:
         """Return the effort of the maps so far."""
@@ -70,9 +70,9 @@ class MapsOfOneCrew(Maps):
     They have no progress bar of their own.
     """
 
-    def __init__(self, options: StudyOptions, backend: str, cases: int):
-        super().__init__(options, backend)
-        self._known, self._context = Store(options.study, options.resume), self._crew(cases)
+    def __init__(self, options: StudyOptions, backend: str, starts: int, cases: int):
+        super().__init__(options, backend, starts)
+        self._known, self._context = Store(options.study, options.resume), self._crew(cases * starts)
 
     def __enter__(self) -> Self:
         self._joined = self._context.__enter__()
@@ -82,4 +82,4 @@ class MapsOfOneCrew(Maps):
         return self._context.__exit__(*exception)
 
     def _made(self, title: str, cases: list[Case]) -> list[Map]:
-        return zwidth.run(cases, self._backend, self._known, self._joined)
+        return zwidth.run(cases, self._backend, self._known, self._joined, starts=self._starts)

@@ -70,6 +70,9 @@ WorkersOption = Annotated[
 SchedulerOption = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="address of a running Dask cluster, whose workers are used")
 ]
+StartsOption = Annotated[
+    int, typer.Option(min=1, max=10_000, metavar="N", help="number of starts that every wall at the edge is hit from")
+]
 ResumeOption = Annotated[bool, typer.Option("--resume", help="go on where an interrupted run ended")]
 SetOption = Annotated[
     list[str] | None,

@@ -8,7 +8,7 @@ from ..scene.case import Case
 from ..studies import rates
 from ..walls.methods import methods
 from .maps import Maps
-from .options import ModelOption, SceneArgument, curves_of, rates_of, refuse, refuse_for_maps
+from .options import ModelOption, SceneArgument, StartsOption, curves_of, rates_of, refuse, refuse_for_maps
 from .study import StudyOptions, study
 
 RATES = ("controller.sample_hz", "controller.actuation_hz", "controller.clock_hz")
@@ -30,6 +30,7 @@ def command(
     tried: Annotated[
         str | None, typer.Option("--rates", metavar="HZ,...", help="sample rates, ascending", show_default="1e3 to 1e6")
     ] = None,
+    starts: StartsOption = 3,
     backend: ModelOption = "fixed",
 ) -> None:
     changes = options.changes()
@@ -38,4 +39,4 @@ def command(
     rates_hz = sorted(rates_of(tried, "--rates")) if tried is not None else list(rates.RATES_HZ)
     case = Case.of(scene, changes)
     curves = curves_of(",".join(rates.METHODS) if wanted is None else wanted, methods(case.scene))
-    options.finish(rates.study(case, curves, rates_hz, Maps(options, backend)))
+    options.finish(rates.study(case, curves, rates_hz, Maps(options, backend, starts)))

@@ -1,7 +1,7 @@
 """The command `table`."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
@@ -32,7 +32,7 @@ class Report(BaseModel):
     scene: Name
     stiffness_n_per_m: Number
     damping_n_s_per_m: Number
-    stable: bool
+    verdict: Literal["stable", "unstable", "undecided"]
     rms_mm: Number
     max_force_n: Number
     estimate_rms_mm_per_s: Number | None

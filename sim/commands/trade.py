@@ -20,7 +20,7 @@ class _Runs:
         self._options = options
 
     def maps(self, backend: str, cases: list[Case]) -> list[Map]:
-        return Maps(self._options, backend)("maps", cases)
+        return Maps(self._options, backend, 1)("maps", cases)
 
     def verdicts(self, jobs: list[dict]) -> list[dict]:
         # Many of these walls have just been hit for a map.

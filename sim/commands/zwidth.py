@@ -1,5 +1,6 @@
 """The command `zwidth`."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -7,8 +8,9 @@ import typer
 from ..scene.case import Case
 from ..studies import zwidth
 from ..walls.methods import methods
+from ..walls.zwidth import STARTS
 from .maps import Maps
-from .options import BackendOption, SceneArgument, curves_of, refuse_for_maps
+from .options import BackendOption, SceneArgument, StartsOption, curves_of, output_file, refuse_for_maps
 from .study import StudyOptions, study
 
 
@@ -25,10 +27,16 @@ def command(
             show_default="these six",
         ),
     ] = None,
+    starts: StartsOption = STARTS,
     backend: BackendOption = "fixed",
+    hits: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE", help="write every start's verdict: .csv")
+    ] = None,
 ) -> None:
     changes = options.changes()
+    hits = output_file(hits, "--csv", (".csv",))
     refuse_for_maps(changes, "see --estimators")
     case = Case.of(scene, changes)
     curves = None if wanted is None else curves_of(wanted, methods(case.scene))
-    options.finish(zwidth.study(case, curves, Maps(options, backend)))
+    found = zwidth.study(case, curves, Maps(options, backend, starts))
+    options.finish(found, {"hits": (hits, found.save)} if hits else {})

@@ -55,6 +55,6 @@ def _force(panel: Axes, each: Hit) -> None:
     panel.fill_between(trace.time_s, trace.force_least_n, trace.force_largest_n, step="post", color=FORCE, lw=0.9)
     moves = length_text(each.rms_m)
     settled = moves if moves == "at rest" else f"RMS {moves}"
-    verdict = f"{'stable' if each.stable else 'unstable'}, {settled}"
+    verdict = f"{each.verdict}, {settled}"
     panel.set_title(f"{wall.stiffness_n_per_m / 1e3:g} kN/m, {wall.damping_n_s_per_m:g} N s/m: {verdict}", loc="right")
     panel.set_ylabel("force (N)")

@@ -15,6 +15,8 @@ from ..walls.zwidth import Map
 from .labels import label_points
 from .style import LABEL_PT, THEORY, ink, lay_out, looks, new_figure, page
 
+BAND = 0.2
+"""The opacity of the interval of a line."""
 BORDER = "0.6"
 """The colour of the map's border."""
 ROOM = 8
@@ -25,7 +27,7 @@ SEEN = 0.02
 
 @page
 def draw(found: ZWidth) -> Figure:
-    """Return the picture of the largest stable stiffness against damping."""
+    """Return the picture of the stiffness up to which a wall is more likely stable than not, against damping."""
     maps = found.maps
     scenes = [each.case.scene for each in maps]
     scene, controller, grid = scenes[0], scenes[0].controller, grid_of(scenes[0])
@@ -36,19 +38,24 @@ def draw(found: ZWidth) -> Figure:
     picture = new_figure(5.2, title)
     axes = picture.subplots()
     styles = looks([(scene.controller.estimator, scene.estimator_output) for scene in scenes])
-    boundaries = [[(point.damping_n_s_per_m, point.stable_n_per_m / 1e3) for point in each.boundary] for each in maps]
+    boundaries = [_until_it_ends(each) for each in maps]
     limits = found.linear_limits
     for each, boundary, limit, style in zip(maps, boundaries, limits, styles, strict=True):
         label = f"{each.case.label}: {each.area / 1e3:.0f}"
         axes.plot(*zip(*boundary, strict=True), label=label, **style | {"ms": 3.5})
+        low, high = np.array(each.intervals).T / 1e3
+        dampings = [point.damping_n_s_per_m for point in each.boundary]
+        axes.fill_between(dampings, low, high, color=style["color"], alpha=BAND, lw=0)
         if limit:
             axes.plot(grid.dampings, np.array(limit) / 1e3, color=style["color"], ls=":", lw=1.1)
     axes.set_xlabel("damping B of the wall (N s/m)")
-    axes.set_ylabel("largest stable stiffness K (kN/m)")
+    axes.set_ylabel("stiffness K up to which half are stable (kN/m)")
     axes.set_xlim(0, None)
     axes.set_ylim(0, 1.08 * axes.get_ylim()[1])
     border = _border(axes, grid)
-    notes = ["dotted: limit of the linear loop without friction, in the colour of its method"] if any(limits) else []
+    starts = maps[0].starts
+    notes = [f"band: 95 of 100 draws of the {starts} starts of every wall"] if starts > 1 else []
+    notes += ["dotted: limit of the linear loop without friction, in the colour of its method"] if any(limits) else []
     if any(each.leaves for each in maps):
         notes.append("a region whose line meets the right or the upper border of the map (grey) goes on beyond it")
     notes += _passive(axes, scene, grid.dampings)
@@ -62,6 +69,13 @@ def draw(found: ZWidth) -> Figure:
         lay_out(picture)
         label_points(axes, labels, lines=[*dotted, border])
     return picture
+
+
+def _until_it_ends(each: Map) -> list[tuple[float, float]]:
+    """Return the boundary as (B, K in kN/m), to the first B behind the last stable wall."""
+    points = [(point.damping_n_s_per_m, point.stable_n_per_m / 1e3) for point in each.boundary]
+    stable = [number for number, (_, stiffness) in enumerate(points) if stiffness]
+    return points[: max(stable, default=0) + 2]
 
 
 def _border(axes: Axes, grid: Grid) -> list[tuple[float, float]]:

@@ -1,20 +1,25 @@
 """The world of a scene in the form that the loop takes; parts that the scene lacks are left out."""
 
+import math
+
 from ...model import quadrature
 from ...model.design import overlap_of
-from ...model.stamped import Controller
+from ...model.stamped import Controller, room_for
 from ..loop.values import EDGE_CAPACITY, Progress, Sweep, World
 from ..world import device
-from ..world.advance import Moment
+from ..world.advance import Interval, Moment, advance
 from ..world.converter import AS_IT_IS, Converter, Pulse, converted, width_of
-from ..world.encoder import Encoder, locate
+from ..world.encoder import Cell, Encoder, locate
 from ..world.euler import Stepped, stepped
 from ..world.linear import State
 from ..world.rigid import Coulomb, Handle, Motion, Rigid, span
+from ..world.taylor import Train
 from .schema import Scene
 
 MARGIN_COUNTS = 1e-6
 """The least distance of a counted position from an edge: far more than rounding moves the time of an edge."""
+EVERYWHERE = Cell(0, -math.inf, math.inf)
+"""A cell without an edge."""
 
 
 def device_of(scene: Scene) -> device.Device | None:
@@ -130,12 +135,37 @@ def sweep_of(scene: Scene, world: World, controller: object) -> Sweep | None:
 
 
 def start_of(scene: Scene, world: World) -> Progress:
-    """Return the start of a run: at rest, under the push alone. If samples overlap, as many more are taken there."""
-    position_m, push_n = scene.protocol.start_m, converted(world.converter, world.push_n)
-    motion = Motion(position_m, 0.0)
-    if not isinstance(world.plant, Rigid):
-        pulse = world.plant.pulse
-        width = width_of(pulse, push_n) if pulse.period else 0
-        motion = State(position_m, 0.0, (0.0, 0.0, 0.0), width)
+    """Return the start of a run, under the push alone. If samples overlap, as many more are taken there.
+
+    The handle is at rest or, with a phase, has been pushed from rest for that part of a period of the force, and is at
+    the place of the start then.
+    """
+    protocol = scene.protocol
+    cell, position_m = locate(world.encoder, protocol.start_m), protocol.start_m
+    if protocol.start_counts is not None:
+        position_m = cell.lower_m + protocol.start_counts * (cell.upper_m - cell.lower_m)
+    push_n = converted(world.converter, world.push_n)
+    motion = _rest_at(position_m, world.plant, push_n)
+    clocks = round(protocol.start_periods * scene.spec.clock_hz / scene.spec.actuation_hz)
+    if clocks:
+        # Where a start does not matter to the motion, one that lies by the travel farther back ends at the place.
+        travel_m = _pushed(world, motion, push_n, clocks).position_m - position_m
+        motion = _pushed(world, _rest_at(position_m - travel_m, world.plant, push_n), push_n, clocks)
     taken = (motion,) * max(overlap_of(world.timing), 1)
-    return Progress(0, Moment(motion, locate(world.encoder, position_m), 0), push_n, taken)
+    return Progress(0, Moment(motion, cell, 0), push_n, taken)
+
+
+def _rest_at(position_m: float, plant: Rigid | Train | Stepped, push_n: float) -> Motion | State:
+    """Return a plant at rest at a place."""
+    if isinstance(plant, Rigid):
+        return Motion(position_m, 0.0)
+    width = width_of(plant.pulse, push_n) if plant.pulse.period else 0
+    return State(position_m, 0.0, (0.0, 0.0, 0.0), width)
+
+
+def _pushed(world: World, motion: Motion | State, push_n: float, clocks: int) -> Motion | State:
+    """Return the motion after clocks of the push, which end at clock 0; nobody looks at the encoder meanwhile."""
+    seconds = clocks / world.encoder.clock_hz
+    length = span(world.plant.handle, seconds) if isinstance(world.plant, Rigid) else seconds
+    moment, interval = Moment(motion, EVERYWHERE, 0), Interval(length, -clocks, clocks)
+    return advance(world.plant, world.encoder, moment, push_n, interval, room_for(1)).motion

@@ -66,17 +66,20 @@ class Case:
         self,
         stiffness_n_per_m: float | None = None,
         damping_n_s_per_m: float | None = None,
-        start_m: float | None = None,
+        start: tuple[float, float] | None = None,
     ) -> Scene:
-        """Return the scene for a hit of another wall, or from another start; only wall and start are checked again.
+        """Return the scene for a hit of another wall, or from another start: its place in a count and its phase. Only
+        the wall is checked again.
 
         Raises:
-            SceneError: if wall or start are not valid.
+            SceneError: if the wall is not valid.
         """
         scene = self.scene
-        own = scene.wall.stiffness_n_per_m, scene.wall.damping_n_s_per_m, scene.protocol.start_m
-        asked = stiffness_n_per_m, damping_n_s_per_m, start_m
-        hit = scene.hitting(*(mine if other is None else other for mine, other in zip(own, asked, strict=True)))
+        own, asked = (
+            (scene.wall.stiffness_n_per_m, scene.wall.damping_n_s_per_m),
+            (stiffness_n_per_m, damping_n_s_per_m),
+        )
+        hit = scene.hitting(*(mine if other is None else other for mine, other in zip(own, asked, strict=True)), start)
         try:
             check_hit(hit)
         except ValueError as error:

@@ -109,8 +109,7 @@ def _range_of(word: Word, scene: Scene) -> str:
 
 
 def check_hit(scene: Scene) -> None:
-    """Raise ValueError for an invalid start or wall of an otherwise valid scene; the message begins with the key."""
-    _check_start(scene)
+    """Raise ValueError for an invalid wall of an otherwise valid scene; the message begins with the key."""
     _check_wall(scene)
 
 
@@ -124,7 +123,7 @@ def _check_start(scene: Scene) -> None:
 
 def _check_protocol(scene: Scene) -> None:
     protocol, rate = scene.protocol, scene.spec.sample_hz
-    for key in ("settle_s", "mean_s", "measure_s"):
+    for key in ("settle_s", "mean_s", "measure_s", "longest_s"):
         value = getattr(protocol, key)
         if not value * rate > 0.5:
             raise ValueError(f"protocol.{key} must be at least one sample of {1 / rate:g} s, not {value!r}")

@@ -148,26 +148,32 @@ class SolverSection(Section):
 
 
 class ProtocolSection(Section):
-    """A hit from rest at `start_m`, pushed towards the wall. A wall is stable if the RMS distance over `measure_s`
-    after `settle_s`, from the mean over `mean_s` before it, is under the threshold."""
+    """A hit from rest at `start_m`, pushed towards the wall, and what is said of it: see `hardwall.sim.walls.tally`.
+
+    The place in the count of `start_m` and the phase of the push in a period of the force are those of one start among
+    many that differ by chance alone: see `hardwall.sim.walls.starts`.
+    """
 
     start_m: Annotated[Place, Field(le=-1e-12)]
+    start_counts: Annotated[float, Field(ge=0, lt=1)] | None = None
+    start_periods: Annotated[float, Field(ge=0, lt=1)] = 0.0
     push_n: Force
     settle_s: Time
     mean_s: Time
     measure_s: Time
+    longest_s: Time = 20.0
     threshold_mm: Threshold
+    verdict: Literal["detrended", "literal"] = "detrended"
 
 
 class ZWidthSection(Section):
-    """Steps of a map of stable walls, and the number of walls hit below its edge: see `hardwall.sim.walls.boundary`."""
+    """Steps of a map of stable walls: see `hardwall.sim.walls.boundary`."""
 
     stiffness_step_n_per_m: Stiffness
     stiffness_to_n_per_m: Stiffness
     damping_from_n_s_per_m: or_none(Damping)
     damping_to_n_s_per_m: or_none(Damping)
     damping_step_n_s_per_m: Damping
-    walls_below: Annotated[int, Field(ge=0, le=1000)] = 0
 
 
 class Scene(Section):
@@ -253,10 +259,16 @@ class Scene(Section):
         """The run-time parameters as the hardware's words."""
         return self.spec.design.encode(**self.parameters)
 
-    def hitting(self, stiffness_n_per_m: float, damping_n_s_per_m: float, start_m: float) -> "Scene":
-        """Return the scene with another wall and start; the axis depends on neither, and is not derived again."""
+    def hitting(
+        self, stiffness_n_per_m: float, damping_n_s_per_m: float, start: tuple[float, float] | None = None
+    ) -> "Scene":
+        """Return the scene with another wall, and with another start (place and phase) if one is given.
+
+        The axis depends on neither, and is not derived again.
+        """
         wall = {"stiffness_n_per_m": stiffness_n_per_m, "damping_n_s_per_m": damping_n_s_per_m}
-        protocol = self.protocol.model_copy(update={"start_m": start_m})
+        changes = {} if start is None else dict(zip(("start_counts", "start_periods"), start, strict=True))
+        protocol = self.protocol.model_copy(update=changes)
         return self.model_copy(update={"wall": self.wall.model_copy(update=wall), "protocol": protocol})
 
     @property
@@ -266,6 +278,23 @@ class Scene(Section):
 
     @property
     def samples(self) -> int:
-        """Number of samples of the protocol, for settling and measuring together."""
-        rate = self.controller.sample_hz
-        return round(self.protocol.settle_s * rate) + round(self.protocol.measure_s * rate)
+        """Number of samples of the protocol, for settling and one window of measuring together."""
+        return self.settled + self.measured
+
+    @property
+    def settled(self) -> int:
+        """Number of samples of the settling."""
+        return round(self.protocol.settle_s * self.controller.sample_hz)
+
+    @property
+    def measured(self) -> int:
+        """Number of samples of a window of the measuring."""
+        return round(self.protocol.measure_s * self.controller.sample_hz)
+
+    @property
+    def most_samples(self) -> int:
+        """Number of samples of a run whose verdict takes the most windows."""
+        if self.protocol.verdict == "literal":
+            return self.samples
+        longest = round(self.protocol.longest_s * self.controller.sample_hz)
+        return self.settled + max((longest - self.settled) // self.measured, 1) * self.measured

@@ -21,7 +21,7 @@ OWN_OF_CONTROLLER = {"output", "glitch_clocks", "slew_limit_n_per_s", "gains"}
 """The keys of the controller that are run-time words, which every axis has of its own."""
 SHARED = {
     *(("controller", key) for key in ControllerSection.model_fields if key not in OWN_OF_CONTROLLER),
-    *(("protocol", key) for key in ("settle_s", "mean_s", "measure_s")),
+    *(("protocol", key) for key in ("settle_s", "mean_s", "measure_s", "longest_s", "verdict")),
     ("encoder", "count_m"),
 }
 """The keys that all axes share."""
@@ -70,6 +70,11 @@ class AxisScene(Scene):
             return si
         gains = self.gains.model_dump()
         return si | {word: gains[field] for word, field in GAIN_WORDS.items() if field in gains}
+
+    @property
+    def most_samples(self) -> int:
+        """The samples of one window: the hardware of all axes is one, and their runs end together."""
+        return self.samples
 
 
 @dataclass(frozen=True)

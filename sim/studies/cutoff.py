@@ -23,7 +23,7 @@ from ..scene.case import Case, accepted
 from ..scene.schema import Scene
 from ..walls.grid import wider_grid
 from ..walls.zwidth import Effort, Map, Mapper
-from .zwidth import area_text, plus_of_areas
+from .zwidth import area_text, interval_text, plus_of_areas
 
 SCENES = ("seed-2011", "desktop-arm", "maglev")
 """The paper's device, and two devices with another mass, friction, count and rates."""
@@ -65,16 +65,21 @@ class Optimum:
     def level_hz(self) -> tuple[float, float]:
         """The range of cutoffs around the best that are equally good, limited to the cutoffs that were mapped.
 
-        Between two maps the area is interpolated linearly over the logarithm of the cutoff.
+        Between two maps the area is interpolated linearly over the logarithm of the cutoff. Where the starts do not
+        tell a cutoff from the best, the range goes on to it.
         """
         cutoffs, areas = list(self.maps), [a_map.area for a_map in self.maps.values()]
         enough = (1 - LEVEL) * self.best.area
 
+        def good(place: int) -> bool:
+            times = self.maps[cutoffs[place]].times(self.best)
+            return areas[place] >= enough or (times is not None and times[1] >= 1)
+
         def end(direction: int) -> float:
             inside = cutoffs.index(self.best_hz)
-            while 0 <= (beyond := inside + direction) < len(areas) and areas[beyond] >= enough:
+            while 0 <= (beyond := inside + direction) < len(areas) and good(beyond):
                 inside = beyond
-            if not 0 <= beyond < len(areas):
+            if not 0 <= beyond < len(areas) or areas[inside] < enough:
                 return cutoffs[inside]
             logs = np.log([cutoffs[beyond], cutoffs[inside]])
             return float(np.exp(np.interp(enough, [areas[beyond], areas[inside]], logs)))
@@ -115,12 +120,21 @@ class Cutoffs:
 
     def tables(self) -> list[Table]:
         """Return the best cutoff of every device, and the areas at every cutoff."""
-        numbers = ("best (Hz)", "its area (kN/m N s/m)", "within 5 %, from (Hz)", "to (Hz)", "no filter: area")
+        numbers = ("best (Hz)", "its area (kN/m N s/m)", "of starts", "as good from (Hz)", "to (Hz)", "no filter: area")
         rows = []
         for each in self.optima:
             best = f"{each.best_hz:.0f}" + ", at the end" * each.at_end
             level = [f"{end:.0f}" for end in each.level_hz]
-            rows.append([each.scene.name, best, area_text(each.best), *level, area_text(each.unfiltered)])
+            rows.append(
+                [
+                    each.scene.name,
+                    best,
+                    area_text(each.best),
+                    interval_text(each.best),
+                    *level,
+                    area_text(each.unfiltered),
+                ]
+            )
         cutoffs = sorted({cutoff_hz for each in self.optima for cutoff_hz in each.maps})
         areas = [
             [f"{cutoff:g}", *(area_text(each.maps[cutoff]) if cutoff in each.maps else "" for each in self.optima)]
@@ -130,8 +144,9 @@ class Cutoffs:
         return [table_of(("device",), numbers, rows), table_of((), columns, areas)]
 
     def notes(self) -> list[str]:
-        """Return the meaning of a +."""
-        return plus_of_areas(a_map for each in self.optima for a_map in (*each.maps.values(), each.unfiltered))
+        """Return what is as good, and the meaning of a +."""
+        good = f"as good: within {LEVEL:.0%} of the best area, or not told from it by the starts"
+        return [good, *plus_of_areas(a_map for each in self.optima for a_map in (*each.maps.values(), each.unfiltered))]
 
 
 class _Cases:

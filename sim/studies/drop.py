@@ -29,13 +29,13 @@ from ..walls import hit
 from ..walls.chatter import at_rest
 from ..walls.grid import wider_grid
 from ..walls.methods import PROPOSED, Curve, methods
+from ..walls.starts import start as start_of
 from ..walls.zwidth import Mapper
 from .drop_result import STIFFNESS_N_PER_M, Drop, End, Law, Shaken
 
 DAMPINGS_N_S_PER_M = np.geomspace(3, 400, 18).round(1)
 STARTS = 8
-"""The number of hits of a wall. Every hit starts `APART` counts farther off, as the cycle of the chatter is chance."""
-APART = 13.7
+"""The number of hits of a wall, each from another start, as the cycle of the chatter is chance."""
 REST_COUNTS = 0.1
 """A handle whose RMS of position is less has come to rest."""
 ENOUGH = 0.75
@@ -93,9 +93,8 @@ def strike(scene: str, text: str, changes: dict[str, Any], damping: float, start
     """
     case = Case("", scene, text, changes)
     plain = case.scene
-    start_m = plain.protocol.start_m - start * APART * plain.encoder.count_m
-    result = hit.run(case.hitting(damping_n_s_per_m=damping, start_m=start_m), backend, until_sure=True)
-    if result.samples <= plain.protocol.settle_s * plain.spec.sample_hz:
+    result = hit.run(case.hitting(damping_n_s_per_m=damping, start=start_of(start)), backend, until_sure=True)
+    if math.isinf(result.rms_m):
         return {"rests": False, "stable": False, "rms_m": None}
     rests = result.rms_m < REST_COUNTS * plain.encoder.count_m and result.mean_m > 0
     return {"rests": rests, "stable": result.stable, "rms_m": result.rms_m}

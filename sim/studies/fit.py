@@ -39,7 +39,7 @@ BEYOND = 1.3
 COARSE, FULL = 12, 54
 """The numbers of steps of B in a map."""
 STIFFNESS_STEP_N_PER_M = 1e3
-SHORT = {"protocol.settle_s": 2.5, "protocol.mean_s": 0.25, "protocol.measure_s": 0.5}
+SHORT = {"protocol.settle_s": 2.5, "protocol.mean_s": 0.25}
 MISSED = 0.05
 FAR = math.log(1.5)
 HOPELESS = math.log(1e3)

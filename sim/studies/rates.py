@@ -28,8 +28,9 @@ FINE = {
     "controller.stiffness_max_n_per_m": 500e3,
 }
 """The grid of the maps: finer in K than in B, because the largest K is of interest."""
-SHORT = {"protocol.settle_s": 1.5, "protocol.mean_s": 0.25, "protocol.measure_s": 0.5}
-"""A third of the paper's protocol: the handle reaches the wall after half a second, and a hit at 1 MHz takes long."""
+SHORT = {"protocol.settle_s": 2.0, "protocol.mean_s": 0.25}
+"""Half of the paper's time to settle: the handle reaches the wall after half a second, and a hit at 1 MHz takes long. A
+hit that still settles then goes on."""
 FINER = 5
 """The factor by which the steps of K are finer at the scene's own rates, where the walls are softer."""
 GAINED = 0.95
@@ -87,9 +88,11 @@ class Gain:
             "label": self.label,
             "rates_hz": self.rates_hz,
             "largest_stiffness_n_per_m": self.largest_n_per_m,
+            "largest_stiffness_interval_n_per_m": [list(each.largest_interval) for each in self.maps],
             "clipped": [each.clipped for each in self.maps],
             "area_n2_s_per_m2": [each.area for each in self.maps],
             "largest_stiffness_at_the_scenes_rates_n_per_m": self.own.largest_n_per_m,
+            "largest_stiffness_interval_at_the_scenes_rates_n_per_m": list(self.own.largest_interval),
             "ratio": self.ratio,
             "gains_up_to_hz": self.ends_at_hz,
         }
@@ -121,7 +124,7 @@ class Rates:
         rates = [f"{rate / 1e3:g} kHz" for rate in self.gains[0].rates_hz]
         rows = []
         for each in self.gains:
-            values = [f"{a_map.largest_n_per_m / 1e3:.0f}" + "+" * a_map.clipped for a_map in (each.own, *each.maps)]
+            values = [_largest_text(a_map) for a_map in (each.own, *each.maps)]
             ratio = "" if each.ratio is None else f"{each.ratio:.2f}"
             ends = "" if each.ends_at_hz is None else f"{each.ends_at_hz / 1e3:g}"
             rows.append([each.label, *values, ratio, ends])
@@ -132,7 +135,15 @@ class Rates:
     def notes(self) -> list[str]:
         """Return the meaning of `own` and of a +."""
         clipped = any(a_map.clipped for gain in self.gains for a_map in (gain.own, *gain.maps))
-        return ["own: at the scene's own rates"] + ["+: K goes on beyond the map"] * clipped
+        return ["own: at the scene's own rates", "in brackets: of the starts, in 95 of 100 draws"] + [
+            "+: K goes on beyond the map"
+        ] * clipped
+
+
+def _largest_text(each: Map) -> str:
+    """Return the largest K of a map and the interval of its starts as text, in kN/m."""
+    low, high = (f"{end / 1e3:.0f}" for end in each.largest_interval)
+    return f"{each.largest_n_per_m / 1e3:.0f}" + "+" * each.clipped + (f" ({low} to {high})" if low != high else "")
 
 
 def study(case: Case, curves: list[Curve], rates_hz: list[int], mapper: Mapper) -> Rates:

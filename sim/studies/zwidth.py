@@ -1,17 +1,22 @@
 """Z-width of several methods on one scene: their maps side by side, and the facts of the paper's Figure 5."""
 
+import csv
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
+from ...model.whole_file import whole_file
 from ..jobs.result import Table, table_of
 from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls import theory
-from ..walls.figure_5 import Fact, facts
+from ..walls.boundary import UNDECIDED
+from ..walls.figure_5 import Fact, with_shares
 from ..walls.grid import grid_of
 from ..walls.methods import Curve, methods
+from ..walls.starts import start
 from ..walls.zwidth import Effort, Map, Mapper
 
 
@@ -43,37 +48,61 @@ class ZWidth:
 
     def tables(self) -> list[Table]:
         """Return a table of the maps, and a table of the facts if there are any."""
-        areas = ("area (kN/m N s/m)", "held", "in place")
+        areas = ("area (kN/m N s/m)", "of starts", "held", "in place")
         rows = [
             [
                 each.case.label,
                 area_text(each),
+                interval_text(each),
                 "" if each.area_held is None else f"{each.area_held / 1e3:.0f}",
                 f"{each.area_in_place / 1e3:.0f}",
-                f"{each.largest_n_per_m / 1e3:g}",
-                f"{each.damping_n_s_per_m:g}",
+                f"{each.largest_n_per_m / 1e3:.3g}" + "+" * each.clipped,
+                f"{each.damping_n_s_per_m:g}" + "+" * (each.boundary[-1].stable_n_per_m > 0),
+                str(len(each.islands)),
+                str(sum(wall.number_of(UNDECIDED) for wall in each.walls)),
                 str(each.hits),
                 f"{each.seconds:.1f}",
             ]
             for each in self.maps
         ]
-        tables = [table_of(("method",), (*areas, "largest K (kN/m)", "to B (N s/m)", "hits", "s"), rows)]
+        numbers = (*areas, "largest K (kN/m)", "to B (N s/m)", "islands", "undecided", "hits", "s")
+        tables = [table_of(("method",), numbers, rows)]
         if self.facts:
-            lines = [[fact.text, "held" if fact.held else "not held", fact.numbers] for fact in self.facts]
-            tables.append(table_of(("the paper's Figure 5", "here", "numbers"), (), lines))
+            lines = [[fact.text, _held(fact), fact.numbers] for fact in self.facts]
+            tables.append(table_of(("the paper's Figure 5", "here, and in draws of the starts", "numbers"), (), lines))
         return tables
 
     def notes(self) -> list[str]:
         """Return the meaning of the columns."""
-        held = ["held: that area, times the share of the walls hit below the edge that are stable too"]
         return [
-            "area: under the largest stable K at every B",
-            *(held if any(each.area_held is not None for each in self.maps) else []),
-            "in place: that area without each B whose largest stable wall holds the handle elsewhere than its spring "
+            "area: under the K at which a hit is as likely stable as not, at every B",
+            f"of starts: between which it is in 95 of 100 draws of the {self.maps[0].starts} starts; the steps of the "
+            "map come on top",
+            "held: that area, times the share of the hits below the edge that are stable too",
+            "in place: that area without each B whose stiffest stable wall holds the handle elsewhere than its spring "
             "alone would",
             "to B: the largest B with a stable wall",
+            "islands: walls that were hit on the wrong side of the edge",
+            "undecided: hits that still settled when their time was over; the lower end takes them for unstable",
             *plus_of_areas(self.maps),
         ]
+
+    def save(self, path: Path) -> None:
+        """Write every hit as a line of a .csv, with units in the names of the columns.
+
+        Raises:
+            OSError: if the file cannot be written.
+        """
+        with whole_file(path) as part, part.open("w", newline="") as file:
+            writer = csv.writer(file)
+            keys = ("verdict", "in_place", "rms_mm", "offset_mm", "drift_mm_per_s", "run_s")
+            names = ("label", "damping_n_s_per_m", "stiffness_n_per_m", "start", "start_counts", "start_periods")
+            writer.writerow((*names, *keys))
+            for each in self.maps:
+                for wall in each.walls:
+                    for number, hit in sorted(wall.hits.items()):
+                        place = each.case.label, wall.damping_n_s_per_m, wall.stiffness_n_per_m, number, *start(number)
+                        writer.writerow((*place, *(hit[key] for key in keys)))
 
 
 def study(case: Case, curves: list[Curve] | None, mapper: Mapper) -> ZWidth:
@@ -91,8 +120,13 @@ def study(case: Case, curves: list[Curve] | None, mapper: Mapper) -> ZWidth:
     papers = methods(scene)
     cases = [case.changed(curve.changes, curve.label) for curve in (papers.values() if curves is None else curves)]
     maps = mapper(f"{scene.name} Z-width", cases)
-    shown = facts(dict(zip(papers, maps, strict=True))) if curves is None else []
+    shown = with_shares(dict(zip(papers, maps, strict=True))) if curves is None else []
     return ZWidth(scene, maps, shown, mapper.effort())
+
+
+def _held(fact: Fact) -> str:
+    """Return whether a fact is held, and in which part of the draws of the starts it is."""
+    return ("held" if fact.held else "not held") + ("" if fact.share is None else f", {fact.share:.0%}")
 
 
 def _linear_limits(scene: Scene) -> list[float] | None:
@@ -105,6 +139,11 @@ def _linear_limits(scene: Scene) -> list[float] | None:
 def area_text(each: Map) -> str:
     """Return the area of a map as text, in kN/m N s/m, with a + where the region leaves the map."""
     return f"{each.area / 1e3:.0f}" + "+" * each.leaves
+
+
+def interval_text(each: Map) -> str:
+    """Return the interval of a map's area as text, in kN/m N s/m."""
+    return "{:.0f} to {:.0f}".format(*(end / 1e3 for end in each.area_interval))
 
 
 def plus_of_areas(maps: Iterable[Map]) -> list[str]:

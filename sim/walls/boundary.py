@@ -1,35 +1,35 @@
-"""The trace of the boundary of the stable region of walls, by the founding paper's method: the walls to hit, in order.
+"""The walls of a map, and who hits them: at every B a search for the K at which as many starts are stable as not.
 
-Stiffness K and damping B go in steps. From a stable wall, raise K until a wall is unstable; then raise B by a step, and
-from that K go down to the first stable wall if the wall there is unstable, else up to the first unstable wall. At each
-B the lowest unstable K found in this way is the marginal K. The trace ends where no K is stable, or at the last B. It
-starts from the softest wall of the first B; if that wall is unstable, K is doubled, then B raised, until one is stable.
+Stiffness K and damping B go in steps. At each B, from the K of the B before, `SCOUTS` starts look for two neighbours in
+K, the softer of which is stable for half of them and the stiffer one is not: in steps that double, then by halves. If
+nothing is stable below, one start looks at every doubling of K from the first step on. All starts then hit both
+neighbours, and walls at twice the distance each time, until `SURE` of them are stable below and unstable above. Farther
+off one start hits a wall at every fourfold distance, down to the first step of K and up to the last: the region of
+stable walls may have holes, and islands around it.
 
-The boundary is the upper one. Walls below it may still be unstable, which a trace does not see: `below` hits some.
-
-Nothing here hits a wall: `trace` is a generator that yields walls and is sent verdicts, so the map does not depend on
-the source of the verdicts, or on the order in which several maps get theirs.
+Nothing here hits a wall: `walls` is a generator that yields walls and starts, and is sent verdicts. So the map does not
+depend on the source of the verdicts, or on the order in which several maps get theirs.
 """
 
 import math
-from collections.abc import Generator
-from dataclasses import dataclass, replace
+from collections.abc import Generator, Iterable
+from dataclasses import dataclass
 from itertools import pairwise
+
+SCOUTS = 3
+SURE = 0.8
+STABLE, UNDECIDED = "stable", "undecided"
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Steps and ends of a map: B from `damping_from_n_s_per_m` to `damping_to_n_s_per_m`, K from one step to its end.
-
-    At each B, `walls_below` walls below the boundary are hit as well.
-    """
+    """Steps and ends of a map: B from the first to the last one, K from one step to its end."""
 
     stiffness_step_n_per_m: float
     stiffness_to_n_per_m: float
     damping_from_n_s_per_m: float
     damping_to_n_s_per_m: float
     damping_step_n_s_per_m: float
-    walls_below: int = 0
 
     @property
     def dampings(self) -> list[float]:
@@ -54,9 +54,10 @@ class BoundaryPoint:
 
     Attributes:
         damping_n_s_per_m: B.
-        stable_n_per_m: the largest stable K under the marginal K; 0 if no K is stable.
-        marginal_n_per_m: the lowest unstable K above it; None where the largest K of the map is still stable.
-        held: the part of the walls hit below the boundary that is stable; None if no wall below was hit.
+        stable_n_per_m: the K up to which a hit is more likely stable than not; 0 if no wall of the map is.
+        marginal_n_per_m: the softest wall above that was hit and is not; None where the region goes on beyond the
+            largest K of the map.
+        held: the share of stable walls below the boundary; None if there is none below.
     """
 
     damping_n_s_per_m: float
@@ -65,61 +66,106 @@ class BoundaryPoint:
     held: float | None = None
 
 
-def trace(grid: Grid) -> Generator[tuple[float, float], bool, list[BoundaryPoint]]:
-    """Yield walls (K, B) to hit, receive whether each is stable, and return the boundary, by B.
-
-    The walls below the boundary that the grid asks for come last.
-    """
-    step, boundary, row = grid.stiffness_step_n_per_m, [], 0
-    for damping in grid.dampings:
-        if row == 0:
-            row = yield from _first(grid, damping)
-            if row == 0:
-                boundary.append(BoundaryPoint(damping, 0.0, step))
-                continue
-            starts_stable = True
-        else:
-            starts_stable = yield row * step, damping
-        if starts_stable:
-            stable = row
-            while stable < grid.rows and (yield (stable + 1) * step, damping):
-                stable += 1
-        else:
-            stable = row - 1
-            while stable > 0 and not (yield stable * step, damping):
-                stable -= 1
-        boundary.append(BoundaryPoint(damping, stable * step, (stable + 1) * step if stable < grid.rows else None))
-        if stable == 0:
-            break
-        row = min(stable + 1, grid.rows)
-    return (yield from below(boundary, grid)) if grid.walls_below else boundary
+Asked = Generator[tuple[float, float, list[int]], list[str], None]
+"""A generator that yields K, B and the numbers of starts, and is sent their verdicts."""
 
 
-def _first(grid: Grid, damping: float) -> Generator[tuple[float, float], bool, int]:
-    """Yield walls of one B, with K doubled each time; return the row of the first stable wall, 0 if none is stable."""
-    row = 1
-    while row <= grid.rows:
-        if (yield row * grid.stiffness_step_n_per_m, damping):
-            return row
-        row *= 2
-    return 0
+def share(verdicts: Iterable[str]) -> float:
+    """Return the share of stable ones; an undecided one counts half."""
+    values = [1.0 if each == STABLE else 0.5 if each == UNDECIDED else 0.0 for each in verdicts]
+    return sum(values) / len(values)
 
 
-def below(boundary: list[BoundaryPoint], grid: Grid) -> Generator[tuple[float, float], bool, list[BoundaryPoint]]:
-    """Yield as many walls below each point as the grid asks for, evenly spaced in K; return the points with `held`."""
-    step, checked = grid.stiffness_step_n_per_m, []
-    for point in boundary:
-        top = round(point.stable_n_per_m / step)
-        rows = sorted({round(top * n / (grid.walls_below + 1)) for n in range(1, grid.walls_below + 1)} - {0, top})
-        stable = 0
-        for row in rows:
-            stable += yield row * step, point.damping_n_s_per_m
-        checked.append(replace(point, held=stable / len(rows)) if rows else point)
-    return checked
+def walls(grid: Grid, starts: int) -> Asked:
+    """Yield the walls of a map and the starts that hit them; no start hits a wall twice."""
+    row = max(grid.rows // 8, 1)
+    for number, damping in enumerate(grid.dampings):
+        column = _Column(grid, damping, starts, number % starts)
+        row = yield from column.searched(row)
+        yield from column.surrounded(row)
+        yield from column.patrolled(row)
+        row = max(row, 1)
+
+
+class _Column:
+    """The walls of one B, by rows of K from 1 on, and their verdicts so far by start; one of the starts goes alone."""
+
+    def __init__(self, grid: Grid, damping_n_s_per_m: float, starts: int, alone: int):
+        self._grid, self._damping = grid, damping_n_s_per_m
+        self._alone, self._scouts, self._all = [alone], list(range(min(SCOUTS, starts))), list(range(starts))
+        self._verdicts: dict[int, dict[int, str]] = {}
+
+    def _share(self, row: int, starts: list[int]) -> Generator:
+        """Have a wall hit by starts that have not yet; return the share of all that are stable."""
+        known = self._verdicts.setdefault(row, {})
+        missing = [start for start in starts if start not in known]
+        if missing:
+            stiffness = row * self._grid.stiffness_step_n_per_m
+            found = yield stiffness, self._damping, missing
+            known.update(zip(missing, found, strict=True))
+        return share(known.values())
+
+    def _holds(self, row: int, starts: list[int]) -> Generator:
+        return (yield from self._share(row, starts)) >= 0.5
+
+    def searched(self, row: int) -> Generator:
+        """Return the last row that scouts find stable, 0 if they find none."""
+        low, high, step = row, row, 1
+        while low >= 1 and not (yield from self._holds(low, self._scouts)):
+            low, high, step = low - step, low, 2 * step
+        low = max(low, 0)
+        if low == 0:
+            low = yield from self._doubled()
+            high = low
+        if low and high == low:
+            low, high = yield from self._climbed(low)
+        while high - low > 1:
+            middle = (low + high) // 2
+            if (yield from self._holds(middle, self._scouts)):
+                low = middle
+            else:
+                high = middle
+        return low
+
+    def _doubled(self) -> Generator:
+        """Return the last of the rows 1, 2, 4 and so on that is stable, 0 if none is."""
+        last, row = 0, 1
+        while row <= self._grid.rows:
+            if (yield from self._holds(row, self._alone)) and (yield from self._holds(row, self._scouts)):
+                last = row
+            row *= 2
+        return last
+
+    def _climbed(self, low: int) -> Generator:
+        """Return a stable row and an unstable one above, perhaps that beyond the last; from a stable row up."""
+        step, high = 1, low + 1
+        while high <= self._grid.rows and (yield from self._holds(high, self._scouts)):
+            low, step = high, 2 * step
+            high = min(low + step, self._grid.rows) if low < self._grid.rows else low + 1
+        return low, high
+
+    def surrounded(self, row: int) -> Generator:
+        """Have all starts hit the walls around a boundary, as far as they differ."""
+        away = 0
+        while row - away >= 1 and (yield from self._share(row - away, self._all)) < SURE:
+            away = max(2 * away, 1)
+        away = 1
+        while row + away <= self._grid.rows and (yield from self._share(row + away, self._all)) > 1 - SURE:
+            away *= 2
+
+    def patrolled(self, row: int) -> Generator:
+        """Have one start hit walls at every fourfold distance from a boundary."""
+        rows, away = {1, self._grid.rows}, 1
+        while away < self._grid.rows:
+            rows |= {row - away, row + away}
+            away *= 4
+        for each in sorted(rows):
+            if 1 <= each <= self._grid.rows and each not in self._verdicts:
+                yield from self._share(each, self._alone)
 
 
 def area(boundary: list[BoundaryPoint]) -> float:
-    """Return the area under the largest stable K, N^2 s/m^2, by trapezoids between the values of B."""
+    """Return the area under the boundary, N^2 s/m^2, by trapezoids between the values of B."""
     return sum(
         (right.damping_n_s_per_m - left.damping_n_s_per_m) * (left.stable_n_per_m + right.stable_n_per_m) / 2
         for left, right in pairwise(boundary)

@@ -15,7 +15,7 @@ Every fact has a shortfall: 0 if it holds, 1 if nothing of it is there, and betw
 - K that should rise and fall: a quarter for each rise or fall that is missing.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -32,12 +32,16 @@ Judged = tuple[bool, float, str]
 
 @dataclass(frozen=True)
 class Fact:
-    """A fact of the paper's figure, whether the maps show it, their shortfall from 0 to 1, and the numbers."""
+    """A fact of the paper's figure, whether the maps show it, their shortfall from 0 to 1, and the numbers.
+
+    `share` is that of the draws of the starts that show it; None if that was not asked for.
+    """
 
     text: str
     held: bool
     shortfall: float
     numbers: str
+    share: float | None = None
 
 
 def facts(maps: dict[str, Map]) -> list[Fact]:
@@ -63,6 +67,14 @@ def facts(maps: dict[str, Map]) -> list[Fact]:
     if not seen.end:
         return [Fact(text, False, 1.0, numbers) for text, (_, _, numbers) in judged]
     return [Fact(text, bool(held), min(float(lack), 1.0), numbers) for text, (held, lack, numbers) in judged]
+
+
+def with_shares(maps: dict[str, Map]) -> list[Fact]:
+    """Return the eight facts with the shares of the draws that show them."""
+    number = next(iter(maps.values())).drawn.shape[2]
+    drawn = [facts({name: each.draw(draw) for name, each in maps.items()}) for draw in range(number)]
+    shares = np.mean([[fact.held for fact in each] for each in drawn], axis=0)
+    return [replace(fact, share=float(share)) for fact, share in zip(facts(maps), shares, strict=True)]
 
 
 class _Regions:

@@ -1,4 +1,4 @@
-"""Hits of the wall by the founding paper's protocol, on any scene and backend."""
+"""Hits of the wall, on any scene and backend: see `tally` for what is said of the wall."""
 
 import json
 import math
@@ -22,14 +22,18 @@ from ..scene.build import output_step_n, start_of, sweep_of, work_of, world_of
 from ..scene.schema import Scene
 from ..world.encoder import level
 from ..world.lines import waiting
-from .tally import Tally
+from . import repetition
+from .tally import STABLE, UNDECIDED, UNSTABLE, Tally
 
+VERDICTS = STABLE, UNSTABLE, UNDECIDED
 CHUNK = 1 << 16
 """Most samples in one call of the loop, which keeps them all; fewer if a sample takes long."""
 LOOKS = 100
 """Number of progress reports in a run."""
 LOOK_S = 0.25
 """Time between two checks whether the verdict is sure; a call of the loop costs as much as some 10^4 samples."""
+RESTS = 0.25, 0.5, 1.0
+"""The parts of the settling time after which the loop is looked at, whether it rests for ever."""
 OVERVIEW_POINTS = 6000
 DETAIL_FROM_M = -0.2e-3
 DETAIL_S = 0.1
@@ -46,8 +50,12 @@ class Hit(Summary):
 
     Attributes:
         seconds: wall time of the loop, without compiling and building.
-        mean_m: mean position before the settling mark, m; positive is inside the wall.
-        rms_m: RMS distance from that mean after the mark, m.
+        mean_m: mean position of the window that was judged, or in the literal protocol before the settling mark, m;
+            positive is inside the wall.
+        rms_m: RMS distance that the verdict is of, m.
+        offset_m, drift_m_per_s: the way from the mean before the settling mark to that of the window that was judged,
+            and the slope of the position over it.
+        judged: `stable`, `unstable` or `undecided`, as if the wall was touched: see `tally`.
         touched: whether the handle ever was within the wall, or felt it.
         force_sha256: digest of the drive words of every actuation, little-endian int32; None for `float`.
         overview, detail: if asked for, samples of the whole run, and every sample from shortly before the first
@@ -60,6 +68,9 @@ class Hit(Summary):
     seconds: float
     mean_m: float
     rms_m: float
+    offset_m: float
+    drift_m_per_s: float
+    judged: str
     touched: bool
     max_force_n: float
     flags: list[str]
@@ -68,9 +79,14 @@ class Hit(Summary):
     detail: record.Trace | None = None
 
     @property
+    def verdict(self) -> str:
+        """What is said of the wall: `stable`, `unstable` or `undecided`. One that was never touched is not stable."""
+        return self.judged if self.touched else UNSTABLE
+
+    @property
     def stable(self) -> bool:
-        """Whether the handle touched the wall, and the RMS stays under the protocol's threshold."""
-        return self.touched and self.rms_m * 1e3 < self.scene.protocol.threshold_mm
+        """Whether the handle touched the wall and stays there, within the protocol's threshold."""
+        return self.verdict == STABLE
 
     @property
     def in_place(self) -> bool:
@@ -78,8 +94,8 @@ class Hit(Summary):
 
         At rest the velocity is 0, and the spring carries the push and the hand, up to the friction that sticks, a step
         of the output and the position hidden in a count. A stable wall may be felt elsewhere: where the estimate is not
-        0 at rest, its damper carries a part. The mean after the settling mark is not farther from the mean before it
-        than the RMS.
+        0 at rest, its damper carries a part. In the literal protocol, the mean after the settling mark is not farther
+        from the mean before it than the RMS.
         """
         scene, stiffness = self.scene, self.scene.wall.stiffness_n_per_m
         hand, cable = scene.hand, scene.transmission
@@ -150,9 +166,12 @@ class Hit(Summary):
             "stiffness_n_per_m": self.scene.wall.stiffness_n_per_m,
             "damping_n_s_per_m": self.scene.wall.damping_n_s_per_m,
             "stable": self.stable,
+            "verdict": self.verdict,
             "touched": self.touched,
             "rms_mm": self.rms_m * 1e3,
             "mean_mm": self.mean_m * 1e3,
+            "offset_mm": self.offset_m * 1e3,
+            "drift_mm_per_s": self.drift_m_per_s * 1e3,
             "samples": self.samples,
             "seconds": self.seconds,
             "samples_per_s": self.samples / self.seconds,
@@ -187,6 +206,7 @@ class Loop:
         self.tally = Tally(scene, is_exact(backend))
         number, spec = number_of(backend), scene.spec
         self.chunk = max(1, CHUNK // work_of(self.world))
+        self.literal = scene.protocol.verdict == "literal"
         self.look = max(round(LOOK_S * spec.sample_hz), 1) if until_sure else scene.samples
         overview = detail = None
         if traces:
@@ -211,19 +231,44 @@ class Loop:
         """
         controller, state, _ = axis
         self.world = self.world._replace(sweep=sweep_of(self.scene, self.world, controller))
-        actions, total = dict(marks), self.scene.samples
+        actions = dict(marks)
         self._compile(controller, state)
         began = time.perf_counter()
-        while self.at.sample < total and not (self.until_sure and self.tally.sure_unstable):
+        looks = self._looks(state)
+        before = None
+        while self.tally.verdict is None and not (self.until_sure and self.tally.sure_unstable):
             first = self.at.sample
             if first in actions:
                 actions.pop(first)()
-            until = min(first + self.chunk, self._next_look(first), *(sample for sample in actions if sample > first))
+            if first in looks:
+                before = self._rests(state, before)
+                if self.tally.verdict is not None:
+                    break
+            stops = [sample for sample in (*actions, *looks) if sample > first]
+            until = min(first + self.chunk, self._next_look(first), *stops)
             state = self._chunk(controller, state, until, progress)
             if self.lost_edges:
                 break
             self.tally.add(first, self.memory.positions[: until - first], self.memory.drives[: until - first])
         return self.result(time.perf_counter() - began, int(state.flags))
+
+    def _looks(self, state) -> frozenset[int]:
+        """Return the numbers of the samples before which the loop is looked at, whether it rests: each second one is a
+        period behind the one before."""
+        period = repetition.period_of(self.scene, self.world, state) if self.until_sure and not self.literal else None
+        if period is None:
+            return frozenset()
+        firsts = [round(part * self.scene.settled) for part in RESTS]
+        if min(np.diff([*firsts, self.scene.samples])) <= period:
+            return frozenset()
+        return frozenset(sample for first in firsts for sample in (first, first + period))
+
+    def _rests(self, state, before: tuple[int, Any] | None) -> tuple[int, Any]:
+        """Judge a handle that rests if the loop is now what it was at the look before; return this look."""
+        now = repetition.seen(state, self.at, self.memory, self.scene.spec.clocks_per_sample)
+        if before and before[1] == now and self.tally.still_from < before[0]:
+            self.tally.rest()
+        return self.at.sample, now
 
     def _compile(self, controller, state) -> None:
         """Compile the loop by a call without samples, so that compiling is not in the measured time."""
@@ -236,9 +281,10 @@ class Loop:
                 _compiled.add(kinds)
 
     def _next_look(self, sample: int) -> int:
-        """Return the end of a chunk that begins at a sample, as far as a verdict may be sure there."""
-        settled = round(self.scene.protocol.settle_s * self.scene.spec.sample_hz)
-        return min(max(settled, sample) + self.look, self.scene.samples)
+        """Return the end of a chunk that begins at a sample, as far as a verdict may be there."""
+        if self.literal:
+            return min(max(self.scene.settled, sample) + self.look, self.scene.samples)
+        return self.tally.window_end
 
     def _chunk(self, controller, state, until: int, progress: Callable[[int], None] | None):
         """Run to the end of a chunk, in pieces if progress is reported; return the controller's state."""
@@ -250,7 +296,7 @@ class Loop:
             end = min(self.at.sample + piece, until)
             state, self.at = loop.run(self.world, controller, state, self.at, rest, end)
             if progress:
-                progress(self.at.sample)
+                progress(min(self.at.sample, self.scene.samples))
         return state
 
     @property
@@ -272,6 +318,9 @@ class Loop:
             seconds=seconds,
             mean_m=tally.mean_m,
             rms_m=math.inf if self.lost_edges else tally.rms_m,
+            offset_m=tally.offset_m,
+            drift_m_per_s=tally.drift_m_per_s,
+            judged=UNSTABLE if self.lost_edges or tally.verdict is None else tally.verdict,
             touched=tally.farthest_m > 0 or tally.largest_drive > 0,
             max_force_n=tally.largest_drive * scene.spec.force_resolution_n,
             flags=scene.spec.design.flag_names(flags),
@@ -297,8 +346,8 @@ def run(
         traces: keep samples of the whole run and of the contact.
         progress: called with the number of samples done.
         vcd: for `rtl`, a VCD file to write, with every signal around the contact.
-        until_sure: end a run that is certainly unstable, or whose handle outruns the encoder by far; `rms_m` is then
-            the RMS up to that point, or infinite.
+        until_sure: end a run whose handle rests for ever, or outruns the encoder by far, and in the literal protocol
+            one that is certainly unstable; `rms_m` is then 0, infinite, or the RMS up to that point.
 
     Raises:
         RuntimeError: if the handle outran every decoder's limit by far, or the RTL could not be built.

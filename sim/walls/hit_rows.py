@@ -24,7 +24,7 @@ def row_of(name: str, report: Mapping[str, Any]) -> list[str]:
         name,
         f"{report['stiffness_n_per_m']:g}",
         f"{report['damping_n_s_per_m']:g}",
-        "stable" if report["stable"] else "unstable",
+        report["verdict"],
         "at rest" if report["rms_mm"] < REST_MM else f"{report['rms_mm']:.3g}",
         f"{report['max_force_n']:.3f}",
         text_of(error if error is None else float(f"{error:.3g}")),

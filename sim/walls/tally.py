@@ -1,4 +1,18 @@
-"""The statistics of a hit, sample by sample: its mean, its RMS, its largest force and its force words."""
+"""The statistics of a hit, sample by sample, and what they say of the wall.
+
+The wall is judged over windows of `measure_s`, the first of which begins at the settling mark:
+
+- *stable* if the RMS distance of the position from its least-squares line over a window is under the threshold;
+- *unstable* if it is not, and is more than `FALLING` of that over the window before;
+- else it still falls: the run goes on with another window, and is *undecided* if no other ends within `longest_s`.
+
+The first window has one before it too, which ends at the settling mark. A handle that creeps or has come to rest in
+another place is not unstable for that: the *offset*, from the mean over `mean_s` before the mark to the mean of the
+window that was judged, and the *drift* are said beside the verdict.
+
+The founding paper's protocol, `verdict = "literal"`, has one window, and the RMS distance from the mean before the
+mark: its square is that of the distance from the line, plus that of the offset, plus that of what the drift spreads.
+"""
 
 import hashlib
 import math
@@ -6,10 +20,15 @@ import math
 import numpy as np
 
 from ..scene.schema import Scene
+from .window import Window
+
+FALLING = 0.9
+"""An RMS that is less than this part of the one before is falling."""
+STABLE, UNSTABLE, UNDECIDED = "stable", "unstable", "undecided"
 
 
 class Tally:
-    """Mean, RMS, largest force and force words of a run, chunk by chunk.
+    """Position, largest force and force words of a run, chunk by chunk, and the verdict.
 
     Args:
         scene: the scene of the run.
@@ -18,33 +37,59 @@ class Tally:
     Attributes:
         largest_drive: the largest magnitude of the drive, force LSB.
         farthest_m: the largest position.
+        still_from: number of the first sample since which the position has not changed.
+        verdict: what is said of the wall; None until then.
+        rms_m: the RMS that it was said for, or that of the window before: infinite before the first one.
     """
 
     def __init__(self, scene: Scene, exact: bool):
         spec, protocol = scene.spec, scene.protocol
-        self._hopeless = round(protocol.measure_s * spec.sample_hz) * (protocol.threshold_mm * 1e-3) ** 2
-        self._settled = round(protocol.settle_s * spec.sample_hz)
+        self._literal, self._threshold_m = protocol.verdict == "literal", protocol.threshold_mm * 1e-3
+        self._hopeless = scene.measured * self._threshold_m**2
+        self._settled, self._measured, self._most = scene.settled, scene.measured, scene.most_samples
+        self._rate = spec.sample_hz
         self._mean_from = self._settled - round(protocol.mean_s * spec.sample_hz)
         self._decimation = spec.samples_per_actuation
         self._digest = hashlib.sha256() if exact else None
         self._sum = self._squares = 0.0
-        self._measured = 0
-        self.largest_drive, self.farthest_m = 0, -math.inf
+        self._counted = 0
+        self._position_m = math.nan
+        self._window_from = max(self._settled - self._measured, 0)
+        self._window, self._before = Window(self._settled - self._window_from), None
+        self._judged: Window | None = None
+        self.largest_drive, self.farthest_m, self.still_from = 0, -math.inf, 0
+        self.verdict: str | None = None
+        self.rms_m = math.inf
 
     @property
-    def mean_m(self) -> float:
+    def _mark_m(self) -> float:
         """The mean position before the settling mark, over the samples added."""
         return self._sum / (self._settled - self._mean_from)
 
     @property
-    def rms_m(self) -> float:
-        """RMS distance from the mean after the settling mark, over the samples added; infinite if there are none."""
-        return (self._squares / self._measured) ** 0.5 if self._measured else math.inf
+    def mean_m(self) -> float:
+        """The mean position of the window that was judged; of the literal protocol, that before the settling mark."""
+        return self._mark_m if self._literal or self._judged is None else self._judged.mean_m
+
+    @property
+    def offset_m(self) -> float:
+        """The way from the mean before the settling mark to that of the window that was judged; 0 without one."""
+        return self._judged.mean_m - self._mark_m if self._judged else 0.0
+
+    @property
+    def drift_m_per_s(self) -> float:
+        """The slope of the position over the window that was judged; 0 without one."""
+        return self._judged.drift_m * self._rate if self._judged else 0.0
+
+    @property
+    def window_end(self) -> int:
+        """Number of the sample at which the window ends that is under way."""
+        return self._window_from + self._window.samples
 
     @property
     def sure_unstable(self) -> bool:
-        """Whether the run is unstable whatever its rest: its sum of squares has reached the threshold's limit."""
-        return self._squares >= self._hopeless
+        """Whether a run of the literal protocol is unstable whatever its rest: its sum of squares is at the limit."""
+        return self._literal and self._squares >= self._hopeless
 
     @property
     def force_sha256(self) -> str | None:
@@ -58,11 +103,46 @@ class Tally:
             return positions[max(start - first, 0) : max(stop - first, 0)]
 
         self._sum += float(part(self._mean_from, self._settled).sum())
-        rest = part(self._settled, first + len(positions))
-        if len(rest):
-            self._squares += float(np.square(rest - self.mean_m).sum())
-            self._measured += len(rest)
+        end = first + len(positions)
+        rest = part(self._settled, end)
+        if self._literal and len(rest):
+            self._squares += float(np.square(rest - self._mark_m).sum())
+            self._counted += len(rest)
+            self.rms_m = (self._squares / self._counted) ** 0.5
+        changes = np.flatnonzero(np.diff(positions, prepend=self._position_m))
+        if len(changes):
+            self.still_from = first + int(changes[-1])
+        self._position_m = float(positions[-1])
         self.largest_drive = max(self.largest_drive, float(np.abs(drives).max()))
         self.farthest_m = max(self.farthest_m, float(positions.max()))
         if self._digest:
             self._digest.update(drives[-first % self._decimation :: self._decimation].astype("<i4").tobytes())
+        while self.window_end <= end:
+            self._window.add(part(max(first, self._window_from), self.window_end))
+            self._judge(self.window_end)
+        self._window.add(part(max(first, self._window_from), end))
+
+    def _judge(self, end: int) -> None:
+        """Judge the window that ends at a sample, and begin the next one."""
+        window = self._window
+        self._window, self._window_from = Window(self._measured), end
+        if end > self._settled:
+            self._judged = window
+            if self._literal:
+                self.verdict = STABLE if self.rms_m < self._threshold_m else UNSTABLE
+                return
+            self.rms_m = window.rms_m
+            if self.rms_m < self._threshold_m:
+                self.verdict = STABLE
+            elif self.rms_m >= FALLING * self._before:
+                self.verdict = UNSTABLE
+            elif end + self._measured > self._most:
+                self.verdict = UNDECIDED
+        self._before = window.rms_m
+
+    def rest(self) -> None:
+        """Judge a handle that stays at rest where it is: see `repetition`."""
+        self._judged = Window(1)
+        self._judged.add(np.array([self._position_m]))
+        self._sum = self._position_m * (self._settled - self._mean_from)
+        self.rms_m, self.verdict = 0.0, STABLE

@@ -1,21 +1,30 @@
-"""Z-width: the boundary of the region of stable walls for each case, a scene with its changes.
+"""Z-width: the region of stable walls for each case, a scene with its changes, from several starts.
 
-A map is a trace, and a trace asks for one hit at a time. Hits of different traces run side by side; every verdict is
-kept as it comes. A verdict depends on the scene and the wall alone, so the map is the same for any crew, and an
-interrupted map continues where it was.
+A map asks for one wall at a time, and all starts of a wall are hit side by side, as are walls of different maps; every
+verdict is kept as it comes. A verdict depends on the scene, the wall and the start alone, so the map is the same for
+any crew, and an interrupted map continues where it was, also with more starts.
 """
 
 import platform
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import groupby
 from typing import Any, NamedTuple, Protocol
+
+import numpy as np
 
 from ..jobs import store
 from ..jobs.crew import Crew
 from ..scene.case import Case
 from . import hit
-from .boundary import BoundaryPoint, area, trace
+from .boundary import BoundaryPoint, area, walls
 from .grid import grid_of
+from .likelihood import ENDS, Column, Wall, draws, held, islands
+from .starts import start as start_of
+
+STARTS = 10
+"""The number of starts of a map, unless another is asked for."""
 
 
 @dataclass(frozen=True)
@@ -24,10 +33,14 @@ class Map:
 
     Attributes:
         case: the case that was mapped.
-        boundary: its points, by B.
-        hits: number of walls that were hit for it.
-        in_place: for each point, whether its largest stable wall holds the handle there: see `hit.Hit.in_place`.
-        seconds: wall time of its hits, wherever and whenever they ran; maps are compared without it.
+        boundary: its points, by B: where a hit is as likely stable as not.
+        hits: number of hits for it.
+        in_place: for each point, whether its stiffest stable wall holds the handle there: see `hit.Hit.in_place`.
+        seconds: time of its hits, wherever and whenever they ran; maps are compared without it.
+        starts: number of starts.
+        walls: the walls that were hit, by B and K.
+        drawn: the K of every point in every bootstrap, shape (2, points, draws): with undecided hits taken for
+            unstable, and for stable; None without walls. See `likelihood`.
     """
 
     case: Case
@@ -35,11 +48,51 @@ class Map:
     hits: int
     in_place: list[bool]
     seconds: float = field(default=0.0, compare=False)
+    starts: int = 1
+    walls: tuple[Wall, ...] = field(default=(), compare=False)
+    drawn: np.ndarray | None = field(default=None, compare=False)
 
     @property
     def area(self) -> float:
         """The area under the boundary, N^2 s/m^2, whether or not all walls there are stable."""
         return area(self.boundary)
+
+    @cached_property
+    def drawn_areas(self) -> np.ndarray:
+        """The area in every bootstrap, shape (2, draws): with undecided hits taken for unstable, and for stable."""
+        if self.drawn is None:
+            return np.full((2, 1), self.area)
+        return np.trapezoid(self.drawn, [point.damping_n_s_per_m for point in self.boundary], axis=1)
+
+    def draw(self, number: int) -> "Map":
+        """Return the map of one bootstrap, with undecided hits taken for unstable."""
+        heights = zip(self.boundary, self.drawn[0, :, number].tolist(), strict=True)
+        return replace(self, boundary=[replace(point, stable_n_per_m=height) for point, height in heights])
+
+    @property
+    def area_interval(self) -> tuple[float, float]:
+        """The ends of the interval of the area, N^2 s/m^2."""
+        return interval(self.drawn_areas)
+
+    def times(self, other: "Map") -> tuple[float, float] | None:
+        """Return the interval of this area over another one's, start for start; None if that may be 0."""
+        least, most = other.drawn_areas
+        if not (least > 0).all() or self.drawn_areas.shape[1] not in (1, len(least)):
+            return None
+        return interval(np.stack([self.drawn_areas[0] / most, self.drawn_areas[1] / least]))
+
+    @property
+    def intervals(self) -> list[tuple[float, float]]:
+        """The ends of the interval of the K of every point, N/m."""
+        if self.drawn is None:
+            return [(point.stable_n_per_m, point.stable_n_per_m) for point in self.boundary]
+        return [interval(self.drawn[:, number]) for number in range(len(self.boundary))]
+
+    @property
+    def islands(self) -> list[Wall]:
+        """The walls that were hit on the wrong side of the boundary."""
+        boundary = {point.damping_n_s_per_m: point.stable_n_per_m for point in self.boundary}
+        return islands(self.walls, boundary.__getitem__)
 
     @property
     def area_held(self) -> float | None:
@@ -52,7 +105,7 @@ class Map:
 
     @property
     def area_in_place(self) -> float:
-        """The area under the boundary, N^2 s/m^2, with K = 0 at each B whose largest stable wall is not in place."""
+        """The area under the boundary, N^2 s/m^2, with K = 0 at each B whose stiffest stable wall is not in place."""
         kept = [
             point if in_place else replace(point, stable_n_per_m=0.0)
             for point, in_place in zip(self.boundary, self.in_place, strict=True)
@@ -79,19 +132,38 @@ class Map:
         """The largest stable stiffness on the map; the true one is larger if the map is `clipped`."""
         return max(point.stable_n_per_m for point in self.boundary)
 
+    @property
+    def largest_interval(self) -> tuple[float, float]:
+        """The ends of the interval of the largest K, N/m."""
+        largest = np.full((2, 1), self.largest_n_per_m) if self.drawn is None else self.drawn.max(axis=1)
+        return interval(largest)
+
     def report(self) -> dict[str, Any]:
         """Return the map as the command line prints it.
 
-        The boundary is a list of [B (N s/m), K (N/m)], with K the largest stable; the true K is larger where the
-        boundary leaves the map.
+        The boundary is a list of [B (N s/m), K (N/m), low, high]: the K at which a hit is as likely stable as not, and
+        the ends of its interval; the true K is larger where the boundary leaves the map. `p_stable` is a list of [B, K,
+        stable, unstable, undecided], the numbers of hits.
         """
+        low, high = self.area_interval
         return {
             "label": self.case.label,
             "scene": self.case.source,
             "changes": self.case.changes,
-            "boundary": [[point.damping_n_s_per_m, point.stable_n_per_m] for point in self.boundary],
+            "starts": self.starts,
+            "boundary": [
+                [point.damping_n_s_per_m, point.stable_n_per_m, *ends]
+                for point, ends in zip(self.boundary, self.intervals, strict=True)
+            ],
+            "p_stable": [
+                [wall.damping_n_s_per_m, wall.stiffness_n_per_m, *map(wall.number_of, hit.VERDICTS)]
+                for wall in self.walls
+            ],
+            "islands": [[wall.damping_n_s_per_m, wall.stiffness_n_per_m] for wall in self.islands],
             "leaves_the_map_at": [point.damping_n_s_per_m for point in self.boundary if point.marginal_n_per_m is None],
             "area_n2_s_per_m2": self.area,
+            "area_low_n2_s_per_m2": low,
+            "area_high_n2_s_per_m2": high,
             "area_held_n2_s_per_m2": self.area_held,
             "area_in_place_n2_s_per_m2": self.area_in_place,
             "largest_stiffness_n_per_m": self.largest_n_per_m,
@@ -122,14 +194,22 @@ class NeverReached(RuntimeError):
     """The handle did not reach the wall in the time of the protocol: such a hit says nothing about the wall."""
 
 
-def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float, damping: float, backend: str) -> dict:
-    """Hit a wall; return whether it is `stable`, then `in_place` at rest, its `rms_mm` until the verdict was sure, and
-    the `seconds` it took.
+def interval(drawn: np.ndarray) -> tuple[float, float]:
+    """Return the ends of an interval, of the lower and the upper values of bootstraps, shape (2, draws)."""
+    return float(np.percentile(drawn[0], ENDS[0])), float(np.percentile(drawn[1], ENDS[1]))
+
+
+def verdict(
+    scene: str, text: str, sources: str, changes: dict, wall: tuple[float, float], start: int | None, backend: str
+) -> dict:
+    """Hit a wall; return the `verdict` on it, whether the handle is `in_place` if stable, what else is said of the hit,
+    and the `seconds` it took.
 
     Args:
         scene, text, changes: attributes of a `Case`.
         sources: the result of `store.sources` where the map is made; results are kept under it.
-        stiffness, damping: the wall's, N/m and N s/m.
+        wall: its stiffness and damping, N/m and N s/m.
+        start: number of the start; None for the scene's own.
         backend: one of `backends.BACKENDS`.
 
     Raises:
@@ -139,48 +219,88 @@ def verdict(scene: str, text: str, sources: str, changes: dict, stiffness: float
     """
     if sources != store.sources():
         raise RuntimeError(f"a worker, {platform.node()}, has other sources of hardwall, or versions of its tools")
-    result = hit.run(Case("", scene, text, changes).hitting(stiffness, damping), backend, until_sure=True)
+    case, start = Case("", scene, text, changes), None if start is None else start_of(start)
+    result = hit.run(case.hitting(*wall, start), backend, until_sure=True)
     if not result.touched:
+        stiffness, damping = wall
         raise NeverReached(f"the handle did not reach the wall: nothing is said of K {stiffness:g}, B {damping:g}")
-    in_place = result.stable and result.in_place
-    rms_mm = result.rms_m * 1e3
-    return {"stable": result.stable, "in_place": in_place, "rms_mm": rms_mm, "seconds": result.seconds}
+    return {
+        "verdict": result.verdict,
+        "in_place": result.stable and result.in_place,
+        "rms_mm": result.rms_m * 1e3,
+        "offset_mm": result.offset_m * 1e3,
+        "drift_mm_per_s": result.drift_m_per_s * 1e3,
+        "run_s": result.samples / result.scene.spec.sample_hz,
+        "seconds": result.seconds,
+    }
 
 
-class _Tracing:
-    """A trace in progress: the job that it asks for next, and at the end its map."""
+class _Mapping:
+    """A map in progress: the jobs that it asks for next, and at the end the map."""
 
-    def __init__(self, case: Case, backend: str):
-        self._case, self._grid = case, grid_of(case.scene)
-        self._steps: Generator = trace(self._grid)
+    def __init__(self, case: Case, backend: str, starts: int):
+        self._case, self._grid, self._starts = case, grid_of(case.scene), starts
+        self._steps: Generator = walls(self._grid, starts)
         self._job = case.job() | {"sources": store.sources(), "backend": backend}
-        self._hits, self._seconds = 0, 0.0
-        self._in_place: dict[tuple[float, float], bool] = {}
-        self.wanted: dict | None = None
+        self._hits: dict[tuple[float, float], dict[int, dict]] = {}
+        self._wall: tuple[float, float] | None = None
+        self.wanted: dict[int, dict] = {}
+        self._results: dict[int, dict] = {}
         self.found: Map | None = None
         self._send(None)
 
-    def answer(self, result: dict) -> None:
-        """Continue the trace with the verdict on the wall that it asked for."""
-        self._hits += 1
-        self._seconds += result["seconds"]
-        self._in_place[self.wanted["stiffness"], self.wanted["damping"]] = result["in_place"]
-        self._send(result["stable"])
+    def answer(self, start: int, result: dict) -> None:
+        """Continue the map with the verdict on the wall that it asked for, from one of the starts."""
+        self._results[start] = result
+        if len(self._results) == len(self.wanted):
+            results = {start: self._results[start] for start in self.wanted}
+            self._hits.setdefault(self._wall, {}).update(results)
+            self._send([result["verdict"] for result in results.values()])
 
-    def _send(self, stable: bool | None) -> None:
+    def _send(self, verdicts: list[str] | None) -> None:
+        self._results, self.wanted = {}, {}
         try:
-            stiffness, damping = self._steps.send(stable)
-            self.wanted = self._job | {"stiffness": stiffness, "damping": damping}
-        except StopIteration as end:
-            walls = [(point.stable_n_per_m, point.damping_n_s_per_m) for point in end.value]
-            in_place = [self._in_place.get(wall, False) for wall in walls]
-            self.wanted, self.found = None, Map(self._case, end.value, self._hits, in_place, self._seconds)
+            stiffness, damping, starts = self._steps.send(verdicts)
+        except StopIteration:
+            self._wall, self.found = None, self._made()
+        else:
+            self._wall = stiffness, damping
+            self.wanted = {start: self._job | {"wall": self._wall, "start": start} for start in starts}
+
+    def _made(self) -> Map:
+        """Return the map of all hits."""
+        found = [Wall(damping, stiffness, hits) for (stiffness, damping), hits in self._hits.items()]
+        found.sort(key=lambda wall: (wall.damping_n_s_per_m, wall.stiffness_n_per_m))
+        drawn, dampings = draws(self._starts), self._grid.dampings
+        points, in_place, bounds = [], [], []
+        for damping, walls_of in groupby(found, lambda wall: wall.damping_n_s_per_m):
+            at = list(walls_of)
+            column = Column(at, self._starts)
+            stiffness = column.boundary()
+            bounds.append(column.bounds(drawn))
+            above = [wall.stiffness_n_per_m for wall in at if wall.stiffness_n_per_m > stiffness]
+            points.append(BoundaryPoint(damping, stiffness, min(above, default=None), held(at, stiffness)))
+            in_place.append(_in_place(at, stiffness))
+        assert len(points) == len(dampings)
+        hits = [result for wall in found for result in wall.hits.values()]
+        seconds = sum(result["seconds"] for result in hits)
+        drawn_points = np.array(bounds).transpose(1, 0, 2)
+        return Map(self._case, points, len(hits), in_place, seconds, self._starts, tuple(found), drawn_points)
 
     @property
     def done(self) -> float:
-        """The part of the values of B that the trace has finished."""
+        """The part of the values of B that the map has finished."""
         dampings = self._grid.dampings
-        return dampings.index(self.wanted["damping"]) / len(dampings) if self.wanted else 1.0
+        return dampings.index(self._wall[1]) / len(dampings) if self._wall else 1.0
+
+
+def _in_place(found: list[Wall], boundary_n_per_m: float) -> bool:
+    """Return whether half of the stable hits of the stiffest wall below a boundary that has some are in place."""
+    for wall in reversed(found):
+        stable = [each["in_place"] for each in wall.hits.values() if each["verdict"] == hit.VERDICTS[0]]
+        if wall.stiffness_n_per_m <= boundary_n_per_m and stable:
+            return 2 * sum(stable) >= len(stable)
+    return False
 
 
 def run(
@@ -189,6 +309,7 @@ def run(
     known: store.Store,
     crew: Crew,
     progress: Callable[[float], None] | None = None,
+    starts: int = STARTS,
 ) -> list[Map]:
     """Return the map of each case.
 
@@ -198,32 +319,37 @@ def run(
         known: the store of verdicts.
         crew: who hits the walls.
         progress: called after every verdict with the number of maps done, unfinished maps counted in part.
+        starts: number of starts.
 
     Raises:
         SceneError: if a case is not valid, or its scene has no section `zwidth`.
         NeverReached: if the handle does not reach the wall in a case.
         RuntimeError: if the cluster fails; see `jobs.cluster`.
     """
-    traces = [_Tracing(case, backend) for case in cases]
+    maps = [_Mapping(case, backend, starts) for case in cases]
 
-    def forward(tracing: _Tracing) -> dict | None:
-        """Answer the trace from the store as far as possible; return the next hit to run, or None at its end."""
-        while tracing.wanted and tracing.wanted in known:
-            tracing.answer(known.get(tracing.wanted))
+    def forward(mapping: _Mapping) -> int:
+        """Answer a map from the store as far as possible; give the hits that it waits for, and return their number."""
+        while mapping.wanted:
+            missing = {start: job for start, job in mapping.wanted.items() if job not in known}
+            wanted = mapping.wanted
+            for start in [start for start in wanted if start not in missing]:
+                mapping.answer(start, known.get(wanted[start]))
+            if missing:
+                for start, job in missing.items():
+                    crew.give((mapping, start, job), verdict, job)
+                break
         if progress:
-            progress(sum(running.done for running in traces))
-        return tracing.wanted
+            progress(sum(running.done for running in maps))
+        return len(missing) if mapping.wanted else 0
 
-    under_way = 0
-    for tracing in traces:
-        if job := forward(tracing):
-            crew.give(tracing, verdict, job)
-            under_way += 1
+    under_way = sum(map(forward, maps))
     while under_way:
-        tracing, result = crew.take()
-        known.put(tracing.wanted, result)
-        if job := forward(tracing):
-            crew.give(tracing, verdict, job)
-        else:
-            under_way -= 1
-    return [tracing.found for tracing in traces]
+        (mapping, start, job), result = crew.take()
+        known.put(job, result)
+        under_way -= 1
+        asked = mapping.wanted
+        mapping.answer(start, result)
+        if mapping.wanted is not asked:
+            under_way += forward(mapping)
+    return [mapping.found for mapping in maps]

@@ -177,9 +177,9 @@ def test_json_has_the_promised_keys_and_nothing_else_is_on_stdout(monkeypatch, c
     report = json.loads(out)
     assert code == 0
     assert set(report) == {
-        "scene", "backend", "estimator", "output", "stiffness_n_per_m", "damping_n_s_per_m", "stable", "touched",
-        "rms_mm",
-        "mean_mm", "samples", "seconds", "samples_per_s", "max_force_n", "estimate_rms_mm_per_s", "flags",
+        "scene", "backend", "estimator", "output", "stiffness_n_per_m", "damping_n_s_per_m", "stable", "verdict",
+        "touched", "rms_mm", "mean_mm", "offset_mm", "drift_mm_per_s",
+        "samples", "seconds", "samples_per_s", "max_force_n", "estimate_rms_mm_per_s", "flags",
         "force_sha256",
     }  # fmt: skip
     assert (report["output"], report["backend"], report["samples"]) == ("u1", "fixed", 60_000)

@@ -140,7 +140,7 @@ REPORT = {
     "scene": "seed-2011",
     "stiffness_n_per_m": 1e3,
     "damping_n_s_per_m": 2.0,
-    "stable": True,
+    "verdict": "undecided",
     "rms_mm": 0.1,
     "max_force_n": 3.0,
     "estimate_rms_mm_per_s": None,
@@ -152,7 +152,7 @@ REPORT = {
     ("change", "said"),
     [
         ({"stiffness_n_per_m": "stiff"}, "stiffness_n_per_m: "),
-        ({"stable": "no"}, "stable: "),
+        ({"verdict": "no"}, "verdict: "),
         ({"rms_mm": float("inf")}, "rms_mm: "),
         ({"force_sha256": 5}, "force_sha256: "),
         ({"scene": "x" * 10**5}, "scene: "),

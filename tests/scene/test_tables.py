@@ -79,7 +79,10 @@ def test_a_key_may_be_in_every_table_and_not_at_the_top():
         ),
         (["name = 'a'\nencoder.count_m = 1e-6"], "axis a: encoder.count_m is shared by all axes"),
         (["name = 'a'\nprotocol.settle_s = 1.0"], "axis a: protocol.settle_s is shared by all axes"),
-        (["name = 'a'\nzwidth.walls_below = 1"], "axis a: zwidth must be absent: no map is made of several axes"),
+        (
+            ["name = 'a'\nzwidth.damping_step_n_s_per_m = 1.0"],
+            "axis a: zwidth must be absent: no map is made of several axes",
+        ),
         (
             ["name = 'a'\ndrive.stage = 'pdm'"],
             "axis a: drive must be absent: the pipeline of several axes has no drive",

@@ -200,7 +200,8 @@ def _recording() -> str:
 def _report() -> str:
     return (
         '{"scene": "a", "backend": "fixed", "estimator": "levant", "output": "u", "stiffness_n_per_m": 1e4,\n'
-        '"damping_n_s_per_m": 20.0, "stable": true, "rms_mm": 0.0, "max_force_n": 1.0, "estimate_rms_mm_per_s": null,\n'
+        '"damping_n_s_per_m": 20.0, "verdict": "stable", "rms_mm": 0.0, "max_force_n": 1.0,\n'
+        '"estimate_rms_mm_per_s": null,\n'
         '"force_sha256": null}'
     )
 

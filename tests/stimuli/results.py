@@ -34,7 +34,17 @@ def hit(rms_m: float = 0.0, reached: bool = True) -> Hit:
         return Trace(times + 0.5, position, velocity, velocity + noise, -1e4 * np.maximum(position, 0))
 
     contact = trace(np.arange(-10, 300) * 1e-4 if reached else np.zeros(0))
-    run = {"samples": 60_000, "seconds": 1.0, "mean_m": 3e-5, "touched": reached, "max_force_n": 10.0}
+    judged = "stable" if rms_m < 3e-6 else "unstable"
+    run = {
+        "offset_m": 0.0,
+        "drift_m_per_s": 0.0,
+        "judged": judged,
+        "samples": 60_000,
+        "seconds": 1.0,
+        "mean_m": 3e-5,
+        "touched": reached,
+        "max_force_n": 10.0,
+    }
     whole = trace(np.linspace(-0.5, 5.5, 500))
     wrong = whole.estimate_m_per_s - whole.velocity_m_per_s
     overview = Overview(*vars(whole).values(), wrong - 0.02, wrong + 0.02, whole.force_n, whole.force_n)
@@ -51,6 +61,12 @@ def hit_axes() -> AxesHit:
         "grip": replace(hit(reached=False), scene=scene.axes[7]),
     }
     return AxesHit(scene, "fixed", 1.0, made)
+
+
+def verdict(stable: bool) -> dict:
+    """Return a verdict on a wall, as that of `hardwall.sim.walls.zwidth`."""
+    said = {"verdict": "stable" if stable else "unstable", "in_place": stable}
+    return said | dict.fromkeys(("rms_mm", "offset_mm", "drift_mm_per_s", "run_s", "seconds"), 0.0)
 
 
 def map_of(method: str, stiffest_n_per_m: float, last_n_s_per_m: float, case: Case | None = None) -> Map:

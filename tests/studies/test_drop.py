@@ -14,6 +14,7 @@ from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.chatter import Chatter
 from hardwall.sim.walls.methods import methods
 from hardwall.sim.walls.zwidth import Effort, Map
+from stimuli import results
 from stimuli.command_line import call
 from stimuli.scenes import ODD
 
@@ -31,10 +32,11 @@ def strike(scene: str, text: str, changes: dict, damping: float, start: int, bac
     return {"rests": rests, "stable": stable, "rms_m": 0.0 if rests else 1e-5}
 
 
-def verdict(changes: dict, stiffness: float, damping: float, **_) -> dict:
+def verdict(changes: dict, wall: tuple[float, float], **_) -> dict:
     """Return a verdict that is stable up to 40 kN/m and up to B = 100 N s/m, for Kalman up to 200."""
+    stiffness, damping = wall
     stable = stiffness <= 40e3 and damping <= (200 if changes["controller.estimator"] == "kalman" else 100)
-    return {"stable": stable, "rms_mm": 0.0, "in_place": stable, "seconds": 0.0}
+    return results.verdict(stable)
 
 
 def at_rest(scene, backend: str) -> Chatter:
@@ -88,8 +90,9 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
         assert each["rests_n_s_per_m"] == tried[tried < 100].max()
         assert each["stable_n_s_per_m"] == tried[tried < stiffness / 100].max()
     kalman, adjusted = report["methods"]["kalman"], report["methods"]["adjusted"]
-    # In steps of 24 N s/m from 6 on, the last stable B are 198 and 78; the next step has no stable wall.
-    assert adjusted["area_n2_s_per_m2"] == pytest.approx((78 - 6) * 40e3 + 24 * 20e3)
+    # In steps of 24 N s/m from 6 on, the last stable B are 198 and 78; the next step has no stable wall. In steps of 4
+    # kN/m, the edge is halfway to 44.
+    assert adjusted["area_n2_s_per_m2"] == pytest.approx((78 - 6 + 12) * 42e3)
     assert kalman["of_papers_best"] == pytest.approx((198 - 6 + 12) / (78 - 6 + 12))
     assert kalman["before_the_end"] == 1.0
     wanted = {

@@ -13,6 +13,7 @@ from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.figure_5 import Fact
 from hardwall.sim.walls.grid import grid_of
 from hardwall.sim.walls.zwidth import Map, NeverReached
+from stimuli import results
 from stimuli.command_line import call
 from stimuli.figure_5 import PAPER
 from stimuli.maps import Known
@@ -120,14 +121,15 @@ def test_what_lacks_least_beside_the_others_is_what_stood_in_the_way():
     assert trials[3].score == pytest.approx(8 + 8 * fit.MISSED)
 
 
-def verdict(changes: dict, stiffness: float, damping: float, **_) -> dict:
+def verdict(changes: dict, wall: tuple[float, float], **_) -> dict:
+    stiffness, damping = wall
     estimator = changes["controller.estimator"]
     gains = changes[f"controller.gains.{estimator}"]
     name = f"fdm-{gains['cutoff_hz']:g}" if estimator == "butterworth" else "adjusted"
     if gains == methods.PROPOSED:
         name = "proposed"
     stable = stiffness <= largest_n_per_m(name, changes, damping)
-    return {"stable": stable, "rms_mm": 0.0, "in_place": stable, "seconds": 0.0}
+    return results.verdict(stable)
 
 
 def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys):

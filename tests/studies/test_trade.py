@@ -11,7 +11,7 @@ from hardwall.sim.studies import trade_runs
 from hardwall.sim.studies.shortcuts import REFERENCE, Shortcut, shortcuts
 from hardwall.sim.studies.trade import HIT, MAP, Point, Trade, best
 from hardwall.sim.studies.trade_runs import AROUND, GRID, METHODS, study
-from hardwall.sim.walls.boundary import trace
+from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.grid import grid_of
 from hardwall.sim.walls.zwidth import Map
 from stimuli.command_line import call
@@ -31,17 +31,18 @@ class Invented:
         return [self._map(case, backend) for case in cases]
 
     def _map(self, case, backend):
-        steps, hits, stable = trace(grid_of(case.scene)), 0, None
-        while True:
-            try:
-                stable = self.stable(*steps.send(stable), case.changes, backend)
-                hits += 1
-            except StopIteration as end:
-                return Map(case, end.value, hits, [None] * len(end.value))
+        grid = grid_of(case.scene)
+        step, points = grid.stiffness_step_n_per_m, []
+        for damping in grid.dampings:
+            stable = [row for row in range(1, grid.rows + 1) if self.stable(row * step, damping, case.changes, backend)]
+            row = max(stable, default=0)
+            points.append(BoundaryPoint(damping, row * step, None if row == grid.rows else (row + 1) * step))
+        return Map(case, points, len(points) * grid.rows, [None] * len(points))
 
     def verdicts(self, jobs):
         return [
-            {"stable": self.stable(job["stiffness"], job["damping"], job["changes"], job["backend"])} for job in jobs
+            {"verdict": "stable" if self.stable(*job["wall"], job["changes"], job["backend"]) else "unstable"}
+            for job in jobs
         ]
 
     def medians(self, contestants, rounds):

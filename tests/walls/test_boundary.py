@@ -1,89 +1,108 @@
-"""Tracing of a stable region: the walls hit and the boundaries found, on known regions."""
+"""The walls of a map: on invented regions, the search finds the edge, and everyone hits what they should."""
 
-from dataclasses import replace
+from collections.abc import Callable
 
+import numpy as np
 import pytest
 
-from hardwall.sim.walls.boundary import BoundaryPoint, Grid, area, trace
+from hardwall.sim.walls.boundary import SCOUTS, BoundaryPoint, Grid, area, share, walls
 
-GRID = Grid(10.0, 100.0, 1.0, 6.0, 0.5)
-
-
-def traced(stable, grid: Grid = GRID) -> tuple[list[BoundaryPoint], list[tuple[float, float]]]:
-    """Return the boundary, and the walls that were hit, for a region given by a function of K and B."""
-    steps, asked = trace(grid), []
-    try:
-        wall = next(steps)
-        while True:
-            asked.append(wall)
-            wall = steps.send(stable(*wall))
-    except StopIteration as end:
-        return end.value, asked
+GRID = Grid(10.0, 1000.0, 1.0, 5.0, 1.0)
+STARTS = 10
+Hits = dict[tuple[float, float], dict[int, str]]
 
 
-def limit(damping: float) -> float:
-    """Return the largest stable K, which rises over B, falls, and ends."""
-    return 5 + 30 * damping - 5.5 * damping**2
+def hit(stable: Callable[[float, float, int], bool], grid: Grid = GRID, starts: int = STARTS) -> Hits:
+    """Return the verdicts on all walls that are asked for; none is asked for twice from one start."""
+    steps, found, hits = walls(grid, starts), None, {}
+    while True:
+        try:
+            stiffness, damping, asked = steps.send(found)
+        except StopIteration:
+            return hits
+        assert stiffness in [row * 10.0 for row in range(1, grid.rows + 1)]
+        own = hits.setdefault((stiffness, damping), {})
+        assert asked
+        assert not set(asked) & set(own)
+        found = ["stable" if stable(stiffness, damping, start) else "unstable" for start in asked]
+        own.update(zip(asked, found, strict=True))
 
 
-def test_the_boundary_is_found_on_the_grid_and_no_wall_is_hit_twice():
-    boundary, asked = traced(lambda stiffness, damping: stiffness <= limit(damping))
-    assert len(asked) == len(set(asked))
-    assert boundary[-1].stable_n_per_m == 0
-    assert [point.damping_n_s_per_m for point in boundary] == GRID.dampings[: len(boundary)]
-    for point in boundary:
-        exact = max(limit(point.damping_n_s_per_m), 0)
-        assert point.stable_n_per_m == exact // 10 * 10
-        assert point.marginal_n_per_m == point.stable_n_per_m + 10
+def column(hits: Hits, damping: float) -> dict[float, dict[int, str]]:
+    return {stiffness: of for (stiffness, at), of in sorted(hits.items()) if at == damping}
 
 
-def test_the_walls_are_hit_in_the_order_of_the_paper():
-    """The search goes up from the softest wall; after every step of B it goes up or down from the marginal K."""
-    _, asked = traced(lambda stiffness, damping: stiffness <= (30 if damping < 2 else 10))
-    assert asked[:4] == [(10, 1), (20, 1), (30, 1), (40, 1)]
-    assert asked[4:8] == [(40, 1.5), (30, 1.5), (40, 2), (30, 2)]
-    assert asked[8:11] == [(20, 2), (10, 2), (20, 2.5)]
+def full(of: dict[float, dict[int, str]]) -> list[float]:
+    """Return the walls that every start has hit."""
+    return [stiffness for stiffness, verdicts in of.items() if len(verdicts) == STARTS]
 
 
-def test_a_region_that_leaves_the_map_has_no_marginal_wall_there():
-    boundary, asked = traced(lambda *_: True)
-    assert {point.stable_n_per_m for point in boundary} == {100.0}
-    assert {point.marginal_n_per_m for point in boundary} == {None}
-    assert len(asked) == 10 + len(GRID.dampings) - 1
+@pytest.mark.parametrize("edge", [10.0, 20.0, 120.0, 130.0, 470.0, 980.0, 990.0])
+def test_every_start_hits_both_sides_of_an_edge(edge):
+    for damping in GRID.dampings:
+        of = column(hit(lambda stiffness, _, __: stiffness <= edge), damping)
+        assert full(of) == [edge, edge + 10]
+        # Others are hit by the scouts, and far away by one.
+        assert {len(verdicts) for verdicts in of.values()} <= {1, SCOUTS, STARTS}
+        assert (min(of), max(of)) == (10.0, 1000.0)
+        assert len(of) < 30
 
 
-def test_nothing_stable_is_looked_for_at_every_damping():
-    boundary, asked = traced(lambda *_: False)
-    assert boundary == [BoundaryPoint(damping, 0.0, 10.0) for damping in GRID.dampings]
-    assert asked == [(stiffness, damping) for damping in GRID.dampings for stiffness in (10.0, 20.0, 40.0, 80.0)]
+def test_a_region_that_ends_has_one_start_in_the_rest_and_all_at_the_first_step():
+    hits = hit(lambda stiffness, damping, _: stiffness <= 300 and damping < 3)
+    ended = column(hits, 5.0)
+    assert full(ended) == [10.0]
+    assert sum(map(len, ended.values())) < STARTS + SCOUTS + 12
 
 
-def test_a_region_that_begins_at_a_stiffer_wall_of_a_larger_damping_is_found():
-    boundary, asked = traced(lambda stiffness, damping: 30 <= stiffness <= 70 and damping >= 2)
-    assert [point.stable_n_per_m for point in boundary] == [0.0, 0.0, *[70.0] * 9]
-    assert asked[8:15] == [(10, 2), (20, 2), (40, 2), (50, 2), (60, 2), (70, 2), (80, 2)]
+def test_a_region_beyond_the_map_is_hit_at_its_last_step():
+    of = column(hit(lambda *_: True), 3.0)
+    assert full(of) == [1000.0]
 
 
-def test_walls_below_the_boundary_are_hit_last_and_counted():
-    """Four walls, a fifth of K apart, are hit below the boundary; the walls under 30 are not stable."""
-    boundary, asked = traced(lambda stiffness, _: 30 <= stiffness <= 70, replace(GRID, walls_below=4))
-    assert {point.held for point in boundary} == {0.75}
-    assert asked[-4:] == [(10, 6), (30, 6), (40, 6), (60, 6)]
-    soft, _ = traced(lambda stiffness, _: stiffness <= 10, replace(GRID, walls_below=4))
-    assert {point.held for point in soft} == {None}, "there is no wall below the softest"
+def test_what_differs_among_starts_is_hit_until_most_agree():
+    """Start n is stable up to 200 + 50 n: all starts hit walls from where 9 of 10 are stable to where 1 of 10 is."""
+    of = column(hit(lambda stiffness, _, start: stiffness <= 200 + 50 * start), 3.0)
+    everywhere = full(of)
+    assert min(everywhere) <= 250
+    assert max(everywhere) > 600
+    assert len(everywhere) < 20
 
 
-def test_rows_go_to_the_last_whole_step():
-    assert Grid(35e3, 100e3, 1.0, 2.0, 1.0).rows == 2
-    assert Grid(0.1, 0.3, 1.0, 2.0, 1.0).rows == 3
+def test_an_island_above_soft_walls_that_are_unstable_is_found():
+    hits = hit(lambda stiffness, _, __: 250 <= stiffness <= 560)
+    for damping in GRID.dampings:
+        of = column(hits, damping)
+        assert full(of) == [560.0, 570.0]
+        assert "unstable" in of[10.0].values()
 
 
-def test_area_is_that_of_trapezoids():
-    boundary = [BoundaryPoint(1.0, 10.0, None), BoundaryPoint(3.0, 30.0, None), BoundaryPoint(4.0, 0.0, None)]
-    assert area(boundary) == 2 * 20 + 15
-    assert area(boundary[:1]) == 0
+def test_one_start_alone_has_a_map():
+    hits = hit(lambda stiffness, damping, _: stiffness <= 100 * damping, starts=1)
+    assert {len(verdicts) for verdicts in hits.values()} == {1}
+    assert all((100 * damping, damping) in hits and (100 * damping + 10, damping) in hits for damping in GRID.dampings)
 
 
-@pytest.mark.parametrize(("last", "count"), [(1.0, 1), (1.2, 1), (1.4999, 1), (1.5, 2), (6.0, 11)])
-def test_dampings_go_to_the_last_whole_step(last, count):
-    assert len(Grid(10.0, 100.0, 1.0, last, 0.5).dampings) == count
+def test_a_grid_of_one_step_and_one_damping():
+    grid = Grid(10.0, 10.0, 5.0, 5.0, 2.0)
+    assert grid.dampings == [5.0]
+    for stable in (True, False):
+        of = hit(lambda *_, stable=stable: stable, grid)
+        assert list(of) == [(10.0, 5.0)]
+        assert len(of[10.0, 5.0]) == STARTS
+
+
+def test_steps_that_do_not_fit_exactly_are_whole():
+    assert Grid(1.0, 100.0, 3.0, 39.0, 2 / 3).dampings[-1] == pytest.approx(39.0)
+    assert Grid(0.1, 0.3, 1.0, 1.0, 1.0).rows == 3
+
+
+def test_an_undecided_one_counts_half():
+    assert share(["stable", "undecided", "unstable", "unstable"]) == 0.375
+
+
+def test_the_area_is_numpys():
+    rng = np.random.default_rng(3)
+    at, heights = np.cumsum(rng.random(9)), rng.random(9)
+    boundary = [BoundaryPoint(b, k, None) for b, k in zip(at.tolist(), heights.tolist(), strict=True)]
+    assert area(boundary) == pytest.approx(np.trapezoid(heights, at))

@@ -1,14 +1,15 @@
 """The eight facts of the paper's Figure 5, on maps made by hand."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
+import numpy as np
 import pytest
 
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls.boundary import BoundaryPoint
-from hardwall.sim.walls.figure_5 import facts
+from hardwall.sim.walls.figure_5 import facts, with_shares
 from hardwall.sim.walls.methods import methods
 from hardwall.sim.walls.zwidth import Map
 from stimuli.figure_5 import PAPER
@@ -94,3 +95,16 @@ def test_a_range_of_one_damping_or_none_is_judged_without_failing(adjusted):
 
 def test_they_are_json():
     assert json.loads(json.dumps([asdict(fact) for fact in facts(maps({}))]))[0]["held"] is True
+
+
+def test_a_share_is_of_the_draws_that_show_a_fact():
+    """In a quarter of the draws the filter of 100 Hz ends before that of 30 Hz."""
+    made = {}
+    for name, each in maps({}).items():
+        drawn = np.repeat([[[point.stable_n_per_m] for point in each.boundary]], 8, axis=2).repeat(2, axis=0)
+        if name == "fdm-100":
+            drawn[:, 1:, :2] = 0.0
+        made[name] = replace(each, drawn=drawn)
+    found = with_shares(made)
+    assert [fact.held for fact in found] == [True] * 8
+    assert [fact.share for fact in found] == [0.75] + [1.0] * 7

@@ -6,8 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hardwall.sim.loop.backends import opened
+from hardwall.sim.scene.build import start_of, world_of
 from hardwall.sim.scene.load import load
-from hardwall.sim.walls import hit
+from hardwall.sim.walls import hit, repetition
+from hardwall.sim.world.rigid import Motion, glide, span
 from stimuli.scenes import CABLE, HAND, PULSES
 
 # The wall is unstable, so that means and distances are large; no time is a whole number of chunks or actuations.
@@ -16,20 +19,39 @@ SCENE = {
     "protocol.mean_s": 0.1207,
     "protocol.measure_s": 0.2111,
     "wall.stiffness_n_per_m": 60e3,
+    "protocol.verdict": "literal",
 }
 
 
-@pytest.fixture(scope="module")
-def run():
-    """Return a run with an overview that holds every sample."""
-    scene = load("seed-2011", SCENE)
+def traced(changes: dict) -> hit.Hit:
+    """Return a run with an overview that holds every sample of one window."""
+    scene = load("seed-2011", SCENE | changes)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(hit, "OVERVIEW_POINTS", scene.samples)
         patch.setattr(hit, "CHUNK", 1000)
         return hit.run(scene, "fixed", traces=True)
 
 
-def test_mean_and_rms_are_those_of_the_positions(run):
+@pytest.fixture(scope="module")
+def run():
+    """Return a run of the literal protocol."""
+    return traced({})
+
+
+def test_mean_rms_offset_and_drift_are_those_of_the_positions(run):
+    detrended = traced({"protocol.verdict": "detrended", "protocol.longest_s": 1.0})
+    x, settled = detrended.overview.position_m, 8503
+    assert (x == run.overview.position_m).all()
+    at, window = np.arange(2111), x[settled:]
+    line = np.polynomial.Polynomial.fit(at, window, 1)
+    assert detrended.rms_m == pytest.approx(np.sqrt(np.mean((window - line(at)) ** 2)), rel=1e-9)
+    assert detrended.mean_m == pytest.approx(window.mean(), rel=1e-12)
+    for each in (run, detrended):
+        assert each.drift_m_per_s == pytest.approx(line.convert().coef[1] * 1e4, rel=1e-6)
+        assert each.offset_m == pytest.approx(window.mean() - x[settled - 1207 : settled].mean(), rel=1e-9)
+
+
+def test_mean_and_rms_of_the_literal_protocol_are_those_of_the_positions(run):
     x, settled = run.overview.position_m, 8503
     assert len(x) == run.samples == 8503 + 2111
     mean = x[settled - 1207 : settled].mean()
@@ -170,3 +192,93 @@ def test_a_slew_limit_limits_and_a_wall_that_may_not_pull_does_not():
 def test_half_samples_in_the_protocol_are_no_trouble():
     times = {"protocol.settle_s": 3.5e-4, "protocol.mean_s": 1e-4, "protocol.measure_s": 1e-4, "amplifier": None}
     assert hit.run(load("seed-2011", times), "fixed").samples == 5
+
+
+EARLY = [
+    ("fdm", "fixed", "detrended", 3),
+    ("fdm", "float", "literal", 2),
+    ("levant", "float", "detrended", 1),
+    ("levant", "fixed", "literal", 2),
+    ("kalman", "fixed", "detrended", 3),
+    ("foaw", "fixed", "detrended", 0),
+    ("period", "fixed", "detrended", 0),
+]
+"""Estimator, backend, verdict, and how many hits at least end early: none with a long cycle in the state, or stamps."""
+
+
+@pytest.mark.parametrize(("estimator", "backend", "verdict", "least"), EARLY)
+def test_an_early_end_changes_no_verdict(estimator, backend, verdict, least):
+    """A detrended run ends early if the handle rests for ever, a literal one if it is sure to be unstable."""
+    ended = 0
+    for stiffness in (5e3, 40e3, 150e3):
+        for damping in (10.0, 60.0, 300.0):
+            wall = {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": damping}
+            scene = load("seed-2011", wall | {"controller.estimator": estimator, "protocol.verdict": verdict})
+            whole, early = hit.run(scene, backend), hit.run(scene, backend, until_sure=True)
+            assert (early.verdict, early.in_place) == (whole.verdict, whole.in_place), wall
+            ended += early.samples < whole.samples
+            if whole.stable or early.samples == whole.samples:
+                # Sums over other pieces round differently.
+                for of in ("rms_m", "mean_m", "offset_m", "drift_m_per_s"):
+                    assert getattr(early, of) == pytest.approx(getattr(whole, of), rel=1e-9, abs=1e-14), of
+    assert ended >= least
+    assert least or not ended
+
+
+def test_a_wall_that_settles_late_is_not_ended_early():
+    """The force is at its limit for a sample now and then, but the handle still comes to rest."""
+    changes = {"controller.estimator": "fdm", "protocol.push_n": 0.138, "wall.stiffness_n_per_m": 10e3}
+    changes |= {"wall.damping_n_s_per_m": 40.0, "protocol.verdict": "literal"}
+    result = hit.run(load("mhz", changes), "float", until_sure=True)
+    assert result.stable
+    assert result.samples == result.scene.samples
+
+
+@pytest.mark.parametrize("part", ["state", "delay", "force"])
+def test_a_loop_that_differs_in_one_thing_does_not_repeat(part):
+    """What the handle's rest depends on is compared: an early end after a look that differs is refused."""
+    scene = load("seed-2011", {"wall.damping_n_s_per_m": 60.0, "controller.estimator": "fdm"})
+    loop = hit.Loop(scene, "fixed", False, True)
+    with opened(scene.spec, "fixed", scene.parameters, loop.start_level) as axis:
+        state, at, memory = axis.state, loop.at, loop.memory
+        clocks = scene.spec.clocks_per_sample
+        before = repetition.seen(state, at, memory, clocks)
+        later = state._replace(clock=state.clock + 2520 * clocks), at._replace(sample=2520)
+        assert repetition.seen(*later, memory, clocks) == before
+        if part == "state":
+            later = later[0]._replace(axis=state.axis._replace(flags=1)), later[1]
+        elif part == "force":
+            later = later[0], later[1]._replace(force_n=at.force_n + 1e-16)
+        else:
+            memory.delay[3] = 1
+        assert repetition.seen(*later, memory, clocks) != before
+
+
+def test_a_start_is_at_its_place_in_the_count_with_its_phase_of_the_push():
+    """The push of 0.3572 N less 0.1 N of friction, on 0.35 kg, with 1 N s/m."""
+    changes = {"protocol.start_counts": 0.25, "protocol.start_periods": 0.5}
+    for parts in ({}, CABLE | {"transmission.stiffness_n_per_m": 1e7}):
+        scene = load("seed-2011", changes | parts)
+        begin = start_of(scene, world_of(scene))
+        # -0.07 / 1e-6 is rounded down: the handle of the scene's own start is at the upper end of its count.
+        assert begin.moment.cell == start_of(load("seed-2011"), world_of(load("seed-2011"))).moment.cell
+        assert begin.moment.motion.position_m == pytest.approx(-0.07 - 0.75e-6, abs=1e-15)
+        if not parts:
+            assert begin.moment.motion.velocity_m_per_s == pytest.approx(0.2572 * -np.expm1(-0.5e-3 / 0.35), rel=1e-12)
+        else:
+            assert begin.moment.motion.velocity_m_per_s > 0
+    assert (
+        start_of(load("seed-2011", {"protocol.start_counts": 0.0}), world_of(scene)).moment.motion.velocity_m_per_s == 0
+    )
+
+
+def test_a_phase_is_the_same_motion_some_time_later():
+    """A start that was pushed for half a period goes as one from rest there whose samples come half a period later."""
+    scene = load("seed-2011", {"protocol.start_periods": 0.5})
+    begin = start_of(scene, world_of(scene)).moment.motion
+    handle = world_of(scene).plant.handle
+    rest_m = begin.position_m - glide(Motion(0.0, 0.0), 0.2572, span(handle, 0.5e-3)).position_m
+    later = glide(begin, 0.2572, span(handle, 0.1))
+    whole = glide(Motion(rest_m, 0.0), 0.2572, span(handle, 0.1005))
+    assert later.position_m == pytest.approx(whole.position_m, abs=1e-14)
+    assert later.velocity_m_per_s == pytest.approx(whole.velocity_m_per_s, rel=1e-12)

@@ -1,0 +1,55 @@
+"""Whether a closed loop provably repeats: all that its future depends on is what it was before.
+
+The loop is a function: plant, encoder, drives on their way and controller after a sample follow from those before it,
+and from nothing else. Time enters by differences alone. So a loop that is in one state twice goes through all states in
+between for ever, and if the handle did not move in between it never will. Equal is exact: no digit of any number
+differs.
+
+What is left out is what no such future sees: the stamps of edges, if the estimator looks at none, and the number of the
+sample, which the clock of the decoder must be in step with. Some loops are never said to repeat: hardware, whose state
+is its own, estimators that look at stamps, encoders whose lines take time, and pulses of a carrier.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ...model.stamped import State
+from ..loop.values import Memory, Progress, World
+from ..scene.schema import Scene
+
+PERIOD = 2520
+"""The time over which a loop is seen to repeat, samples: a multiple of the length of every cycle of 1 to 10."""
+
+
+def period_of(scene: Scene, world: World, state: Any) -> int | None:
+    """Return the number of samples after which a resting loop of a scene is as before; None if that cannot be seen."""
+    pulse = getattr(world.plant, "pulse", None)
+    if not isinstance(state, State) or scene.spec.design.estimator.uses_stamps() or (pulse and pulse.period):
+        return None
+    if world.encoder.lines is not None:
+        return None
+    return math.lcm(PERIOD, scene.spec.samples_per_actuation, max(scene.delay_samples, 1))
+
+
+def seen(state: State, progress: Progress, memory: Memory, clocks_per_sample: int) -> Any:
+    """Return all that the future of a loop depends on, for `==`.
+
+    Args:
+        state, progress: what `loop.run` returned.
+        memory: what it wrote to.
+        clocks_per_sample: the scene's.
+    """
+    stamps = {name: 0 for name in state.decoder._fields if name.startswith("stamp")}
+    clock = state.clock - progress.sample * clocks_per_sample
+    still = state._replace(decoder=state.decoder._replace(**stamps), clock=clock)
+    delay = () if memory.delay is None else memory.delay
+    return _comparable((still, progress._replace(sample=0), delay))
+
+
+def _comparable(value: Any) -> Any:
+    """Return a copy of a value in which arrays are bytes."""
+    if isinstance(value, tuple):
+        return tuple(map(_comparable, value))
+    return value.tobytes() if isinstance(value, np.ndarray) else value

@@ -1,0 +1,93 @@
+"""What is said of a wall, from invented positions: every verdict, its windows, and the paper's own protocol."""
+
+import numpy as np
+import pytest
+
+from hardwall.sim.scene.load import load
+from hardwall.sim.walls.tally import Tally
+
+# A window has 50 samples: the first one is from 100 to 150, and the one before it from 50 on.
+PROTOCOL = {
+    "controller.sample_hz": 1000, "controller.actuation_hz": 1000, "protocol.settle_s": 0.1, "protocol.mean_s": 0.01,
+    "protocol.measure_s": 0.05, "protocol.longest_s": 0.32, "protocol.threshold_mm": 1e-3, "amplifier": None,
+}  # fmt: skip
+LITERAL = PROTOCOL | {"protocol.verdict": "literal"}
+WINDOW = 50
+BUZZ = np.tile([1.0, -1.0], 250) * 1e-6
+"""An RMS of 1 um, the threshold, about any line that a window has."""
+
+
+def judged(positions: np.ndarray, changes: dict = PROTOCOL, piece: int = 7) -> tuple[Tally, int]:
+    """Return the tally of positions, piece by piece until the verdict, and the end of the piece."""
+    tally, end = Tally(load("seed-2011", changes), True), 0
+    while tally.verdict is None:
+        first, end = end, min(end + piece, tally.window_end)
+        tally.add(first, positions[first:end], np.zeros(end - first, np.int64))
+    return tally, end
+
+
+def falling(part: float) -> np.ndarray:
+    """Return a buzz of which every window has that part of the one before, 10 um in the one before the mark."""
+    return 10 * BUZZ * part ** ((np.arange(len(BUZZ)) - WINDOW) // WINDOW)
+
+
+@pytest.mark.parametrize(
+    ("positions", "verdict", "end"),
+    [
+        (1.01 * BUZZ, "unstable", 150),
+        (0.99 * BUZZ, "stable", 150),
+        (falling(0.91), "unstable", 150),
+        (falling(0.89), "undecided", 300),
+        (falling(0.5), "stable", 300),
+        (falling(0.4), "stable", 250),
+        (falling(1.5), "unstable", 150),
+    ],
+)
+def test_the_windows_give_the_verdict(positions, verdict, end):
+    tally, at = judged(5e-3 + positions)
+    assert (tally.verdict, at) == (verdict, end)
+
+
+def test_what_falls_and_then_goes_on_is_unstable():
+    positions = falling(0.5)
+    positions[200:] = positions[150:200].tolist() * 6
+    tally, end = judged(positions)
+    assert (tally.verdict, end) == ("unstable", 250)
+    assert tally.rms_m == pytest.approx(np.sqrt(np.mean(positions[200:250] ** 2)), rel=1e-2)
+
+
+def test_a_handle_that_has_moved_away_or_creeps_is_stable_and_that_is_said():
+    """The paper's protocol calls it unstable; its square is made of the three parts."""
+    positions = 5e-3 + 0.5 * BUZZ + 2e-8 * np.maximum(np.arange(len(BUZZ)) - 100, 0)
+    positions[:100] -= 30e-6
+    tally, _ = judged(positions)
+    assert tally.verdict == "stable"
+    slope = np.polynomial.Polynomial.fit(np.arange(WINDOW), positions[100:150], 1).convert().coef[1]
+    assert tally.drift_m_per_s == pytest.approx(slope * 1000, rel=1e-9)
+    assert slope > 1e-8
+    assert tally.offset_m == pytest.approx(30e-6 + 24.5 * 2e-8, rel=1e-6)
+    assert tally.mean_m == pytest.approx(positions[100:150].mean(), rel=1e-12)
+    literal, _ = judged(positions, LITERAL)
+    assert literal.verdict == "unstable"
+    assert literal.mean_m == pytest.approx(positions[90:100].mean(), rel=1e-12)
+    spread = (tally.drift_m_per_s / 1000) ** 2 * (WINDOW**2 - 1) / 12
+    assert literal.rms_m**2 == pytest.approx(tally.rms_m**2 + tally.offset_m**2 + spread, rel=1e-9)
+
+
+def test_pieces_do_not_matter():
+    for changes in (PROTOCOL, LITERAL):
+        ways = [judged(5e-3 + falling(0.6), changes, piece) for piece in (1, 7, 50, 400)]
+        assert len({(tally.verdict, end) for tally, end in ways}) == 1
+        assert all(tally.rms_m == pytest.approx(ways[0][0].rms_m, rel=1e-9) for tally, _ in ways)
+    whole = Tally(load("seed-2011", PROTOCOL), True)
+    whole.add(0, 0.5 * BUZZ[:150], np.zeros(150, np.int64))
+    assert whole.verdict == "stable"
+
+
+def test_a_handle_is_still_since_its_last_change():
+    tally = Tally(load("seed-2011", PROTOCOL), False)
+    for first, positions in ((0, [1.0, 2.0, 2.0]), (3, [2.0, 2.0]), (5, [3.0, 3.0, 2.0]), (8, [2.0])):
+        tally.add(first, np.array(positions) * 1e-3, np.zeros(len(positions)))
+    assert tally.still_from == 7
+    tally.rest()
+    assert (tally.verdict, tally.rms_m, tally.mean_m, tally.offset_m, tally.drift_m_per_s) == ("stable", 0, 2e-3, 0, 0)
