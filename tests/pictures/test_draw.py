@@ -25,6 +25,7 @@ from hardwall.sim.pictures import (
     trade,
     zwidth,
 )
+from hardwall.sim.pictures import axes as several
 from hardwall.sim.pictures import replay as replayed
 from hardwall.sim.pictures.style import PAGE_IN, lay_out, save
 from hardwall.sim.studies.accuracy import Accuracy
@@ -55,6 +56,7 @@ PICTURES = {
     "replay": lambda: replayed.draw(replay(swing(), coarsen=COARSEN, acceleration_max_counts_per_s2=BOUND)),
     "figure 1": figure_1,
     "figure 2": lambda: accuracy.draw(results.rows()),
+    "axes": lambda: several.draw(results.axes_costs()),
     "bits": lambda: bits.draw(results.bits_dropped()),
     "costs": lambda: costs.draw(results.costs_of_boards()),
     "cutoff": lambda: cutoff.draw(results.devices()),
