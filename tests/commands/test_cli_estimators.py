@@ -105,6 +105,9 @@ def test_figures_are_drawn(monkeypatch, capsys, tmp_path, figure):
         (["accuracy", "--plot", "a.gif"], "--plot must end in .pdf or .png or .svg, not 'a.gif'"),
         (["choose", "--rate", "1"], "--rate must be whole numbers of 1000 to 1e+07 Hz, not '1.0'"),
         (["bits", "--estimators", ""], "--estimators: estimator must be one of fdm, "),
+        (["axes", "--estimators", "kalman"], "--estimators must be of fdm, levant, window, not 'kalman'"),
+        (["axes", "--axes", "8,33"], "--axes must be whole numbers of 1 to 32, not '33'"),
+        (["axes", "--axes", ""], "--axes must be whole numbers of 1 to 32, not ''"),
         (
             ["costs", "--device", "z80"],
             "--device must be one of ecp5-12k, ecp5-25k, ecp5-45k, ecp5-85k, ice40-up5k, gw1nr-9, not 'z80'",

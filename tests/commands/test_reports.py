@@ -19,6 +19,7 @@ ELSEWHERE = {
 }
 """Commands whose reports are held to the schema where their results are made."""
 RESULTS = {
+    "axes": results.axes_costs,
     "bits": results.bits_dropped,
     "cutoff": results.devices,
     "drop": results.dropped,

@@ -25,9 +25,11 @@ from hardwall.sim.pictures import (
     trade,
     zwidth,
 )
+from hardwall.sim.pictures import axes as several
 from hardwall.sim.pictures import replay as replayed
 from hardwall.sim.pictures.style import PAGE_IN, lay_out, save
 from hardwall.sim.studies.accuracy import Accuracy
+from hardwall.sim.studies.published import LOOPS
 from hardwall.sim.studies.trade import HIT, MAP
 from stimuli import results
 from stimuli.replays import BOUND, COARSEN, swing
@@ -55,6 +57,7 @@ PICTURES = {
     "replay": lambda: replayed.draw(replay(swing(), coarsen=COARSEN, acceleration_max_counts_per_s2=BOUND)),
     "figure 1": figure_1,
     "figure 2": lambda: accuracy.draw(results.rows()),
+    "axes": lambda: several.draw(results.axes_costs()),
     "bits": lambda: bits.draw(results.bits_dropped()),
     "costs": lambda: costs.draw(results.costs_of_boards()),
     "cutoff": lambda: cutoff.draw(results.devices()),
@@ -257,3 +260,17 @@ def test_a_circle_is_at_the_derived_width():
     assert by_width.lines[0].get_xdata().tolist() == [20, 19, 18]
     assert [line.get_xdata()[0] for line in by_logic.lines[1::2]] == [1000, 500, 1500]
     assert np.isfinite([line.get_ydata()[0] for line in by_width.lines]).all()
+
+
+@pytest.mark.parametrize("picture", ["costs"], indirect=True)
+def test_a_panel_of_costs_has_every_board_that_fits_and_every_published_loop(picture):
+    rows = results.costs_of_boards().rows
+    for axes, device in zip(picture.axes, ("ecp5-25k", "ice40-up5k"), strict=True):
+        placed = [row["board"] for row in rows if row["device"] == device and row["board"]]
+        boards = {(board["lut4"], board["max_sample_hz"]) for board in placed}
+        assert {tuple(line.get_xydata()[0]) for line in axes.lines if len(line.get_xdata()) == 1} == boards
+        published = {line.get_ydata()[0] for line in axes.lines if len(line.get_xdata()) == 2}
+        assert published == {loop.sample_hz for loop in LOOPS}
+        low, high = axes.get_ylim()
+        assert all(low < rate < high for rate in published | {rate for _, rate in boards})
+    assert "too large for it: levant-adaptive" in picture.axes[1].get_title(loc="left")

@@ -11,7 +11,7 @@ from hardwall.sim.loop.record import Overview, Trace
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.scene.tables import load_any
-from hardwall.sim.studies import bits, costs, cutoff, drop, gains, lipschitz, rates, shortcuts, sines, trade
+from hardwall.sim.studies import axes, bits, costs, cutoff, drop, gains, lipschitz, rates, shortcuts, sines, trade
 from hardwall.sim.studies.accuracy import Accuracy
 from hardwall.sim.studies.drop_result import Drop, End, Law, Shaken
 from hardwall.sim.studies.zwidth import ZWidth
@@ -131,6 +131,24 @@ def costs_of_boards() -> costs.Costs:
         ]
         + [row("levant-adaptive", "ice40-up5k", 6000, 1e6)]
     )
+
+
+def axes_costs() -> axes.AxesCosts:
+    """Return the costs of a few numbers of axes, with two estimators, placed with three seeds."""
+
+    def row(estimator: str, number: int, supervised: bool) -> dict:
+        slots = max(number, 14 if estimator == "levant" else 4)
+        fmax_mhz = 120.0 - number / 2
+        return {
+            **{"estimator": estimator, "axes": number, "supervised": supervised, "device": axes.DEVICE},
+            **{"clock_mhz": 96.0, "lut4": 3000 + 360 * number * (1 + supervised), "ff": 2000, "dsp": 5, "bram": 0},
+            **{"available": {"lut4": 24288, "dsp": 28, "bram": 56}, "untimed": [], "latency_clocks": 25},
+            **{"seeds": [1, 2, 3], "fmax_mhz_seeds": [fmax_mhz, fmax_mhz - 4, fmax_mhz + 2], "fmax_mhz": fmax_mhz},
+            **{"interval_clocks": slots, "max_sample_hz": round(fmax_mhz * 1e6 / slots)},
+        }
+
+    kinds = [("levant", True), ("levant", False), ("fdm", True)]
+    return axes.AxesCosts([row(name, number, kind) for name, kind in kinds for number in (1, 8, 32)])
 
 
 def devices() -> cutoff.Cutoffs:
