@@ -23,9 +23,10 @@ def command(
     numbers: Annotated[
         str, typer.Option("--axes", metavar="N,...", help=f"numbers of axes, 1 to {AXES_MAX}")
     ] = ",".join(map(str, axes.NUMBERS)),
+    bare: Annotated[bool, typer.Option("--bare", help="also the axes without supervisors")] = False,
     seeds: SeedsOption = 1,
 ) -> None:
-    jobs = axes.jobs(_names(wanted), _numbers(numbers), seeds)
+    jobs = axes.jobs(_names(wanted), _numbers(numbers), bare, seeds)
     # Placement runs in processes of its own.
     rows = replace(options, workers=1).results(f"axes on {axes.DEVICE}", axes.cost, jobs, Store("axes"))
     options.finish(axes.AxesCosts(rows))

@@ -33,7 +33,7 @@ COMMANDS = {
     "accuracy": "Hold velocity estimators against the exact derivative of known motions, at any rate.",
     "costs": "What each estimator takes of a device: alone, and the board with it placed and routed "
     "(a minute or two each).",
-    "axes": "What 1 to 32 axes in one pipeline take of an ECP5, and how fast each is, with supervisors and without "
+    "axes": "What 1 to 32 axes in one pipeline take of an ECP5, and how fast each is: with supervisors, without pins "
     "(some minutes each).",
     "choose": "The table to choose an estimator by: its error in each situation, all with one set of gains, "
     "and its cost.",

@@ -14,7 +14,8 @@ def draw(costs: AxesCosts) -> Figure:
     numbers = sorted({row["axes"] for row in rows})
     # No rota ends sooner than a clock for each axis, and no netlist here has a faster clock than this one.
     clock_mhz = max(row["fmax_mhz"] for row in rows)
-    title = f"several axes in one pipeline on {rows[0]['device']}, placed alone; full: with supervisors, open: without"
+    open_ones = "" if all(row["supervised"] for row in rows) else "; open: without supervisors"
+    title = f"several axes in one pipeline on {rows[0]['device']}, placed alone{open_ones}"
     picture = new_figure(5.8, title)
     logic, rate = picture.subplots(2, 1, sharex=True)
     estimators = list(dict.fromkeys(row["estimator"] for row in rows))

@@ -28,7 +28,7 @@ class AxesCosts:
         return {"rows": self.rows}
 
     def tables(self) -> list[Table]:
-        """Return a table for every estimator, with supervisors and without."""
+        """Return a table for every kind of axes."""
         return [table_of((), (kind, *COLUMNS), [_line(row) for row in own]) for kind, own in self.kinds().items()]
 
     def kinds(self) -> dict[str, list[dict[str, Any]]]:
@@ -58,13 +58,13 @@ def _line(row: dict[str, Any]) -> list[str]:
     return [*used, f"{row['fmax_mhz']:.1f}{spread}", str(row["interval_clocks"]), *rates]
 
 
-def jobs(estimators: Iterable[str], numbers: Iterable[int], seeds: int) -> list[dict[str, Any]]:
-    """Return the arguments of `cost` for every estimator and number of axes, with supervisors and without."""
+def jobs(estimators: Iterable[str], numbers: Iterable[int], bare: bool, seeds: int) -> list[dict[str, Any]]:
+    """Return the arguments of `cost` for every estimator and number of axes, supervised, and if `bare` also without."""
     numbers = list(numbers)
     return [
         {"estimator": name, "axes": axes, "supervised": supervised, "seeds": list(range(1, seeds + 1))}
         for name in estimators
-        for supervised in (True, False)
+        for supervised in ((True, False) if bare else (True,))
         for axes in numbers
     ]
 

@@ -22,11 +22,12 @@ def calls(tmp_path, monkeypatch) -> Path:
 
 
 def test_a_job_for_every_estimator_number_and_kind():
-    jobs = axes.jobs(["levant", "fdm"], (1, 16), 2)
+    jobs = axes.jobs(["levant", "fdm"], (1, 16), True, 2)
     assert [(job["estimator"], job["supervised"], job["axes"]) for job in jobs] == [
         (name, supervised, number) for name in ("levant", "fdm") for supervised in (True, False) for number in (1, 16)
     ]
     assert {tuple(job["seeds"]) for job in jobs} == {(1, 2)}
+    assert axes.jobs(["levant"], (1, 16), False, 2) == [job for job in jobs[:4] if job["supervised"]]
 
 
 @pytest.mark.parametrize(("estimator", "number", "slots"), [("levant", 1, 14), ("levant", 32, 32), ("fdm", 2, 4)])
