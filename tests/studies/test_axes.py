@@ -41,16 +41,16 @@ def test_axes_sample_as_fast_as_their_rota_allows_at_the_clock(estimator, number
 
 
 def test_a_row_is_what_the_placer_reports(calls):
-    row = axes.cost("fdm", 8, True, (5, 9, 6))
+    row = axes.cost("fdm", 2, True, (5, 9, 6))
     assert (row["seeds"], row["fmax_mhz_seeds"], row["fmax_mhz"]) == ([5, 9, 6], [50.0, 90.0, 60.0], 60.0)
-    assert (row["interval_clocks"], row["max_sample_hz"]) == (8, round(60e6 / 8))
+    assert (row["interval_clocks"], row["max_sample_hz"]) == (4, round(60e6 / 4))
     assert (row["lut4"], row["dsp"], row["bram"], row["ff"]) == (0, 1, 2, 3)
     assert row["available"] == {"lut4": 100, "dsp": 101, "bram": 102}
-    assert row["latency_clocks"] == SupervisedAxes(axes.fastest("fdm", 8)).latency
-    assert axes.cost("fdm", 8, False, (5,))["latency_clocks"] == axes.fastest("fdm", 8).latency < row["latency_clocks"]
+    assert row["latency_clocks"] == SupervisedAxes(axes.fastest("fdm", 2)).latency
+    assert axes.cost("fdm", 2, False, (5,))["latency_clocks"] == axes.fastest("fdm", 2).latency < row["latency_clocks"]
     check("axes", axes.AxesCosts([row]).report())
     assert calls.read_text().split() == ["0", "5", "9", "6", "0", "5"]
-    assert axes.cost("fdm", 8, True, (5, 9, 6)) == row
+    assert axes.cost("fdm", 2, True, (5, 9, 6)) == row
     assert len(calls.read_text().split()) == 6, "what was placed is not placed again"
 
 
