@@ -85,8 +85,8 @@ struct Context {
 #else
     Registers& registers = *axis.rootp;
 
-    // The clocks in a row, at most two, in which nothing but the counters changed; what the registers should be after the
-    // next if there is another; and the first clock at which it is worth to see.
+    // The clocks in a row, at most RESTED, in which nothing but the counters changed; what the registers should be after
+    // the next if there is another; and the first clock at which it is worth to see.
     int rested = 0;
     alignas(Registers) unsigned char expected[sizeof(Registers)];
     int64_t see_from = 0;
@@ -127,7 +127,7 @@ struct Context {
                 if (free < 0) see_from = clock + SAMPLE_CLOCKS;
                 rested = 0;
                 tick();
-            } else if (rested == 2) {
+            } else if (rested == RESTED) {
                 const int64_t some = std::min(until - clock, free);
                 count_on(registers, some);
                 clock += some;

@@ -15,7 +15,7 @@ from ...model import quadrature
 from ...model.spec import AxisSpec
 from ..jobs.stages import logger
 from . import resting, shared_library
-from .resting import Counter, RestsNotError
+from .resting import Resting, RestsNotError
 from .shared_library import FAST_TO_BUILD, FAST_TO_RUN, Recipe
 from .verilated import Rtl, RtlState
 
@@ -26,8 +26,8 @@ SHOWN = ("drive", "velocity", "flags")
 """The outputs of an axis that the compiled loop reads."""
 
 
-def counters(spec: AxisSpec) -> tuple[Counter, ...]:
-    """Return what may run in an axis while all else rests.
+def resting_of(spec: AxisSpec) -> Resting:
+    """Return what may run in an axis while all else rests, and how to tell that it does.
 
     Raises:
         RestsNotError: if none of its clocks may be skipped.
@@ -35,15 +35,15 @@ def counters(spec: AxisSpec) -> tuple[Counter, ...]:
     return resting.check(to_netlist(Axis(spec), "axis"), SHOWN)
 
 
-def _header(spec: AxisSpec, running: tuple[Counter, ...] | None) -> str:
-    """Return the header that describes an axis to the shim: its ports, and its counters, None if no clock is skipped.
+def _header(spec: AxisSpec, rest: Resting | None) -> str:
+    """Return the header that describes an axis to the shim: its ports, and how it rests, None if no clock is skipped.
 
     Of the names of a counter Verilator keeps one, which is none with a `$` or two underscores.
     """
     words = " ".join(f"WORD({index}, {word.name})" for index, word in enumerate(spec.design.words))
     members = [
         (f"harness__DOT__axis__DOT__{name.replace('.', '__DOT__')}, {(1 << counter.width) - 1}", counter.stops)
-        for counter in running or ()
+        for counter in (rest.counters if rest else ())
         for name in counter.names
         if "$" not in name and "__" not in name
     ]
@@ -51,7 +51,8 @@ def _header(spec: AxisSpec, running: tuple[Counter, ...] | None) -> str:
         f"#define DRIVE_WIDTH {spec.force.width}\n"
         f"#define VELOCITY_WIDTH {spec.design.estimator.velocity.width}\n"
         f"#define AXIS_WORDS {words}\n"
-        f"#define SKIPS {int(running is not None)}\n"
+        f"#define SKIPS {int(rest is not None)}\n"
+        f"#define RESTED {rest.clocks if rest else 0}\n"
         f"#define SAMPLE_CLOCKS {spec.design.latency_to_drive + 1}\n"
         f"#define COUNTERS {' '.join(f'COUNTER({member})' for member, _ in members)}\n"
         f"#define STOPS {' '.join(f'STOP({member}, {stop})' for member, stops in members for stop in stops)}\n"
@@ -107,7 +108,7 @@ def _sources(spec: AxisSpec, traced: bool) -> _Sources:
         return _Sources(files | {"axis_ports.h": _header(spec, None)})
     files["harness.v"] = _harness(component)
     try:
-        return _Sources(files | {"axis_ports.h": _header(spec, counters(spec))})
+        return _Sources(files | {"axis_ports.h": _header(spec, resting_of(spec))})
     except RestsNotError as error:
         return _Sources(files | {"axis_ports.h": _header(spec, None)}, str(error))
 

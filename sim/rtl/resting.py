@@ -21,7 +21,13 @@ would, too. So what a register takes is made of what has not changed. And a coun
 for by any other it would not be one further after each clock. The third clock begins as the second did, but for the
 counters, so it goes the same ways; and so does every clock up to one with a counter at a stop, or with other inputs.
 
-A simulation has to see two such clocks each time; what it then skips is exact. If the check fails, nothing is skipped.
+**When one clock is enough.** Where no register that the shown outputs follow from takes a counter by any way, and a
+counter's own next value is its successor, itself or a constant, one clock tells as much as two. What leaves such a
+register as it was does so in the next clock, too; and a counter that is one further went by the way of its successor,
+unless the constant is just that: the value below a constant is a stop, besides. Other registers need not rest, for
+nothing that is looked at follows from them.
+
+A simulation has to see these clocks each time; what it then skips is exact. If the check fails, nothing is skipped.
 It may keep more than registers from clock to clock, as Verilator does: what follows from them. All of that is compared;
 what follows from a counter is its successor, which differs from clock to clock, or the bit of a stop, which is the same
 at both ends of what is skipped.
@@ -55,8 +61,21 @@ class Counter:
     stops: tuple[int, ...]
 
 
-def check(netlist: nir.Netlist, shown: Iterable[str], listed: Iterable[str] = COUNTERS) -> tuple[Counter, ...]:
-    """Return the counters of a component that may run while all else rests.
+@dataclass(frozen=True)
+class Resting:
+    """How a component rests.
+
+    Attributes:
+        counters: what may run while all else rests.
+        clocks: the clocks in a row in which nothing but the counters may change, to tell that it rests.
+    """
+
+    counters: tuple[Counter, ...]
+    clocks: int
+
+
+def check(netlist: nir.Netlist, shown: Iterable[str], listed: Iterable[str] = COUNTERS) -> Resting:
+    """Return the counters of a component that may run while all else rests, and how to tell that it does.
 
     Args:
         netlist: the component, from `hdl.export.to_netlist`.
@@ -83,8 +102,10 @@ class _Check:
         }
         self._stops: dict[int, set[int]] = {number: set() for number in self._counters}
         self._made = self._made_of_counters()
+        self._fixed: dict[int, set[int]] = {number: set() for number in self._counters}  # below a constant it takes
+        self._loaded = False  # whether a counter takes anything but a constant, itself and its successor
 
-    def run(self, shown: tuple[str, ...]) -> tuple[Counter, ...]:
+    def run(self, shown: tuple[str, ...]) -> Resting:
         clocks = {(cell.clk, cell.clk_edge) for cell in self._cells if isinstance(cell, nir.FlipFlop)}
         if len(clocks) > 1:
             raise RestsNotError("it has more than one clock")
@@ -92,9 +113,39 @@ class _Check:
             self._check(number, cell)
         for name in shown:
             self._decides(f"the output {name}", self._netlist.top.ports_o[name])
-        return tuple(
-            Counter(tuple(self._names[value]), len(value), tuple(sorted(self._stops[number])))
+        at_once = not (self._loaded or self._latched(shown))
+        counters = tuple(
+            Counter(
+                tuple(self._names[value]),
+                len(value),
+                tuple(sorted(self._stops[number] | (self._fixed[number] if at_once else set()))),
+            )
             for number, value in self._counters.items()
+        )
+        return Resting(counters, 1 if at_once else 2)
+
+    def _latched(self, shown: tuple[str, ...]) -> bool:
+        """Return whether anything that the shown outputs follow from takes a counter."""
+        writers: dict[int, list[int]] = {}
+        for number, cell in enumerate(self._cells):
+            if isinstance(cell, nir.SyncWritePort):
+                writers.setdefault(cell.memory, []).append(number)
+        seen: set[int] = set()
+        waiting = [net.cell for name in shown for net in self._netlist.top.ports_o[name] if net.is_cell]
+        while waiting:
+            number = waiting.pop()
+            if number in seen or number == 0:
+                continue
+            seen.add(number)
+            cell = self._cells[number]
+            waiting += [net.cell for net in cell.input_nets() if net.is_cell]
+            if isinstance(cell, nir.SyncReadPort | nir.AsyncReadPort):
+                waiting += writers.get(cell.memory, [])
+        return any(
+            isinstance(self._cells[number], nir.FlipFlop | nir.SyncWritePort)
+            and number not in self._counters
+            and any(net in self._made for net in self._cells[number].data)
+            for number in seen
         )
 
     def _made_of_counters(self) -> set[nir.Net]:
@@ -192,7 +243,13 @@ class _Check:
     def _next(self, number: int, value: nir.Value) -> None:
         """Raise RestsNotError unless every way to the next value of a counter is one that the argument allows."""
         counter = self._counters[number]
-        if value == counter or not any(net in self._made for net in value) or self._is_successor(value, counter):
+        if value == counter or self._is_successor(value, counter):
+            return
+        if value.is_const:
+            self._fixed[number].add((_constant(value) - 1) % (1 << len(counter)))
+            return
+        if not any(net in self._made for net in value):
+            self._loaded = True
             return
         ways = self._ways(number, value)
         if ways is None:

@@ -18,7 +18,7 @@ from hardwall.model.quadrature import latency
 from hardwall.sim.rtl import library
 from hardwall.sim.rtl.c_function import call
 from hardwall.sim.rtl.library import Hardware
-from hardwall.sim.rtl.resting import Counter, RestsNotError, check
+from hardwall.sim.rtl.resting import Counter, Resting, RestsNotError, check
 from hardwall.sim.scene.load import load
 from hardwall.testing import rng
 from stimuli.lengths import LONG
@@ -51,8 +51,12 @@ class Clockwork(wiring.Component):
         return m
 
 
+def resting(describe: Describe = lambda m, clockwork: None, shown: str = "seen") -> Resting:
+    return check(to_netlist(Clockwork(describe), "top"), (shown,), ("divider", "stamp"))
+
+
 def counters(describe: Describe = lambda m, clockwork: None) -> tuple[Counter, ...]:
-    return check(to_netlist(Clockwork(describe), "top"), ("seen",), ("divider", "stamp"))
+    return resting(describe).counters
 
 
 def allowed_latch_of_some_bits(m, c):
@@ -213,19 +217,98 @@ def test_a_counter_that_reaches_anything_else_is_found(describe, why):
 
 def test_an_output_that_is_looked_at_and_shows_a_counter_is_found():
     netlist = to_netlist(Clockwork(bug_output), "top")
-    assert len(check(netlist, ("seen",), ("divider", "stamp"))) == 2
+    assert len(check(netlist, ("seen",), ("divider", "stamp")).counters) == 2
     with pytest.raises(RestsNotError, match=r"^the output other depends on a counter$"):
         check(netlist, ("seen", "other"), ("divider", "stamp"))
+
+
+def follows_nothing(m, c):
+    m.d.sync += c.other.eq(c.word)
+
+
+def follows_a_memory_without_stamps(m, c):
+    m.submodules.memory = memory = Memory(shape=8, depth=4, init=[])
+    write, read = memory.write_port(), memory.read_port()
+    m.d.comb += [
+        write.en.eq(c.edge),
+        write.addr.eq(c.word),
+        write.data.eq(c.word),
+        read.en.eq(1),
+        c.other.eq(read.data),
+    ]
+
+
+@pytest.mark.parametrize("describe", [follows_nothing, follows_a_memory_without_stamps])
+def test_one_clock_is_enough_where_what_is_shown_follows_from_no_latch(describe):
+    rest = resting(describe, "other")
+    assert rest.clocks == 1
+    stops = {counter.names[-1]: counter.stops for counter in rest.counters}
+    assert stops == {"divider": (STOP, 15), "stamp": (255,)}  # both may be made 0
+
+
+def follows_a_latch(m, c):
+    m.d.sync += c.other.eq(c.seen ^ c.word)
+
+
+def follows_a_latch_by_a_decision(m, c):
+    with m.If(c.seen == c.word):
+        m.d.sync += c.other.eq(c.word)
+
+
+def follows_a_memory_of_stamps(m, c):
+    m.submodules.memory = memory = Memory(shape=8, depth=4, init=[])
+    write, read = memory.write_port(), memory.read_port()
+    m.d.comb += [
+        write.en.eq(c.edge),
+        write.addr.eq(c.word),
+        write.data.eq(c.stamp),
+        read.en.eq(1),
+        c.other.eq(read.data),
+    ]
+
+
+def follows_a_memory_that_is_read_at_once(m, c):
+    m.submodules.memory = memory = Memory(shape=8, depth=4, init=[])
+    write, read = memory.write_port(), memory.read_port(domain="comb")
+    m.d.comb += [write.en.eq(c.edge), write.addr.eq(c.word), write.data.eq(c.stamp)]
+    m.d.sync += c.other.eq(read.data)
+
+
+def loads_a_counter(m, c):
+    """The word may be one further by chance, and is the same in the next clock."""
+    follows_nothing(m, c)
+    allowed_reset_of_a_counter(m, c)
+
+
+@pytest.mark.parametrize(
+    "describe",
+    [
+        follows_a_latch,
+        follows_a_latch_by_a_decision,
+        follows_a_memory_of_stamps,
+        follows_a_memory_that_is_read_at_once,
+        loads_a_counter,
+    ],
+)
+def test_two_clocks_are_needed_where_one_may_mislead(describe):
+    rest = resting(describe, "other")
+    assert rest.clocks == 2
+    assert {counter.names[-1]: counter.stops for counter in rest.counters} == {"divider": (STOP,), "stamp": ()}
 
 
 @pytest.mark.parametrize("estimator", SKIPPING)
 def test_in_an_axis_the_divider_and_the_stamp_may_run(estimator):
     for name in ("mhz", "seed-2011"):
         axis = load(name, {"controller.estimator": estimator}).spec
-        found = {name: counter for counter in library.counters(axis) for name in counter.names}
-        assert len(library.counters(axis)) == 2
-        assert found["divider"].stops == (axis.clocks_per_sample - 1,)
-        assert (found["stamp"].width, found["stamp"].stops) == (axis.stamp_width, ())
+        rest = library.resting_of(axis)
+        found = {name: counter for counter in rest.counters for name in counter.names}
+        assert len(rest.counters) == 2
+        by_stamps = axis.design.estimator.uses_stamps()
+        assert rest.clocks == (2 if by_stamps else 1)
+        # Both begin again at 0, one of them by a reset, and to wrap does the same.
+        below_0 = {} if by_stamps else {name: {(1 << found[name].width) - 1} for name in ("divider", "stamp")}
+        assert set(found["divider"].stops) == {axis.clocks_per_sample - 1} | below_0.get("divider", set())
+        assert (found["stamp"].width, set(found["stamp"].stops)) == (axis.stamp_width, below_0.get("stamp", set()))
 
 
 class Leaky(Axis):
@@ -289,7 +372,7 @@ def test_what_is_evaluated_is_the_way_to_the_drive_and_through_the_decoder(estim
             _advance(hardware, clocks, np.array([1, 3, 2, 0])[np.arange(edges) % 4], until * every)
             evaluated.append(hardware.evaluated - before)
     decoder_clocks = latency(words["encoder_glitch_clocks"])
-    assert evaluated[1] <= 100 * (axis.design.latency_to_drive + 6)
+    assert evaluated[1] <= 100 * (axis.design.latency_to_drive + 2 + library.resting_of(axis).clocks)
     assert evaluated[2] <= evaluated[1] + 300 * (decoder_clocks + 4)
 
 

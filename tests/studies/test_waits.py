@@ -1,6 +1,7 @@
 """Whole commands from the prompt: timed in turns, compared as ratios, and refused where there is no hardwall."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,23 @@ def test_a_command_that_fails_is_named(monkeypatch):
     monkeypatch.setattr(waits, "COMMANDS", {"a hit (s)": Command(("hit", "nowhere"), 1, cold=True)})
     with pytest.raises(RuntimeError, match=r"^hit nowhere by \S+ failed: hardwall: error: .*nowhere"):
         waits.measure(read("seed-2011"), None, lambda text: None)
+
+
+def test_a_command_that_an_older_version_refuses_has_no_ratio(tmp_path, monkeypatch):
+    """It is run here to the end, and tried there once."""
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    other, calls = tmp_path / "hardwall", tmp_path / "calls"
+    other.write_text(f"#!/bin/sh\necho called >> {calls}\nexit 2\n")
+    other.chmod(0o755)
+    command = Command(HIT, 2, speed=True, lately=True)
+    monkeypatch.setattr(waits, "COMMANDS", {"fixed (samples/s)": command})
+    (wait,) = waits.measure(read("seed-2011"), other, lambda text: None)
+    assert (len(wait.here), wait.other, calls.read_text()) == (2, [], "called\n")
+    compared = Wait("a hit (s)", [2.0], [4.0])
+    assert waits.table([wait, compared]).rows[0] == ["fixed (samples/s)", f"{sum(wait.here) / 2:.4g}", "", ""]
+    monkeypatch.setattr(waits, "COMMANDS", {"fixed (samples/s)": replace(command, lately=False)})
+    with pytest.raises(RuntimeError, match="failed: exit code 2"):
+        waits.measure(read("seed-2011"), other, lambda text: None)
 
 
 def test_what_has_no_hardwall_is_refused(tmp_path, monkeypatch, capsys):
