@@ -143,7 +143,8 @@ def start_of(scene: Scene, world: World) -> Progress:
     protocol = scene.protocol
     cell, position_m = locate(world.encoder, protocol.start_m), protocol.start_m
     if protocol.start_counts is not None:
-        position_m = cell.lower_m + protocol.start_counts * (cell.upper_m - cell.lower_m)
+        place_m = cell.lower_m + protocol.start_counts * (cell.upper_m - cell.lower_m)
+        position_m = min(place_m, math.nextafter(cell.upper_m, cell.lower_m))
     push_n = converted(world.converter, world.push_n)
     motion = _rest_at(position_m, world.plant, push_n)
     clocks = round(protocol.start_periods * scene.spec.clock_hz / scene.spec.actuation_hz)

@@ -25,6 +25,7 @@ def or_none(quantity: Any) -> Any:
 Mass = number(1e-6, 1e3)  # the needle of an instrument, to a vehicle
 Length = number(1e-12, 1e3)  # a count of an interferometer, to a hall
 Place = number(-1e3, 1e3)
+Part = number(0.0, 1.0)
 Speed = number(1e-9, 1e5)  # a nanometre in a second, to what no encoder follows
 Acceleration = number(1e-9, 1e9)  # what shows after minutes, to the largest force on a gram
 Force = number(1e-12, 1e6)  # one step of the smallest force, to a press

@@ -27,6 +27,7 @@ from .quantities import (
     Inductance,
     Length,
     Mass,
+    Part,
     Place,
     Radius,
     Rate,
@@ -155,8 +156,8 @@ class ProtocolSection(Section):
     """
 
     start_m: Annotated[Place, Field(le=-1e-12)]
-    start_counts: Annotated[float, Field(ge=0, lt=1)] | None = None
-    start_periods: Annotated[float, Field(ge=0, lt=1)] = 0.0
+    start_counts: Part | None = None
+    start_periods: Part = 0.0
     push_n: Force
     settle_s: Time
     mean_s: Time
