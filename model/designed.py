@@ -7,7 +7,10 @@ from typing import Any
 
 from .design import Design
 from .estimators.estimate import EstimatorGains
-from .requirements import AxisRequirements
+from .requirements import EDGE_ERROR_COUNTS, AxisRequirements
+
+USUAL_BOUNDS = {"jerk_max_m_per_s3": None, "edge_error_max_counts": EDGE_ERROR_COUNTS}
+"""Bounds that are no facts of an axis unless they are others than these."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +34,9 @@ class DesignedAxis(AxisRequirements):
 
     @property
     def facts(self) -> dict[str, Any]:
-        """Every field by name, with the gains that are in use."""
-        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)} | {
-            "gains": self.design.gains
-        }
+        """Every field by name, with the gains that are in use; without bounds that are the usual ones."""
+        facts = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        for name, usual in USUAL_BOUNDS.items():
+            if facts[name] == usual:
+                del facts[name]
+        return facts | {"gains": self.design.gains}

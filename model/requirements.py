@@ -29,6 +29,10 @@ CLOCK_HZ_MAX = 1 << 48
 """The largest clock, far beyond any: stamps, of as many bits, are computed in 64."""
 RATES_HZ = 1, 10**9
 """The least and the largest rate of an axis in true seconds, of a recording too."""
+EDGE_ERROR_COUNTS = 0.1
+"""The RMS error of single edges that is borne unless another is given: that of a poor scale."""
+JERK_SHARE = 2.0**-7
+"""The jerk that is expected unless it is given, of C in the time in which C moves half a count."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +47,10 @@ class AxisRequirements:
         travel_m: length of the workspace, m.
         speed_max_m_per_s: largest speed to estimate, m/s.
         acceleration_max_m_per_s2: bound C on the acceleration, m/s^2; sets default estimator gains.
+        jerk_max_m_per_s3: bound on the jerk between impacts, m/s^3; sets default gains of `edge-kalman`. None for
+            `jerk_bound_m_per_s3`.
+        edge_error_max_counts: RMS error of single edges of the encoder that estimates are to bear, counts; sets default
+            gains of `edge-kalman`.
         force_max_n: largest drive, N.
         force_resolution_n: force LSB, N.
         stiffness_max_n_per_m: largest wall stiffness, N/m.
@@ -68,6 +76,8 @@ class AxisRequirements:
     force_resolution_n: float
     stiffness_max_n_per_m: float
     damping_max_n_s_per_m: float
+    jerk_max_m_per_s3: float | None = None
+    edge_error_max_counts: float = EDGE_ERROR_COUNTS
     glitch_clocks: int | None = None
     estimator_bits_dropped: int = 0
 
@@ -81,6 +91,9 @@ class AxisRequirements:
             if kind is float:
                 check_number(name, value)
                 check_range(name, value, *NUMBERS)
+        if self.jerk_max_m_per_s3 is not None:
+            check_number("jerk_max_m_per_s3", self.jerk_max_m_per_s3)
+            check_range("jerk_max_m_per_s3", self.jerk_max_m_per_s3, *NUMBERS)
         if self.glitch_clocks is not None:
             check_int("glitch_clocks", self.glitch_clocks, 0, GLITCH_CLOCKS_MAX)
         self._check_rates()
@@ -148,6 +161,14 @@ class AxisRequirements:
     @property
     def speed_max_counts_per_sample(self) -> float:
         return self.speed_max_m_per_s / self.velocity_unit_m_per_s
+
+    @property
+    def jerk_bound_m_per_s3(self) -> float:
+        """The bound on the jerk between impacts: `jerk_max_m_per_s3`, or else JERK_SHARE C sqrt(C / q)."""
+        if self.jerk_max_m_per_s3 is not None:
+            return self.jerk_max_m_per_s3
+        bound = self.acceleration_max_m_per_s2
+        return JERK_SHARE * bound * math.sqrt(bound / self.count_m)
 
     @property
     def glitch_clocks_at_reset(self) -> int:

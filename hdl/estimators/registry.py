@@ -4,6 +4,7 @@ from hardwall.model.estimators.estimate import EstimatorDesign
 
 from . import (
     butterworth,
+    edge_kalman,
     finite_difference,
     foaw,
     kalman,
@@ -28,6 +29,7 @@ ESTIMATORS: dict[str, type[EstimatorBlock]] = {
     "period": period.Estimator,
     "period-count": period_count.Estimator,
     "levant-edge": levant_edge.Estimator,
+    "edge-kalman": edge_kalman.Estimator,
     "levant-semi-implicit": levant_semi_implicit.Estimator,
     "levant-implicit": levant_implicit.Estimator,
     "levant-adaptive": levant_adaptive.Estimator,

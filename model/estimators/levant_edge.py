@@ -127,7 +127,7 @@ def _shifted(places, to, since, by, low, high):
 
 
 @compiled
-def _within(line, velocity, bound):
+def within(line, velocity, bound):
     """Return the extrapolated `line` held within the bound that the module gives for no further edge."""
     if velocity < 0:
         return saturate(line, -max(bound + velocity, 0), -velocity)
@@ -212,7 +212,7 @@ def step(params, state, seen, restart):
     line = _fitted(straight, most)
     flags |= int(line != straight) << 1
     if met != LOOSE:
-        line = _within(line, velocity, min(params.bound >> max(length_of(age) - 1, 0), most))
+        line = within(line, velocity, min(params.bound >> max(length_of(age) - 1, 0), most))
     return State(1, known, number, stamp, kind, length, velocity, acceleration, places), line, flags
 
 
@@ -263,5 +263,5 @@ def float_step(params, state, seen, restart):
         known = int(known and not gone)
     line = velocity + acceleration * age
     if met != LOOSE:
-        line = _within(line, velocity, 2.5 * params.clocks * 2.0 ** -max(length_of(age) - 1, 0))
+        line = within(line, velocity, 2.5 * params.clocks * 2.0 ** -max(length_of(age) - 1, 0))
     return State(1, known, number, stamp, kind, length, velocity, acceleration, places), line, 0

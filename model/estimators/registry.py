@@ -8,6 +8,7 @@ add one line here and one in `hdl/estimators/registry.py`. The model's file has 
 
 from . import (
     butterworth,
+    edge_kalman,
     finite_difference,
     foaw,
     kalman,
@@ -32,6 +33,7 @@ ESTIMATORS: dict[str, type[EstimatorDesign]] = {
     "period": period.Design,
     "period-count": period_count.Design,
     "levant-edge": levant_edge.Design,
+    "edge-kalman": edge_kalman.Design,
     "levant-semi-implicit": levant_semi_implicit.Design,
     "levant-implicit": levant_implicit.Design,
     "levant-adaptive": levant_adaptive.Design,

@@ -1,8 +1,9 @@
 """How accurate a velocity estimator is: known motions at any rate, on any backend, against the exact derivative.
 
-Gains are the estimator's defaults for the signal's own bound C on the acceleration, unless others are given. The clock
-is the slowest multiple of the rate that is at least 50 MHz and leaves 50 clocks a sample, enough for every estimator's
-path. Above 1 MHz the clock is faster than that of a real part, so the stamps are finer too. The row reports the clock.
+Gains are the estimator's defaults for the signal's own bound C on the acceleration, unless others are given; a bound on
+the jerk is the swing's for every signal. The clock is the slowest multiple of the rate that is at least 50 MHz and
+leaves 50 clocks a sample, enough for every estimator's path. Above 1 MHz the clock is faster than that of a real part,
+so the stamps are finer too. The row reports the clock.
 """
 
 import math
@@ -96,6 +97,7 @@ def axis_spec(
     acceleration_max_m_per_s2: float,
     gains: dict[str, float] | None = None,
     bits_dropped: int = 0,
+    jerk_max_m_per_s3: float | None = None,
 ) -> AxisSpec:
     """Return the specification of the axis: the device of the scene `mhz` at another rate, unfiltered.
 
@@ -109,6 +111,7 @@ def axis_spec(
         actuation_hz=sample_hz,
         glitch_clocks=GLITCH_CLOCKS,
         acceleration_max_m_per_s2=acceleration_max_m_per_s2,
+        jerk_max_m_per_s3=jerk_max_m_per_s3,
         estimator=estimator,
         gains=gains and registry.design_of(estimator).gains_class(**gains),
         estimator_bits_dropped=bits_dropped,
@@ -121,10 +124,11 @@ def spec_of(job: dict) -> AxisSpec:
     Raises:
         ValueError: if there is no such axis; the message names the field.
     """
-    bound = job.get("acceleration_max_m_per_s2") or signals.load(job["signal"]).acceleration_max_m_per_s2
+    known = signals.load(job["signal"])
+    bound = job.get("acceleration_max_m_per_s2") or known.acceleration_max_m_per_s2
     name, rate = job["estimator"], job["sample_hz"]
     try:
-        return axis_spec(name, rate, bound, job.get("gains"), job.get("bits_dropped", 0))
+        return axis_spec(name, rate, bound, job.get("gains"), job.get("bits_dropped", 0), known.jerk_max_m_per_s3)
     except ValueError as error:
         raise ValueError(f"{name} at {rate} Hz with C {bound:g} m/s^2: {error}") from None
 

@@ -44,6 +44,11 @@ class Signal:
     turns_apart_s: float = 1e-3
     delay_max_s: float = 0.1
 
+    @property
+    def jerk_max_m_per_s3(self) -> float:
+        """The bound on the jerk between impacts, which some gains follow from: the swing's, for every motion."""
+        return swing_jerk_m_per_s3()
+
 
 def paper() -> Signal:
     """Return 50 exp(-t) sin(2 pi t) mm over 5 s, judged from 1 s on; C is its largest acceleration."""
@@ -52,6 +57,15 @@ def paper() -> Signal:
     at = (-3 * cmath.phase(p)) % math.pi / p.imag
     largest = abs((PAPER.amplitude_m * p**2 * cmath.exp(p * at)).imag)
     return Signal("paper", PAPER, 5.0, 1.0, largest)
+
+
+@cache
+def swing_jerk_m_per_s3() -> float:
+    """Return the largest jerk of the paper's signal."""
+    p = complex(-PAPER.decay_per_s, math.tau * PAPER.frequency_hz)
+    # It is at the start, or where the fourth derivative first vanishes.
+    at = (-4 * cmath.phase(p)) % math.pi / p.imag
+    return max(abs((PAPER.amplitude_m * p**3 * cmath.exp(p * time)).imag) for time in (0.0, at))
 
 
 def steady(speed_mm_per_s: float) -> Signal:

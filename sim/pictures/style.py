@@ -61,13 +61,14 @@ COLOURS = {
     "period": "#999933",
     "period-count": "#B08900",
     "levant-edge": "#E69F00",
+    "edge-kalman": "#661100",
     "levant-semi-implicit": "#AA4499",
     "levant-implicit": "#882255",
     "levant-adaptive": "#332288",
     "window": "#CC79A7",
     "foaw": "#3FA7D6",
 }
-MARKERS = dict(zip(COLOURS, "ovsDd<>^phXP*", strict=True))
+MARKERS = dict(zip(COLOURS, "ovsDd<>^8phXP*", strict=True))
 OTHER = {"color": "#000000", "marker": "."}
 """The style of an estimator that has no colour here yet."""
 FADED = 0.5

@@ -28,6 +28,7 @@ Place = number(-1e3, 1e3)
 Part = number(0.0, 1.0)
 Speed = number(1e-9, 1e5)  # a nanometre in a second, to what no encoder follows
 Acceleration = number(1e-9, 1e9)  # what shows after minutes, to the largest force on a gram
+Jerk = number(1e-12, 1e15)  # what takes the least acceleration minutes, to the largest in a microsecond
 Force = number(1e-12, 1e6)  # one step of the smallest force, to a press
 Stiffness = number(1e-6, 1e10)  # a hair, to a block of steel
 Damping = number(1e-9, 1e7)  # air on a needle, to many dampers of a vehicle
@@ -45,5 +46,6 @@ Inductance = number(1e-9, 1e3)
 TorqueConstant = number(1e-6, 1e3)
 Radius = number(1e-4, 1e1)
 EdgeError = number(-1.0, 1.0)  # counts: a whole one puts an edge upon its neighbour
+EdgeErrorMax = number(1e-6, 1.0)  # counts: below what any stamp resolves, to a whole one
 Gain = number(1e-15, 1e15)  # in various units; the words of each estimator hold less, and say so
 Rate = Annotated[int, Field(ge=RATES_HZ[0], le=RATES_HZ[1])]

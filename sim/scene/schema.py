@@ -14,6 +14,7 @@ from ...model.designed import DesignedAxis
 from ...model.drive import pdm
 from ...model.estimators import registry
 from ...model.quadrature_speed import GLITCH_CLOCKS_MAX, SPEED_MARGIN, glitch_clocks_for
+from ...model.requirements import EDGE_ERROR_COUNTS
 from ...model.spec import AxisSpec
 from .drive import DriveSection
 from .encoder_section import EncoderSection
@@ -22,9 +23,11 @@ from .quantities import (
     Bandwidth,
     Current,
     Damping,
+    EdgeErrorMax,
     Force,
     Gain,
     Inductance,
+    Jerk,
     Length,
     Mass,
     Part,
@@ -76,6 +79,8 @@ class ControllerSection(Section):
     travel_m: Length
     speed_max_m_per_s: Speed
     acceleration_max_m_per_s2: Acceleration
+    jerk_max_m_per_s3: Jerk | None = None
+    edge_error_max_counts: EdgeErrorMax = EDGE_ERROR_COUNTS
     force_max_n: Force
     force_resolution_n: Force
     stiffness_max_n_per_m: Stiffness

@@ -1,0 +1,310 @@
+"""Velocity from the clock stamps of edges: a Kalman filter of edges whose places are uncertain."""
+
+from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, signed, unsigned
+from amaranth.lib.memory import Memory
+
+from hardwall.model.estimators.edge_kalman import AGILE_LEVEL, BLEND_BITS, HALF, KX_BITS, TOP
+from hardwall.model.estimators.edge_kalman_design import (
+    ALARM_AT,
+    BLEND,
+    FALL,
+    GUARD_BITS,
+    KA,
+    KV,
+    KX,
+    LEVEL_BITS,
+    REST_BITS,
+    Design,
+)
+
+from ..arithmetic.fixed import fitted, length_of, saturate, shape, shift_floor, shift_round_half_up
+from .estimate import EstimatorBlock
+
+LIMB_BITS = 13
+"""Bits of the right operand that the multiplier takes first; the rest, 14 at most, comes a clock later."""
+HIGH = "TURN HIGH", "TRAVEL HIGH", "MEAN HIGH", "PLACE HIGH", "VELOCITY HIGH", "BEND HIGH", "LINE HIGH"
+"""The states in which the multiplier takes the rest."""
+
+
+class Estimator(EstimatorBlock):
+    """Position, velocity and acceleration at the last edge, corrected at every edge by gains for the time between them.
+
+    Equation, with D clocks a sample, T clocks and n counts from the last edge to this one, s clocks since this edge:
+
+        at an edge       r = n D - (v + a T/2) T - x
+                         z <- z + blend (r - z)
+                         the memory is agile if |z| is above its bound, and else grows with T
+                         x <- K_x r - r,  v <- v + a T + K_v r,  a <- a + K_a r
+        at every sample  line = v + a s, held within the bound for no further edge
+
+    with the gains and bounds of the table's row for T and the memory; the velocity is the line. Start: at the first
+    sample, and with `restart`, everything is forgotten; v = 0 until the second edge.
+
+    Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
+    all seven products, each in two halves: the right operand is wider than a multiplier of the part.
+
+    Rounding and overflow: what a product corrects is rounded half up, the change of velocity, the mean and the bound
+    are rounded down, and so the line half up. Velocities and the error of the place saturate, with flags; the
+    acceleration saturates, which is its limit. Count and stamp may wrap.
+
+    Parameters
+    ----------
+    design : hardwall.model.estimators.edge_kalman.Design
+        Formats and table; its module derives them.
+
+    Source: Kalman 1960 for the filter; its use on edges is this project's.
+    """
+
+    design_class = Design
+
+    def elaborate(self, platform):
+        m = Module()
+        s = _Signals(self._design)
+        self._multiply(m, s)
+        self._look_up(m, s)
+        m.d.sync += self.valid.eq(0)
+        sequence = self._sample(s) | self._innovation(s) | self._correction(s) | self._line(s)
+        after = [*list(sequence)[1:], "SAMPLE"]
+        with m.FSM():
+            with m.State("SAMPLE"), m.If(self.strobe):
+                self._take(m, s)
+                m.next = next(iter(sequence))
+            # Every state takes one clock: what it always does, and then what it does under a condition.
+            for (name, statements), following in zip(sequence.items(), after, strict=True):
+                with m.State(name):
+                    m.d.sync += statements
+                    if name in HIGH:
+                        m.d.comb += s.limb.eq(s.right[LIMB_BITS:])
+                    self._decide(m, s, name)
+                    m.next = following
+        return m
+
+    def _multiply(self, m, s):
+        """Add the multiplier. A product takes two clocks, its sum another, with which the next product may begin."""
+        m.d.comb += s.limb.eq(s.right[:LIMB_BITS])
+        m.d.sync += s.product.eq(s.left * s.limb)
+
+    def _look_up(self, m, s):
+        """Add the table: a row's words are there two clocks after its number."""
+        d = self._design
+        lines = [
+            sum(word << start for word, start in zip(line, s.starts[:-1], strict=True)) for line in d.table.tolist()
+        ]
+        m.submodules.table = table = Memory(shape=unsigned(s.starts[-1]), depth=len(lines), init=lines)
+        read = table.read_port()
+        m.d.comb += [read.addr.eq(s.row), read.en.eq(1), Cat(*s.entry).eq(read.data)]
+
+    def _take(self, m, s):
+        """Add what the strobe takes."""
+        d, seen = self._design, self.seen
+        stamps = Array([seen.stamp_a_rise, seen.stamp_b_rise, seen.stamp_a_fall, seen.stamp_b_fall])
+        m.d.sync += [
+            s.fresh.eq(self.restart | ~s.running),
+            s.running.eq(1),
+            s.now.eq(seen.stamp >> d.unit),
+            s.at.eq(stamps[seen.edge] >> d.unit),
+            s.to.eq(seen.count + seen.down),
+            s.flags.eq(0),
+        ]
+
+    def _sample(self, s):
+        """Return the states that take the interval, and what passed in it."""
+        d, p = self._design, s.params
+        return {
+            "DIFFERENCE": [
+                s.interval.eq(Mux(s.fresh, 0, s.at - s.stamp)),
+                # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
+                s.passed.eq(Mux(s.fresh, 0, (s.to - s.number)[: len(s.passed)].as_signed())),
+            ],
+            "DECISION": [s.left.eq(s.a), s.right.eq(s.interval)],
+            "TURN LOW": [s.size.eq(length_of(s.interval)), s.age.eq(s.now - Mux(s.anchor, s.at, s.stamp))],
+            "TURN HIGH": [
+                s.waits(0),
+                s.row.eq(s.of_time | (s.level + HALF) >> LEVEL_BITS << d.row_bits),
+                s.age_size.eq(length_of(s.age)),
+            ],
+            "TURN SUM": [s.summed, s.way.eq(shift_floor(s.distance * d.clocks, p.place_shift))],
+        }
+
+    def _innovation(self, s):
+        """Return the states that predict the place of the edge, and take the mean of what it is off by."""
+        p = s.params
+        travelled = shift_floor(s.total, p.travel_shift)
+        limited = saturate(s.far, -p.error_max, p.error_max)
+        fallen = s.level - s.entry[FALL]
+        return {
+            "TURN": [s.turned, s.behind.eq(s.way - s.place)],
+            "TRAVEL": [s.left.eq(s.v + (s.turn >> 1)), s.right.eq(s.interval), s.ahead.eq(s.v + s.turn)],
+            "TRAVEL LOW": [s.lower.eq(Mux(fallen < 0, 0, fallen))],
+            "TRAVEL HIGH": [s.waits(p.travel_shift)],
+            "TRAVEL SUM": [s.summed],
+            "DISTANCE": [s.far.eq(s.behind - travelled)],
+            "INNOVATION": [s.r.eq(limited), s.flags[0].eq(s.correct & (s.beyond | (limited != s.far)))],
+            "MEAN": [s.left.eq(s.r - s.mean), s.right.eq(s.entry[BLEND])],
+            "MEAN LOW": [],
+            "MEAN HIGH": [s.waits(0)],
+            "MEAN SUM": [s.summed],
+            "BLEND": [],
+        }
+
+    def _correction(self, s):
+        """Return the states that choose the memory, and correct the motion by its gains."""
+        p = s.params
+        magnitude = shift_floor(Mux(s.mean < 0, -s.mean, s.mean), p.alarm_shift)
+        faster = shift_floor(s.total, p.velocity_shift)
+        return {
+            "ALARM": [s.alarm.eq(magnitude > s.entry[ALARM_AT])],
+            "LEVEL": [],
+            "READ": [],
+            "GAINS": [s.left.eq(s.r), s.right.eq(s.entry[KX])],
+            "PLACE LOW": [],
+            "PLACE HIGH": [s.waits(KX_BITS), s.right.eq(s.entry[KV])],
+            "PLACE SUM": [s.summed],
+            "VELOCITY HIGH": [s.waits(p.velocity_shift), s.right.eq(s.entry[KA])],
+            "VELOCITY SUM": [s.summed],
+            "BEND HIGH": [s.waits(p.bend_shift), s.far_v.eq(s.ahead + faster)],
+            "BEND SUM": [s.summed],
+            "BEND": [s.bent.eq(s.a + shift_floor(s.total, p.bend_shift))],
+            "UPDATE": [],
+        }
+
+    def _line(self, s):
+        """Return the states that extrapolate the velocity from the anchor, and hold it within the bound for no edge."""
+        p = s.params
+        onward = Mux(s.room < 0, 0, s.room)
+        limited = saturate(s.straight, -p.velocity_max, p.velocity_max)
+        held = Mux(s.line < s.least, s.least, Mux(s.line > s.most, s.most, s.line))
+        return {
+            "LINE": [s.left.eq(s.a), s.right.eq(s.age), s.room.eq(Mux(s.v < 0, s.bound + s.v, s.bound - s.v))],
+            "LINE LOW": [s.least.eq(Mux(s.v < 0, -onward, -s.v)), s.most.eq(Mux(s.v < 0, -s.v, onward))],
+            "LINE HIGH": [s.waits(0)],
+            "LINE SUM": [s.summed],
+            "LINE TURN": [s.turned],
+            "STRAIGHT": [s.straight.eq(s.v + s.turn)],
+            "LIMIT": [s.line.eq(limited), s.flags[1].eq(s.flags[1] | (limited != s.straight))],
+            "HOLD": [s.held.eq(held)],
+            "OUTPUT": [
+                self.velocity.eq(shift_round_half_up(s.held, GUARD_BITS)),
+                self.saturated.eq(s.flags),
+                self.valid.eq(1),
+            ],
+        }
+
+    def _decide(self, m, s, name):
+        """Add what a state does under a condition."""
+        d, p = self._design, s.params
+        match name:
+            case "DIFFERENCE":
+                with m.If(s.fresh):
+                    m.d.sync += [s.number.eq(s.to), s.stamp.eq(s.at), s.known.eq(0), *s.forgotten]
+            case "DECISION":
+                came, unknown = (s.interval != 0) | (s.passed != 0), ~s.known | s.interval[-1]
+                counted = fitted(s.passed, d.distance.width)
+                below = counted < -p.distance_max
+                m.d.sync += [
+                    s.anchor.eq(came),
+                    s.correct.eq(came & ~unknown),
+                    s.distance.eq(Mux(below, -p.distance_max, counted)),
+                    s.beyond.eq((counted != s.passed) | below),
+                ]
+                with m.If(came & unknown):
+                    m.d.sync += [s.known.eq(1), *s.forgotten]
+            case "TURN HIGH":
+                with m.If(s.correct):
+                    m.d.sync += s.length.eq(s.size)
+            case "TURN SUM":
+                bound = Const(p.bound) >> Mux(s.age_size == 0, 0, s.age_size - 1)[: len(s.age_size)]
+                m.d.sync += [
+                    s.gone.eq(s.age[-1]),
+                    s.rest.eq(s.age[-1] | (s.age_size > s.length + REST_BITS)),
+                    s.bound.eq(Mux(bound > p.velocity_max, p.velocity_max, bound)),
+                ]
+            case "BLEND":
+                with m.If(s.correct):
+                    m.d.sync += s.mean.eq(s.mean + (s.total >> BLEND_BITS))
+            case "LEVEL":
+                with m.If(s.correct):
+                    m.d.sync += s.level.eq(Mux(s.alarm, TOP, s.lower))
+                with m.If(s.alarm):
+                    m.d.sync += s.row[d.row_bits :].eq(AGILE_LEVEL)
+            case "VELOCITY HIGH":
+                with m.If(s.correct):
+                    m.d.sync += s.place.eq((s.total >> KX_BITS) - s.r)
+            case "BEND SUM":
+                limited = saturate(s.far_v, -p.velocity_max, p.velocity_max)
+                with m.If(s.correct):
+                    m.d.sync += [s.v.eq(limited), s.flags[1].eq(limited != s.far_v)]
+            case "UPDATE":
+                with m.If(s.correct):
+                    m.d.sync += s.a.eq(saturate(s.bent, -p.acceleration_max, p.acceleration_max))
+                with m.If(s.anchor):
+                    m.d.sync += [s.number.eq(s.to), s.stamp.eq(s.at)]
+                with m.If(s.rest):
+                    m.d.sync += [s.level.eq(TOP), s.mean.eq(0), s.v.eq(0), s.a.eq(0), s.known.eq(s.known & ~s.gone)]
+
+
+class _Signals:
+    """The registers and wires for a design, by the names that the model uses."""
+
+    def __init__(self, d: Design):
+        self.params = p = d.params({})
+        count, time, error, motion = signed(d.count_width), unsigned(d.time_bits), shape(d.error), shape(d.motion)
+
+        # The state from sample to sample: the anchor, the motion there, and how long it is remembered.
+        self.running, self.known = Signal(), Signal()
+        self.number, self.stamp, self.length = Signal(count), Signal(time), Signal(range(d.time_bits + 1))
+        self.level = Signal(range(TOP + 1))
+        self.place, self.mean = Signal(error), Signal(error)
+        self.v, self.a = Signal(motion), Signal(shape(d.acceleration))
+        states = self.place, self.mean, self.v, self.a, self.length
+        self.forgotten = [self.level.eq(TOP), *(state.eq(0) for state in states)]
+
+        # The sample. `correct`: its edge corrects; `anchor`: its edge is the new anchor.
+        self.fresh, self.correct, self.anchor = Signal(), Signal(), Signal()
+        self.now, self.at, self.to = Signal(time), Signal(time), Signal(count)
+        self.interval, self.passed = Signal(time), Signal(count)
+        self.distance, self.beyond = Signal(shape(d.distance)), Signal()
+        self.age, self.rest, self.gone = Signal(time), Signal(), Signal()
+        self.size, self.age_size = Signal(range(d.time_bits + 1)), Signal(range(d.time_bits + 1))
+        self.flags = Signal(2)
+
+        # The multiplier: the low limb's product waits, with half of what is rounded off, for the high limb's.
+        wide = max(d.time_bits, *(fmt.width for fmt in d.columns))
+        self.left = Signal(signed(max(d.motion.width + 1, d.acceleration.width, d.error.width + 1)))
+        self.right, self.limb = Signal(wide), Signal(max(LIMB_BITS, wide - LIMB_BITS))
+        self.product = Signal(signed(len(self.left) + len(self.limb)))
+        self.low = Signal(signed(max(len(self.product), len(self.left) + wide - 1) + 1))
+        self.total = Signal(signed(max(len(self.low), len(self.product) + LIMB_BITS) + 1))
+        self.summed = self.total.eq(self.low + (self.product << LIMB_BITS))
+
+        # The row of the table, and its words; `of_time` is the part of a row's number that the interval gives.
+        widths = [fmt.width for fmt in d.columns]
+        self.starts = [sum(widths[:n]) for n in range(len(widths) + 1)]
+        self.row = Signal(range(len(d.table)))
+        self.entry = [Signal(width, name=f"entry_{n}") for n, width in enumerate(widths)]
+        next_bit = self.interval.bit_select((self.size - 2)[: len(self.size)], 1)
+        self.of_time = Cat((self.size > 1) & next_bit, self.size)[: d.row_bits]
+
+        # The innovation, and what it changes.
+        self.turn, self.ahead = Signal(signed(d.motion.width + 1)), Signal(signed(d.motion.width + 2))
+        self.turned = self.turn.eq(fitted(shift_floor(self.total, p.turn_shift), len(self.turn)))
+        self.way = Signal(signed(d.distance.width + d.clocks.bit_length() + max(d.error.f, 0) + 1))
+        self.behind = Signal(signed(max(len(self.way), d.error.width) + 1))
+        self.far = Signal(signed(max(len(self.behind), self._shifted(p.travel_shift)) + 1))
+        self.r = Signal(error)
+        self.lower, self.alarm = Signal.like(self.level), Signal()
+        self.far_v = Signal(signed(max(len(self.ahead), self._shifted(p.velocity_shift)) + 1))
+        self.bent = Signal(signed(max(d.acceleration.width, self._shifted(p.bend_shift)) + 1))
+
+        # The line, and the bound on it without a further edge.
+        self.bound, self.room = Signal(d.motion.width - 1), Signal(signed(d.motion.width + 1))
+        self.straight, self.line = Signal(signed(d.motion.width + 2)), Signal(motion)
+        self.least, self.most, self.held = Signal(motion), Signal(motion), Signal(motion)
+
+    def _shifted(self, shift: int) -> int:
+        """Return the bits of the sum of a product after a shift to the right."""
+        return max(len(self.total) - shift, 1)
+
+    def waits(self, shift: int):
+        """Return the statement that keeps the low limb's product, with half of what a shift will round off."""
+        return self.low.eq(self.product + (1 << (shift - 1) if shift > 0 else 0))

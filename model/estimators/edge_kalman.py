@@ -1,0 +1,224 @@
+"""Velocity from the clock stamps of the encoder's edges: a Kalman filter of edges whose places are uncertain.
+
+An edge says where the axis is, to the edge's own error, at a time that its stamp gives to a clock. Position, velocity
+and acceleration are tracked from edge to edge, with gains for the time T between them; nothing is corrected between
+edges. With v in counts a sample, a in counts a sample per clock, D clocks a sample, n the edges passed (0 if the same
+edge is crossed back), and x the distance of the axis from the edge that it was last seen at, times D, at every edge:
+
+    r = n D - (v + a T/2) T - x                               the innovation
+    z <- z + blend (r - z)                                    its mean over an agile memory
+    x <- -r + K_x r,  v <- v + a T + K_v r,  a <- a + K_a r         |a| <= 2**ACCELERATION_BITS C, or next above
+
+and at every sample, s clocks after the last edge, u = v + a s; this line is the output, `u`. A sample takes its last
+edge alone: where edges come faster than samples, T is the time between edges in use.
+
+The gains are those of the steady-state Kalman filter of a white jerk and of edges displaced at random, for a memory M
+(the time in which the past fades by e): K_x = 2 T / M, K_v = 2 T / M**2 and K_a = T / M**3 for T far below M; from
+T = M on nearly those that take the last three edges for exact. So one filter is a mean over many edges where they are
+dense, and a second difference of edges where they are rare. Gains come from a table, by the top two bits of T and by
+the level of the memory: a gain needs no precision, only the same sign of mistake everywhere.
+
+The memory. There are two bounds on what the motion may do, its jerk between impacts and its acceleration at one; they
+give a quiet and an agile memory (`edge_kalman_design` has the rule). The quiet one is used until |z| passes a bound,
+ALARM standard deviations of the mean of that many innovations for edges that err as much as they may: then the memory
+is the agile one at once, and grows again at GROWTH, a quarter, of the time that passes. An impact is noticed by some
+tenths of a count, and what came before it is forgotten in an agile memory; edges that err alone are no alarm.
+
+Silence. Without an edge the axis is within its cell. The line is held as that of `levant_edge` is: within -v and
+(5/2) D 2**-l - v, where 2**l <= s < 2**(l+1). An axis is at rest, v = a = 0, once s has more than REST_BITS bits more
+than the last T, or is half the range of the stamp, since slower edges cannot be distinguished from rest; the memory is
+then agile, and the next edge begins a motion. At standstill the velocity is exactly 0.
+
+A turn needs no care: an edge has one place, whichever way it is crossed.
+
+Not learnt. Unlike `levant_edge` this filter does not learn where edges are; errors that repeat every four edges are
+averaged like any others, over the edges of a memory.
+
+Start. The first sample, and a sample with `restart`, forget everything; u = 0 until the second edge. A start in motion
+is caught up in some agile memories.
+
+Saturation. v and u saturate at the velocity format (flag `velocity_saturated`); the distance and r saturate at the
+error's format (flag `error_saturated`), after which the place is that of the last edge, and the next edges recover a
+motion within the format. The acceleration saturates silently: as a limit it is part of the law, in float64 too. z is a
+mean of innovations and within their range.
+
+Limits. The count and the stamp may wrap: differences are modulo their widths. An interval of half the stamp's range or
+more only sets a new anchor.
+
+Source: Kalman 1960 for the filter; a memory that an alarm shortens, after Bar-Shalom, Li and Kirubarajan, Estimation
+with Applications to Tracking and Navigation (2001), section 11.2; its use on stamped edges, with gains in a table by
+the time between them, is this project's.
+"""
+
+from ..arithmetic.fixed import saturate, shift_floor, shift_round_half_up, wrap
+from ..compiled import compiled
+from ..quadrature import stamp_of
+from .edge_kalman_design import (
+    ALARM_AT,
+    BLEND,
+    FALL,
+    KA,
+    KV,
+    KX,
+    LEVEL_BITS,
+    LEVELS,
+    REST_BITS,
+    WIDTHS,
+    Design,
+    FloatParams,
+    Gains,
+    Params,
+    State,
+)
+from .estimate import estimate
+from .levant_edge import within
+from .levant_edge_anchor import length_of, number_of
+
+__all__ = ["Design", "Gains"]
+AGILE_LEVEL = LEVELS - 1
+TOP = AGILE_LEVEL << LEVEL_BITS
+HALF = 1 << (LEVEL_BITS - 1)
+BLEND_BITS, KX_BITS = WIDTHS[BLEND], WIDTHS[KX]
+ANCHOR, FIRST, TIMED = range(3)
+"""The last edge is: the anchor itself; the first known edge; an edge to correct by."""
+
+
+@compiled
+def _time_of(params, stamp):
+    """Return a stamp in units, whose bits are all that is used."""
+    return stamp >> params.unit
+
+
+@compiled
+def _started(params, seen, top, zero):
+    """Return the state at a first sample: its last edge is the anchor, whose arrival was not seen."""
+    at = _time_of(params, stamp_of(seen, seen.edge))
+    return State(1, 0, number_of(params, seen), at, 0, top, zero, zero, zero, zero)
+
+
+@compiled
+def _met(params, state, seen):
+    """Return (what the last edge is, ANCHOR to TIMED; units from the anchor to it; edges from the anchor to it)."""
+    mask = (1 << params.time_bits) - 1
+    interval = (_time_of(params, stamp_of(seen, seen.edge)) - state.stamp) & mask
+    passed = wrap(number_of(params, seen) - state.number, params.count_width)
+    if interval == 0 and passed == 0:
+        return ANCHOR, interval, passed
+    if not state.known or interval >> (params.time_bits - 1):
+        return FIRST, interval, passed
+    return TIMED, interval, passed
+
+
+@compiled
+def _row(params, interval, level):
+    """Return the row of the table for an interval at a whole level: the top two bits of the interval choose it."""
+    length = length_of(interval)
+    next_bit = interval >> max(length - 2, 0) & 1 if length > 1 else 0
+    return level << params.row_bits | length << 1 | next_bit
+
+
+@compiled
+def _turn(params, acceleration, time):
+    """Return the change of velocity over `time` units, with one bit more of range than a velocity."""
+    return saturate(shift_floor(acceleration * time, params.turn_shift), ~params.turn_max, params.turn_max)
+
+
+@compiled
+def _correct(params, state, interval, passed):
+    """Return (level, place, mean, velocity, acceleration, flags) at the new edge."""
+    row = _row(params, interval, (state.level + HALF) >> LEVEL_BITS)
+    turn = _turn(params, state.acceleration, interval)
+    travelled = shift_round_half_up((state.velocity + (turn >> 1)) * interval, params.travel_shift)
+    distance = saturate(passed, -params.distance_max, params.distance_max)
+    far = shift_floor(distance * params.clocks, params.place_shift) - travelled - state.place
+    r = saturate(far, -params.error_max, params.error_max)
+
+    mean = state.mean + shift_floor(params.table[row, BLEND] * (r - state.mean), BLEND_BITS)
+    level = max(state.level - params.table[row, FALL], 0)
+    if shift_floor(abs(mean), params.alarm_shift) > params.table[row, ALARM_AT]:
+        level = TOP
+        row = _row(params, interval, AGILE_LEVEL)
+
+    place = shift_round_half_up(params.table[row, KX] * r, KX_BITS) - r
+    far_velocity = state.velocity + turn + shift_round_half_up(params.table[row, KV] * r, params.velocity_shift)
+    velocity = saturate(far_velocity, -params.velocity_max, params.velocity_max)
+    bend = shift_round_half_up(params.table[row, KA] * r, params.bend_shift)
+    acceleration = saturate(state.acceleration + bend, -params.acceleration_max, params.acceleration_max)
+    flags = int(distance != passed or r != far) | int(velocity != far_velocity) << 1
+    return level, place, mean, velocity, acceleration, flags
+
+
+@estimate.register(Params)
+@compiled
+def step(params, state, seen, restart):
+    if restart or not state.running:
+        state = _started(params, seen, TOP, 0)
+    met, interval, passed = _met(params, state, seen)
+    known, length, level, place, mean = state.known, state.length, state.level, state.place, state.mean
+    velocity, acceleration, flags = state.velocity, state.acceleration, 0
+    if met == FIRST:
+        known, length, level, place, mean, velocity, acceleration = 1, 0, TOP, 0, 0, 0, 0
+    elif met == TIMED:
+        length = length_of(interval)
+        level, place, mean, velocity, acceleration, flags = _correct(params, state, interval, passed)
+    number, stamp = state.number, state.stamp
+    if met != ANCHOR:
+        number, stamp = number_of(params, seen), _time_of(params, stamp_of(seen, seen.edge))
+
+    age = (_time_of(params, seen.stamp) - stamp) & ((1 << params.time_bits) - 1)
+    gone = age >> (params.time_bits - 1)
+    if gone or age >> (length + REST_BITS):
+        level, mean, velocity, acceleration = TOP, 0, 0, 0
+        known = int(known and not gone)
+    straight = velocity + _turn(params, acceleration, age)
+    line = saturate(straight, -params.velocity_max, params.velocity_max)
+    flags |= int(line != straight) << 1
+    line = within(line, velocity, min(params.bound >> max(length_of(age) - 1, 0), params.velocity_max))
+    after = State(1, known, number, stamp, length, level, place, mean, velocity, acceleration)
+    return after, shift_round_half_up(line, params.output_shift), flags
+
+
+@compiled
+def _float_correct(params, state, interval, passed):
+    row = _row(params, interval, int(state.level + 0.5))
+    turn = state.acceleration * interval
+    r = passed * params.per_sample - (state.velocity + turn / 2) * interval - state.place
+
+    mean = state.mean + params.table[row, BLEND] * (r - state.mean)
+    level = max(state.level - params.table[row, FALL], 0.0)
+    if abs(mean) > params.table[row, ALARM_AT]:
+        level = float(AGILE_LEVEL)
+        row = _row(params, interval, AGILE_LEVEL)
+
+    place = params.table[row, KX] * r - r
+    velocity = state.velocity + turn + params.table[row, KV] * r
+    acceleration = saturate(state.acceleration + params.table[row, KA] * r, -params.steepest, params.steepest)
+    return level, place, mean, velocity, acceleration
+
+
+@estimate.register(FloatParams)
+@compiled
+def float_step(params, state, seen, restart):
+    """Take one sample in float64, unsaturated: the same algorithm, as a reference for the cost of fixed point."""
+    if restart or not state.running:
+        state = _started(params, seen, float(AGILE_LEVEL), 0.0)
+    met, interval, passed = _met(params, state, seen)
+    known, length, level, place, mean = state.known, state.length, state.level, state.place, state.mean
+    velocity, acceleration = state.velocity, state.acceleration
+    if met == FIRST:
+        known, length, level, place, mean, velocity, acceleration = 1, 0, float(AGILE_LEVEL), 0.0, 0.0, 0.0, 0.0
+    elif met == TIMED:
+        length = length_of(interval)
+        level, place, mean, velocity, acceleration = _float_correct(params, state, interval, passed)
+    number, stamp = state.number, state.stamp
+    if met != ANCHOR:
+        number, stamp = number_of(params, seen), _time_of(params, stamp_of(seen, seen.edge))
+
+    age = (_time_of(params, seen.stamp) - stamp) & ((1 << params.time_bits) - 1)
+    gone = age >> (params.time_bits - 1)
+    if gone or age >> (length + REST_BITS):
+        level, mean, velocity, acceleration = float(AGILE_LEVEL), 0.0, 0.0, 0.0
+        known = int(known and not gone)
+    line = velocity + acceleration * age
+    line = within(line, velocity, 2.5 * params.per_sample * 2.0 ** -max(length_of(age) - 1, 0))
+    return State(1, known, number, stamp, length, level, place, mean, velocity, acceleration), line, 0

@@ -1,0 +1,401 @@
+"""The Kalman filter of edges: RTL against model, model against exact rationals, fixed against float, accuracy."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import cocotb
+import numpy as np
+import pytest
+import scipy.linalg
+
+from hardwall.hdl.estimators.edge_kalman import Estimator
+from hardwall.model.estimators import edge_kalman
+from hardwall.model.estimators.edge_kalman_design import LEVELS, START
+from hardwall.sim.estimates import signals
+from hardwall.sim.estimates.accuracy import measure
+from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
+from hardwall.testing.estimators import follow, model, names
+from stimuli.lengths import LONG, some_of
+from stimuli.passing import Scale
+from stimuli.seeded import seeded
+from stimuli.specs import spec
+
+
+def design(name: str) -> edge_kalman.Design:
+    return spec(name, "edge-kalman").design.estimator
+
+
+def make(name: str) -> Estimator:
+    return Estimator(design(name))
+
+
+def stimulus(d: edge_kalman.Design, samples: int):
+    """Yield rows: motion at every speed, through every wrap; impacts, rests, vibration, displaced edges, noise."""
+    random = seeded()
+    half = 1 << (d.count_width - 1)
+    scale = Scale(d, now=(1 << d.stamp_width) - 3 * d.clocks, count=half - 5)
+    # Motion faster than the velocity format, and than the distance's, in both directions.
+    fast = (d.velocity.max >> d.velocity.f) + 2
+    for k in range(120):
+        scale.now += d.clocks
+        edges, up = (fast, 2 * d.distance.max)[k // 20 % 2], k // 40 % 2 == 0
+        for edge in range(scale.pass_all_but_four(up, edges), edges):
+            scale.pass_edge(up, scale.now - min(edges, d.clocks - 1) + edge)
+        yield *scale.row(), int(k % 60 == 0)
+    while samples > 0:
+        style, pace, up = random.randrange(8), random.randrange(9), random.random() < 0.5
+        # A rest, at most until the stamps wrap.
+        scale.now += int(2.0 ** random.uniform(0, d.stamp_width)) if random.random() < 0.3 else 0
+        every = random.randrange(1, 40)
+        for k in range(random.randrange(5, 120)):
+            scale.now += d.clocks
+            edges = random.randrange(fast) if pace == 0 else int(random.random() < 2.0 ** (1 - pace))
+            if style > 5:  # a constant speed, to which the gains become quiet
+                edges = int(k % every == 0)
+            for edge in range(scale.pass_all_but_four(up, edges) if style > 1 else 0, edges):
+                if style == 0 or (style == 1 and random.random() < 0.1):
+                    up = not up
+                scale.pass_edge(up, scale.now - 1 - int(random.random() * d.clocks / (edge + 1)) * (style != 7))
+            if style == 2:
+                scale.count = random.randrange(-half, half)
+            row = scale.row()
+            if style == 3:
+                noise = [random.getrandbits(d.stamp_width) for _ in range(5)]
+                row = (row[0], *noise, *(random.randrange(most) for most in (4, 2, 5)))
+            yield *row, int(random.random() < 0.002)
+            samples -= 1
+
+
+def rows_of(d: edge_kalman.Design, samples: int):
+    """Yield the rows of `stimulus` without the run of edges, which this estimator does not use."""
+    for row in stimulus(d, samples):
+        yield *row[:8], row[9]
+
+
+@cocotb.test(**CAMPAIGN)
+async def follows_model(dut):
+    name = parameters()["name"]
+    expected = await follow(dut, make(name), rows_of(design(name), SAMPLES), START)
+    # The campaign must reach both saturations, and the quiet track too.
+    assert 0 in expected["saturated"]
+    assert np.bitwise_or.reduce(expected["saturated"]) == 0b11
+
+
+@cocotb.test()
+async def reset_mid_stream_starts_afresh(dut):
+    d = design(parameters()["name"])
+    bench, scale = Bench(dut, Estimator(d)), Scale(d)
+
+    async def sample(edges):
+        scale.now += 4 * d.clocks
+        for _ in range(edges):
+            scale.pass_edge(True, scale.now - 3)
+        row = (*scale.row()[:8], 0)
+        await bench.transact("strobe", "valid", **dict(zip(names(d), row, strict=True)))
+        return bench.reader("velocity")()
+
+    await bench.reset()
+    moving = [await sample(1) for _ in range(4)]
+    assert moving[:2] == [0, 0]
+    assert moving[3] > 0
+    await bench.reset()
+    assert await sample(1) == 0
+
+
+@pytest.mark.parametrize("name", some_of(["mhz", "narrow", "paper"], 0))
+def test_rtl(name):
+    simulate(__file__, make, name=name)
+
+
+class Oracle:
+    """The module's equations in exact rationals, rounded as documented, on unwrapped positions."""
+
+    def __init__(self, d: edge_kalman.Design):
+        self.d, self.known = d, None
+
+    @staticmethod
+    def to(value: Fraction, f: int, add: Fraction = Fraction(0)) -> Fraction:
+        """Return the value rounded down to an LSB, after a share of an LSB is added."""
+        lsb = Fraction(2) ** -f
+        return math.floor(value / lsb + add) * lsb
+
+    def half_up(self, value: Fraction, f: int) -> Fraction:
+        return self.to(value, f, Fraction(1, 2))
+
+    @staticmethod
+    def held(value: Fraction, fmt) -> Fraction:
+        most = fmt.max * Fraction(2) ** -fmt.f
+        return max(-most, min(most, value))
+
+    def forget(self) -> None:
+        self.x = self.z = self.v = self.a = Fraction(0)
+        self.level, self.length = Fraction(LEVELS - 1), 0
+
+    def turn(self, units: int) -> Fraction:
+        d = self.d
+        beyond = Fraction(2) ** d.motion.i
+        return max(-beyond, min(beyond - Fraction(2) ** -d.motion.f, self.to(self.a * units, d.motion.f)))
+
+    def entries(self, units: int, level: int) -> list[Fraction]:
+        """Return the row's entries for a time in units: it has two rows an octave, from 2 and from 3 on."""
+        length = units.bit_length()
+        within = 2 * length + int(length > 1 and units >= 3 << (length - 2))
+        row = self.d.table[level * (1 << self.d.row_bits) + within]
+        return [int(word) * Fraction(2) ** -fmt.f for word, fmt in zip(row, self.d.columns, strict=True)]
+
+    @property
+    def fastest(self) -> Fraction:
+        return self.d.velocity.max * Fraction(2) ** -self.d.velocity.f
+
+    def limited(self, v: Fraction) -> Fraction:
+        return max(-self.fastest, min(self.fastest, v))
+
+    def step(self, row) -> tuple[Fraction, int]:
+        d = self.d
+        count, now, *stamps, edge, down, restart = row
+        wide = 1 << d.time_bits
+        at, now, number = (stamps[edge] >> d.unit) % wide, (now >> d.unit) % wide, count + down
+        if self.known is None or restart:
+            self.known, self.anchor = False, (number, at)
+            self.forget()
+        half, flags = 1 << (d.count_width - 1), 0
+        passed = (number - self.anchor[0] + half) % (2 * half) - half
+        interval = (at - self.anchor[1]) % wide
+        if interval or passed:
+            if not self.known or interval >= wide // 2:
+                self.known = True
+                self.forget()
+            else:
+                flags = self.correct(passed, interval)
+            self.anchor = number, at
+        age = (now - self.anchor[1]) % wide
+        if age >= wide // 2 or age >= 8 << self.length:
+            x, length, self.known = self.x, self.length, self.known and age < wide // 2
+            self.forget()
+            self.x, self.length = x, length
+        straight = self.v + self.turn(age)
+        line = self.limited(straight)
+        flags |= 2 * (line != straight)
+        bound = Fraction(5 * d.clocks, 2 << d.unit) / 2 ** max(age.bit_length() - 1, 0)
+        bound = min(self.to(bound, d.motion.f), self.fastest)
+        sign = -1 if self.v < 0 else 1
+        line = sign * max(-abs(self.v), min(sign * line, max(bound - abs(self.v), 0)))
+        return self.half_up(line, d.velocity.f) * 2**d.velocity.f, flags
+
+    def correct(self, passed: int, interval: int) -> int:
+        d, e = self.d, self.d.error
+        self.length = interval.bit_length()
+        blend, alarm, fall, kx, *_ = self.entries(interval, math.floor(self.level + Fraction(1, 2)))
+        turn = self.turn(interval)
+        mean = self.to(self.v + turn / 2, d.motion.f)
+        edges = max(-d.distance.max, min(d.distance.max, passed))
+        far = self.to(Fraction(edges * d.clocks, 1 << d.unit), e.f) - self.half_up(mean * interval, e.f) - self.x
+        r = self.held(far, e)
+        self.z += self.to(blend * (r - self.z), e.f)
+        alarmed = self.to(abs(self.z), d.columns[1].f) > alarm
+        level = math.floor(self.level + Fraction(1, 2))
+        self.level = Fraction(LEVELS - 1) if alarmed else max(self.level - fall, Fraction(0))
+        *_, kx, kv, ka = self.entries(interval, LEVELS - 1 if alarmed else level)
+        self.x = self.half_up(kx * r, e.f) - r
+        fast = self.v + turn + self.half_up(kv * r, d.motion.f)
+        self.v = self.limited(fast)
+        self.a = self.held(self.a + self.half_up(ka * r, d.acceleration.f), d.acceleration)
+        return int(edges != passed or r != far) | 2 * (self.v != fast)
+
+
+@pytest.mark.parametrize("name", ["paper", "mhz", "narrow", "wide"])
+def test_model_is_the_exact_equation_rounded_as_documented(name):
+    d = design(name)
+    rows = list(rows_of(d, 6000))
+    seen, oracle = model(d, rows, START), Oracle(d)
+    for k, row in enumerate(rows):
+        assert oracle.step(row) == (seen["velocity"][k], seen["saturated"][k]), f"sample {k}: {row}"
+
+
+# ---- the rule -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["paper", "mhz"])
+def test_the_memories_are_where_the_motion_may_do_what_the_edges_hide(name):
+    """At the middle of every row J M^3 and C M^2 are the documented shares of the error of the place over M."""
+    axis, d = spec(name, "edge-kalman"), design(name)
+    length = np.arange(4, d.time_bits - 2)
+    for half, middle in ((0, math.sqrt(1.5)), (1, math.sqrt(3))):
+        time_s = 2.0 ** (length - 1) * middle / axis.clock_hz
+        memory = d.memories_s[:, 2 * length + half]
+        stamp = axis.speed_max_m_per_s / axis.count_m / axis.clock_hz / math.sqrt(12)
+        error = math.hypot(axis.edge_error_max_counts, stamp) * axis.count_m
+        hidden = error * np.sqrt(time_s / memory)
+        assert axis.jerk_bound_m_per_s3 * memory[0] ** 3 == pytest.approx(1.6 * hidden[0])
+        agile = axis.acceleration_max_m_per_s2 * memory[-1] ** 2
+        assert np.all(np.isclose(agile, 28 * hidden[-1]) | (memory[-1] == memory[0]))
+        assert np.allclose(np.diff(np.log(memory), 2, axis=0), 0)
+
+
+def test_gains_are_those_of_the_riccati_equation():
+    """Independent of `riccati`: SciPy's solution for a white jerk, and the rounding of the table's words."""
+    d, axis = design("mhz"), spec("mhz", "edge-kalman")
+    for level in range(LEVELS):
+        for length in (6, 9, 13, 18):
+            row = level * (1 << d.row_bits) + 2 * length
+            units = 2.0 ** (length - 1) * math.sqrt(1.5)
+            h = units / (d.memories_s[level, 2 * length] * axis.clock_hz)
+            moved = np.array([[1, 1, 0.5], [0, 1, 1], [0, 0, 1]])
+            jerk = h**6 * np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1]])
+            p = scipy.linalg.solve_discrete_are(moved.T, np.array([[1.0, 0, 0]]).T, jerk, np.eye(1))
+            gains = p[:, 0] / (p[0, 0] + 1) / units ** np.arange(3)
+            words = [int(d.table[row, n]) * d.columns[n].lsb for n in (3, 4, 5)]
+            for word, gain, fmt in zip(words, gains, d.columns[3:], strict=True):
+                assert word == pytest.approx(gain, rel=1e-4, abs=0.51 * fmt.lsb)
+
+
+def test_bounds_of_the_axis_are_the_gains():
+    axis = replace(spec("mhz", "edge-kalman"), jerk_max_m_per_s3=7.0, edge_error_max_counts=0.02)
+    assert axis.design.gains == edge_kalman.Gains(0.02, 7.0, 12.0)
+    shorter = replace(axis, jerk_max_m_per_s3=70.0)
+    assert np.all(shorter.design.estimator.memories_s[0] <= axis.design.estimator.memories_s[0])
+    usual = spec("mhz", "edge-kalman")
+    assert usual.jerk_bound_m_per_s3 == pytest.approx(12.0 * math.sqrt(12e6) / 128)
+    assert {"jerk_max_m_per_s3", "edge_error_max_counts"} & usual.facts.keys() == set()
+    assert axis.facts["jerk_max_m_per_s3"] == 7.0
+    assert axis.facts["edge_error_max_counts"] == 0.02
+
+
+@pytest.mark.parametrize("field", ["jerk_max_m_per_s3", "edge_error_max_counts"])
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
+def test_bounds_that_are_none_are_refused(field, value):
+    with pytest.raises(ValueError, match=rf"^{field} must be 1e-30 to 1e\+30, not {value!r}$"):
+        replace(spec("mhz", "edge-kalman"), **{field: value})
+
+
+# ---- promises -------------------------------------------------------------------------------------------------------
+
+
+def walk(d: edge_kalman.Design, rows) -> list[tuple[int, int]]:
+    """Return (velocity, flags) of rows of a decoder, with a restart appended or without."""
+    seen = model(d, [(*row[:8], row[9] if len(row) > 9 else 0) for row in rows], START)
+    return list(zip(seen["velocity"].tolist(), seen["saturated"].tolist(), strict=True))
+
+
+def steady(d, samples: int, every: int, scale: Scale | None = None, displaced=None):
+    """Yield rows of an axis with an edge every `every` samples, each `displaced` clocks late."""
+    scale, displaced = scale or Scale(d), displaced if displaced is not None else np.zeros(samples, int)
+    for k in range(samples):
+        scale.now += d.clocks
+        if k % every == every - 1:
+            scale.pass_edge(True, scale.now - 1 - d.clocks * every // 4 + int(displaced[k]))
+        yield scale.row()
+
+
+def test_a_constant_speed_is_read_to_a_few_words():
+    d = design("mhz")
+    seen = walk(d, steady(d, 60_000, 20))
+    assert seen[:39] == [(0, 0)] * 39
+    assert seen[60][0] > 0
+    # A place that is rounded by half an LSB at every edge is a velocity off by that over the interval.
+    exact, rounding = 2**d.velocity.f / 20, 2.0 ** (d.velocity.f - d.error.f - 1) / (20 * d.clocks) + 1
+    assert max(abs(velocity - exact) for velocity, _ in seen[50_000:]) <= rounding
+    assert {flags for _, flags in seen} == {0}
+
+
+def test_edges_that_err_are_averaged_over_the_memory():
+    """At a constant speed and independent errors the velocity's deviation is that of the filter's own covariance."""
+    d, axis, every = design("mhz"), spec("mhz", "edge-kalman"), 20
+    sigma = 0.05
+    displaced = np.round(sigma * every * d.clocks * np.random.default_rng(5).standard_normal(400_000)).astype(int)
+    seen = walk(d, steady(d, 400_000, every, displaced=displaced))
+    velocity = np.array([v for v, _ in seen[40_000:]]) * d.velocity.lsb - 1 / every
+    time_s = every * d.clocks / axis.clock_hz
+    memory_s = d.memories_s[0, 2 * 10 + 0]
+    # The continuous filter's: sigma sqrt(3/2 T / M) / M; each edge errs independently of the motion.
+    expected = sigma * math.sqrt(1.5 * time_s / memory_s) / memory_s / axis.sample_hz
+    assert velocity.std() == pytest.approx(expected, rel=0.15)
+
+
+def test_an_impact_makes_the_memory_agile_and_it_grows_again():
+    """A speed that doubles at once is read within an agile memory or two, far sooner than a quiet one fades."""
+    axis = replace(spec("mhz", "edge-kalman"), jerk_max_m_per_s3=12.0)
+    d = axis.design.estimator
+    scale = Scale(d)
+    before = list(steady(d, 100_000, 20, scale))
+    after = list(steady(d, 20_000, 10, scale))
+    seen = [velocity * d.velocity.lsb for velocity, _ in walk(d, [*before, *after])]
+    agile = d.memories_s[-1, 2 * 9 + 1] * axis.sample_hz
+    quiet = d.memories_s[0, 2 * 9 + 1] * axis.sample_hz
+    assert quiet > 4 * agile
+    reached = next(k for k, velocity in enumerate(seen[100_000:]) if abs(velocity - 0.1) < 0.01)
+    assert reached < 2.5 * agile
+    assert abs(seen[-1] - 0.1) < 1e-5
+
+
+@pytest.mark.parametrize("every", [50, 1000])
+def test_an_axis_that_stops_reads_exactly_zero(every):
+    """After a stop from constant speed the velocity is 0 within 16 times the last interval, and stays 0."""
+    d = design("mhz")
+    scale = Scale(d)
+    moving = list(steady(d, 40 * every, every, scale))
+    seen = walk(d, [*moving, *steady(d, 20 * every, 10**9, scale)])
+    at_rest = [velocity for velocity, _ in seen[40 * every :]]
+    assert at_rest[0] > 0
+    assert set(at_rest[17 * every :]) == {0}
+    assert all(abs(velocity) <= at_rest[0] for velocity in at_rest)
+
+
+def test_a_vibration_across_one_edge_reads_no_drift():
+    d, scale, rows = design("mhz"), Scale(design("mhz")), []
+    for k in range(4000):
+        scale.now += d.clocks
+        if k % 100 == 99:
+            scale.pass_edge(k // 100 % 2 == 0, scale.now - 1)
+        rows.append(scale.row())
+    assert {velocity for velocity, _ in walk(d, rows)} == {0}
+
+
+def test_wraps_of_count_and_clock_change_nothing():
+    d = design("mhz")
+    plain = walk(d, steady(d, 3000, 7, Scale(d, now=10**6)))
+    wrapped = Scale(d, now=(1 << d.stamp_width) - 1500 * d.clocks, count=(1 << (d.count_width - 1)) - 200)
+    assert walk(d, steady(d, 3000, 7, wrapped)) == plain
+
+
+def test_restart_mid_motion_starts_afresh():
+    d = design("mhz")
+    rows = [(*row, 0) for row in steady(d, 1000, 50)]
+    rows[500] = (*rows[500][:-1], 1)
+    seen = walk(d, rows)
+    assert seen[499][0] > 0
+    assert [velocity for velocity, _ in seen[500:549]] == [0] * 49
+
+
+def test_stamps_of_a_faster_clock_are_taken_in_units():
+    """A clock beyond TIME_BITS: the times in use have the same bits, and the velocity is the same."""
+    axis = replace(spec("mhz", "edge-kalman"), clock_hz=1_000_000_000)
+    d = axis.design.estimator
+    assert (d.unit, d.time_bits) == (3, 27)
+    seen = model(d, [(*row[:8], 0) for row in steady(d, 20_000, 20)], START)
+    assert abs(int(seen["velocity"][-1]) * d.velocity.lsb - 1 / 20) < 1e-4
+
+
+# ---- measured -------------------------------------------------------------------------------------------------------
+
+WANTED = {0.01: 0.015, 0.05: 0.03, 0.1: 0.05}
+"""The RMS error that edges displaced at random may cost on the paper's signal, mm/s, by their error in counts."""
+
+
+@pytest.mark.parametrize("error", WANTED if LONG else [0.05])
+def test_one_set_of_gains_bears_edges_of_their_own_and_an_impact(error):
+    """The gains are those for the impact's acceleration and the swing's jerk, in both."""
+    bound = signals.load("hit").acceleration_max_m_per_s2
+    encoder = {"encoder.edge_error_counts": error, "encoder.seed": 2}
+    of_one = {"backend": "fixed", "encoder": encoder, "acceleration_max_m_per_s2": bound}
+    swing, impact = (measure("edge-kalman", "u", name, 1_000_000, **of_one) for name in ("paper", "hit"))
+    assert swing["rms_mm_s"] < WANTED[error]
+    assert impact["rms_mm_s"] < 0.3
+    assert abs(impact["delay_s"]) < 10e-6
+    assert swing["flags"] == impact["flags"] == []
+
+
+def test_wrong_design_is_refused():
+    with pytest.raises(TypeError, match=r"not 3$"):
+        Estimator(3)
