@@ -123,7 +123,8 @@ def _check_start(scene: Scene) -> None:
 
 def _check_protocol(scene: Scene) -> None:
     protocol, rate = scene.protocol, scene.spec.sample_hz
-    for key in ("settle_s", "mean_s", "measure_s", "longest_s"):
+    times = ("settle_s", "mean_s", "measure_s", "longest_s")
+    for key in (key for key in times if getattr(protocol, key) is not None):
         value = getattr(protocol, key)
         if not value * rate > 0.5:
             raise ValueError(f"protocol.{key} must be at least one sample of {1 / rate:g} s, not {value!r}")

@@ -153,6 +153,10 @@ class SolverSection(Section):
     step_s: Step
 
 
+LONGEST_S = 20.0
+"""How long a run goes on at most whose scene does not say it, s."""
+
+
 class ProtocolSection(Section):
     """A hit from rest at `start_m`, pushed towards the wall, and what is said of it: see `hardwall.sim.walls.tally`.
 
@@ -167,7 +171,7 @@ class ProtocolSection(Section):
     settle_s: Time
     mean_s: Time
     measure_s: Time
-    longest_s: Time = 20.0
+    longest_s: Time | None = None
     threshold_mm: Threshold
     verdict: Literal["detrended", "literal"] = "detrended"
 
@@ -302,5 +306,5 @@ class Scene(Section):
         """Number of samples of a run whose verdict takes the most windows."""
         if self.protocol.verdict == "literal":
             return self.samples
-        longest = round(self.protocol.longest_s * self.controller.sample_hz)
+        longest = round((self.protocol.longest_s or LONGEST_S) * self.controller.sample_hz)
         return self.settled + max((longest - self.settled) // self.measured, 1) * self.measured

@@ -102,7 +102,7 @@ def test_a_handle_that_never_comes_to_the_wall_proves_no_wall_stable():
         "backend": "fixed",
     }
     with pytest.raises(RuntimeError, match=r"^the handle did not reach the wall: nothing is said of K 1000, B 10$"):
-        verdict(**job, stiffness=1e3, damping=10.0)
+        verdict(**job, wall=(1e3, 10.0), start=None)
 
 
 def test_a_chunk_shrinks_by_the_work_of_a_sample():

@@ -13,7 +13,13 @@ from hardwall.sim.scene.sentences import sections_of
 from hardwall.sim.walls import hit
 
 # Thirty samples beside the wall, so that the stiffest devices do not take long either.
-BRIEF = {"protocol.start_m": -2e-6, "protocol.settle_s": 2e-3, "protocol.mean_s": 1e-3, "protocol.measure_s": 1e-3}
+BRIEF = {
+    "protocol.start_m": -2e-6,
+    "protocol.settle_s": 2e-3,
+    "protocol.mean_s": 1e-3,
+    "protocol.measure_s": 1e-3,
+    "protocol.longest_s": 3e-3,
+}
 # With 0 a part is left out, and the loop is compiled without it.
 LEFT_OUT = {("handle.coulomb_n", 0.0), ("amplifier.delay_s", 0.0)}
 HELD = {"handle.coulomb_n", "protocol.push_n"}
@@ -47,7 +53,7 @@ def run(base: str, changes: dict[str, float]) -> list[hit.Hit]:
         assert told.startswith((f"{base}: ", "the handle passed more than"))
     for result in found:
         assert all(map(math.isfinite, (result.mean_m, result.rms_m, result.max_force_n)))
-        assert result.samples == scene.samples
+        assert scene.samples <= result.samples <= scene.most_samples
         assert 0 <= result.max_force_n <= scene.spec.force_max_n * (1 + 1e-9)
     return found
 
@@ -69,6 +75,7 @@ def test_the_lightest_and_the_heaviest_handle_fall_as_they_should(mass_kg):
     """Under 0.2572 N, what friction leaves of the push, on the way to a far wall."""
     changes = {"handle.mass_kg": mass_kg, "handle.viscous_n_s_per_m": 0.0, "encoder.count_m": 1e-4}
     protocol = {"protocol.start_m": -0.14, "protocol.settle_s": 1e-3, "protocol.mean_s": 1e-4}
+    protocol["protocol.verdict"] = "literal"
     result = hit.run(load("seed-2011", BRIEF | changes | protocol), "fixed")
     # The mean is that of the last sample before the end of settling; the first one was taken at rest.
     assert result.mean_m + 0.14 == pytest.approx(0.2572 / mass_kg * 0.9e-3**2 / 2, rel=1e-3 if mass_kg > 1 else 1e-9)

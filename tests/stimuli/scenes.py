@@ -15,12 +15,17 @@ DRIVE = {
     "motor.voltage_limit_v": 24.0, "motor.pulley_radius_m": 0.01,
 }  # fmt: skip
 PULSES = {"output.full_scale_n": 50.0, "output.pwm_carrier_hz": 20_000, "output.pwm_steps": 300}
-ONE_SECOND = {"protocol.settle_s": 0.7, "protocol.mean_s": 0.1, "protocol.measure_s": 0.3}
-TWO_SECONDS = {"protocol.settle_s": 1.5, "protocol.mean_s": 0.2, "protocol.measure_s": 0.5}
+ONE_SECOND = {
+    "protocol.settle_s": 0.7, "protocol.mean_s": 0.1, "protocol.measure_s": 0.3, "protocol.longest_s": 1.0,
+}  # fmt: skip
+TWO_SECONDS = {
+    "protocol.settle_s": 1.5, "protocol.mean_s": 0.2, "protocol.measure_s": 0.5, "protocol.longest_s": 2.0,
+}  # fmt: skip
 ODD = {"controller.sample_hz": 11_000, "controller.clock_hz": 9_900_000}
 SHORT_OF_AXES = {
     "protocol.settle_s": 0.02,
     "protocol.mean_s": 0.005,
     "protocol.measure_s": 0.01,
+    "protocol.longest_s": 0.03,
     "protocol.start_m": -2e-5,
 }
