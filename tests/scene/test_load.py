@@ -6,6 +6,7 @@ import re
 import pytest
 
 from hardwall.model.quadrature_speed import max_edge_rate
+from hardwall.sim.scene import checks
 from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import BYTES_MAX, load, parse, read
 from hardwall.sim.scene.schema import Scene
@@ -108,6 +109,16 @@ def test_keys_that_contradict_each_other_are_both_named(changes, said):
     with pytest.raises(SceneError) as refusal:
         load("seed-2011", changes)
     assert str(refusal.value).startswith(f"seed-2011: {said}")
+
+
+def test_a_run_is_too_long_only_by_what_its_scene_says(monkeypatch):
+    """An axis may be so fast that the 20 s of a scene that says nothing are more samples than can be asked for."""
+    monkeypatch.setattr(checks, "SAMPLES_MAX", 60_000)
+    assert load("seed-2011").most_samples == 200_000
+    with pytest.raises(
+        SceneError, match=r"^seed-2011: protocol.longest_s must be at most 6, 60000 samples, not 20\.0$"
+    ):
+        load("seed-2011", {"protocol.longest_s": 20.0})
 
 
 @pytest.mark.parametrize(

@@ -54,6 +54,7 @@ def run(base: str, changes: dict[str, float]) -> list[hit.Hit]:
     for result in found:
         assert all(map(math.isfinite, (result.mean_m, result.rms_m, result.max_force_n)))
         assert scene.samples <= result.samples <= scene.most_samples
+        assert (result.samples - scene.settled) % scene.measured == 0, "a run ends with a window"
         assert 0 <= result.max_force_n <= scene.spec.force_max_n * (1 + 1e-9)
     return found
 
