@@ -14,6 +14,7 @@ import os
 import shutil
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
 from covering.blocks import BLOCKS, Block
@@ -43,7 +44,7 @@ def measure(block: Block, folder: Path) -> Coverage | None:
     """Run the tests of a block, and return what they cover; None if they fail."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    command = [sys.executable, "-m", "pytest", "-q", "-n", str(os.cpu_count()), "-m", "rtl", str(block.test)]
+    command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-m", "rtl", str(block.test)]
     # The suite's own limit ends the process of a test that takes longer, as if it had crashed.
     command += ["-o", f"faulthandler_timeout={LONGEST_TEST_S}"]
     done = subprocess.run(
@@ -58,12 +59,15 @@ def measure(block: Block, folder: Path) -> Coverage | None:
 def main(begins: str) -> int:
     """Measure the blocks whose names begin so; return the exit code."""
     chosen = [block for block in BLOCKS if block.name.startswith(begins)]
-    found: list[Coverage] = []
-    for number, block in enumerate(chosen, 1):
-        print(f"{number} of {len(chosen)}: {block.name}", file=sys.stderr, flush=True)
-        coverage = measure(block, build_dir() / "coverage" / block.name.replace("/", "-"))
-        if coverage:
-            found.append(coverage)
+    # The last blocks have the longest tests, so they are begun first.
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        futures = {
+            pool.submit(measure, block, build_dir() / "coverage" / block.name.replace("/", "-")): block
+            for block in reversed(chosen)
+        }
+        for number, future in enumerate(as_completed(futures), 1):
+            print(f"{number} of {len(chosen)}: {futures[future].name}", file=sys.stderr, flush=True)
+    found = [coverage for coverage in (future.result() for future in reversed(futures)) if coverage]
     table, short = Table(COLUMNS, [coverage.row for coverage in found]), (each.explanation for each in found)
     good = sum(coverage.ok for coverage in found)
     return conclude(table, short, "coverage: {} blocks, {} covered", len(chosen), good)

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 
 from covering.blocks import Block
 from reasons import reasons_for
@@ -49,6 +49,11 @@ def modules_of(block: Block) -> tuple[str, ...]:
     return tuple(module.replace("component", BLOCK, 1) for module in block.modules)
 
 
+def shares_of(count: int, sizes: int) -> list[int]:
+    """Return how many of `count` mutants each of some sizes gets: from each as many, as far as they go."""
+    return [count * (n + 1) // sizes - count * n // sizes for n in range(sizes)]
+
+
 def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result], None]) -> list[Result]:
     """Return what came of `count` mutants of each block; `done` is called with each result as it comes.
 
@@ -63,20 +68,32 @@ def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result]
     Raises:
         RuntimeError: if a block's own tests fail without a mutant, or a tool fails.
     """
-    results = []
+
+    def result_of(block: Block, fates: list[Fate]) -> Result:
+        result = Result(block.name, fates, reasons_for(block.name, REASONS), ours)
+        done(result)
+        return result
+
+    # All sizes are taken first, for a run of pytest takes the standard streams and the environment to itself.
+    sizes = {block: sizes_of(block.test) for block in blocks}
+    digests = {block: digest_of(block, sizes[block], count) for block in blocks}
+    kept = {block: kept_of(block, digests[block]) for block in blocks}
+    results = {block: result_of(block, fates) for block, fates in kept.items() if fates is not None}
+    waiting: dict[Block, list[Future[list[Fate]]]] = {}
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for block in blocks:
-            sizes = sizes_of(block.test)
-            shares = [count * (n + 1) // len(sizes) - count * n // len(sizes) for n in range(len(sizes))]
-            digest = digest_of(block, sizes, count)
-            fates = kept_of(block, digest)
-            if fates is None:
-                futures = [
+            if block not in results:
+                waiting[block] = [
                     pool.submit(fates_of, size, modules_of(block), share)
-                    for size, share in zip(sizes, shares, strict=True)
+                    for size, share in zip(sizes[block], shares_of(count, len(sizes[block])), strict=True)
                 ]
+        try:
+            # While one block's last size is tested, the next block's first are, too.
+            for block, futures in waiting.items():
                 fates = [fate for future in futures for fate in future.result()]
-                keep(block, digest, fates)
-            results.append(Result(block.name, fates, reasons_for(block.name, REASONS), ours))
-            done(results[-1])
-    return results
+                keep(block, digests[block], fates)
+                results[block] = result_of(block, fates)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return [results[block] for block in blocks]
