@@ -3,6 +3,8 @@
     make coverage                   every block
     make coverage ONLY=link/        only the blocks whose names begin so
 
+What a block's tests cover is kept, until something changes that it comes from: see `kept.py`.
+
 Prints a table in percent, a line for every point that is missed without a reason, and one last line for a script;
 exits with 1 if a block falls short of a goal: lines 100 %, branches and toggles 98 %, of which points that have their
 reason in `covering/reasons.toml` are taken as reached. `covering/points.py` says which points count.
@@ -14,18 +16,26 @@ import os
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
+from covering import points
 from covering.blocks import BLOCKS, Block
-from covering.points import merged
+from covering.points import Point, merged
 from covering.report import REASONS, Coverage
+from kept import digest_of, keep, kept_of
 from reasons import reasons_for
 from targets import conclude
 
+from hardwall.hdl.export import to_verilog
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs.result import Table
+from hardwall.sim.rtl import cocotb_runner
 from hardwall.sim.rtl.cocotb_runner import COVERAGE
+from hardwall.testing import SAMPLES, SEED
+from mutation.sizes import sizes_of
+from mutation.sources import TREE, sources_of
 
 COLUMNS = {
     "block": "left",
@@ -40,8 +50,29 @@ LONGEST_TEST_S = 3600
 """The longest that a test may take: it counts every point, which must be compiled, too, perhaps beside other work."""
 
 
-def measure(block: Block, folder: Path) -> Coverage | None:
-    """Run the tests of a block, and return what they cover; None if they fail."""
+def sources_digest(block: Block) -> str:
+    """Return a digest of all that a block's coverage comes from: its Verilog, its tests, and what counts points."""
+    verilog = [to_verilog(size.component(), "block") for size in sizes_of(block.test)]
+    sources = {str(file): (TREE / file).read_bytes() for file in sources_of(block.test)}
+    means = [Path(file).read_bytes() for file in (__file__, points.__file__, cocotb_runner.__file__)]
+    return digest_of(block.modules, SEED, SAMPLES, verilog, sources, means)
+
+
+def measure(block: Block, digest: str) -> Coverage | None:
+    """Return what the tests of a block cover, as they were run or as it is kept; None if they fail."""
+    kept = kept_of("coverage", block.name, digest)
+    if kept is None:
+        counts = _counted(block, build_dir() / "coverage" / block.name.replace("/", "-"))
+        if counts is None:
+            return None
+        keep("coverage", block.name, digest, [[*vars(point).values(), count] for point, count in counts.items()])
+    else:
+        counts = Counter({Point(kind, name, tuple(place)): count for kind, name, place, count in kept})
+    return Coverage(block.name, counts, reasons_for(block.name, REASONS))
+
+
+def _counted(block: Block, folder: Path) -> Counter[Point] | None:
+    """Run the tests of a block, and return how often they reached every point; None if they fail."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-m", "rtl", str(block.test)]
@@ -53,18 +84,16 @@ def measure(block: Block, folder: Path) -> Coverage | None:
     if done.returncode:
         print(done.stdout, done.stderr, sep="", end="", file=sys.stderr)
         return None
-    return Coverage(block.name, merged(sorted(folder.glob("*.dat")), block.modules), reasons_for(block.name, REASONS))
+    return merged(sorted(folder.glob("*.dat")), block.modules)
 
 
 def main(begins: str) -> int:
     """Measure the blocks whose names begin so; return the exit code."""
     chosen = [block for block in BLOCKS if block.name.startswith(begins)]
+    digests = {block: sources_digest(block) for block in chosen}
     # The last blocks have the longest tests, so they are begun first.
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        futures = {
-            pool.submit(measure, block, build_dir() / "coverage" / block.name.replace("/", "-")): block
-            for block in reversed(chosen)
-        }
+        futures = {pool.submit(measure, block, digests[block]): block for block in reversed(chosen)}
         for number, future in enumerate(as_completed(futures), 1):
             print(f"{number} of {len(chosen)}: {futures[future].name}", file=sys.stderr, flush=True)
     found = [coverage for coverage in (future.result() for future in reversed(futures)) if coverage]

@@ -4,7 +4,7 @@
     make prove ONLY="axis mhz"      only the properties of blocks whose names begin so
 
 Prints a table, the counterexample of what is refuted, and one last line for a script; exits with 1 if anything falls
-short: a property that is not proven, or a bug that is not found.
+short: a property that is not proven, or a bug that is not found. What is proven is kept until its hardware changes.
 """
 
 import sys

@@ -1,10 +1,12 @@
 """The means of `make coverage`: points are read, merged over sizes of a block, and held against goals and reasons."""
 
 import re
+from collections import Counter
 from pathlib import Path
 
+import cover
 import pytest
-from covering.blocks import BLOCKS, TESTS
+from covering.blocks import BLOCKS, TESTS, Block
 from covering.points import Point, merged
 from covering.report import REASONS, Coverage, grouped
 from reasons import Reason, reasons_for
@@ -120,3 +122,32 @@ def test_every_block_has_its_test_and_every_reason_its_block():
     written = sum(len(reasons_for(block.name, REASONS)) for block in BLOCKS)
     text = REASONS.read_text(encoding="utf-8")
     assert written == text.count("[[reason]]")
+
+
+def test_what_is_covered_is_kept_and_failed_tests_are_run_again(monkeypatch, tmp_path):
+    monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
+    missed = Point("toggle", "part.sum[0]:0->1")
+    counts = Counter({Point("line", "part block: sum", ("0f", 1)): 2, missed: 0})
+    asked, given = [], [None, counts]
+
+    def counted(block, folder):
+        asked.append(folder.name)
+        return given.pop(0)
+
+    monkeypatch.setattr(cover, "_counted", counted)
+    block = Block("link/part")
+    assert cover.measure(block, "a") is None
+    first, again = cover.measure(block, "a"), cover.measure(block, "a")
+    assert first.counts == again.counts == counts
+    assert asked == ["link-part"] * 2
+    given.append(counts)
+    assert cover.measure(block, "b").missed == [missed]
+    assert len(asked) == 3
+
+
+def test_the_digest_of_a_block_is_of_its_verilog_and_its_tests(monkeypatch):
+    block = Block("arithmetic/sqrt")
+    digest = cover.sources_digest(block)
+    assert digest == cover.sources_digest(block) != cover.sources_digest(Block("arithmetic/sqrt", ("component.part",)))
+    monkeypatch.setattr(cover, "to_verilog", lambda component, name: "module block; endmodule")
+    assert digest != cover.sources_digest(block)

@@ -10,12 +10,14 @@ from amaranth.hdl import Module, Shape
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+import proofs.run as proving
 from hardwall.hdl.output import Output
 from proofs import properties
 from proofs.bench import Bench
 from proofs.bugs import Bug
 from proofs.property import Property
 from proofs.run import run
+from proofs.solver import Verdict
 from proofs.widths import Widths, extremes, range_of_product
 
 QUICK = [known for known in properties.PROPERTIES if known.quick]
@@ -86,6 +88,35 @@ def test_the_range_of_a_product_is_that_of_all_products(signs):
         (a, b), (c, d) = map(extremes, shapes)
         products = {x * y for x in range(a, b + 1) for y in range(c, d + 1)}
         assert range_of_product(*shapes) == (min(products), max(products))
+
+
+def test_what_is_proven_is_kept_until_it_changes(monkeypatch, tmp_path):
+    monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
+    known, asked = sums("difference"), []
+
+    def solve(name, text, depth, bounded):
+        asked.append(name)
+        return Verdict(not bounded, bounded, 3 if bounded else None, tmp_path if bounded else None, ("a",), 1.5)
+
+    monkeypatch.setattr(proving, "solve", solve)
+    first, again = run([known], lambda _: None), run([known], lambda _: None)
+    assert first == again
+    assert asked == [known.name, f"{known.name}-bug-0"]
+    for other in (replace(known, depth=3), replace(known, within=5), sums("sum", "difference")):
+        asked.clear()
+        assert run([other], lambda _: None)[0].ok
+        assert len(asked) == 2
+    # What falls short is tried again.
+    monkeypatch.setattr(proving, "solve", lambda *given: replace(solve(*given), proved=False))
+    asked.clear()
+    for _ in range(2):
+        assert not run([replace(known, depth=4)], lambda _: None)[0].ok
+    assert len(asked) == 4
+
+
+def test_where_the_source_stands_is_no_part_of_what_is_proven():
+    here, there = (f'  attribute \\src "{place}:7"\n  cell $and $1\n' for place in ("a.py", "b/a.py"))
+    assert proving._unplaced(here) == proving._unplaced(there) == "  cell $and $1\n"
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,18 @@
-"""Properties proven side by side, each with its bugs."""
+"""Properties proven side by side, each with its bugs; what is proven is kept until its text or its means change."""
 
 import os
+import re
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
 
+from kept import digest_of, keep, kept_of
+
+from . import solver
 from .property import Property
-from .solver import Verdict, solve
+from .solver import SOLVERS, Verdict, solve
 from .trace import table
 
 
@@ -59,6 +65,11 @@ class Outcome:
         return f"\n{head}{lines}{table(verdict.trace, self.text)}\n"
 
 
+def _unplaced(rtlil: str) -> str:
+    """Return a module without the places in the source that its parts come from."""
+    return re.sub(r"^ *attribute \\src .*\n", "", rtlil, flags=re.MULTILINE)
+
+
 def run(properties: Sequence[Property], done: Callable[[Outcome], None]) -> list[Outcome]:
     """Return the outcomes in the order of the properties; `done` is called with each as it comes.
 
@@ -67,11 +78,21 @@ def run(properties: Sequence[Property], done: Callable[[Outcome], None]) -> list
     """
     # The hardware is made by this thread alone, because a bug changes the code that makes it.
     texts = [(known.rtlil(), [known.rtlil(bug) for bug in known.bugs]) for known in properties]
+    means = [Path(file).read_bytes() for file in (__file__, solver.__file__)], [version(tool) for tool in SOLVERS]
 
     def outcome(known: Property, text: str, wrong: Sequence[str]) -> Outcome:
+        digest = digest_of(means, _unplaced(text), [*map(_unplaced, wrong)], known.depth, known.bounded, known.within)
+        kept = kept_of("prove", known.name, digest)
+        if kept is not None:
+            verdict, *bugs = (Verdict.of(each) for each in kept)
+            return Outcome(known, verdict, tuple(bugs), text)
         verdict = solve(known.name, text, known.depth, known.bounded)
         bugs = [solve(f"{known.name}-bug-{n}", each, known.within, True) for n, each in enumerate(wrong)]
-        return Outcome(known, verdict, tuple(bugs), text)
+        came = Outcome(known, verdict, tuple(bugs), text)
+        # What fell short is tried again, for the solver may have had too little time.
+        if came.ok:
+            keep("prove", known.name, digest, [each.as_json for each in (verdict, *bugs)])
+        return came
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         futures = [pool.submit(outcome, known, *made) for known, made in zip(properties, texts, strict=True)]

