@@ -14,6 +14,7 @@ from hardwall.sim.boards.parts import PARTS
 from hardwall.sim.rtl import netlist, shared_library
 from hardwall.sim.rtl.families import FAMILIES
 from hardwall.sim.rtl.netlist import GATES, Netlist, mapped
+from stimuli.lengths import LONG, long_form
 
 ECP5 = FAMILIES["ecp5"]
 CELLS, AXIS, SMALLEST = (Case(ECP5, top) for top in (TOPS[0], TOPS[1], SMALL))
@@ -38,6 +39,7 @@ def netlist_of(case: Case) -> Netlist:
     return mapped(case.top.component(), case.family)
 
 
+@long_form
 def test_products_and_memories_are_those_of_their_cells():
     """The models of cells that are ours have the product and the memory of plain Verilog."""
     outcome = compared(CELLS, netlist_of(CELLS), 2_000)
@@ -70,6 +72,7 @@ def test_a_wrong_table_of_a_cell_is_found():
     assert values
 
 
+@long_form
 def test_registers_without_a_value_at_power_up_are_found():
     right = netlist_of(CELLS)
     blank = replace(right, models=right.models.replace("initial Q = srval;", ""))
@@ -80,7 +83,7 @@ def test_registers_without_a_value_at_power_up_are_found():
     assert outcome.first == 0
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", FAMILIES if LONG else [ECP5.name.lower()])
 def test_the_first_evaluation_leaves_the_inputs_as_they_are(family):
     """In the gate there is none that has inputs; on a virtual board the first one has the reset."""
     made = netlist_of(Case(FAMILIES[family], SMALL))

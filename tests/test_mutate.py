@@ -269,7 +269,7 @@ REASON = Reason("part", "a mut*", "Nothing reads it.")
         (Result("part", [*KILLED, LEFT], []), False, "part: left, differs after 3 clocks: a mutant\n"),
         (Result("part", [*KILLED, EQUAL, LEFT], [REASON]), True, ""),
         (Result("part", [*KILLED, LEFT, LEFT], [REASON]), False, ""),
-        (Result("part", KILLED, [REASON]), False, "part: not left, so that its reason must go: a mut*\n"),
+        (Result("part", KILLED, [REASON]), False, "part: killed or not drawn, so that its reason must go: a mut*\n"),
         (Result("part", KILLED, [REASON], ours=False), True, ""),
         (Result("part", [], []), False, ""),
     ],

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from fractions import Fraction
 from functools import lru_cache
+from random import Random
 
 import cocotb
 import numpy as np
@@ -20,7 +21,17 @@ from hardwall.sim.estimates import accuracy, motions, signals
 from hardwall.sim.world.encoder import offsets
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model
-from stimuli.edges import anything, check_rounding_is_the_only_difference, exact, rows, sights, turn, velocities
+from stimuli.edges import (
+    Edge,
+    Strobe,
+    anything,
+    check_rounding_is_the_only_difference,
+    exact,
+    rows,
+    sights,
+    turn,
+    velocities,
+)
 from stimuli.lengths import some_of
 from stimuli.papers_signal import RATES
 from stimuli.seeded import seeded
@@ -37,13 +48,36 @@ def make(name: str) -> Estimator:
     return Estimator(design(name))
 
 
+def at_the_bound(d: period.Design, random: Random, cases: int) -> tuple[list[Strobe], list[Edge]]:
+    """Return motions that pause until the time since their last edge bounds the speed to about what it is.
+
+    Two edges tell a speed. The sample after these comes when the bound's quotient is that of the speed, or the next
+    one on either side of it.
+    """
+    strobes, edges, now = [], [], 0
+    speed, bound = (part * d.clocks << d.velocity.f for part in (2, 3))
+    longest = 1 << (d.stamp_width - 2)
+    while len(strobes) < 3 * cases:
+        gap = round(2.0 ** random.uniform(1, d.stamp_width - 3))
+        age = int(bound / (speed // gap + random.choice((-1, 0, 1)) + 0.5))
+        if not gap < age < longest:
+            continue
+        edges += [Edge(now + 1, 0, 0), Edge(now + 1 + gap, 1, 0)]
+        strobes += [Strobe(now, 1, len(edges) - 2), Strobe(now + gap + 2, 0, len(edges))]
+        now += gap + 1 + age
+        strobes.append(Strobe(now, 0, len(edges)))
+        now += 1
+    return strobes, edges
+
+
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     name = parameters()["name"]
     d, random = design(name), seeded()
     samples = SAMPLES // (10 if name == "narrow" else 1)
     turns = [rows(d, *turn(d, random, samples // 3), invert) for invert in (False, True)]
-    stimulus = [row for part in (*turns, anything(d, random, samples // 3)) for row in part]
+    bounds = rows(d, *at_the_bound(d, random, samples // 30))
+    stimulus = [row for part in (*turns, bounds, anything(d, random, samples // 3)) for row in part]
     expected = await follow(dut, make(name), stimulus, START)
     assert set(expected["saturated"]) == {0, 1}
     for end in (-d.velocity.max, 0, d.velocity.max):

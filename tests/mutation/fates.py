@@ -71,10 +71,9 @@ class Result:
 
     @property
     def stale(self) -> list[Reason]:
-        """Reasons for what is not left."""
-        return [
-            reason for reason in self.reasons if self.ours and not any(reason.is_of(fate.mutant) for fate in self.left)
-        ]
+        """Reasons for what a test kills or what was not drawn: a proof has only so much time, and may not come."""
+        alive = [fate.mutant for fate in self.fates if fate.killed_by is None]
+        return [reason for reason in self.reasons if self.ours and not any(map(reason.is_of, alive))]
 
     @property
     def share(self) -> float:
@@ -97,5 +96,5 @@ class Result:
     def explanation(self) -> str:
         """Every mutant that is left without a reason, and every stale reason; one line for each."""
         left = [f"{self.block}: left, {fate.known}: {fate.mutant}" for fate in self.unexplained]
-        stale = [f"{self.block}: not left, so that its reason must go: {reason.name}" for reason in self.stale]
+        stale = [f"{self.block}: killed or not drawn, so that its reason must go: {reason.name}" for reason in self.stale]
         return "".join(f"{line}\n" for line in left + stale)
