@@ -8,6 +8,7 @@ from . import (
     finite_difference,
     foaw,
     kalman,
+    least_squares,
     levant,
     levant_adaptive,
     levant_edge,
@@ -35,6 +36,7 @@ ESTIMATORS: dict[str, type[EstimatorBlock]] = {
     "levant-adaptive": levant_adaptive.Estimator,
     "window": window.Estimator,
     "foaw": foaw.Estimator,
+    "least-squares": least_squares.Estimator,
 }
 
 

@@ -12,6 +12,7 @@ from . import (
     finite_difference,
     foaw,
     kalman,
+    least_squares,
     levant,
     levant_adaptive,
     levant_edge,
@@ -39,6 +40,7 @@ ESTIMATORS: dict[str, type[EstimatorDesign]] = {
     "levant-adaptive": levant_adaptive.Design,
     "window": window.Design,
     "foaw": foaw.Design,
+    "least-squares": least_squares.Design,
 }
 
 

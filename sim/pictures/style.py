@@ -67,8 +67,9 @@ COLOURS = {
     "levant-adaptive": "#332288",
     "window": "#CC79A7",
     "foaw": "#3FA7D6",
+    "least-squares": "#1F4E79",
 }
-MARKERS = dict(zip(COLOURS, "ovsDd<>^8phXP*", strict=True))
+MARKERS = dict(zip(COLOURS, "ovsDd<>^8phXP*H", strict=True))
 OTHER = {"color": "#000000", "marker": "."}
 """The style of an estimator that has no colour here yet."""
 FADED = 0.5
