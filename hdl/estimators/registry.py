@@ -8,11 +8,13 @@ from . import (
     finite_difference,
     foaw,
     kalman,
+    least_squares,
     levant,
     levant_adaptive,
     levant_edge,
     levant_implicit,
     levant_semi_implicit,
+    mt,
     period,
     period_count,
     tracking_loop,
@@ -28,6 +30,7 @@ ESTIMATORS: dict[str, type[EstimatorBlock]] = {
     "tracking-loop": tracking_loop.Estimator,
     "period": period.Estimator,
     "period-count": period_count.Estimator,
+    "mt": mt.Estimator,
     "levant-edge": levant_edge.Estimator,
     "edge-kalman": edge_kalman.Estimator,
     "levant-semi-implicit": levant_semi_implicit.Estimator,
@@ -35,6 +38,7 @@ ESTIMATORS: dict[str, type[EstimatorBlock]] = {
     "levant-adaptive": levant_adaptive.Estimator,
     "window": window.Estimator,
     "foaw": foaw.Estimator,
+    "least-squares": least_squares.Estimator,
 }
 
 

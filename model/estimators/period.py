@@ -103,9 +103,12 @@ START = State(NOTHING, 0)
 FLOAT_START = State(NOTHING, 0.0)
 
 
-def check_stamps(axis) -> None:
-    """Raise ValueError if the samples of an axis are too long for its stamps to distinguish edges."""
-    longest = 1 << min(axis.stamp_width - 2, DIVIDEND_BITS - axis.stamp_width)
+def check_stamps(axis, spare: int = 0) -> None:
+    """Raise ValueError if the samples of an axis are too long for its stamps to distinguish edges.
+
+    An estimator that needs `spare` more bits, in the stamp and in the dividend, takes samples shorter by as much.
+    """
+    longest = 1 << min(axis.stamp_width - 2, DIVIDEND_BITS - axis.stamp_width) - spare
     if axis.clocks_per_sample > longest:
         raise FieldError(
             "sample_hz",

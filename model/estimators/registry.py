@@ -12,11 +12,13 @@ from . import (
     finite_difference,
     foaw,
     kalman,
+    least_squares,
     levant,
     levant_adaptive,
     levant_edge,
     levant_implicit,
     levant_semi_implicit,
+    mt,
     period,
     period_count,
     tracking_loop,
@@ -32,6 +34,7 @@ ESTIMATORS: dict[str, type[EstimatorDesign]] = {
     "tracking-loop": tracking_loop.Design,
     "period": period.Design,
     "period-count": period_count.Design,
+    "mt": mt.Design,
     "levant-edge": levant_edge.Design,
     "edge-kalman": edge_kalman.Design,
     "levant-semi-implicit": levant_semi_implicit.Design,
@@ -39,6 +42,7 @@ ESTIMATORS: dict[str, type[EstimatorDesign]] = {
     "levant-adaptive": levant_adaptive.Design,
     "window": window.Design,
     "foaw": foaw.Design,
+    "least-squares": least_squares.Design,
 }
 
 

@@ -60,6 +60,7 @@ COLOURS = {
     "tracking-loop": "#117733",
     "period": "#999933",
     "period-count": "#B08900",
+    "mt": "#7A5C00",
     "levant-edge": "#E69F00",
     "edge-kalman": "#661100",
     "levant-semi-implicit": "#AA4499",
@@ -67,8 +68,9 @@ COLOURS = {
     "levant-adaptive": "#332288",
     "window": "#CC79A7",
     "foaw": "#3FA7D6",
+    "least-squares": "#1F4E79",
 }
-MARKERS = dict(zip(COLOURS, "ovsDd<>^8phXP*", strict=True))
+MARKERS = dict(zip(COLOURS, "ovsDd<>1^8phXP*H", strict=True))
 OTHER = {"color": "#000000", "marker": "."}
 """The style of an estimator that has no colour here yet."""
 FADED = 0.5
