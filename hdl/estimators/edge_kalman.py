@@ -309,14 +309,7 @@ class _Signals:
         self.size, self.age_size = Signal(range(d.time_bits + 1)), Signal(range(d.time_bits + 1))
         self.flags = Signal(2)
 
-        # What passed with the errors of both edges' places, where a map has them: `before` is that of the anchor.
-        self.exact, self.place_shift, self.displaced = self.distance, p.place_shift - FRACTION_BITS, []
-        if d.scale is not None:
-            self.error, self.before = Signal(shape(d.scale.place)), Signal(shape(d.scale.place))
-            edges = self.distance << FRACTION_BITS
-            self.exact = Signal(signed(max(len(edges), d.scale.place.width + 1) + 1))
-            self.place_shift = p.place_shift
-            self.displaced = [self.exact.eq(edges + (self.error - self.before))]
+        self._place(d)
 
         # The multiplier: the low limb's product waits, with half of what is rounded off, for the high limb's.
         wide = max(d.time_bits, *(fmt.width for fmt in d.columns))
@@ -350,6 +343,16 @@ class _Signals:
         self.bound, self.room = Signal(d.motion.width - 1), Signal(signed(d.motion.width + 1))
         self.straight, self.line = Signal(signed(d.motion.width + 2)), Signal(motion)
         self.least, self.most, self.held = Signal(motion), Signal(motion), Signal(motion)
+
+    def _place(self, d: Design) -> None:
+        """Add what passed, with the errors of both edges' places where a map has them: `before` is the anchor's."""
+        self.exact, self.place_shift, self.displaced = self.distance, self.params.place_shift - FRACTION_BITS, []
+        if d.scale is not None:
+            self.error, self.before = Signal(shape(d.scale.place)), Signal(shape(d.scale.place))
+            edges = self.distance << FRACTION_BITS
+            self.exact = Signal(signed(max(len(edges), d.scale.place.width + 1) + 1))
+            self.place_shift = self.params.place_shift
+            self.displaced = [self.exact.eq(edges + (self.error - self.before))]
 
     def _shifted(self, shift: int) -> int:
         """Return the bits of the sum of a product after a shift to the right."""
