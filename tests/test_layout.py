@@ -63,6 +63,7 @@ BROAD = {
     "commands/test_cli": "every command, as it is called",
     "commands/test_cli_estimators": "the commands on estimators, as they are called",
     "commands/test_reports": "every report in JSON",
+    "estimators/test_edge_kalman_map": "edge_kalman with a scale_map",
     "estimators/test_levant_edge_bound": "levant_edge in motions beyond its gains",
     "estimators/test_levants": "what several of Levant's differentiators promise alike",
     "host/test_unwanted": "what axis, heartbeat and words together must not let happen",

@@ -2,6 +2,7 @@
 
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, signed, unsigned
 from amaranth.lib.memory import Memory
+from amaranth.lib.wiring import Member
 
 from hardwall.model.estimators.edge_kalman import AGILE_LEVEL, BLEND_BITS, HALF, KX_BITS, TOP
 from hardwall.model.estimators.edge_kalman_design import (
@@ -16,8 +17,10 @@ from hardwall.model.estimators.edge_kalman_design import (
     REST_BITS,
     Design,
 )
+from hardwall.model.scale_map import FRACTION_BITS
 
 from ..arithmetic.fixed import fitted, length_of, saturate, shape, shift_floor, shift_round_half_up
+from ..scale_map import ScaleMap
 from .estimate import EstimatorBlock
 
 LIMB_BITS = 13
@@ -40,6 +43,9 @@ class Estimator(EstimatorBlock):
     with the gains and bounds of the table's row for T and the memory; the velocity is the line. Start: at the first
     sample, and with `restart`, everything is forgotten; v = 0 until the second edge.
 
+    With a map of the scale (`design.scale`) n is the difference of the places of the two edges: their numbers, each
+    with the error that the map has for it.
+
     Latency: `latency` clocks from `strobe` to `valid`; the next `strobe` may come with `valid`. One multiplier makes
     all seven products, each in two halves: the right operand is wider than a multiplier of the part.
 
@@ -52,16 +58,34 @@ class Estimator(EstimatorBlock):
     design : hardwall.model.estimators.edge_kalman.Design
         Formats and table; its module derives them.
 
+    Members, with a map of the scale, beside those of every estimator
+    -----------------------------------------------------------------
+    map_enabled, map_write, map_bin, map_written : In
+        Those of `hardwall.hdl.scale_map.ScaleMap`. They change only before a sample with `restart`.
+    map_outside : Out(1)
+        From `valid` until the next `strobe`: the last edge is beyond the map's bins.
+
     Source: Kalman 1960 for the filter; its use on edges is this project's.
     """
 
     design_class = Design
+
+    @staticmethod
+    def members(design: Design) -> dict[str, Member]:
+        own = EstimatorBlock.members(design)
+        if design.scale is None:
+            return own
+        of_map = {f"map_{name}": member for name, member in ScaleMap.members(design.scale).items()}
+        del of_map["map_number"], of_map["map_error"]
+        return own | of_map
 
     def elaborate(self, platform):
         m = Module()
         s = _Signals(self._design)
         self._multiply(m, s)
         self._look_up(m, s)
+        if self._design.scale is not None:
+            self._displace(m, s)
         m.d.sync += self.valid.eq(0)
         sequence = self._sample(s) | self._innovation(s) | self._correction(s) | self._line(s)
         after = [*list(sequence)[1:], "SAMPLE"]
@@ -94,6 +118,19 @@ class Estimator(EstimatorBlock):
         read = table.read_port()
         m.d.comb += [read.addr.eq(s.row), read.en.eq(1), Cat(*s.entry).eq(read.data)]
 
+    def _displace(self, m, s):
+        """Add the map: the error of this edge is there two clocks after its number, before it is used."""
+        m.submodules.scale = scale = ScaleMap(self._design.scale)
+        m.d.comb += [
+            scale.number.eq(s.to),
+            scale.enabled.eq(self.map_enabled),
+            scale.write.eq(self.map_write),
+            scale.bin.eq(self.map_bin),
+            scale.written.eq(self.map_written),
+            self.map_outside.eq(scale.outside),
+            s.error.eq(scale.error),
+        ]
+
     def _take(self, m, s):
         """Add what the strobe takes."""
         d, seen = self._design, self.seen
@@ -109,7 +146,7 @@ class Estimator(EstimatorBlock):
 
     def _sample(self, s):
         """Return the states that take the interval, and what passed in it."""
-        d, p = self._design, s.params
+        d = self._design
         return {
             "DIFFERENCE": [
                 s.interval.eq(Mux(s.fresh, 0, s.at - s.stamp)),
@@ -120,10 +157,11 @@ class Estimator(EstimatorBlock):
             "TURN LOW": [s.size.eq(length_of(s.interval)), s.age.eq(s.now - Mux(s.anchor, s.at, s.stamp))],
             "TURN HIGH": [
                 s.waits(0),
+                *s.displaced,
                 s.row.eq(s.of_time | (s.level + HALF) >> LEVEL_BITS << d.row_bits),
                 s.age_size.eq(length_of(s.age)),
             ],
-            "TURN SUM": [s.summed, s.way.eq(shift_floor(s.distance * d.clocks, p.place_shift))],
+            "TURN SUM": [s.summed, s.way.eq(shift_floor(s.exact * d.clocks, s.place_shift))],
         }
 
     def _innovation(self, s):
@@ -239,6 +277,9 @@ class Estimator(EstimatorBlock):
                     m.d.sync += s.a.eq(saturate(s.bent, -p.acceleration_max, p.acceleration_max))
                 with m.If(s.anchor):
                     m.d.sync += [s.number.eq(s.to), s.stamp.eq(s.at)]
+                if d.scale is not None:
+                    with m.If(s.anchor | s.fresh):
+                        m.d.sync += s.before.eq(s.error)
                 with m.If(s.rest):
                     m.d.sync += [s.level.eq(TOP), s.mean.eq(0), s.v.eq(0), s.a.eq(0), s.known.eq(s.known & ~s.gone)]
 
@@ -268,6 +309,8 @@ class _Signals:
         self.size, self.age_size = Signal(range(d.time_bits + 1)), Signal(range(d.time_bits + 1))
         self.flags = Signal(2)
 
+        self._place(d)
+
         # The multiplier: the low limb's product waits, with half of what is rounded off, for the high limb's.
         wide = max(d.time_bits, *(fmt.width for fmt in d.columns))
         self.left = Signal(signed(max(d.motion.width + 1, d.acceleration.width, d.error.width + 1)))
@@ -288,7 +331,7 @@ class _Signals:
         # The innovation, and what it changes.
         self.turn, self.ahead = Signal(signed(d.motion.width + 1)), Signal(signed(d.motion.width + 2))
         self.turned = self.turn.eq(fitted(shift_floor(self.total, p.turn_shift), len(self.turn)))
-        self.way = Signal(signed(d.distance.width + d.clocks.bit_length() + max(d.error.f, 0) + 1))
+        self.way = Signal(signed(max(len(self.exact) + d.clocks.bit_length() - self.place_shift, 1)))
         self.behind = Signal(signed(max(len(self.way), d.error.width) + 1))
         self.far = Signal(signed(max(len(self.behind), self._shifted(p.travel_shift)) + 1))
         self.r = Signal(error)
@@ -300,6 +343,16 @@ class _Signals:
         self.bound, self.room = Signal(d.motion.width - 1), Signal(signed(d.motion.width + 1))
         self.straight, self.line = Signal(signed(d.motion.width + 2)), Signal(motion)
         self.least, self.most, self.held = Signal(motion), Signal(motion), Signal(motion)
+
+    def _place(self, d: Design) -> None:
+        """Add what passed, with the errors of both edges' places where a map has them: `before` is the anchor's."""
+        self.exact, self.place_shift, self.displaced = self.distance, self.params.place_shift - FRACTION_BITS, []
+        if d.scale is not None:
+            self.error, self.before = Signal(shape(d.scale.place)), Signal(shape(d.scale.place))
+            edges = self.distance << FRACTION_BITS
+            self.exact = Signal(signed(max(len(edges), d.scale.place.width + 1) + 1))
+            self.place_shift = self.params.place_shift
+            self.displaced = [self.exact.eq(edges + (self.error - self.before))]
 
     def _shifted(self, shift: int) -> int:
         """Return the bits of the sum of a product after a shift to the right."""

@@ -31,8 +31,10 @@ then agile, and the next edge begins a motion. At standstill the velocity is exa
 
 A turn needs no care: an edge has one place, whichever way it is crossed.
 
-Not learnt. Unlike `levant_edge` this filter does not learn where edges are; errors that repeat every four edges are
-averaged like any others, over the edges of a memory.
+The scale. Where edges really stand may be known, by a map (`scale_map`): n is then the difference of the places of two
+edges. Without a map every edge is where its number says. The filter itself learns none, and averages errors that repeat
+every four edges like any others, over the edges of a memory. A map is changed with `restart` only, for the anchor's
+place is that of the map, too.
 
 Start. The first sample, and a sample with `restart`, forget everything; u = 0 until the second edge. A start in motion
 is caught up in some agile memories.
@@ -53,6 +55,7 @@ the time between them, is this project's.
 from ..arithmetic.fixed import saturate, shift_floor, shift_round_half_up, wrap
 from ..compiled import compiled
 from ..quadrature import stamp_of
+from ..scale_map import FRACTION_BITS, place_of
 from .edge_kalman_design import (
     ALARM_AT,
     BLEND,
@@ -124,13 +127,20 @@ def _turn(params, acceleration, time):
 
 
 @compiled
-def _correct(params, state, interval, passed):
+def _displaced(params, state, number):
+    """Return by how much more an edge is out of its place than the anchor is, as the map of the scale has it."""
+    return place_of(params.scale, number).error - place_of(params.scale, state.number).error
+
+
+@compiled
+def _correct(params, state, interval, passed, number):
     """Return (level, place, mean, velocity, acceleration, flags) at the new edge."""
     row = _row(params, interval, (state.level + HALF) >> LEVEL_BITS)
     turn = _turn(params, state.acceleration, interval)
     travelled = shift_round_half_up((state.velocity + (turn >> 1)) * interval, params.travel_shift)
     distance = saturate(passed, -params.distance_max, params.distance_max)
-    far = shift_floor(distance * params.clocks, params.place_shift) - travelled - state.place
+    exact = (distance << FRACTION_BITS) + _displaced(params, state, number)
+    far = shift_floor(exact * params.clocks, params.place_shift) - travelled - state.place
     r = saturate(far, -params.error_max, params.error_max)
 
     mean = state.mean + shift_floor(params.table[row, BLEND] * (r - state.mean), BLEND_BITS)
@@ -154,16 +164,17 @@ def step(params, state, seen, restart):
     if restart or not state.running:
         state = _started(params, seen, TOP, 0)
     met, interval, passed = _met(params, state, seen)
+    here = number_of(params, seen)
     known, length, level, place, mean = state.known, state.length, state.level, state.place, state.mean
     velocity, acceleration, flags = state.velocity, state.acceleration, 0
     if met == FIRST:
         known, length, level, place, mean, velocity, acceleration = 1, 0, TOP, 0, 0, 0, 0
     elif met == TIMED:
         length = length_of(interval)
-        level, place, mean, velocity, acceleration, flags = _correct(params, state, interval, passed)
+        level, place, mean, velocity, acceleration, flags = _correct(params, state, interval, passed, here)
     number, stamp = state.number, state.stamp
     if met != ANCHOR:
-        number, stamp = number_of(params, seen), _time_of(params, stamp_of(seen, seen.edge))
+        number, stamp = here, _time_of(params, stamp_of(seen, seen.edge))
 
     age = (_time_of(params, seen.stamp) - stamp) & ((1 << params.time_bits) - 1)
     gone = age >> (params.time_bits - 1)
@@ -179,10 +190,11 @@ def step(params, state, seen, restart):
 
 
 @compiled
-def _float_correct(params, state, interval, passed):
+def _float_correct(params, state, interval, passed, number):
     row = _row(params, interval, int(state.level + 0.5))
     turn = state.acceleration * interval
-    r = passed * params.per_sample - (state.velocity + turn / 2) * interval - state.place
+    exact = passed + _displaced(params, state, number)
+    r = exact * params.per_sample - (state.velocity + turn / 2) * interval - state.place
 
     mean = state.mean + params.table[row, BLEND] * (r - state.mean)
     level = max(state.level - params.table[row, FALL], 0.0)
@@ -203,16 +215,17 @@ def float_step(params, state, seen, restart):
     if restart or not state.running:
         state = _started(params, seen, float(AGILE_LEVEL), 0.0)
     met, interval, passed = _met(params, state, seen)
+    here = number_of(params, seen)
     known, length, level, place, mean = state.known, state.length, state.level, state.place, state.mean
     velocity, acceleration = state.velocity, state.acceleration
     if met == FIRST:
         known, length, level, place, mean, velocity, acceleration = 1, 0, float(AGILE_LEVEL), 0.0, 0.0, 0.0, 0.0
     elif met == TIMED:
         length = length_of(interval)
-        level, place, mean, velocity, acceleration = _float_correct(params, state, interval, passed)
+        level, place, mean, velocity, acceleration = _float_correct(params, state, interval, passed, here)
     number, stamp = state.number, state.stamp
     if met != ANCHOR:
-        number, stamp = number_of(params, seen), _time_of(params, stamp_of(seen, seen.edge))
+        number, stamp = here, _time_of(params, stamp_of(seen, seen.edge))
 
     age = (_time_of(params, seen.stamp) - stamp) & ((1 << params.time_bits) - 1)
     gone = age >> (params.time_bits - 1)

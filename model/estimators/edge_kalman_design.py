@@ -44,6 +44,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .. import scale_map
 from ..arithmetic.fixed import SQ, UQ, bits_for, shift_floor
 from ..checks import FieldError
 from ..quadrature import Seen
@@ -98,7 +99,10 @@ class Gains(EstimatorGains):
 
 
 class Params(NamedTuple):
-    """Widths, limits and shifts of the integer kernel; see `Design` for the formats. `table` has the rows' words."""
+    """Widths, limits and shifts of the integer kernel; see `Design` for the formats.
+
+    `table` has the rows' words, and `scale` the errors of the edges' places: none, unless it is replaced.
+    """
 
     count_width: int
     unit: int
@@ -119,6 +123,7 @@ class Params(NamedTuple):
     bound: int
     row_bits: int
     table: np.ndarray
+    scale: scale_map.Params
 
 
 class FloatParams(NamedTuple):
@@ -129,6 +134,7 @@ class FloatParams(NamedTuple):
     steepest: float
     row_bits: int
     table: np.ndarray
+    scale: scale_map.Params
 
 
 class State(NamedTuple):
@@ -159,7 +165,12 @@ FLOAT_START = State(0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
 class Design(EstimatorDesign):
     """Formats, tables and latency of the filter for an axis, derived as the module says.
 
+    Args:
+        axis, gains: those of every estimator.
+        scale: the map of the scale that the hardware is to have; None for none.
+
     Attributes:
+        scale: the argument.
         velocity, motion, acceleration, error: formats of the output, of v, of a, and of r and the place.
         distance: format of the number of edges passed in an interval.
         unit, time_bits: log2 of the clocks in a unit of time, and the bits of a stamp in units.
@@ -178,8 +189,9 @@ class Design(EstimatorDesign):
     flags = ("error_saturated", "velocity_saturated")
     latency = STEPS
 
-    def __init__(self, axis: AxisRequirements, gains: Gains):
+    def __init__(self, axis: AxisRequirements, gains: Gains, scale: scale_map.Design | None = None):
         super().__init__(axis, gains)
+        self.scale = scale
         self.clocks = axis.clocks_per_sample
         if 4 * self.clocks > 1 << axis.stamp_width:
             raise FieldError("sample_hz", f"must be 4 or more for stamps that last a second, not {axis.sample_hz!r}")
@@ -277,7 +289,7 @@ class Design(EstimatorDesign):
             time_bits=self.time_bits,
             clocks=self.clocks,
             distance_max=self.distance.max,
-            place_shift=self.unit - e.f,
+            place_shift=self.unit - e.f + scale_map.FRACTION_BITS,
             travel_shift=v.f - e.f,
             error_max=e.max,
             alarm_shift=e.f - self.columns[ALARM_AT].f,
@@ -291,13 +303,14 @@ class Design(EstimatorDesign):
             bound=shift_floor(5 * self.clocks, 1 + self.unit - v.f),
             row_bits=self.row_bits,
             table=self.table,
+            scale=scale_map.nothing(),
         )
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 kernel's parameters: unrounded gains."""
         steepest = 2.0 ** (self.acceleration.i - 1)
         sizes = self.count_width, self.unit, self.time_bits
-        return FloatParams(*sizes, self._per_sample, steepest, self.row_bits, self.rates)
+        return FloatParams(*sizes, self._per_sample, steepest, self.row_bits, self.rates, scale_map.nothing(True))
 
     def start(self, floating: bool = False) -> State:
         return FLOAT_START if floating else START

@@ -12,7 +12,7 @@ import typer
 from ...model.checks import shown
 from ...model.estimators import registry
 from ..boards.parts import PARTS
-from ..estimates.accuracy import FASTEST, RATES_HZ, SCENE, outputs
+from ..estimates.accuracy import FASTEST, LEARNED, RATES_HZ, SCENE, outputs
 from ..scene.errors import SceneError
 from ..scene.load import load, names, toml_of
 from ..walls.methods import Curve, label
@@ -109,7 +109,7 @@ def encoder_of(assignments: list[str] | None) -> dict[str, Any]:
             raise BadInput(f"--set must be of an error of the encoder, encoder.KEY=VALUE, not {shown(key)}")
     if changes:
         try:
-            load(SCENE, FASTEST | changes)
+            load(SCENE, FASTEST | {key: value for key, value in changes.items() if key != LEARNED})
         except SceneError as error:
             raise BadInput(str(error)) from None
     return changes

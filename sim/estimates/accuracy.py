@@ -18,7 +18,7 @@ from ...model.estimators import registry
 from ...model.spec import AxisSpec
 from ..scene.load import load
 from ..world.encoder import Errors, offsets
-from . import recording, signals
+from . import learning, recording, signals
 from .judge import Judge
 from .motions import velocity
 from .playback import velocities
@@ -35,6 +35,8 @@ SCENE = "mhz"
 FASTEST = {"controller.speed_max_m_per_s": 0.4}
 """The speed up to which the errors of an encoder must leave edges their order: more than the paper's signal has."""
 PHASE = "encoder.phase_error_counts"
+LEARNED = "encoder.learned_passes"
+"""The training passes from which the map of the encoder's scale is learned: no error, and no key of a scene."""
 COARSEN = 16
 """The factor by which a recording's counts are made coarser; the full counts are the reference."""
 
@@ -59,7 +61,7 @@ def _device() -> AxisSpec:
 
 
 def errors_of(encoder: dict[str, Any] | None) -> Errors:
-    """Return the errors of an encoder, given as changes of the scene's keys `encoder.KEY`.
+    """Return the errors of an encoder, given as changes of the scene's keys `encoder.KEY`, with `LEARNED` or without.
 
     A phase error alone may be as large as the order of edges allows, for the axis has no glitch filter; together with
     other errors it has the limits of a scene.
@@ -67,7 +69,7 @@ def errors_of(encoder: dict[str, Any] | None) -> Errors:
     Raises:
         ValueError: if the errors are not valid.
     """
-    encoder = encoder or {}
+    encoder = {key: value for key, value in (encoder or {}).items() if key != LEARNED}
     if encoder.keys() <= {PHASE}:
         return Errors(offsets(encoder.get(PHASE, 0.0)))
     return load(SCENE, FASTEST | encoder).encoder.errors
@@ -127,6 +129,9 @@ def spec_of(job: dict) -> AxisSpec:
     known = signals.load(job["signal"])
     bound = job.get("acceleration_max_m_per_s2") or known.acceleration_max_m_per_s2
     name, rate = job["estimator"], job["sample_hz"]
+    encoder = job.get("encoder") or {}
+    if LEARNED in encoder:
+        learning.check(encoder[LEARNED], name, job.get("backend", "float"))
     try:
         return axis_spec(name, rate, bound, job.get("gains"), job.get("bits_dropped", 0), known.jerk_max_m_per_s3)
     except ValueError as error:
@@ -165,26 +170,19 @@ def measure(
         signal: name of the signal, as for `signals.load`.
         sample_hz: sample rate of the estimator.
         backend: `float`, `fixed` or `rtl`.
-        encoder: errors of the encoder, as for `errors_of`; None for none.
+        encoder: errors of the encoder, as for `errors_of`, and `LEARNED` for a map of its scale; None for none.
         acceleration_max_m_per_s2: C for the default gains; None for the signal's own.
         gains: gains to use instead, by the names of the estimator's `Gains`.
         bits_dropped: number of fraction bits taken from the estimator's words.
 
     Raises:
-        ValueError: if there is no such axis; the message names the field.
+        ValueError: if there is no such axis, or no map for it; the message names the field.
         RuntimeError: if the RTL could not be built.
     """
     known = signals.load(signal)
-    spec = spec_of(
-        {
-            "estimator": estimator,
-            "signal": signal,
-            "sample_hz": sample_hz,
-            "acceleration_max_m_per_s2": acceleration_max_m_per_s2,
-            "gains": gains,
-            "bits_dropped": bits_dropped,
-        }
-    )
+    job = {"estimator": estimator, "signal": signal, "sample_hz": sample_hz, "backend": backend, "encoder": encoder}
+    job |= {"acceleration_max_m_per_s2": acceleration_max_m_per_s2, "gains": gains, "bits_dropped": bits_dropped}
+    spec = spec_of(job)
     begin = math.ceil(known.judged_from_s * sample_hz)
     judge, raised = judged(known, spec, output, backend, encoder)
     return {
@@ -221,10 +219,13 @@ def judged(
     Raises:
         RuntimeError: if the RTL could not be built.
     """
-    sample_hz = spec.sample_hz
+    sample_hz, errors, scale = spec.sample_hz, errors_of(encoder), None
+    if encoder and LEARNED in encoder:
+        passes = learning.Passes(encoder.get("encoder.seed", 1), encoder[LEARNED])
+        scale = learning.learned(spec, errors, passes, floating=backend == "float")
     begin = math.ceil(known.judged_from_s * sample_hz)
     judge, raised = Judge(int(known.seconds * sample_hz) - begin, sample_hz), 0
-    for first, words, flags in velocities(known, spec, output, backend, *errors_of(encoder)):
+    for first, words, flags in velocities(known, spec, output, backend, *errors, learned=scale):
         raised |= flags
         estimate = words[max(begin - first, 0) :]
         since = first + len(words) - len(estimate)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...model import scale_map
 from ...model.compiled import compiled
 from ...model.design import change_of, strobe_of
 from ...model.spec import AxisSpec
@@ -61,6 +62,7 @@ def velocities(
     offsets: Offsets,
     scale: Scale | None = None,
     lines: Lines | None = None,
+    learned: scale_map.Params | None = None,
 ) -> Iterator[tuple[int, np.ndarray, int]]:
     """Yield the chunks of a signal, each as (first sample, velocities in m/s, sticky flags).
 
@@ -70,6 +72,7 @@ def velocities(
         output: the estimator's output.
         backend: one of `backends.BACKENDS`.
         offsets, scale, lines: errors of the encoder: see `sim.world.encoder.Encoder`.
+        learned: the map of the scale that the estimator has, on `float` or `fixed`.
 
     Raises:
         RuntimeError: if the RTL could not be built.
@@ -77,7 +80,7 @@ def velocities(
     passed, parameters = encoded_signal(signal, spec, offsets, scale, lines), spec.design.estimator.choose(output)
     unit = spec.velocity_unit_m_per_s * (spec.design.estimator.velocity.lsb if is_exact(backend) else 1.0)
     samples, taken = int(signal.seconds * spec.sample_hz), 0
-    with opened(spec, backend, parameters, passed.start_level) as axis:
+    with opened(spec, backend, parameters, passed.start_level, scale=learned) as axis:
         state = axis.state
         for first in range(0, samples, CHUNK):
             velocity = np.zeros(min(CHUNK, samples - first), number_of(backend))

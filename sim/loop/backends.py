@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...model import stamped
+from ...model import scale_map, stamped
 from ...model.axis import Axis
 from ...model.spec import AxisSpec
 from ..rtl.verilated import Rtl, RtlState
@@ -58,6 +58,7 @@ def opened(
     level: int,
     traced: bool = False,
     short: bool = False,
+    scale: scale_map.Params | None = None,
 ) -> Iterator[Opened]:
     """Open an axis on a backend, and free its resources at the end.
 
@@ -67,11 +68,14 @@ def opened(
         parameters: run-time parameters in SI units, by word: see `Axis`.
         level: level of the encoder's pins at reset, a | b << 1.
         traced, short: options of `rtl`: built for waveforms; built quickly rather than for speed.
+        scale: the map of the encoder's scale that the estimator has, on `float` or `fixed`; None for none.
 
     Raises:
         RuntimeError: if the RTL could not be built.
     """
     axis = whole(spec, backend, parameters)
+    if scale is not None:
+        axis.params = axis.params._replace(estimator=axis.params.estimator._replace(scale=scale))
     if backend != "rtl":
         yield Opened(*stamped.controller(axis, level), None)
         return
