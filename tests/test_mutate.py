@@ -1,5 +1,6 @@
 """The mutants of a small component, and the means: `make mutate` draws mutants of every block."""
 
+import subprocess
 from pathlib import Path
 
 import cocotb
@@ -13,8 +14,9 @@ from cocotb.triggers import RisingEdge
 from covering.blocks import BLOCKS, TESTS, Block
 from reasons import Reason, reasons_for
 
+from hardwall.sim.rtl.tools import SynthesisError
 from hardwall.testing import SEED, Bench
-from mutation import run
+from mutation import asking, run
 from mutation.equivalent import EQUIVALENT, known_of
 from mutation.fates import REASONS, Fate, Result
 from mutation.netlist import BLOCK, Mutant, Netlist, mutated
@@ -254,6 +256,20 @@ def test_a_block_is_mutated_in_its_own_modules():
     modules = {block.name: modules_of(block) for block in BLOCKS}
     assert modules["wall"] == (f"{BLOCK}.law",)
     assert modules["link/uart"] == (f"{BLOCK}.receiver", f"{BLOCK}.transmitter")
+
+
+@pytest.mark.parametrize(("printed", "code"), [("wasm trap: call stack exhausted", 1), ("", -9)])
+def test_a_question_that_is_too_large_for_the_solver_has_no_answer(printed, code, monkeypatch, tmp_path):
+    done = subprocess.CompletedProcess([], code, stdout=printed)
+    monkeypatch.setattr(asking, "_run", lambda *given: done)
+    assert asking.answer(tmp_path, {}, [], "miter", "-prove trigger 0") == ""
+
+
+def test_a_question_that_is_wrong_ends_the_run(monkeypatch, tmp_path):
+    done = subprocess.CompletedProcess([], 1, stdout="read\nERROR: No such command: sut\n")
+    monkeypatch.setattr(asking, "_run", lambda *given: done)
+    with pytest.raises(SynthesisError, match=r"^Yosys cannot compare a mutant: No such command: sut$"):
+        asking.answer(tmp_path, {}, [], "miter", "-prove trigger 0")
 
 
 KILLED = [Fate(f"killed {number}", "a test") for number in range(19)]

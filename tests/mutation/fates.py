@@ -96,5 +96,5 @@ class Result:
     def explanation(self) -> str:
         """Every mutant that is left without a reason, and every stale reason; one line for each."""
         left = [f"{self.block}: left, {fate.known}: {fate.mutant}" for fate in self.unexplained]
-        stale = [f"{self.block}: killed or not drawn, so that its reason must go: {reason.name}" for reason in self.stale]
+        stale = [f"{self.block}: killed or not drawn, so that its reason must go: {each.name}" for each in self.stale]
         return "".join(f"{line}\n" for line in left + stale)
