@@ -87,7 +87,7 @@ def weights(order: int, points: int) -> tuple[Fraction, ...]:
 
     They are a polynomial of the same degree in the place of the point; its coefficients solve the normal equations.
     """
-    sums = [sum(Fraction(-place) ** power for place in range(points)) for power in range(2 * order + 1)]
+    sums = [Fraction(sum((-place) ** power for place in range(points))) for power in range(2 * order + 1)]
     rows = [[*sums[power : power + order + 1], Fraction(power == 1)] for power in range(order + 1)]
     # Sums of even powers are positive and the matrix is a Gram matrix: no pivot is 0.
     for pivot in range(order + 1):
