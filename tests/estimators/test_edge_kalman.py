@@ -8,6 +8,7 @@ import cocotb
 import numpy as np
 import pytest
 import scipy.linalg
+from cocotb.triggers import ClockCycles
 
 from hardwall.hdl.estimators.edge_kalman import Estimator
 from hardwall.model.estimators import edge_kalman
@@ -96,6 +97,8 @@ async def reset_mid_stream_starts_afresh(dut):
         return bench.reader("velocity")()
 
     await bench.reset()
+    # A clock without a strobe begins nothing.
+    await ClockCycles(dut.clk, 2)
     moving = [await sample(1) for _ in range(4)]
     assert moving[:2] == [0, 0]
     assert moving[3] > 0
