@@ -41,10 +41,11 @@ OF_THE_BENCH = {
         "testing/test_campaign",
         "link/test_mbpoll",
         "link/test_axi_link",
+        "estimators/test_edge_kalman_map",
     )
 }
-"""Tests that simulate hardware of their own, need a program that may be absent, or see a block in a board alone;
-or inject faults by hand into what a block's own test covers."""
+"""Tests that simulate hardware of their own, need a program that may be absent, see a block in a board alone, or with
+another block that has a test; or inject faults by hand into what a block's own test covers."""
 REACHED = Point("toggle", "part.sum[0]:0->1")
 MISSED = Point("toggle", "part.sum[1]:0->1")
 

@@ -36,6 +36,7 @@ BLOCKS = (
     *(Block(f"estimators/{name}") for name in ("cycle_times", "history")),
     *(Block("estimators/finite_difference" if n == "fdm" else f"estimators/{n.replace('-', '_')}") for n in ESTIMATORS),
     Block("quadrature", RECORDED),
+    Block("scale_map", RECORDED),
     Block("wall", ("component.law",)),
     Block("output", ("component.stage",)),
     Block("monitors", RECORDED),
