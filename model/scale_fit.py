@@ -24,7 +24,7 @@ import numpy as np
 
 from .checks import check_number, check_range
 from .compiled import compiled
-from .scale_map import Design, Params, place_of
+from .scale_map import Design, Params, bin_of, place_of
 
 DEGREE = 5
 KNOT_S = 0.1
@@ -70,7 +70,7 @@ def _accumulate(scale, times, numbers, knot_s, gram, cross, right, hits, sums):
         values[DEGREE + 1] = -0.5 if up else 0.5
         for n in range(DEGREE + 1):
             places[n] = first + n
-        bin_, number = (numbers[k] - scale.first) >> scale.bin_bits, float(numbers[k] - middle)
+        bin_, number = bin_of(scale, numbers[k]), float(numbers[k] - middle)
         hits[bin_] += 1
         sums[bin_] += number
         for n in range(DEGREE + 2):

@@ -22,20 +22,18 @@ from pathlib import Path
 
 from covering import points
 from covering.blocks import BLOCKS, Block
+from covering.origin import origin_of
 from covering.points import Point, merged
 from covering.report import REASONS, Coverage
+from covering.sizes import sizes_of
 from kept import digest_of, keep, kept_of
 from reasons import reasons_for
 from targets import conclude
 
-from hardwall.hdl.export import to_verilog
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs.result import Table
 from hardwall.sim.rtl import cocotb_runner
 from hardwall.sim.rtl.cocotb_runner import COVERAGE
-from hardwall.testing import SAMPLES, SEED
-from mutation.sizes import sizes_of
-from mutation.sources import TREE, sources_of
 
 COLUMNS = {
     "block": "left",
@@ -50,12 +48,10 @@ LONGEST_TEST_S = 3600
 """The longest that a test may take: it counts every point, which must be compiled, too, perhaps beside other work."""
 
 
-def sources_digest(block: Block) -> str:
-    """Return a digest of all that a block's coverage comes from: its Verilog, its tests, and what counts points."""
-    verilog = [to_verilog(size.component(), "block") for size in sizes_of(block.test)]
-    sources = {str(file): (TREE / file).read_bytes() for file in sources_of(block.test)}
+def origin_digest(block: Block) -> str:
+    """Return a digest of all that a block's coverage comes from: what its tests do, and what counts points."""
     means = [Path(file).read_bytes() for file in (__file__, points.__file__, cocotb_runner.__file__)]
-    return digest_of(block.modules, SEED, SAMPLES, verilog, sources, means)
+    return digest_of(origin_of(block, sizes_of(block.test)), means)
 
 
 def measure(block: Block, digest: str) -> Coverage | None:
@@ -90,7 +86,7 @@ def _counted(block: Block, folder: Path) -> Counter[Point] | None:
 def main(begins: str) -> int:
     """Measure the blocks whose names begin so; return the exit code."""
     chosen = [block for block in BLOCKS if block.name.startswith(begins)]
-    digests = {block: sources_digest(block) for block in chosen}
+    digests = {block: origin_digest(block) for block in chosen}
     # The last blocks have the longest tests, so they are begun first.
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         futures = {pool.submit(measure, block, digests[block]): block for block in reversed(chosen)}

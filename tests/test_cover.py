@@ -6,6 +6,7 @@ from pathlib import Path
 
 import cover
 import pytest
+from covering import origin
 from covering.blocks import BLOCKS, TESTS, Block
 from covering.points import Point, merged
 from covering.report import REASONS, Coverage, grouped
@@ -148,7 +149,7 @@ def test_what_is_covered_is_kept_and_failed_tests_are_run_again(monkeypatch, tmp
 
 def test_the_digest_of_a_block_is_of_its_verilog_and_its_tests(monkeypatch):
     block = Block("arithmetic/sqrt")
-    digest = cover.sources_digest(block)
-    assert digest == cover.sources_digest(block) != cover.sources_digest(Block("arithmetic/sqrt", ("component.part",)))
-    monkeypatch.setattr(cover, "to_verilog", lambda component, name: "module block; endmodule")
-    assert digest != cover.sources_digest(block)
+    digest = cover.origin_digest(block)
+    assert digest == cover.origin_digest(block) != cover.origin_digest(Block("arithmetic/sqrt", ("component.part",)))
+    monkeypatch.setattr(origin, "to_verilog", lambda component, name: "module block; endmodule")
+    assert digest != cover.origin_digest(block)

@@ -37,6 +37,7 @@ NOT_TWINNED = {
     "block": "the base class of blocks",
     "board": "the supervised axis behind a link; its twin, clock by clock, is in tests/oracles/board.py",
     "board_clocks": "clock domains, and the clock's monitor, which has its twin",
+    "estimators/edge_kalman_signals": "the registers of edge_kalman by name; that block's twin has their values",
     "estimators/levant_edge_signals": "the registers of levant_edge by name; that block's twin has their values",
     "export": "text of the hardware",
     "lead_out": "wires",

@@ -12,6 +12,7 @@ from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 from cocotb.triggers import RisingEdge
 from covering.blocks import BLOCKS, TESTS, Block
+from covering.sizes import Size, sizes_of
 from reasons import Reason, reasons_for
 
 from hardwall.sim.rtl.tools import SynthesisError
@@ -21,7 +22,6 @@ from mutation.equivalent import EQUIVALENT, known_of
 from mutation.fates import REASONS, Fate, Result
 from mutation.netlist import BLOCK, Mutant, Netlist, mutated
 from mutation.run import fates_of, modules_of
-from mutation.sizes import Size, sizes_of
 from stimuli.lengths import some_of
 
 CLOCKS = 3

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 from covering.blocks import BLOCKS, TESTS
-
-from mutation.sources import HARDWARE, RUNNER, TREE, sources_of
+from covering.sources import HARDWARE, RUNNER, TREE, sources_of
 
 IMPORTING = """
 import json, sys

@@ -59,7 +59,7 @@ from ..requirements import AxisRequirements
 from ..words import Word
 from . import history
 from .estimate import EstimatorDesign, EstimatorGains, estimate
-from .history import change_over, take
+from .history import Held, change_over, take
 
 TAPS = 12
 """Largest number of steps back that are searched, one a clock."""
@@ -112,11 +112,6 @@ class Params(NamedTuple):
     fraction: int
 
 
-class State(NamedTuple):
-    history: history.State
-    velocity: float
-
-
 class FloatParams(NamedTuple):
     """Parameters of the float64 kernel: `band` in counts, so `scale` is 1; `samples` is `spacing` in samples."""
 
@@ -166,9 +161,9 @@ class Design(EstimatorDesign):
     def latency(self) -> int:
         return STEPS + self.history.latency + TAPS + divide_latency(self.velocity.width - 1)
 
-    def start(self, floating: bool = False) -> State:
+    def start(self, floating: bool = False) -> Held:
         """Return the state before the first sample, with a memory of its own."""
-        return State(self.history.start(), 0.0 if floating else 0)
+        return self.history.start_at_rest(floating)
 
     def params(self, words: Mapping[str, int]) -> Params:
         window = min(max(words["foaw_window"], 1), TAPS)
@@ -221,7 +216,7 @@ def step(params, state, seen, restart):
     if stored:
         change, taps = _fit(params, past)
         velocity = divide(change, taps * params.spacing, params.fraction)
-    return State(past, velocity), velocity, int(limited)
+    return Held(past, velocity), velocity, int(limited)
 
 
 @estimate.register(FloatParams)
@@ -233,4 +228,4 @@ def float_step(params, state, seen, restart):
     if stored:
         change, taps = _fit(params, past)
         velocity = change / (taps * params.samples)
-    return State(past, velocity), velocity, 0
+    return Held(past, velocity), velocity, 0

@@ -65,6 +65,13 @@ class State(NamedTuple):
     positions: np.ndarray
 
 
+class Held(NamedTuple):
+    """The state of an estimator of past counts: their history, and its velocity, which is held between stored ones."""
+
+    history: State
+    velocity: float
+
+
 class Design:
     """Formats of the history for an axis and a window.
 
@@ -118,6 +125,10 @@ class Design:
     def start(self) -> State:
         """Return the state before the first sample, with a memory of its own."""
         return State(0, 0, 0, 0, 0, 0, np.zeros(1 << self.age_bits, np.int64))
+
+    def start_at_rest(self, floating: bool = False) -> Held:
+        """Return the state of an estimator before the first sample, with a memory of its own."""
+        return Held(self.start(), 0.0 if floating else 0)
 
 
 @compiled

@@ -68,7 +68,7 @@ from ..compiled import compiled
 from ..requirements import AxisRequirements
 from . import history
 from .estimate import EstimatorDesign, EstimatorGains, estimate
-from .history import change_over, take
+from .history import Held, change_over, take
 from .window import EPS_COUNTS, ROUNDING_BITS
 
 ORDER_MAX = 3
@@ -173,11 +173,6 @@ class Params(NamedTuple):
     fraction: int
 
 
-class State(NamedTuple):
-    history: history.State
-    velocity: float
-
-
 class FloatParams(NamedTuple):
     """Parameters of the float64 kernel: c_i / T, with T in samples, and T in stored positions."""
 
@@ -235,9 +230,9 @@ class Design(EstimatorDesign):
     def latency(self) -> int:
         return STEPS + self.history.latency + self.taps + divide_latency(self.velocity.width - 1)
 
-    def start(self, floating: bool = False) -> State:
+    def start(self, floating: bool = False) -> Held:
         """Return the state before the first sample, with a memory of its own."""
-        return State(self.history.start(), 0.0 if floating else 0)
+        return self.history.start_at_rest(floating)
 
     def params(self, words: Mapping[str, int]) -> Params:
         return Params(self.history.params(), self._whole, self.spacing, self.divisor, self.fraction)
@@ -264,7 +259,7 @@ def step(params, state, seen, restart):
     velocity = state.velocity
     if stored:
         velocity = divide(_weighed(params, past), params.divisor, params.fraction)
-    return State(past, velocity), velocity, int(limited)
+    return Held(past, velocity), velocity, int(limited)
 
 
 @estimate.register(FloatParams)
@@ -275,4 +270,4 @@ def float_step(params, state, seen, restart):
     velocity = state.velocity
     if stored:
         velocity = _weighed(params, past)
-    return State(past, velocity), velocity, 0
+    return Held(past, velocity), velocity, 0

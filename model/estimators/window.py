@@ -46,7 +46,7 @@ from ..requirements import AxisRequirements
 from ..words import Word
 from . import history
 from .estimate import EstimatorDesign, EstimatorGains, estimate
-from .history import change_over, take
+from .history import Held, change_over, take
 
 EPS_COUNTS = 0.5
 """Largest distance, counts, between the position and the count plus half a count."""
@@ -74,11 +74,6 @@ class Params(NamedTuple):
     history: history.Params
     length: int
     fraction: int
-
-
-class State(NamedTuple):
-    history: history.State
-    velocity: float
 
 
 class FloatParams(NamedTuple):
@@ -125,9 +120,9 @@ class Design(EstimatorDesign):
     def latency(self) -> int:
         return STEPS + self.history.latency + divide_latency(self.velocity.width - 1)
 
-    def start(self, floating: bool = False) -> State:
+    def start(self, floating: bool = False) -> Held:
         """Return the state before the first sample, with a memory of its own."""
-        return State(self.history.start(), 0.0 if floating else 0)
+        return self.history.start_at_rest(floating)
 
     def params(self, words: Mapping[str, int]) -> Params:
         return Params(self.history.params(), max(words["window_length"], 1), self.fraction)
@@ -146,7 +141,7 @@ def step(params, state, seen, restart):
     velocity = state.velocity
     if stored:
         velocity = divide(change_over(params.history, past, params.length), params.length, params.fraction)
-    return State(past, velocity), velocity, int(limited)
+    return Held(past, velocity), velocity, int(limited)
 
 
 @estimate.register(FloatParams)
@@ -157,4 +152,4 @@ def float_step(params, state, seen, restart):
     velocity = state.velocity
     if stored:
         velocity = change_over(params.history, past, params.length) / params.samples
-    return State(past, velocity), velocity, 0
+    return Held(past, velocity), velocity, 0

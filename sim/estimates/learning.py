@@ -31,10 +31,10 @@ BIN_BITS = 4
 LIMIT_COUNTS = 16.0
 
 
-def bins_of(spec: AxisSpec, bin_bits: int = BIN_BITS) -> scale_map.Design:
+def bins_of(spec: AxisSpec) -> scale_map.Design:
     """Return the bins of a map about the start of the count, as far as the count goes."""
     reach = min(REACH_COUNTS, 1 << (spec.count_width - 1))
-    return scale_map.Design(spec.count_width, -reach, bin_bits, 2 * reach >> bin_bits, LIMIT_COUNTS)
+    return scale_map.Design(spec.count_width, -reach, BIN_BITS, 2 * reach >> BIN_BITS, LIMIT_COUNTS)
 
 
 class Passes(NamedTuple):

@@ -11,16 +11,24 @@ import pytest
 from hardwall.hdl.estimators.mt import Estimator
 from hardwall.model.checks import FieldError
 from hardwall.model.estimators import mt
-from hardwall.model.estimators.cycle_times import AGE_LIMIT
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.mt import NOTHING, START, Gains, State
 from hardwall.model.quadrature import Seen
 from hardwall.model.spec import AxisSpec
-from hardwall.sim.estimates import accuracy, motions, signals
+from hardwall.sim.estimates import accuracy, signals
 from hardwall.sim.world.encoder import offsets
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model
-from stimuli.edges import Edge, anything, check_rounding_is_the_only_difference, exact, rows, turn, velocities
+from stimuli.edges import (
+    Edge,
+    anything,
+    check_a_standing_axis_reads_zero_and_a_slowing_one_falls,
+    check_rounding_is_the_only_difference,
+    exact,
+    rows,
+    turn,
+    velocities,
+)
 from stimuli.lengths import some_of
 from stimuli.seeded import seeded
 from stimuli.specs import PAPER, spec
@@ -159,17 +167,7 @@ def test_a_turn_within_a_count_reads_the_mean_and_not_the_edges_that_passed():
 
 
 def test_a_standing_axis_reads_zero_and_a_slowing_one_falls():
-    signal = signals.Signal("stop", motions.Stop(5e-3, 0.1, 1.0), 1.2, 0.0, signals.DEVICE_ACCELERATION)
-    axis = accuracy.axis_spec(NAME, 10_000, signals.DEVICE_ACCELERATION)
-    seen, _ = velocities(signal, axis, "fixed")
-    after = np.arange(len(seen)) / axis.sample_hz - 0.105
-    d = axis.design.estimator
-    assert (np.diff(seen[after > 0]) <= 0).all()
-    standing = after > 0
-    assert (seen[standing] <= 1.5 * axis.count_m / after[standing] + d.velocity.lsb * axis.velocity_unit_m_per_s).all()
-    rest = seen[after > AGE_LIMIT * (1 << d.stamp_width) / axis.clock_hz]
-    assert len(rest) > 100
-    assert not rest.any()
+    check_a_standing_axis_reads_zero_and_a_slowing_one_falls(NAME)
 
 
 def test_the_default_window_is_the_minimax_one():

@@ -17,7 +17,7 @@ from hardwall.model.estimators import period
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.period import FLOAT_START, START
 from hardwall.model.quadrature import Seen
-from hardwall.sim.estimates import accuracy, motions, signals
+from hardwall.sim.estimates import accuracy, signals
 from hardwall.sim.world.encoder import offsets
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model
@@ -25,6 +25,7 @@ from stimuli.edges import (
     Edge,
     Strobe,
     anything,
+    check_a_standing_axis_reads_zero_and_a_slowing_one_falls,
     check_rounding_is_the_only_difference,
     exact,
     rows,
@@ -184,18 +185,7 @@ def test_misplaced_edges_change_little_on_the_way():
 
 
 def test_a_standing_axis_reads_zero_and_a_slowing_one_falls():
-    signal = signals.Signal("stop", motions.Stop(5e-3, 0.1, 1.0), 1.2, 0.0, signals.DEVICE_ACCELERATION)
-    axis = accuracy.axis_spec(NAME, 10_000, signals.DEVICE_ACCELERATION)
-    seen, _ = velocities(signal, axis, "fixed")
-    after = np.arange(len(seen)) / axis.sample_hz - 0.105
-    d = axis.design.estimator
-    assert (np.diff(seen[after > 0]) <= 0).all()
-    standing = after > 0
-    assert (seen[standing] <= 1.5 * axis.count_m / after[standing] + d.velocity.lsb * axis.velocity_unit_m_per_s).all()
-    limit = period.AGE_LIMIT * (1 << d.stamp_width) / axis.clock_hz
-    rest = seen[after > limit]
-    assert len(rest) > 100
-    assert not rest.any()
+    check_a_standing_axis_reads_zero_and_a_slowing_one_falls(NAME)
 
 
 def still(d: period.Design, at: int, run: int = 4) -> Seen:

@@ -4,6 +4,8 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
+from covering.sizes import Size
+
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs.scratch import scratch
 from hardwall.sim.rtl import cocotb_runner
@@ -11,7 +13,6 @@ from hardwall.testing import SEED
 from hardwall.testing.harness import SEQUENCER, Harness
 
 from .netlist import Netlist
-from .sizes import Size
 from .stand_in import StandIn
 
 HERE = Path(__file__).parent

@@ -1,20 +1,24 @@
-"""The mutants of blocks drawn, tested, and where they survive, compared with the block."""
+"""The mutants of blocks drawn, tested, and where they survive, compared with the block; their fates are kept."""
 
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import asdict
+from pathlib import Path
 
 from covering.blocks import Block
+from covering.origin import origin_of
+from covering.sizes import Size, sizes_of
+from kept import digest_of, keep, kept_of
 from reasons import reasons_for
 
 from hardwall.testing import SEED
+from hardwall.testing.harness import SEQUENCER
 
 from .equivalent import known_of
 from .fates import REASONS, Fate, Result
-from .kept import digest_of, keep, kept_of
 from .killing import killed
 from .netlist import BLOCK, mutated
-from .sizes import Size, sizes_of
 
 SAMPLES = 1000
 """The samples of the first campaign, which kills most mutants; what it leaves goes through a whole one."""
@@ -54,6 +58,12 @@ def shares_of(count: int, sizes: int) -> list[int]:
     return [count * (n + 1) // sizes - count * n // sizes for n in range(sizes)]
 
 
+def _digest(block: Block, sizes: Sequence[Size], count: int) -> str:
+    """Return a digest of all that a block's mutants and their fates come from."""
+    means = [file.read_bytes() for file in (SEQUENCER, *sorted(Path(__file__).parent.glob("*.py")))]
+    return digest_of(origin_of(block, sizes), count, means)
+
+
 def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result], None]) -> list[Result]:
     """Return what came of `count` mutants of each block; `done` is called with each result as it comes.
 
@@ -76,9 +86,11 @@ def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result]
 
     # All sizes are taken first, for a run of pytest takes the standard streams and the environment to itself.
     sizes = {block: sizes_of(block.test) for block in blocks}
-    digests = {block: digest_of(block, sizes[block], count) for block in blocks}
-    kept = {block: kept_of(block, digests[block]) for block in blocks}
-    results = {block: result_of(block, fates) for block, fates in kept.items() if fates is not None}
+    digests = {block: _digest(block, sizes[block], count) for block in blocks}
+    kept = {block: kept_of("mutate", block.name, digests[block]) for block in blocks}
+    results = {
+        block: result_of(block, [Fate(**each) for each in fates]) for block, fates in kept.items() if fates is not None
+    }
     waiting: dict[Block, list[Future[list[Fate]]]] = {}
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for block in blocks:
@@ -91,7 +103,7 @@ def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result]
             # While one block's last size is tested, the next block's first are, too.
             for block, futures in waiting.items():
                 fates = [fate for future in futures for fate in future.result()]
-                keep(block, digests[block], fates)
+                keep("mutate", block.name, digests[block], [asdict(fate) for fate in fates])
                 results[block] = result_of(block, fates)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)

@@ -8,7 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hardwall.sim.estimates import accuracy, playback, signals
+from hardwall.model.estimators.cycle_times import AGE_LIMIT
+from hardwall.sim.estimates import accuracy, motions, playback, signals
 
 
 class Edge(NamedTuple):
@@ -191,3 +192,19 @@ def check_rounding_is_the_only_difference(name: str, rate: int) -> None:
     first = rate // 100  # the signal starts at full speed, so the error is the whole speed until the first edges
     own = real[first::7] - exact(signal, axis, len(real))[first::7]
     assert np.sqrt(np.mean((fixed - real) ** 2)) <= 0.01 * np.sqrt(np.mean(own**2))
+
+
+def check_a_standing_axis_reads_zero_and_a_slowing_one_falls(name: str) -> None:
+    """Check that behind the last edge the speed falls with the bound, to exactly 0 when that edge is forgotten."""
+    signal = signals.Signal("stop", motions.Stop(5e-3, 0.1, 1.0), 1.2, 0.0, signals.DEVICE_ACCELERATION)
+    axis = accuracy.axis_spec(name, 10_000, signals.DEVICE_ACCELERATION)
+    seen, _ = velocities(signal, axis, "fixed")
+    after = np.arange(len(seen)) / axis.sample_hz - 0.105
+    d = axis.design.estimator
+    assert (np.diff(seen[after > 0]) <= 0).all()
+    standing = after > 0
+    assert (seen[standing] <= 1.5 * axis.count_m / after[standing] + d.velocity.lsb * axis.velocity_unit_m_per_s).all()
+    limit = AGE_LIMIT * (1 << d.stamp_width) / axis.clock_hz
+    rest = seen[after > limit]
+    assert len(rest) > 100
+    assert not rest.any()

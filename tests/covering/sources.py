@@ -9,9 +9,9 @@ Two parts of the project are no such sources:
 from collections.abc import Iterator
 from pathlib import Path
 
-from covering.blocks import TESTS
-
 from hardwall.model.provenance import imported
+
+from .blocks import TESTS
 
 TREE = TESTS.parent
 HARDWARE, RUNNER = Path("hdl"), Path("sim/rtl")
