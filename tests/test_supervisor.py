@@ -48,7 +48,7 @@ def campaign(name: str, clocks: int) -> dict[str, np.ndarray]:
         host.trips(bit, MOST + 2)
     if name == "slow":
         host.is_silent(1026)
-        host.is_silent(0b101101101)
+        host.is_silent(0b101101100)
     host.clock()
     host.clock(reset=1)
     return dict(zip(("reset", *Inputs._fields), np.array(host.rows, np.int64).T, strict=True))
