@@ -4,6 +4,7 @@
 #   ARGS="-k levant"          more options for pytest (test, soak, fuzz)
 #   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests), or of what is checked
 #                             (prove, faults, gate, coverage, mutate)
+#   AGAIN=1                   find anew what is kept in tests/findings/ (the same five)
 #   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
 #                             the seeds, the samples for every seed, and the samples of endurance (soak)
 #   CALLS=1000 KILLS=16       the hostile calls, and the runs that are ended (fuzz)
@@ -63,6 +64,8 @@ all: $(REPORTS) $(PICTURES) ## hit the wall with the generated hardware in the l
 test: export HARDWALL_SAMPLES ?= 20000
 test: $(VENV)/.test | tools ## every regression: the model against exact arithmetic, the RTL against the model
 	@$(PYTEST) $(if $(CI),--junitxml build/junit.xml) $(ARGS)
+
+prove faults gate coverage mutate: export HARDWALL_AGAIN := $(AGAIN)
 
 prove: $(VENV)/.prove | tools ## every promise about safety and every width, proven; every proof is seen to fail with a bug
 	@$(VENV)/bin/python tests/prove.py $(ONLY)

@@ -3,16 +3,18 @@
     make faults                     inject everything, with each drive stage and into several axes
     make faults ONLY="the host"     only the faults whose names begin so
 
-Prints a table and one last line for a script; exits with 1 if any fault does not come to what is promised of it.
+What was safe is kept until the board, the faults or the world change. Prints a table and one last line for a script;
+exits with 1 if any fault does not come to what is promised of it.
 """
 
 import sys
 
+from kept import findings_of
 from targets import conclude
 
 from hardwall.sim.jobs.result import Table
 from injection.every import FAULTS
-from injection.run import run
+from injection.run import run_all
 
 COLUMNS = {
     "stage": "left",
@@ -28,13 +30,17 @@ COLUMNS = {
 }
 
 
+def tell(stage: str, through: int) -> None:
+    """Say how many more faults of a stage are through."""
+    print(f"{stage}: {through} more", file=sys.stderr, flush=True)
+
+
 def main(begins: str) -> int:
     """Inject the faults whose names begin so; return the exit code."""
-    rows, good = [], 0
-    for stage, faults in FAULTS.items():
-        outcomes = run(stage, [fault for fault in faults if fault.name.startswith(begins)])
-        rows += [[stage, *outcome.row] for outcome in outcomes]
-        good += sum(outcome.safe for outcome in outcomes)
+    chosen = {stage: [fault for fault in faults if fault.name.startswith(begins)] for stage, faults in FAULTS.items()}
+    outcomes = run_all(chosen, tell, findings_of("faults"))
+    rows = [[stage, *outcome.row] for stage, each in outcomes.items() for outcome in each]
+    good = sum(outcome.safe for each in outcomes.values() for outcome in each)
     return conclude(Table(COLUMNS, rows), (), "faults: {} faults, {} safe", len(rows), good)
 
 

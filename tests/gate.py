@@ -5,12 +5,13 @@
 
 Prints a table, what differs if anything does, and one last line for a script; exits with 1 if anything falls short: a
 netlist that is not equal, or an output that was never seen to change. `HARDWALL_SAMPLES` is the number of samples of
-each; `HARDWALL_SEED` draws other stimuli.
+each; `HARDWALL_SEED` draws other stimuli. What was equal is kept until its hardware, mapping or stimuli change.
 """
 
 import os
 import sys
 
+from kept import findings_of
 from targets import conclude
 
 from gates.run import Case, Outcome, run
@@ -33,15 +34,20 @@ COLUMNS = {
 
 def row(outcome: Outcome) -> list[str]:
     """Return an outcome as a row of the table."""
-    cells = (str(outcome.netlist.cells[name]) for name in CELLS)
+    cells = (str(outcome.cells[name]) for name in CELLS)
     numbers = map(str, (outcome.samples, outcome.clocks, outcome.different))
     return [outcome.case.family.name, outcome.case.top.name, *cells, *numbers]
+
+
+def tell(outcome: Outcome) -> None:
+    """Say how a netlist went."""
+    print(outcome.line, file=sys.stderr, flush=True)
 
 
 def main(begins: str, samples: int = SAMPLES) -> int:
     """Simulate the netlists whose names begin so; return the exit code."""
     chosen = [case for case in CASES if case.name.startswith(begins)]
-    outcomes = run(chosen, samples, lambda outcome: print(outcome.line, file=sys.stderr, flush=True))
+    outcomes = run(chosen, samples, tell, findings_of("gate"))
     table, short = Table(COLUMNS, [row(outcome) for outcome in outcomes]), (each.explanation for each in outcomes)
     good = sum(outcome.ok for outcome in outcomes)
     return conclude(table, short, "gate: {} netlists, {} equal", len(outcomes), good)

@@ -13,6 +13,7 @@ import os
 import sys
 
 from covering.blocks import BLOCKS
+from kept import findings_of
 from targets import conclude
 
 from hardwall.sim.jobs.result import Table
@@ -43,7 +44,7 @@ def tell(result: Result) -> None:
 def main(begins: str, count: int = MUTANTS) -> int:
     """Draw mutants of the blocks whose names begin so, and test them; return the exit code."""
     chosen = [block for block in BLOCKS if block.name.startswith(begins)]
-    results = run(chosen, count, (SEED, count) == OURS, tell)
+    results = run(chosen, count, (SEED, count) == OURS, tell, findings_of("mutate"))
     table, short = Table(COLUMNS, [result.row for result in results]), (each.explanation for each in results)
     killed, equivalent = sum(each.killed for each in results), sum(each.equivalent for each in results)
     every = sum(len(each.fates) for each in results)

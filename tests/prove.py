@@ -9,6 +9,7 @@ short: a property that is not proven, or a bug that is not found. What is proven
 
 import sys
 
+from kept import findings_of
 from targets import conclude
 
 from hardwall.sim.jobs.result import Table
@@ -35,7 +36,7 @@ def row(outcome: Outcome) -> list[str]:
 def main(begins: str) -> int:
     """Prove the properties of the blocks whose names begin so; return the exit code."""
     chosen = [known for known in PROPERTIES if known.block.startswith(begins)]
-    outcomes = run(chosen, lambda outcome: print(outcome.line, file=sys.stderr, flush=True))
+    outcomes = run(chosen, lambda outcome: print(outcome.line, file=sys.stderr, flush=True), findings_of("prove"))
     table, short = Table(COLUMNS, [row(outcome) for outcome in outcomes]), (each.explanation for each in outcomes)
     good = sum(outcome.ok for outcome in outcomes)
     return conclude(table, short, "prove: {} properties, {} proved", len(outcomes), good)

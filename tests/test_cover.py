@@ -1,6 +1,7 @@
 """The means of `make coverage`: points are read, merged over sizes of a block, and held against goals and reasons."""
 
 import re
+import subprocess
 from collections import Counter
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from covering import origin
 from covering.blocks import BLOCKS, TESTS, Block
 from covering.points import Point, merged
 from covering.report import REASONS, Coverage, grouped
+from covering.sources import code_of
+from kept import Findings
 from reasons import Reason, reasons_for
 
 from hardwall.hdl import axis
@@ -93,18 +96,18 @@ def test_a_file_without_the_module_is_refused(tmp_path):
 
 def test_a_point_that_is_missed_needs_a_reason():
     counts = merged([], ()) | {REACHED: 1, MISSED: 0}
-    without = Coverage("part", counts, [])
+    without = Coverage.of("part", counts, [])
     assert not without.ok
     assert without.row == ["part", "100.00", "100.00", "50.00", "0", "1", "FAILED"]
     assert without.explanation == "part: missed: toggle part.sum[1]:0->1\n"
-    explained = Coverage("part", counts, [Reason("part", "toggle part.sum[1]*", "It is constant.")])
+    explained = Coverage.of("part", counts, [Reason("part", "toggle part.sum[1]*", "It is constant.")])
     assert explained.ok
     assert explained.row == ["part", "100.00", "100.00", "50.00", "1", "0", "covered"]
 
 
 def test_a_reason_for_what_is_reached_is_a_failure():
     counts = merged([], ()) | {REACHED: 1}
-    stale = Coverage("part", counts, [Reason("part", "toggle part.sum[0]*", "It is constant.")])
+    stale = Coverage.of("part", counts, [Reason("part", "toggle part.sum[0]*", "It is constant.")])
     assert not stale.ok
     assert stale.explanation == "part: reached, so that its reason must go: toggle part.sum[0]*\n"
 
@@ -127,24 +130,45 @@ def test_every_block_has_its_test_and_every_reason_its_block():
 
 
 def test_what_is_covered_is_kept_and_failed_tests_are_run_again(monkeypatch, tmp_path):
-    monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
-    missed = Point("toggle", "part.sum[0]:0->1")
-    counts = Counter({Point("line", "part block: sum", ("0f", 1)): 2, missed: 0})
-    asked, given = [], [None, counts]
+    whole, short = ({REACHED: 2, MISSED: count} for count in (1, 0))
+    asked, given = [], [[short, None], [None], [whole, None], [short, short]]
 
     def counted(block, folder):
         asked.append(folder.name)
-        return given.pop(0)
+        yield from (counts and Counter(counts) for counts in given.pop(0))
 
     monkeypatch.setattr(cover, "_counted", counted)
-    block = Block("link/part")
-    assert cover.measure(block, "a") is None
-    first, again = cover.measure(block, "a"), cover.measure(block, "a")
-    assert first.counts == again.counts == counts
-    assert asked == ["link-part"] * 2
-    given.append(counts)
-    assert cover.measure(block, "b").missed == [missed]
-    assert len(asked) == 3
+    block, findings = Block("link/part"), Findings(tmp_path / "coverage.json")
+    # A whole campaign that fails, after a short one that falls short, leaves nothing.
+    assert [cover.measure(block, "a", findings) for _ in range(2)] == [None] * 2
+    # A short one that is enough is all.
+    first, again = cover.measure(block, "a", findings), cover.measure(block, "a", findings)
+    assert first == again
+    assert (first.points, first.missed) == ({"toggle": 2}, [])
+    assert asked == ["link-part"] * 3
+    other = [cover.measure(block, "b", findings) for _ in range(2)]
+    assert other[0] == other[1]
+    assert other[0].missed == [MISSED]
+    assert len(asked) == 4
+
+
+@pytest.mark.parametrize(("failing", "yielded"), [((), 2), ((20,), 1), ((50,), 2), ((20, 50), 1)])
+def test_campaigns_are_short_and_then_whole(failing, yielded, monkeypatch, tmp_path):
+    asked = []
+
+    def run(command, env, **_):
+        samples = int(env["HARDWALL_SAMPLES"])
+        asked.append((samples, env["HARDWALL_EVERY_SIZE"]))
+        return subprocess.CompletedProcess(command, int(samples in failing), "", "")
+
+    monkeypatch.setattr(cover, "SHORT", 20)
+    monkeypatch.setattr(cover, "SAMPLES", 50)
+    monkeypatch.setattr(cover.subprocess, "run", run)
+    monkeypatch.setattr(cover, "merged", lambda files, modules: Counter({REACHED: 1}))
+    came = list(cover._counted(Block("part"), tmp_path))
+    assert asked == [(20, "1"), (50, "1")]
+    assert len(came) == yielded
+    assert [counts is None for counts in came] == [False] * (yielded - 1) + [50 in failing]
 
 
 def test_the_digest_of_a_block_is_of_its_verilog_and_its_tests(monkeypatch):
@@ -153,3 +177,11 @@ def test_the_digest_of_a_block_is_of_its_verilog_and_its_tests(monkeypatch):
     assert digest == cover.origin_digest(block) != cover.origin_digest(Block("arithmetic/sqrt", ("component.part",)))
     monkeypatch.setattr(origin, "to_verilog", lambda component, name: "module block; endmodule")
     assert digest != cover.origin_digest(block)
+
+
+def test_what_says_nothing_to_the_interpreter_is_no_part_of_the_origin():
+    code = b"class A:\n    b = 1\n    def c(self):\n        return 'd'\n"
+    told = b'"""All."""\n\nclass A:\n    """An A."""\n    b = (\n        1)  # One.\n    def c(self): return "d"\n'
+    assert code_of(told) == code_of(code)
+    assert code_of(code.replace(b"'d'", b"'e'")) != code_of(code)
+    assert code_of(b'def a():\n    """Nothing."""\n') == code_of(b"def a():\n    pass\n")

@@ -2,6 +2,7 @@
 
 import faults
 import pytest
+from kept import Findings
 
 from hardwall.hdl.axes_board import AxesBoard
 from hardwall.hdl.drive.dac import Dac
@@ -9,6 +10,7 @@ from hardwall.hdl.drive.pwm import Pwm
 from hardwall.hdl.pipelines.doors import Doors
 from hardwall.hdl.supervisor import Supervisor
 from hardwall.model.supervisor import CAUSES
+from injection import run as running
 from injection.every import FAULTS
 from injection.fault import Outcome
 from injection.run import run
@@ -134,16 +136,23 @@ def test_every_fault_has_a_name_of_its_own(stage):
 
 
 @pytest.mark.parametrize(("wrong", "last"), [((), "4 safe"), (("the force is not as before",), "0 safe")])
-def test_the_command_ends_in_a_line_for_a_script(wrong, last, monkeypatch, capsys):
-    given = []
+def test_the_command_ends_in_a_line_for_a_script(wrong, last, monkeypatch, capsys, tmp_path):
+    given, findings = [], Findings(tmp_path / "faults.json")
 
     def came(stage, some):
         given.extend((stage, fault.name) for fault in some)
-        return [Outcome("a", "ARMED", "ARMED", 3, 11.7, 1e-3, 4.0, wrong)]
+        return [Outcome(fault.name, "ARMED", "ARMED", 3, 11.7, 1e-3, 4.0, wrong) for fault in some]
 
-    monkeypatch.setattr(faults, "run", came)
-    code = faults.main("the host is k")
+    monkeypatch.setattr(running, "run", came)
+    monkeypatch.setattr(faults, "findings_of", lambda task: findings)
+    monkeypatch.setattr(running, "origin_digest", lambda stage: stage)
     killed = "the host is killed (supervisor_watchdog 50 ms)"
-    assert given == [(stage, killed) for stage in FAULTS]
-    assert capsys.readouterr().out.splitlines()[-1] == f"faults: 4 faults, {last}"
-    assert code == (1 if wrong else 0)
+    for _ in range(2):
+        assert faults.main("the host is k") == (1 if wrong else 0)
+        assert capsys.readouterr().out.splitlines()[-1] == f"faults: 4 faults, {last}"
+    # What was safe is kept, and what was not is injected again.
+    assert sorted(given) == sorted([(stage, killed) for stage in FAULTS] * (2 if wrong else 1))
+
+
+def test_faults_of_other_stages_come_from_something_else():
+    assert len({running.origin_digest(stage) for stage in FAULTS}) == len(FAULTS)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import gate
 import pytest
+from kept import Findings
 
 from gates import run
 from gates.run import Case, Outcome, compared
@@ -43,14 +44,15 @@ def netlist_of(case: Case) -> Netlist:
 def test_products_and_memories_are_those_of_their_cells():
     """The models of cells that are ours have the product and the memory of plain Verilog."""
     outcome = compared(CELLS, netlist_of(CELLS), 2_000)
-    assert (outcome.netlist.cells["dsp"], outcome.netlist.cells["bram"]) == (4, 20)
+    assert (outcome.cells["dsp"], outcome.cells["bram"]) == (4, 20)
     assert outcome.ok, outcome.explanation
 
 
 def test_the_netlist_of_an_axis_is_equal_to_it():
-    outcome = compared(AXIS, netlist_of(AXIS), 2_000)
-    assert outcome.netlist.cells["dsp"] == 2
-    assert outcome.clocks >= 2_000 * outcome.netlist.component.spec.clocks_per_sample
+    made = netlist_of(AXIS)
+    outcome = compared(AXIS, made, 2_000)
+    assert outcome.cells["dsp"] == 2
+    assert outcome.clocks >= 2_000 * made.component.spec.clocks_per_sample
     assert outcome.different == 0, outcome.explanation
     # So few samples need not have one with a velocity beyond its range.
     assert set(outcome.still) <= {"saturated"}
@@ -101,7 +103,7 @@ def test_netlists_are_mapped_as_the_parts_are():
     }  # fmt: skip
 
 
-OUTCOME = Outcome(CELLS, Netlist(None, "", "", "", dict.fromkeys(gate.CELLS, 5)), 10, 20, 0, 0, {}, ())
+OUTCOME = Outcome.equal(CELLS, dict.fromkeys(gate.CELLS, 5), 10, 20)
 
 
 @pytest.mark.parametrize(
@@ -116,8 +118,9 @@ OUTCOME = Outcome(CELLS, Netlist(None, "", "", "", dict.fromkeys(gate.CELLS, 5))
 )
 def test_the_command_ends_in_a_line_for_a_script(outcome, said, monkeypatch, capsys):
     monkeypatch.setattr(gate, "CASES", [CELLS])
-    monkeypatch.setattr(run, "mapped", lambda component, family: outcome.netlist)
+    monkeypatch.setattr(run, "mapped", lambda component, family: None)
     monkeypatch.setattr(run, "compared", lambda case, netlist, samples: outcome)
+    monkeypatch.setattr(gate, "findings_of", lambda task: Findings())
     code = gate.main("ECP5")
     out, err = capsys.readouterr()
     assert out.splitlines()[-1] == said
@@ -129,3 +132,22 @@ def test_the_command_ends_in_a_line_for_a_script(outcome, said, monkeypatch, cap
 def test_no_netlist_is_no_success(monkeypatch, capsys):
     assert gate.main("no such family") == 1
     assert capsys.readouterr().out.splitlines()[-1] == "gate: 0 netlists, 0 equal"
+
+
+def test_what_was_equal_is_kept_until_something_changes_that_it_came_from(monkeypatch, tmp_path):
+    findings, asked = Findings(tmp_path / "gate.json"), []
+
+    def compare(case, netlist, samples):
+        asked.append(samples)
+        return replace(OUTCOME, different=int(samples == 11))
+
+    monkeypatch.setattr(run, "mapped", lambda component, family: None)
+    monkeypatch.setattr(run, "compared", compare)
+    first, again = (run.run([CELLS], 10, lambda _: None, findings) for _ in range(2))
+    assert first == again == [OUTCOME]
+    assert asked == [10]
+    # What differs is compared again.
+    assert [run.run([CELLS], 11, lambda _: None, findings)[0].ok for _ in range(2)] == [False] * 2
+    assert asked == [10, 11, 11]
+    digests = {run.origin_digest(case, 10) for case in (CELLS, SMALLEST, Case(FAMILIES["ice40"], TOPS[0]))}
+    assert len(digests) == 3

@@ -13,6 +13,7 @@ from amaranth.lib.wiring import In, Out
 from cocotb.triggers import RisingEdge
 from covering.blocks import BLOCKS, TESTS, Block
 from covering.sizes import Size, sizes_of
+from kept import Findings
 from reasons import Reason, reasons_for
 
 from hardwall.sim.rtl.tools import SynthesisError
@@ -218,9 +219,8 @@ def test_tests_that_fail_without_a_mutant_say_nothing(monkeypatch):
 
 
 def test_what_came_of_a_block_is_kept_until_something_changes_that_it_came_from(monkeypatch, tmp_path):
-    monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
     sizes, asked = [Size(HERE, Answer, {})], []
-    block = Block("part", tested_with="arithmetic/sqrt")
+    block, findings = Block("part", tested_with="arithmetic/sqrt"), Findings(tmp_path / "mutate.json")
 
     def fates(size, modules, count):
         asked.append(count)
@@ -228,13 +228,13 @@ def test_what_came_of_a_block_is_kept_until_something_changes_that_it_came_from(
 
     monkeypatch.setattr(run, "sizes_of", lambda test: sizes)
     monkeypatch.setattr(run, "fates_of", fates)
-    results = [run.run([block], count, True, lambda result: None)[0] for count in (2, 2, 1, 2, 2)]
+    results = [run.run([block], count, True, lambda result: None, findings)[0] for count in (2, 2, 1, 2, 2)]
     assert [result.fates for result in results] == [[LEFT, EQUAL]] * 2 + [[LEFT]] + [[LEFT, EQUAL]] * 2
     assert asked == [2, 1, 2]
     sizes[0] = Size(HERE, Around, {})
-    run.run([block], 2, True, lambda result: None)
+    run.run([block], 2, True, lambda result: None, findings)
     monkeypatch.setattr(Block, "test", HERE)
-    run.run([block], 2, True, lambda result: None)
+    run.run([block], 2, True, lambda result: None, findings)
     assert asked == [2, 1, 2, 2, 2]
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from covering.blocks import BLOCKS, TESTS
-from covering.sources import HARDWARE, RUNNER, TREE, sources_of
+from covering.sources import HARDWARE, REGISTRIES, RUNNER, TREE, sources_of
 
 IMPORTING = """
 import json, sys
@@ -65,6 +65,7 @@ SOURCES = {
     "model/inside/most.py": "",
     "model/other.py": "",
 }
+REGISTRY = REGISTRIES[0]
 OTHERS = {
     *("tests/part/other_world.py", "tests/oracles/three.py", "tests/benches/more.py"),
     *("hdl/part.py", "hdl/inside.py", "sim/rtl/runner.py", "model/inside/most.py", "model/other.py"),
@@ -90,7 +91,22 @@ def test_nothing_is_imported_that_is_no_source(name):
     assert done.returncode == 0, done.stderr
     imported = {Path(file) for file in json.loads(done.stdout)}
     assert test.relative_to(TREE) in imported
-    assert {file for file in imported - {*sources_of(test)} if not file.is_relative_to(HARDWARE)} == set()
+    others = {file for file in imported - {*sources_of(test)} if not file.is_relative_to(HARDWARE)}
+    # All estimators come with an axis's specification, whether the test has to do with them or not.
+    assert REGISTRY in others
+    assert others <= {*sources_of(TREE / REGISTRY)}
+
+
+def test_estimators_are_sources_of_the_tests_that_name_them():
+    axis, small = ({*sources_of(TESTS / f"{name}.py")} for name in ("test_axis", "estimators/test_finite_difference"))
+    edge, plain, other = (REGISTRY.with_name(f"{name}.py") for name in ("levant_edge", "levant", "mt"))
+    assert {edge, plain} <= axis
+    # The specification's own choice is one of any axis.
+    assert plain in small
+    assert not {edge, other} & small
+    assert other not in axis
+    # A test that has all estimators to do with has them all.
+    assert {edge, plain, other, REGISTRY} <= {*sources_of(TESTS / "estimators/test_levants.py")}
 
 
 def test_a_small_block_does_not_come_from_the_models_of_large_ones():

@@ -9,6 +9,7 @@ import pytest
 from amaranth.hdl import Module, Shape
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
+from kept import Findings
 
 import proofs.run as proving
 from hardwall.hdl.output import Output
@@ -51,7 +52,7 @@ def test_every_property_has_a_bug_and_a_name_of_its_own():
 
 @pytest.mark.parametrize("known", QUICK, ids=[known.name for known in QUICK])
 def test_is_proven_and_a_bug_is_found(known):
-    (outcome,) = run([replace(known, bugs=known.bugs[:1])], lambda _: None)
+    (outcome,) = run([replace(known, bugs=known.bugs[:1])], lambda _: None, Findings())
     assert outcome.verdict.proved, outcome.explanation
     assert [verdict.refuted for verdict in outcome.bugs] == [True]
 
@@ -91,26 +92,26 @@ def test_the_range_of_a_product_is_that_of_all_products(signs):
 
 
 def test_what_is_proven_is_kept_until_it_changes(monkeypatch, tmp_path):
-    monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
+    findings = Findings(tmp_path / "prove.json")
     known, asked = sums("difference"), []
 
     def solve(name, text, depth, bounded):
         asked.append(name)
-        return Verdict(not bounded, bounded, 3 if bounded else None, tmp_path if bounded else None, ("a",), 1.5)
+        return Verdict(not bounded, bounded, 3 if bounded else None, None, ("a",), 1.5)
 
     monkeypatch.setattr(proving, "solve", solve)
-    first, again = run([known], lambda _: None), run([known], lambda _: None)
+    first, again = (run([known], lambda _: None, findings) for _ in range(2))
     assert first == again
     assert asked == [known.name, f"{known.name}-bug-0"]
     for other in (replace(known, depth=3), replace(known, within=5), sums("sum", "difference")):
         asked.clear()
-        assert run([other], lambda _: None)[0].ok
+        assert run([other], lambda _: None, findings)[0].ok
         assert len(asked) == 2
     # What falls short is tried again.
     monkeypatch.setattr(proving, "solve", lambda *given: replace(solve(*given), proved=False))
     asked.clear()
     for _ in range(2):
-        assert not run([replace(known, depth=4)], lambda _: None)[0].ok
+        assert not run([replace(known, depth=4)], lambda _: None, findings)[0].ok
     assert len(asked) == 4
 
 
@@ -130,6 +131,7 @@ def test_where_the_source_stands_is_no_part_of_what_is_proven():
 )
 def test_the_command_ends_in_a_line_for_a_script(known, result, last, monkeypatch, capsys):
     monkeypatch.setattr(prove, "PROPERTIES", [known])
+    monkeypatch.setattr(prove, "findings_of", lambda task: Findings())
     code = prove.main("")
     out, err = capsys.readouterr()
     assert out.splitlines()[-1] == last

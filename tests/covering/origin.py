@@ -7,7 +7,7 @@ from hardwall.testing import SAMPLES, SEED
 
 from .blocks import Block
 from .sizes import Size
-from .sources import TREE, sources_of
+from .sources import code_of_all
 
 
 def origin_of(block: Block, sizes: Sequence[Size]) -> tuple[object, ...]:
@@ -18,5 +18,4 @@ def origin_of(block: Block, sizes: Sequence[Size]) -> tuple[object, ...]:
         sizes: those that its tests simulate.
     """
     verilog = [(size.name, to_verilog(size.component(), "block")) for size in sizes]
-    sources = {str(file): (TREE / file).read_bytes() for file in sources_of(block.test)}
-    return block.modules, verilog, sources, SEED, SAMPLES
+    return block.modules, verilog, code_of_all(block.test), SEED, SAMPLES

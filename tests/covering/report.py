@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -33,18 +33,21 @@ class Coverage:
 
     Attributes:
         block: its name.
-        counts: how often every point was reached.
+        points: how many points of each kind it has.
+        missed: those that were not reached.
         reasons: the reasons that are written for it.
     """
 
     block: str
-    counts: Counter[Point]
-    reasons: list[Reason]
+    points: dict[str, int]
+    missed: list[Point]
+    reasons: list[Reason] = field(default_factory=list)
 
-    @cached_property
-    def missed(self) -> list[Point]:
-        """Points that were not reached."""
-        return [point for point, count in self.counts.items() if not count]
+    @classmethod
+    def of(cls, block: str, counts: Counter[Point], reasons: list[Reason]) -> "Coverage":
+        """Return the coverage of a block, of which every point was reached so often."""
+        points = Counter(point.kind for point in counts)
+        return cls(block, dict(points), [point for point, count in counts.items() if not count], reasons)
 
     @cached_property
     def unexplained(self) -> list[Point]:
@@ -58,7 +61,7 @@ class Coverage:
 
     def share(self, kind: str, missed: list[Point]) -> float:
         """Return the share of the points of a kind that are not among those missed."""
-        total = sum(point.kind == kind for point in self.counts)
+        total = self.points.get(kind, 0)
         return 1 - sum(point.kind == kind for point in missed) / total if total else 1.0
 
     @property

@@ -19,7 +19,7 @@ from hardwall.sim.estimates.accuracy import (
 from hardwall.sim.estimates.recording import load
 from hardwall.sim.estimates.replay import replay
 from stimuli.lengths import LONG
-from stimuli.specs import EVERY_OUTPUT
+from stimuli.outputs import EVERY_OUTPUT
 
 RECORDINGS = ("davinci_L2_02.csv", "davinci_L2_22.csv", "davinci_R5_42.csv")
 PUBLISHED = {"fdm": 4.13, "butterworth, 0.1 fs": 0.621, "levant u, proposed gains": 0.626}

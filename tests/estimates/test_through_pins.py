@@ -14,8 +14,8 @@ from hardwall.sim.estimates.through_pins import through_pins
 from hardwall.sim.world.encoder import level
 from hardwall.testing import rng
 from stimuli.lengths import LONG
+from stimuli.outputs import EVERY_OUTPUT
 from stimuli.replays import BOUND, COARSEN, recording, swing
-from stimuli.specs import EVERY_OUTPUT
 
 # One estimator on the count, one with a memory, one on the stamps; by `make soak` all.
 KINDS = [("levant", "u"), ("window", "u"), ("levant-edge", "u")]

@@ -1,15 +1,23 @@
-"""Netlists simulated beside their RTL: what came of each."""
+"""Netlists simulated beside their RTL: what came of each; what was equal is kept."""
 
 import json
+import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+from covering.sources import code_of_all
+from kept import Findings, digest_of
+
+from hardwall.hdl.export import to_verilog
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs.scratch import scratch
-from hardwall.sim.rtl import cocotb_runner, netlist
+from hardwall.sim.rtl import cocotb_runner, netlist, tools
 from hardwall.sim.rtl.families import Family
-from hardwall.sim.rtl.netlist import Netlist, mapped
+from hardwall.sim.rtl.flow import YOSYS
+from hardwall.sim.rtl.netlist import RTL, Netlist, mapped
 from hardwall.testing import SEED
 
 from .pair import Pair
@@ -20,6 +28,7 @@ OPTIONS = (
     # What no initial value and no reset has set is random, and so is what Yosys leaves open.
     *("--x-initial", "unique", "--x-assign", "unique"),
 )
+IN_SIMULATOR = Path(__file__).with_name("side_by_side.py")
 PLUSARGS = ("+verilator+rand+reset+2", f"+verilator+seed+{SEED}")
 
 
@@ -41,7 +50,7 @@ class Outcome:
 
     Attributes:
         case: the case.
-        netlist: what Yosys made of it.
+        cells: the units of every resource in the netlist.
         samples: the samples that were asked for.
         clocks: the clock edges at which all outputs were compared.
         different: how many of them found an output different.
@@ -51,7 +60,7 @@ class Outcome:
     """
 
     case: Case
-    netlist: Netlist
+    cells: dict[str, int]
     samples: int
     clocks: int
     different: int
@@ -63,6 +72,16 @@ class Outcome:
     def ok(self) -> bool:
         """Whether all outputs were equal at every clock, and all that can change did."""
         return self.clocks >= self.samples and not self.different and not self.still
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """What is kept of a case whose netlist is equal, of what JSON has."""
+        return {name: getattr(self, name) for name in ("cells", "samples", "clocks")}
+
+    @classmethod
+    def equal(cls, case: Case, cells: dict[str, int], samples: int, clocks: int) -> "Outcome":
+        """Return the outcome of a case whose netlist was found equal."""
+        return cls(case, cells, samples, clocks, 0, 0, {}, ())
 
     @property
     def line(self) -> str:
@@ -92,8 +111,8 @@ def compared(case: Case, made: Netlist, samples: int) -> Outcome:
         report = own / "report"
         given = {"top": case.top.name, "samples": samples, "report": str(report)}
         job = cocotb_runner.Job(
-            module="side_by_side",
-            folder=Path(__file__).parent,
+            module=IN_SIMULATOR.stem,
+            folder=IN_SIMULATOR.parent,
             environ={"HARDWALL_PARAMETERS": json.dumps(given)},
             seed=SEED,
             log=folder / f"{case.name.replace(' ', '-')}.log",
@@ -106,7 +125,7 @@ def compared(case: Case, made: Netlist, samples: int) -> Outcome:
     unlike = {name: (value, found["gates"][name]) for name, value in found["rtl"].items()}
     return Outcome(
         case,
-        made,
+        made.cells,
         samples,
         found["clocks"],
         found["different"],
@@ -116,15 +135,37 @@ def compared(case: Case, made: Netlist, samples: int) -> Outcome:
     )
 
 
-def run(cases: Sequence[Case], samples: int, done: Callable[[Outcome], None]) -> list[Outcome]:
+def origin_digest(case: Case, samples: int) -> str:
+    """Return a digest of all that an outcome comes from: the RTL, the mapping, the cells' models and the stimuli."""
+    component, family = case.top.component(), case.family
+    verilog = to_verilog(component, RTL), to_verilog(Pair(component), "pair")
+    mapping = family.synth, family.models, tools.versions([YOSYS])
+    means = [Path(file).read_bytes() for file in (__file__, netlist.__file__, cocotb_runner.__file__)]
+    return digest_of(case.top.still, verilog, mapping, code_of_all(IN_SIMULATOR), means, samples, SEED)
+
+
+def run(cases: Sequence[Case], samples: int, done: Callable[[Outcome], None], findings: Findings) -> list[Outcome]:
     """Return the outcomes in the order of the cases; `done` is called with each as it comes.
+
+    What was found equal before is not simulated again.
 
     Raises:
         SynthesisError: if Yosys is missing or fails.
         RuntimeError: if a simulation cannot be built, or fails.
     """
-    outcomes = []
-    for case in cases:
-        outcomes.append(compared(case, mapped(case.top.component(), case.family), samples))
-        done(outcomes[-1])
-    return outcomes
+    # The hardware is made by this thread alone.
+    digests = [origin_digest(case, samples) for case in cases]
+
+    def outcome(case: Case, digest: str) -> Outcome:
+        if kept := findings.of(case.name, digest):
+            return Outcome.equal(case, **kept)
+        came = compared(case, mapped(case.top.component(), case.family), samples)
+        if came.ok:
+            findings.keep(case.name, digest, came.figures)
+        return came
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        futures = [pool.submit(outcome, case, digest) for case, digest in zip(cases, digests, strict=True)]
+        for future in as_completed(futures):
+            done(future.result())
+    return [future.result() for future in futures]

@@ -18,8 +18,8 @@ from hardwall.sim.world.encoder import edge, level, locate
 from hardwall.sim.world.rigid import Motion
 from hardwall.testing import SEED
 from stimuli.lengths import LONG
+from stimuli.outputs import EVERY_OUTPUT
 from stimuli.scenes import HAND, ONE_SECOND
-from stimuli.specs import EVERY_OUTPUT
 
 HISTORY = {"stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall", "edge", "down", "run"}
 """What a decoder that was left at rest does not know of the edges before: no estimator that is swept looks at it."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from covering.blocks import Block
 from covering.origin import origin_of
 from covering.sizes import Size, sizes_of
-from kept import digest_of, keep, kept_of
+from kept import Findings, digest_of
 from reasons import reasons_for
 
 from hardwall.testing import SEED
@@ -64,7 +64,9 @@ def _digest(block: Block, sizes: Sequence[Size], count: int) -> str:
     return digest_of(origin_of(block, sizes), count, means)
 
 
-def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result], None]) -> list[Result]:
+def run(
+    blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result], None], findings: Findings
+) -> list[Result]:
     """Return what came of `count` mutants of each block; `done` is called with each result as it comes.
 
     The mutants are drawn from all sizes of a block, from each as many. What is kept of a block is not tested again.
@@ -74,6 +76,7 @@ def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result]
         count: the mutants of each.
         ours: whether these are the mutants that the reasons were written for.
         done: told every result.
+        findings: what was found before; what is found is added.
 
     Raises:
         RuntimeError: if a block's own tests fail without a mutant, or a tool fails.
@@ -87,7 +90,7 @@ def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result]
     # All sizes are taken first, for a run of pytest takes the standard streams and the environment to itself.
     sizes = {block: sizes_of(block.test) for block in blocks}
     digests = {block: _digest(block, sizes[block], count) for block in blocks}
-    kept = {block: kept_of("mutate", block.name, digests[block]) for block in blocks}
+    kept = {block: findings.of(block.name, digests[block]) for block in blocks}
     results = {
         block: result_of(block, [Fate(**each) for each in fates]) for block, fates in kept.items() if fates is not None
     }
@@ -103,7 +106,7 @@ def run(blocks: Sequence[Block], count: int, ours: bool, done: Callable[[Result]
             # While one block's last size is tested, the next block's first are, too.
             for block, futures in waiting.items():
                 fates = [fate for future in futures for fate in future.result()]
-                keep("mutate", block.name, digests[block], [asdict(fate) for fate in fates])
+                findings.keep(block.name, digests[block], [asdict(fate) for fate in fates])
                 results[block] = result_of(block, fates)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
-from kept import digest_of, keep, kept_of
+from kept import Findings, digest_of
 
 from . import solver
 from .property import Property
@@ -70,8 +70,10 @@ def _unplaced(rtlil: str) -> str:
     return re.sub(r"^ *attribute \\src .*\n", "", rtlil, flags=re.MULTILINE)
 
 
-def run(properties: Sequence[Property], done: Callable[[Outcome], None]) -> list[Outcome]:
+def run(properties: Sequence[Property], done: Callable[[Outcome], None], findings: Findings) -> list[Outcome]:
     """Return the outcomes in the order of the properties; `done` is called with each as it comes.
+
+    What was found of a property before is not asked again.
 
     Raises:
         SolverError: if a tool is missing or fails.
@@ -82,7 +84,7 @@ def run(properties: Sequence[Property], done: Callable[[Outcome], None]) -> list
 
     def outcome(known: Property, text: str, wrong: Sequence[str]) -> Outcome:
         digest = digest_of(means, _unplaced(text), [*map(_unplaced, wrong)], known.depth, known.bounded, known.within)
-        kept = kept_of("prove", known.name, digest)
+        kept = findings.of(known.name, digest)
         if kept is not None:
             verdict, *bugs = (Verdict.of(each) for each in kept)
             return Outcome(known, verdict, tuple(bugs), text)
@@ -91,7 +93,7 @@ def run(properties: Sequence[Property], done: Callable[[Outcome], None]) -> list
         came = Outcome(known, verdict, tuple(bugs), text)
         # What fell short is tried again, for the solver may have had too little time.
         if came.ok:
-            keep("prove", known.name, digest, [each.as_json for each in (verdict, *bugs)])
+            findings.keep(known.name, digest, [each.as_json for each in (verdict, *bugs)])
         return came
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:

@@ -61,14 +61,13 @@ class Verdict:
 
     @property
     def as_json(self) -> dict[str, object]:
-        """The verdict, of what JSON has."""
-        return {**asdict(self), "trace": self.trace and str(self.trace)}
+        """The verdict, of what JSON has; the waveform is of this machine, and is left out."""
+        return {name: value for name, value in asdict(self).items() if name != "trace"}
 
     @classmethod
     def of(cls, found: dict[str, Any]) -> "Verdict":
         """Return the verdict of which `as_json` said this."""
-        trace = found["trace"] and Path(found["trace"])
-        return cls(**{**found, "trace": trace, "failed": tuple(found["failed"])})
+        return cls(**{**found, "trace": None, "failed": tuple(found["failed"])})
 
 
 def solve(name: str, rtlil: str, depth: int, bounded: bool, timeout: int = 600) -> Verdict:

@@ -15,7 +15,9 @@ long_form = pytest.mark.skipif(not LONG, reason="it takes minutes: make soak, or
 """Marks a test that only the long forms have."""
 REACHING = 100_000
 """The samples from which a campaign that takes a part of `SAMPLES` reaches every flag: it does not take less."""
-WHOLE = LONG or SAMPLES >= REACHING
+EVERY_SIZE = "HARDWALL_EVERY_SIZE"
+"""The variable that asks for every size of a block, however short the campaigns are."""
+WHOLE = LONG or SAMPLES >= REACHING or bool(os.environ.get(EVERY_SIZE))
 """Whether campaigns are whole: those of the mutants and of the coverage are, and those of `make test` are not."""
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 
 from hardwall.sim.estimates.recording import Recording
-from stimuli.specs import EVERY_OUTPUT
+from stimuli.outputs import EVERY_OUTPUT
 
 COARSEN = 16
 # About the largest bound of the real recordings. All tests share it, so that every estimator needs only one build.

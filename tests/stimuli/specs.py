@@ -3,7 +3,7 @@
 import math
 from functools import cache
 
-from hardwall.model.estimators import levant, registry
+from hardwall.model.estimators import levant
 from hardwall.model.spec import AxisSpec
 
 ADJUSTED = levant.Gains(500 * math.sqrt(1e-3), 50.0)
@@ -41,8 +41,6 @@ SPECS = {
     "narrow": NARROW,
     "wide": WIDE,
 }
-
-EVERY_OUTPUT = [(name, output) for name in registry.ESTIMATORS for output in registry.design_of(name).outputs]
 
 
 @cache
