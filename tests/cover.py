@@ -28,6 +28,7 @@ from covering.origin import origin_of
 from covering.points import Point, merged
 from covering.report import REASONS, Coverage
 from covering.sizes import sizes_of
+from covering.sources import means
 from kept import Findings, digest_of, findings_of
 from reasons import reasons_for
 from targets import conclude
@@ -56,8 +57,8 @@ LONGEST_TEST_S = 3600
 
 def origin_digest(block: Block) -> str:
     """Return a digest of all that a block's coverage comes from: what its tests do, and what counts points."""
-    means = [Path(file).read_bytes() for file in (__file__, points.__file__, cocotb_runner.__file__)]
-    return digest_of(origin_of(block, sizes_of(block.test)), means)
+    counted_by = means(__file__, points.__file__, cocotb_runner.__file__)
+    return digest_of(origin_of(block, sizes_of(block.test)), counted_by)
 
 
 def measure(block: Block, digest: str, findings: Findings) -> Coverage | None:

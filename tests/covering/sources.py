@@ -100,6 +100,12 @@ def _is_text(statement: ast.stmt) -> bool:
     )
 
 
+def means(*files: str | Path) -> list[str]:
+    """Return what some files say to those that run them: the code of Python, and any other text as it is."""
+    paths = [Path(file) for file in files]
+    return [code_of(path.read_bytes()) if path.suffix == ".py" else path.read_text(encoding="utf-8") for path in paths]
+
+
 def code_of_all(test: Path) -> dict[str, str]:
     """Return the code of all sources of a test, by their names."""
     return {str(file): code_of((TREE / file).read_bytes()) for file in sources_of(test)}

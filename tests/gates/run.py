@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from covering.sources import code_of_all
+from covering.sources import code_of_all, means
 from kept import Findings, digest_of
 
 from hardwall.hdl.export import to_verilog
@@ -140,8 +140,8 @@ def origin_digest(case: Case, samples: int) -> str:
     component, family = case.top.component(), case.family
     verilog = to_verilog(component, RTL), to_verilog(Pair(component), "pair")
     mapping = family.synth, family.models, tools.versions([YOSYS])
-    means = [Path(file).read_bytes() for file in (__file__, netlist.__file__, cocotb_runner.__file__)]
-    return digest_of(case.top.still, verilog, mapping, code_of_all(IN_SIMULATOR), means, samples, SEED)
+    compared_by = means(__file__, netlist.__file__, cocotb_runner.__file__)
+    return digest_of(case.top.still, verilog, mapping, code_of_all(IN_SIMULATOR), compared_by, samples, SEED)
 
 
 def run(cases: Sequence[Case], samples: int, done: Callable[[Outcome], None], findings: Findings) -> list[Outcome]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from amaranth.lib import wiring
-from covering.sources import code_of_all
+from covering.sources import code_of_all, means
 from kept import Findings, digest_of
 
 from hardwall.hdl.export import to_verilog
@@ -63,9 +63,9 @@ def run(stage: str, faults: Sequence[Fault], bug: Bug | None = None) -> list[Out
 
 
 def origin_digest(stage: str) -> str:
-    """Return a digest of all that the outcomes of a stage come from: the board, its amplifier, the faults and the rest."""
-    means = [Path(file).read_bytes() for file in (__file__, cocotb_runner.__file__, AMPLIFIERS)]
-    return digest_of(stage, to_verilog(_damaged(stage), "damaged"), code_of_all(IN_SIMULATOR), means, SEED)
+    """Return a digest of all that the outcomes of a stage come from: the board, its amplifier and the faults."""
+    injected_by = means(__file__, cocotb_runner.__file__, AMPLIFIERS)
+    return digest_of(stage, to_verilog(_damaged(stage), "damaged"), code_of_all(IN_SIMULATOR), injected_by, SEED)
 
 
 def run_all(

@@ -9,6 +9,7 @@ from pathlib import Path
 from covering.blocks import Block
 from covering.origin import origin_of
 from covering.sizes import Size, sizes_of
+from covering.sources import means
 from kept import Findings, digest_of
 from reasons import reasons_for
 
@@ -60,8 +61,8 @@ def shares_of(count: int, sizes: int) -> list[int]:
 
 def _digest(block: Block, sizes: Sequence[Size], count: int) -> str:
     """Return a digest of all that a block's mutants and their fates come from."""
-    means = [file.read_bytes() for file in (SEQUENCER, *sorted(Path(__file__).parent.glob("*.py")))]
-    return digest_of(origin_of(block, sizes), count, means)
+    changed_by = means(SEQUENCER, *sorted(Path(__file__).parent.glob("*.py")))
+    return digest_of(origin_of(block, sizes), count, changed_by)
 
 
 def run(

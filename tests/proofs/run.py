@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from importlib.metadata import version
-from pathlib import Path
 
+from covering.sources import means
 from kept import Findings, digest_of
 
 from . import solver
@@ -80,10 +80,12 @@ def run(properties: Sequence[Property], done: Callable[[Outcome], None], finding
     """
     # The hardware is made by this thread alone, because a bug changes the code that makes it.
     texts = [(known.rtlil(), [known.rtlil(bug) for bug in known.bugs]) for known in properties]
-    means = [Path(file).read_bytes() for file in (__file__, solver.__file__)], [version(tool) for tool in SOLVERS]
+    proven_by = means(__file__, solver.__file__), [version(tool) for tool in SOLVERS]
 
     def outcome(known: Property, text: str, wrong: Sequence[str]) -> Outcome:
-        digest = digest_of(means, _unplaced(text), [*map(_unplaced, wrong)], known.depth, known.bounded, known.within)
+        digest = digest_of(
+            proven_by, _unplaced(text), [*map(_unplaced, wrong)], known.depth, known.bounded, known.within
+        )
         kept = findings.of(known.name, digest)
         if kept is not None:
             verdict, *bugs = (Verdict.of(each) for each in kept)
