@@ -17,7 +17,14 @@ project = "hardwall"
 author = "the hardwall project"
 version = release = _project["version"]
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "from_the_program", "from_docstrings"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "from_the_program",
+    "from_the_findings",
+    "from_docstrings",
+]
 exclude_patterns = ["examples"]
 root_doc = "index"
 default_role = "code"

@@ -4,9 +4,13 @@ import json
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from covering.blocks import BLOCKS
+from gate import CASES
 from kept import OURS, USUAL, Findings, digest_of, findings_of
 
 from hardwall.model.build_folder import build_dir
+from injection.every import FAULTS
+from proofs.properties import PROPERTIES
 
 
 def test_a_finding_is_of_its_digest_alone(tmp_path):
@@ -61,3 +65,16 @@ def test_the_projects_findings_are_whole():
     for file in sorted(OURS.glob("*.json")):
         for name, each in json.loads(file.read_text(encoding="utf-8")).items():
             assert sorted(each) == ["digest", "found"], f"{file.name}: {name}"
+
+
+def test_the_projects_findings_are_of_what_there_is():
+    blocks = {block.name for block in BLOCKS}
+    there = {
+        "prove": {known.name for known in PROPERTIES},
+        "faults": {f"{stage}: {fault.name}" for stage, faults in FAULTS.items() for fault in faults},
+        "gate": {case.name for case in CASES},
+        "coverage": blocks,
+        "mutate": blocks,
+    }
+    for file in OURS.glob("*.json"):
+        assert {*json.loads(file.read_text(encoding="utf-8"))} - there[file.stem] == set(), f"{file.name} has these"

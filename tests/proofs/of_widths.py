@@ -16,22 +16,26 @@ from hardwall.hdl.arithmetic.sqrt import Sqrt
 from hardwall.hdl.estimators import (
     butterworth,
     finite_difference,
+    foaw,
     kalman,
+    least_squares,
     levant,
     levant_semi_implicit,
+    mt,
     tracking_loop,
 )
 from hardwall.hdl.estimators.cycle_times import CycleTimes
 from hardwall.hdl.estimators.estimate import EstimatorBlock
-from hardwall.hdl.estimators.foaw import FIRST
 from hardwall.hdl.estimators.history import History
 from hardwall.hdl.estimators.registry import block_of
 from hardwall.hdl.output import Output
 from hardwall.hdl.quadrature import Quadrature
+from hardwall.hdl.scale_map import ScaleMap
 from hardwall.hdl.wall import Wall
 from hardwall.model.estimators.foaw import TAPS
 from hardwall.model.estimators.levant_adaptive import RAISED
 from hardwall.model.quadrature import START
+from hardwall.model.scale_map import Design as Bins
 from stimuli.specs import spec
 
 from .bench import Bench
@@ -101,13 +105,24 @@ def past(bench: Bench, block: wiring.Component) -> None:
     bench.within(**{"history.phase": (0, design.every - 1), "history.step": design.change.max})
 
 
+def edges(bench: Bench, block: wiring.Component) -> None:
+    design = block.design
+    counted = {"counts": (0, design.edges_max), "scaled": (0, design.edges_max * design.clocks)}
+    bench.within(phase=(0, design.half - 1), **counted)
+
+
+def fit(bench: Bench, block: wiring.Component) -> None:
+    past(bench, block)
+    bench.within(clock=(0, least_squares.FIRST + block.design.taps))
+
+
 def nothing(bench: Bench, block: wiring.Component) -> None:
     """Promise nothing more."""
 
 
 def search(bench: Bench, block: wiring.Component) -> None:
     past(bench, block)
-    bench.within(clock=(0, FIRST + TAPS + 3))
+    bench.within(clock=(0, foaw.FIRST + TAPS + 3))
 
 
 class Case(NamedTuple):
@@ -136,6 +151,8 @@ MOVED = ("moved",)
 DIGITS = ("digits", "remainder", "quotient")
 HISTORY = (*MOVED, "head", "read__addr", "write__data", "data", "position", "change")
 CYCLES = (*DIGITS, *MOVED, "age", "change", "gap", "cycles", "kind", "behind", "samples")
+# What the sum of a fit may be follows from its coefficients, one by one.
+FIT = ("age", "total")
 # In the search for the longest window, what the slopes and the sums may be follows from the history alone.
 SEARCH = ("age", "weight", "slope", "before", "below", "above", "total", "sums", "dividend")
 
@@ -221,8 +238,27 @@ CASES = {
         search,
         promise="no counter wraps; slopes and sums are not looked at",
     ),
+    "least-squares": Case(
+        partial(estimator, "least-squares"),
+        (*HISTORY, *DIGITS, *FIT),
+        FAST,
+        fit,
+        promise="no arithmetic wraps but where it is meant to; the sum of the fit is not looked at",
+    ),
     "period": Case(partial(estimator, "period"), CYCLES, FORWARD),
     "period-count": Case(partial(estimator, "period-count"), CYCLES, FORWARD),
+    "mt": Case(
+        partial(estimator, "mt"),
+        (*DIGITS, *MOVED, "number", "age", "span"),
+        Bug(mt.Estimator._divide, "Divide(bound.bit_length(), ", "Divide(bound.bit_length() - 1, "),
+        edges,
+    ),
+    "scale_map": Case(
+        lambda axis: ScaleMap(Bins(12, -300, 3, 64, 16.0)),
+        (),
+        Bug(ScaleMap.elaborate, "wanted > d.bins - 1", "wanted > d.bins"),
+        axes=ALONE,
+    ),
 }
 
 
