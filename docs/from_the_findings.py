@@ -63,12 +63,9 @@ def coverage(found: dict[str, Any]) -> list[str]:
     """Return a table of the blocks: the share of every kind of points that their tests reach, and what they miss."""
     rows = []
     for block, each in found.items():
-        missed = Counter(kind for kind, *_ in each["missed"])
-        shares = [
-            f"{100 * (1 - missed[kind] / each['points'][kind]):.2f}" for kind in KINDS if each["points"].get(kind)
-        ]
-        shares += ["none"] * (len(KINDS) - len(shares))
-        rows.append([f"`{block}`", *shares, str(sum(each["points"].values())), str(sum(missed.values()))])
+        points, missed = each["points"], Counter(kind for kind, *_ in each["missed"])
+        shares = [f"{100 * (1 - missed[kind] / points[kind]):.2f}" if points.get(kind) else "none" for kind in KINDS]
+        rows.append([f"`{block}`", *shares, str(sum(points.values())), str(sum(missed.values()))])
     return table(["block", "lines, %", "branches, %", "toggles, %", "points", "missed, each with its reason"], rows)
 
 
