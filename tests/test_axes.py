@@ -145,7 +145,9 @@ async def every_axis_is_a_single_one(dut):
         (number, spare, estimator)
         for number, spare in ((1, 0), (3, 2), (16, 0))
         for estimator in axes.PIPELINES
-        if LONG or (WHOLE and number == 3) or (number, estimator) in [(1, "fdm"), (3, "levant")]
+        if LONG
+        or (WHOLE and (number == 3 or (number, estimator) == (1, "fdm")))
+        or (number, estimator) == (3, "levant")
     ],
 )
 def test_rtl(number, spare, estimator):

@@ -11,6 +11,7 @@ from cocotb.triggers import RisingEdge
 from hardwall.hdl.wall import Wall
 from hardwall.model import wall
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from stimuli.lengths import some_of
 from stimuli.magnitudes import magnitudes
 from stimuli.sampled import Sampled
 from stimuli.specs import spec
@@ -118,10 +119,10 @@ async def the_force_is_constant_from_one_valid_to_the_next(dut):
                 before = wall.render(d.params({name: row[name] for name in NAMES}), count, velocity)
 
 
-@pytest.mark.parametrize(
-    ("name", "estimator", "after"),
-    [("paper", "fdm", wall.LEAD), ("mhz", "levant", wall.LEAD + 1), ("narrow", "levant", 8), ("wide", "levant", 5)],
-)
+SIZES = [("paper", "fdm", wall.LEAD), ("mhz", "levant", wall.LEAD + 1), ("narrow", "levant", 8), ("wide", "levant", 5)]
+
+
+@pytest.mark.parametrize(("name", "estimator", "after"), some_of(SIZES, 1, 2))
 def test_rtl(name, estimator, after):
     simulate(__file__, make, name=name, estimator=estimator, after=after)
 
