@@ -51,7 +51,10 @@ def stimulus(name: str, samples: int):
     for k in range(samples // 8):
         count += fast if k // max(reach // 5, 1) % 2 else -fast
         yield count, 0, k & 1, foaw.BAND.max, reset_window
-    for _ in range(samples - samples // 4 - samples // 28 * 7 - samples // 8):
+    # A count that was left for one sample, alone in the window: where that is a tap's, limits are met exactly.
+    for k in range(samples // 8):
+        yield count - (k % (reach + 1) == 0), 0, k & 1, reset_band, reset_window
+    for _ in range(samples - samples // 4 - samples // 28 * 7 - samples // 8 * 2):
         count += random.randrange(-half, half) if random.random() < 0.01 else random.randint(-1, 1)
         given = random.random() < 0.3
         band = random.randint(0, foaw.BAND.max) if given else reset_band
