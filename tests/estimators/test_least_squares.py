@@ -106,7 +106,7 @@ async def reset_mid_stream_starts_afresh(dut):
         assert bench.reader("velocity")() == 0
 
 
-@pytest.mark.parametrize("name", some_of([name for name in FITS if name != "paper"], 0, 1))
+@pytest.mark.parametrize("name", some_of(FITS, 0, 1))
 def test_rtl(name):
     simulate(__file__, make, name=name)
 
