@@ -97,11 +97,12 @@ async def reset_mid_stream_starts_afresh(dut):
     component = make(**parameters())
     bench = Bench(dut, component)
     await bench.reset()
-    for count in range(3):
+    every = component.design.history.every
+    for count in range(3 * every):
         await bench.transact("strobe", "valid", seen__count=count)
     assert bench.reader("velocity")() != 0
     await bench.reset()
-    for _ in range(3):
+    for _ in range(2 * every + 1):
         await bench.transact("strobe", "valid", seen__count=-1)
         assert bench.reader("velocity")() == 0
 
