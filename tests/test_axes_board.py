@@ -10,6 +10,7 @@ from hardwall.model.axes_capture import SAMPLED
 from hardwall.model.axes_registers import BANK
 from hardwall.model.capture import DONE, RECORD_REGISTERS, SOURCES, WAITING
 from hardwall.model.link.server import ABSENT, FAILURE, VALUE
+from hardwall.model.monitors import IDLE_EDGES
 from hardwall.model.quadrature import latency
 from hardwall.model.registers import CAPTURE
 from hardwall.model.supervisor import ARMED, CAUSES, DISARMED, REQUIRED, TRIPPED
@@ -204,6 +205,28 @@ async def find_another_index(host: Host) -> None:
 
 
 @cocotb.test()
+async def a_channel_without_edges_is_warned_of_in_its_axis(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+
+    async def warned() -> list[int]:
+        return [(await host.look(axis, *["a_channel_idle"] * 2))["a_channel_idle"] for axis in (0, 1)]
+
+    assert await warned() == [0, 0]
+    # Between the counts 0 and 1 there are edges of A alone, and from 0 to -1 there is one of B.
+    for k in range(1, IDLE_EDGES):
+        await host.turn(k % 2, 0)
+    assert await warned() == [0, 0]
+    await host.turn(0, 0)
+    assert await warned() == [1, 0]
+    for k in range(1, IDLE_EDGES):
+        await host.turn(0, k % 2)
+    assert await warned() == [1, 0]
+    await host.turn(-1, 0)
+    assert await warned() == [0, 1]
+
+
+@cocotb.test()
 async def the_stamp_of_a_status_is_the_clock_of_its_sample(dut):
     host = Host(dut, **parameters())
     await host.reset()
@@ -361,6 +384,13 @@ async def a_clock_that_stops_makes_every_output_low_and_all_come_back_disarmed(d
     host.bench.drive(rst=1)
     await ClockCycles(dut.clk, 2 * SYNCHRONISER)
     assert not int(dut.outputs_enable.value)
+
+
+@cocotb.test()
+async def a_clock_that_comes_back_is_believed_after_a_level_of_its_beat(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    await host.check_returns()
 
 
 def test_rtl():

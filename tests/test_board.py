@@ -302,6 +302,13 @@ async def a_clock_that_stops_makes_the_outputs_low_and_comes_back_disarmed(dut):
     assert not any(int(output.value) for output in outputs[:2])
 
 
+@cocotb.test()
+async def a_clock_that_comes_back_is_believed_after_a_level_of_its_beat(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    await host.check_returns()
+
+
 # A second axis takes as long again: the long runs, of more samples, have it.
 AXES = [("paper", "levant"), ("narrow", "levant-adaptive")][: 1 + (SAMPLES > 100_000)]
 
