@@ -97,7 +97,7 @@ def test_what_is_proven_is_kept_until_it_changes(monkeypatch, tmp_path):
 
     def solve(name, text, depth, bounded):
         asked.append(name)
-        return Verdict(not bounded, bounded, 3 if bounded else None, None, ("a",), 1.5)
+        return Verdict(not bounded, bounded, 3 if bounded else None, None, (), 1.5)
 
     monkeypatch.setattr(proving, "solve", solve)
     first, again = (run([known], lambda _: None, findings) for _ in range(2))
