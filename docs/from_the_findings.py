@@ -72,7 +72,8 @@ def coverage(found: dict[str, Any]) -> list[str]:
 def mutants(found: dict[str, Any]) -> list[str]:
     """Return a table of the blocks: what came of their mutants."""
     rows = []
-    for block, fates in found.items():
+    for block, each in found.items():
+        fates = each["fates"]
         killed = sum(fate["killed_by"] is not None for fate in fates)
         equivalent = sum(fate["killed_by"] is None and fate["known"] == "equivalent" for fate in fates)
         others = len(fates) - equivalent

@@ -1,6 +1,8 @@
 """The mutants of a small component, and the means: `make mutate` draws mutants of every block."""
 
+import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import cocotb
@@ -220,22 +222,45 @@ def test_tests_that_fail_without_a_mutant_say_nothing(monkeypatch):
 
 def test_what_came_of_a_block_is_kept_until_something_changes_that_it_came_from(monkeypatch, tmp_path):
     sizes, asked = [Size(HERE, Answer, {})], []
+    came = [replace(fate, mutant=f": {fate.mutant}") for fate in (LEFT, EQUAL)]
     block, findings = Block("part", tested_with="arithmetic/sqrt"), Findings(tmp_path / "mutate.json")
 
-    def fates(size, modules, count):
-        asked.append(count)
-        return [LEFT, EQUAL][:count]
+    def fates(size, modules, count, before):
+        asked.append((count, *before))
+        return came[:count]
 
     monkeypatch.setattr(run, "sizes_of", lambda test: sizes)
     monkeypatch.setattr(run, "fates_of", fates)
     results = [run.run([block], count, True, lambda result: None, findings)[0] for count in (2, 2, 1, 2, 2)]
-    assert [result.fates for result in results] == [[LEFT, EQUAL]] * 2 + [[LEFT]] + [[LEFT, EQUAL]] * 2
-    assert asked == [2, 1, 2]
+    assert [result.fates for result in results] == [came, came, came[:1], came, came]
+    assert asked == [(2,), (1,), (2,)]
     sizes[0] = Size(HERE, Around, {})
     run.run([block], 2, True, lambda result: None, findings)
     monkeypatch.setattr(Block, "test", HERE)
     run.run([block], 2, True, lambda result: None, findings)
-    assert asked == [2, 1, 2, 2, 2]
+    assert asked[3:] == [(2,), (2,)]
+    # With other proofs, what had survived is asked about again.
+    monkeypatch.setattr(run, "PROVING", run.PROVING[:1])
+    monkeypatch.setattr(run, "_digest", lambda block, sizes, count: kept["part"]["digest"])
+    kept = json.loads((tmp_path / "mutate.json").read_text(encoding="utf-8"))
+    run.run([block], 2, True, lambda result: None, findings)
+    assert asked[5:] == [(2, *came)]
+
+
+def test_only_what_has_survived_is_asked_about_again(monkeypatch):
+    size, asked = Size(HERE, Answer, {}), []
+
+    def known_of(netlist, numbers):
+        asked.append(numbers)
+        return dict.fromkeys(numbers, "undecided")
+
+    monkeypatch.setattr(run, "known_of", known_of)
+    monkeypatch.setattr(run, "killed", lambda *given: pytest.fail("it was tested again"))
+    before = [Fate("a", "a test"), Fate("b", None, EQUIVALENT), Fate("c", "a test"), Fate("d", None, "undecided")]
+    fates = fates_of(size, (BLOCK,), 4, before)
+    assert [fate.killed_by for fate in fates] == ["a test", None] * 2
+    assert [fate.known for fate in fates] == ["", "undecided"] * 2
+    assert asked == [[2, 4]]
 
 
 def test_the_seed_draws_the_mutants_and_the_selector_counts_them():
