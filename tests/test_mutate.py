@@ -20,7 +20,7 @@ from reasons import Reason, reasons_for
 
 from hardwall.sim.rtl.tools import SynthesisError
 from hardwall.testing import SEED, Bench
-from mutation import asking, run
+from mutation import asking, by_state, equivalent, run
 from mutation.equivalent import EQUIVALENT, known_of
 from mutation.fates import REASONS, Fate, Result
 from mutation.netlist import BLOCK, Mutant, Netlist, mutated
@@ -160,6 +160,34 @@ endmodule
 def test_what_differs_where_no_state_reads_it_is_equivalent(number, equal):
     known = known_of(Netlist(Answer(), SUM, (BLOCK,), [Mutant(number, "planted")]), [number])
     assert (known[number] == EQUIVALENT) == equal
+
+
+TURNS = """
+module block(input clk, input start, input [15:0] word, input [15:0] mutant, output reg [15:0] shown);
+  parameter READ = 5, SKIPS = 0;
+  reg [2:0] fsm_state = 0;
+  reg [15:0] held = 0;
+  initial shown = 0;
+  always @(posedge clk) begin
+    held <= (fsm_state == 1 ? word : held) ^ mutant[0];
+    if (fsm_state == READ) shown <= held * held;
+    fsm_state <= fsm_state ? fsm_state + (SKIPS & fsm_state == 3 & start ? 2 : 1) : start;
+  end
+endmodule
+"""
+"""Shows the square of a word some clocks after its start. The mutant inverts a bit of what holds it at every clock: it
+differs if that is read an odd number of clocks after it is written, or perhaps one less, or before it is written."""
+
+
+@pytest.mark.parametrize(
+    ("read", "skips", "equal"),
+    [(3, 0, True), (7, 0, True), (7, 1, False), (2, 0, False), (6, 0, False), (1, 0, False)],
+)
+def test_what_is_inverted_where_no_state_reads_it_is_equal_by_states(read, skips, equal, tmp_path):
+    verilog = TURNS.replace("READ = 5, SKIPS = 0", f"READ = {read}, SKIPS = {skips}")
+    (tmp_path / "mutated.v").write_text(verilog, encoding="utf-8")
+    flat = equivalent._flat(tmp_path, f"hierarchy -top {BLOCK}; proc")
+    assert by_state.equal_by_state(tmp_path, flat, 1) == equal
 
 
 LEVEL = """

@@ -1,11 +1,15 @@
 """Mutants that are equal to the component because what differs is not read in the states in which it differs.
 
-The component and its mutant begin alike and get the same inputs. Two kinds of facts are found and then proven for a
+The component and its mutant begin alike and get the same inputs. Three kinds of facts are found and then proven for a
 single step, so that they hold for ever:
 
 - **States that are reached**: words of the registers in `CONTROL`, which are to be alike always.
 - **Registers that differ**: in which of these states each of the others may. None does at power-up; a register is given
   every state in which some step makes it differ, until no step makes another.
+- **A bit that is inverted**: in which of these states the mutant's is known to be the other one. This is tried where
+  the first two are not enough and a single bit of a register begins to differ: all its steps are listed, and what comes
+  of them from power-up on is taken to hold. So a bit that turns at every clock, and is read an even number of clocks
+  after it is written, is equal where it is read.
 
 A product is any number, the same for both where its factors are: that two products are equal, a solver finds slowly.
 
@@ -26,11 +30,16 @@ CONTROL = ("fsm_state", "running")
 """The registers by which states are told apart. A block with more bits of them than `MOST_BITS` is not tried."""
 MOST_BITS = 8
 PROVEN = "SUCCESS"
+SHOWN = "at", "next", "bad", "new", "off", "before", "unlike"
+"""What examples tell, as far as a question has it."""
 QUESTIONS, ANSWERS, STATES = 40, 12, 10_000
 """The most questions, the most examples of each, and the most steps from a state to another."""
 _REGISTER, _PRODUCT = re.compile(r"[DQ]_(\d+)$"), re.compile(r"(TIMES_\d+)_[ABY]$")
 """The ports of registers and of multipliers."""
 _VALUE = re.compile(r"^ *\\(\S+) .* ([01]+)$", re.MULTILINE)
+
+Place = tuple[int, int]
+"""A bit of a register: the number of that, and its place in it."""
 
 
 @dataclass
@@ -43,13 +52,16 @@ class Facts:
         firsts: the first value of every register that has one.
         untouched: the registers that have it as long as the first state lasts.
         differ: the states in which a register may differ, by its number.
+        inverted: the states in which a bit is known to be inverted, by its register and its place in it; none of them
+            is that at power-up.
     """
 
-    bits: list[tuple[int, int]]
+    bits: list[Place]
     reached: set[int] = field(default_factory=set)
     firsts: dict[int, str] = field(default_factory=dict)
     untouched: set[int] = field(default_factory=set)
     differ: dict[int, set[int]] = field(default_factory=dict)
+    inverted: dict[Place, set[int]] = field(default_factory=dict)
 
     @property
     def control(self) -> set[int]:
@@ -63,6 +75,13 @@ class Facts:
     def word(self, prefix: str) -> str:
         """Return Verilog of the control's word."""
         return "{" + ", ".join(f"{prefix}{register}[{place}]" for register, place in reversed(self.bits)) + "}"
+
+    def of_mutant(self, register: int | None, value: str, word: str) -> str:
+        """Return Verilog of what a register of the component is in the mutant, where it may not differ otherwise."""
+        turned = [
+            f"({self.among(word, states)} << {place})" for (n, place), states in self.inverted.items() if n == register
+        ]
+        return " ^ ".join([value, *turned])
 
     def among(self, word: str, states: set[int]) -> str:
         """Return Verilog that says whether a word of the control is among some states."""
@@ -101,6 +120,15 @@ def equal_by_state(work: Path, flat: dict, number: int) -> bool:
     while new:
         facts.reached |= new
         new = {step["next"] for step in steps if step["at"] in facts.reached} - facts.reached
+    if _holds(work, design, number, facts):
+        return True
+    facts.differ = {}
+    return _take_inverted(work, design, number, facts) and _holds(work, design, number, facts)
+
+
+def _holds(work: Path, design: dict, number: int, facts: Facts) -> bool:
+    """Return whether a mutant is proven equal by facts, without those that some step leads out of."""
+    module = design["modules"][BLOCK]
     for _ in range(QUESTIONS):
         found = _examples(work, design, number, _pair(module, facts), f"-prove trigger 0 -max {ANSWERS}")
         if not found:
@@ -108,12 +136,73 @@ def equal_by_state(work: Path, flat: dict, number: int) -> bool:
         for example in found:
             if example["bad"]:
                 return False
-            for n in outputs:
+            for n in range(example["new"].bit_length()):
                 if example["new"] >> n & 1:
                     facts.differ.setdefault(n, set()).add(example["next"])
-                if example["off"] >> n & 1:
-                    facts.untouched.discard(n)
+            facts.untouched -= {n for n in facts.untouched if example["off"] >> n & 1}
     return False
+
+
+def _take_inverted(work: Path, design: dict, number: int, facts: Facts) -> bool:
+    """Take a bit to be inverted in some states, and to be any in others; return whether there is such a bit.
+
+    It is the only one that a step from equal registers makes differ. Its steps are all listed, with the others equal.
+    """
+    module = design["modules"][BLOCK]
+    places = [
+        (int(found[1]), place)
+        for name, port in module["ports"].items()
+        if name.startswith("D_") and (found := _REGISTER.match(name)) and int(found[1]) not in facts.control
+        for place in range(len(port["bits"]))
+    ]
+    begun = _examples(work, design, number, _single(module, facts, places), f"-prove trigger 0 -max {ANSWERS}")
+    unlike = {place for example in begun or () for k, place in enumerate(places) if example["unlike"] >> k & 1}
+    if len(unlike) != 1:
+        return False
+    steps = _examples(work, design, number, _single(module, facts, [*unlike]), f"-prove trigger 0 -max {STATES}")
+    if not steps or len(steps) >= STATES:
+        return False
+    come, new = set(), {(facts.first, 0)}
+    while new:
+        come |= new
+        new = {(step["next"], step["unlike"]) for step in steps if (step["at"], step["before"]) in come} - come
+    inverted = {state for state, differs in come if differs and (state, 0) not in come}
+    ((register, place),) = unlike
+    facts.inverted = {(register, place): inverted}
+    facts.differ = {register: {state for state, differs in come if differs} - inverted}
+    return bool(inverted)
+
+
+def _single(module: dict, facts: Facts, places: list[Place]) -> str:
+    """Return Verilog of a machine for steps from registers that are equal, but for a bit if `places` has one alone.
+
+    Its outputs are `unlike`, which of the places differ in the next state. If there is one, it triggers at every step,
+    and the others are `at` and `next`, this state and the next one, and `before`, whether the bit differs in this one.
+    Otherwise it triggers where one differs.
+    """
+    alone = places[0] if len(places) == 1 else None
+    sides: dict[str, list[str]] = {"gold": [], "gate": []}
+    heads, body = ["input inverts", "output trigger", f"output [{len(places) - 1}:0] unlike"], []
+    for name, port in module["ports"].items():
+        width, register = len(port["bits"]), _REGISTER.match(name)
+        if port["direction"] == "output":
+            for side, pins in sides.items():
+                body.append(f"wire [{width - 1}:0] {side}_{name};")
+                pins.append(f".{name}({side}_{name})")
+        elif name != SELECTOR:
+            heads.append(f"input [{width - 1}:0] {name}")
+            turned = f" ^ (inverts << {alone[1]})" if alone and register and int(register[1]) == alone[0] else ""
+            body.append(f"wire [{width - 1}:0] gate_{name} = {name}{turned};")
+            sides["gold"].append(f".{name}({name})")
+            sides["gate"].append(f".{name}(gate_{name})")
+    words = {"at": facts.word("Q_"), "next": facts.word("gold_D_"), "before": "inverts"} if alone else {}
+    heads += [f"output [{0 if key == 'before' else len(facts.bits) - 1}:0] {key}" for key in words]
+    words["unlike"] = "{" + ", ".join(f"gold_D_{n}[{k}] ^ gate_D_{n}[{k}]" for n, k in reversed(places)) + "}"
+    lines = [f"module machine({', '.join(heads)});", *body, f"wire [{len(facts.bits) - 1}:0] now = {facts.word('Q_')};"]
+    lines += [f"{side} {side}({', '.join(pins)});" for side, pins in sides.items()]
+    lines += [f"assign {key} = {value};" for key, value in words.items()]
+    lines += [f"assign trigger = {facts.among('now', facts.reached)}{'' if alone else ' & (|unlike)'};", "endmodule"]
+    return "\n".join(lines) + "\n"
 
 
 def _part_from_products(module: dict) -> None:
@@ -159,7 +248,7 @@ def _pair(module: dict, facts: Facts) -> str:
             for side, pins in sides.items():
                 body.append(f"wire [{width - 1}:0] {side}_{name};")
                 pins.append(f".{name}({side}_{name})")
-            unlike = f"(gold_{name} != gate_{name})"
+            unlike = f"(({facts.of_mutant(n, f'gold_{name}', 'next')}) != gate_{name})"
             if n is not None and n not in facts.control:
                 new[n] = f"{unlike} & ~{facts.among('next', facts.differ.get(n, set()))}"
             elif not _PRODUCT.match(name):
@@ -168,7 +257,8 @@ def _pair(module: dict, facts: Facts) -> str:
                 off[n] = f"(next == {facts.first}) & (gold_{name} != {first})"
         elif name != SELECTOR:
             heads += [f"input [{width - 1}:0] {side}{name}" for side in ("", "other_")]
-            body.append(f"wire [{width - 1}:0] gate_{name} = {_apart(name, n, facts)} ? other_{name} : {name};")
+            given = facts.of_mutant(n, name, "now")
+            body.append(f"wire [{width - 1}:0] gate_{name} = {_apart(name, n, facts)} ? other_{name} : {given};")
             sides["gold"].append(f".{name}({name})")
             sides["gate"].append(f".{name}(gate_{name})")
             if first:
@@ -198,7 +288,7 @@ def _apart(name: str, register: int | None, facts: Facts) -> str:
 def _examples(work: Path, design: dict, number: int, machine: str, how: str) -> list[dict[str, int]] | None:
     """Return what the machine's outputs are in the solver's examples; None if it has no answer in its time."""
     (work / "machine.v").write_text(machine, encoding="utf-8")
-    shown = " ".join(f"-show {name}" for name in ("at", "next", "bad", "new", "off") if f" {name} =" in machine)
+    shown = " ".join(f"-show {name}" for name in SHOWN if f" {name} =" in machine)
     said = answer(work, design, [*copies(number), "read_verilog machine.v"], "machine", f"{how} {shown}")
     tables = said.split("Signal Name")[1:]
     if not tables and PROVEN not in said:
