@@ -6,10 +6,10 @@ single step, so that they hold for ever:
 - **States that are reached**: words of the registers in `CONTROL`, which are to be alike always.
 - **Registers that differ**: in which of these states each of the others may. None does at power-up; a register is given
   every state in which some step makes it differ, until no step makes another.
-- **A bit that is inverted**: in which of these states the mutant's is known to be the other one. This is tried where
-  the first two are not enough and a single bit of a register begins to differ: all its steps are listed, and what comes
-  of them from power-up on is taken to hold. So a bit that turns at every clock, and is read an even number of clocks
-  after it is written, is equal where it is read.
+- **A bit that is inverted**: in which of these states the mutant's is known to be the other one. This is looked for
+  where a single bit of a register begins to differ: all its steps are listed, and what comes of them from power-up on
+  is taken to hold, until some step leads out of it. So a bit that turns at every clock, and is read an even number of
+  clocks after it is written, is equal where it is read.
 
 A product is any number, the same for both where its factors are: that two products are equal, a solver finds slowly.
 
@@ -120,10 +120,8 @@ def equal_by_state(work: Path, flat: dict, number: int) -> bool:
     while new:
         facts.reached |= new
         new = {step["next"] for step in steps if step["at"] in facts.reached} - facts.reached
-    if _holds(work, design, number, facts):
-        return True
-    facts.differ = {}
-    return _take_inverted(work, design, number, facts) and _holds(work, design, number, facts)
+    _take_inverted(work, design, number, facts)
+    return _holds(work, design, number, facts)
 
 
 def _holds(work: Path, design: dict, number: int, facts: Facts) -> bool:
@@ -143,8 +141,8 @@ def _holds(work: Path, design: dict, number: int, facts: Facts) -> bool:
     return False
 
 
-def _take_inverted(work: Path, design: dict, number: int, facts: Facts) -> bool:
-    """Take a bit to be inverted in some states, and to be any in others; return whether there is such a bit.
+def _take_inverted(work: Path, design: dict, number: int, facts: Facts) -> None:
+    """Take a bit to be inverted in some states, and to be any in others, if there is such a bit.
 
     It is the only one that a step from equal registers makes differ. Its steps are all listed, with the others equal.
     """
@@ -155,13 +153,15 @@ def _take_inverted(work: Path, design: dict, number: int, facts: Facts) -> bool:
         if name.startswith("D_") and (found := _REGISTER.match(name)) and int(found[1]) not in facts.control
         for place in range(len(port["bits"]))
     ]
+    if not places:
+        return
     begun = _examples(work, design, number, _single(module, facts, places), f"-prove trigger 0 -max {ANSWERS}")
     unlike = {place for example in begun or () for k, place in enumerate(places) if example["unlike"] >> k & 1}
     if len(unlike) != 1:
-        return False
+        return
     steps = _examples(work, design, number, _single(module, facts, [*unlike]), f"-prove trigger 0 -max {STATES}")
     if not steps or len(steps) >= STATES:
-        return False
+        return
     come, new = set(), {(facts.first, 0)}
     while new:
         come |= new
@@ -170,7 +170,6 @@ def _take_inverted(work: Path, design: dict, number: int, facts: Facts) -> bool:
     ((register, place),) = unlike
     facts.inverted = {(register, place): inverted}
     facts.differ = {register: {state for state, differs in come if differs} - inverted}
-    return bool(inverted)
 
 
 def _single(module: dict, facts: Facts, places: list[Place]) -> str:
