@@ -14,8 +14,8 @@ from hardwall.sim.scene.load import load
 from hardwall.sim.studies.bench import under_cocotb
 from hardwall.sim.walls import hit
 from stimuli.lengths import LONG
+from stimuli.outputs import EVERY_OUTPUT
 from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, TWO_SECONDS
-from stimuli.specs import EVERY_OUTPUT
 
 STABLE = {"wall.stiffness_n_per_m": 10e3, "wall.damping_n_s_per_m": 20.0}
 UNSTABLE = {"wall.stiffness_n_per_m": 100e3, "wall.damping_n_s_per_m": 20.0}
