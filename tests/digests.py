@@ -125,9 +125,9 @@ def _hits() -> Iterator[Case]:
             for backend in ("float", "fixed", "rtl"):
                 if backend == "rtl" and scene != "seed-2011" and (estimator, output) != ("levant", "u"):
                     continue  # every one needs its own build, and its words equal those of `fixed`
-                own = scene == "seed-2011" and estimator in FEW and backend != "rtl"
+                own = scene == "seed-2011" and estimator in FEW and backend == "fixed"
                 short = own or (estimator, output, backend) == ("levant", "u", "fixed")
-                short = short or (scene, estimator, output, backend) == ("seed-2011", "levant", "u", "rtl")
+                short = short or (scene, estimator, output) == ("seed-2011", "levant", "u")
                 name = f"hit/{scene}/{estimator}:{output}/{backend}"
                 yield Case(name, (*_hit(scene, estimator, output, backend), *SHORT), whole, short)
     for variant, (scene, options) in VARIANTS.items():
@@ -148,12 +148,14 @@ def _estimates() -> Iterator[Case]:
         for backend in ("float", "fixed"):
             arguments = ("accuracy", "--estimators", estimator, "--rates", "1e4,1e5", "--backend", backend)
             arguments += ("--signal", "stop", "--signal", "flicker", "--workers", "1", "--json")
-            yield Case(f"accuracy/{estimator}/{backend}", arguments, rows, estimator in FEW)
+            short = estimator == "levant" or (estimator in FEW and backend == "fixed")
+            yield Case(f"accuracy/{estimator}/{backend}", arguments, rows, short)
     for estimator in FEW:
         for backend in ("float", "fixed", "rtl"):
             arguments = ("replay", "recording.csv", "--column", "counts", "--rate", "1000", "--coarsen", "4")
             arguments += ("--estimator", estimator, "--backend", backend, "--out", "out.csv", "--json")
-            yield Case(f"replay/{estimator}/{backend}", arguments, replayed, backend != "rtl" or estimator == "levant")
+            short = estimator == "levant" or backend == "fixed"
+            yield Case(f"replay/{estimator}/{backend}", arguments, replayed, short)
 
 
 def _walls() -> Iterator[Case]:
@@ -173,7 +175,7 @@ def _netlists() -> Iterator[Case]:
     for estimator in OUTPUTS:
         arguments = ("verilog", "mhz", "--estimator", estimator)
         yield Case(f"axis/{estimator}", arguments, axis_netlist, estimator == "levant")
-        yield Case(f"board/{estimator}", arguments, board_netlist, estimator == "levant")
+        yield Case(f"board/{estimator}", arguments, board_netlist)
 
 
 def record(only: str) -> None:

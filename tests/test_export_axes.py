@@ -14,6 +14,7 @@ from hardwall.model.axes import AxesSpec
 from hardwall.model.axes_registers import AxesMap
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from hardwall.sim.scene.load import load
+from stimuli.lengths import LONG
 from stimuli.tables import rows, verilog_ports
 
 TOPS = {"axes": Axes, "board": AxesBoard}
@@ -32,7 +33,7 @@ def written(tmp_path_factory) -> Path:
 
 
 @pytest.mark.parametrize("top", TOPS)
-@pytest.mark.parametrize(("axes", "estimator"), [(1, "fdm"), (5, "window")])
+@pytest.mark.parametrize(("axes", "estimator"), [(1, "fdm"), (5, "window")] if LONG else [(5, "window")])
 def test_table_and_verilog_have_the_same_ports(axes, estimator, top):
     component = TOPS[top](several(axes, estimator))
     table = rows(port_table(component))

@@ -8,6 +8,7 @@ import pytest
 
 from hardwall.model.build_folder import build_dir
 from stimuli.command_line import call
+from stimuli.lengths import LONG
 from stimuli.processes import HARDWALL, ended_by, session, started, stored, wait_until
 
 KEYS = {
@@ -57,7 +58,8 @@ def test_fixed_is_rtl(monkeypatch, capsys):
     assert {**fixed, "backend": "rtl"} == rtl
 
 
-@pytest.mark.parametrize("figure", [1, 2])
+# The curves of the second are nine loops to compile; their figures and their picture have shorter tests of their own.
+@pytest.mark.parametrize("figure", [1, 2] if LONG else [1])
 def test_figures_are_drawn(monkeypatch, capsys, tmp_path, figure):
     picture = tmp_path / "figure.svg"
     few = [] if figure == 1 else ["--rates", "1e3,2e3"]

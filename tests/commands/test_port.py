@@ -2,9 +2,9 @@
 
 import json
 import signal
-import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -26,13 +26,23 @@ REGISTERS = RegisterMap(load("seed-2011", SCENE).spec)
 
 @pytest.fixture(scope="module")
 def virtual() -> Iterator[VirtualBoard]:
-    with running(SCENE, "--tcp", "0") as board:
+    # Half of real time, which its hosts wait for, takes half of a core from the other tests.
+    with running(SCENE, "--tcp", "0", "--speed", "0.5") as board:
         yield board
 
 
-def called(*words: object) -> subprocess.CompletedProcess:
-    words = [HARDWALL, *words, *AT]
-    return subprocess.run(list(map(str, words)), capture_output=True, text=True, check=False, timeout=300)
+class Called(NamedTuple):
+    """What came of a command that was called in this process."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def called(monkeypatch, capsys) -> Callable[..., Called]:
+    """Return what calls a command in this process: a process of its own would take a second to begin."""
+    return lambda *words: Called(*call(monkeypatch, capsys, *words, *AT))
 
 
 def state_of(board: VirtualBoard) -> State | None:
@@ -44,7 +54,7 @@ def state_of(board: VirtualBoard) -> State | None:
         return None
 
 
-def test_connect_says_what_a_board_is(virtual):
+def test_connect_says_what_a_board_is(virtual, called):
     done = called("connect", virtual.path, "--registers", "--json")
     assert done.returncode == 0, done.stderr
     check_text("connect", done.stdout)
@@ -60,7 +70,7 @@ def test_connect_says_what_a_board_is(virtual):
     assert "0x00c8" in called("connect", virtual.tcp, "--registers").stdout
 
 
-def test_set_writes_and_says_what_is_used(virtual):
+def test_set_writes_and_says_what_is_used(virtual, called):
     done = called("set", virtual.path, "wall_position=-2e-3", "wall_stiffness=1000", "--json")
     assert done.returncode == 0, done.stderr
     check_text("set", done.stdout)
@@ -69,7 +79,7 @@ def test_set_writes_and_says_what_is_used(virtual):
     assert used["wall_stiffness"] == pytest.approx(1000, abs=REGISTERS["wall_stiffness"].lsb)
 
 
-def test_arm_lasts_as_long_as_its_command(virtual):
+def test_arm_lasts_as_long_as_its_command(virtual, called):
     with started(HARDWALL, "arm", virtual.path, "--acknowledge", *AT) as process:
         assert process.stdout.readline().startswith("ARMED ")
         # Another host cannot have the port meanwhile.
@@ -82,7 +92,7 @@ def test_arm_lasts_as_long_as_its_command(virtual):
     assert state_of(virtual) is State.DISARMED
 
 
-def test_a_host_that_is_killed_leaves_a_board_that_trips(virtual):
+def test_a_host_that_is_killed_leaves_a_board_that_trips(virtual, called):
     with started(HARDWALL, "arm", virtual.path, "--acknowledge", *AT) as process:
         assert process.stdout.readline().startswith("ARMED ")
         process.kill()
@@ -96,7 +106,7 @@ def test_a_host_that_is_killed_leaves_a_board_that_trips(virtual):
     assert called("arm", virtual.path, "--seconds", "0.1", "--acknowledge").returncode == 0
 
 
-def test_a_trip_can_be_acknowledged_without_arming(virtual):
+def test_a_trip_can_be_acknowledged_without_arming(virtual, called):
     virtual.order("open emergency_stop")
     wait_until(lambda: state_of(virtual) is State.TRIPPED)
     done = called("disarm", virtual.path, "--acknowledge")
@@ -118,10 +128,11 @@ def test_a_trip_ends_arm(virtual):
     assert err.splitlines()[-1].startswith("hardwall: error: the axis is TRIPPED: emergency_stop: ")
 
 
-def test_watch_shows_a_line_and_home_finds_the_index(virtual):
-    done = called("watch", virtual.path, "--seconds", "0.2")
-    assert done.returncode == 0, done.stderr
-    assert " mm/s " in done.stdout
+def test_watch_shows_a_line_and_home_finds_the_index(virtual, called):
+    with started(HARDWALL, "watch", virtual.path, "--seconds", "0.2", *AT) as process:
+        code, out, err = ended(process)
+    assert code == 0, err
+    assert " mm/s " in out
     done = called("home", virtual.path, "--seconds", "0.2")
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == (
@@ -202,7 +213,7 @@ def test_a_contact_is_captured_into_a_file_and_a_picture(virtual, tmp_path):
     assert state_of(virtual) is State.DISARMED
 
 
-def test_a_capture_by_hand_and_one_that_does_not_come(virtual):
+def test_a_capture_by_hand_and_one_that_does_not_come(virtual, called):
     done = called("capture", virtual.path, "--trigger", "hand", "--before", "10", "--decimation", "2", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["before"] == 10

@@ -5,12 +5,16 @@ import pytest
 from scipy import signal
 
 from hardwall.sim.estimates.recording import Recording
+from stimuli.lengths import LONG
 from stimuli.outputs import EVERY_OUTPUT
 
 COARSEN = 16
 # About the largest bound of the real recordings. All tests share it, so that every estimator needs only one build.
 BOUND = 1e6
-EVERY = pytest.mark.parametrize(("estimator", "output"), EVERY_OUTPUT)
+KINDS = [("levant", "u"), ("fdm", "u"), ("foaw", "best-fit"), ("levant-edge", "u")]
+"""One estimator of each kind: with a few words of state or none, with an array, and from the stamps of edges."""
+EVERY = pytest.mark.parametrize(("estimator", "output"), EVERY_OUTPUT if LONG else KINDS)
+"""Every estimator, by `make soak`, and else one of each kind: each is a loop of its own to compile."""
 
 
 def recording(counts, rate_hz=1000.0, start_s=0.0) -> Recording:

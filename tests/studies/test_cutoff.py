@@ -110,7 +110,8 @@ def verdict(changes: dict, wall: tuple[float, float], **_) -> dict:
 def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", verdict)
     picture = tmp_path / "cutoff.svg"
-    code, out, _ = call(monkeypatch, capsys, "cutoff", "seed-2011", "--workers", 1, "--json", "--plot", picture)
+    few = "--set", "zwidth.damping_step_n_s_per_m=111.0"
+    code, out, _ = call(monkeypatch, capsys, "cutoff", "seed-2011", *few, "--workers", 1, "--json", "--plot", picture)
     assert code == 0
     report = json.loads(out)
     (device,) = report["devices"]
@@ -131,7 +132,7 @@ def test_report_table_and_picture(monkeypatch, capsys, tmp_path):
     )
     assert [label for label in wanted if label not in text] == []
     monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
-    code, out, _ = call(monkeypatch, capsys, "cutoff", "seed-2011", "--workers", 1, "--resume")
+    code, out, _ = call(monkeypatch, capsys, "cutoff", "seed-2011", *few, "--workers", 1, "--resume")
     assert code == 0
     assert f"{max(areas.values()) / 1e3:.0f}+" in out
 

@@ -84,7 +84,7 @@ def test_without_a_cable_mass_and_friction_of_the_motor_are_the_handle_s():
 def test_report_and_picture(monkeypatch, capsys, tmp_path):
     picture = tmp_path / "rates.svg"
     words = [word for key, value in FEW.items() for word in ("--set", f"{key}={value}")]
-    words += ["--estimators", "fdm", "--rates", "1e3,1e4", "--workers", 1]
+    words += ["--estimators", "fdm", "--rates", "1e3,1e4", "--starts", 1, "--workers", 1]
     code, out, _ = call(monkeypatch, capsys, "rates", *words, "--json", "--plot", picture)
     assert code == 0
     report = json.loads(out)

@@ -74,7 +74,11 @@ def test_an_axis_knows_nothing_of_its_neighbours():
     assert all(kept(changed[name]) != kept(among[name]) for name in list(among)[1:])
 
 
-@pytest.mark.parametrize(("clocks", "overlap"), [(4, 3), (6, 2), (8, 1), (12, 1), (13, 0), (24, 0)])
+PACES = [(4, 3), (6, 2), (8, 1), (12, 1), (13, 0), (24, 0)]
+"""Clocks a sample, and by how many samples the drive is behind: each number of them has its own loop to compile."""
+
+
+@pytest.mark.parametrize(("clocks", "overlap"), PACES if LONG else [PACES[0], PACES[-1]])
 def test_a_handle_takes_its_way_however_many_samples_overlap(clocks, overlap):
     """The positions of the samples are those of the undisturbed handle: they are kept when the drive changes, which may
     be several samples later. The samples before then are taken at the start."""
@@ -124,14 +128,15 @@ def test_rtl_gives_the_models_force_words_in_every_axis(case):
     scene = three((ON_RTL | IN_LONG)[case])
     overlaps = {"no overlap": 0, "one sample overlaps": 1, "three samples overlap": 3}
     assert overlap_of(scene.axes[0].timing) == overlaps.get(case, overlap_of(scene.axes[0].timing))
-    fixed, rtl = (hit_axes.run(scene, backend, traces=True).hits for backend in ("fixed", "rtl"))
+    fixed, rtl = (hit_axes.run(scene, backend, traces=LONG).hits for backend in ("fixed", "rtl"))
     for name, result in rtl.items():
         assert kept(result) | {"backend": "fixed"} == kept(fixed[name])
-        for trace in ("overview", "detail"):
+        assert result.max_force_n > 1
+        # Traces are a loop of their own to compile.
+        for trace in ("overview", "detail") if LONG else ():
             for key, values in vars(getattr(result, trace)).items():
                 assert (values == getattr(getattr(fixed[name], trace), key)).all(), f"{trace} {key} of {name}"
-        assert result.max_force_n > 1
-        assert len(result.detail.time_s) > 1000
+            assert len(result.detail.time_s) > 1000
     assert len({result.force_sha256 for result in rtl.values()}) == 3
 
 
@@ -149,7 +154,7 @@ def test_rtl_of_an_axis_that_is_too_fast_has_its_neighbours_as_they_were():
     assert not calm["elbow"].flags
 
 
-@pytest.mark.parametrize("backend", ["fixed", "rtl"])
+@pytest.mark.parametrize("backend", ["fixed", "rtl"] if LONG else ["fixed"])
 def test_a_handle_that_outruns_every_decoder_ends_the_run(backend):
     changes = FDM | {"controller.sample_hz": 100, "controller.actuation_hz": 100}
     changes |= {"controller.clock_hz": 100_000, "controller.speed_max_m_per_s": 0.001, "protocol.start_m": -0.15}
