@@ -15,6 +15,7 @@ from hardwall.model.supervisor import ALL, ARMED, CAUSES, DISARMED, REQUIRED, TR
 from hardwall.testing import SAMPLES, parameters, simulate
 from oracles.board import RECORDS, make
 from oracles.board_host import Host
+from oracles.returning_clock import check_returns
 from oracles.supervised import SYNCHRONISER
 from stimuli import frames
 from stimuli.lengths import REACHING, WHOLE
@@ -306,7 +307,7 @@ async def a_clock_that_stops_makes_the_outputs_low_and_comes_back_disarmed(dut):
 async def a_clock_that_comes_back_is_believed_after_a_level_of_its_beat(dut):
     host = Host(dut, **parameters())
     await host.reset()
-    await host.check_returns()
+    await check_returns(host)
 
 
 # A second axis takes as long again: the long runs, of more samples, have it.

@@ -1,16 +1,13 @@
 """A host on the serial line of a board that has its own clocks, and what watches the board's pins meanwhile."""
 
 import logging
-import math
 from abc import ABC, abstractmethod
 
 import cocotb
 from cocotb.clock import Clock
-from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
+from cocotb.triggers import ClockCycles, First, Timer
 from cocotbext.uart import UartSink, UartSource
 
-from hardwall.model.clock_monitor import SYNCHRONISER as OF_BEAT
-from hardwall.model.clock_monitor import Design as Monitor
 from hardwall.model.link.line import framed
 from hardwall.testing import Bench
 
@@ -22,8 +19,6 @@ OSCILLATOR_NS = 22
 """Where the clock's period is 10 ns."""
 STARTING = 100
 """Clocks in which the oscillator has seen that the clock runs."""
-STOPS = 8
-"""Phases of the beat at which the clock stops."""
 
 
 class OnALine(ABC):
@@ -61,27 +56,6 @@ class OnALine(ABC):
     def leave(self) -> None:
         """Look no more from now on."""
         self._following.cancel()
-
-    async def check_returns(self) -> None:
-        """Check that a clock that comes back is believed after one level of its beat, and before the third."""
-        monitor = Monitor(CLOCK_HZ)
-        level = monitor.beat_clocks
-        # The oscillator sees a change of the beat at its next edge, and takes it through the synchroniser.
-        seen = math.ceil((1 + OF_BEAT + 1) * OSCILLATOR_NS / self.bench.period_ns)
-        self.leave()
-        for stop in range(STOPS):
-            # The beat is at the same place whenever the clock is found to run.
-            await ClockCycles(self.dut.clk, level + level * stop // STOPS)
-            self.bench.clock.stop()
-            await ClockCycles(self.dut.oscillator, 1 + int(monitor.stop_latency_s(1.0)))
-            assert not int(self.dut.outputs_enable.value)
-            self.bench.clock.start()
-            clocks = 0
-            while not int(self.dut.outputs_enable.value):
-                await RisingEdge(self.dut.clk)
-                clocks += 1
-                assert clocks <= 2 * level + seen, f"stop {stop}"
-            assert clocks > level, f"stop {stop}"
 
     async def edges(self, count: int) -> None:
         """Let `count` clock edges pass."""
