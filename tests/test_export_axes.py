@@ -32,8 +32,10 @@ def written(tmp_path_factory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("top", TOPS)
-@pytest.mark.parametrize(("axes", "estimator"), [(1, "fdm"), (5, "window")] if LONG else [(5, "window")])
+SIZES = [(5, "window", "axes"), (1, "fdm", "board"), (1, "fdm", "axes"), (5, "window", "board")]
+
+
+@pytest.mark.parametrize(("axes", "estimator", "top"), SIZES if LONG else SIZES[:2])
 def test_table_and_verilog_have_the_same_ports(axes, estimator, top):
     component = TOPS[top](several(axes, estimator))
     table = rows(port_table(component))
@@ -64,7 +66,9 @@ def test_written_verilog_passes_the_lint_and_says_what_it_is_of(written, top):
     head = text.splitlines()[: text.splitlines().index("")]
     assert all(line.startswith("//") for line in head)
     assert "// axes = 3" in head
-    assert text.endswith(to_verilog(TOPS[top](several(3)), top))
+    # The Verilog of a board takes seconds, and has been made for the file.
+    if LONG or top == "axes":
+        assert text.endswith(to_verilog(TOPS[top](several(3)), top))
 
 
 def test_written_tables_have_the_ports_the_words_and_the_registers(written):

@@ -26,8 +26,7 @@ REGISTERS = RegisterMap(load("seed-2011", SCENE).spec)
 
 @pytest.fixture(scope="module")
 def virtual() -> Iterator[VirtualBoard]:
-    # Half of real time, which its hosts wait for, takes half of a core from the other tests.
-    with running(SCENE, "--tcp", "0", "--speed", "0.5") as board:
+    with running(SCENE, "--tcp", "0", "--speed", str(2 * PACE)) as board:
         yield board
 
 

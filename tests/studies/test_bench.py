@@ -19,8 +19,8 @@ COMMANDS = {"fixed (samples/s)": Command(HIT, 1, speed=True), "a hit, nothing co
 PARTS = (
     "none", "coulomb friction", "amplifier delay", "encoder phase error", "converter", "amplifier lag",
     "amplifier lag, motor, cable, friction",
-)[:: 1 if LONG else 6]  # fmt: skip
-"""What is timed of a device: each has its own loop to compile, so the short form has none and all."""
+)[: None if LONG else 1]  # fmt: skip
+"""What is timed of a device: each has its own loop to compile, so the short form has none of the parts."""
 
 
 def measured_uncompiled(*given):
