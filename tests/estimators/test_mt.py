@@ -10,9 +10,9 @@ import pytest
 
 from hardwall.hdl.estimators.mt import Estimator
 from hardwall.model.checks import FieldError
-from hardwall.model.estimators import mt
+from hardwall.model.estimators import kept_edges, mt
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.estimators.mt import NOTHING, START, Gains, State
+from hardwall.model.estimators.kept_edges import NOTHING, Gains
 from hardwall.model.quadrature import Seen
 from hardwall.model.spec import AxisSpec
 from hardwall.sim.estimates import accuracy, signals
@@ -58,7 +58,7 @@ async def follows_model(dut):
     samples = SAMPLES // (4 if parameters()["name"] == "mhz" else 10)
     turns = [rows(d, *turn(d, random, samples // 3), invert) for invert in (False, True)]
     stimulus = without_run(row for part in (*turns, anything(d, random, samples // 3)) for row in part)
-    expected = await follow(dut, make(**parameters()), stimulus, START)
+    expected = await follow(dut, make(**parameters()), stimulus, NOTHING)
     assert set(expected["saturated"]) == {0, 1}
     for end in (-d.velocity.max, 0, d.velocity.max):
         assert end in expected["velocity"]
@@ -114,7 +114,7 @@ def speeds(d: mt.Design, strobes, edges: list[Edge]):
 def test_model_is_the_exact_mean_velocity_within_its_bound(name, half):
     d = design(name, half)
     strobes, edges = turn(d, seeded(), 6_000)
-    seen = model(d, without_run(rows(d, strobes, edges)), START)
+    seen = model(d, without_run(rows(d, strobes, edges)), NOTHING)
     moving = 0
     for k, (velocity, bound) in enumerate(speeds(d, strobes, edges)):
         word = math.floor(min(abs(velocity), bound) * d.clocks * 2**d.velocity.f + Fraction(1, 2))
@@ -152,7 +152,7 @@ def test_the_error_is_within_the_guaranteed_bound(displaced):
 def test_a_turn_within_a_count_reads_the_mean_and_not_the_edges_that_passed():
     """The same edge passed both ways is the same place: between them the axis has not moved on the mean."""
     d = design("mhz", 50)
-    params, state = d.params({}), START
+    params, state = d.params({}), NOTHING
     there = [(0, 0, 100, {}), (1, 0, 200, {"stamp_a_rise": 150}), (2, 0, 300, {"stamp_b_rise": 250})]
     back = [(1, 1, 400, {"stamp_b_rise": 350}), (0, 1, 500, {"stamp_a_rise": 450})]
     seen, stamps = [], {}
@@ -184,9 +184,9 @@ def test_the_default_window_is_the_minimax_one():
 def test_int64_holds_every_intermediate_at_the_longest_window(name):
     """From the ends of the inputs the kernel gives what Python's own integers give."""
     axis = spec(name, NAME)
-    most = mt.half_max(axis)
+    most = kept_edges.half_max(axis)
     d = design(name, most)
-    assert d.clocks * d.edges_max << d.velocity.f + 1 < 1 << mt.DIVIDEND_BITS
+    assert d.clocks * d.edges_max << d.velocity.f + 1 < 1 << kept_edges.DIVIDEND_BITS
     assert (3 << d.stamp_width - 2) + 2 * most * d.clocks <= 1 << d.stamp_width
     with pytest.raises(FieldError, match=r"^window_s must be more than 0 and at most .* at these rates, not"):
         design(name, most + 1)
@@ -195,8 +195,8 @@ def test_int64_holds_every_intermediate_at_the_longest_window(name):
         stamp = (top - age) & top
         kept = NOTHING._replace(running=1, known=1, older_stamp=(stamp - time) & top, number=1)
         sight = Seen(count, top, stamp, 0, 0, 0, 0, 0, 0)
-        given = estimate(d.params({}), State(kept, 0, 0), sight, 0)
-        assert given == mt.step.py_func(d.params({}), State(kept, 0, 0), sight, 0)
+        given = estimate(d.params({}), kept, sight, 0)
+        assert given == kept_edges.step.py_func(d.params({}), kept, sight, 0)
         assert abs(given[1]) <= d.velocity.max
 
 
