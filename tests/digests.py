@@ -45,6 +45,10 @@ OUTPUTS = {
     "levant-adaptive": ("u", "u1"),
     "window": ("u",),
     "foaw": ("end-fit", "best-fit"),
+    "edge-kalman": ("u",),
+    "least-squares": ("u",),
+    "mt": ("u",),
+    "mt-divisionless": ("u",),
 }
 SCENES = ("seed-2011", "fit-2011", "drive-2011", "mhz", "desktop-arm", "maglev")
 FEW = ("levant", "kalman", "period", "foaw")

@@ -61,6 +61,7 @@ COLOURS = {
     "period": "#999933",
     "period-count": "#B08900",
     "mt": "#7A5C00",
+    "mt-divisionless": "#C4A35A",
     "levant-edge": "#E69F00",
     "edge-kalman": "#661100",
     "levant-semi-implicit": "#AA4499",
@@ -70,7 +71,7 @@ COLOURS = {
     "foaw": "#3FA7D6",
     "least-squares": "#1F4E79",
 }
-MARKERS = dict(zip(COLOURS, "ovsDd<>1^8phXP*H", strict=True))
+MARKERS = dict(zip(COLOURS, "ovsDd<>12^8phXP*H", strict=True))
 OTHER = {"color": "#000000", "marker": "."}
 """The style of an estimator that has no colour here yet."""
 FADED = 0.5

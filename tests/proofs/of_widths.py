@@ -22,6 +22,7 @@ from hardwall.hdl.estimators import (
     levant,
     levant_semi_implicit,
     mt,
+    mt_divisionless,
     tracking_loop,
 )
 from hardwall.hdl.estimators.cycle_times import CycleTimes
@@ -32,6 +33,7 @@ from hardwall.hdl.output import Output
 from hardwall.hdl.quadrature import Quadrature
 from hardwall.hdl.scale_map import ScaleMap
 from hardwall.hdl.wall import Wall
+from hardwall.model.arithmetic.divisionless import digits
 from hardwall.model.estimators.foaw import TAPS
 from hardwall.model.estimators.levant_adaptive import RAISED
 from hardwall.model.quadrature import START
@@ -107,8 +109,17 @@ def past(bench: Bench, block: wiring.Component) -> None:
 
 def edges(bench: Bench, block: wiring.Component) -> None:
     design = block.design
-    counted = {"counts": (0, design.edges_max), "scaled": (0, design.edges_max * design.clocks)}
-    bench.within(phase=(0, design.half - 1), **counted)
+    bench.within(**{"edges.phase": (0, design.half - 1), "edges.moved": (0, design.edges_max)})
+
+
+def scaled_edges(bench: Bench, block: wiring.Component) -> None:
+    edges(bench, block)
+    bench.within(scaled=(0, block.design.edges_max * block.design.clocks))
+
+
+def digits_left(bench: Bench, block: wiring.Component) -> None:
+    edges(bench, block)
+    bench.promise(bench.inner["speed.left"] <= digits(block.design.velocity.width)[0])
 
 
 def fit(bench: Bench, block: wiring.Component) -> None:
@@ -151,6 +162,9 @@ MOVED = ("moved",)
 DIGITS = ("digits", "remainder", "quotient")
 HISTORY = (*MOVED, "head", "read__addr", "write__data", "data", "position", "change")
 CYCLES = (*DIGITS, *MOVED, "age", "change", "gap", "cycles", "kind", "behind", "samples")
+EDGES = ("number", "age", "between", "passed")
+# What the parts of a quotient by multiplications may be follows from its products, one from another.
+PRODUCTS = ("dividend", "t", "x", "remainder", "made", "left")
 # What the sum of a fit may be follows from its coefficients, one by one.
 FIT = ("age", "total")
 # In the search for the longest window, what the slopes and the sums may be follows from the history alone.
@@ -249,9 +263,16 @@ CASES = {
     "period-count": Case(partial(estimator, "period-count"), CYCLES, FORWARD),
     "mt": Case(
         partial(estimator, "mt"),
-        (*DIGITS, *MOVED, "number", "age", "span"),
-        Bug(mt.Estimator._divide, "Divide(bound.bit_length(), ", "Divide(bound.bit_length() - 1, "),
-        edges,
+        (*DIGITS, *EDGES),
+        Bug(mt.Estimator.elaborate, "Divide(bound.bit_length(), ", "Divide(bound.bit_length() - 1, "),
+        scaled_edges,
+    ),
+    "mt-divisionless": Case(
+        partial(estimator, "mt-divisionless"),
+        (*EDGES, *PRODUCTS),
+        Bug(mt_divisionless.Estimator.elaborate, "stamp + 1, velocity.f", "stamp, velocity.f"),
+        digits_left,
+        promise="no arithmetic wraps but where it is meant to; what a product is put into is not looked at",
     ),
     "scale_map": Case(
         lambda axis: ScaleMap(Bins(12, -300, 3, 64, 16.0)),

@@ -1,0 +1,59 @@
+"""The M/T method without a divider: RTL against model, whose words are those of `mt`, in fewer clocks."""
+
+import cocotb
+import pytest
+from mts import design, follows_model, starts_afresh, stimulus
+
+from hardwall.hdl.estimators.mt_divisionless import Estimator
+from hardwall.testing import CAMPAIGN, parameters, simulate
+from hardwall.testing.estimators import model
+from stimuli.edges import (
+    check_a_standing_axis_reads_zero_and_a_slowing_one_falls,
+    check_rounding_is_the_only_difference,
+)
+from stimuli.lengths import some_of
+
+NAME = "mt-divisionless"
+
+
+def make(name: str, half: int | None = None) -> Estimator:
+    return Estimator(design(NAME, name, half))
+
+
+@cocotb.test(**CAMPAIGN)
+async def rtl_follows_model(dut):
+    await follows_model(dut, make(**parameters()), parameters()["name"])
+
+
+@cocotb.test()
+async def reset_mid_stream_starts_afresh(dut):
+    await starts_afresh(dut, make(**parameters()))
+
+
+# On the wide axis the quotient has one digit more, on the narrow one fewer bits each.
+@pytest.mark.parametrize(("name", "half"), some_of([("mhz", None), ("narrow", 1), ("wide", 5)], 0, 1))
+def test_rtl(name, half):
+    simulate(__file__, make, name=name, half=half)
+
+
+@pytest.mark.parametrize("name", ["mhz", "paper"])
+def test_every_word_is_that_of_mt_and_sooner(name):
+    ours, others = design(NAME, name, 3), design("mt", name, 3)
+    rows = [*stimulus(ours, 3_000)]
+    seen, expected = (model(d, rows, d.start()) for d in (ours, others))
+    assert all((seen[output] == expected[output]).all() for output in ("velocity", "saturated"))
+    assert ours.latency < 0.75 * others.latency
+
+
+@pytest.mark.parametrize("rate", [1_000, 100_000])
+def test_fixed_point_is_the_algorithm_rounded(rate):
+    check_rounding_is_the_only_difference(NAME, rate)
+
+
+def test_a_standing_axis_reads_zero_and_a_slowing_one_falls():
+    check_a_standing_axis_reads_zero_and_a_slowing_one_falls(NAME)
+
+
+def test_the_design_of_mt_is_refused():
+    with pytest.raises(TypeError, match=r"^design must be a mt_divisionless.Design, not <"):
+        Estimator(design("mt", "mhz"))
