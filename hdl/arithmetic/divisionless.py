@@ -1,6 +1,5 @@
 """A rounded quotient by multiplications alone, all of one multiplier."""
 
-from itertools import pairwise
 from types import SimpleNamespace
 
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal
@@ -129,11 +128,10 @@ class Divisionless(wiring.Component):
     def _place(self, m: Module, s: SimpleNamespace) -> None:
         """Add the states that take the operands and shift them until the divisor's top bit is 1."""
         width, places = len(self.divisor), model.places(len(self.divisor), len(self.factor))
-        top = s.t[width - places : width]
-        # From the top down, the lowest 1 alone is two to the number of zeros above t.
-        above = top[::-1]
-        shift = (above & -above)[:places]
-        coarse = [f"SHIFT_{each}" for each in range(-(-width // places) - 1)]
+        # From the top down, the lowest 1 alone is two to the number of zeros above t; without one in sight, the most.
+        above = s.t[width - places : width][::-1]
+        shift = (above & -above)[:places] | (~above.any() << places - 1)
+        passes = model.passes(width, len(self.factor))
         with m.State("IDLE"):
             m.d.comb += [s.narrow.eq(self.factor), s.wide.eq(self.term)]
             with m.If(self.start):
@@ -144,19 +142,21 @@ class Divisionless(wiring.Component):
                     s.made.eq(0),
                     s.left.eq(self._digits),
                 ]
-                m.next = [*coarse, "PLACE"][0]
-        for state, after in pairwise([*coarse, "PLACE"]):
-            with m.State(state):
-                with m.If(~top.any()):
-                    m.d.sync += [s.t.eq(s.t << places), s.x.eq(s.x << places), s.over.eq(s.over | s.x[-places:].any())]
-                m.next = after
-        with m.State("PLACE"):
-            m.d.comb += [s.narrow.eq(shift), s.wide.eq(s.t)]
-            m.next = "PLACED"
-        with m.State("PLACED"):
-            m.d.comb += [s.narrow.eq(shift), s.wide.eq(s.x)]
-            m.d.sync += s.t.eq(self.product)
-            m.next = "LOOK"
+                m.next = "SHIFT_0"
+        for each in range(passes):
+            with m.State(f"SHIFT_{each}"):
+                m.d.comb += [s.narrow.eq(shift), s.wide.eq(s.t)]
+                if each:
+                    self._take_dividend(m, s)
+                m.next = f"TOO_{each}"
+            with m.State(f"TOO_{each}"):
+                m.d.comb += [s.narrow.eq(shift), s.wide.eq(s.x)]
+                m.d.sync += s.t.eq(self.product)
+                m.next = f"SHIFT_{each + 1}" if each + 1 < passes else "LOOK"
+
+    def _take_dividend(self, m: Module, s: SimpleNamespace) -> None:
+        """Take the shifted dividend; what is above its place is a quotient that does not fit."""
+        m.d.sync += [s.x.eq(self.product), s.over.eq(s.over | self.product[len(s.x) :].any())]
 
     def _invert(self, m: Module, s: SimpleNamespace) -> None:
         """Add the states that make the reciprocal, and scale both operands by it."""
@@ -167,7 +167,7 @@ class Divisionless(wiring.Component):
         finer = self.product[model.TABLE + model.STEP - model.FINE :][: model.FINE + 1]
         with m.State("LOOK"):
             m.d.comb += [s.narrow.eq(entry), s.wide.eq(s.t)]
-            m.d.sync += [s.x.eq(self.product), s.over.eq(s.over | self.product[len(s.x) :].any())]
+            self._take_dividend(m, s)
             m.next = "STEP"
         with m.State("STEP"):
             m.d.comb += [s.narrow.eq(entry), s.wide.eq(two_less)]

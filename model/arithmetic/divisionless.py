@@ -71,18 +71,23 @@ def digits(bits: int) -> tuple[int, int]:
 
 
 def places(divisor_width: int, factor_width: int) -> int:
-    """Return by how many places at a time, at most, the operands are shifted: the bits of the narrower factor."""
+    """Return how many of the divisor's top bits a shift looks at: as many as the narrower factor, a power of 2, has."""
     return min(divisor_width, max(FINE + 1, factor_width))
+
+
+def passes(divisor_width: int, factor_width: int) -> int:
+    """Return how many shifts it takes until any divisor's top bit is 1: each but the last by a place less than seen."""
+    seen = places(divisor_width, factor_width)
+    return 1 - (seen - divisor_width) // (seen - 1)
 
 
 def latency(divisor_width: int, quotient_width: int, factor_width: int = 1) -> int:
     """Return the clocks from `start` to `done` of the hardware.
 
-    One clock loads the operands, one shifts them each time by a factor's bits, three shift them by products, four make
-    the reciprocal and multiply both operands by it, and two make each digit.
+    One clock loads the operands, two make each shift of them, five make the reciprocal and multiply both operands by
+    it, and two make each digit.
     """
-    coarse = -(-divisor_width // places(divisor_width, factor_width)) - 1
-    return 8 + coarse + 2 * digits(quotient_width + 1)[0]
+    return 6 + 2 * passes(divisor_width, factor_width) + 2 * digits(quotient_width + 1)[0]
 
 
 @compiled
