@@ -48,7 +48,8 @@ async def follows_model(dut):
     few = stimulus(component.design, SAMPLES // 10)
     inputs, outputs = await bench.campaign("strobe", "valid", names, OUTPUTS, few, momentary=names)
     expected = observed(component.design, inputs.rows)
-    assert {0, component.design.edges_max} <= set(expected["moved"])
+    d = component.design
+    assert {0, min(d.edges_max, 1 << d.count_width - 1)} <= set(expected["moved"])
     unknown = expected["age"] == 0
     assert set(expected["moved"][unknown]) == {0}
     expected["age"][unknown] = [row[OUTPUTS.index("age")] for row in np.array(outputs.rows)[unknown]]
@@ -56,7 +57,7 @@ async def follows_model(dut):
     assert at_next_strobe.rows[1:] == outputs.rows[:-1], "the outputs must stay until the next strobe"
 
 
-@pytest.mark.parametrize(("name", "half"), [("narrow", 5)])
+@pytest.mark.parametrize(("name", "half"), [("mhz", 3), ("narrow", 5)])
 def test_rtl(name, half):
     simulate(__file__, make, name=name, half=half)
 
