@@ -11,6 +11,7 @@ import numpy as np
 from ...model.design import Timing
 from ...model.stamped import Edges
 from ..world.advance import Moment
+from ..world.bristles import Bent, Bristled
 from ..world.converter import Converter
 from ..world.encoder import Encoder
 from ..world.euler import Stepped
@@ -20,6 +21,7 @@ from ..world.rigid import Motion, Rigid, Span
 from ..world.taylor import Train
 from .record import Kept
 
+Plant = Rigid | Bristled | Train | Stepped
 EDGE_CAPACITY = 1 << 14
 """The most edges in one sample before the loop gives up, far beyond the limit of any decoder."""
 
@@ -31,13 +33,13 @@ class World(NamedTuple):
     drive: of the sample itself, or of a later one if samples overlap.
     """
 
-    plant: Rigid | Train | Stepped
+    plant: Plant
     encoder: Encoder
     converter: Converter | None
     push_n: float  # steady push of the motor, added to the wall's force
     force_lsb_n: float
     timing: Timing
-    before: Span | float  # a `Span` for a `Rigid`, else s
+    before: Span | float  # a `Span` for a `Rigid` or a `Bristled`, else s
     after: Span | float
     sweep: "Sweep | None" = None
 
@@ -58,7 +60,7 @@ class Progress(NamedTuple):
     sample: int
     moment: Moment
     force_n: float
-    taken: tuple[Motion | State, ...]  # at the strobe of `sample`, and of those that overlap it but the last
+    taken: tuple[Motion | Bent | State, ...]  # at the strobe of `sample`, and of those that overlap it but the last
 
 
 class Memory(NamedTuple):

@@ -5,15 +5,16 @@ import math
 from ...model import quadrature
 from ...model.design import overlap_of
 from ...model.stamped import Controller, room_for
-from ..loop.values import EDGE_CAPACITY, Progress, Sweep, World
+from ..loop.values import EDGE_CAPACITY, Plant, Progress, Sweep, World
 from ..world import device
 from ..world.advance import Interval, Moment, advance
+from ..world.bristles import Bent, Bristled
 from ..world.converter import AS_IT_IS, Converter, Pulse, converted, width_of
 from ..world.encoder import Cell, Encoder, locate
 from ..world.euler import Stepped, stepped
 from ..world.linear import State
-from ..world.rigid import Coulomb, Handle, Motion, Rigid, span
-from ..world.taylor import Train
+from ..world.presliding import bristled, fastest_per_s
+from ..world.rigid import Coulomb, Handle, Motion, Rigid, Span, span
 from .schema import Scene
 
 MARGIN_COUNTS = 1e-6
@@ -41,6 +42,19 @@ def device_of(scene: Scene) -> device.Device | None:
     if hand:
         parts["hand"] = device.Hand(**hand.model_dump())
     return device.Device(**parts)
+
+
+def bristled_of(scene: Scene) -> Bristled:
+    """Return the handle of a scene with a section `presliding`."""
+    handle, bristles = Handle(scene.handle.mass_kg, scene.handle.viscous_n_s_per_m), scene.presliding
+    return bristled(
+        handle,
+        scene.handle.coulomb_n,
+        bristles.stiffness_n_per_m,
+        bristles.damping_n_s_per_m or 0.0,
+        scene.sticking_n,
+        bristles.stribeck_m_per_s or math.inf,
+    )
 
 
 def _pulse(scene: Scene) -> Pulse:
@@ -78,6 +92,8 @@ def work_of(world: World) -> int:
     plant = world.plant
     if isinstance(plant, Rigid):
         return 1
+    if isinstance(plant, Bristled):
+        return 2 + int(world.timing.clocks_per_sample / world.encoder.clock_hz * fastest_per_s(plant))
     step_s = plant.step_s if isinstance(plant, Stepped) else plant.leg_s
     pulses = world.timing.clocks_per_sample // plant.pulse.period if plant.pulse.period else 0
     return 1 + int(world.timing.clocks_per_sample / world.encoder.clock_hz / step_s) + 2 * pulses
@@ -90,7 +106,10 @@ def world_of(scene: Scene) -> World:
     after_s = after / spec.clock_hz
     before_s = (timing.clocks_per_sample - after) / spec.clock_hz
     parts = device_of(scene)
-    if parts is None:
+    if scene.presliding:
+        plant = bristled_of(scene)
+        before, after = span(plant.handle, before_s), span(plant.handle, after_s)
+    elif parts is None:
         handle = Handle(scene.handle.mass_kg, scene.handle.viscous_n_s_per_m)
         coulomb = Coulomb(scene.handle.coulomb_n) if scene.handle.coulomb_n else None
         plant, before, after = Rigid(handle, coulomb), span(handle, before_s), span(handle, after_s)
@@ -156,17 +175,19 @@ def start_of(scene: Scene, world: World) -> Progress:
     return Progress(0, Moment(motion, cell, 0), push_n, taken)
 
 
-def _rest_at(position_m: float, plant: Rigid | Train | Stepped, push_n: float) -> Motion | State:
-    """Return a plant at rest at a place."""
+def _rest_at(position_m: float, plant: Plant, push_n: float) -> Motion | Bent | State:
+    """Return a plant at rest at a place, its bristles straight."""
     if isinstance(plant, Rigid):
         return Motion(position_m, 0.0)
+    if isinstance(plant, Bristled):
+        return Bent(position_m, 0.0, 0.0)
     width = width_of(plant.pulse, push_n) if plant.pulse.period else 0
     return State(position_m, 0.0, (0.0, 0.0, 0.0), width)
 
 
-def _pushed(world: World, motion: Motion | State, push_n: float, clocks: int) -> Motion | State:
+def _pushed(world: World, motion: Motion | Bent | State, push_n: float, clocks: int) -> Motion | Bent | State:
     """Return the motion after clocks of the push, which end at clock 0; nobody looks at the encoder meanwhile."""
     seconds = clocks / world.encoder.clock_hz
-    length = span(world.plant.handle, seconds) if isinstance(world.plant, Rigid) else seconds
+    length = span(world.plant.handle, seconds) if isinstance(world.before, Span) else seconds
     moment, interval = Moment(motion, EVERYWHERE, 0), Interval(length, -clocks, clocks)
     return advance(world.plant, world.encoder, moment, push_n, interval, room_for(1)).motion

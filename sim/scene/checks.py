@@ -7,7 +7,8 @@ from ...model.quadrature_speed import max_edge_rate
 from ...model.words import Word
 from ..world import device
 from ..world.euler import longest_s
-from .build import device_of
+from ..world.presliding import fastest_per_s
+from .build import bristled_of, device_of
 from .schema import Scene
 from .sentences import plain
 from .several import GAIN_WORDS
@@ -55,6 +56,8 @@ def check(scene: Scene) -> None:
         _check_amplifier(scene)
     if scene.output is not None:
         _check_output(scene)
+    if scene.presliding is not None:
+        _check_presliding(scene)
     _check_device(scene)
     if scene.zwidth is not None:
         _check_map(scene)
@@ -191,6 +194,21 @@ def _check_output(scene: Scene) -> None:
     if period % output.pwm_steps:
         raise ValueError(
             f"output.pwm_steps must divide the {period} clocks of a carrier's period, not {output.pwm_steps!r}"
+        )
+
+
+def _check_presliding(scene: Scene) -> None:
+    scene.presliding.check(scene.handle.coulomb_n)
+    if device_of(scene) is not None:
+        raise ValueError(
+            "presliding must be absent beside amplifier.bandwidth_hz, motor, transmission, hand, solver and pulses of "
+            "output: bristles are solved for a handle that the force drives directly"
+        )
+    fastest, most = fastest_per_s(bristled_of(scene)), device.LEGS_MAX * scene.spec.sample_hz
+    if not fastest <= most:
+        raise ValueError(
+            f"presliding and handle must change at no more than {most:g} 1/s together, {device.LEGS_MAX} steps of the "
+            f"solver a sample, not {fastest:g}"
         )
 
 

@@ -18,6 +18,7 @@ from ...model.requirements import EDGE_ERROR_COUNTS
 from ...model.spec import AxisSpec
 from .drive import DriveSection
 from .encoder_section import EncoderSection
+from .presliding_section import PreslidingSection
 from .quantities import (
     Acceleration,
     Bandwidth,
@@ -191,6 +192,7 @@ class Scene(Section):
 
     name: str
     handle: HandleSection
+    presliding: PreslidingSection | None = None
     encoder: EncoderSection
     controller: ControllerSection
     wall: WallSection
@@ -280,6 +282,12 @@ class Scene(Section):
         changes = {} if start is None else dict(zip(("start_counts", "start_periods"), start, strict=True))
         protocol = self.protocol.model_copy(update=changes)
         return self.model_copy(update={"wall": self.wall.model_copy(update=wall), "protocol": protocol})
+
+    @property
+    def sticking_n(self) -> float:
+        """The most that dry friction holds at rest."""
+        bristles = self.presliding
+        return (bristles and bristles.static_n) or self.handle.coulomb_n or 0.0
 
     @property
     def delay_samples(self) -> int:

@@ -100,7 +100,7 @@ class Hit(Summary):
         scene, stiffness = self.scene, self.scene.wall.stiffness_n_per_m
         hand, cable = scene.hand, scene.transmission
         carried_n = scene.protocol.push_n + (hand.stiffness_n_per_m * (hand.rest_m - self.mean_m) if hand else 0.0)
-        slack_n = (scene.handle.coulomb_n or 0.0) + output_step_n(scene)
+        slack_n = scene.sticking_n + output_step_n(scene)
         hidden_m = scene.encoder.count_m + self.rms_m
         if cable and cable.encoder_at == "motor":
             hidden_m += (abs(carried_n) + slack_n) / cable.stiffness_n_per_m

@@ -1,7 +1,7 @@
-"""Advancing a device and its encoder together over an interval of constant force: the contract of all three solvers.
+"""Advancing a device and its encoder together over an interval of constant force: the contract of all four solvers.
 
-Which of them runs is decided by the class of the plant: `rigid` (closed form), `taylor` (polynomials to rounding) and
-`euler` (fixed steps) register their variants here.
+Which of them runs is decided by the class of the plant: `rigid` (closed form), `presliding` (that and power series),
+`taylor` (polynomials to rounding) and `euler` (fixed steps) register their variants here.
 """
 
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from .encoder import Cell
 class Interval(NamedTuple):
     """A length of time under one force."""
 
-    length: object  # in the form that the solver takes: a `rigid.Span` for a `rigid.Rigid`, else seconds
+    length: object  # in the form that the solver takes: a `rigid.Span` for a rigid handle, else seconds
     clock: int  # number of the clock at which it starts
     clocks: int  # its length in clocks of the encoder, at least 1
 
@@ -21,7 +21,7 @@ class Interval(NamedTuple):
 class Moment(NamedTuple):
     """The state of plant and encoder between two intervals."""
 
-    motion: object  # a `rigid.Motion` for a `rigid.Rigid`, else a `linear.State`
+    motion: object  # a `rigid.Motion`, a `bristles.Bent` or a `linear.State`, as the plant has it
     cell: Cell  # the encoder's cell, which holds its position; `encoder.locate` gives the first
     n_edges: int  # edges that are on their way to the controller; negative: edges were lost
 
@@ -41,7 +41,7 @@ def advance(plant, encoder, moment, force_n, interval, edges):
     """Return the `Moment` after one `Interval` of constant applied force.
 
     Args:
-        plant: a `rigid.Rigid`, a `taylor.Train` or a `euler.Stepped`.
+        plant: a `rigid.Rigid`, a `bristles.Bristled`, a `taylor.Train` or a `euler.Stepped`.
         encoder: an `Encoder`.
         moment: the `Moment` at the start.
         force_n: force of motor and wall together (N), positive towards positive positions.

@@ -29,11 +29,11 @@ def measure(series):
 
 
 @compiled
-def halve(series):
-    """Restrict the polynomials to the leg's first half."""
+def shorten(series, part):
+    """Restrict the polynomials to the first part of the leg, 0 to 1."""
     share = 1.0
     for j in range(FIRST + 1, len(series)):
-        share *= 0.5
+        share *= part
         for number in range(series.shape[1]):
             series[j, number] *= share
     measure(series)
@@ -65,9 +65,13 @@ def stays(series, number, low, high):
 
 @compiled
 def root(series, number, wanted, after):
-    """Return the time, `after` to 1, at which a monotone polynomial passes `wanted`, by Newton's method."""
+    """Return the time, `after` to 1, at which a monotone polynomial passes `wanted`, by Newton's method.
+
+    Where it begins with a slope of 0, the wanted value says which way it goes.
+    """
     low, high = after, 1.0
-    rising = series[FIRST + 1, number] > 0.0
+    slope = series[FIRST + 1, number]
+    rising = slope > 0.0 or (slope == 0.0 and wanted > series[FIRST, number])
     time = 0.5 * (low + high)
     for _ in range(60):
         here, slope = value(series, number, time)

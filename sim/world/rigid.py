@@ -52,6 +52,15 @@ class Motion(NamedTuple):
     velocity_m_per_s: float
 
 
+class Leg(NamedTuple):
+    """A part of an interval, s, with a motion in one direction under one net force."""
+
+    start: Motion
+    net_n: float
+    since_s: float
+    until_s: float
+
+
 class Span(NamedTuple):
     """A length of time and its coefficients in the two equations of this file."""
 
@@ -178,6 +187,21 @@ def resume(handle, coulomb, rest, force_n, seconds):
     return glide(rest, net_force(coulomb, rest, force_n), span(handle, seconds))
 
 
+@inlined
+def glide_past(handle, encoder, leg, end_m, cell, n_edges, interval, edges):
+    """Append the edges that a `Leg` passes on its way to `end_m`; return (cell, n_edges), or -1 if they are full."""
+    room = min(len(edges.clocks), len(edges.levels))
+    while not cell.lower_m <= end_m < cell.upper_m and 0 <= n_edges < room:
+        upwards = end_m >= cell.upper_m
+        travel_m = (cell.upper_m if upwards else cell.lower_m) - leg.start.position_m
+        at_s = leg.since_s + reach(handle, leg.start, leg.net_n, leg.until_s - leg.since_s, travel_m)
+        edges.clocks[n_edges] = stamp(encoder, cell, upwards, at_s, interval)
+        cell = next_cell(encoder, cell, upwards)
+        edges.levels[n_edges] = level(cell.number)
+        n_edges += 1
+    return cell, n_edges if cell.lower_m <= end_m < cell.upper_m else -1
+
+
 @advance_quietly.register(Rigid)
 @inlined
 def _advance_quietly(plant, moment, force_n, interval):
@@ -204,24 +228,15 @@ def _advance(plant, encoder, moment, force_n, interval, edges):
     seconds = interval.length.seconds
     net_n = net_force(coulomb, motion, force_n)
     whole = glide(motion, net_n, interval.length)
-    # A leg is a motion in one direction under one net force. A turn divides the interval into two legs.
+    # A turn divides the interval into two legs.
     start, since_s = motion, 0.0
     end, until_s = whole, seconds
     turning = turned(motion, whole)
     if turning:
         until_s, end = turn(handle, motion, net_n, seconds)
-    room = min(len(edges.clocks), len(edges.levels))
     while True:
-        while not cell.lower_m <= end.position_m < cell.upper_m and 0 <= n_edges < room:
-            upwards = end.position_m >= cell.upper_m
-            travel_m = (cell.upper_m if upwards else cell.lower_m) - start.position_m
-            at_s = since_s + reach(handle, start, net_n, until_s - since_s, travel_m)
-            edges.clocks[n_edges] = stamp(encoder, cell, upwards, at_s, interval)
-            cell = next_cell(encoder, cell, upwards)
-            edges.levels[n_edges] = level(cell.number)
-            n_edges += 1
-        if not cell.lower_m <= end.position_m < cell.upper_m:
-            n_edges = -1
+        leg = Leg(start, net_n, since_s, until_s)
+        cell, n_edges = glide_past(handle, encoder, leg, end.position_m, cell, n_edges, interval, edges)
         if not turning:
             return Moment(end, cell, n_edges)
         turning = False

@@ -30,7 +30,7 @@ from .linear import (
     phase_number,
     stretch,
 )
-from .polynomials import FIRST, NEVER, UNSURE, at, halve, leaves, measure, root, stays
+from .polynomials import FIRST, NEVER, UNSURE, at, leaves, measure, root, shorten, stays
 
 HALVINGS = 40
 """Halvings of a leg after which the values at its ends alone decide: by then it is as short as rounding."""
@@ -105,20 +105,22 @@ def _switches(series, most, limited, surely):
 
 
 @compiled
-def _emit(train, encoder, cell, n_edges, leg, interval, edges):
+def emit(series, number, encoder, cell, n_edges, leg, interval, edges):
     """Append the edges that the encoder passes in a leg; return (cell, n_edges).
 
     Args:
+        series: the polynomials of the leg.
+        number: number of the encoder's position among them; it is monotone.
         leg: (its beginning in the interval, s; its length, s; its time of 0 to 1 at which the search ends).
 
     If the arrays are full, the returned n_edges is -1.
     """
-    series, (now_s, seconds, end) = train.series, leg
+    now_s, seconds, end = leg
     room = min(len(edges.clocks), len(edges.levels))
-    seen_m, passed = at(series, SEEN, end), 0.0
+    seen_m, passed = at(series, number, end), 0.0
     while not cell.lower_m <= seen_m < cell.upper_m and 0 <= n_edges < room:
         upwards = seen_m >= cell.upper_m
-        passed = root(series, SEEN, cell.upper_m if upwards else cell.lower_m, passed)
+        passed = root(series, number, cell.upper_m if upwards else cell.lower_m, passed)
         at_s = now_s + min(passed, end) * seconds
         edges.clocks[n_edges] = stamp(encoder, cell, upwards, at_s, interval)
         cell = next_cell(encoder, cell, upwards)
@@ -146,11 +148,12 @@ def _stretch(train, encoder, moment, command_n, since_s, until_s, interval, edge
             switches = NEVER if blind else _switches(series, train.voltage_limit_n, limited, surely)
             if surely or ((inside or one_way) and UNSURE not in (breaks, switches)):
                 break
-            halve(series)
+            shorten(series, 0.5)
             seconds *= 0.5
         end = min(breaks, switches, 1.0)
         if not inside:
-            cell, n_edges = _emit(train, encoder, cell, n_edges, (now_s, seconds, end), interval, edges)
+            leg = now_s, seconds, end
+            cell, n_edges = emit(series, SEEN, encoder, cell, n_edges, leg, interval, edges)
             if n_edges < 0:
                 break
         others = at(series, 2, end), at(series, 3, end), at(series, 4, end)

@@ -9,10 +9,10 @@ from hardwall.sim.world.polynomials import (
     NEVER,
     UNSURE,
     at,
-    halve,
     leaves,
     measure,
     root,
+    shorten,
     stays,
     value,
 )
@@ -35,7 +35,7 @@ def test_values_and_halves():
         )
         assert at(series, 1, 1.0) == pytest.approx(polynomial(1.0), rel=1e-12, abs=1e-13)
         assert at(series, 0, time) == 0.0
-        halve(series)
+        shorten(series, 0.5)
         assert at(series, 1, 1.0) == pytest.approx(polynomial(0.5), rel=1e-12, abs=1e-13)
 
 
