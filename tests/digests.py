@@ -74,12 +74,15 @@ GRID = setting(
     damping_to_n_s_per_m=180.0,
     damping_step_n_s_per_m=40.0,
 )
+LUGRE = {"damping_n_s_per_m": 300.0, "static_n": 0.15, "stribeck_m_per_s": 1e-3}
 # Parts of a device that no built-in scene has.
 VARIANTS = {
     "euler": ("drive-2011", setting("solver", step_s=2e-5)),
     "euler-rigid": ("seed-2011", setting("solver", step_s=2e-5)),
     "hand": ("seed-2011", setting("hand", mass_kg=0.1, damping_n_s_per_m=2.0, stiffness_n_per_m=50.0, rest_m=1e-3)),
     "encoder-errors": ("seed-2011", setting("encoder", phase_error_counts=0.3, duty_error_counts=0.1)),
+    "dahl": ("seed-2011", setting("presliding", model="dahl", stiffness_n_per_m=1e5)),
+    "lugre": ("seed-2011", setting("presliding", model="lugre", stiffness_n_per_m=1e5, **LUGRE)),
     "encoder-at-motor": ("drive-2011", setting("transmission", encoder_at='"motor"')),
     "voltage": ("drive-2011", setting("amplifier", bandwidth_hz="", current_limit_a="")),
     "pwm": ("mhz", setting("output", full_scale_n=40.0, pwm_carrier_hz=50_000, pwm_steps=1000)),

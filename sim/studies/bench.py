@@ -28,14 +28,21 @@ COCOTB_SAMPLES = 2000
 
 
 def _parts(sample_s: float) -> dict[str, dict]:
-    """Return changes that give a scene one optional part, too slight to alter the motion; the last has all of them."""
+    """Return changes that give a scene one optional part, too slight to alter the motion but for bristles, which are
+    those of LuGre's paper; the last has all of them that go together."""
     bare = {"handle.coulomb_n": None, "amplifier": None}
     cable = {"transmission.stiffness_n_per_m": 1e6, "transmission.damping_n_s_per_m": 10.0}
     motor = {"resistance_ohm": 2.0, "inductance_h": 3e-4, "torque_constant_n_m_per_a": 0.04}
     motor |= {"voltage_limit_v": 48.0, "pulley_radius_m": 0.01}
+    alone = dict.fromkeys(("motor", "transmission", "hand", "output", "solver"))
+    bristles = {"handle.coulomb_n": 0.1, "presliding.stiffness_n_per_m": 1e5}
+    lugre = {"model": "lugre", "damping_n_s_per_m": 300.0, "static_n": 0.15, "stribeck_m_per_s": 1e-3}
+    lugre = {f"presliding.{key}": value for key, value in lugre.items()}
     return {
         "none": bare,
         "coulomb friction": bare | {"handle.coulomb_n": 1e-12},
+        "bristles, Dahl's model": bare | alone | bristles | {"presliding.model": "dahl"},
+        "bristles, LuGre's model": bare | alone | bristles | lugre,
         "amplifier delay": {"handle.coulomb_n": None, "amplifier.delay_s": sample_s},
         "encoder phase error": bare | {"encoder.phase_error_counts": 1e-9},
         "converter": bare | {"output.full_scale_n": 64.0, "output.dac_bits": 32},

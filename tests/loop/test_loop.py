@@ -13,6 +13,7 @@ from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load
 from hardwall.sim.studies.bench import under_cocotb
 from hardwall.sim.walls import hit
+from stimuli.bristles import DAHL_KEYS, LUGRE_KEYS
 from stimuli.lengths import LONG
 from stimuli.outputs import EVERY_OUTPUT
 from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, TWO_SECONDS
@@ -75,6 +76,14 @@ def test_rtl_gives_the_models_force_words_with_an_imperfect_encoder(estimator):
     slow = {} if estimator in WHOLE else SLOW
     result = same_words("seed-2011", ESTIMATORS[estimator] | UNSTABLE | errors | ONE_SECOND | slow)
     assert result.max_force_n > 1
+
+
+@pytest.mark.parametrize("keys", [DAHL_KEYS, LUGRE_KEYS], ids=["dahl", "lugre"])
+def test_rtl_gives_the_models_force_words_on_bristles(keys):
+    result = same_words("seed-2011", keys | STABLE | ONE_SECOND | SLOW)
+    assert result.samples == 10_000
+    assert result.max_force_n > 1
+    assert result.force_sha256 != hit.run(load("seed-2011", STABLE | ONE_SECOND | SLOW), "fixed").force_sha256
 
 
 @pytest.mark.parametrize("output", ["dac", "pwm"] if LONG else ["dac"])

@@ -8,9 +8,11 @@ from hypothesis import strategies as st
 
 from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load
+from hardwall.sim.scene.presliding_section import OF_LUGRE
 from hardwall.sim.scene.schema import Scene
 from hardwall.sim.scene.sentences import sections_of
 from hardwall.sim.walls import hit
+from stimuli.bristles import LUGRE_KEYS
 
 # Thirty samples beside the wall, so that the stiffest devices do not take long either.
 BRIEF = {
@@ -22,13 +24,18 @@ BRIEF = {
 }
 # With 0 a part is left out, and the loop is compiled without it.
 LEFT_OUT = {("handle.coulomb_n", 0.0), ("amplifier.delay_s", 0.0)}
-HELD = {"handle.coulomb_n", "protocol.push_n"}
+BASES = {"seed-2011": ("seed-2011", {}), "drive-2011": ("drive-2011", {}), "bristles": ("seed-2011", LUGRE_KEYS)}
+"""Scenes by name, with what is changed first."""
+HELD = {"handle.coulomb_n", "presliding.static_n", "protocol.push_n"}
 """Keys of the handle's friction, and of what overcomes it."""
 
 
+LUGRES = [f"presliding.{key}" for key in OF_LUGRE]
+
+
 def ends_of(base: str) -> list[tuple[str, float]]:
-    """Return every number of a scene's sections with the least and the largest value that it accepts."""
-    scene, found = load(base), []
+    """Return every number of the sections of one of `BASES` with the least and the largest value that it accepts."""
+    scene, found = load(*BASES[base]), []
     for name, section in sections_of(Scene).items():
         if getattr(scene, name) is None:
             continue
@@ -41,16 +48,17 @@ def ends_of(base: str) -> list[tuple[str, float]]:
 
 
 def run(base: str, changes: dict[str, float]) -> list[hit.Hit]:
-    """Return the hits of a scene with changes on both models; none if the scene or the run is refused."""
+    """Return the hits of one of `BASES` with changes on both models; none if the scene or the run is refused."""
+    name, first = BASES[base]
     try:
-        scene = load(base, BRIEF | changes)
+        scene = load(name, BRIEF | first | changes)
         found = [hit.run(scene, backend) for backend in ("float", "fixed")]
     except (SceneError, RuntimeError) as refusal:
         told, found = str(refusal), []
     if not found:
         assert "\n" not in told
         assert len(told) < 400
-        assert told.startswith((f"{base}: ", "the handle passed more than"))
+        assert told.startswith((f"{name}: ", "the handle passed more than"))
     for result in found:
         assert all(map(math.isfinite, (result.mean_m, result.rms_m, result.max_force_n)))
         assert scene.samples <= result.samples <= scene.most_samples
@@ -59,7 +67,7 @@ def run(base: str, changes: dict[str, float]) -> list[hit.Hit]:
     return found
 
 
-@pytest.mark.parametrize("base", ["seed-2011", "drive-2011"])
+@pytest.mark.parametrize("base", BASES)
 @settings(derandomize=True, deadline=None, max_examples=60)
 @given(data=st.data())
 def test_the_ends_of_all_ranges_are_refused_or_give_finite_numbers(base, data):
@@ -69,6 +77,20 @@ def test_the_ends_of_all_ranges_are_refused_or_give_finite_numbers(base, data):
     if found and base == "seed-2011" and not HELD & changes.keys():
         start_m = changes.get("protocol.start_m", BRIEF["protocol.start_m"])
         assert all(result.mean_m != start_m for result in found), "the handle never moved"
+
+
+@pytest.mark.parametrize("end", [end for end in ends_of("bristles") if end[0].startswith("presliding")])
+def test_bristles_run_at_both_ends_of_every_key(end):
+    """LuGre's model with one key at an end, and the static level with Coulomb's beside it; Dahl's with its one key."""
+    key, value = end
+    beside = {"handle.coulomb_n": min(value, 0.1)} if key == "presliding.static_n" else {}
+    found = run("bristles", dict([end]) | beside)
+    if key == "presliding.stiffness_n_per_m":
+        found += run("bristles", dict([end]) | {"presliding.model": "dahl"} | dict.fromkeys(LUGRES))
+    if end == ("presliding.stribeck_m_per_s", 1e5):
+        assert not found, "the level falls too slowly for bristles so stiff"
+        found = run("bristles", dict([end]) | {"presliding.stiffness_n_per_m": 1e-2})
+    assert found
 
 
 @pytest.mark.parametrize("mass_kg", [1e-6, 1e3])

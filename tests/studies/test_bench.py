@@ -17,8 +17,8 @@ HIT = ("hit", SCENE, "--set", "protocol.start_m=-1e-5", *waits.SHORT, "--json")
 COMMANDS = {"fixed (samples/s)": Command(HIT, 1, speed=True), "a hit, nothing compiled (s)": Command(HIT, 1, cold=True)}
 
 PARTS = (
-    "none", "coulomb friction", "amplifier delay", "encoder phase error", "converter", "amplifier lag",
-    "amplifier lag, motor, cable, friction",
+    "none", "coulomb friction", "bristles, Dahl's model", "bristles, LuGre's model", "amplifier delay",
+    "encoder phase error", "converter", "amplifier lag", "amplifier lag, motor, cable, friction",
 )[: None if LONG else 1]  # fmt: skip
 """What is timed of a device: each has its own loop to compile, so the short form has none of the parts."""
 
