@@ -18,7 +18,7 @@ from stimuli.bristles import COULOMB_N, DAHL, HANDLE, LUGRE, STATIC_N
 from stimuli.moves import ANYWHERE, after
 
 PLANTS = {"dahl": DAHL, "lugre": LUGRE}
-FINE = Encoder(1e-8, 1e8)
+FINE, COARSE = Encoder(1e-8, 1e8), Encoder(2e-5, 1e8)
 
 
 def ends(quantity):
@@ -43,24 +43,27 @@ def test_edges_are_stamped_where_the_motion_passes_them(name):
     A stamp may be off by rounding where an edge is passed at the very clock: no such case is in these.
     """
     plant, rng = PLANTS[name], np.random.default_rng(1)
-    passed = 0
-    for case in range(12):
-        start = Bent(float(rng.normal()) * 1e-7, [0.0, 2e-3, -1e-2][case % 3], float(rng.uniform(-1, 1)) * 1e-6)
+    passed, full = 0, 0
+    for case in range(16):
+        velocity = [0.0, 2e-3, -1e-2, 2.0][case % 4]
+        encoder = FINE if abs(velocity) < 1 else FINE._replace(count_m=2e-7)
+        start = Bent(float(rng.normal()) * 1e-7, velocity, float(rng.uniform(-1, 1)) * 1e-6)
         force, clocks = float(rng.normal(0, 0.15)), 4000
-        end, stamps = moved(plant, FINE, start, force, clocks / 1e8, clocks)
+        end, stamps = moved(plant, encoder, start, force, clocks / 1e8, clocks)
         assert (np.diff(stamps) >= 0).all()
         assert ((stamps > 0) & (stamps <= clocks)).all()
-        first = locate(FINE, start.position_m).number
-        for clock in np.unique(np.concatenate([stamps, stamps - 1, rng.integers(1, clocks, 5)])):
+        some = rng.permutation(stamps)[:60]
+        for clock in np.unique(np.concatenate([some, some - 1, rng.integers(1, clocks, 5)])):
             if not 0 < clock <= clocks:
                 continue
             there = after(plant, start, force, span(plant.handle, clock / 1e8))
-            number, turns = locate(FINE, there.position_m).number, moved(plant, FINE, start, force, clock / 1e8, clock)
-            assert turns[0].cell.number == number
-            assert len(turns[1]) == np.searchsorted(stamps, clock, "right")
+            until, before = moved(plant, encoder, start, force, clock / 1e8, clock)
+            assert until.cell.number == locate(encoder, there.position_m).number
+            assert len(before) == np.searchsorted(stamps, clock, "right")
         passed += len(stamps)
-        assert abs(end.cell.number - first) <= len(stamps)
+        full += abs(end.motion.bend_m) == plant.full_m != abs(start.bend_m)
     assert passed > 100
+    assert full > 2, "bristles fill, and edges are passed after that"
 
 
 @pytest.mark.parametrize("name", PLANTS)
@@ -77,6 +80,30 @@ def test_full_bristles_are_rigid_coulomb_friction(name):
         assert surely
         assert quiet.motion == (*expected, start.bend_m)
         assert after(plant, start, force, length) == (*expected, start.bend_m)
+
+
+@pytest.mark.parametrize("name", PLANTS)
+def test_an_interval_is_quiet_only_without_an_event(name):
+    """An edge, a turn, and by LuGre's model a level that begins to rise; and then the other path has its result."""
+    plant, rng = PLANTS[name], np.random.default_rng(6)
+    free = plant.stribeck.free_m_per_s if plant.stribeck else 0.0
+    said = {"edge": 0, "slow": 0, "bent": 0, "quiet": 0}
+    for _ in range(600):
+        sign, bent = float(rng.choice([-1, 1])), bool(rng.random() < 0.1)
+        start = Bent(0.0, sign * float(10 ** rng.uniform(-3, -1)), sign * plant.full_m * (0.5 if bent else 1.0))
+        force, interval = float(rng.normal(0, 5)), Interval(span(plant.handle, 1e-3), 0, 100_000)
+        moment = Moment(start, locate(COARSE, 0.0), 0)
+        quiet, surely = advance_quietly(plant, moment, force, interval)
+        end, stamps = moved(plant, COARSE, start, force, 1e-3, 100_000)
+        ideal = Rigid(plant.handle, Coulomb(COULOMB_N))
+        slowest = sign * after(ideal, Motion(0.0, start.velocity_m_per_s), force, interval.length).velocity_m_per_s
+        slow = min(slowest, abs(start.velocity_m_per_s)) <= free
+        cause = "bent" if bent else "slow" if slow else "edge" if len(stamps) else "quiet"
+        said[cause] += 1
+        assert surely == (cause == "quiet"), cause
+        if surely:
+            assert quiet == end
+    assert min(said.values()) > 20, said
 
 
 def test_dahls_full_bristles_turn_where_coulomb_friction_turns():
