@@ -7,7 +7,6 @@ from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
-from amaranth.hdl import Cat
 from amaranth.lib import wiring
 
 from hardwall.hdl.arithmetic.divide import Divide
@@ -15,11 +14,11 @@ from hardwall.hdl.arithmetic.signed_divide import SignedDivide
 from hardwall.hdl.arithmetic.sqrt import Sqrt
 from hardwall.hdl.estimators import (
     butterworth,
+    edge_kalman,
     finite_difference,
-    foaw,
     kalman,
-    least_squares,
     levant,
+    levant_edge,
     levant_semi_implicit,
     mt,
     mt_divisionless,
@@ -33,16 +32,12 @@ from hardwall.hdl.output import Output
 from hardwall.hdl.quadrature import Quadrature
 from hardwall.hdl.scale_map import ScaleMap
 from hardwall.hdl.wall import Wall
-from hardwall.model.arithmetic.divisionless import digits
-from hardwall.model.estimators.foaw import TAPS
-from hardwall.model.estimators.levant_adaptive import RAISED
-from hardwall.model.quadrature import START
 from hardwall.model.scale_map import Design as Bins
 from stimuli.specs import spec
 
+from . import ranges
 from .bench import Bench
 from .bugs import Bug
-from .of_arithmetic import root_keeps
 from .property import Property
 from .widths import Widths
 
@@ -54,86 +49,6 @@ QUICK = ("wall",)
 
 def estimator(name: str, axis: str) -> EstimatorBlock:
     return block_of(spec(axis, name).design.estimator)
-
-
-def phase(bench: Bench, stage: Output) -> None:
-    bench.within(phase=(0, stage.design.decimation - 1))
-
-
-def start(bench: Bench, decoder: Quadrature) -> None:
-    bench.within(starting=(0, START.starting))
-
-
-def levants(bench: Bench, block: wiring.Component) -> None:
-    velocity, error = block.design.velocity, block.design.error
-    root_keeps(bench, "root.")
-    bench.within(u1=velocity.max, next_u1=velocity.max, lead=error.max + velocity.max)
-
-
-def levant_alone(bench: Bench, block: wiring.Component) -> None:
-    """Promise that u1 with the steps of the digits so far leaves room for those of the digits that are left.
-
-    A sum goes up by a digit's place, takes in two bits, and adds three steps at most.
-    """
-    inner, design, root_path = bench.inner, block.design, "square_root."
-    root_keeps(bench, root_path)
-    total, left, digits = inner["total"], inner[f"{root_path}left"], len(inner["low"]) // 2
-    rooting = bench.state("ROOT")
-    bench.promise(rooting == (left != 0))
-    bench.promise(bench.state("PREPARE") | (inner["e"] >= -design.error.max) & (inner["e"] <= design.error.max))
-    lambda_ = (1 << len(inner["step"]) - 1) - 1
-    bench.within(step=lambda_, triple=3 * lambda_, relay=design.alpha.max)
-    finer = len(inner["step"]) - 1 - design.lambda_.width + design.product - design.velocity.f
-    room = (((-design.velocity.min << finer) + lambda_ + 1) >> 2 * digits + 1) + 1
-    for taken in range(digits + 1):
-        bench.promise((left != digits - taken) | (total >= -room) & (total <= room))
-        room = 4 * room + 3 + 3 * lambda_
-    shifted = Cat(inner["low"][-2:], total).as_signed()
-    for number, more in enumerate((0, inner["step"], inner["step"] << 1, inner["triple"])):
-        bench.promise(~rooting | (inner[f"sum_{number}"] == shifted + more))
-
-
-def adaptive(bench: Bench, block: wiring.Component) -> None:
-    """Promise that the counters of the law stop before their next threshold, too."""
-    levants(bench, block)
-    levels, inner = block.design.levels, bench.inner
-    bench.within(reached=(0, levels), _level=(0, RAISED + levels), calm=(0, block.design.hold_samples(levels - 1) - 1))
-    for level in range(levels):
-        bench.promise((inner["reached"] != level) | (inner["elapsed"] < block.design.reach_samples(level + 1)))
-
-
-def past(bench: Bench, block: wiring.Component) -> None:
-    design = block.design.history
-    bench.within(**{"history.phase": (0, design.every - 1), "history.step": design.change.max})
-
-
-def edges(bench: Bench, block: wiring.Component) -> None:
-    design = block.design
-    bench.within(**{"edges.phase": (0, design.half - 1), "edges.moved": (0, design.edges_max)})
-
-
-def scaled_edges(bench: Bench, block: wiring.Component) -> None:
-    edges(bench, block)
-    bench.within(scaled=(0, block.design.edges_max * block.design.clocks))
-
-
-def digits_left(bench: Bench, block: wiring.Component) -> None:
-    edges(bench, block)
-    bench.promise(bench.inner["speed.left"] <= digits(block.design.velocity.width)[0])
-
-
-def fit(bench: Bench, block: wiring.Component) -> None:
-    past(bench, block)
-    bench.within(clock=(0, least_squares.FIRST + block.design.taps))
-
-
-def nothing(bench: Bench, block: wiring.Component) -> None:
-    """Promise nothing more."""
-
-
-def search(bench: Bench, block: wiring.Component) -> None:
-    past(bench, block)
-    bench.within(clock=(0, foaw.FIRST + TAPS + 3))
 
 
 class Case(NamedTuple):
@@ -151,7 +66,7 @@ class Case(NamedTuple):
     make: Callable[[str], wiring.Component]
     wraps: tuple[str, ...]
     bug: Bug
-    keeps: Callable[[Bench, wiring.Component], None] = nothing
+    keeps: Callable[[Bench, wiring.Component], None] = ranges.nothing
     axes: tuple[str, ...] = AXES
     promise: str = "no arithmetic wraps but where it is meant to"
 
@@ -160,9 +75,15 @@ class Case(NamedTuple):
 # shift bits out, and their exact result is proven; a counter that its next assignment clears may pass its end.
 MOVED = ("moved",)
 DIGITS = ("digits", "remainder", "quotient")
+ROOTED = (*MOVED, "digits")
 HISTORY = (*MOVED, "head", "read__addr", "write__data", "data", "position", "change")
 CYCLES = (*DIGITS, *MOVED, "age", "change", "gap", "cycles", "kind", "behind", "samples")
 EDGES = ("number", "age", "between", "passed")
+STAMPED = (*DIGITS, "to", "passed", "waited", "interval", "measure", "age")
+# What a state that uses a time or a length finds is promised; else they may be cut too short.
+TIMES = ("time", "kept", "more", "few", "halves")
+# Both are what a weight between 0 and 1 makes of an error, which a free product does not know.
+WEIGHTED = ("mean", "place")
 # What the parts of a quotient by multiplications may be follows from its products, one from another.
 PRODUCTS = ("dividend", "t", "x", "remainder", "made", "left")
 # What the sum of a fit may be follows from its coefficients, one by one.
@@ -180,14 +101,14 @@ CASES = {
         lambda axis: Quadrature(20, 16),
         ("count", "seen__stamp"),
         Bug(Quadrature.elaborate, "held >= self.glitch_clocks", "held > self.glitch_clocks"),
-        start,
+        ranges.start,
         ALONE,
     ),
     "sqrt": Case(
         lambda axis: Sqrt(31),
         ("digits",),
         Bug(Sqrt.elaborate, "Signal(2 * clocks + 1)", "Signal(2 * clocks)"),
-        lambda bench, _: root_keeps(bench),
+        lambda bench, _: ranges.root_keeps(bench),
         ALONE,
     ),
     "divide": Case(
@@ -211,7 +132,7 @@ CASES = {
         lambda axis: Output(spec(axis).design.output),
         (),
         Bug(Output.elaborate, "design.slew.max + design.force.max + 1", "design.slew.max + 1"),
-        phase,
+        ranges.phase,
     ),
     "fdm": Case(
         partial(estimator, "fdm"),
@@ -223,11 +144,13 @@ CASES = {
         partial(estimator, "levant"),
         (*MOVED, "digits", "low", *(f"sum_{number}" for number in range(4))),
         Bug(levant.Estimator._corrected, "design.lambda_.width + coarser + 1", "design.lambda_.width + coarser"),
-        levant_alone,
+        ranges.levant_alone,
     ),
-    "levant-semi-implicit": Case(partial(estimator, "levant-semi-implicit"), (*MOVED, "digits"), PRODUCT, levants),
-    "levant-implicit": Case(partial(estimator, "levant-implicit"), (*MOVED, "digits"), PRODUCT, levants),
-    "levant-adaptive": Case(partial(estimator, "levant-adaptive"), (*MOVED, "digits"), PRODUCT, adaptive),
+    "levant-semi-implicit": Case(
+        partial(estimator, "levant-semi-implicit"), (*MOVED, "digits"), PRODUCT, ranges.levants
+    ),
+    "levant-implicit": Case(partial(estimator, "levant-implicit"), (*MOVED, "digits"), PRODUCT, ranges.levants),
+    "levant-adaptive": Case(partial(estimator, "levant-adaptive"), (*MOVED, "digits"), PRODUCT, ranges.adaptive),
     "butterworth": Case(
         partial(estimator, "butterworth"),
         MOVED,
@@ -244,19 +167,19 @@ CASES = {
         MOVED,
         Bug(tracking_loop.Estimator.elaborate, "_bandwidth)))", "_bandwidth) - 1))"),
     ),
-    "window": Case(partial(estimator, "window"), (*HISTORY, *DIGITS), FAST, past),
+    "window": Case(partial(estimator, "window"), (*HISTORY, *DIGITS), FAST, ranges.past),
     "foaw": Case(
         partial(estimator, "foaw"),
         (*HISTORY, *DIGITS, *SEARCH),
         FAST,
-        search,
+        ranges.search,
         promise="no counter wraps; slopes and sums are not looked at",
     ),
     "least-squares": Case(
         partial(estimator, "least-squares"),
         (*HISTORY, *DIGITS, *FIT),
         FAST,
-        fit,
+        ranges.fit,
         promise="no arithmetic wraps but where it is meant to; the sum of the fit is not looked at",
     ),
     "period": Case(partial(estimator, "period"), CYCLES, FORWARD),
@@ -265,14 +188,27 @@ CASES = {
         partial(estimator, "mt"),
         (*DIGITS, *EDGES),
         Bug(mt.Estimator.elaborate, "Divide(bound.bit_length(), ", "Divide(bound.bit_length() - 1, "),
-        scaled_edges,
+        ranges.scaled_edges,
     ),
     "mt-divisionless": Case(
         partial(estimator, "mt-divisionless"),
         (*EDGES, *PRODUCTS),
         Bug(mt_divisionless.Estimator.elaborate, "stamp + 1, velocity.f", "stamp, velocity.f"),
-        digits_left,
+        ranges.digits_left,
         promise="no arithmetic wraps but where it is meant to; what a product is put into is not looked at",
+    ),
+    "levant-edge": Case(
+        partial(estimator, "levant-edge"),
+        (*STAMPED, *TIMES),
+        Bug(levant_edge.Estimator._measure, "s.size - d.mantissa, 0", "s.size, 0"),
+        ranges.levant_edge,
+    ),
+    "edge-kalman": Case(
+        partial(estimator, "edge-kalman"),
+        (*STAMPED, *WEIGHTED),
+        Bug(edge_kalman.Estimator._sample, "s.level + HALF", "s.level + 3 * HALF"),
+        ranges.edge_kalman,
+        promise="no arithmetic wraps but where it is meant to; the sums of what is weighted are not looked at",
     ),
     "scale_map": Case(
         lambda axis: ScaleMap(Bins(12, -300, 3, 64, 16.0)),
