@@ -8,11 +8,9 @@ from hardwall.hdl.monitors import Monitors
 from hardwall.model import monitors
 from hardwall.model.monitors import IDLE_EDGES, LOSS_BITS, MADE, START, Inputs
 from hardwall.model.supervisor import CAUSES, names
-from hardwall.sim.scene import load
 from hardwall.testing import SAMPLES, Recorded, check, parameters, play, rng, simulate
 from stimuli.lengths import some_of
 from stimuli.magnitudes import magnitudes
-from stimuli.scenes import OF_ONE_AXIS
 from stimuli.specs import spec
 
 OUTPUTS = monitors.State._fields[:2]
@@ -207,17 +205,6 @@ def test_a_way_with_the_drive_is_no_runaway():
     for count in range(0, -1000, -7):
         bench.moves(count)
         assert bench.clock() == []
-
-
-@pytest.mark.parametrize("name", OF_ONE_AXIS)
-def test_no_hit_of_a_scene_is_a_runaway(name):
-    scene = load.load(name)
-    axis, protocol = scene.spec, scene.protocol
-    # What the push has given the handle on its way, and gives it on, the drive at its limit takes: friction helps.
-    way_m = protocol.push_n * abs(protocol.start_m) / (axis.force_max_n - protocol.push_n)
-    words = monitors.Design(axis, axis.design.estimator.velocity).words
-    runaway = next(word for word in words if word.name == "supervisor_runaway")
-    assert way_m < runaway.to_si(runaway.reset)
 
 
 def test_a_drive_below_its_limit_is_no_runaway():
