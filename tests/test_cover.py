@@ -11,7 +11,7 @@ from covering import origin
 from covering.blocks import BLOCKS, TESTS, Block
 from covering.points import Point, merged
 from covering.report import REASONS, Coverage, grouped
-from covering.sources import code_of
+from covering.sources import code_of, sources_of
 from kept import Findings
 from reasons import Reason, reasons_for
 
@@ -127,6 +127,12 @@ def test_every_block_has_its_test_and_every_reason_its_block():
     written = sum(len(reasons_for(block.name, REASONS)) for block in BLOCKS)
     text = REASONS.read_text(encoding="utf-8")
     assert written == text.count("[[reason]]")
+
+
+def test_no_block_is_tested_with_the_simulation():
+    """So what is found of the hardware outlives a change of the simulation: tests with both have files of their own."""
+    sources = {block.name: set(sources_of(block.test)) - {Path("sim/__init__.py")} for block in BLOCKS}
+    assert {name: every for name, every in sources.items() if any(path.parts[0] == "sim" for path in every)} == {}
 
 
 def test_what_is_covered_is_kept_and_failed_tests_are_run_again(monkeypatch, tmp_path):

@@ -7,10 +7,6 @@ from mts import design, follows_model, starts_afresh, stimulus
 from hardwall.hdl.estimators.mt_divisionless import Estimator
 from hardwall.testing import CAMPAIGN, parameters, simulate
 from hardwall.testing.estimators import model
-from stimuli.edges import (
-    check_a_standing_axis_reads_zero_and_a_slowing_one_falls,
-    check_rounding_is_the_only_difference,
-)
 from stimuli.lengths import some_of
 
 NAME = "mt-divisionless"
@@ -42,15 +38,6 @@ def test_every_word_is_that_of_mt_and_sooner(name):
     seen, expected = (model(d, rows, d.start()) for d in (ours, others))
     assert all((seen[output] == expected[output]).all() for output in ("velocity", "saturated"))
     assert ours.latency < 0.75 * others.latency
-
-
-@pytest.mark.parametrize("rate", [1_000, 100_000])
-def test_fixed_point_is_the_algorithm_rounded(rate):
-    check_rounding_is_the_only_difference(NAME, rate)
-
-
-def test_a_standing_axis_reads_zero_and_a_slowing_one_falls():
-    check_a_standing_axis_reads_zero_and_a_slowing_one_falls(NAME)
 
 
 def test_the_design_of_mt_is_refused():

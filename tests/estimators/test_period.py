@@ -17,24 +17,17 @@ from hardwall.model.estimators import period
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.period import FLOAT_START, START
 from hardwall.model.quadrature import Seen
-from hardwall.sim.estimates import accuracy, signals
-from hardwall.sim.world.encoder import offsets
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model
 from stimuli.edges import (
     Edge,
     Strobe,
     anything,
-    check_a_standing_axis_reads_zero_and_a_slowing_one_falls,
-    check_rounding_is_the_only_difference,
-    exact,
     rows,
     sights,
     turn,
-    velocities,
 )
 from stimuli.lengths import some_of
-from stimuli.papers_signal import RATES
 from stimuli.seeded import seeded
 from stimuli.specs import spec
 
@@ -151,43 +144,6 @@ def test_model_is_the_exact_speed_rounded(name, invert):
     assert moving > 2_000
 
 
-@pytest.mark.parametrize("rate", RATES)
-def test_fixed_point_is_the_algorithm_rounded(rate):
-    check_rounding_is_the_only_difference(NAME, rate)
-
-
-@pytest.mark.parametrize("rate", [1_000, 1_000_000])
-@pytest.mark.parametrize("speed", [1.03, 29.7, 973.0])
-def test_misplaced_edges_change_nothing_at_constant_speed(speed, rate):
-    """The speed is within the stamp's own error, v / D, of the exact one, for any errors of phase and duty."""
-    signal = replace(signals.steady(speed), seconds=0.05 if speed > 2 else 0.5)
-    axis = accuracy.axis_spec(NAME, rate, signals.DEVICE_ACCELERATION)
-    v = speed * 1e-3 / axis.count_m / axis.clock_hz  # counts a clock
-    samples_a_cycle = 4 / v / axis.clocks_per_sample
-    for errors in ((0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.4), ((0.2, -0.1, 0.0, 0.15), 0.1)):
-        seen, flags = velocities(signal, axis, "float", offsets(*errors))
-        settled = seen[math.ceil(3 * samples_a_cycle) + 2 :] / axis.count_m / axis.clock_hz
-        assert (flags, len(settled) > 10) == (0, True)
-        least_clocks = 4 / v - 1
-        assert np.abs(settled - v).max() <= v / least_clocks
-
-
-def test_misplaced_edges_change_little_on_the_way():
-    """On the paper's signal the RMS error is that of ideal edges except for the few edges of every turn."""
-    signal, rate = signals.paper(), 10_000
-    axis = accuracy.axis_spec(NAME, rate, signal.acceleration_max_m_per_s2)
-    true = exact(signal, axis, int(signal.seconds * rate))[rate:]
-    ideal, misplaced = (
-        np.sqrt(np.mean((velocities(signal, axis, "fixed", late)[0][rate:] - true) ** 2))
-        for late in (offsets(), offsets((0.0, 0.25, 0.0, 0.25)))
-    )
-    assert misplaced <= 1.02 * ideal
-
-
-def test_a_standing_axis_reads_zero_and_a_slowing_one_falls():
-    check_a_standing_axis_reads_zero_and_a_slowing_one_falls(NAME)
-
-
 def still(d: period.Design, at: int, run: int = 4) -> Seen:
     """Return an axis whose last edges came at the clocks 0, 10, 20, 30."""
     return Seen(7, at & ((1 << d.stamp_width) - 1), 0, 10, 20, 30, 3, 0, run)
@@ -254,13 +210,6 @@ def test_rounding_is_at_most_a_hundredth_of_every_speed_that_can_be_read(name):
     d = design(name)
     slowest = 4 * d.clocks / (period.AGE_LIMIT * 2.0**d.stamp_width)  # counts a sample: a cycle in the age limit
     assert d.velocity.lsb / 2 <= period.ERROR_SHARE * slowest
-
-
-@pytest.mark.parametrize("rate", [10_000, 1_000_000])
-def test_a_hundredth_of_a_millimetre_a_second_is_read(rate):
-    """A step of 1 um lasts 0.1 s; stamps are exact to 0.2 ppm of it, so what is off is the rounding."""
-    row = accuracy.measure(NAME, "u", "steady:0.01", rate, "fixed")
-    assert 0 < row["max_mm_s"] < 0.01 * 0.01
 
 
 def test_a_filter_by_default_keeps_short_pulses_from_the_estimate():

@@ -6,21 +6,15 @@ from fractions import Fraction
 from random import Random
 
 import cocotb
-import numpy as np
 import pytest
 
 from hardwall.hdl.estimators.period_count import Estimator
 from hardwall.model.estimators import period_count
-from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.period_count import START
-from hardwall.model.quadrature import seen_count
-from hardwall.sim.estimates import accuracy, motions, signals
-from hardwall.sim.world.encoder import offsets
 from hardwall.testing import CAMPAIGN, SAMPLES, parameters, simulate
 from hardwall.testing.estimators import follow, model, reset_words
-from stimuli.edges import anything, check_rounding_is_the_only_difference, rows, sights, turn, velocities
+from stimuli.edges import anything, rows, sights, turn
 from stimuli.lengths import some_of
-from stimuli.papers_signal import RATES
 from stimuli.seeded import seeded
 from stimuli.specs import spec
 
@@ -113,66 +107,6 @@ def test_model_is_the_exact_speed_rounded(name, switch):
         modes[counting] += word > 0
     assert modes[False] > 100
     assert modes[True] > 100
-
-
-@pytest.mark.parametrize("rate", RATES)
-def test_fixed_point_is_the_algorithm_rounded(rate):
-    check_rounding_is_the_only_difference(NAME, rate)
-
-
-@pytest.mark.parametrize("rate", [10_000, 1_000_000])
-def test_errors_and_jumps_are_within_the_bounds(rate):
-    """Both modes keep their promise while the axis brakes through the switching speed at its largest acceleration."""
-    bound = 12.0
-    axis = accuracy.axis_spec(NAME, rate, bound)
-    d, unit = axis.design.estimator, axis.velocity_unit_m_per_s
-    window, switch = 1 << d.window_bits, axis.design.gains.switch_m_per_s
-    seconds = switch / bound + 4 * window / rate
-    slowing = motions.Stop(1.5 * switch, 4 * window / rate, bound)
-    signal = signals.Signal("slowing", slowing, seconds, 0.0, bound, 1e-4)
-    seen, flags = velocities(signal, axis, "float")
-    assert flags == 0
-    v = np.array([motions.velocity(slowing, k / rate) for k in range(len(seen))])
-    c, acceleration = axis.clocks_per_sample, bound / unit / rate
-    counted = 1 / window + 1.5 * acceleration * window
-    timed = (v / unit) ** 2 / (4 * c) * (1 + 1e-3) + 3 * acceleration / (v / unit)
-    settled = slice(2 * window + 8, None)
-    error = np.abs(seen - v)[settled] / unit
-    assert (error <= np.maximum(counted, timed[settled])).all()
-    whole = np.abs(seen * window / unit - np.round(seen * window / unit)) < 1e-9
-    assert whole[settled][0]
-    assert not whole[-1]
-
-
-@pytest.mark.parametrize("errors", [(0.0, 0.0), (0.25, 0.0), (-0.25, 0.0), (0.0, 0.4)])
-def test_misplaced_edges_change_nothing_below_the_switching_speed(errors):
-    """The speed is within the stamp's own error, v / D, of the exact one."""
-    signal = replace(signals.steady(29.7), seconds=0.05)
-    axis = accuracy.axis_spec(NAME, 100_000, signals.DEVICE_ACCELERATION)
-    seen, _ = velocities(signal, axis, "float", offsets(*errors))
-    v = 29.7e-3 / axis.count_m / axis.clock_hz  # counts a clock
-    settled = seen[math.ceil(12 / v / axis.clocks_per_sample) :] / axis.count_m / axis.clock_hz
-    assert len(settled) > 1000
-    assert np.abs(settled - v).max() <= v / (4 / v - 1)
-
-
-@pytest.mark.parametrize(("name", "switch"), [("paper", None), ("narrow", 5)])
-def test_constant_speed_does_not_chatter(name, switch):
-    """There is at most one switch around the switching speed, with edges misplaced by a quarter count."""
-    d = design(name)
-    window, switch, half = 1 << d.window_bits, switch or reset_words(d)[0], 1 << (d.count_width - 1)
-    params, late, counted = d.params({"period_count_switch": switch}), offsets((0.0, 0.25, 0.0, -0.25)), []
-    for speed in np.linspace(switch - 3, switch + 3, 13) / window:
-        state, modes = START, []
-        for k in range(50 * window):
-            n = math.floor(speed * k)
-            count = n + 1 if speed * k >= n + 1 + late[(n + 1) & 3] else n - 1 if speed * k < n + late[n & 3] else n
-            state, *_ = estimate(params, state, seen_count((count + half) % (2 * half) - half), 0)
-            modes.append(state.counting)
-        assert np.abs(np.diff(modes)).sum() <= 1
-        counted.append(modes[-1])
-    assert counted[0] == 0
-    assert counted[-1] == 1
 
 
 @pytest.mark.parametrize(

@@ -78,8 +78,11 @@ def scaled_edges(bench: Bench, block: wiring.Component) -> None:
 
 
 def digits_left(bench: Bench, block: wiring.Component) -> None:
+    """Promise that digits are left of every quotient under way, and no more than it has."""
     edges(bench, block)
-    bench.promise(bench.inner["speed.left"] <= digits(block.design.velocity.width)[0])
+    left, machine = bench.inner["speed.left"], bench.inner["speed.fsm_state"]
+    bench.promise(left <= digits(block.design.velocity.width)[0])
+    bench.promise((left != 0) | (machine == machine.init))
 
 
 def fit(bench: Bench, block: wiring.Component) -> None:

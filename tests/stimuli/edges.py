@@ -2,14 +2,8 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from random import Random
 from typing import NamedTuple
-
-import numpy as np
-
-from hardwall.model.estimators.cycle_times import AGE_LIMIT
-from hardwall.sim.estimates import accuracy, motions, playback, signals
 
 
 class Edge(NamedTuple):
@@ -167,44 +161,3 @@ def _cycle(edges, before: Strobe, strobe: Strobe, run: int, since: int, limit: i
         if (last.number - edge.number) % 4 == 0:
             return (abs(last.number - edge.number), last.at - edge.at) if before.at - edge.at < limit else None
     return None
-
-
-def velocities(signal, axis, backend, encoder=(0.0, 0.0, 0.0, 0.0)):
-    """Return the velocity at every sample, m/s, and the flags."""
-    chunks = list(playback.velocities(signal, axis, "u", backend, encoder))
-    return np.concatenate([chunk for _, chunk, _ in chunks]), chunks[-1][2]
-
-
-def exact(signal, axis, samples):
-    """Return the exact velocity at every sample, m/s."""
-    return accuracy.exact_velocity(signal.motion, np.arange(samples) / axis.sample_hz)
-
-
-def check_rounding_is_the_only_difference(name: str, rate: int) -> None:
-    """Check that `fixed` is within half an LSB of `float`, and within 1 % of the estimator's own error in RMS."""
-    signal = replace(signals.paper(), seconds=0.3)
-    axis = accuracy.axis_spec(name, rate, signal.acceleration_max_m_per_s2)
-    fixed, flags = velocities(signal, axis, "fixed")
-    real, _ = velocities(signal, axis, "float")
-    assert flags == 0
-    half_lsb = axis.design.estimator.velocity.lsb / 2 * axis.velocity_unit_m_per_s
-    assert np.abs(fixed - real).max() <= half_lsb * (1 + 1e-9)
-    first = rate // 100  # the signal starts at full speed, so the error is the whole speed until the first edges
-    own = real[first::7] - exact(signal, axis, len(real))[first::7]
-    assert np.sqrt(np.mean((fixed - real) ** 2)) <= 0.01 * np.sqrt(np.mean(own**2))
-
-
-def check_a_standing_axis_reads_zero_and_a_slowing_one_falls(name: str) -> None:
-    """Check that behind the last edge the speed falls with the bound, to exactly 0 when that edge is forgotten."""
-    signal = signals.Signal("stop", motions.Stop(5e-3, 0.1, 1.0), 1.2, 0.0, signals.DEVICE_ACCELERATION)
-    axis = accuracy.axis_spec(name, 10_000, signals.DEVICE_ACCELERATION)
-    seen, _ = velocities(signal, axis, "fixed")
-    after = np.arange(len(seen)) / axis.sample_hz - 0.105
-    d = axis.design.estimator
-    assert (np.diff(seen[after > 0]) <= 0).all()
-    standing = after > 0
-    assert (seen[standing] <= 1.5 * axis.count_m / after[standing] + d.velocity.lsb * axis.velocity_unit_m_per_s).all()
-    limit = AGE_LIMIT * (1 << d.stamp_width) / axis.clock_hz
-    rest = seen[after > limit]
-    assert len(rest) > 100
-    assert not rest.any()
