@@ -14,8 +14,10 @@ from ...model.estimators import registry
 from ..boards.parts import PARTS
 from ..estimates.accuracy import FASTEST, LEARNED, RATES_HZ, SCENE, outputs
 from ..scene.errors import SceneError
+from ..scene.hand_section import OF_A_HAND
 from ..scene.load import load, names, toml_of
 from ..walls.methods import Curve, label
+from ..walls.worst import HELD_BY
 from .errors import BadInput
 
 Estimator = Literal[tuple(registry.ESTIMATORS)]
@@ -138,6 +140,7 @@ def value_of(key: str, text: str) -> Any:
 
 
 GAINS = ("controller.estimator", "controller.output", "controller.gains")
+OF_HANDS = ("hand.model", *(f"hand.{key}" for key in OF_A_HAND))
 WALL = ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m")
 
 
@@ -173,6 +176,16 @@ def curves_of(wanted: str | None, papers: dict[str, Curve] | None = None) -> lis
         also = f", or of {', '.join(papers)}" if papers else ""
         raise BadInput(f"--estimators: {error}{also}") from None
     return list({curve.label: curve for curve in curves}.values())
+
+
+def hands_of(wanted: str) -> list[str]:
+    """Return the hands of a list NAME,...; the name `all` stands for all of them."""
+    hands = []
+    for name in (word.strip() for word in wanted.split(",")):
+        if name not in ("all", *HELD_BY):
+            raise BadInput(f"--hands must be all, or some of {', '.join(HELD_BY)}, not {shown(name)}")
+        hands += HELD_BY if name == "all" else [name]
+    return list(dict.fromkeys(hands))
 
 
 def rates_of(text: str, option: str) -> list[int]:

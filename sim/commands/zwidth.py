@@ -8,9 +8,20 @@ import typer
 from ..scene.case import Case
 from ..studies import zwidth
 from ..walls.methods import methods
+from ..walls.worst import HELD_BY
 from ..walls.zwidth import STARTS
 from .maps import Maps
-from .options import BackendOption, SceneArgument, StartsOption, curves_of, output_file, refuse_for_maps
+from .options import (
+    OF_HANDS,
+    BackendOption,
+    SceneArgument,
+    StartsOption,
+    curves_of,
+    hands_of,
+    output_file,
+    refuse,
+    refuse_for_maps,
+)
 from .study import StudyOptions, study
 
 
@@ -28,6 +39,15 @@ def command(
         ),
     ] = None,
     starts: StartsOption = STARTS,
+    hands: Annotated[
+        str | None,
+        typer.Option(
+            "--hands",
+            metavar="NAME,...",
+            help=f"hands on the handle, and the worst of them: all, or some of {', '.join(HELD_BY)}",
+            show_default="the scene's",
+        ),
+    ] = None,
     backend: BackendOption = "fixed",
     hits: Annotated[
         Path | None, typer.Option("--csv", metavar="FILE", help="write every start's verdict: .csv")
@@ -36,7 +56,10 @@ def command(
     changes = options.changes()
     hits = output_file(hits, "--csv", (".csv",))
     refuse_for_maps(changes, "see --estimators")
+    holding = None if hands is None else hands_of(hands)
+    if holding is not None:
+        refuse(changes, OF_HANDS, "see --hands")
     case = Case.of(scene, changes)
     curves = None if wanted is None else curves_of(wanted, methods(case.scene))
-    found = zwidth.study(case, curves, Maps(options, backend, starts))
+    found = zwidth.study(case, curves, holding, Maps(options, backend, starts))
     options.finish(found, {"hits": (hits, found.save)} if hits else {})

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from ..scene.schema import Scene
 from ..studies.zwidth import ZWidth
-from ..walls import theory
+from ..walls import theory, worst
 from ..walls.boundary import Grid
 from ..walls.grid import grid_of
 from ..walls.zwidth import Map
@@ -58,6 +58,7 @@ def draw(found: ZWidth) -> Figure:
     notes += ["dotted: limit of the linear loop without friction, in the colour of its method"] if any(limits) else []
     if any(each.leaves for each in maps):
         notes.append("a region whose line meets the right or the upper border of the map (grey) goes on beyond it")
+    notes += [f"{each.case.label}: {worst.told(each.variants, each.boundary)} N s/m" for each in maps if each.variants]
     notes += _passive(axes, scene, grid.dampings)
     picture.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)
     if len(maps) > ROOM:

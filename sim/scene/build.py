@@ -40,7 +40,7 @@ def device_of(scene: Scene) -> device.Device | None:
         parts["transmission"] = device.Transmission(**cable.model_dump(exclude={"encoder_at"}))
         parts["encoder_at_motor"] = cable.encoder_at == "motor"
     if hand:
-        parts["hand"] = device.Hand(**hand.model_dump())
+        parts["hand"] = device.Hand(**hand.parts)
     return device.Device(**parts)
 
 

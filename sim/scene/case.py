@@ -50,6 +50,11 @@ class Case:
         except SceneError as error:
             raise SceneError(f"{error} ({self.label})" if self.label else str(error)) from None
 
+    @property
+    def variants(self) -> dict[str, "Case"]:
+        """The cases, by name, that are hit for this one: itself, without a name. See `walls.worst.WorstCase`."""
+        return {"": self}
+
     def changed(self, changes: dict[str, Any], label: str | None = None) -> "Case":
         """Return the case with more changes, and another label if one is given."""
         return replace(self, changes=self.changes | changes, label=self.label if label is None else label)

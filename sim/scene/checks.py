@@ -50,6 +50,8 @@ def check(scene: Scene) -> None:
     scene.encoder.check_at(scene.edges_hz, scene.controller.sample_hz)
     if scene.drive is not None:
         scene.drive.check()
+    if scene.hand is not None:
+        scene.hand.check()
     _check_axis(scene)
     _check_protocol(scene)
     if scene.amplifier is not None:

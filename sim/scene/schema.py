@@ -18,6 +18,7 @@ from ...model.requirements import EDGE_ERROR_COUNTS
 from ...model.spec import AxisSpec
 from .drive import DriveSection
 from .encoder_section import EncoderSection
+from .hand_section import HandSection
 from .presliding_section import PreslidingSection
 from .quantities import (
     Acceleration,
@@ -127,15 +128,6 @@ class TransmissionSection(Section):
     motor_mass_kg: Mass
     motor_viscous_n_s_per_m: or_none(Damping) = 0.0
     encoder_at: Literal["handle", "motor"] = "handle"
-
-
-class HandSection(Section):
-    """A hand that moves with the handle and holds it, by a spring to `rest_m` and a damper."""
-
-    mass_kg: or_none(Mass)
-    damping_n_s_per_m: or_none(Damping)
-    stiffness_n_per_m: or_none(Stiffness)
-    rest_m: Place = 0.0
 
 
 class OutputSection(Section):

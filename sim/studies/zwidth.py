@@ -1,7 +1,7 @@
 """Z-width of several methods on one scene: their maps side by side, and the facts of the paper's Figure 5."""
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,13 +11,17 @@ from ...model.whole_file import whole_file
 from ..jobs.result import Table, table_of
 from ..scene.case import Case
 from ..scene.schema import Scene
-from ..walls import theory
+from ..walls import theory, worst
 from ..walls.boundary import UNDECIDED
 from ..walls.figure_5 import Fact, with_shares
 from ..walls.grid import grid_of
+from ..walls.likelihood import Wall
 from ..walls.methods import Curve, methods
 from ..walls.starts import start
 from ..walls.zwidth import Effort, Map, Mapper
+
+WORST = "worst hand, at B"
+WORST_SAYS = f"{WORST}: with which the fewest hits are stable of the walls on both sides of the edge"
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,7 @@ class ZWidth:
     @cached_property
     def linear_limits(self) -> list[list[float] | None]:
         """The linear loop's limit (N/m) at every B, for each map; None for an estimator that is not linear."""
-        return [_linear_limits(each.case.scene) for each in self.maps]
+        return [_linear_limits(each.case) for each in self.maps]
 
     def report(self) -> dict[str, Any]:
         """Return what the command line prints, units in the keys."""
@@ -49,9 +53,10 @@ class ZWidth:
     def tables(self) -> list[Table]:
         """Return a table of the maps, and a table of the facts if there are any."""
         areas = ("area (kN/m N s/m)", "of starts", "held", "in place")
+        words = ("method", WORST) if any(each.variants for each in self.maps) else ("method",)
         rows = [
             [
-                each.case.label,
+                *(each.case.label, worst.told(each.variants, each.boundary))[: len(words)],
                 area_text(each),
                 interval_text(each),
                 "" if each.area_held is None else f"{each.area_held / 1e3:.0f}",
@@ -66,7 +71,7 @@ class ZWidth:
             for each in self.maps
         ]
         numbers = (*areas, "largest K (kN/m)", "to B (N s/m)", "islands", "undecided", "hits", "s")
-        tables = [table_of(("method",), numbers, rows)]
+        tables = [table_of(words, numbers, rows)]
         if self.facts:
             lines = [[fact.text, _held(fact), fact.numbers] for fact in self.facts]
             tables.append(table_of(("the paper's Figure 5", "here, and in draws of the starts", "numbers"), (), lines))
@@ -85,6 +90,7 @@ class ZWidth:
             "islands: walls that were hit on the wrong side of the edge",
             "undecided: hits that still settled when their time was over; the lower end takes them for unstable",
             *plus_of_areas(self.maps),
+            *([WORST_SAYS] if any(each.variants for each in self.maps) else []),
         ]
 
     def save(self, path: Path) -> None:
@@ -98,19 +104,33 @@ class ZWidth:
             keys = ("verdict", "in_place", "rms_mm", "offset_mm", "drift_mm_per_s", "run_s")
             names = ("label", "damping_n_s_per_m", "stiffness_n_per_m", "start", "start_counts", "start_periods")
             writer.writerow((*names, *keys))
-            for each in self.maps:
-                for wall in each.walls:
+            for label, wall, number, hit in self._hits():
+                place = label, wall.damping_n_s_per_m, wall.stiffness_n_per_m, number, *start(number)
+                writer.writerow((*place, *(hit[key] for key in keys)))
+
+    def _hits(self) -> Iterator[tuple[str, Wall, int, dict]]:
+        """Yield every hit once, with the label of its case, its wall and the number of its start: those of a worst case
+        are of its variants, whose own maps may have had them."""
+        seen = set()
+        for each in self.maps:
+            labels = {name: case.label for name, case in each.case.variants.items()}
+            for name, walls in (each.variants or dict.fromkeys(labels, each.walls)).items():
+                for wall in walls:
                     for number, hit in sorted(wall.hits.items()):
-                        place = each.case.label, wall.damping_n_s_per_m, wall.stiffness_n_per_m, number, *start(number)
-                        writer.writerow((*place, *(hit[key] for key in keys)))
+                        place = labels[name], wall.damping_n_s_per_m, wall.stiffness_n_per_m, number
+                        if place not in seen:
+                            seen.add(place)
+                            yield labels[name], wall, number, hit
 
 
-def study(case: Case, curves: list[Curve] | None, mapper: Mapper) -> ZWidth:
+def study(case: Case, curves: list[Curve] | None, hands: list[str] | None, mapper: Mapper) -> ZWidth:
     """Return the maps of a scene.
 
     Args:
         case: the scene.
         curves: the methods; None for those of the paper's Figure 5.
+        hands: the hands that hold the handle, by name, each in a map of its own and the worst of several in another;
+            None for what the scene has.
         mapper: function that makes the maps.
 
     Raises:
@@ -119,8 +139,10 @@ def study(case: Case, curves: list[Curve] | None, mapper: Mapper) -> ZWidth:
     scene = case.scene
     papers = methods(scene)
     cases = [case.changed(curve.changes, curve.label) for curve in (papers.values() if curves is None else curves)]
+    if hands is not None:
+        cases = [held for each in cases for held in worst.cases_of(each, hands)]
     maps = mapper(f"{scene.name} Z-width", cases)
-    shown = with_shares(dict(zip(papers, maps, strict=True))) if curves is None else []
+    shown = with_shares(dict(zip(papers, maps, strict=True))) if curves is None and hands is None else []
     return ZWidth(scene, maps, shown, mapper.effort())
 
 
@@ -129,11 +151,12 @@ def _held(fact: Fact) -> str:
     return ("held" if fact.held else "not held") + ("" if fact.share is None else f", {fact.share:.0%}")
 
 
-def _linear_limits(scene: Scene) -> list[float] | None:
-    if scene.controller.estimator not in theory.LINEAR:
+def _linear_limits(case: Case) -> list[float] | None:
+    if case.scene.controller.estimator not in theory.LINEAR:
         return None
-    loop = theory.Loop(scene)
-    return [theory.linear_limit_n_per_m(loop, damping) for damping in grid_of(scene).dampings]
+    loops = [theory.Loop(each.scene) for each in case.variants.values()]
+    dampings = grid_of(case.scene).dampings
+    return [min(theory.linear_limit_n_per_m(loop, damping) for loop in loops) for damping in dampings]
 
 
 def area_text(each: Map) -> str:

@@ -99,7 +99,9 @@ class Hit(Summary):
         """
         scene, stiffness = self.scene, self.scene.wall.stiffness_n_per_m
         hand, cable = scene.hand, scene.transmission
-        carried_n = scene.protocol.push_n + (hand.stiffness_n_per_m * (hand.rest_m - self.mean_m) if hand else 0.0)
+        held = hand and hand.parts
+        pull_n = held["stiffness_n_per_m"] * (held["rest_m"] - self.mean_m) if held else 0.0
+        carried_n = scene.protocol.push_n + pull_n
         slack_n = scene.sticking_n + output_step_n(scene)
         hidden_m = scene.encoder.count_m + self.rms_m
         if cable and cable.encoder_at == "motor":

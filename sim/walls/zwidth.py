@@ -17,7 +17,7 @@ import numpy as np
 from ..jobs import store
 from ..jobs.crew import Crew
 from ..scene.case import Case
-from . import hit
+from . import hit, worst
 from .boundary import BoundaryPoint, area, walls
 from .grid import grid_of
 from .likelihood import ENDS, Column, Wall, draws, held, islands
@@ -41,6 +41,8 @@ class Map:
         walls: the walls that were hit, by B and K.
         drawn: the K of every point in every bootstrap, shape (2, points, draws): with undecided hits taken for
             unstable, and for stable; None without walls. See `likelihood`.
+        variants: the walls that were hit in each variant of a `worst.WorstCase`, in the order of `walls`, by name; none
+            for other cases.
     """
 
     case: Case
@@ -51,6 +53,7 @@ class Map:
     starts: int = 1
     walls: tuple[Wall, ...] = field(default=(), compare=False)
     drawn: np.ndarray | None = field(default=None, compare=False)
+    variants: dict[str, tuple[Wall, ...]] = field(default_factory=dict, compare=False)
 
     @property
     def area(self) -> float:
@@ -143,7 +146,7 @@ class Map:
 
         The boundary is a list of [B (N s/m), K (N/m), low, high]: the K at which a hit is as likely stable as not, and
         the ends of its interval; the true K is larger where the boundary leaves the map. `p_stable` is a list of [B, K,
-        stable, unstable, undecided], the numbers of hits.
+        stable, unstable, undecided], the numbers of hits. A worst case also has what `worst.report` says.
         """
         low, high = self.area_interval
         return {
@@ -169,6 +172,7 @@ class Map:
             "largest_stiffness_n_per_m": self.largest_n_per_m,
             "hits": self.hits,
             "seconds": self.seconds,
+            **(worst.report(self.variants, self.boundary) if self.variants else {}),
         }
 
 
@@ -236,26 +240,43 @@ def verdict(
 
 
 class _Mapping:
-    """A map in progress: the jobs that it asks for next, and at the end the map."""
+    """A map in progress: the jobs that it asks for next, by variant and start, and at the end the map.
+
+    Every wall is hit in all variants of the case. The search is sent the verdicts of the worst of them so far, and the
+    map is of the walls as the worst variant had them.
+    """
 
     def __init__(self, case: Case, backend: str, starts: int):
         self._case, self._grid, self._starts = case, grid_of(case.scene), starts
         self._steps: Generator = walls(self._grid, starts)
-        self._job = case.job() | {"sources": store.sources(), "backend": backend}
-        self._hits: dict[tuple[float, float], dict[int, dict]] = {}
+        common = {"sources": store.sources(), "backend": backend}
+        self._jobs = {name: variant.job() | common for name, variant in case.variants.items()}
+        self._hits: dict[tuple[float, float], dict[str, dict[int, dict]]] = {}
         self._wall: tuple[float, float] | None = None
-        self.wanted: dict[int, dict] = {}
-        self._results: dict[int, dict] = {}
+        self.wanted: dict[tuple[str, int], dict] = {}
+        self._results: dict[tuple[str, int], dict] = {}
         self.found: Map | None = None
         self._send(None)
 
-    def answer(self, start: int, result: dict) -> None:
-        """Continue the map with the verdict on the wall that it asked for, from one of the starts."""
-        self._results[start] = result
+    @property
+    def of_variants(self) -> bool:
+        """Whether it is of a case that has variants, whose hits other maps may have had."""
+        return len(self._jobs) > 1
+
+    def answer(self, place: tuple[str, int], result: dict) -> None:
+        """Continue the map with the verdict on the wall that it asked for, in one of the variants from one start."""
+        self._results[place] = result
         if len(self._results) == len(self.wanted):
-            results = {start: self._results[start] for start in self.wanted}
-            self._hits.setdefault(self._wall, {}).update(results)
-            self._send([result["verdict"] for result in results.values()])
+            hits = self._hits.setdefault(self._wall, {name: {} for name in self._jobs})
+            for name, start in self.wanted:
+                hits[name][start] = self._results[name, start]
+            verdicts = hits[worst.of(self._walls(self._wall))[0]]
+            self._send([verdicts[start]["verdict"] for start in dict.fromkeys(start for _, start in self.wanted)])
+
+    def _walls(self, place: tuple[float, float]) -> dict[str, Wall]:
+        """Return a wall that was hit, by variant."""
+        stiffness, damping = place
+        return {name: Wall(damping, stiffness, hits) for name, hits in self._hits[place].items()}
 
     def _send(self, verdicts: list[str] | None) -> None:
         self._results, self.wanted = {}, {}
@@ -265,12 +286,17 @@ class _Mapping:
             self._wall, self.found = None, self._made()
         else:
             self._wall = stiffness, damping
-            self.wanted = {start: self._job | {"wall": self._wall, "start": start} for start in starts}
+            self.wanted = {
+                (name, start): job | {"wall": self._wall, "start": start}
+                for name, job in self._jobs.items()
+                for start in starts
+            }
 
     def _made(self) -> Map:
         """Return the map of all hits."""
-        found = [Wall(damping, stiffness, hits) for (stiffness, damping), hits in self._hits.items()]
-        found.sort(key=lambda wall: (wall.damping_n_s_per_m, wall.stiffness_n_per_m))
+        every = [self._walls(place) for place in sorted(self._hits, key=lambda place: place[::-1])]
+        found = [walls_of[worst.of(walls_of)[0]] for walls_of in every]
+        variants = {name: tuple(walls_of[name] for walls_of in every) for name in self._jobs if self.of_variants}
         drawn, dampings = draws(self._starts), self._grid.dampings
         points, in_place, bounds = [], [], []
         for damping, walls_of in groupby(found, lambda wall: wall.damping_n_s_per_m):
@@ -282,10 +308,10 @@ class _Mapping:
             points.append(BoundaryPoint(damping, stiffness, min(above, default=None), held(at, stiffness)))
             in_place.append(_in_place(at, stiffness))
         assert len(points) == len(dampings)
-        hits = [result for wall in found for result in wall.hits.values()]
+        hits = [result for walls_of in every for wall in walls_of.values() for result in wall.hits.values()]
         seconds = sum(result["seconds"] for result in hits)
         drawn_points = np.array(bounds).transpose(1, 0, 2)
-        return Map(self._case, points, len(hits), in_place, seconds, self._starts, tuple(found), drawn_points)
+        return Map(self._case, points, len(hits), in_place, seconds, self._starts, tuple(found), drawn_points, variants)
 
     @property
     def done(self) -> float:
@@ -331,25 +357,27 @@ def run(
     def forward(mapping: _Mapping) -> int:
         """Answer a map from the store as far as possible; give the hits that it waits for, and return their number."""
         while mapping.wanted:
-            missing = {start: job for start, job in mapping.wanted.items() if job not in known}
+            missing = {place: job for place, job in mapping.wanted.items() if job not in known}
             wanted = mapping.wanted
-            for start in [start for start in wanted if start not in missing]:
-                mapping.answer(start, known.get(wanted[start]))
+            for place in [place for place in wanted if place not in missing]:
+                mapping.answer(place, known.get(wanted[place]))
             if missing:
-                for start, job in missing.items():
-                    crew.give((mapping, start, job), verdict, job)
+                for place, job in missing.items():
+                    crew.give((mapping, place, job), verdict, job)
                 break
         if progress:
             progress(sum(running.done for running in maps))
         return len(missing) if mapping.wanted else 0
 
-    under_way = sum(map(forward, maps))
-    while under_way:
-        (mapping, start, job), result = crew.take()
-        known.put(job, result)
-        under_way -= 1
-        asked = mapping.wanted
-        mapping.answer(start, result)
-        if mapping.wanted is not asked:
-            under_way += forward(mapping)
+    # Worst cases come last: what their variants share with the maps of these alone is known by then.
+    for of_variants in (False, True):
+        under_way = sum(forward(mapping) for mapping in maps if mapping.of_variants == of_variants)
+        while under_way:
+            (mapping, place, job), result = crew.take()
+            known.put(job, result)
+            under_way -= 1
+            asked = mapping.wanted
+            mapping.answer(place, result)
+            if mapping.wanted is not asked:
+                under_way += forward(mapping)
     return [mapping.found for mapping in maps]

@@ -1,0 +1,98 @@
+"""The worst of several variants of a case, such as the hands that may hold a handle: at every wall the variant in which
+the fewest hits are stable.
+
+All variants hit a wall from the same starts. A map of the worst case is a map like others, of walls that each have the
+verdicts of their worst variant: its boundary is the K at which the least P(stable) over the variants passes one half.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..scene.case import Case
+from ..scene.hand_section import HANDS, OF_A_HAND
+from .boundary import BoundaryPoint
+from .likelihood import Wall
+
+NO_HAND = "none"
+HELD_BY = (NO_HAND, *HANDS)
+"""The names of the hands that may hold a handle; none is one of them."""
+
+
+@dataclass(frozen=True)
+class WorstCase(Case):
+    """A scene to be mapped in its worst variant.
+
+    Attributes:
+        by_name: the changes of each variant, by name, besides those of the case.
+    """
+
+    by_name: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    @property
+    def variants(self) -> dict[str, Case]:
+        """The cases of the variants, by name."""
+        alone = Case(self.label, self.source, self.text, self.changes)
+        return {name: alone.changed(changes, named(self.label, name)) for name, changes in self.by_name.items()}
+
+
+def named(label: str, hand: str) -> str:
+    """Return the label of a case with a hand."""
+    return f"{label}, {'no hand' if hand == NO_HAND else hand}"
+
+
+def changes_of(hand: str) -> dict[str, Any]:
+    """Return the changes, by dotted key, that put one of `HANDS` on a scene's handle, or no hand."""
+    if hand == NO_HAND:
+        return {"hand": None}
+    return {"hand.model": hand} | {f"hand.{key}": None for key in OF_A_HAND}
+
+
+def cases_of(case: Case, hands: Sequence[str]) -> list[Case]:
+    """Return a case with each of the hands, of `HANDS` or none, and last, if they are several, with the worst one."""
+    by_name = {hand: changes_of(hand) for hand in hands}
+    worst = WorstCase(f"{case.label}, worst hand", case.source, case.text, case.changes, by_name)
+    cases = [case.changed(changes, named(case.label, hand)) for hand, changes in by_name.items()]
+    return [*cases, worst] if len(cases) > 1 else cases
+
+
+def of(walls: dict[str, Wall]) -> list[str]:
+    """Return the variants, by name, in which the fewest hits of a wall are stable: all that have as few."""
+    least = min(wall.share for wall in walls.values())
+    return [name for name, wall in walls.items() if wall.share == least]
+
+
+def report(variants: dict[str, tuple[Wall, ...]], boundary: list[BoundaryPoint]) -> dict[str, Any]:
+    """Return what a report says of a worst case: the names of the variants, and those that are worst at every point of
+    the boundary, and at every wall of `p_stable`."""
+    return {
+        "hands": list(variants),
+        "worst_of_boundary": [at_edge(variants, point) for point in boundary],
+        "worst_of_p_stable": [
+            of(dict(zip(variants, walls, strict=True))) for walls in zip(*variants.values(), strict=True)
+        ],
+    }
+
+
+def at_edge(variants: dict[str, tuple[Wall, ...]], point: BoundaryPoint) -> list[str]:
+    """Return the variants, by name, in which the fewest hits are stable of the two walls around a boundary together."""
+    shares = {}
+    for name, walls in variants.items():
+        here = [wall for wall in walls if wall.damping_n_s_per_m == point.damping_n_s_per_m]
+        below = [wall.share for wall in here if wall.stiffness_n_per_m <= point.stable_n_per_m][-1:]
+        above = [wall.share for wall in here if wall.stiffness_n_per_m > point.stable_n_per_m][:1]
+        shares[name] = sum(below + above)
+    return [name for name, each in shares.items() if each == min(shares.values())]
+
+
+def told(variants: dict[str, tuple[Wall, ...]], boundary: list[BoundaryPoint]) -> str:
+    """Return in words which variant is the worst at which B."""
+    stretches: list[tuple[str, list[float]]] = []
+    for point in boundary:
+        names = " or ".join(at_edge(variants, point))
+        if not stretches or stretches[-1][0] != names:
+            stretches.append((names, []))
+        stretches[-1][1].append(point.damping_n_s_per_m)
+    return ", ".join(
+        f"{names} at {all_[0]:g}" + (f" to {all_[-1]:g}" if len(all_) > 1 else "") for names, all_ in stretches
+    )
