@@ -14,7 +14,6 @@ from ...model.estimators import registry
 from ..boards.parts import PARTS
 from ..estimates.accuracy import FASTEST, LEARNED, RATES_HZ, SCENE, outputs
 from ..scene.errors import SceneError
-from ..scene.hand_section import OF_A_HAND
 from ..scene.load import load, names, toml_of
 from ..walls.methods import Curve, label
 from ..walls.worst import HELD_BY
@@ -140,7 +139,6 @@ def value_of(key: str, text: str) -> Any:
 
 
 GAINS = ("controller.estimator", "controller.output", "controller.gains")
-OF_HANDS = ("hand.model", *(f"hand.{key}" for key in OF_A_HAND))
 WALL = ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m")
 
 

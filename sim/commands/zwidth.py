@@ -12,7 +12,6 @@ from ..walls.worst import HELD_BY
 from ..walls.zwidth import STARTS
 from .maps import Maps
 from .options import (
-    OF_HANDS,
     BackendOption,
     SceneArgument,
     StartsOption,
@@ -58,7 +57,7 @@ def command(
     refuse_for_maps(changes, "see --estimators")
     holding = None if hands is None else hands_of(hands)
     if holding is not None:
-        refuse(changes, OF_HANDS, "see --hands")
+        refuse(changes, ("hand.",), "see --hands")
     case = Case.of(scene, changes)
     curves = None if wanted is None else curves_of(wanted, methods(case.scene))
     found = zwidth.study(case, curves, holding, Maps(options, backend, starts))

@@ -24,21 +24,19 @@ class WorstCase(Case):
     """A scene to be mapped in its worst variant.
 
     Attributes:
-        by_name: the changes of each variant, by name, besides those of the case.
+        of: the cases of the variants, by name.
     """
 
-    by_name: dict[str, dict[str, Any]] = field(default_factory=dict)
+    of: dict[str, Case] = field(default_factory=dict)
 
     @property
     def variants(self) -> dict[str, Case]:
         """The cases of the variants, by name."""
-        alone = Case(self.label, self.source, self.text, self.changes)
-        return {name: alone.changed(changes, named(self.label, name)) for name, changes in self.by_name.items()}
+        return self.of
 
 
-def named(label: str, hand: str) -> str:
-    """Return the label of a case with a hand."""
-    return f"{label}, {'no hand' if hand == NO_HAND else hand}"
+def _held_by(hand: str) -> str:
+    return "no hand" if hand == NO_HAND else hand
 
 
 def changes_of(hand: str) -> dict[str, Any]:
@@ -50,10 +48,9 @@ def changes_of(hand: str) -> dict[str, Any]:
 
 def cases_of(case: Case, hands: Sequence[str]) -> list[Case]:
     """Return a case with each of the hands, of `HANDS` or none, and last, if they are several, with the worst one."""
-    by_name = {hand: changes_of(hand) for hand in hands}
-    worst = WorstCase(f"{case.label}, worst hand", case.source, case.text, case.changes, by_name)
-    cases = [case.changed(changes, named(case.label, hand)) for hand, changes in by_name.items()]
-    return [*cases, worst] if len(cases) > 1 else cases
+    held = {hand: case.changed(changes_of(hand), f"{case.label}, {_held_by(hand)}") for hand in hands}
+    worst = WorstCase(f"{case.label}, worst hand", case.source, case.text, case.changes, held)
+    return [*held.values(), worst][: None if len(held) > 1 else 1]
 
 
 def of(walls: dict[str, Wall]) -> list[str]:
@@ -86,10 +83,12 @@ def at_edge(variants: dict[str, tuple[Wall, ...]], point: BoundaryPoint) -> list
 
 
 def told(variants: dict[str, tuple[Wall, ...]], boundary: list[BoundaryPoint]) -> str:
-    """Return in words which variant is the worst at which B."""
+    """Return in words which variant is the worst at which B; nothing of a case without variants."""
+    if not variants:
+        return ""
     stretches: list[tuple[str, list[float]]] = []
     for point in boundary:
-        names = " or ".join(at_edge(variants, point))
+        names = " or ".join(map(_held_by, at_edge(variants, point)))
         if not stretches or stretches[-1][0] != names:
             stretches.append((names, []))
         stretches[-1][1].append(point.damping_n_s_per_m)
