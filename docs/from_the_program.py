@@ -1,6 +1,7 @@
 """What pages take from the program itself, so that they cannot fall behind it.
 
-A line `%commands%` in a page becomes every command of the command line with its arguments, options and defaults.
+A line `%commands%` in a page becomes every command of the command line with its arguments, options and defaults, and a
+line `%hands%` a table of the hands that a scene may name.
 
 The directive `{scene-section} handle` lists the keys of a section of a scene, with the unit, range and default that the
 schema has; its content is a line `key: meaning` for each. A key without a meaning, or a meaning without a key, is a
@@ -16,6 +17,7 @@ from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 
 from hardwall.sim.commands.group import app
+from hardwall.sim.scene.hand_section import HANDS, OF_A_HAND
 from hardwall.sim.scene.schema import Scene
 from hardwall.sim.scene.sentences import accepted, sections_of
 
@@ -99,9 +101,24 @@ def _options(command, context) -> list[str]:
 
 
 def fill(_: Sphinx, __: str, source: list[str]) -> None:
-    """Put the commands where a page wants them."""
-    if "%commands%" in source[0]:
-        source[0] = source[0].replace("%commands%", "\n".join(commands()))
+    """Put the commands, or the published hands, where a page wants them."""
+    for mark, lines in (("%commands%", commands), ("%hands%", hands)):
+        if mark in source[0]:
+            source[0] = source[0].replace(mark, "\n".join(lines()))
+
+
+# ---- hands ----------------------------------------------------------------------------------------------------------
+
+
+def hands() -> list[str]:
+    """Return a table of the published hands: a dagger marks figures that were not seen in the source itself."""
+    rows = [
+        [code(name), *(f"{hand[key]:g}" for key in OF_A_HAND), cell(hand["grip"]), cell(hand["source"])]
+        for name, hand in HANDS.items()
+    ]
+    for row, hand in zip(rows, HANDS.values(), strict=True):
+        row[-1] += "" if hand["seen"] else " †"
+    return table(["name", "kg", "N s/m", "N/m", "grip", "source"], rows)
 
 
 # ---- scenes ---------------------------------------------------------------------------------------------------------

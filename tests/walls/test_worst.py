@@ -15,8 +15,9 @@ from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.hand_section import HANDS, HandSection
 from hardwall.sim.studies import zwidth as study
 from hardwall.sim.walls import worst, zwidth
-from hardwall.sim.walls.boundary import STABLE
+from hardwall.sim.walls.boundary import STABLE, BoundaryPoint
 from hardwall.sim.walls.grid import grid_of
+from hardwall.sim.walls.likelihood import Wall
 from stimuli import results
 from stimuli.command_line import call
 from stimuli.lengths import long_form
@@ -161,6 +162,29 @@ def test_report_lines_table_and_picture(monkeypatch, capsys, tmp_path, asked):
     assert {line[0] for line in lines} == {none["label"], arm["label"]}
     told = "no hand at 10, hogan-1989 at 30 to 50"
     assert f"kalman, worst hand: {told} N s/m" in picture.read_text()
+
+
+@pytest.mark.parametrize(
+    ("edge", "one", "other", "names"),
+    [
+        (2e3, (4, 3, 0, 0), (4, 4, 0, 0), ["one"]),
+        (2.5e3, (4, 4, 1, 0), (4, 4, 0, 0), ["other"]),
+        (2.5e3, (3, 4, 1, 0), (4, 4, 1, 0), ["one", "other"]),
+        (0.0, (1, 0, 0, 0), (0, 0, 0, 0), ["other"]),
+        (4e3, (4, 4, 4, 3), (4, 4, 4, 4), ["one"]),
+    ],
+    ids=["below", "above", "neither", "no stable wall", "beyond the map"],
+)
+def test_the_worst_at_an_edge_is_that_of_its_two_walls(edge, one, other, names):
+    """Of four starts so many are stable at 1, 2, 3 and 4 kN/m."""
+    variants = {
+        name: tuple(
+            Wall(10.0, 1e3 * row, {start: results.verdict(start < number) for start in range(4)})
+            for row, number in enumerate(numbers, 1)
+        )
+        for name, numbers in (("one", one), ("other", other))
+    }
+    assert worst.at_edge(variants, BoundaryPoint(10.0, edge, None)) == names
 
 
 def test_the_table_says_which_hand_is_the_worst(case, asked):
