@@ -76,10 +76,10 @@ faults: $(VENV)/.test | tools ## faults injected into the board and its plant: w
 gate: $(VENV)/.test | tools ## netlists of three families of FPGAs beside the RTL, from power-up on: all outputs, every clock
 	@$(VENV)/bin/python tests/gate.py $(ONLY)
 
-coverage: $(VENV)/.test | tools ## lines, branches and toggles of every block that its tests reach (an hour)
+coverage: $(VENV)/.test | tools ## lines, branches and toggles of every block that its tests reach (half an hour)
 	@$(VENV)/bin/python tests/cover.py $(ONLY)
 
-mutate: $(VENV)/.test | tools ## mutants of every block's netlist, which its own tests must kill (an hour or two)
+mutate: $(VENV)/.test | tools ## mutants of every block's netlist, which its own tests must kill (an hour and a half)
 	@$(VENV)/bin/python tests/mutate.py $(ONLY)
 
 lint: $(VENV)/.test | tools ## style and common mistakes
