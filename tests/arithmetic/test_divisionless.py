@@ -5,7 +5,7 @@ from fractions import Fraction
 import cocotb
 import numpy as np
 import pytest
-from cocotb.triggers import ClockCycles
+from cocotb.triggers import ClockCycles, RisingEdge
 
 from hardwall.hdl.arithmetic.divisionless import Divisionless
 from hardwall.model.arithmetic.divisionless import (
@@ -49,25 +49,29 @@ def stimulus(sizes: tuple[int, ...], samples: int):
         yield min(max(dividend, 0), largest), divisor
 
 
-def steps(dividend: int, divisor: int, fraction: int, width: int, bits: int) -> int:
-    """Return the quotient by the module's steps, with a divisor of so many bits, and check each of its bounds."""
+def steps(dividend: int, divisor: int, fraction: int, width: int, bits: int) -> tuple[int, list[int]]:
+    """Return the quotient by the module's steps, with a divisor of so many bits, and check each of its bounds.
+
+    Beside it are the products from that which makes the reciprocal on; none of a quotient that does not fit at once.
+    """
     number, digit = digits(width + 1)
     whole, zeros = number * digit - fraction - 1, bits - divisor.bit_length()
     t, x = divisor << zeros, dividend << zeros
     if x >> bits + whole:
-        return 2**width - 1
+        return 2**width - 1, []
     r, one = reciprocal(t, bits), 1 << bits + FINE
     less = one - r * t
     assert 0 < less < ERROR_MAX * one
-    remainder, scale, made = r * x, one << whole, 0
-    for _ in range(number):
+    remainder, scale, made, products = r * x, one << whole, 0, [r * t, r * x]
+    for left in range(number, 0, -1):
         leading = remainder * 2**digit // scale
         assert leading < 2 << digit
         made, remainder = (made << digit) + leading, remainder * 2**digit - leading * (r * t << whole)
         assert 0 <= remainder < 2 * scale
+        products.append((leading + (left == 1)) * (less << whole))
     assert remainder < 2 * (r * t << whole)
     made += remainder >= r * t << whole
-    return min((made + 1) >> 1, 2**width - 1)
+    return min((made + 1) >> 1, 2**width - 1), products
 
 
 def test_no_reciprocal_is_above_or_below_by_more_than_derived():
@@ -84,13 +88,13 @@ def test_the_steps_end_in_the_exact_quotient(sizes):
     pairs = [pair for pair in stimulus(sizes, 2_000) if pair[1]]
     expected = [exact(*pair, *sizes[2:4]) for pair in pairs]
     assert [quotient(*pair, *sizes[2:4]) for pair in pairs] == expected
-    assert [steps(*pair, *sizes[2:4], sizes[1]) for pair in pairs] == expected
+    assert [steps(*pair, *sizes[2:4], sizes[1])[0] for pair in pairs] == expected
 
 
 def test_the_steps_end_in_the_exact_quotient_of_all_small_operands():
     for divisor in range(1, 1 << 7):
         for dividend in range(1 << 7):
-            assert steps(dividend, divisor, 3, 6, 7) == exact(dividend, divisor, 3, 6)
+            assert steps(dividend, divisor, 3, 6, 7)[0] == exact(dividend, divisor, 3, 6)
 
 
 @cocotb.test(**CAMPAIGN)
@@ -123,6 +127,30 @@ async def an_idle_multiplier_is_the_users(dut):
         await bench.transact("start", "done", dividend=1, divisor=1, factor=factor, term=term)
         await ClockCycles(dut.clk, 2)
         assert bench.reader("product")() == factor * term
+
+
+@cocotb.test()
+async def every_product_is_that_of_the_steps(dut):
+    """A reciprocal that is a little less makes the same quotients; it is not what the module says, all the same."""
+    component, sizes = Divisionless(**parameters()), tuple(parameters()[name] for name in NAMES)
+    bench, clock, last = Bench(dut, component), RisingEdge(dut.clk), digits(sizes[3] + 1)[0] - 1
+    await bench.reset()
+    product, seen = bench.reader("product"), 0
+    for dividend, divisor in list(stimulus(sizes, 300))[-600:]:
+        _, expected = steps(dividend, divisor, *sizes[2:4], sizes[1])
+        bench.drive(start=1, dividend=dividend, divisor=divisor)
+        await clock
+        bench.drive(start=0)
+        products = []
+        for _ in range(component.latency):
+            await clock
+            products.append(product())
+        if expected:
+            # The products by the reciprocal follow one another; those of the digits come every other clock.
+            first = len(products) - 2 * last - 5
+            assert [*products[first : first + 2], *products[first + 3 :: 2]] == expected
+            seen += 1
+    assert seen > 100
 
 
 @pytest.mark.parametrize("sizes", some_of(SIZES, 0, 1), ids=str)

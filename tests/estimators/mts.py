@@ -1,11 +1,13 @@
 """What the tests of the M/T estimators share: their designs, and campaigns of their RTL against the model."""
 
+from cocotb.triggers import ClockCycles, RisingEdge
+
 from hardwall.hdl.estimators.estimate import EstimatorBlock
 from hardwall.model.estimators.kept_edges import NOTHING, Gains, KeptDesign
 from hardwall.model.estimators.registry import design_of
 from hardwall.model.quadrature import Seen
 from hardwall.testing import SAMPLES, Bench
-from hardwall.testing.estimators import follow
+from hardwall.testing.estimators import follow, model
 from stimuli.edges import anything, rows, turn
 from stimuli.seeded import seeded
 from stimuli.specs import spec
@@ -56,3 +58,25 @@ async def starts_afresh(dut, component: EstimatorBlock) -> None:
     await bench.reset()
     await bench.transact("strobe", "valid", seen__count=5, seen__stamp=90, seen__stamp_a_rise=85)
     assert bench.reader("velocity")() == 0
+
+
+async def stays_until_the_next(dut, component: EstimatorBlock) -> None:
+    """Put a few motions through the RTL: both outputs change with `valid` alone, at a saturated velocity too."""
+    bench, clock, d = Bench(dut, component), RisingEdge(dut.clk), component.design
+    await bench.reset()
+    names = (*(f"seen__{name}" for name in Seen._fields if name != "run"), "restart")
+    velocity, saturated = map(bench.reader, ("velocity", "saturated"))
+    every = list(stimulus(d, 6_000))
+    first = int(model(d, every, NOTHING)["saturated"].argmax())
+    seen = set()
+    for row in every[max(first - 2 * d.half - 8, 0) : first + 20]:
+        before = velocity(), saturated()
+        bench.drive(strobe=1, **dict(zip(names, row, strict=True)))
+        await clock
+        bench.drive(strobe=0)
+        for _ in range(d.latency - 1):
+            await clock
+            assert (velocity(), saturated()) == before
+        await ClockCycles(dut.clk, 2)
+        seen.add(saturated())
+    assert seen == {0, 1}

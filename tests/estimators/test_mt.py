@@ -2,7 +2,7 @@
 
 import cocotb
 import pytest
-from mts import design, follows_model, starts_afresh
+from mts import design, follows_model, starts_afresh, stays_until_the_next
 
 from hardwall.hdl.estimators.mt import Estimator
 from hardwall.testing import CAMPAIGN, parameters, simulate
@@ -23,6 +23,11 @@ async def rtl_follows_model(dut):
 @cocotb.test()
 async def reset_mid_stream_starts_afresh(dut):
     await starts_afresh(dut, make(**parameters()))
+
+
+@cocotb.test()
+async def outputs_stay_until_the_next(dut):
+    await stays_until_the_next(dut, make(**parameters()))
 
 
 @pytest.mark.parametrize(("name", "half"), some_of([("mhz", None), ("narrow", 1), ("narrow", 5)], 0, 1))
