@@ -12,6 +12,7 @@ from stimuli.lengths import some_of
 from stimuli.seeded import seeded
 
 CLOCKS = 6000
+"""Clocks of a campaign, beside one for each bin."""
 SIZES = [(12, -300, 3, 77, 16.0), (20, -65536, 4, 8192, 10.0), (8, -128, 0, 256, 1.0)]
 """Bins in the middle of the count, of a long scale, and all of a small count: width, first, bin_bits, bins, limit."""
 
@@ -26,7 +27,7 @@ def stimulus(d: Design) -> dict[str, np.ndarray]:
     half, last = 1 << (d.count_width - 1), d.first + (d.bins << d.bin_bits)
     ends = [-half, half - 1, d.first, d.first - 1, d.first + (1 << d.bin_bits), last, last - 1, 0]
     rows = []
-    for k in range(CLOCKS):
+    for k in range(d.bins + CLOCKS):
         number = random.choice(ends) if random.random() < 0.3 else random.randint(d.first - 99, last + 99)
         rows.append(
             {
