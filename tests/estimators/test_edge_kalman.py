@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from fractions import Fraction
+from itertools import chain
 
 import cocotb
 import numpy as np
@@ -66,9 +67,25 @@ def stimulus(d: edge_kalman.Design, samples: int):
             samples -= 1
 
 
+def drifting(d: edge_kalman.Design, samples: int):
+    """Yield rows of edges at a constant time until the memory is long, which then come later and later.
+
+    The mean of the errors passes the alarm's bound as slowly as not, so that a little more or less of it tells.
+    """
+    random, scale = seeded(), Scale(d)
+    while samples > 0:
+        span, up = int(2.0 ** random.uniform(7, d.stamp_width - 4)), random.random() < 0.5
+        grow, quiet = 2.0 ** random.uniform(-14, -3), random.randrange(8, 40)
+        for k in range(quiet + 40):
+            scale.now += span
+            scale.pass_edge(up, scale.now - 1 - int(min(grow * max(k - quiet, 0), 0.9) * span))
+            yield *scale.row(), 0
+        samples -= quiet + 40
+
+
 def rows_of(d: edge_kalman.Design, samples: int):
-    """Yield the rows of `stimulus` without the run of edges, which this estimator does not use."""
-    for row in stimulus(d, samples):
+    """Yield the rows of both stimuli without the run of edges, which this estimator does not use."""
+    for row in chain(stimulus(d, samples - samples // 3), drifting(d, samples // 3)):
         yield *row[:8], row[9]
 
 
