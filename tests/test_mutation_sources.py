@@ -82,8 +82,8 @@ def test_sources_are_what_is_imported_directly_or_not(tmp_path):
     assert {*map(str, found)} == set(SOURCES) - OTHERS
 
 
-# One with signals of the closed loop, one with a world beside its tests and most of the models.
-@pytest.mark.parametrize("name", ["estimators/cycle_times", "link/banked_file"])
+# One with a whole axis, one with a world beside its tests and most of the models.
+@pytest.mark.parametrize("name", ["axis", "link/banked_file"])
 def test_nothing_is_imported_that_is_no_source(name):
     test = next(block.test for block in BLOCKS if block.name == name)
     command = [sys.executable, "-c", IMPORTING, TREE.resolve(), test.parent, test.stem]
