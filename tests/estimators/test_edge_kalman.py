@@ -74,8 +74,10 @@ def drifting(d: edge_kalman.Design, samples: int):
     """
     random, scale = seeded(), Scale(d)
     while samples > 0:
-        span, up = int(2.0 ** random.uniform(7, d.stamp_width - 4)), random.random() < 0.5
-        grow, quiet = 2.0 ** random.uniform(-14, -3), random.randrange(8, 40)
+        size, up = random.uniform(7, d.stamp_width - 4), random.random() < 0.5
+        # The shorter the time between edges, the more of them make the memory long, and the less each of them weighs.
+        span, quiet = int(2.0**size), min(int(2.0 ** random.uniform(3, max(20 - size, 5))), 3_000)
+        grow = 2.0 ** random.uniform(-14, -3)
         for k in range(quiet + 40):
             scale.now += span
             scale.pass_edge(up, scale.now - 1 - int(min(grow * max(k - quiet, 0), 0.9) * span))
