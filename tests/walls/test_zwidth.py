@@ -20,6 +20,7 @@ from hardwall.sim.walls import methods, zwidth
 from hardwall.sim.walls.boundary import BoundaryPoint
 from stimuli import results
 from stimuli.command_line import call
+from stimuli.lengths import long_form
 from stimuli.processes import HARDWALL, ended_by, session, started, stored, wait_until
 
 pytestmark = pytest.mark.usefixtures("fresh")
@@ -92,6 +93,7 @@ def test_a_map_goes_on_from_what_is_known(map_of_one_thread, monkeypatch):
     assert all(job not in before for job in hits[5:])
 
 
+@long_form
 @pytest.mark.rtl
 def test_the_rtl_gives_the_map_of_fixed(monkeypatch, capsys):
     smaller = {"zwidth.stiffness_to_n_per_m": 20e3, "zwidth.damping_to_n_s_per_m": 10.0}
