@@ -47,6 +47,11 @@ HELD = (
 """Stages whose pins act on when nothing permits it, as long as no clock says so."""
 
 
+QUICK_OF_AXES = (
+    "both channels change at once: the scale slips by two counts",
+    "the loop of external_fault opens, which the other axes take no part in",
+    "the loop of emergency_stop opens",
+)
 (AXES,) = (name for name, device in DEVICES.items() if device is SEVERAL)
 NEIGHBOURS = Bug(Doors.__init__, "Cat(each[axis] for", "Cat(each for")
 """Doors of several axes that a loop shuts which is another axis's matter."""
@@ -92,11 +97,11 @@ def test_pins_that_need_a_clock_to_be_safe_are_found(stage, bug):
     assert any("at the pins" in wrong for wrong in opens.wrong)
 
 
-@long_form
 @pytest.mark.rtl
 def test_faults_of_several_axes_are_safe():
-    outcomes = run(AXES, FAULTS[AXES])
-    assert len(outcomes) == len(FAULTS[AXES]) > 0
+    faults = [fault for fault in FAULTS[AXES] if LONG or fault.name in QUICK_OF_AXES]
+    outcomes = run(AXES, faults)
+    assert len(outcomes) == len(faults) >= len(QUICK_OF_AXES)
     assert {outcome.name: outcome.wrong for outcome in outcomes if not outcome.safe} == {}
 
 

@@ -11,7 +11,7 @@ the exact quotient, rounded half up, so the derived bound on the reciprocal's er
 each word is that of `mt`. The lesser of two quotients, each rounded, is the lesser quotient rounded.
 
 What multiplying is for is time: a divider makes a bit a clock, a product DIGIT bits. It takes a larger multiplier, and
-hardly more logic.
+more logic than a divider, which is small if it makes a bit a clock.
 
 Sources: those of `mt`; that an M/T method can do without a divider, if the reciprocal of the time is corrected by
 multiplications, is the idea of Sensors 2018, 18(10), 3250 and Electronics 2019, 8(3), 361, of which only the abstracts

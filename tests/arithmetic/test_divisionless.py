@@ -97,6 +97,27 @@ def test_the_steps_end_in_the_exact_quotient_of_all_small_operands():
             assert steps(dividend, divisor, 3, 6, 7)[0] == exact(dividend, divisor, 3, 6)
 
 
+def test_bit_12_of_what_the_only_digit_leaves_decides_nothing():
+    """What `tests/mutation/reasons.toml` says of a mutant: with that bit set every quotient that fits is the same."""
+    dividends, bits, fraction, width = SIZES[1][:4]
+    (number, digit), tried = digits(width + 1), 0
+    assert number == 1
+    whole = digit - fraction - 1
+    point = bits + FINE + whole
+    for divisor in range(1, 1 << bits):
+        zeros = bits - divisor.bit_length()
+        r, dividend = reciprocal(divisor << zeros, bits), np.arange(1 << dividends)
+        dividend = dividend[dividend << zeros >> bits + whole == 0]
+        remainder = r * dividend << zeros
+        leading, left = remainder >> point - digit, remainder % (1 << point - digit) << digit
+        last = (leading + 1) * ((1 << bits + FINE) - (r * divisor << zeros) << whole)
+        for bit in (0, 1 << 12):
+            made = (leading >> 1) + (leading & 1 | (left | bit) + last >> point & 1)
+            assert (made == ((dividend << fraction + 1) // divisor + 1) >> 1).all()
+        tried += len(dividend)
+    assert tried == 43_688
+
+
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     component, sizes = Divisionless(**parameters()), tuple(parameters()[name] for name in NAMES)

@@ -85,7 +85,7 @@ TIMES = ("time", "kept", "more", "few", "halves")
 # Both are what a weight between 0 and 1 makes of an error, which a free product does not know.
 WEIGHTED = ("mean", "place")
 # What the parts of a quotient by multiplications may be follows from its products, one from another.
-PRODUCTS = ("dividend", "t", "x", "remainder", "made", "left")
+PRODUCTS = ("dividend", "t", "x", "remainder", "made")
 # What the sum of a fit may be follows from its coefficients, one by one.
 FIT = ("age", "total")
 # In the search for the longest window, what the slopes and the sums may be follows from the history alone.
@@ -142,15 +142,13 @@ CASES = {
     # What the sums are while there is no root is not used; else it is promised.
     "levant": Case(
         partial(estimator, "levant"),
-        (*MOVED, "digits", "low", *(f"sum_{number}" for number in range(4))),
+        (*ROOTED, "low", *(f"sum_{number}" for number in range(4))),
         Bug(levant.Estimator._corrected, "design.lambda_.width + coarser + 1", "design.lambda_.width + coarser"),
         ranges.levant_alone,
     ),
-    "levant-semi-implicit": Case(
-        partial(estimator, "levant-semi-implicit"), (*MOVED, "digits"), PRODUCT, ranges.levants
-    ),
-    "levant-implicit": Case(partial(estimator, "levant-implicit"), (*MOVED, "digits"), PRODUCT, ranges.levants),
-    "levant-adaptive": Case(partial(estimator, "levant-adaptive"), (*MOVED, "digits"), PRODUCT, ranges.adaptive),
+    "levant-semi-implicit": Case(partial(estimator, "levant-semi-implicit"), ROOTED, PRODUCT, ranges.levants),
+    "levant-implicit": Case(partial(estimator, "levant-implicit"), ROOTED, PRODUCT, ranges.levants),
+    "levant-adaptive": Case(partial(estimator, "levant-adaptive"), ROOTED, PRODUCT, ranges.adaptive),
     "butterworth": Case(
         partial(estimator, "butterworth"),
         MOVED,

@@ -37,6 +37,8 @@ def test_values_and_halves():
         assert at(series, 0, time) == 0.0
         shorten(series, 0.5)
         assert at(series, 1, 1.0) == pytest.approx(polynomial(0.5), rel=1e-12, abs=1e-13)
+        shorten(series, 0.6)
+        assert at(series, 1, 1.0) == pytest.approx(polynomial(0.3), rel=1e-12, abs=1e-13)
 
 
 def test_what_is_sure_is_so_and_the_rest_is_found():
