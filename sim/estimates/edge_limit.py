@@ -10,7 +10,7 @@ and a motion that has impacts has no one density: the bound is a measure, not a 
 import math
 
 import numpy as np
-import scipy.optimize
+import scipy
 
 from ...model.compiled import compiled
 from ...model.spec import AxisSpec

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import isotonic_regression
+import scipy
 
 from .boundary import STABLE, UNDECIDED, share
 
@@ -95,7 +95,7 @@ class Column:
         if not some.any():
             return 0.0
         stiffness, tries = self._stiffness[some], tries[some]
-        curve = isotonic_regression(stable[some] / tries, weights=tries, increasing=False).x
+        curve = scipy.optimize.isotonic_regression(stable[some] / tries, weights=tries, increasing=False).x
         over = int((curve >= HALF).sum())
         if over in (0, len(curve)):
             return float(stiffness[-1]) if over else 0.0

@@ -20,6 +20,8 @@ from stimuli.command_line import call
 from stimuli.processes import HARDWALL
 
 HEAVY = {"numba", "numpy", "scipy", "matplotlib", "distributed", "pydantic", "amaranth"}
+LATER = {"scipy.optimize", "scipy.signal", "scipy.stats", "matplotlib", "distributed", "amaranth"}
+"""What takes long to import, and is for few of the runs of a command."""
 WITHOUT = """
 import sys
 class Absent:
@@ -68,6 +70,14 @@ def test_alone_it_prints_help_and_no_error(monkeypatch, capsys):
     code, out, err = call(monkeypatch, capsys)
     assert (code, err) == (0, "")
     assert "Usage: hardwall" in out
+
+
+@pytest.mark.parametrize("name", ["hit", "zwidth", "accuracy"])
+def test_a_command_loads_nothing_that_most_of_its_runs_do_not_use(name):
+    program = f"import sys, hardwall.sim.commands.{name}; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert f"hardwall.sim.commands.{name}" in done.stdout.split()
+    assert set(done.stdout.split()) & LATER == set()
 
 
 def test_signals_are_heard_before_anything_long_is_imported():
