@@ -109,10 +109,7 @@ class Tally:
             self._squares += float(np.square(rest - self._mark_m).sum())
             self._counted += len(rest)
             self.rms_m = (self._squares / self._counted) ** 0.5
-        changes = np.flatnonzero(np.diff(positions, prepend=self._position_m))
-        if len(changes):
-            self.still_from = first + int(changes[-1])
-        self._position_m = float(positions[-1])
+        self._note_rest(first, positions)
         self.largest_drive = max(self.largest_drive, float(np.abs(drives).max()))
         self.farthest_m = max(self.farthest_m, float(positions.max()))
         if self._digest:
@@ -121,6 +118,19 @@ class Tally:
             self._window.add(part(max(first, self._window_from), self.window_end))
             self._judge(self.window_end)
         self._window.add(part(max(first, self._window_from), end))
+
+    def _note_rest(self, first: int, positions: np.ndarray) -> None:
+        """Note since when the position has not changed, with samples from number `first` on."""
+        last = positions[-1]
+        if len(positions) > 1 and positions[-2] != last:  # which tells it of a handle that moves, at once
+            self.still_from = first + len(positions) - 1
+        else:
+            moved = np.flatnonzero(positions != last)
+            if len(moved):
+                self.still_from = first + int(moved[-1]) + 1
+            elif last != self._position_m:
+                self.still_from = first
+        self._position_m = float(last)
 
     def _judge(self, end: int) -> None:
         """Judge the window that ends at a sample, and begin the next one."""
