@@ -14,7 +14,6 @@ from ..scene.errors import SceneError
 from . import streams
 from .errors import BadInput, one_line
 
-
 COLLECTED = 100_000, 100, 100
 """How seldom Python looks for garbage. Imports and the compiler make objects that stay: to go through all of them again
 and again, by Python's own numbers, is an eighth of the time in which a loop is compiled."""

@@ -3,12 +3,11 @@
 from collections.abc import Callable, Hashable
 
 from ..jobs import rounds
-from ..jobs.store import Store
 from ..scene.case import Case
 from ..studies import trade_runs
-from ..walls.zwidth import Map, verdict
+from ..walls.zwidth import STARTS, Map
 from .maps import Maps
-from .options import SceneArgument, refuse, refuse_for_maps
+from .options import SceneArgument, StartsOption, refuse, refuse_for_maps
 from .study import StudyOptions, study
 from .terminal import progress
 
@@ -16,15 +15,11 @@ from .terminal import progress
 class _Runs:
     """A `trade_runs.Runs` that runs hits as the options say; timed hits run alone, in this process."""
 
-    def __init__(self, options: StudyOptions):
-        self._options = options
+    def __init__(self, options: StudyOptions, starts: int):
+        self._options, self.starts = options, starts
 
     def maps(self, backend: str, cases: list[Case]) -> list[Map]:
-        return Maps(self._options, backend, 1)("maps", cases)
-
-    def verdicts(self, jobs: list[dict]) -> list[dict]:
-        # Many of these walls have just been hit for a map.
-        return self._options.results("walls around the edge", verdict, jobs, Store("zwidth"))
+        return Maps(self._options, backend, self.starts)("maps", cases)
 
     def medians(self, contestants: dict[Hashable, Callable[[], float]], times: int) -> dict[Hashable, float]:
         with progress("times", times * len(contestants)) as advance:
@@ -33,8 +28,8 @@ class _Runs:
 
 
 @study("workers", "resume", "set_", "plot")
-def command(options: StudyOptions, scene: SceneArgument = "drive-2011") -> None:
+def command(options: StudyOptions, scene: SceneArgument = "drive-2011", starts: StartsOption = STARTS) -> None:
     changes = options.changes()
     refuse_for_maps(changes, "it takes two of the paper's")
     refuse(changes, ("solver",), "it is one of the settings")
-    options.finish(trade_runs.study(Case.of(scene, changes), _Runs(options)))
+    options.finish(trade_runs.study(Case.of(scene, changes), _Runs(options, starts)))

@@ -1,104 +1,96 @@
-"""Pictures of speed against accuracy: the time and the error of every shortcut of a simulation."""
+"""The picture of speed against accuracy: the time of a map, and how far every setting moves its edge."""
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..studies.shortcuts import SCATTER
-from ..studies.trade import HIT, MAP, Point, Question, Trade
+from ..studies.trade import Point, Trade
 from ..walls import methods
 from .labels import label_points
 from .style import COLOURS, LABEL_PT, THEORY, lay_out, new_figure, page, plain_decades
 
-NAMED = 8
+NAMED = 9
 """The largest number of settings of a panel that are labelled."""
-BEST, PLAIN = COLOURS["butterworth"], "0.55"
-NOTES = (
-    "blue, on the line: no setting is both faster and more right; those without a name are in the command's table\n"
-    "grey band: so much is chance, for a handle that is 0.1 % heavier or lighter changes as much"
-)
-QUESTIONS = {
-    HIT: ("time of a hit (ms)", "verdicts that differ (%)", "is a wall stable? {walls} walls around the edge"),
-    MAP: ("time of both maps, in one process (s)", "largest error of K (%)", "where is the edge?"),
-}
+BEST, PLAIN, SAME = COLOURS["butterworth"], "0.25", "0.65"
+MOST = 2.0
+"""The ratio of areas at which an interval is cut off that has no end, or a far one."""
 
 
 @page
-def draw(trade: Trade) -> dict[str, Figure]:
-    """Return the pictures of the questions, `hit` and `map`: a panel for every estimator, error against time."""
-    return {question.name: _picture(trade, question) for question in QUESTIONS}
-
-
-def _picture(trade: Trade, question: Question) -> Figure:
-    """Return the picture of one question."""
-    time, error, asked = QUESTIONS[question]
+def draw(trade: Trade) -> Figure:
+    """Return a panel for every estimator: the area of a setting's map over the reference's, against time."""
     controller, grid = trade.scene.controller, trade.scene.zwidth
     title = (
-        f"What a faster simulation of a {question.name} gets wrong\n{trade.scene.name}: samples at "
+        f"What moves the edge of the stable walls, and what it costs\n{trade.scene.name}: samples at "
         f"{controller.sample_hz / 1e3:g} kHz, force at {controller.actuation_hz / 1e3:g} kHz; "
         f"B of {grid.damping_from_n_s_per_m:g} to {grid.damping_to_n_s_per_m:g} N s/m, K by "
-        f"{grid.stiffness_step_n_per_m / 1e3:g} kN/m"
+        f"{grid.stiffness_step_n_per_m / 1e3:g} kN/m, {trade.starts} starts"
     )
-    picture = new_figure(0.9 + 3.2 * len(trade.walls), title)
-    panels = picture.subplots(len(trade.walls), sharex=True, squeeze=False)[:, 0]
-    for axes, label in zip(panels, trade.walls, strict=True):
-        name = methods.methods()[label].label
-        axes.set_title(f"{name}: {asked.format(walls=trade.walls[label])}")
-        axes.set_ylabel(error)
-        _draw(axes, trade, question, label)
-    panels[-1].set_xlabel(time)
+    picture = new_figure(0.9 + 3.4 * len(trade.labels), title)
+    panels = picture.subplots(len(trade.labels), sharex=True, squeeze=False)[:, 0]
+    for axes, label in zip(panels, trade.labels, strict=True):
+        axes.set_title(methods.methods()[label].label)
+        axes.set_ylabel("area (of that with all parts)")
+        _draw(axes, trade, label)
+    panels[-1].set_xlabel("time of both maps, in one process (s)")
     picture.align_ylabels(panels)
-    picture.supxlabel(NOTES, x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)
+    notes = (
+        "bars: 95 of 100 draws of the starts; grey: the same area, as far as these tell; blue: no map is both faster "
+        "and as right\nthose without a name are in the command's table"
+    )
+    picture.supxlabel(notes, x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)
     lay_out(picture)
-    for axes, label in zip(panels, trade.walls, strict=True):
-        _name(axes, trade, question, label)
+    for axes, label in zip(panels, trade.labels, strict=True):
+        _name(axes, trade, label)
     return picture
 
 
-def _spot(point: Point, question: Question, label: str) -> tuple[float, float]:
-    """Return the coordinates of a point: time (ms for a hit, s for maps) and error (%)."""
-    return question.cost_s(point) * (1e3 if question is HIT else 1.0), question.error(point, label) * 100
-
-
-def _shown(trade: Trade, question: Question) -> list[Point]:
-    """Return the points of a panel; shortcuts of a map's steps are left out for a hit, which they do not change."""
-    return [point for point in trade.points if question is MAP or point.shortcut.coarser == 1]
-
-
-def named(trade: Trade, question: Question, label: str) -> list[Point]:
+def named(trade: Trade, label: str) -> list[Point]:
     """Return the points of a panel that are labelled, at most `NAMED`.
 
-    They are the reference, the best, the slowest, and the boldest shortcut of every axis, which is the first of the
-    axis.
+    They are the reference, the best, and of the others those that move the edge most.
     """
-    best, shown = trade.best(question, label), _shown(trade, question)
-    chosen = [trade.points[0], best[0], best[-1], max(shown, key=question.cost_s), *best]
-    chosen += {point.shortcut.axis: point for point in reversed(shown) if point.shortcut.axis != SCATTER}.values()
+    others = [point for point in trade.points if point.shortcut.axis != SCATTER]
+    chosen = [trade.points[0], *trade.best(label), *sorted(others, key=lambda point: -point.error(label))]
     distinct = [point for number, point in enumerate(chosen) if point not in chosen[:number]]
     return distinct[:NAMED]
 
 
-def _draw(axes: Axes, trade: Trade, question: Question, label: str) -> None:
-    """Draw the points of a panel, the line through the best points, and the scatter."""
-    scatter = trade.scatter(question, label) * 100
-    axes.axhspan(-100, scatter, color="0.92", lw=0)
-    best = trade.best(question, label)
-    shown = _shown(trade, question)
-    axes.plot(*zip(*(_spot(point, question, label) for point in best), strict=True), color=BEST, lw=1.2)
-    for point in shown:
-        colour = BEST if point in best else PLAIN
-        axes.plot(*_spot(point, question, label), ls="", marker="o", ms=5, color=colour)
+def _colour(point: Point, best: list[Point], label: str) -> str:
+    return BEST if point in best else PLAIN if point.moves[label].moved else SAME
+
+
+def _draw(axes: Axes, trade: Trade, label: str) -> None:
+    """Draw the points of a panel with their intervals, and the line of the reference."""
+    best = trade.best(label)
+    axes.axhline(1, color="0.85", lw=1, zorder=0)
+    for point in trade.points:
+        move, colour = point.moves[label], _colour(point, best, label)
+        below, above = max(move.area - move.low, 0), max(min(move.high, MOST) - move.area, 0)
+        axes.errorbar(
+            *(point.map_s, move.area),
+            yerr=[[below], [above]],
+            fmt="o",
+            ms=5,
+            color=colour,
+            ecolor=colour,
+            elinewidth=0.8,
+        )
     axes.set_xscale("log")
     plain_decades(axes.xaxis)
-    most = max(_spot(point, question, label)[1] for point in shown)
-    axes.set_ylim(-0.12 * most - 0.5, 1.2 * most + 1)
-    axes.margins(x=0.1)
+    most = max(min(point.moves[label].high, MOST) for point in trade.points)
+    least = min(point.moves[label].low for point in trade.points)
+    room = 0.12 * (most - least) + 0.02
+    axes.set_ylim(least - room, most + room)
+    axes.margins(x=0.12)
 
 
-def _name(axes: Axes, trade: Trade, question: Question, label: str) -> None:
+def _name(axes: Axes, trade: Trade, label: str) -> None:
     """Write labels beside the points of a panel."""
-    best, names = trade.best(question, label), named(trade, question, label)
-    labels = [
-        (point.shortcut.label, _spot(point, question, label), BEST if point in best else "0.25") for point in names
-    ]
-    others = [_spot(point, question, label) for point in _shown(trade, question) if point not in names]
-    label_points(axes, labels, avoid=others, lines=[[_spot(point, question, label) for point in best]])
+    best, names = trade.best(label), named(trade, label)
+
+    def spot(point: Point) -> tuple[float, float]:
+        return point.map_s, point.moves[label].area
+
+    labels = [(point.shortcut.label, spot(point), _colour(point, best, label)) for point in names]
+    label_points(axes, labels, avoid=[spot(point) for point in trade.points if point not in names])

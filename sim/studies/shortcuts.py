@@ -1,7 +1,8 @@
 """Shortcuts that make a simulation cheaper, grouped by what they leave out, and their changes of a scene.
 
-Every axis of shortcuts begins with its boldest; the boldest are also combined in pairs. Two more changes, `scatter`,
-are too slight to be measured on a bench: their effect on a verdict is chance, and no shortcut can be judged finer.
+Every axis of shortcuts begins with its boldest; the boldest are also combined in pairs. Parts that a scene lacks are
+the opposite: what is left out by those who describe a device without them. Two more changes, `scatter`, are too slight
+to be measured on a bench: what they move is chance, and tells how often a move is said that is none.
 """
 
 from collections.abc import Callable
@@ -19,6 +20,21 @@ PARTS = {
     "no motor": {"motor": None, "amplifier.current_limit_a": None},
     "no output steps": {"output": None},
 }
+LACKED = {
+    "with dry friction of 0.1 N": {"handle.coulomb_n": 0.1},
+    "with friction that bends": {"presliding.model": "dahl", "presliding.stiffness_n_per_m": 1e5},
+    "with a hand": {"hand.model": "van-beek-2015"},
+    "with an amplifier of 1 kHz": {"amplifier.bandwidth_hz": 1e3},
+    "with a converter of 12 bits": {"output.full_scale_n": 40.0, "output.dac_bits": 12},
+    "with edges off by 0.05": {"encoder.edge_error_counts": 0.05},
+    "with the HEDS-9040's errors": {
+        "encoder.edge_error_counts": 0.0067,
+        "encoder.duty_error_counts": 0.078,
+        "encoder.phase_error_counts": 0.022,
+    },
+    "with hysteresis and jitter": {"encoder.hysteresis_counts": 0.2, "encoder.jitter_s": 50e-9},
+}
+"""Parts that a device has and a scene may lack, with figures of `docs/scenes.md`, each where the scene says none."""
 SLOWER = 2, 5
 """The factors by which the sample rate is lower."""
 CLOCK = 4
@@ -65,7 +81,13 @@ def shortcuts(scene: Scene, accepted: Callable[[Shortcut], bool]) -> list[Shortc
     beside = _scatter(scene), _backends(scene)
     bold = [list(filter(accepted, axis)) for axis in (_parts(scene), _rates(scene), _steps(scene), _grids(scene))]
     pairs = [_together(*pair) for pair in combinations([axis[0] for axis in bold if axis], 2)]
-    return [REFERENCE, *filter(accepted, chain(*beside)), *chain(*bold), *filter(accepted, pairs)]
+    return [
+        REFERENCE,
+        *filter(accepted, chain(*beside)),
+        *filter(accepted, _lacked(scene)),
+        *chain(*bold),
+        *filter(accepted, pairs),
+    ]
 
 
 def _backends(scene: Scene) -> list[Shortcut]:
@@ -87,6 +109,14 @@ def _parts(scene: Scene) -> list[Shortcut]:
         if changes and all(changes != other.changes for other in parts):
             parts.append(Shortcut("parts", label, changes))
     return parts
+
+
+def _lacked(scene: Scene) -> list[Shortcut]:
+    def says(key: str) -> bool:
+        section, _, name = key.partition(".")
+        return bool(getattr(getattr(scene, section), name, None))
+
+    return [Shortcut("lacked", label, keys) for label, keys in LACKED.items() if not any(map(says, keys))]
 
 
 def _rates(scene: Scene) -> list[Shortcut]:

@@ -1,10 +1,9 @@
 """The runs that trade speed for accuracy: shortcuts of a scene's simulation, compared with the most exact simulation.
 
 The reference is the bit-accurate model with every part of the scene, the exact solver, and the scene's own rates and
-steps of K. Three things are compared with it, for two estimators:
+steps of K. Two things are compared with it, for two estimators:
 
-- the verdicts on walls around the reference's boundary, from 0.7 times as stiff to 1 / 0.7 times;
-- K at the boundary of the shortcut's own map, at every B where the reference has one, from one start, as the verdicts;
+- the edge of the shortcut's own map, from the same starts, draw by draw of these: see `walls.moves`;
 - the time of a hit, the mean over a wall of every B, and the time of a map: that of a hit times its number of hits.
 
 The hardware has the verdicts of `fixed`, because it has its force words: every hit of the hardware checks that.
@@ -18,12 +17,12 @@ from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
-from ..jobs.store import sources
 from ..scene.case import Case
 from ..scene.errors import SceneError
 from ..walls import hit
 from ..walls.grid import grid_of
 from ..walls.methods import Curve, methods
+from ..walls.moves import move
 from ..walls.zwidth import Map
 from .shortcuts import REFERENCE, Shortcut, shortcuts
 from .trade import Point, Trade
@@ -32,11 +31,11 @@ METHODS = "adjusted", "fdm-500"
 GRID = {
     "zwidth.damping_from_n_s_per_m": 10.0,
     "zwidth.damping_to_n_s_per_m": 70.0,
-    "zwidth.damping_step_n_s_per_m": 15.0,
+    "zwidth.damping_step_n_s_per_m": 20.0,
 }
 """A grid with few B, as there are many maps; both estimators have a boundary there on the paper's device and drive."""
 AROUND = 0.7, 0.85, 0.95, 1 / 0.95, 1 / 0.85, 1 / 0.7
-"""The walls whose verdicts are compared, as multiples of the reference's boundary."""
+"""The walls that are timed, as multiples of the reference's boundary."""
 ROUNDS = 3
 RTL_WALLS = 2
 """The number of walls on which the hardware is timed, once, for every estimator: a hit takes seconds."""
@@ -46,13 +45,12 @@ Wall = tuple[float, float]
 
 
 class Runs(Protocol):
-    """A runner of the study's hits, which shows its progress."""
+    """A runner of the study's hits, which shows its progress; `starts` is the number of starts of its maps."""
+
+    starts: int
 
     def maps(self, backend: str, cases: list[Case]) -> list[Map]:
         """Return the map of every case."""
-
-    def verdicts(self, jobs: list[dict]) -> list[dict]:
-        """Return the results of `zwidth.verdict` for the jobs."""
 
     def medians(self, contestants: dict[Hashable, Callable[[], float]], rounds: int) -> dict[Hashable, float]:
         """Return the median of every contestant's results over rounds in which they take turns: `rounds.medians`."""
@@ -131,18 +129,16 @@ def study(case: Case, runs: Runs) -> Trade:
 
     Raises:
         SceneError: if the scene is not valid, or has no section `zwidth`.
-        RuntimeError: if no wall of a map is stable, or the hardware's force words are not those of `fixed`.
+        RuntimeError: if the stable walls of a map have no area, or the hardware's force words are not those of `fixed`.
     """
     began, contest = time.perf_counter(), _Contest(case)
     maps = _maps(contest, runs)
+    for curve in contest.curves:
+        if not maps[REFERENCE.label, curve.label].area:
+            name = f"{contest.scene.name}: with {curve.label}"
+            raise RuntimeError(f"{name} the stable walls of the map have no area: nothing to compare at")
     boundaries = {curve.label: _boundary(maps[REFERENCE.label, curve.label]) for curve in contest.curves}
-    for label, boundary in boundaries.items():
-        if not boundary:
-            raise RuntimeError(
-                f"{contest.scene.name}: with {label} no wall of the map is stable: nothing to compare at"
-            )
     around = {label: contest.walls_around(boundary) for label, boundary in boundaries.items()}
-    verdicts = _verdicts(contest, around, runs)
     # The timed walls: one for every B, at varying distances from the boundary.
     timed = {label: [at[n % len(at)] for n, at in enumerate(walls)] for label, walls in around.items()}
     seconds = _seconds(contest, timed, runs)
@@ -156,25 +152,11 @@ def study(case: Case, runs: Runs) -> Trade:
             hit_s=statistics.mean(hit_s.values()),
             hits=sum(a_map.hits for a_map in own.values()),
             map_s=sum(a_map.hits * hit_s[label] for label, a_map in own.items()),
-            differ={
-                label: _share_that_differs(verdicts[_hits_of(model), label], verdicts[_hits_of(REFERENCE), label])
-                for label in boundaries
-            },
-            errors={label: _errors(_boundary(own[label]), boundary) for label, boundary in boundaries.items()},
+            moves={label: move(a_map, maps[REFERENCE.label, label]) for label, a_map in own.items()},
         )
         points.append(point)
     checked = len(contest.hardware) * sum(len(walls[:RTL_WALLS]) for walls in timed.values())
-    walls = {label: sum(map(len, walls)) for label, walls in around.items()}
-    return Trade(contest.scene, points, walls, checked, time.perf_counter() - began)
-
-
-def _share_that_differs(verdicts: list[str], truth: list[str]) -> float:
-    return statistics.mean(float(here != there) for here, there in zip(verdicts, truth, strict=True))
-
-
-def _errors(boundary: dict[float, float], truth: dict[float, float]) -> list[float]:
-    """Return the relative errors of K at every B of the true boundary; 1 where the region has already ended."""
-    return [abs(boundary.get(damping, 0.0) / stiffness - 1) for damping, stiffness in truth.items()]
+    return Trade(contest.scene, points, runs.starts, checked, time.perf_counter() - began)
 
 
 def _maps(contest: _Contest, runs: Runs) -> dict[tuple[str, str], Map]:
@@ -185,25 +167,6 @@ def _maps(contest: _Contest, runs: Runs) -> dict[tuple[str, str], Map]:
         made = runs.maps(backend, [contest.case_of(*key) for key in keys])
         maps |= {(each.label, curve.label): a_map for (each, curve), a_map in zip(keys, made, strict=True)}
     return maps
-
-
-def _verdicts(contest: _Contest, around: dict[str, list[list[Wall]]], runs: Runs) -> dict[tuple[str, str], list[str]]:
-    """Return the verdicts on the walls, by `_hits_of` a shortcut and the estimator's label."""
-    common = {"sources": sources()}
-    cases = {
-        (_hits_of(each), curve.label): contest.case_of(each, curve).job() | common | {"backend": each.backend}
-        for each in contest.computed
-        if each.coarser == 1
-        for curve in contest.curves
-    }
-    jobs = [
-        job | {"wall": wall, "start": 0}
-        for (_, label), job in cases.items()
-        for walls in around[label]
-        for wall in walls
-    ]
-    results = iter(runs.verdicts(jobs))
-    return {key: [next(results)["verdict"] for walls in around[key[1]] for _ in walls] for key in cases}
 
 
 def _seconds(contest: _Contest, timed: dict[str, list[Wall]], runs: Runs) -> dict[tuple[str, str], float]:

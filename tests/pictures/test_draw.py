@@ -30,7 +30,6 @@ from hardwall.sim.pictures import replay as replayed
 from hardwall.sim.pictures.style import PAGE_IN, lay_out, save
 from hardwall.sim.studies.accuracy import Accuracy
 from hardwall.sim.studies.published import LOOPS
-from hardwall.sim.studies.trade import HIT, MAP
 from stimuli import results
 from stimuli.lengths import LONG
 from stimuli.replays import BOUND, COARSEN, swing
@@ -71,7 +70,7 @@ PICTURES = {
         f"drop, {name}": lambda name=name: drop.draw(results.dropped())[name]
         for name in ("rest", "law", "ends", "maps")
     },
-    **{f"trade, {name}": lambda name=name: trade.draw(results.traded())[name] for name in ("hit", "map")},
+    "trade": lambda: trade.draw(results.traded()),
 }
 
 
@@ -131,7 +130,7 @@ def test_letters_are_large_enough_to_read(picture):
         ("hit", ".png"),
         ("figure 2", ".svg"),
         ("zwidth", ".pdf"),
-        *([("zwidth", ".png"), ("zwidth", ".svg"), ("trade, map", ".svg")] if LONG else ()),
+        *([("zwidth", ".png"), ("zwidth", ".svg"), ("trade", ".svg")] if LONG else ()),
     ],
 )
 def test_a_picture_is_always_the_same_file(tmp_path, name, suffix):
@@ -213,17 +212,15 @@ def test_a_hit_says_how_it_settled_in_digits_that_count(rms_m, text):
     assert "0.0000" not in title
 
 
-@pytest.mark.parametrize(
-    ("picture", "question"), [("trade, hit", HIT), ("trade, map", MAP)], indirect=["picture"], scope="module"
-)
-def test_a_panel_of_the_trade_names_its_best_and_few_others(picture, question):
+@pytest.mark.parametrize("picture", ["trade"], indirect=True)
+def test_a_panel_of_the_trade_names_its_best_and_few_others(picture):
     made = results.traded()
-    assert len(picture.axes) == len(made.walls)
-    for axes, label in zip(picture.axes, made.walls, strict=True):
+    assert len(picture.axes) == len(made.labels)
+    for axes, label in zip(picture.axes, made.labels, strict=True):
         labels = {point.shortcut.label for point in made.points}
         names = [text.get_text() for text in axes.texts if text.get_text() in labels]
         assert 2 <= len(names) == len(set(names)) <= trade.NAMED
-        best = made.best(question, label)
+        best = made.best(label)
         assert {best[0].shortcut.label, best[-1].shortcut.label, made.points[0].shortcut.label} <= set(names)
         assert not any(text.isdigit() for text in names)
 

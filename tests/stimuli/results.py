@@ -20,6 +20,7 @@ from hardwall.sim.walls.chatter import Chatter
 from hardwall.sim.walls.hit import Hit
 from hardwall.sim.walls.hit_axes import AxesHit
 from hardwall.sim.walls.methods import methods
+from hardwall.sim.walls.moves import Move
 from hardwall.sim.walls.zwidth import Effort, Map
 
 NOTHING = Effort("fixed", 0, 0.0)
@@ -211,14 +212,16 @@ def rate_gains() -> rates.Rates:
 
 
 def traded() -> trade.Trade:
-    """Return a trade of every shortcut of drive-2011, with random times and errors."""
+    """Return a trade of every shortcut of drive-2011, with random times and edges."""
     scene = load("drive-2011")
     chance = np.random.default_rng(2)
     points = []
     for each in shortcuts.shortcuts(scene, lambda _: True):
         exact = each is shortcuts.REFERENCE
         hit_s = 0.1 if exact else 0.1 * 10 ** chance.uniform(-1, 1)
-        wrong = {label: 0.0 if exact else float(chance.uniform(0, 0.5)) for label in ("adjusted", "fdm-500")}
-        errors = {label: [value, value / 2] for label, value in wrong.items()}
-        points.append(trade.Point(each, hit_s, 100, 100 * hit_s, wrong, errors))
-    return trade.Trade(scene, points, {"adjusted": 30, "fdm-500": 30}, 8)
+        moves = {}
+        for label in ("adjusted", "fdm-500"):
+            area, half = (1.0, 0.0) if exact else (float(chance.uniform(0.7, 1.3)), float(chance.uniform(0, 0.2)))
+            moves[label] = Move(area, area - half, area + half, 0.02, area - 1, 5)
+        points.append(trade.Point(each, hit_s, 100, 100 * hit_s, moves))
+    return trade.Trade(scene, points, 10, 8)

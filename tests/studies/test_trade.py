@@ -8,11 +8,12 @@ import pytest
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load
 from hardwall.sim.studies import trade_runs
-from hardwall.sim.studies.shortcuts import REFERENCE, Shortcut, shortcuts
-from hardwall.sim.studies.trade import HIT, MAP, Point, Trade, best
-from hardwall.sim.studies.trade_runs import AROUND, GRID, METHODS, study
+from hardwall.sim.studies.shortcuts import LACKED, REFERENCE, Shortcut, shortcuts
+from hardwall.sim.studies.trade import Point, Trade, best
+from hardwall.sim.studies.trade_runs import GRID, METHODS, study
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.grid import grid_of
+from hardwall.sim.walls.moves import Move
 from hardwall.sim.walls.zwidth import Map
 from stimuli.command_line import call
 
@@ -21,6 +22,8 @@ EDGE = 22e3
 
 class Invented:
     """Runs of a world with one rule: walls are stable up to 22 kN/m, with some shortcuts up to another stiffness."""
+
+    starts = 1
 
     def stable(self, stiffness, damping, changes, backend):
         times = 1.5 if "solver.step_s" in changes else 1.1 if backend == "float" else 1.0
@@ -38,12 +41,6 @@ class Invented:
             row = max(stable, default=0)
             points.append(BoundaryPoint(damping, row * step, None if row == grid.rows else (row + 1) * step))
         return Map(case, points, len(points) * grid.rows, [None] * len(points))
-
-    def verdicts(self, jobs):
-        return [
-            {"verdict": "stable" if self.stable(*job["wall"], job["changes"], job["backend"]) else "unstable"}
-            for job in jobs
-        ]
 
     def medians(self, contestants, rounds):
         if rounds == 1:
@@ -67,28 +64,29 @@ def found(hardware):
 
 def test_a_shortcut_is_held_against_the_reference(found):
     trade, points = found
-    assert trade.walls == dict.fromkeys(METHODS, 5 * len(AROUND))
+    assert trade.labels == list(METHODS)
     reference = points[REFERENCE.label]
-    assert (reference.differ, reference.errors) == (dict.fromkeys(METHODS, 0.0), {name: [0.0] * 5 for name in METHODS})
+    assert [(move.area, move.stiffness, move.moved) for move in reference.moves.values()] == [(1.0, 0.0, False)] * 2
     assert reference.hit_s == pytest.approx(0.2)
     assert reference.map_s == pytest.approx(0.2 * reference.hits)
     stepped = points["steps of 100 µs"]
-    assert stepped.errors == {name: [pytest.approx(0.5)] * 5 for name in METHODS}
-    # With 33 kN/m as the limit, the last three of 16, 19, 21, 24, 26 and 32 kN/m become stable.
-    assert stepped.differ == dict.fromkeys(METHODS, 0.5)
+    for move in stepped.moves.values():
+        # 33 kN/m for 22, at each of four B.
+        assert (move.area, move.stiffness, move.dampings) == (pytest.approx(1.5), pytest.approx(0.5), 4)
+        assert move.moved
+    assert stepped.error("adjusted") == pytest.approx(0.5)
     assert stepped.hit_s == pytest.approx(0.1)
-    assert points["float"].errors["adjusted"] == [pytest.approx(2 / 22)] * 5
+    assert points["float"].moves["adjusted"].area == pytest.approx(24 / 22)
 
 
-def test_a_region_that_ends_is_wrong_by_all_of_k(found):
-    assert found[1]["no cable"].errors["adjusted"] == [0.0, 0.0, 1.0, 1.0, 1.0]
-    assert found[1]["no cable"].of_stiffness("adjusted") == {"median": 1.0, "largest": 1.0}
+def test_a_region_that_ends_moves_by_all_of_k(found):
+    move = found[1]["no cable"].moves["adjusted"]
+    assert (move.stiffness, move.dampings) == (-1.0, 2)
 
 
 def test_steps_of_k_are_of_maps_alone(found):
     coarse, reference = found[1]["K by 5 kN/m"], found[1][REFERENCE.label]
-    assert coarse.errors["adjusted"] == [pytest.approx(2 / 22)] * 5
-    assert coarse.differ == reference.differ
+    assert coarse.moves["adjusted"].area == pytest.approx(20 / 22)
     assert coarse.hit_s == reference.hit_s
     assert coarse.hits < reference.hits / 2
 
@@ -97,7 +95,7 @@ def test_the_hardware_has_the_verdicts_of_its_model(found):
     trade, points = found
     for label, model in (("rtl", REFERENCE.label), ("rtl, clock of 3 MHz", "clock of 3 MHz")):
         assert points[label].hit_s == 5.0
-        assert (points[label].hits, points[label].errors) == (points[model].hits, points[model].errors)
+        assert (points[label].hits, points[label].moves) == (points[model].hits, points[model].moves)
     assert trade.words_checked == 2 * 2 * 2
 
 
@@ -111,29 +109,41 @@ def test_other_force_words_are_a_failure(monkeypatch):
 
 def test_where_nothing_is_stable_there_is_nothing_to_compare(hardware, monkeypatch):
     monkeypatch.setattr(Invented, "stable", lambda *_: False)
-    with pytest.raises(RuntimeError, match=r"^drive-2011: with adjusted no wall of the map is stable"):
+    with pytest.raises(RuntimeError, match=r"^drive-2011: with adjusted the stable walls of the map have no area"):
         study(Case.of("drive-2011"), Invented())
 
 
-def point(label, seconds, error, axis="parts", coarser=1):
-    return Point(Shortcut(axis, label, {}, coarser=coarser), seconds, 1, seconds, {"fdm": error}, {"fdm": [0.0, error]})
+def point(label, seconds, area, half=0.0, step=0.0):
+    move = Move(area, area - half, area + half, step, 0.0, 0)
+    return Point(Shortcut("parts", label, {}), seconds, 1, seconds, {"fdm": move})
 
 
 def test_the_best_are_those_that_none_beats_in_both():
-    points = [point("a", 3, 0.0), point("b", 2, 0.1), point("c", 2.5, 0.1), point("d", 1, 0.5), point("e", 2, 0.2)]
-    found = best(points, lambda each: each.hit_s, lambda each: each.differ["fdm"])
+    points = [point("a", 3, 1.0), point("b", 2, 0.9), point("c", 2.5, 1.1), point("d", 1, 0.5), point("e", 2, 1.2)]
+    found = best(points, lambda each: each.map_s, lambda each: each.error("fdm"))
     assert [each.shortcut.label for each in found] == ["d", "b", "a"]
 
 
-def test_what_is_within_the_scatter_is_no_error():
-    scatter = [point("heavier", 4, 0.05, "scatter"), point("lighter", 4, 0.12, "scatter")]
-    points = [point("reference", 3, 0.0, "reference"), *scatter, point("b", 2, 0.1), point("d", 1, 0.5)]
-    trade = Trade(load("drive-2011"), points, {"fdm": 9}, 0)
-    for question in (HIT, MAP):
-        assert trade.scatter(question, "fdm") == 0.12
-        assert [each.shortcut.label for each in trade.best(question, "fdm")] == ["d", "b"]
-    marks = [row["best_for_hits"] for row in trade.report()["settings"]]
-    assert marks == [[], [], [], ["fdm"], ["fdm"]]
+def test_what_the_starts_or_a_step_do_not_tell_is_no_error():
+    points = [
+        point("reference", 3, 1.0),
+        point("b", 2, 0.9, half=0.15),
+        point("c", 1.5, 1.1, step=0.1),
+        point("d", 1, 0.5),
+    ]
+    assert [each.error("fdm") for each in points] == [0.0, 0.0, 0.0, 0.5]
+    assert [row["best_for"] for row in Trade(load("drive-2011"), points, 10, 0).report()["settings"]] == [
+        [],
+        [],
+        ["fdm"],
+        ["fdm"],
+    ]
+
+
+def test_an_interval_without_an_end_has_none_in_the_report():
+    endless = Point(REFERENCE, 1, 1, 1, {"fdm": Move(1.0, 0.0, float("inf"), 0.1, 0.0, 0)})
+    assert endless.report()["moves"]["fdm"]["area_ratio_high"] is None
+    assert endless.error("fdm") == 0.0
 
 
 def test_every_shortcut_is_a_scene_of_its_own():
@@ -142,8 +152,8 @@ def test_every_shortcut_is_a_scene_of_its_own():
 
     scene = load("drive-2011", GRID)
     every = shortcuts(scene, lambda _: True)
-    assert len({each.label for each in every}) == len(every) == 25
-    scenes = {each.label: changed(each) for each in every}
+    assert len({each.label for each in every}) == len(every) == 30
+    scenes = {each.label: changed(each) for each in every if each.label != "with friction that bends"}
     rigid = scenes["rigid handle only"]
     assert rigid.handle.mass_kg == pytest.approx(0.35)
     assert (rigid.transmission, rigid.motor, rigid.output) == (None, None, None)
@@ -160,6 +170,9 @@ def test_every_shortcut_is_a_scene_of_its_own():
 def test_a_scene_that_lacks_a_part_has_no_shortcut_without_it(hardware):
     labels = [each.shortcut.label for each in study(Case.of("seed-2011"), Invented()).points]
     assert [label for label in labels if "no " in label or "rigid" in label] == []
+    # It has dry friction, so no second one is tried; and no amplifier, so one is.
+    lacked = [label for label in labels if label.startswith("with ")]
+    assert lacked == [label for label in LACKED if label != "with dry friction of 0.1 N"]
     assert "steps of 10 µs" in labels
     assert "samples at 5 kHz + steps of 100 µs" in labels
 
@@ -182,7 +195,7 @@ def test_what_cannot_be_is_refused_in_a_line(monkeypatch, capsys, arguments, mes
 
 SMALL = {
     "zwidth.stiffness_step_n_per_m": 4e3,
-    "zwidth.damping_to_n_s_per_m": 10.0,
+    "zwidth.damping_to_n_s_per_m": 30.0,
     "protocol.settle_s": 2.0,
     "protocol.measure_s": 0.2,
 }
@@ -197,21 +210,18 @@ def test_the_command_prints_and_draws_real_hits(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(trade_runs, "METHODS", ("fdm-500",))
     picture = tmp_path / "trade.svg"
     set_ = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
-    order = ["trade", "seed-2011", *set_, "--workers", 1]
+    order = ["trade", "seed-2011", *set_, "--workers", 1, "--starts", 2]
     code, out, err = call(monkeypatch, capsys, *order, "--json", "--plot", picture)
     assert code == 0, err
     report = json.loads(out)
     assert [row["label"] for row in report["settings"]] == [each.label for each in kept]
-    assert report["settings"][0]["stiffness_error"] == {"fdm-500": {"median": 0.0, "largest": 0.0}}
+    assert report["starts"] == 2
+    assert report["settings"][0]["moves"]["fdm-500"]["area_ratio"] == 1.0
     assert all(row["hit_s"] > 0 and row["map_hits"] > 0 for row in report["settings"])
-    assert any(row["best_for_maps"] for row in report["settings"])
-    wanted = {
-        "hit": ("steps of 100 µs", "time of a hit (ms)", "verdicts that differ (%)", "FDM + 500 Hz"),
-        "map": ("steps of 100 µs", "in one process (s)", "largest error of K (%)", "FDM + 500 Hz"),
-    }
-    for name, labels in wanted.items():
-        text = (tmp_path / f"trade-{name}.svg").read_text()
-        assert [label for label in labels if label not in text] == []
+    assert any(row["best_for"] for row in report["settings"])
+    text = picture.read_text()
+    wanted = "steps of 100 µs", "in one process (s)", "area (of that with all parts)", "FDM + 500 Hz"
+    assert [label for label in wanted if label not in text] == []
     monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
     code, out, _ = call(monkeypatch, capsys, *order, "--resume")
     assert code == 0
