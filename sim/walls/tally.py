@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from ..scene.schema import Scene
-from .window import Window
+from .window import Room, Window
 
 FALLING = 0.9
 """An RMS that is less than this part of the one before is falling."""
@@ -55,7 +55,8 @@ class Tally:
         self._counted = 0
         self._position_m = math.nan
         self._window_from = max(self._settled - self._measured, 0)
-        self._window, self._before = Window(self._settled - self._window_from), None
+        self._room = Room()
+        self._window, self._before = Window(self._settled - self._window_from, self._room), None
         self._judged: Window | None = None
         self.largest_drive, self.farthest_m, self.still_from = 0, -math.inf, 0
         self.verdict: str | None = None
@@ -106,11 +107,13 @@ class Tally:
         end = first + len(positions)
         rest = part(self._settled, end)
         if self._literal and len(rest):
-            self._squares += float(np.square(rest - self._mark_m).sum())
+            _, off, squares = self._room.of(len(rest))
+            np.subtract(rest, self._mark_m, out=off)
+            self._squares += float(np.square(off, out=squares).sum())
             self._counted += len(rest)
             self.rms_m = (self._squares / self._counted) ** 0.5
         self._note_rest(first, positions)
-        self.largest_drive = max(self.largest_drive, float(np.abs(drives).max()))
+        self.largest_drive = max(self.largest_drive, float(drives.max()), -float(drives.min()))
         self.farthest_m = max(self.farthest_m, float(positions.max()))
         if self._digest:
             self._digest.update(drives[-first % self._decimation :: self._decimation].astype("<i4").tobytes())
@@ -135,7 +138,7 @@ class Tally:
     def _judge(self, end: int) -> None:
         """Judge the window that ends at a sample, and begin the next one."""
         window = self._window
-        self._window, self._window_from = Window(self._measured), end
+        self._window, self._window_from = Window(self._measured, self._room), end
         if end > self._settled:
             self._judged = window
             if self._literal:
@@ -152,7 +155,7 @@ class Tally:
 
     def rest(self) -> None:
         """Judge a handle that stays at rest where it is: see `repetition`."""
-        self._judged = Window(1)
+        self._judged = Window(1, self._room)
         self._judged.add(np.array([self._position_m]))
         self._sum = self._position_m * (self._settled - self._mean_from)
         self.rms_m, self.verdict = 0.0, STABLE

@@ -3,6 +3,20 @@
 import numpy as np
 
 
+class Room:
+    """Arrays for what is computed of a piece, kept from one piece to the next: new memory costs more than the sums."""
+
+    def __init__(self) -> None:
+        self._ramp = self._values = self._places = np.empty(0)
+
+    def of(self, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the numbers from 0 on, and two arrays to write to, of so many samples."""
+        if samples > len(self._ramp):
+            self._ramp = np.arange(float(samples))
+            self._values, self._places = np.empty(samples), np.empty(samples)
+        return self._ramp[:samples], self._values[:samples], self._places[:samples]
+
+
 class Window:
     """The least-squares line through samples at equal distances, and how far they are from it, piece by piece.
 
@@ -10,14 +24,16 @@ class Window:
 
     Args:
         samples: number of samples of the whole window, at least 1.
+        room: what one window after the other may use.
 
     Attributes:
         samples: that number.
         added: number of samples so far.
     """
 
-    def __init__(self, samples: int):
+    def __init__(self, samples: int, room: Room):
         self.samples, self.added = samples, 0
+        self._room = room
         self._first_m = self._sum = self._moment = self._squares = 0.0
 
     def add(self, positions: np.ndarray) -> None:
@@ -26,11 +42,13 @@ class Window:
             return
         if not self.added:
             self._first_m = float(positions[0])
-        off = positions - self._first_m
-        places = np.arange(self.added, self.added + len(off)) - (self.samples - 1) / 2
+        ramp, off, places = self._room.of(len(positions))
+        np.subtract(positions, self._first_m, out=off)
+        np.add(ramp, self.added - (self.samples - 1) / 2, out=places)
+        # No BLAS: its threads would wait for each other, and the last digits would depend on how many there are.
         self._sum += float(off.sum())
-        self._moment += float(places @ off)
-        self._squares += float(off @ off)
+        self._moment += float(np.multiply(places, off, out=places).sum())
+        self._squares += float(np.square(off, out=off).sum())
         self.added += len(off)
 
     @property

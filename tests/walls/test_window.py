@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from hardwall.sim.walls.window import Window
+from hardwall.sim.walls.window import Room, Window
 
 RNG = np.random.default_rng(5)
 
 
 def of(positions: np.ndarray, *cuts: int) -> Window:
-    window = Window(len(positions))
+    window = Window(len(positions), Room())
     for piece in np.split(positions, cuts):
         window.add(piece)
     return window
