@@ -12,7 +12,7 @@ from .style import COLOURS, LABEL_PT, THEORY, lay_out, new_figure, page, plain_d
 NAMED = 9
 """The largest number of settings of a panel that are labelled."""
 BEST, PLAIN, SAME = COLOURS["butterworth"], "0.25", "0.65"
-MOST = 2.0
+MOST = 3.0
 """The ratio of areas at which an interval is cut off that has no end, or a far one."""
 
 

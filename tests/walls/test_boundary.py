@@ -77,6 +77,17 @@ def test_an_island_above_soft_walls_that_are_unstable_is_found():
         assert "unstable" in of[10.0].values()
 
 
+@pytest.mark.parametrize(("number", "looked"), [(5, 5), (31, 31), (32, 16), (50, 17), (160, 16)])
+def test_far_from_the_edge_a_map_of_many_b_is_looked_at_in_some(number, looked):
+    grid = Grid(10.0, 1000.0, 1.0, float(number), 1.0)
+    hits = hit(lambda stiffness, _, __: stiffness <= 300, grid)
+    far = [damping for damping in grid.dampings if (1000.0, damping) in hits]
+    assert len(far) == looked
+    assert len(set(np.diff(far))) == 1
+    # The edge is found in all of them.
+    assert all(len(hits[300.0, damping]) == len(hits[310.0, damping]) == STARTS for damping in grid.dampings)
+
+
 def test_one_start_alone_has_a_map():
     hits = hit(lambda stiffness, damping, _: stiffness <= 100 * damping, starts=1)
     assert {len(verdicts) for verdicts in hits.values()} == {1}
