@@ -12,9 +12,10 @@ from ..world.bristles import Bent, Bristled
 from ..world.converter import AS_IT_IS, Converter, Pulse, converted, width_of
 from ..world.encoder import Cell, Encoder, locate
 from ..world.euler import Stepped, stepped
-from ..world.linear import State
+from ..world.linear import State, at_rest
 from ..world.presliding import bristled, fastest_per_s
 from ..world.rigid import Coulomb, Handle, Motion, Rigid, Span, span
+from .motor_section import DAMPING
 from .schema import Scene
 
 MARGIN_COUNTS = 1e-6
@@ -33,7 +34,9 @@ def device_of(scene: Scene) -> device.Device | None:
     parts = scene.handle.model_dump() | {"bandwidth_hz": bandwidth_hz, "pulse": pulse}
     parts["coulomb_n"] = scene.handle.coulomb_n or None
     if motor:
-        parts["motor"] = device.Motor(**motor.model_dump())
+        parts["motor"] = device.Motor(**motor.model_dump(exclude=DAMPING))
+        if motor.damping_resistance_ohm:
+            parts["shunt"] = device.Shunt(motor.damping_resistance_ohm, motor.damping_capacitance_f)
         if amplifier and amplifier.current_limit_a:
             parts["force_limit_n"] = amplifier.current_limit_a * parts["motor"].newtons_per_ampere
     if cable:
@@ -116,7 +119,7 @@ def world_of(scene: Scene) -> World:
     else:
         plant, before, after = device.train(parts, max(before_s, after_s)), before_s, after_s
         if scene.solver:
-            plant = stepped(plant, parts.transmission is not None, scene.solver.step_s)
+            plant = stepped(plant, parts, scene.solver.step_s)
     return World(
         plant=plant,
         encoder=Encoder(spec.count_m, float(spec.clock_hz), *scene.encoder.errors),
@@ -182,7 +185,7 @@ def _rest_at(position_m: float, plant: Plant, push_n: float) -> Motion | Bent | 
     if isinstance(plant, Bristled):
         return Bent(position_m, 0.0, 0.0)
     width = width_of(plant.pulse, push_n) if plant.pulse.period else 0
-    return State(position_m, 0.0, (0.0, 0.0, 0.0), width)
+    return at_rest(plant.tables, position_m, width)
 
 
 def _pushed(world: World, motion: Motion | Bent | State, push_n: float, clocks: int) -> Motion | Bent | State:

@@ -52,6 +52,8 @@ def check(scene: Scene) -> None:
         scene.drive.check()
     if scene.hand is not None:
         scene.hand.check()
+    if scene.motor is not None:
+        scene.motor.check(scene.amplifier and scene.amplifier.bandwidth_hz)
     _check_axis(scene)
     _check_protocol(scene)
     if scene.amplifier is not None:

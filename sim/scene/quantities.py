@@ -43,6 +43,7 @@ Offset = number(-1e5, 1e5)  # volts or amperes
 ForcePerUnit = number(1e-9, 1e9)  # newtons of a volt or an ampere
 Resistance = number(1e-3, 1e6)
 Inductance = number(1e-9, 1e3)
+Capacitance = number(1e-12, 1e3)  # of a winding, to a bank of the largest capacitors
 TorqueConstant = number(1e-6, 1e3)
 Radius = number(1e-4, 1e1)
 EdgeError = number(-1.0, 1.0)  # counts: a whole one puts an edge upon its neighbour

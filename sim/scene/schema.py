@@ -19,6 +19,7 @@ from ...model.spec import AxisSpec
 from .drive import DriveSection
 from .encoder_section import EncoderSection
 from .hand_section import HandSection
+from .motor_section import MotorSection
 from .presliding_section import PreslidingSection
 from .quantities import (
     Acceleration,
@@ -28,23 +29,18 @@ from .quantities import (
     EdgeErrorMax,
     Force,
     Gain,
-    Inductance,
     Jerk,
     Length,
     Mass,
     Part,
     Place,
-    Radius,
     Rate,
-    Resistance,
     SlewRate,
     Speed,
     Step,
     Stiffness,
     Threshold,
     Time,
-    TorqueConstant,
-    Voltage,
     or_none,
 )
 from .section import Section
@@ -108,16 +104,6 @@ class AmplifierSection(Section):
     delay_s: or_none(Time) = 0.0
     bandwidth_hz: Bandwidth | None = None
     current_limit_a: Current | None = None
-
-
-class MotorSection(Section):
-    """A brushed DC motor. With an amplifier's bandwidth its current follows the force; else its voltage does."""
-
-    resistance_ohm: Resistance
-    inductance_h: Inductance
-    torque_constant_n_m_per_a: TorqueConstant
-    voltage_limit_v: Voltage
-    pulley_radius_m: Radius
 
 
 class TransmissionSection(Section):

@@ -7,7 +7,7 @@
 - Linear: in contact, without sticking friction, limits, quantisation and a carrier's pulses, the loop with a linear
   estimator is linear and periodic with the force's update. It is stable while every eigenvalue of the state's change
   over a period is within the unit circle. Nothing else is left out: the zero-order hold, the clocks from strobe to
-  drive, the clocks of the decoder, the amplifier, motor, cable and hand, and the estimator are all in the matrix.
+  drive, the clocks of the decoder, amplifier, motor and its shunt, cable and hand, and the estimator are all in it.
 
 The first two are for a rigid handle. A passive wall is stable with any hand, so these bounds lie below the linear
 boundary without a hand.

@@ -9,6 +9,13 @@ kf = Kt / r.
   that it would hold at standstill, e = kf V / R; with the motor's speed vm, L/R df/dt = e - f - (kf^2 / R) vm. An
   amplifier with a bandwidth is a current loop that asks for the e that makes df/dt = w (u - f), and gets no more than
   its limit. An amplifier without a bandwidth asks for e = u at any current: a voltage drive, damped by the motor.
+- Shunt: a resistor Rd, alone or in series with a capacitor C, across the terminals of a motor with a current loop. The
+  motor's own voltage drives a current through it, and that damps. With h its current (as a force of the motor) and q
+  the capacitor's voltage (as a force at standstill; 0 without one), e = q + (Rd / R) h and dq/dt = h / (R C). The loop
+  makes f + h = g r, dr/dt = w (u - r), where g = 1 + R / Rd without a capacitor, else 1: u is the force at standstill,
+  and |u| <= kf I / g. Where that takes more than the voltage's limit, e is at the limit, and h is what e makes it.
+  Within the limit the motor's side meets the damping kf^2 / Z, whatever u is, with Z = R + Rd + s L + 1 / (s C), and f
+  is g (Rd + 1 / (s C)) / Z times r. With a capacitor there is hardly any damping below the corner 1 / ((R + Rd) C).
 - Transmission: a cable of stiffness k and damping d. The motor's side is a separate mass: with s its position less the
   handle's, and w = ds/dt, mm d(v + w)/dt = f - c - bm (v + w), c = k s + d w. Without a transmission c = f.
 - Hand: a mass that moves with the handle, held by a spring and a damper, with the force kh (rest - x) - bh v.
@@ -16,7 +23,8 @@ kf = Kt / r.
 
 A converter or pulses act on the command before all of these parts; pulses reach the parts unsmoothed.
 
-The state is x, v; s, w with a transmission; f with a lag or a motor: a part that is absent has no row.
+The state is x, v; s, w with a transmission; f with a lag or a motor; r with a shunt, q with its capacitor: a part that
+is absent has no row.
 """
 
 import math
@@ -26,7 +34,7 @@ import numpy as np
 import scipy
 
 from .converter import AS_IT_IS, Pulse
-from .linear import GRIP, PHASES, QUANTITIES, SEEN, STATES, VOLTAGE, phase_number
+from .linear import COLUMNS, COMMAND, EXTRA, GRIP, ONE, PHASES, QUANTITIES, SEEN, STATES, VOLTAGE, phase_number
 from .polynomials import FIRST
 from .taylor import Train
 
@@ -71,6 +79,24 @@ class Motor:
 
 
 @dataclass(frozen=True)
+class Shunt:
+    """A circuit across the terminals of a motor that a current loop feeds: a resistor, or a resistor and a capacitor in
+    series."""
+
+    resistance_ohm: float
+    capacitance_f: float | None = None
+
+    @property
+    def states(self) -> int:
+        """Number of states that it adds: the command that the loop has reached, and the capacitor's voltage."""
+        return 2 if self.capacitance_f else 1
+
+    def amplified(self, motor: Motor) -> float:
+        """Return the amplifier's current over that of a motor at standstill."""
+        return 1.0 if self.capacitance_f else 1.0 + motor.resistance_ohm / self.resistance_ohm
+
+
+@dataclass(frozen=True)
 class Transmission:
     """A cable between motor and handle."""
 
@@ -96,8 +122,9 @@ class Device:
 
     Attributes:
         mass_kg, viscous_n_s_per_m, coulomb_n: the handle's mass and friction; `coulomb_n` is None without dry friction.
-        bandwidth_hz, force_limit_n: the amplifier's bandwidth and largest force.
+        bandwidth_hz, force_limit_n: the amplifier's bandwidth, and the force of its largest current.
         motor, transmission, hand: see their classes.
+        shunt: see its class; only beside a motor and a bandwidth.
         encoder_at_motor: whether the encoder is on the motor's side of the transmission.
         pulse: the pulses that a pulse-width output makes of the command.
     """
@@ -112,12 +139,14 @@ class Device:
     hand: Hand | None = None
     encoder_at_motor: bool = False
     pulse: Pulse = AS_IT_IS
+    shunt: Shunt | None = None
 
     @property
     def command_limit_n(self) -> float:
         """The largest command that is passed on: the limit of the amplifier's current, or a voltage drive's voltage."""
-        voltage_drive = self.motor is not None and self.bandwidth_hz is None
-        return self.motor.stall_n if voltage_drive else self.force_limit_n
+        if self.motor is not None and self.bandwidth_hz is None:
+            return self.motor.stall_n
+        return self.force_limit_n / (1.0 if self.shunt is None else self.shunt.amplified(self.motor))
 
 
 @dataclass(frozen=True)
@@ -147,11 +176,12 @@ def equations(device: Device, along: int | None = None, limited: int = 0) -> Equ
     """
     cable, hand, motor = device.transmission, device.hand, device.motor
     lagging = device.bandwidth_hz is not None or motor is not None
-    n = 2 + 2 * (cable is not None) + lagging
+    mechanical = 2 + 2 * (cable is not None)
+    n = mechanical + lagging + (0 if device.shunt is None else device.shunt.states)
     unit = np.eye(n + 2)
     nothing, position, one, command = np.zeros(n + 2), unit[0], unit[n], unit[n + 1]
     velocity = nothing if along == 0 else unit[1]
-    force = unit[n - 1] if lagging else command
+    force = unit[mechanical] if lagging else command
     stretch, stretching = (unit[2], unit[3]) if cable else (nothing, nothing)
 
     pull = cable.stiffness_n_per_m * stretch + cable.damping_n_s_per_m * stretching if cable else force
@@ -167,18 +197,40 @@ def equations(device: Device, along: int | None = None, limited: int = 0) -> Equ
         on_motor = force - pull - cable.motor_viscous_n_s_per_m * motor_velocity
         rates += [stretching, on_motor / cable.motor_mass_kg - acceleration]
 
-    voltage = asked = None
-    if device.bandwidth_hz is not None:
-        asked = 2 * math.pi * device.bandwidth_hz * (command - force)
-    if motor:
-        settled = force + motor.damping_n_s_per_m * motor_velocity
+    voltage = None
+    if lagging:
+        electrical, voltage = _electrical(device, unit, mechanical, motor_velocity, limited)
+        rates += electrical
+    return Equations(np.array(rates), on_handle, voltage, position + stretch * device.encoder_at_motor)
+
+
+def _electrical(
+    device: Device, unit: np.ndarray, first: int, motor_velocity: np.ndarray, limited: int
+) -> tuple[list[np.ndarray], np.ndarray | None]:
+    """Return the rates of amplifier, motor and shunt, whose states begin at `first`, and the voltage asked for.
+
+    `unit` has the rows of the state, of 1, and of the command; the rest is as in `equations`.
+    """
+    motor, shunt = device.motor, device.shunt
+    force, one, command = unit[first], unit[-2], unit[-1]
+    followed = force if shunt is None else unit[first + 1]
+    asked = None if device.bandwidth_hz is None else 2 * math.pi * device.bandwidth_hz * (command - followed)
+    if motor is None:
+        return [asked], None
+    settled, limit = force + motor.damping_n_s_per_m * motor_velocity, limited * motor.stall_n * one
+    if shunt is None:
         voltage = None if asked is None else settled + asked / motor.electrical_per_s
         if asked is None or limited:
-            given = command if asked is None else limited * motor.stall_n * one
-            asked = motor.electrical_per_s * (given - settled)
-    if asked is not None:
-        rates.append(asked)
-    return Equations(np.array(rates), on_handle, voltage, position + stretch * device.encoder_at_motor)
+            asked = motor.electrical_per_s * ((command if asked is None else limit) - settled)
+        return [asked], voltage
+    charge = unit[first + 2] if shunt.capacitance_f else np.zeros(len(unit))
+    ratio = shunt.resistance_ohm / motor.resistance_ohm
+    voltage = charge + ratio * (shunt.amplified(motor) * followed - force)
+    given = limit if limited else voltage
+    rates = [motor.electrical_per_s * (given - settled), asked]
+    if shunt.capacitance_f:
+        rates.append((given - charge) / (shunt.resistance_ohm * shunt.capacitance_f))
+    return rates, voltage
 
 
 def fastest_per_s(device: Device) -> float:
@@ -215,19 +267,21 @@ def train(device: Device, longest_s: float) -> Train:
         rest = reach**order / math.factorial(order + 1) / (1 - LEG_RATE / 2)
     free = equations(device)
     n = len(free.rates)
-    # The columns are the coefficients of the state, with room for states that it lacks, of 1, and of the command.
-    columns = [*range(n), STATES, STATES + 1]
-    tables = np.zeros((PHASES, QUANTITIES, STATES + 2))
+    # Room for states that it lacks is within the tables, and that for more states behind them.
+    extra = EXTRA if n > STATES else 0
+    rows, places = ([*range(STATES), *range(first, first + EXTRA)][:n] for first in (QUANTITIES, COLUMNS))
+    columns = [*places, ONE, COMMAND]
+    tables = np.zeros((PHASES, QUANTITIES + extra, COLUMNS + extra))
     for along in (-1, 0, 1):
         for limited in (-1, 0, 1):
             table, here = tables[phase_number(along, limited)], equations(device, along, limited)
-            table[:n, columns] = here.rates
+            table[np.ix_(rows, columns)] = here.rates
             table[SEEN, columns] = here.seen
             table[GRIP, columns] = np.eye(n + 2)[1] if along else here.on_handle
             table[VOLTAGE, columns] = 0.0 if here.voltage is None else here.voltage
     return Train(
         tables=tables,
-        series=np.zeros((FIRST + order + 1, QUANTITIES)),
+        series=np.zeros((FIRST + order + 1, QUANTITIES + extra)),
         coulomb_n=-1.0 if device.coulomb_n is None else device.coulomb_n,
         voltage_limit_n=math.inf if free.voltage is None else device.motor.stall_n,
         command_limit_n=device.command_limit_n,

@@ -2,7 +2,7 @@
 
 It uses the same tables in steps of `step_s`; the last step before the command changes is the rest of the interval:
 
-- velocities, and the motor's force, change by their rates at the beginning of the step;
+- velocities, the motor's force, and what its shunt adds, change by their rates at the beginning of the step;
 - positions change linearly by the new velocities, and edges are passed where that line passes them (stamping all edges
   at the step's end would be an illegal transition of the pins for a handle that passes two in a step);
 - Coulomb friction is clamped: where a step would turn the handle, and friction could hold it, the handle rests; it
@@ -27,6 +27,7 @@ from .device import Device, equations
 from .encoder import level, next_cell, stamp
 from .linear import (
     GRIP,
+    QUANTITIES,
     SEEN,
     STUCK,
     State,
@@ -55,6 +56,7 @@ class Stepped(NamedTuple):
     command_limit_n: float
     pulse: Pulse
     cable: bool  # whether the state has a cable's stretch and its rate
+    shunted: bool  # whether it has those of a shunt
     step_s: float
 
 
@@ -62,17 +64,17 @@ advance_quietly.register(Stepped)(never_quietly)
 advance.register(Stepped)(advance_in_stretches)
 
 
-def stepped(train: Train, cable: bool, step_s: float) -> Stepped:
+def stepped(train: Train, device: Device, step_s: float) -> Stepped:
     """Return a device in the form that this solver advances.
 
     Args:
         train: the result of `device.train`.
-        cable: whether the device has a transmission.
+        device: the device itself.
         step_s: length of a step.
     """
-    return Stepped(
-        train.tables, train.coulomb_n, train.voltage_limit_n, train.command_limit_n, train.pulse, cable, step_s
-    )
+    limits = train.voltage_limit_n, train.command_limit_n
+    cable, shunted = device.transmission is not None, device.shunt is not None
+    return Stepped(train.tables, train.coulomb_n, *limits, train.pulse, cable, shunted, step_s)
 
 
 def growth(device: Device, step_s: float) -> float:
@@ -101,6 +103,15 @@ def longest_s(device: Device, most_s: float) -> float:
 
 
 @compiled
+def _more_stepped(plant, phase, state, more, command_n, seconds):
+    """Return `more`, that of the state, after one step; None if there is none."""
+    if more is None:
+        return more
+    first = more[0] + seconds * quantity(plant.tables, phase, QUANTITIES, state, command_n)
+    return first, more[1] + seconds * quantity(plant.tables, phase, QUANTITIES + 1, state, command_n)
+
+
+@compiled
 def step(plant, state, command_n, seconds):
     """Return the `State` after one step."""
     tables = plant.tables
@@ -112,6 +123,7 @@ def step(plant, state, command_n, seconds):
     stopped = velocity if held else 0.0
     velocity -= stopped
     first, second, third = state.others
+    more = _more_stepped(plant, phase, state, state.more, command_n, seconds)
     if plant.cable:
         # The motor's side is not stopped with the handle.
         second += seconds * quantity(tables, phase, 3, state, command_n) + stopped
@@ -119,7 +131,10 @@ def step(plant, state, command_n, seconds):
         third += seconds * quantity(tables, phase, 4, state, command_n)
     else:
         first += seconds * quantity(tables, phase, 2, state, command_n)
-    return State(state.position_m + seconds * velocity, velocity, (first, second, third), state.width)
+        if plant.shunted:
+            second += seconds * quantity(tables, phase, 3, state, command_n)
+            third += seconds * quantity(tables, phase, 4, state, command_n)
+    return State(state.position_m + seconds * velocity, velocity, (first, second, third), state.width, more)
 
 
 @compiled

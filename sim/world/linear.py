@@ -19,6 +19,12 @@ STATES = 5
 SEEN, GRIP, VOLTAGE, QUANTITIES = 5, 6, 7, 8
 """The quantities after the state: the encoder's position, the one that decides on sticking, and the voltage; then the
 number of quantities."""
+ONE, COMMAND = 5, 6
+"""The columns after those of the state: of 1, and of the command."""
+EXTRA = 2
+"""Number of states that a device may have beyond `STATES`; their rows are behind the quantities, and their columns
+behind the command's."""
+COLUMNS = STATES + 2
 
 
 class State(NamedTuple):
@@ -28,6 +34,13 @@ class State(NamedTuple):
     velocity_m_per_s: float
     others: tuple[float, float, float]  # the rest of the state as in `device`, then zeros
     width: int  # length of the pulse, clocks
+    more: tuple[float, float] | None = None  # the states beyond `STATES`; None for a device without any
+
+
+def at_rest(tables: np.ndarray, position_m: float, width: int) -> State:
+    """Return the `State` at rest at a place of a device with these tables, which has passed no command on yet."""
+    more = (0.0,) * EXTRA if tables.shape[1] > QUANTITIES else None
+    return State(position_m, 0.0, (0.0,) * (STATES - 2), width, more)
 
 
 @compiled
@@ -40,13 +53,21 @@ STUCK, SLIDING = 4, 7  # phase_number(0, 0) and phase_number(1, 0), written out 
 
 
 @compiled
+def with_more(total, tables, phase, number, more):
+    """Return a sum of a quantity's terms with those of the states in `more`, if there are any."""
+    if more is None:
+        return total
+    return total + tables[phase, number, COLUMNS] * more[0] + tables[phase, number, COLUMNS + 1] * more[1]
+
+
+@compiled
 def quantity(tables, phase, number, state, command_n):
     """Return the value of a quantity in a phase; for a state this is its rate of change."""
-    result = tables[phase, number, STATES] + tables[phase, number, STATES + 1] * command_n
+    result = tables[phase, number, ONE] + tables[phase, number, COMMAND] * command_n
     result += tables[phase, number, 0] * state.position_m + tables[phase, number, 1] * state.velocity_m_per_s
     for i in range(STATES - 2):
         result += tables[phase, number, 2 + i] * state.others[i]
-    return result
+    return with_more(result, tables, phase, number, state.more)
 
 
 @compiled
@@ -97,8 +118,8 @@ def advance_in_stretches(plant, encoder, moment, force_n, interval, edges):
     while now < end:
         within = now % pulse.period
         if within == 0:
-            x, v, others, _ = moment.motion
-            moment = Moment(State(x, v, others, width_of(pulse, force_n)), moment.cell, moment.n_edges)
+            x, v, others, _, more = moment.motion
+            moment = Moment(State(x, v, others, width_of(pulse, force_n), more), moment.cell, moment.n_edges)
         high = within < moment.motion.width
         until = min(end, now - within + (moment.motion.width if high else pulse.period))
         since_s, until_s = (now - interval.clock) / encoder.clock_hz, (until - interval.clock) / encoder.clock_hz

@@ -16,7 +16,10 @@ from .advance import Moment, advance, advance_quietly
 from .converter import Pulse
 from .encoder import level, next_cell, stamp
 from .linear import (
+    COMMAND,
+    EXTRA,
     GRIP,
+    ONE,
     QUANTITIES,
     SEEN,
     STATES,
@@ -29,6 +32,7 @@ from .linear import (
     never_quietly,
     phase_number,
     stretch,
+    with_more,
 )
 from .polynomials import FIRST, NEVER, UNSURE, at, leaves, measure, root, shorten, stays
 
@@ -43,8 +47,9 @@ BRIEF = 1e-6
 class Train(NamedTuple):
     """A linear device in the form that `device.train` makes."""
 
-    tables: np.ndarray  # (PHASES, QUANTITIES, STATES + 2): dy/dt and watched quantities, by y, by 1, by the command
+    tables: np.ndarray  # (PHASES, QUANTITIES, COLUMNS): dy/dt and watched quantities, by y, by 1, by the command
     series: np.ndarray  # scratch, (FIRST + order + 1, QUANTITIES): the polynomials of the leg
+    # Of a device with `State.more` there are `EXTRA` more quantities, and in `tables` as many more columns.
     coulomb_n: float  # negative for none
     voltage_limit_n: float
     command_limit_n: float
@@ -57,22 +62,43 @@ advance.register(Train)(advance_in_stretches)
 
 
 @compiled
-def expand(tables, series, phase, state, command_n, seconds):
-    """Fill `series` with the polynomials of a leg in the time t / seconds, 0 to 1."""
-    last = len(series) - 1
+def _more_of(series, row, more):
+    """Return a row of the polynomials of the states in `more`; None if there are none."""
+    if more is None:
+        return more
+    return series[row, QUANTITIES], series[row, QUANTITIES + 1]
+
+
+@compiled
+def _more_at(series, time, more):
+    """Return the states in `more` at a time of the leg, 0 to 1; None if there are none."""
+    if more is None:
+        return more
+    return at(series, QUANTITIES, time), at(series, QUANTITIES + 1, time)
+
+
+@compiled
+def expand(tables, series, phase, state, more, command_n, seconds):
+    """Fill `series` with the polynomials of a leg in the time t / seconds, 0 to 1; `more` is that of the state."""
+    last, quantities = len(series) - 1, QUANTITIES
+    if more is not None:
+        quantities = QUANTITIES + EXTRA
+        series[FIRST, QUANTITIES], series[FIRST, QUANTITIES + 1] = more
     series[FIRST, 0] = state.position_m
     series[FIRST, 1] = state.velocity_m_per_s
     for i in range(STATES - 2):
         series[FIRST, 2 + i] = state.others[i]
     for j in range(FIRST, last + 1):
         y = series[j, 0], series[j, 1], series[j, 2], series[j, 3], series[j, 4]
+        more_y = _more_of(series, j, more)
         share = seconds / (j - FIRST + 1)
-        for number in range(QUANTITIES):
-            change = tables[phase, number, STATES] + tables[phase, number, STATES + 1] * command_n
+        for number in range(quantities):
+            change = tables[phase, number, ONE] + tables[phase, number, COMMAND] * command_n
             change = change if j == FIRST else 0.0
             for k in range(STATES):
                 change += tables[phase, number, k] * y[k]
-            if number >= STATES:
+            change = with_more(change, tables, phase, number, more_y)
+            if STATES <= number < QUANTITIES:
                 series[j, number] = change
             elif j < last:
                 series[j + 1, number] = share * change
@@ -140,7 +166,7 @@ def _stretch(train, encoder, moment, command_n, since_s, until_s, interval, edge
         blind = stalled >= STALLED
         if blind:
             seconds *= BRIEF
-        expand(train.tables, series, phase_number(along, limited), state, command_n, seconds)
+        expand(train.tables, series, phase_number(along, limited), state, state.more, command_n, seconds)
         for halving in range(HALVINGS + 1):
             surely = halving == HALVINGS
             inside, one_way = stays(series, SEEN, cell.lower_m, cell.upper_m)
@@ -157,9 +183,10 @@ def _stretch(train, encoder, moment, command_n, since_s, until_s, interval, edge
             if n_edges < 0:
                 break
         others = at(series, 2, end), at(series, 3, end), at(series, 4, end)
+        more = _more_at(series, end, state.more)
         stalled = stalled + 1 if end * seconds < BRIEF * train.leg_s and not blind else 0
         now_s = until_s if end == 1.0 and seconds == until_s - now_s else now_s + end * seconds
-        state = State(at(series, 0, end), at(series, 1, end), others, state.width)
+        state = State(at(series, 0, end), at(series, 1, end), others, state.width, more)
         if end == 1.0:
             continue
         if switches < breaks:
@@ -167,6 +194,6 @@ def _stretch(train, encoder, moment, command_n, since_s, until_s, interval, edge
         elif along == 0:
             along = 1 if at(series, GRIP, end) > 0.0 else -1
         else:
-            state = State(state.position_m, 0.0, others, state.width)
+            state = State(state.position_m, 0.0, others, state.width, more)
             along = along_of(train, state, command_n)
     return Moment(state, cell, n_edges)

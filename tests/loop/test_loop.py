@@ -16,7 +16,7 @@ from hardwall.sim.walls import hit
 from stimuli.bristles import DAHL_KEYS, LUGRE_KEYS
 from stimuli.lengths import LONG
 from stimuli.outputs import EVERY_OUTPUT
-from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, TWO_SECONDS
+from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, SHUNT, TWO_SECONDS
 
 STABLE = {"wall.stiffness_n_per_m": 10e3, "wall.damping_n_s_per_m": 20.0}
 UNSTABLE = {"wall.stiffness_n_per_m": 100e3, "wall.damping_n_s_per_m": 20.0}
@@ -95,6 +95,19 @@ def test_rtl_gives_the_models_force_words_on_a_device_of_every_part(output):
     parts |= {"output.dac_bits": 12} if output == "dac" else {"output.pwm_carrier_hz": 20_000, "output.pwm_steps": 600}
     parts |= {"protocol.push_n": 2.0}  # pulses meet the voltage's limit, and push the less
     assert same_words("seed-2011", STABLE | ONE_SECOND | parts).max_force_n > 1
+
+
+@pytest.mark.parametrize("keys", [SHUNT, {"motor.damping_resistance_ohm": 3.0}][: None if LONG else 1], ids=len)
+def test_rtl_gives_the_models_force_words_with_a_damping_circuit(keys):
+    found = {}
+    for name, circuit in (("damped", keys), ("plain", {})):
+        changes = STABLE | ONE_SECOND | SLOW | {"protocol.start_m": -0.01} | circuit
+        found[name] = same_words("drive-2011", changes)
+        assert found[name].max_force_n > 1
+        assert hit.run(load("drive-2011", changes), "float").max_force_n == pytest.approx(
+            found[name].max_force_n, rel=0.1
+        )
+    assert found["damped"].force_sha256 != found["plain"].force_sha256
 
 
 QUICK_HIT = {

@@ -10,16 +10,16 @@ from hardwall.sim.scene.load import load, read
 from hardwall.sim.walls import hit
 from hardwall.sim.walls.zwidth import verdict
 from hardwall.sim.world.converter import AS_IT_IS, Converter, Pulse
-from hardwall.sim.world.device import Device, Hand, Motor, Transmission, train
+from hardwall.sim.world.device import Device, Hand, Motor, Shunt, Transmission, train
 from hardwall.sim.world.rigid import Rigid
 from hardwall.sim.world.taylor import Train
-from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, PULSES
+from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, PULSES, SHUNT
 
 
 def test_every_key_of_a_scene_reaches_the_device():
     limits = {"amplifier.current_limit_a": 15.0, "transmission.motor_viscous_n_s_per_m": 0.5}
     sides = {"transmission.encoder_at": "motor", "handle.viscous_n_s_per_m": 0.7}
-    parts = AMPLIFIER | CABLE | HAND | DRIVE | PULSES | limits | sides
+    parts = AMPLIFIER | CABLE | HAND | DRIVE | SHUNT | PULSES | limits | sides
     assert device_of(load("seed-2011", parts)) == Device(
         mass_kg=0.35,
         viscous_n_s_per_m=0.7,
@@ -31,7 +31,20 @@ def test_every_key_of_a_scene_reaches_the_device():
         hand=Hand(0.2, 3.0, 10.0, 1e-3),
         encoder_at_motor=True,
         pulse=Pulse(50.0, 600, 2),
+        shunt=Shunt(3.0, 2e-3),
     )
+    alone = AMPLIFIER | DRIVE | {"motor.damping_resistance_ohm": 3.0}
+    assert device_of(load("seed-2011", alone)).shunt == Shunt(3.0)
+    assert device_of(load("seed-2011", AMPLIFIER | DRIVE)).shunt is None
+
+
+@pytest.mark.parametrize(("parts", "more"), [({}, None), (SHUNT, None), (CABLE, None), (CABLE | SHUNT, (0.0, 0.0))])
+def test_only_a_cable_with_a_damping_circuit_makes_a_state_of_more_parts(parts, more):
+    """What a scene lacks is not in the compiled loop."""
+    scene = load("seed-2011", AMPLIFIER | DRIVE | parts)
+    world = world_of(scene)
+    assert world.plant.tables.shape == ((9, 10, 9) if more else (9, 8, 7))
+    assert start_of(scene, world).moment.motion.more == more
 
 
 @pytest.mark.parametrize(
@@ -119,6 +132,15 @@ REFUSED = {
     "amplifier.bandwidth_hz must be a number of 0.001 to 1e+09, not 0.0": {"amplifier.bandwidth_hz": 0.0},
     "amplifier.current_limit_a needs amplifier.bandwidth_hz and a section motor": {"amplifier.current_limit_a": 1.0},
     "motor.inductance_h is missing": {key: value for key, value in DRIVE.items() if "inductance" not in key},
+    "motor.damping_resistance_ohm must be a number of 0.001 to 1e+06, not 0.0":
+        AMPLIFIER | DRIVE | {"motor.damping_resistance_ohm": 0.0},
+    "motor.damping_capacitance_f must be a number of 1e-12 to 1000, not 2000.0":
+        AMPLIFIER | DRIVE | SHUNT | {"motor.damping_capacitance_f": 2e3},
+    "motor.damping_capacitance_f needs motor.damping_resistance_ohm":
+        AMPLIFIER | DRIVE | {"motor.damping_capacitance_f": 2e-3},
+    "motor.damping_resistance_ohm needs amplifier.bandwidth_hz": DRIVE | SHUNT,
+    "motor.damping_resistance_ohm needs amplifier.bandwidth_hz, a current loop":
+        DRIVE | SHUNT | {"amplifier.delay_s": 1e-3},
     "transmission.stiffness_n_per_m must be a number of 1e-06 to 1e+10, not -1.0":
         CABLE | {"transmission.stiffness_n_per_m": -1.0},
     "transmission.encoder_at must be one of handle, motor, not 'wall'": CABLE | {"transmission.encoder_at": "wall"},

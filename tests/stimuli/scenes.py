@@ -14,6 +14,8 @@ DRIVE = {
     "motor.resistance_ohm": 2.0, "motor.inductance_h": 1e-3, "motor.torque_constant_n_m_per_a": 0.04,
     "motor.voltage_limit_v": 24.0, "motor.pulley_radius_m": 0.01,
 }  # fmt: skip
+SHUNT = {"motor.damping_resistance_ohm": 3.0, "motor.damping_capacitance_f": 2e-3}
+"""A damping circuit, for a scene with the keys of `DRIVE` and `AMPLIFIER`."""
 PULSES = {"output.full_scale_n": 50.0, "output.pwm_carrier_hz": 20_000, "output.pwm_steps": 300}
 ONE_SECOND = {
     "protocol.settle_s": 0.7, "protocol.mean_s": 0.1, "protocol.measure_s": 0.3, "protocol.longest_s": 1.0,

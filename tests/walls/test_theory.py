@@ -8,7 +8,7 @@ from hardwall.model.quadrature import latency
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls import hit, theory
 from stimuli.lengths import LONG
-from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND
+from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, SHUNT
 
 # No dry friction, fine counts, a threshold of fifty counts; slow enough for the decoder, long enough for growth.
 LINEAR = {
@@ -46,11 +46,19 @@ CASES = {
     "cable, encoder at the motor": ("fdm", {}, 7.0, CABLE | {"transmission.encoder_at": "motor"}),
     "hand": ("fdm", {}, 10.0, HAND),
     "voltage drive": ("fdm", {}, 10.0, DRIVE),
+    "damping circuit": ("fdm", {}, 10.0, AMPLIFIER | DRIVE | SHUNT),
+    "damping resistor": ("fdm", {}, 10.0, AMPLIFIER | DRIVE | {"motor.damping_resistance_ohm": 3.0}),
+    "all of them and a damping circuit": (
+        "butterworth",
+        {"cutoff_hz": 500.0},
+        20.0,
+        AMPLIFIER | CABLE | HAND | DRIVE | SHUNT,
+    ),
     "all of them": ("butterworth", {"cutoff_hz": 500.0}, 20.0, AMPLIFIER | CABLE | HAND | DRIVE),
 }
 
 
-QUICK = "fdm, soft", "samples overlap", "cable, encoder at the motor", "all of them"
+QUICK = "fdm, soft", "samples overlap", "cable, encoder at the motor", "all of them and a damping circuit"
 """Every part is in one of these, the filter and the overlap, too; `make soak` has each alone."""
 
 

@@ -27,7 +27,7 @@ SCALES = np.array([0.01, 0.1, 1e-3, 0.1, 1.0])
 
 
 def system(device, step_s, seconds=SECONDS):
-    return stepped(train(device, seconds), device.transmission is not None, step_s)
+    return stepped(train(device, seconds), device, step_s)
 
 
 def moved_in_steps(device, state, command, step_s, seconds=SECONDS):

@@ -210,13 +210,13 @@ def plants(seconds: float) -> dict:
     """Return a mass of 1 kg in the form of every solver, with its start and the length of an interval."""
     handle = Handle(1.0, 0.0)
     free = train(Device(1.0, bandwidth_hz=1e6), seconds)
-    plain = train(Device(1.0), seconds)
+    plain = Device(1.0)
     state = State(0.3e-6, 0.02, (0.0, 0.0, 0.0), 0)
     lagging = state._replace(others=(-4.0, 0.0, 0.0))
     return {
         "rigid": (Rigid(handle, None), Motion(0.3e-6, 0.02), span(handle, seconds)),
         "taylor": (free, lagging, seconds),
-        "euler": (stepped(plain, False, 1e-8), state, seconds),
+        "euler": (stepped(train(plain, seconds), plain, 1e-8), state, seconds),
     }
 
 
