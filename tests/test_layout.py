@@ -102,6 +102,8 @@ COVERED = {
     "costs": "rtl/test_synthesis",
     "drop_result": "studies/test_drop",
     "published": "pictures/test_draw",
+    "rendered_result": "studies/test_rendered",
+    "rendered_setting": "studies/test_rendered",
     "shortcuts": "studies/test_trade",
     "trade_runs": "studies/test_trade",
     "zwidth": "walls/test_zwidth",

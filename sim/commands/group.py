@@ -46,6 +46,8 @@ COMMANDS = {
     "cutoff": "The best cutoff of a filter behind a finite difference: the area of the stable region against it.",
     "gains": "Levant's gains, searched in full: the area of the stable region over lambda and alpha, for both outputs.",
     "rates": "What rate buys a stiff wall, 1 kHz to 1 MHz, and which part of the device ends it.",
+    "rendered": "What a wall renders of the stiffness and damping that it is commanded, by frequency, and its "
+    "rate-hardness at contact.",
     "drop": "Why Levant's stable region ends at one damping, in a sharp drop; and estimators that have none.",
     "fit": "Search what the paper does not give (mass, friction, delay ...) for a device that shows its Figure 5.",
 }

@@ -33,6 +33,15 @@ class Steady(NamedTuple):
     start_m: float
 
 
+class Sine(NamedTuple):
+    """A sine of constant amplitude and frequency about a place, whose phase at time 0 is `since_s` of motion."""
+
+    centre_m: float
+    amplitude_m: float
+    frequency_hz: float
+    since_s: float
+
+
 class Sweep(NamedTuple):
     """A sine of constant amplitude whose frequency grows exponentially with time."""
 
@@ -94,6 +103,19 @@ def _steady_position(motion, time_s):
 @compiled
 def _steady_velocity(motion, time_s):
     return motion.speed_m_per_s
+
+
+@position.register(Sine)
+@compiled
+def _sine_position(motion, time_s):
+    return motion.centre_m + motion.amplitude_m * math.sin(math.tau * motion.frequency_hz * (time_s + motion.since_s))
+
+
+@velocity.register(Sine)
+@compiled
+def _sine_velocity(motion, time_s):
+    omega = math.tau * motion.frequency_hz
+    return motion.amplitude_m * omega * math.cos(omega * (time_s + motion.since_s))
 
 
 @position.register(Sweep)

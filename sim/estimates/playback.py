@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...model import scale_map
-from ...model.compiled import compiled
+from ...model.compiled import compiled, inlined
 from ...model.design import change_of, strobe_of
 from ...model.spec import AxisSpec
 from ...model.stamped import Edges
@@ -29,18 +29,22 @@ Offsets = tuple[float, float, float, float]
 """The errors of the four kinds of edges, in counts, from `sim.world.encoder.offsets`."""
 
 
+@inlined
+def take(controller, state, timing, edges, taken, k):
+    """Take sample k of a record of edges, of which so many are taken; return (state, number of edges taken)."""
+    strobe, remaining = strobe_of(timing, k), len(edges.clocks) - taken
+    if remaining > 0 and edges.clocks[taken] < change_of(timing, k):
+        rest = Edges(edges.clocks[taken:], edges.levels[taken:])
+        state, some = sample(controller, state, rest, remaining, strobe)
+        return state, taken + some
+    return sample_quietly(controller, state, strobe), taken
+
+
 @compiled
-def _take(controller, state, timing, edges, taken, first, velocity):
+def _take_all(controller, state, timing, edges, taken, first, velocity):
     """Fill `velocity` with the samples from `first` on; return (state, number of edges taken)."""
     for i in range(len(velocity)):
-        strobe = strobe_of(timing, first + i)
-        remaining = len(edges.clocks) - taken
-        if remaining > 0 and edges.clocks[taken] < change_of(timing, first + i):
-            rest = Edges(edges.clocks[taken:], edges.levels[taken:])
-            state, some = sample(controller, state, rest, remaining, strobe)
-            taken += some
-        else:
-            state = sample_quietly(controller, state, strobe)
+        state, taken = take(controller, state, timing, edges, taken, first + i)
         velocity[i] = state.velocity
     return state, taken
 
@@ -84,5 +88,5 @@ def velocities(
         state = axis.state
         for first in range(0, samples, CHUNK):
             velocity = np.zeros(min(CHUNK, samples - first), number_of(backend))
-            state, taken = _take(axis.controller, state, spec.design.timing, passed.edges, taken, first, velocity)
+            state, taken = _take_all(axis.controller, state, spec.design.timing, passed.edges, taken, first, velocity)
             yield first, velocity * unit, int(state.flags)

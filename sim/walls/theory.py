@@ -50,8 +50,38 @@ def abbott_okamura_n_per_m(scene: Scene) -> float:
     return min(colgate_schenkel_n_per_m(scene, 0.0), 2 * (scene.handle.coulomb_n or 0.0) / scene.encoder.count_m)
 
 
-def _estimator(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return the estimator as (A, B, C, D) from position (m) to velocity (m/s), one step a sample.
+def held(scene: Scene, frequency_hz: float) -> complex:
+    """Return the factor by which a force at a frequency is late and held when it acts: the zero-order hold's and all
+    delays'."""
+    period_s = 1 / scene.controller.actuation_hz
+    late_s = delay_s(scene) + period_s / 2
+    return complex(np.exp(-2j * np.pi * frequency_hz * late_s) * np.sinc(frequency_hz * period_s))
+
+
+def impedance_n_per_m(scene: Scene, frequency_hz: float, exact: bool = False) -> complex:
+    """Return what a scene's wall renders of itself to a handle that moves sinusoidally: K_r + j w B_r, N/m.
+
+    The commanded K + j w B, its damper behind the estimator, and all of it late and held. Counts are as fine as can be.
+
+    Args:
+        scene: the scene.
+        frequency_hz: frequency of the motion, below half of the force's rate.
+        exact: whether to take the exact velocity in place of the estimator's.
+
+    Raises:
+        ValueError: if the estimator is not linear, and the velocity is not exact.
+    """
+    velocity = 2j * np.pi * frequency_hz
+    if not exact:
+        numerator, denominator = _transfer(scene)
+        z = np.exp(velocity / scene.spec.sample_hz)
+        velocity = np.polyval(numerator, z) / np.polyval(denominator, z)
+    wall = scene.wall
+    return (wall.stiffness_n_per_m + wall.damping_n_s_per_m * complex(velocity)) * held(scene, frequency_hz)
+
+
+def _transfer(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Return the estimator as numerator and denominator in z, of one length, from position (m) to velocity (m/s).
 
     Raises:
         ValueError: if the estimator is not linear.
@@ -63,7 +93,16 @@ def _estimator(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]
     if name == "butterworth":
         b, a = scipy.signal.butter(2, scene.spec.design.gains.cutoff_hz, fs=rate)
         numerator, denominator = np.convolve(numerator, b), np.convolve(denominator, a)
-    a, b, c, d = scipy.signal.tf2ss(numerator, denominator)
+    return numerator, denominator
+
+
+def _estimator(scene: Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Return the estimator as (A, B, C, D) from position (m) to velocity (m/s), one step a sample.
+
+    Raises:
+        ValueError: if the estimator is not linear.
+    """
+    a, b, c, d = scipy.signal.tf2ss(*_transfer(scene))
     return a, b[:, 0], c[0], float(d[0, 0])
 
 

@@ -27,6 +27,7 @@ RESULTS = {
     "hit": results.hit,
     "lipschitz": results.fit,
     "rates": results.rate_gains,
+    "rendered": results.rendered_walls,
     "replay": lambda: replay(swing(), coarsen=COARSEN),
     "trade": results.traded,
     "zwidth": results.maps,

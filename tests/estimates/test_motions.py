@@ -14,6 +14,7 @@ _T = np.linspace(0, SECONDS, 301)
 MOTIONS = {
     "decaying": motions.DecayingSine(2e-3, 30.0, 97.3),
     "steady": motions.Steady(-0.7213, 0.31416e-6),
+    "sine": motions.Sine(3e-4, 2e-4, 61.3, 1.7e-3),
     "sweep": motions.Sweep(1e-4, 20.0, 80.0),
     "stop": motions.Stop(0.2013, 0.0101, 19.7),
     "track": motions.Track(0.00507, 1e-4, 1e-3 * np.sin(297.31 * _T), 0.29731 * np.cos(297.31 * _T)),

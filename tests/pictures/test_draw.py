@@ -22,6 +22,7 @@ from hardwall.sim.pictures import (
     hit_axes,
     lipschitz,
     rates,
+    rendered,
     trade,
     zwidth,
 )
@@ -64,6 +65,10 @@ PICTURES = {
     "gains": lambda: gains.draw(results.search()),
     "lipschitz": lambda: lipschitz.draw(results.fit()),
     "rates": lambda: rates.draw(results.rate_gains()),
+    **{
+        f"rendered, {name}": lambda name=name: rendered.draw(results.rendered_walls())[name]
+        for name in ("impedance", "contact")
+    },
     "zwidth": lambda: zwidth.draw(results.maps()),
     "zwidth of many": every_estimator_mapped,
     **{

@@ -14,7 +14,10 @@ from hardwall.sim.scene.tables import load_any
 from hardwall.sim.studies import axes, bits, costs, cutoff, drop, gains, lipschitz, rates, shortcuts, sines, trade
 from hardwall.sim.studies.accuracy import Accuracy
 from hardwall.sim.studies.drop_result import Drop, End, Law, Shaken
+from hardwall.sim.studies.rendered_result import Moving, Rendered
+from hardwall.sim.studies.rendered_setting import Setting
 from hardwall.sim.studies.zwidth import ZWidth
+from hardwall.sim.walls import theory
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.chatter import Chatter
 from hardwall.sim.walls.hit import Hit
@@ -209,6 +212,39 @@ def rate_gains() -> rates.Rates:
         found.append(rates.Gain(at[0].case.label, hz, at[0], at[1:]))
     limits = {left: [1e5 * n, 4e5 * n, 5e5 * n**2] for n, left in enumerate(rates.WITHOUT, 1)}
     return rates.Rates(load("seed-2011"), found, limits, NOTHING)
+
+
+def rendered_setting(name: str, rate_hz: int | None, moving: Moving, starts: int = 3) -> Setting:
+    """Return what a wall would render with two thirds of its stiffness, and a hundredth more at each start."""
+    curve = methods()[name]
+    at = rates.at_rate(rate_hz) if rate_hz else {}
+    case = Case(curve.label, "seed-2011", read("seed-2011"), curve.changes | at)
+    scene, parts = case.scene, [1 + 0.01 * number for number in range(starts)]
+
+    def wave(frequency_hz: int, damping_n_s_per_m: float) -> dict:
+        whole = theory.impedance_n_per_m(scene.hitting(10e3, damping_n_s_per_m), frequency_hz, exact=True)
+        values = 2 * whole.real / 3, whole.imag / (2 * np.pi * frequency_hz)
+        stiffness, damping = ([value * part for part in parts] for value in values)
+        rendered = {"stiffness_n_per_m": stiffness, "damping_n_s_per_m": damping}
+        return rendered | {"rest_n": [0.1] * starts, "flags": ["force_limited"]}
+
+    def contact(speed_m_per_s: float) -> dict:
+        firsts = {"first_n": [20 * speed_m_per_s * part for part in parts], "first_s": [1e-3 * part for part in parts]}
+        return firsts | {"rate_hardness_n_per_m": [15e3 * part for part in parts], "flags": []}
+
+    waves = {each: wave(each, 20.0) for each in moving.frequencies_hz if 2 * each < scene.controller.actuation_hz}
+    contacts = {each: contact(each) for each in moving.speeds_m_per_s}
+    return Setting(curve, rate_hz, case, waves, wave(moving.frequencies_hz[0], 0.0), contacts)
+
+
+def rendered_walls() -> Rendered:
+    """Return what two estimators render at three rates; one start never feels the wall."""
+    moving = Moving([1, 50, 600], 1e-4, [0.05, 0.2], 2e-3)
+    at = [(name, rate) for name in ("adjusted", "fdm-100") for rate in (None, 1_000, 10_000)]
+    settings = [rendered_setting(*each, moving) for each in at]
+    unfelt = settings[-1].contacts[0.05]
+    unfelt["first_n"][1] = unfelt["first_s"][1] = None
+    return Rendered(load("seed-2011"), "fixed", 3, moving, settings)
 
 
 def traded() -> trade.Trade:
