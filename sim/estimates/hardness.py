@@ -45,16 +45,16 @@ def lead_s(scene: Scene, speed_m_per_s: float) -> float:
 def path(scene: Scene, speed_m_per_s: float, from_: Start) -> tuple[Steady, float]:
     """Return the motion from a start, and the time of the contact (s): the handle begins at that place in a count, and
     has moved for that part of a period of the force."""
-    count_m, before_s = scene.encoder.count_m, from_.periods / scene.controller.actuation_hz
-    counts = math.ceil(speed_m_per_s * (lead_s(scene, speed_m_per_s) + before_s) / count_m)
-    start_m = (from_.counts - counts) * count_m + speed_m_per_s * before_s
+    count_m, period_s = scene.encoder.count_m, 1 / scene.controller.actuation_hz
+    counts = math.ceil(speed_m_per_s * (lead_s(scene, speed_m_per_s) + period_s) / count_m)
+    start_m = (from_.counts - counts) * count_m + speed_m_per_s * from_.periods * period_s
     return Steady(speed_m_per_s, start_m), -start_m / speed_m_per_s
 
 
 def samples_of(scene: Scene, speed_m_per_s: float, window_s: float) -> int:
     """Return a number of samples that reaches behind the window from any start."""
     spec = scene.spec
-    latest_s = lead_s(scene, speed_m_per_s) + spec.count_m / speed_m_per_s
+    latest_s = lead_s(scene, speed_m_per_s) + 1 / spec.actuation_hz + spec.count_m / speed_m_per_s
     return math.ceil((latest_s + (1 + MEAN) * window_s) * spec.sample_hz) + 1
 
 
