@@ -109,6 +109,7 @@ figures: $(VENV)/.synth | tools ## the founding paper's figures and every study 
 	@$(HARDWALL) zwidth --resume --plot build/estimators.png $(ALL_ON_THE_MAP)
 	@for study in $(STUDIES); do $(HARDWALL) $$study --resume --plot build/$$study.png; done
 	@$(HARDWALL) bits --plot build/bits.png
+	@$(HARDWALL) rendered --plot build/rendered.png
 
 panel: $(VENV)/.panel | tools ## feel a wall: a board in simulation, behind a page in the browser
 	@$(HARDWALL) panel virtual

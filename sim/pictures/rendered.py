@@ -112,7 +112,8 @@ def _contact(rendered: Rendered) -> Figure:
     hardest, stiffness = rendered.hardest_n_per_m, rendered.scene.wall.stiffness_n_per_m
     title = (
         f"{rendered.scene.name}: rate-hardness over W = {rendered.moving.window_s * 1e3:g} ms, by speed at contact\n"
-        f"dotted: as commanded, K + B/W = {hardest / 1e3:g} kN/m; dashed: K alone; bars: all starts; what leaves is cut"
+        f"dotted: as commanded, K + B/W = {hardest / 1e3:g} kN/m; dashed: K alone;\n"
+        "bars: all starts; what leaves a panel is cut"
     )
     picture = new_figure(1.3 + 1.65 * len(speeds), title)
     panels = picture.subplots(len(speeds), 1, sharex=True, squeeze=False)[:, 0]

@@ -87,6 +87,10 @@ GOOD: dict[str, tuple[str, ...]] = {
     "after": ("0.05",),
     "acceleration_max": ("1", "50"),
     "encoder_phase_error": ("0.1", "0"),
+    "frequencies": ("20", "1,10,100"),
+    "amplitude": ("0.1", "1"),
+    "speeds": ("50", "10,200"),
+    "window": ("2", "0.5"),
 }
 """Good values by the name of the parameter; a parameter that is absent has only hostile ones."""
 SHORT = {
