@@ -45,7 +45,7 @@ RUNS: dict[str, tuple[str, ...]] = {
     "trade": ("trade", "seed-2011", "--workers", "2", "--resume", *STABLE),
 }
 NAMES = list(RUNS) if KILLS else ["zwidth"]
-TIMES = {"seconds", "samples_per_s", "hit_s", "map_s", "best_for_hits", "best_for_maps"}
+TIMES = {"seconds", "samples_per_s", "hit_s", "map_s", "best_for"}
 """Keys of reports that depend on times."""
 
 

@@ -1,15 +1,25 @@
 """The command `trade`."""
 
 from collections.abc import Callable, Hashable
+from typing import Annotated
+
+import typer
 
 from ..jobs import rounds
 from ..scene.case import Case
 from ..studies import trade_runs
 from ..walls.zwidth import STARTS, Map
 from .maps import Maps
-from .options import SceneArgument, StartsOption, refuse, refuse_for_maps
+from .options import SceneArgument, refuse, refuse_for_maps
 from .study import StudyOptions, study
 from .terminal import progress
+
+LEAST = 5
+"""The number of starts below which no interval of theirs tells a move from chance."""
+FewStartsOption = Annotated[
+    int,
+    typer.Option(min=LEAST, max=10_000, metavar="N", help="number of starts that hit every wall at the edge"),
+]
 
 
 class _Runs:
@@ -28,7 +38,7 @@ class _Runs:
 
 
 @study("workers", "resume", "set_", "plot")
-def command(options: StudyOptions, scene: SceneArgument = "drive-2011", starts: StartsOption = STARTS) -> None:
+def command(options: StudyOptions, scene: SceneArgument = "drive-2011", starts: FewStartsOption = STARTS) -> None:
     changes = options.changes()
     refuse_for_maps(changes, "it takes two of the paper's")
     refuse(changes, ("solver",), "it is one of the settings")

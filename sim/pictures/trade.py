@@ -35,8 +35,8 @@ def draw(trade: Trade) -> Figure:
     panels[-1].set_xlabel("time of both maps, in one process (s)")
     picture.align_ylabels(panels)
     notes = (
-        "bars: 95 of 100 draws of the starts; grey: the same area, as far as these tell; blue: no map is both faster "
-        "and as right\nthose without a name are in the command's table"
+        "bars: 95 of 100 draws of the starts; grey: the same area, as far as these tell\n"
+        "blue: no map is both faster and as surely right; those without a name are in the command's table"
     )
     picture.supxlabel(notes, x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)
     lay_out(picture)
@@ -51,7 +51,7 @@ def named(trade: Trade, label: str) -> list[Point]:
     They are the reference, the best, and of the others those that move the edge most.
     """
     others = [point for point in trade.points if point.shortcut.axis != SCATTER]
-    chosen = [trade.points[0], *trade.best(label), *sorted(others, key=lambda point: -point.error(label))]
+    chosen = [trade.points[0], *trade.best(label), *sorted(others, key=lambda point: -abs(point.moves[label].area - 1))]
     distinct = [point for number, point in enumerate(chosen) if point not in chosen[:number]]
     return distinct[:NAMED]
 

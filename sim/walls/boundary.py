@@ -4,8 +4,9 @@ Stiffness K and damping B go in steps. At each B, from the K of the B before, `S
 K, the softer of which is stable for half of them and the stiffer one is not: in steps that double, then by halves. If
 nothing is stable below, one start looks at every doubling of K from the first step on. All starts then hit both
 neighbours, and walls at twice the distance each time, until `SURE` of them are stable below and unstable above. Farther
-off one start hits a wall at every fourfold distance, down to the first step of K and up to the last, at every B of a map
-that has few and at some `PATROLS` of one that has many: the region of stable walls may have holes, and islands around it.
+off one start hits a wall at every fourfold distance, down to the first step of K and up to the last, at every B of a
+map that has few and at some `PATROLS` of one that has many: the region of stable walls may have holes, and islands
+around it.
 
 Nothing here hits a wall: `walls` is a generator that yields walls and starts, and is sent verdicts. So the map does not
 depend on the source of the verdicts, or on the order in which several maps get theirs.
@@ -82,7 +83,7 @@ def walls(grid: Grid, starts: int) -> Asked:
     """Yield the walls of a map and the starts that hit them; no start hits a wall twice."""
     row, every = max(grid.rows // 8, 1), max(len(grid.dampings) // PATROLS, 1)
     for number, damping in enumerate(grid.dampings):
-        column = _Column(grid, damping, starts, number % starts)
+        column = _Column(grid, damping, starts, number // every % starts)
         row = yield from column.searched(row)
         yield from column.surrounded(row)
         if number % every == 0:

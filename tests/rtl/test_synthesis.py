@@ -181,6 +181,12 @@ def test_a_part_that_is_too_small_is_told_in_numbers(calls):
     assert reported.tables()[1].rows == [["fdm", "", "", "", "", "does not fit", "5950 of 5280 LUT4"]]
 
 
+def test_a_part_that_is_full_before_its_cells_are_is_too_small(calls):
+    row = costs.cost("fdm", "ice40-up5k", (19,))
+    assert (row["board"], row["lacking"]) == (None, {"lut4": [5017, 5280]})
+    assert costs.Costs([row]).tables()[1].rows == [["fdm", "", "", "", "", "does not fit", "5017 of 5280 LUT4"]]
+
+
 def test_an_absent_tool_is_one_line(calls, monkeypatch):
     (calls.parent / "bin" / flow.YOSYS).unlink()
     monkeypatch.setenv("PATH", "")

@@ -12,9 +12,11 @@ import json, pathlib, sys
 seed = int(sys.argv[sys.argv.index("--seed") + 1]) if "--seed" in sys.argv else 0
 with open({calls!r}, "a") as calls:
     print(seed, file=calls)
-print("Info: as if\\nInfo: \\t  ICESTORM_LC:  " + ("5950" if seed == 17 else "1") + "/ 5280   9%")
-print("ERROR: " * (seed in (13, 17)) + "Unable to place cell 'x', no BELs remaining.")
-if seed in (13, 17):
+cells = {{17: "5950", 19: "5017"}}.get(seed, "1")
+print("Info: as if\\nInfo: \\t  ICESTORM_LC:  " + cells + "/ 5280   9%")
+said = "find legal placement for all cells" if seed == 19 else "place cell 'x', no BELs remaining"
+print("ERROR: " * (seed in (13, 17, 19)) + "Unable to " + said + ".")
+if seed in (13, 17, 19):
     sys.exit(1)
 if not seed:
     cells = ["TRELLIS_FF"] * 3 + ["LUT4"] * 4 + ["SB_DFFESR"] * 5 + ["SB_DFF"] + ["DFFRE"] * 2 + ["MULT9X9"]

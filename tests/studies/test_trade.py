@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from hardwall.sim.scene.case import Case
+from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load
 from hardwall.sim.studies import trade_runs
 from hardwall.sim.studies.shortcuts import LACKED, REFERENCE, Shortcut, shortcuts
@@ -74,7 +75,7 @@ def test_a_shortcut_is_held_against_the_reference(found):
         # 33 kN/m for 22, at each of four B.
         assert (move.area, move.stiffness, move.dampings) == (pytest.approx(1.5), pytest.approx(0.5), 4)
         assert move.moved
-    assert stepped.error("adjusted") == pytest.approx(0.5)
+    assert stepped.moves["adjusted"].distance == pytest.approx(0.5)
     assert stepped.hit_s == pytest.approx(0.1)
     assert points["float"].moves["adjusted"].area == pytest.approx(24 / 22)
 
@@ -85,7 +86,7 @@ def test_a_region_that_ends_moves_by_all_of_k(found):
 
 
 def test_steps_of_k_are_of_maps_alone(found):
-    coarse, reference = found[1]["K by 5 kN/m"], found[1][REFERENCE.label]
+    coarse, reference = found[1]["K in steps of 5 kN/m"], found[1][REFERENCE.label]
     assert coarse.moves["adjusted"].area == pytest.approx(20 / 22)
     assert coarse.hit_s == reference.hit_s
     assert coarse.hits < reference.hits / 2
@@ -109,7 +110,7 @@ def test_other_force_words_are_a_failure(monkeypatch):
 
 def test_where_nothing_is_stable_there_is_nothing_to_compare(hardware, monkeypatch):
     monkeypatch.setattr(Invented, "stable", lambda *_: False)
-    with pytest.raises(RuntimeError, match=r"^drive-2011: with adjusted the stable walls of the map have no area"):
+    with pytest.raises(RuntimeError, match=r"^drive-2011: with adjusted no wall of the map is stable"):
         study(Case.of("drive-2011"), Invented())
 
 
@@ -120,30 +121,44 @@ def point(label, seconds, area, half=0.0, step=0.0):
 
 def test_the_best_are_those_that_none_beats_in_both():
     points = [point("a", 3, 1.0), point("b", 2, 0.9), point("c", 2.5, 1.1), point("d", 1, 0.5), point("e", 2, 1.2)]
-    found = best(points, lambda each: each.map_s, lambda each: each.error("fdm"))
+    found = best(points, lambda each: each.map_s, lambda each: each.moves["fdm"].distance)
     assert [each.shortcut.label for each in found] == ["d", "b", "a"]
 
 
-def test_what_the_starts_or_a_step_do_not_tell_is_no_error():
-    points = [
-        point("reference", 3, 1.0),
-        point("b", 2, 0.9, half=0.15),
-        point("c", 1.5, 1.1, step=0.1),
-        point("d", 1, 0.5),
-    ]
-    assert [each.error("fdm") for each in points] == [0.0, 0.0, 0.0, 0.5]
-    assert [row["best_for"] for row in Trade(load("drive-2011"), points, 10, 0).report()["settings"]] == [
-        [],
-        [],
-        ["fdm"],
-        ["fdm"],
-    ]
+def test_what_the_starts_or_a_step_do_not_tell_is_no_move_and_a_wide_interval_is_not_right():
+    points = [point("reference", 3, 1.0), point("b", 2, 1.0, half=0.3), point("c", 1.5, 1.1, step=0.1)]
+    points.append(point("d", 1, 0.5))
+    rows = Trade(load("drive-2011"), points, 10, 0).report()["settings"]
+    assert [row["moves"]["fdm"]["moved"] for row in rows] == [False, False, False, True]
+    assert [row["best_for"] for row in rows] == [["fdm"], [], ["fdm"], ["fdm"]]
 
 
 def test_an_interval_without_an_end_has_none_in_the_report():
     endless = Point(REFERENCE, 1, 1, 1, {"fdm": Move(1.0, 0.0, float("inf"), 0.1, 0.0, 0)})
     assert endless.report()["moves"]["fdm"]["area_ratio_high"] is None
-    assert endless.error("fdm") == 0.0
+    assert not endless.moves["fdm"].moved
+
+
+def test_what_is_clipped_new_or_refused_is_said():
+    new = Point(REFERENCE, 1, 1, 1, {"fdm": Move(1.3, 1.2, 1.4, 0.1, float("inf"), 2, clipped=True)})
+    trade = Trade(load("drive-2011"), [new], 10, 0, {"with a hand": "it has one"})
+    assert trade.tables()[0].rows[0][-2:] == ["* 1.30+ (1.20 to 1.40)!", "new at 2"]
+    assert new.report()["moves"]["fdm"]["farthest_stiffness_change"] is None
+    notes = " ".join(trade.notes())
+    assert "not tried: with a hand, for it has one" in notes
+    assert "+: a region goes on" in notes
+
+
+def test_what_a_scene_refuses_is_kept_with_its_reason(found):
+    reason = found[0].refused["with friction that bends"]
+    assert reason.startswith("presliding")
+    assert found[0].report()["refused"]["with friction that bends"] == reason
+
+
+def test_a_map_of_one_damping_is_refused_before_a_hit(hardware):
+    one = Case.of("drive-2011", {"zwidth.damping_to_n_s_per_m": 10.0})
+    with pytest.raises(SceneError, match=r"^drive-2011: zwidth.damping_to_n_s_per_m must leave two values of B"):
+        study(one, None)
 
 
 def test_every_shortcut_is_a_scene_of_its_own():
@@ -183,6 +198,7 @@ def test_a_scene_that_lacks_a_part_has_no_shortcut_without_it(hardware):
         (["mhz"], "mhz: zwidth.stiffness_step_n_per_m is missing"),
         (["--set", "solver.step_s=1e-5"], "--set 'solver.step_s' is what this command sets itself: it is one of the"),
         (["--set", "controller.output=u1"], "--set 'controller.output' is what this command sets itself: it takes two"),
+        (["--starts", "4"], "--starts must be a whole number of 5 to 10000, not '4'"),
         (["--plot", "trade.gif"], "--plot must end in .pdf or .png or .svg"),
     ],
 )
@@ -203,19 +219,19 @@ SMALL = {
 
 def test_the_command_prints_and_draws_real_hits(monkeypatch, capsys, tmp_path):
     """The command runs with one estimator and few shortcuts, then again from the stored results."""
-    few = (REFERENCE.label, "steps of 100 µs", "K by 2", "scatter")
+    few = (REFERENCE.label, "steps of 100 µs", "K in steps of 2", "scatter")
     every = shortcuts(load("seed-2011", GRID | SMALL), lambda _: True)
     kept = [each for each in every if each.label.startswith(few) and "+" not in each.label]
     monkeypatch.setattr(trade_runs, "shortcuts", lambda scene, accepted: kept)
     monkeypatch.setattr(trade_runs, "METHODS", ("fdm-500",))
     picture = tmp_path / "trade.svg"
     set_ = [word for key, value in SMALL.items() for word in ("--set", f"{key}={value}")]
-    order = ["trade", "seed-2011", *set_, "--workers", 1, "--starts", 2]
+    order = ["trade", "seed-2011", *set_, "--workers", 1, "--starts", 5]
     code, out, err = call(monkeypatch, capsys, *order, "--json", "--plot", picture)
     assert code == 0, err
     report = json.loads(out)
     assert [row["label"] for row in report["settings"]] == [each.label for each in kept]
-    assert report["starts"] == 2
+    assert report["starts"] == 5
     assert report["settings"][0]["moves"]["fdm-500"]["area_ratio"] == 1.0
     assert all(row["hit_s"] > 0 and row["map_hits"] > 0 for row in report["settings"])
     assert any(row["best_for"] for row in report["settings"])

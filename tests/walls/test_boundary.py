@@ -84,6 +84,8 @@ def test_far_from_the_edge_a_map_of_many_b_is_looked_at_in_some(number, looked):
     far = [damping for damping in grid.dampings if (1000.0, damping) in hits]
     assert len(far) == looked
     assert len(set(np.diff(far))) == 1
+    # Every start looks, in turn.
+    assert {start for damping in far for start in hits[1000.0, damping]} == set(range(min(looked, STARTS)))
     # The edge is found in all of them.
     assert all(len(hits[300.0, damping]) == len(hits[310.0, damping]) == STARTS for damping in grid.dampings)
 

@@ -1,6 +1,7 @@
 """How far one edge lies from another: areas, draws of the starts, steps, and edges that are not there."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,6 +61,26 @@ def test_undecided_hits_make_both_edges_uncertain():
     assert move(made(25e3, 35e3, 25e3), there).dampings == 3
     assert move(made(25e3, 35e3, 25e3, undecided=6e3), there).dampings == 0
     assert move(made(25e3, 35e3, 25e3), made(20e3, 30e3, 20e3, undecided=6e3)).dampings == 3
+
+
+def test_an_edge_where_there_was_none_has_moved():
+    found = move(made(20e3, 30e3, 20e3), made(20e3, 30e3, 0.0))
+    assert (found.stiffness, found.dampings) == (math.inf, 1)
+
+
+def test_a_region_beyond_the_map_is_a_bound():
+    whole = made(20e3, 30e3, 20e3)
+    beyond = replace(whole, boundary=[replace(whole.boundary[0], marginal_n_per_m=None), *whole.boundary[1:]])
+    pairs = (whole, whole), (beyond, whole), (whole, beyond)
+    assert [move(*pair).clipped for pair in pairs] == [False, True, True]
+
+
+def test_starts_are_compared_with_themselves():
+    """Two edges of chance whose draws rise and fall together differ by a constant, and against each other by much."""
+    here, there = made(24e3, 34e3, 24e3, spread=10e3), made(20e3, 30e3, 20e3, spread=10e3)
+    turned = replace(there, drawn=there.drawn[:, :, ::-1])
+    assert (move(here, there).dampings, move(here, turned).dampings) == (3, 0)
+    assert move(here, turned).high - move(here, turned).low > 5 * (move(here, there).high - move(here, there).low)
 
 
 def test_beside_an_area_that_may_be_none_nothing_is_said():
