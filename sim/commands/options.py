@@ -1,5 +1,6 @@
 """The options of the commands, and the checks of their values."""
 
+import math
 import os
 import stat
 import tempfile
@@ -55,6 +56,14 @@ EstimatorsOption = Annotated[
     str | None,
     typer.Option("--estimators", metavar="NAME[:OUTPUT],...", help="estimators, or `all`", show_default="all"),
 ]
+
+
+def methods_option(default: str) -> Any:
+    """Return the option for estimators by name or by the founding paper's methods, with its default in words."""
+    listed = "NAME[:OUTPUT],..."
+    return typer.Option("--estimators", metavar=listed, help="estimators, as zwidth takes them", show_default=default)
+
+
 BackendOption = Annotated[Backend, typer.Option(help="float64 algorithm, bit-accurate model, or the Verilated RTL")]
 ModelOption = Annotated[Literal["float", "fixed"], typer.Option(help="float64 algorithm, or bit-accurate model")]
 DeviceOption = Annotated[PartName, typer.Option(help="the part to place and route for")]
@@ -186,20 +195,25 @@ def hands_of(wanted: str) -> list[str]:
     return list(dict.fromkeys(hands))
 
 
-def rates_of(text: str, option: str) -> list[int]:
-    """Return the rates (Hz) of a list given with an option."""
-    rates = []
+def numbers_of(text: str, option: str, least: float, most: float, unit: str, whole: bool = False) -> list[float]:
+    """Return the numbers, or whole numbers, of a list given with an option, each once; raise BadInput if one is not
+    `least` to `most`."""
+    numbers = []
     for word in text.split(","):
         try:
-            rate = float(word)
+            number = float(word)
         except ValueError:
-            rate = 0.0
-        if not (RATES_HZ[0] <= rate <= RATES_HZ[1] and rate == int(rate)):
-            raise BadInput(
-                f"{option} must be whole numbers of {RATES_HZ[0]:g} to {RATES_HZ[1]:g} Hz, not {shown(word)}"
-            )
-        rates.append(int(rate))
-    return list(dict.fromkeys(rates))
+            number = math.nan
+        if not least <= number <= most or (whole and number != int(number)):
+            kind = "whole numbers" if whole else "numbers"
+            raise BadInput(f"{option} must be {kind} of {least:g} to {most:g} {unit}, not {shown(word)}")
+        numbers.append(number)
+    return list(dict.fromkeys(numbers))
+
+
+def rates_of(text: str, option: str) -> list[int]:
+    """Return the rates (Hz) of a list given with an option."""
+    return [int(rate) for rate in numbers_of(text, option, *RATES_HZ, "Hz", whole=True)]
 
 
 def within(value: float, option: str, least: float, most: float, unit: str) -> float:

@@ -8,7 +8,16 @@ from ..scene.case import Case
 from ..studies import rates
 from ..walls.methods import methods
 from .maps import Maps
-from .options import ModelOption, SceneArgument, StartsOption, curves_of, rates_of, refuse, refuse_for_maps
+from .options import (
+    ModelOption,
+    SceneArgument,
+    StartsOption,
+    curves_of,
+    methods_option,
+    rates_of,
+    refuse,
+    refuse_for_maps,
+)
 from .study import StudyOptions, study
 
 RATES = ("controller.sample_hz", "controller.actuation_hz", "controller.clock_hz")
@@ -18,15 +27,7 @@ RATES = ("controller.sample_hz", "controller.actuation_hz", "controller.clock_hz
 def command(
     options: StudyOptions,
     scene: SceneArgument = "drive-2011",
-    wanted: Annotated[
-        str | None,
-        typer.Option(
-            "--estimators",
-            metavar="NAME[:OUTPUT],...",
-            help="estimators, as zwidth takes them",
-            show_default="six of all",
-        ),
-    ] = None,
+    wanted: Annotated[str | None, methods_option("six of all")] = None,
     tried: Annotated[
         str | None, typer.Option("--rates", metavar="HZ,...", help="sample rates, ascending", show_default="1e3 to 1e6")
     ] = None,

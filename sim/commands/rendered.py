@@ -1,11 +1,10 @@
 """The command `rendered`."""
 
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from ...model.checks import shown
 from ..estimates.moved import MotionError
 from ..jobs.store import Store
 from ..scene.case import Case
@@ -13,7 +12,17 @@ from ..studies import rendered
 from ..studies.rendered_result import Moving
 from ..walls.methods import methods
 from .errors import BadInput
-from .options import BackendOption, SceneArgument, StartsOption, curves_of, rates_of, refuse, within
+from .options import (
+    BackendOption,
+    SceneArgument,
+    StartsOption,
+    curves_of,
+    methods_option,
+    numbers_of,
+    rates_of,
+    refuse,
+    within,
+)
 from .study import StudyOptions, study
 
 FREQUENCIES_HZ, SPEEDS_MM_PER_S, AMPLITUDES_MM, WINDOWS_MS = (1, 10_000), (0.1, 10_000.0), (1e-6, 100.0), (0.01, 100.0)
@@ -26,15 +35,7 @@ METHODS = "controller.estimator", "controller.output"
 def command(
     options: StudyOptions,
     scene: SceneArgument = "seed-2011",
-    wanted: Annotated[
-        str | None,
-        typer.Option(
-            "--estimators",
-            metavar="NAME[:OUTPUT],...",
-            help="estimators, as zwidth takes them",
-            show_default="seven of all",
-        ),
-    ] = None,
+    wanted: Annotated[str | None, methods_option("seven of all")] = None,
     tried: Annotated[
         str | None,
         typer.Option("--rates", metavar="HZ,...", help="rates besides the scene's own", show_default="1e3,1e4,1e6"),
@@ -55,9 +56,9 @@ def command(
     changes = options.changes()
     refuse(changes, METHODS, "see --estimators")
     moving = Moving(
-        [round(each) for each in _numbers(frequencies, "--frequencies", *FREQUENCIES_HZ, "Hz", whole=True)],
+        [round(each) for each in _few(frequencies, "--frequencies", *FREQUENCIES_HZ, "Hz", whole=True)],
         within(amplitude, "--amplitude", *AMPLITUDES_MM, "mm") / 1e3,
-        [each / 1e3 for each in _numbers(speeds, "--speeds", *SPEEDS_MM_PER_S, "mm/s")],
+        [each / 1e3 for each in _few(speeds, "--speeds", *SPEEDS_MM_PER_S, "mm/s")],
         within(window, "--window", *WINDOWS_MS, "ms") / 1e3,
     )
     rates_hz = sorted(rates_of(tried, "--rates")) if tried is not None else list(rendered.RATES_HZ)
@@ -71,18 +72,9 @@ def command(
     options.finish(result)
 
 
-def _numbers(text: str, option: str, least: float, most: float, unit: str, whole: bool = False) -> list[float]:
-    """Return the numbers of a list given with an option, ascending, each once."""
-    numbers = set()
-    for word in text.split(","):
-        try:
-            number = float(word)
-        except ValueError:
-            number = float("nan")
-        if not least <= number <= most or (whole and number != int(number)):
-            kind = "whole numbers" if whole else "numbers"
-            raise BadInput(f"{option} must be {kind} of {least:g} to {most:g} {unit}, not {shown(word)}")
-        numbers.add(number)
+def _few(text: str, option: str, *limits: Any, whole: bool = False) -> list[float]:
+    """Return the numbers of a list given with an option, ascending; raise BadInput if there are too many."""
+    numbers = sorted(numbers_of(text, option, *limits, whole=whole))
     if len(numbers) > MOST:
         raise BadInput(f"{option} must be at most {MOST} numbers, not {len(numbers)}")
-    return sorted(numbers)
+    return numbers

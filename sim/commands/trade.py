@@ -1,25 +1,19 @@
 """The command `trade`."""
 
 from collections.abc import Callable, Hashable
-from typing import Annotated
-
-import typer
 
 from ..jobs import rounds
 from ..scene.case import Case
 from ..studies import trade_runs
 from ..walls.zwidth import STARTS, Map
+from .errors import BadInput
 from .maps import Maps
-from .options import SceneArgument, refuse, refuse_for_maps
+from .options import SceneArgument, StartsOption, refuse, refuse_for_maps
 from .study import StudyOptions, study
 from .terminal import progress
 
 LEAST = 5
 """The number of starts below which no interval of theirs tells a move from chance."""
-FewStartsOption = Annotated[
-    int,
-    typer.Option(min=LEAST, max=10_000, metavar="N", help="number of starts that hit every wall at the edge"),
-]
 
 
 class _Runs:
@@ -38,8 +32,10 @@ class _Runs:
 
 
 @study("workers", "resume", "set_", "plot")
-def command(options: StudyOptions, scene: SceneArgument = "drive-2011", starts: FewStartsOption = STARTS) -> None:
+def command(options: StudyOptions, scene: SceneArgument = "drive-2011", starts: StartsOption = STARTS) -> None:
     changes = options.changes()
+    if starts < LEAST:
+        raise BadInput(f"--starts must be {LEAST} or more, for fewer tell no move from chance, not {starts}")
     refuse_for_maps(changes, "it takes two of the paper's")
     refuse(changes, ("solver",), "it is one of the settings")
     options.finish(trade_runs.study(Case.of(scene, changes), _Runs(options, starts)))

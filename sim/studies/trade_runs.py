@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Hashable
 from dataclasses import replace
 from functools import partial
+from itertools import cycle
 from typing import Protocol
 
 from ..scene.case import Case
@@ -35,7 +36,7 @@ GRID = {
 }
 """A grid with few B, as there are many maps; both estimators have a boundary there on the paper's device and drive."""
 AROUND = 0.7, 0.85, 0.95, 1 / 0.95, 1 / 0.85, 1 / 0.7
-"""The walls that are timed, as multiples of the reference's boundary."""
+"""The stiffness of the walls that are timed, over the reference's boundary, from one B to the next."""
 ROUNDS = 3
 RTL_WALLS = 2
 """The number of walls on which the hardware is timed, once, for every estimator: a hit takes seconds."""
@@ -102,12 +103,12 @@ class _Contest:
             return shortcut
         return next(each for each in self.computed if (each.backend, each.changes) == ("fixed", shortcut.changes))
 
-    def walls_around(self, boundary: dict[float, float]) -> list[list[Wall]]:
-        """Return the walls around a boundary, in one list for every B."""
+    def timed(self, boundary: dict[float, float]) -> list[Wall]:
+        """Return the walls that are timed: one for every B of a boundary, at varying distances from it."""
         step, walls = self._grid.stiffness_step_n_per_m, []
-        for damping, stiffness in boundary.items():
-            rows = (min(max(round(times * (stiffness / step + 0.5)), 1), self._grid.rows) for times in AROUND)
-            walls.append([(row * step, damping) for row in dict.fromkeys(rows)])
+        for (damping, stiffness), times in zip(boundary.items(), cycle(AROUND), strict=False):
+            row = round(times * (stiffness / step + 0.5))
+            walls.append((min(max(row, 1), self._grid.rows) * step, damping))
         return walls
 
     def hit(self, shortcut: Shortcut, curve: Curve, wall: Wall, until_sure: bool = True) -> hit.Hit:
@@ -144,9 +145,7 @@ def study(case: Case, runs: Runs) -> Trade:
             raise RuntimeError(f"{name} no wall of the map is stable: nothing to compare with")
     maps |= _maps(contest, runs, [each for each in contest.computed if each != REFERENCE])
     boundaries = {curve.label: _boundary(maps[REFERENCE.label, curve.label]) for curve in contest.curves}
-    around = {label: contest.walls_around(boundary) for label, boundary in boundaries.items()}
-    # The timed walls: one for every B, at varying distances from the boundary.
-    timed = {label: [at[n % len(at)] for n, at in enumerate(walls)] for label, walls in around.items()}
+    timed = {label: contest.timed(boundary) for label, boundary in boundaries.items()}
     seconds = _seconds(contest, timed, runs)
     points = []
     for shortcut in contest.shortcuts:

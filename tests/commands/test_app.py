@@ -95,6 +95,13 @@ def test_signals_are_heard_before_anything_else_is_done(monkeypatch):
     assert done[0] == "jobs.ending.hear_signals"
 
 
+def test_garbage_is_looked_for_as_seldom_as_said():
+    program = "import gc, sys; from hardwall.sim.commands.app import main; sys.argv = ['hardwall', '--version']\n"
+    program += "try: main()\nfinally: print(gc.get_threshold())"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == str(app.COLLECTED)
+
+
 def test_the_version_is_the_package_s(monkeypatch, capsys):
     code, out, _ = call(monkeypatch, capsys, "--version")
     assert (code, out) == (0, f"hardwall {importlib.metadata.version('hardwall')}\n")

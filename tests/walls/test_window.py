@@ -1,5 +1,9 @@
 """The line through a window of positions is NumPy's, however the positions come."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -32,3 +36,22 @@ def test_a_handle_at_rest_or_in_steady_motion_is_on_its_line():
     assert of(1e-3 + 1e-9 * np.arange(20_000)).rms_m < 1e-11
     single = of(np.array([4e-6]))
     assert (single.mean_m, single.drift_m, single.rms_m) == (4e-6, 0.0, 0.0)
+
+
+SUMS = """
+import numpy as np
+from hardwall.sim.walls.window import Room, Window
+window, values = Window(200_000, Room()), np.random.default_rng(1).normal(0, 1, 200_000)
+for piece in np.split(values, [65_536, 131_072]):
+    window.add(piece)
+print(window.mean_m.hex(), window.drift_m.hex(), window.rms_m.hex())
+"""
+
+
+def test_no_digit_depends_on_the_number_of_threads():
+    """BLAS has as many as there are cores, unless it is told, and adds their parts."""
+    found = set()
+    for threads in ("1", "2"):
+        environ = os.environ | {"OPENBLAS_NUM_THREADS": threads}
+        found.add(subprocess.run([sys.executable, "-c", SUMS], env=environ, capture_output=True, check=True).stdout)
+    assert len(found) == 1
