@@ -1,6 +1,6 @@
 """One axis, from pins to force: the chain of blocks, a sample strobe, and parameters that change together."""
 
-from amaranth.hdl import Cat, Module, Mux, Signal, signed
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, signed
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
@@ -10,12 +10,13 @@ from hardwall.model.spec import AxisSpec
 from .arithmetic.fixed import shape
 from .estimators.registry import block_of
 from .output import Output
+from .passivity import Passivity
 from .quadrature import Quadrature
 from .wall import Wall
 
 
 class Axis(wiring.Component):
-    """An axis from encoder pins to drive: decoder, velocity estimator, wall and output stage.
+    """An axis from encoder pins to drive: decoder, velocity estimator, wall, passivity if it is so made, output stage.
 
     Every `spec.clocks_per_sample` clocks a strobe takes the count; `latency` clocks later the drive has changed. The
     next strobe may come before that: then two samples are under way, and what belongs to one travels beside it.
@@ -156,12 +157,8 @@ class Axis(wiring.Component):
         m.d.sync += divider.eq(Mux(strobe, 0, divider + 1))
 
         active = self._active(m, strobe, estimator.valid)
-        for block, words in (
-            (estimator, design.estimator.words),
-            (wall, design.wall.words),
-            (output, design.output.words),
-        ):
-            m.d.comb += [getattr(block, word.name).eq(active[word.name]) for word in words]
+        for block in (estimator, wall, output):
+            m.d.comb += [getattr(block, word.name).eq(active[word.name]) for word in block.design.words]
 
         # A preload changes the count without a motion.
         restart = Signal()
@@ -199,8 +196,6 @@ class Axis(wiring.Component):
             wall.count.eq(decoder.seen.count),
             wall.strobe.eq(estimator.valid),
             wall.velocity.eq(estimator.velocity),
-            output.strobe.eq(wall.valid),
-            output.force.eq(wall.force),
             output.fault.eq(fault),
             output.enable.eq(self.drive_enable),
             self.drive.eq(output.drive),
@@ -227,10 +222,27 @@ class Axis(wiring.Component):
             self.stamp_b_fall.eq(decoder.seen.stamp_b_fall),
         ]
 
+        given, forced, acts = wall.force, wall.valid, Const(0, 0)
+        if design.passivity is not None:
+            m.submodules.passivity = passivity = Passivity(design.passivity)
+            m.d.comb += [getattr(passivity, word.name).eq(active[word.name]) for word in design.passivity.words]
+            m.d.comb += [
+                passivity.lead.eq(strobe),
+                passivity.count.eq(decoder.seen.count),
+                passivity.restart.eq(restart),
+                passivity.strobe.eq(estimator.valid),
+                passivity.velocity.eq(estimator.velocity),
+                passivity.drive.eq(output.drive),
+                passivity.forced.eq(wall.valid),
+                passivity.force.eq(wall.force),
+            ]
+            given, forced, acts = passivity.given, passivity.valid, passivity.active
+        m.d.comb += [output.strobe.eq(forced), output.force.eq(given)]
+
         # A flag is visible from the sample that raised it until it is cleared.
         raised = Cat(
             Mux(estimator.valid, Cat(taken_fault, estimator.saturated), 0),
-            Mux(output.valid, output.limited, 0),
+            Mux(output.valid, Cat(output.limited, acts), 0),
         )
         sticky = Signal(len(raised))
         m.d.sync += sticky.eq(Mux(self.clear_flags, 0, sticky) | raised)

@@ -83,6 +83,8 @@ class AxesSpec(DesignedAxis):
     def __post_init__(self) -> None:
         check_int("axes", self.axes, 1, AXES_MAX)
         super().__post_init__()
+        if self.passivity:
+            raise FieldError("passivity", "must be False, for axes that share their logic have no such controller")
         if self.estimator not in PIPELINES:
             raise FieldError("estimator", f"must be one of {', '.join(PIPELINES)}, not {self.estimator!r}")
         if self.clocks_per_sample < self.slots:

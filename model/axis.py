@@ -1,4 +1,4 @@
-"""One axis, from counts to drive: estimator, wall and output stage, wired as the hardware wires them.
+"""One axis, from counts to drive: estimator, wall, passivity and output stage, wired as the hardware wires them.
 
 For studies in Python, `Axis` takes and returns numpy arrays and SI units:
 
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import checks, output, quadrature, wall
+from . import checks, output, passivity, quadrature, wall
 from .compiled import compiled, inlined
 from .design import Design, Params, State
 from .designed import DesignedAxis
@@ -37,9 +37,13 @@ def step(
     """
     estimator, velocity, estimator_flags = estimate(params.estimator, state.estimator, seen, restart)
     force = wall.render(params.wall, seen.count, velocity)
-    driven, output_flags = output.step(params.output, state.output, force, enable and not fault)
-    flags = state.flags | fault | estimator_flags << params.estimator_bit | output_flags << params.output_bit
-    return State(estimator, driven, flags), velocity, force
+    observed, given, acted = passivity.step(
+        params.passivity, state.passivity, seen.count, restart, velocity, force, state.output.drive
+    )
+    driven, output_flags = output.step(params.output, state.output, given, enable and not fault)
+    flags = state.flags | fault | estimator_flags << params.estimator_bit
+    flags |= output_flags << params.output_bit | acted << params.passivity_bit
+    return State(estimator, observed, driven, flags), velocity, force
 
 
 @compiled
@@ -58,7 +62,7 @@ class Record:
 
     Attributes:
         velocity: words of `design.estimator.velocity`; counts a sample if the axis is float64.
-        force, drive: force on the handle, force LSB, before and after the output stage.
+        force, drive: force on the handle, force LSB: the wall's, and behind the output stage.
         flags: sticky flags after every sample, bits as in `design.flags`.
     """
 

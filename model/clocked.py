@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import design, output, quadrature, wall
+from . import design, output, passivity, quadrature, wall
 from .compiled import compiled
 from .estimators.estimate import estimate
 
@@ -45,13 +45,15 @@ class Outputs(NamedTuple):
 
 
 class UnderWay(NamedTuple):
-    """A sample from its strobe to its changed drive, for which the words of the output stage are kept."""
+    """A sample from its strobe to its changed drive, for which its words are kept."""
 
+    count: int
+    restart: int
+    velocity: int
     force: int
     enable: int  # no fault was taken with it
     flags: int
-    stage: output.Params
-    output_bit: int
+    params: design.Params
 
 
 class State(NamedTuple):
@@ -66,7 +68,7 @@ class State(NamedTuple):
 
 def start(axis: design.Design) -> State:
     """Return the state after reset."""
-    nothing = UnderWay(0, 0, 0, output.Params(0, 0, 1), 0)
+    nothing = UnderWay(0, 0, 0, 0, 0, 0, axis.params(axis.encode()))
     return State(quadrature.START, axis.start(), 0, nothing, nothing)
 
 
@@ -79,17 +81,21 @@ def _take(params, state, outputs, k):
     fault = state.decoder.illegal | state.decoder.overspeed << 1
     outputs.velocity[k], outputs.wall_force[k] = velocity, force
     flags = fault | raised << params.estimator_bit
-    return estimator, UnderWay(force, int(fault == 0), flags, params.output, params.output_bit)
+    return estimator, UnderWay(seen.count, state.restart, velocity, force, int(fault == 0), flags, params)
 
 
 @compiled
 def _drive(now, outputs, k, sample, enable):
     """Let the drive follow sample k: store what it comes to, and return the axis's state."""
+    params = sample.params
     outputs.actuated[k] = now.output.phase == 0
-    driven, limited = output.step(sample.stage, now.output, sample.force, enable and sample.enable)
-    flags = now.flags | sample.flags | limited << sample.output_bit
+    observed, given, acted = passivity.step(
+        params.passivity, now.passivity, sample.count, sample.restart, sample.velocity, sample.force, now.output.drive
+    )
+    driven, limited = output.step(params.output, now.output, given, enable and sample.enable)
+    flags = now.flags | sample.flags | limited << params.output_bit | acted << params.passivity_bit
     outputs.drive[k], outputs.flags[k] = driven.drive, flags
-    return design.State(now.estimator, driven, flags)
+    return design.State(now.estimator, observed, driven, flags)
 
 
 @compiled
@@ -119,7 +125,7 @@ def run(controller, timing, state, pins, outputs, first, until):
         now, restart, older, newer = state.axis, state.restart, state.older, state.newer
         if (n + 1) % per_sample == 0:
             estimator, sample = _take(controller.axis, state, outputs, (n + 1) // per_sample - 1)
-            now = design.State(estimator, now.output, now.flags)
+            now = design.State(estimator, now.passivity, now.output, now.flags)
             restart, older, newer = 0, newer, sample
         # The strobes whose drive has changed before this edge, and behind it.
         before, behind = n - latency, n + 1 - latency
@@ -129,9 +135,10 @@ def run(controller, timing, state, pins, outputs, first, until):
             sample = older if overlap else newer
             now = _drive(now, outputs, (behind + 1) // per_sample - 1, sample, pins.drive_enable[n])
         if pins.clear_flags[n]:
-            now = design.State(now.estimator, now.output, 0)
+            now = design.State(now.estimator, now.passivity, now.output, 0)
         if not pins.drive_enable[n]:
-            now = design.State(now.estimator, output.State(now.output.phase, 0), now.flags)
+            released = output.State(now.output.phase, 0)
+            now = design.State(now.estimator, now.passivity, released, now.flags)
         inputs = quadrature.Inputs(
             pins.encoder_a[n], pins.encoder_b[n], pins.encoder_z[n], controller.glitch_clocks, controller.invert
         )

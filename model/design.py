@@ -1,8 +1,9 @@
 """The design of one axis: every format, run-time word, flag and latency, and its kernels' parameters and states."""
 
+from itertools import accumulate, chain
 from typing import NamedTuple
 
-from . import output, quadrature, wall
+from . import output, passivity, quadrature, wall
 from .arithmetic.fixed import UQ
 from .compiled import compiled
 from .estimators import registry
@@ -19,19 +20,22 @@ ENCODER_FLAGS = ("encoder_illegal", "encoder_overspeed")
 
 
 class Params(NamedTuple):
-    """Parameters of the three blocks, all integer words or all float64, and the lowest bits of their flags."""
+    """Parameters of the blocks, all integer words or all float64, and the lowest bits of their flags."""
 
     estimator: tuple
     wall: tuple
+    passivity: passivity.Params | passivity.FloatParams | passivity.Absent
     output: output.Params
     estimator_bit: int
     output_bit: int
+    passivity_bit: int
 
 
 class State(NamedTuple):
     """The states of the blocks, and the sticky flags (bits as in `Design.flags`, after the encoder's flags)."""
 
     estimator: tuple
+    passivity: passivity.State | passivity.Absent
     output: output.State
     flags: int
 
@@ -77,10 +81,12 @@ class Design:
         requirements: the axis's `AxisRequirements`.
         estimator: name of the velocity estimator.
         gains: that estimator's `Gains`, or None for its default ones.
+        passive: whether a passivity observer and controller follow the wall.
 
     Attributes:
         decoder: the decoder's `quadrature.Params`.
         estimator, wall, output: the designs of the other blocks.
+        passivity: that of the passivity observer and controller; None without.
         words: every run-time word, in the order of the hardware's ports.
         flags: names of the sticky flags, bit 0 first.
         latency_to_drive: clocks from the sample strobe to the changed drive.
@@ -91,7 +97,13 @@ class Design:
     words: tuple[Word, ...]
     flags: tuple[str, ...]
 
-    def __init__(self, requirements: AxisRequirements, estimator: str, gains: EstimatorGains | None = None):
+    def __init__(
+        self,
+        requirements: AxisRequirements,
+        estimator: str,
+        gains: EstimatorGains | None = None,
+        passive: bool = False,
+    ):
         chosen = registry.design_of(estimator)
         gains = chosen.gains_class.default(requirements) if gains is None else gains
         if not isinstance(gains, chosen.gains_class):
@@ -102,6 +114,7 @@ class Design:
         self.decoder = quadrature.Params(requirements.count_width, requirements.stamp_width, ILLEGAL_WIDTH)
         self.estimator = chosen(requirements, gains)
         self.wall = wall.Design(requirements, self.estimator.velocity)
+        self.passivity = passivity.Design(requirements, self.estimator.velocity) if passive else None
         self.output = output.Design(requirements)
         self.words = (
             Word(
@@ -116,17 +129,19 @@ class Design:
             Word("encoder_invert", UQ(1, 0), 1.0, "", 0, "1: count the other way"),
             *self.estimator.words,
             *self.wall.words,
+            *(self.passivity.words if self.passivity else ()),
             *self.output.words,
         )
-        self.flags = (*ENCODER_FLAGS, *self.estimator.flags, *self.output.flags)
-        self._flag_bits = len(ENCODER_FLAGS), len(ENCODER_FLAGS) + len(self.estimator.flags)
+        flags = ENCODER_FLAGS, self.estimator.flags, self.output.flags, self.passivity.flags if self.passivity else ()
+        self.flags = tuple(chain(*flags))
+        self._flag_bits = tuple(accumulate(map(len, flags[:3])))
         if self.estimator.latency < self.wall.lead:
             raise ValueError(
                 f"estimator must take {self.wall.lead} clocks or more, as the wall's lead does, "
                 f"not {self.estimator.latency}"
             )
-        self.latency_to_drive = self.estimator.latency + self.wall.latency + self.output.latency
-        behind = self.wall.latency + self.output.latency
+        behind = self.wall.latency + (self.passivity.latency if self.passivity else 0) + self.output.latency
+        self.latency_to_drive = self.estimator.latency + behind
         self.interval = max(self.estimator.interval, self.wall.interval, self.output.interval, behind + 1)
         per_sample = requirements.clocks_per_sample
         self.timing = Timing(per_sample, per_sample - 1, self.latency_to_drive)
@@ -146,22 +161,33 @@ class Design:
 
     def params(self, words: dict[str, int]) -> Params:
         """Return the integer kernel's parameters."""
-        blocks = self.estimator.params(words), self.wall.params(words), self.output.params(words)
+        controller = self.passivity.params(words) if self.passivity else passivity.ABSENT
+        blocks = self.estimator.params(words), self.wall.params(words), controller, self.output.params(words)
         return Params(*blocks, *self._flag_bits)
 
     def float_params(self, words: dict[str, int], si: dict[str, float]) -> Params:
         """Return the float64 kernel's parameters: gains unrounded, as given in `si` by the name of their word."""
         selected = self.estimator.outputs[words.get(self.estimator.output_word(), 0)]
+        controller = passivity.ABSENT
+        if self.passivity:
+            controller = self.passivity.float_params(si.get("passivity_damping", 0.0))
         return Params(
             self.estimator.float_params(self.gains, selected, si),
             self.wall.float_params(si.get("wall_stiffness", 0.0), si.get("wall_damping", 0.0), words),
+            controller,
             self.output.float_params(words),
             *self._flag_bits,
         )
 
     def start(self, floating: bool = False) -> State:
         """Return the state before the first sample, for one run only: the run may write to arrays in it."""
-        return State(self.estimator.start(floating), output.FLOAT_START if floating else output.START, 0)
+        started = passivity.FLOAT_START if floating else passivity.START
+        return State(
+            self.estimator.start(floating),
+            started if self.passivity else passivity.ABSENT,
+            output.FLOAT_START if floating else output.START,
+            0,
+        )
 
     def flag_names(self, flags: int) -> list[str]:
         """Return the names of the flags that are raised in `flags`."""

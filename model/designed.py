@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from .checks import shown
 from .design import Design
 from .estimators.estimate import EstimatorGains
 from .requirements import EDGE_ERROR_COUNTS, AxisRequirements
 
-USUAL_BOUNDS = {"jerk_max_m_per_s3": None, "edge_error_max_counts": EDGE_ERROR_COUNTS}
-"""Bounds that are no facts of an axis unless they are others than these."""
+USUAL = {"jerk_max_m_per_s3": None, "edge_error_max_counts": EDGE_ERROR_COUNTS, "passivity": False}
+"""What is no fact of an axis unless it is another than this."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,23 +21,30 @@ class DesignedAxis(AxisRequirements):
     Attributes:
         estimator: name of the velocity estimator.
         gains: that estimator's `Gains`, or None for its default ones.
+        passivity: whether a passivity observer and controller follow the wall: see `passivity`.
 
     The other attributes, and the errors, are those of `requirements.AxisRequirements`.
     """
 
     estimator: str = "levant"
     gains: EstimatorGains | None = None
+    passivity: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not isinstance(self.passivity, bool):
+            raise TypeError(f"passivity must be a bool, not {shown(self.passivity)}")
 
     @cached_property
     def design(self) -> Design:
         """Every derived format, word and flag, and the latency of an axis that is alone."""
-        return Design(self, self.estimator, self.gains)
+        return Design(self, self.estimator, self.gains, self.passivity)
 
     @property
     def facts(self) -> dict[str, Any]:
-        """Every field by name, with the gains that are in use; without bounds that are the usual ones."""
+        """Every field by name, with the gains that are in use; without those that are the usual ones."""
         facts = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        for name, usual in USUAL_BOUNDS.items():
+        for name, usual in USUAL.items():
             if facts[name] == usual:
                 del facts[name]
         return facts | {"gains": self.design.gains}

@@ -98,6 +98,12 @@ class WallSection(Section):
     forbid_pull: bool = False
 
 
+class PassivitySection(Section):
+    """A passivity observer and controller behind the wall: see `hardwall.model.passivity`."""
+
+    damping_n_s_per_m: Damping
+
+
 class AmplifierSection(Section):
     """The amplifier; a key that is absent means no delay, lag or limit. A current limit needs motor and bandwidth."""
 
@@ -174,6 +180,7 @@ class Scene(Section):
     encoder: EncoderSection
     controller: ControllerSection
     wall: WallSection
+    passivity: PassivitySection | None = None
     amplifier: AmplifierSection | None = None
     motor: MotorSection | None = None
     transmission: TransmissionSection | None = None
@@ -192,7 +199,8 @@ class Scene(Section):
         gains = self.gains
         if gains is not None:
             gains = registry.design_of(self.controller.estimator).gains_class(**gains.model_dump())
-        return fields | {"glitch_clocks": self.glitch_clocks, "count_m": self.encoder.count_m, "gains": gains}
+        derived = {"glitch_clocks": self.glitch_clocks, "passivity": self.passivity is not None}
+        return fields | derived | {"count_m": self.encoder.count_m, "gains": gains}
 
     @cached_property
     def spec(self) -> AxisSpec:
@@ -240,6 +248,8 @@ class Scene(Section):
             "wall_forbid_pull": self.wall.forbid_pull,
         }
         si |= self.spec.design.estimator.choose(self.estimator_output)
+        if self.passivity is not None:
+            si["passivity_damping"] = self.passivity.damping_n_s_per_m
         if self.controller.slew_limit_n_per_s is not None:
             si["output_slew_limit"] = self.controller.slew_limit_n_per_s
         return si

@@ -1,0 +1,195 @@
+"""The passivity observer and controller: what the drive has taken and given, and a damper while it has given more."""
+
+from amaranth.hdl import Module, Mux, Signal, Value, signed
+from amaranth.lib.wiring import In, Member, Out
+
+from hardwall.model.passivity import LOWER, MIDDLE, UPPER, Design
+
+from .arithmetic.fixed import shape, shift_floor
+from .block import Block
+from .wall import products
+
+
+def significant_bits(value: Value) -> Value:
+    """Return the number of bits of a signed value but for those that are all as its sign."""
+    return _length(value[:-1] ^ value[-1].replicate(len(value) - 1))
+
+
+def _length(bits: Value) -> Value:
+    """Return the place behind the highest bit that is set; 0 if none is."""
+    if len(bits) == 1:
+        return bits
+    half = 1 << (len(bits) - 1).bit_length() - 1
+    high = bits[half:]
+    return Mux(high.any(), half + _length(high), _length(bits[:half]))
+
+
+class Passivity(Block):
+    """The observer of the energy that the drive takes from the handle, and a damper while it has given more than taken.
+
+    Equation, at every sample, with `drive` as it has been since the last one:
+
+        energy <- energy - drive (place - last place),    place: the count, and where in it the handle is
+        given  =  force - part velocity                   for energy < 0 and a force, not beyond zero, else force
+
+    The part is passivity_damping 2**-n; what it dissipates until the next actuation is a quarter of the debt to twice
+    the debt, unless n is 0. A debt stays. A credit loses a share of 2**-`design.memory` a sample, and all of it where
+    there is no force.
+
+    Latency: `latency` clocks from `forced` to `valid`. A sample's `lead` comes 2 clocks or more before its `strobe`,
+    and not before the last one's; `forced` comes `behind` clocks or more behind the `strobe`, and the next `strobe`
+    comes behind `valid`.
+
+    Rounding and overflow: the energy is exact and saturates; the damper's force is rounded once, half up, and
+    saturates; its part is rounded to zero; what is given saturates.
+
+    Parameters
+    ----------
+    design : hardwall.model.passivity.Design
+        Formats; its module derives them.
+
+    Members
+    -------
+    lead : In(1)
+        Pulse: take a sample's count.
+    count : In(signed)
+        With `lead`: position, counts; may wrap. It changes by one a clock at most, but for a preload.
+    restart : In(1)
+        With `lead`: the count was preloaded since the last sample.
+    strobe : In(1)
+        Pulse: take the same sample's velocity.
+    velocity : In(SQ)
+        With `strobe`: velocity, counts a sample.
+    drive : In(SQ)
+        With `strobe`: the drive since the last sample, force LSB.
+    passivity_damping : In(UQ)
+        With `strobe`: force LSB a count/sample.
+    forced : In(1)
+        Pulse: the same sample's force is there.
+    force : In(SQ)
+        From `forced` to `valid`: the wall's force on the handle, force LSB.
+    given : Out(SQ)
+        The force that is given on, force LSB; constant from one `valid` to the next.
+    active : Out(1)
+        With `given`: whether it is another than the wall's.
+    valid : Out(1)
+        High for one clock.
+
+    Raises
+    ------
+    TypeError
+        If `design` is of another class.
+
+    Source: Hannaford and Ryu, IEEE Transactions on Robotics and Automation 18(1), 2002; see
+    `hardwall.model.passivity`.
+    """
+
+    design_class = Design
+
+    @staticmethod
+    def members(design: Design) -> dict[str, Member]:
+        return {
+            "lead": In(1),
+            "count": In(signed(design.count_width)),
+            "restart": In(1),
+            "strobe": In(1),
+            "velocity": In(shape(design.velocity)),
+            "drive": In(shape(design.force)),
+            **{word.name: In(shape(word.format)) for word in design.words},
+            "forced": In(1),
+            "force": In(shape(design.force)),
+            "given": Out(shape(design.force)),
+            "active": Out(1),
+            "valid": Out(1),
+        }
+
+    def elaborate(self, platform):
+        m = Module()
+        energy = Signal(shape(self._design.energy))
+        self._observe(m, energy)
+        part, back = self._damp(m, energy)
+
+        # A sum that is past zero is zero, and the force's least word is out of range.
+        sign, top = self.force[-1], len(self.force) - 1
+        total = Mux(back, self.force + part, self.force - part)[: top + 2].as_signed()
+        limited = (total[-1] != total[top]) | total[top] & ~total[:top].any()
+        limit = Mux(sign, -self._design.force.max, self._design.force.max)
+        halved, given = Signal(), Signal()
+        m.d.sync += [halved.eq(self.forced), given.eq(halved), self.valid.eq(given)]
+        with m.If(given):
+            within = Mux(limited, limit, total[: top + 1].as_signed())
+            m.d.sync += [self.given.eq(Mux(total[-1] == sign, within, 0)), self.active.eq(part.any())]
+        return m
+
+    def _observe(self, m: Module, energy: Signal) -> None:
+        """Let the energy follow the samples: it is a sample's 3 clocks behind the strobe, up to `forced`."""
+        design = self._design
+        last, moved = Signal(signed(design.count_width)), Signal(shape(design.place))
+        within, before = Signal(range(UPPER + 1), init=MIDDLE), Signal(range(UPPER + 1), init=MIDDLE)
+        restarted, known, placed = Signal(), Signal(), Signal()
+        half_counts = Signal(shape(design.place))
+        m.d.sync += [known.eq(self.lead), placed.eq(known)]
+        with m.If(self.lead):
+            m.d.sync += [last.eq(self.count), moved.eq(self.count - last), restarted.eq(self.restart)]
+        with m.If(known):
+            one = Mux(moved == 1, LOWER, Mux(moved == -1, UPPER, MIDDLE))
+            m.d.sync += [before.eq(within), within.eq(Mux(restarted, MIDDLE, Mux(moved == 0, within, one)))]
+        with m.If(placed):
+            m.d.sync += half_counts.eq(Mux(restarted, 0, 2 * moved + within - before))
+
+        worked, taken = products("worked", self.drive, half_counts)
+        multiplied, summed = Signal(), Signal()
+        work = Signal.like(taken)
+        m.d.sync += [multiplied.eq(self.strobe), summed.eq(multiplied), work.eq(taken)]
+        with m.If(self.strobe):
+            m.d.sync += worked
+
+        # What a sample leaves of a credit comes behind its force, and before the next sample's work.
+        loss, forgets = Signal.like(energy), Signal()
+        share = (energy >> design.memory) + energy[: design.memory].any()
+        m.d.sync += [forgets.eq(self.forced), loss.eq(Mux(energy[-1], 0, Mux(self.force.any(), share, energy)))]
+        total = energy - work
+        sign, most = total[-1], design.energy.max
+        limited = (total[len(energy) - 1 :] != sign.replicate(len(total) - len(energy) + 1))
+        least = sign & ~total[: len(energy) - 1].any()
+        with m.If(summed):
+            m.d.sync += energy.eq(Mux(limited | least, Mux(sign, -most, most), total[: len(energy)].as_signed()))
+        with m.If(forgets):
+            m.d.sync += energy.eq(energy - loss)
+
+    def _damp(self, m: Module, energy: Signal) -> tuple[Signal, Signal]:
+        """Return the magnitude of the damper's force, halved as often as the debt says, and its sign; 2 clocks late."""
+        design = self._design
+        coarse = shift_floor(self.velocity, design.velocity.f - design.coarse.f)[: design.coarse.width].as_signed()
+        braked, product = products("damper", self.passivity_damping, coarse)
+        multiplied, summed = Signal(), Signal()
+        speed_bits = Signal(range(design.coarse.width))
+        m.d.sync += [multiplied.eq(self.strobe), summed.eq(multiplied)]
+        with m.If(self.strobe):
+            m.d.sync += [*braked, speed_bits.eq(significant_bits(coarse))]
+
+        half = 1 << design.shift - 1 if design.shift > 0 else 0
+        total, damper = Signal(signed(len(product) + 1)), Signal(shape(design.force))
+        with m.If(multiplied):
+            m.d.sync += total.eq(product + half)
+        sign, top = total[-1], design.shift + design.force.width - 1
+        limited = (total[top:] != sign.replicate(len(total) - top)) | sign & ~total[max(design.shift, 0) : top].any()
+        within = shift_floor(total, design.shift)[: design.force.width].as_signed()
+        with m.If(summed):
+            m.d.sync += damper.eq(Mux(limited, Mux(sign, -design.force.max, design.force.max), within))
+
+        # The force that is given on comes of a part and its sign, without a force or a debt of none.
+        excess = significant_bits(damper) + speed_bits + design.spare_bits - significant_bits(energy)
+        halvings, magnitude = Signal(len(excess)), Signal(design.force.width - 1)
+        part, back, halved = Signal.like(magnitude), Signal(), Signal()
+        m.d.sync += halved.eq(self.forced)
+        with m.If(self.forced):
+            owed = energy[-1] & self.force.any()
+            m.d.sync += [
+                halvings.eq(Mux(excess < 0, 0, excess)),
+                magnitude.eq(Mux(owed, abs(damper), 0)),
+                back.eq(damper[-1]),
+            ]
+        with m.If(halved):
+            m.d.sync += part.eq(magnitude >> halvings)
+        return part, back
