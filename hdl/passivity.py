@@ -125,17 +125,16 @@ class Passivity(Block):
         """Let the energy follow the samples: it is a sample's 3 clocks behind the strobe, up to `forced`."""
         design = self._design
         last, moved = Signal(signed(design.count_width)), Signal(shape(design.place))
-        within, before = Signal(range(UPPER + 1), init=MIDDLE), Signal(range(UPPER + 1), init=MIDDLE)
-        restarted, known, placed = Signal(), Signal(), Signal()
-        half_counts = Signal(shape(design.place))
-        m.d.sync += [known.eq(self.lead), placed.eq(known)]
+        within, half_counts = Signal(range(UPPER + 1), init=MIDDLE), Signal(shape(design.place))
+        restarted, known = Signal(), Signal()
+        m.d.sync += known.eq(self.lead)
+        turned = (self.count - last)[: design.count_width].as_signed()
         with m.If(self.lead):
-            m.d.sync += [last.eq(self.count), moved.eq(self.count - last), restarted.eq(self.restart)]
+            m.d.sync += [last.eq(self.count), moved.eq(turned), restarted.eq(self.restart)]
         with m.If(known):
-            one = Mux(moved == 1, LOWER, Mux(moved == -1, UPPER, MIDDLE))
-            m.d.sync += [before.eq(within), within.eq(Mux(restarted, MIDDLE, Mux(moved == 0, within, one)))]
-        with m.If(placed):
-            m.d.sync += half_counts.eq(Mux(restarted, 0, 2 * moved + within - before))
+            now = Mux(moved == 0, within, Mux(moved == 1, LOWER, Mux(moved == -1, UPPER, MIDDLE)))
+            m.d.sync += within.eq(Mux(restarted, MIDDLE, now))
+            m.d.sync += half_counts.eq(Mux(restarted, 0, 2 * moved + now - within))
 
         worked, taken = products("worked", self.drive, half_counts)
         multiplied, summed = Signal(), Signal()

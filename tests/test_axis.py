@@ -26,8 +26,9 @@ ACTS, CHANCES = ("", "words", "drive_enable", *STROBES), (0.968, 0.006, 0.006, *
 """What a host does at a clock, and the chance of each."""
 
 
-def make(estimator: str, overlaps: bool) -> Axis:
-    return Axis(fastest(busy(estimator)) if overlaps else busy(estimator))
+def make(estimator: str, overlaps: bool, passive: bool) -> Axis:
+    axis = busy(estimator, passive)
+    return Axis(fastest(axis) if overlaps else axis)
 
 
 class Events:
@@ -164,6 +165,7 @@ async def follows_model(dut):
     assert (seen.column("drive") < 0).any()
     rose = spec.design.flag_names(int(np.bitwise_or.reduce(seen.column("flags"))))
     limits = {"error_saturated", "slew_limited", "force_limited"}
+    limits |= {"passivity_active"} if spec.passivity else set()
     assert {"encoder_illegal", "encoder_overspeed", *limits} <= set(rose)
     assert [clock - first_clock for clock in seen.clocks[:kept]] == [change_of(timing, k) for k in range(kept)]
 
@@ -210,12 +212,18 @@ async def late_edges_have_late_stamps(dut):
 
 
 # One estimator on the count and one on the stamps. `test_loop` runs all estimators.
-SIZES = [("levant", False), ("levant", True), ("levant-edge", False), ("levant-edge", True)]
+SIZES = [
+    ("levant", False, False),
+    ("levant", True, False),
+    ("levant", True, True),
+    ("levant-edge", False, True),
+    ("levant-edge", True, False),
+]
 
 
-@pytest.mark.parametrize(("estimator", "overlaps"), some_of(SIZES, 1, 2))
-def test_rtl(estimator, overlaps):
-    simulate(__file__, make, estimator=estimator, overlaps=overlaps)
+@pytest.mark.parametrize(("estimator", "overlaps", "passive"), some_of(SIZES, 1, 3))
+def test_rtl(estimator, overlaps, passive):
+    simulate(__file__, make, estimator=estimator, overlaps=overlaps, passive=passive)
 
 
 def test_wrong_spec_is_refused():

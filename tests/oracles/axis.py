@@ -1,10 +1,10 @@
-"""An axis clock for clock from the models of its blocks: decoder, estimator, wall and output stage."""
+"""An axis clock for clock from the models of its blocks: decoder, estimator, wall, passivity and output stage."""
 
 from collections import defaultdict
 from collections.abc import Callable
 from operator import attrgetter
 
-from hardwall.model import output, quadrature, wall
+from hardwall.model import output, passivity, quadrature, wall
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.supervised import FIXED, Design
 
@@ -43,7 +43,7 @@ class AxisTwin:
         self.clocks = self.restart = 0
         self.words = {word.name: word.reset for word in self.design.words} | self.fixed()
         self.pending = self.begun = False
-        self.decoder, self.estimator, self.output = quadrature.START, self.design.start().estimator, output.START
+        self.decoder, (self.estimator, self.passivity, self.output, _) = quadrature.START, self.design.start()
         self.sampled_count = self.velocity = self.wall_force = self.drive = self.sticky = 0
         self.enabled = 0
         self.due: defaultdict[int, list[Callable[[], None]]] = defaultdict(list)
@@ -82,22 +82,29 @@ class AxisTwin:
             params.estimator, self.estimator, quadrature.seen(decoder), self.restart
         )
         force = wall.render(params.wall, decoder.count, velocity)
-        count, fault = decoder.count, decoder.illegal | decoder.overspeed << 1
+        count, fault, restart = decoder.count, decoder.illegal | decoder.overspeed << 1, self.restart
+        driven: list[int] = []
+
+        def observe() -> None:
+            driven.append(self.drive)
 
         def drive() -> None:
+            self.passivity, given, active = passivity.step(
+                params.passivity, self.passivity, count, restart, velocity, force, *driven
+            )
             # The output stage slews from the drive, which a low enable has made zero.
             begun = self.output._replace(drive=self.drive)
             self.pulses[self.clocks + 1] = {"sampled": 1, "actuated": int(begun.phase == 0)}
             stage = d.output.params(self.words)
-            self.output, limited = output.step(stage, begun, force, self.enabled and not fault)
+            self.output, limited = output.step(stage, begun, given, self.enabled and not fault)
             self.drive = self.output.drive
-            self.raised[self.clocks + 1] = limited << params.output_bit
+            self.raised[self.clocks + 1] = limited << params.output_bit | active << params.passivity_bit
 
         # A result is seen `latency` edges after the strobe, so its register is loaded at the edge before.
         estimated = now + d.estimator.latency
         walled = estimated + d.wall.latency
         self.due[estimated - 1] += [lambda: setattr(self, "velocity", velocity)]
-        self.due[estimated] += [lambda: setattr(self, "sampled_count", count)]
+        self.due[estimated] += [lambda: setattr(self, "sampled_count", count), observe]
         self.raised[estimated] = fault | raised << params.estimator_bit
         self.pulses[estimated] = {"estimated": 1, "saturated": int(raised != 0)}
         self.due[walled - 1] += [lambda: setattr(self, "wall_force", force)]

@@ -22,12 +22,13 @@ HASTY = levant.Gains(4 * ADJUSTED.lambda_sqrt_m_per_s, 2_000.0)
 """Gains that drive a differentiator to its limits within a few samples."""
 
 
-def busy(estimator: str) -> AxisSpec:
+def busy(estimator: str, passive: bool = False) -> AxisSpec:
     """Return an axis that samples nearly as fast as its latency allows, and is moved faster than it is made for."""
-    latency = spec("mhz", estimator).design.latency_to_drive
+    latency = dataclasses.replace(spec("mhz", estimator), passivity=passive).design.latency_to_drive
     gains = ADJUSTED if estimator == "levant" else None
     rates = {"clock_hz": 100_000 * (latency + SLACK), "sample_hz": 100_000, "actuation_hz": 50_000}
-    return AxisSpec(**{**MHZ, **rates, "speed_max_m_per_s": 0.05, "travel_m": 1e-3}, estimator=estimator, gains=gains)
+    moved = {"speed_max_m_per_s": 0.05, "travel_m": 1e-3}
+    return AxisSpec(**{**MHZ, **rates, **moved}, estimator=estimator, gains=gains, passivity=passive)
 
 
 def with_clocks(axis: AxisSpec, clocks: int) -> AxisSpec:
@@ -49,8 +50,8 @@ def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
     if random.random() < 0.5:
         for word in design.estimator.words:
             words[word.name] = int(random.integers(0, int(word.format.max * 2.0 ** -random.integers(0, 8)) + 1))
-    for name in ("wall_stiffness", "wall_damping", "output_force_limit", "output_slew_limit"):
-        top = next(word.format.max for word in design.words if word.name == name)
+    of_all_sizes = "wall_stiffness", "wall_damping", "passivity_damping", "output_force_limit", "output_slew_limit"
+    for name, top in ((word.name, word.format.max) for word in design.words if word.name in of_all_sizes):
         words[name] = int(random.integers(0, int(top * 2.0 ** -random.integers(0, 16)) + 1))
     words["wall_position"] = int(random.integers(-30, 30))
     words["wall_left"], words["wall_forbid_pull"] = random.integers(0, 2, 2).tolist()
