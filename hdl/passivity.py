@@ -111,7 +111,8 @@ class Passivity(Block):
 
         # A sum that is past zero is zero, and the force's least word is out of range.
         sign, top = self.force[-1], len(self.force) - 1
-        total = Mux(back, self.force + part, self.force - part)[: top + 2].as_signed()
+        total = Signal(signed(top + 2))
+        m.d.comb += total.eq(Mux(back, self.force + part, self.force - part))
         limited = (total[-1] != total[top]) | total[top] & ~total[:top].any()
         limit = Mux(sign, -self._design.force.max, self._design.force.max)
         halved, given = Signal(), Signal()
@@ -147,9 +148,10 @@ class Passivity(Block):
         loss, forgets = Signal.like(energy), Signal()
         share = (energy >> design.memory) + energy[: design.memory].any()
         m.d.sync += [forgets.eq(self.forced), loss.eq(Mux(energy[-1], 0, Mux(self.force.any(), share, energy)))]
-        total = energy - work
+        total = Signal((energy - work).shape())
+        m.d.comb += total.eq(energy - work)
         sign, most = total[-1], design.energy.max
-        limited = (total[len(energy) - 1 :] != sign.replicate(len(total) - len(energy) + 1))
+        limited = total[len(energy) - 1 :] != sign.replicate(len(total) - len(energy) + 1)
         least = sign & ~total[: len(energy) - 1].any()
         with m.If(summed):
             m.d.sync += energy.eq(Mux(limited | least, Mux(sign, -most, most), total[: len(energy)].as_signed()))
@@ -177,18 +179,19 @@ class Passivity(Block):
         with m.If(summed):
             m.d.sync += damper.eq(Mux(limited, Mux(sign, -design.force.max, design.force.max), within))
 
-        # The force that is given on comes of a part and its sign, without a force or a debt of none.
-        excess = significant_bits(damper) + speed_bits + design.spare_bits - significant_bits(energy)
-        halvings, magnitude = Signal(len(excess)), Signal(design.force.width - 1)
-        part, back, halved = Signal.like(magnitude), Signal(), Signal()
+        # Without a debt, or a force, there is no part.
+        taken = significant_bits(damper) + speed_bits + design.spare_bits
+        own_bits, debt_bits = Signal(taken.shape()), Signal(range(design.energy.width))
+        magnitude, back, halved = Signal(design.force.width - 1), Signal(), Signal()
         m.d.sync += halved.eq(self.forced)
         with m.If(self.forced):
-            owed = energy[-1] & self.force.any()
             m.d.sync += [
-                halvings.eq(Mux(excess < 0, 0, excess)),
-                magnitude.eq(Mux(owed, abs(damper), 0)),
+                own_bits.eq(taken),
+                debt_bits.eq(significant_bits(energy)),
+                magnitude.eq(Mux(energy[-1] & self.force.any(), abs(damper), 0)),
                 back.eq(damper[-1]),
             ]
+        excess, part = own_bits - debt_bits, Signal.like(magnitude)
         with m.If(halved):
-            m.d.sync += part.eq(magnitude >> halvings)
+            m.d.sync += part.eq(magnitude >> Mux(excess < 0, 0, excess)[: len(excess) - 1])
         return part, back

@@ -140,6 +140,11 @@ class Design:
                 f"estimator must take {self.wall.lead} clocks or more, as the wall's lead does, "
                 f"not {self.estimator.latency}"
             )
+        if self.passivity and self.wall.latency < self.passivity.behind:
+            raise ValueError(
+                f"wall must take {self.passivity.behind} clocks or more before a passivity controller, "
+                f"not {self.wall.latency}"
+            )
         behind = self.wall.latency + (self.passivity.latency if self.passivity else 0) + self.output.latency
         self.latency_to_drive = self.estimator.latency + behind
         self.interval = max(self.estimator.interval, self.wall.interval, self.output.interval, behind + 1)

@@ -112,6 +112,7 @@ class Design:
     """
 
     latency = LATENCY
+    behind = BEHIND
     flags = FLAGS
 
     def __init__(self, axis: AxisRequirements, velocity: SQ):

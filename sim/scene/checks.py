@@ -24,6 +24,7 @@ DELAY_SAMPLES_MAX = 10**6
 KEYS = {
     "wall_stiffness": "wall.stiffness_n_per_m",
     "wall_damping": "wall.damping_n_s_per_m",
+    "passivity_damping": "passivity.damping_n_s_per_m",
     "output_slew_limit": "controller.slew_limit_n_per_s",
     "count_m": "encoder.count_m",
 }

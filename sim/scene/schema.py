@@ -99,7 +99,8 @@ class WallSection(Section):
 
 
 class PassivitySection(Section):
-    """A passivity observer and controller behind the wall: see `hardwall.model.passivity`."""
+    """An observer of the energy that the drive gives, and a controller that damps by this much at most while it has
+    given more than it has taken: see `hardwall.model.passivity`."""
 
     damping_n_s_per_m: Damping
 

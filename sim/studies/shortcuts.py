@@ -32,9 +32,12 @@ LACKED = {
         "encoder.duty_error_counts": 0.078,
         "encoder.phase_error_counts": 0.022,
     },
+    "with a passivity controller of 10 N s/m": {"passivity.damping_n_s_per_m": 10.0},
+    "with a passivity controller of 50 N s/m": {"passivity.damping_n_s_per_m": 50.0},
     "with hysteresis and jitter": {"encoder.hysteresis_counts": 0.2, "encoder.jitter_s": 50e-9},
 }
-"""Parts that a device has and a scene may lack, with figures of `docs/scenes.md`, each where the scene says none."""
+"""Parts that a device or a controller has and a scene may lack, with figures of `docs/scenes.md` where a data sheet or
+a paper has them, each where the scene says none."""
 SLOWER = 2, 5
 """The factors by which the sample rate is lower."""
 CLOCK = 4

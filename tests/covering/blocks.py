@@ -38,6 +38,7 @@ BLOCKS = (
     Block("quadrature", RECORDED),
     Block("scale_map", RECORDED),
     Block("wall", ("component.law",)),
+    Block("passivity", ("component.controller",)),
     Block("output", ("component.stage",)),
     Block("monitors", RECORDED),
     Block("supervisor", RECORDED),

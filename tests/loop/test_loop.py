@@ -70,6 +70,15 @@ def test_rtl_gives_the_models_force_words_in_an_unstable_wall(estimator):
     assert not (result.stable and estimator in CORE)
 
 
+@pytest.mark.parametrize("scene", ["seed-2011", "mhz"])
+def test_rtl_gives_the_models_force_words_with_a_passivity_controller(scene):
+    """In a wall without a damper, which chatters, and where the controller halves its own again and again."""
+    changes = {"wall.stiffness_n_per_m": 100e3, "wall.damping_n_s_per_m": 0.0, "passivity.damping_n_s_per_m": 50.0}
+    result = same_words(scene, changes | (ONE_SECOND | SLOW if scene == "seed-2011" else A_FIFTH))
+    assert result.max_force_n > 1
+    assert "passivity_active" in result.flags
+
+
 @pytest.mark.parametrize("estimator", IMPERFECT)
 def test_rtl_gives_the_models_force_words_with_an_imperfect_encoder(estimator):
     errors = {"encoder.phase_error_counts": 0.25, "encoder.duty_error_counts": 0.1}

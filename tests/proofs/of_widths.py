@@ -29,13 +29,14 @@ from hardwall.hdl.estimators.estimate import EstimatorBlock
 from hardwall.hdl.estimators.history import History
 from hardwall.hdl.estimators.registry import block_of
 from hardwall.hdl.output import Output
+from hardwall.hdl.passivity import Passivity
 from hardwall.hdl.quadrature import Quadrature
 from hardwall.hdl.scale_map import ScaleMap
 from hardwall.hdl.wall import Wall
 from hardwall.model.scale_map import Design as Bins
 from stimuli.specs import spec
 
-from . import ranges
+from . import of_passivity, ranges
 from .bench import Bench
 from .bugs import Bug
 from .property import Property
@@ -44,7 +45,7 @@ from .widths import Widths
 AXES = ("paper", "mhz", "narrow", "wide")
 """The axes of the tests: the paper's rates, a megahertz, and formats at both extremes."""
 ALONE = ("",)
-QUICK = ("wall",)
+QUICK = ("wall", "passivity")
 
 
 def estimator(name: str, axis: str) -> EstimatorBlock:
@@ -127,6 +128,13 @@ CASES = {
         lambda axis: Wall(spec(axis).design.wall),
         ("offset",),
         Bug(Wall.elaborate, "signed(design.total_bits)", "signed(design.total_bits - 3)"),
+    ),
+    # A count that goes by more than one a clock, which a restart alone does, is not used.
+    "passivity": Case(
+        of_passivity.passivity,
+        MOVED,
+        Bug(Passivity._observe, "init=MIDDLE), Signal(shape(design.place))", "init=MIDDLE), Signal(len(moved))"),
+        of_passivity.keeps,
     ),
     "output": Case(
         lambda axis: Output(spec(axis).design.output),
