@@ -32,7 +32,7 @@ class Passivity(Block):
         energy <- energy - drive (place - last place),    place: the count, and where in it the handle is
         given  =  force - part velocity                   for energy < 0 and a force, not beyond zero, else force
 
-    The part is passivity_damping 2**-n; what it dissipates until the next actuation is a quarter of the debt to twice
+    The part is passivity_damping 2**-n; what it dissipates until the next actuation is an eighth of the debt to twice
     the debt, unless n is 0. A debt stays. A credit loses a share of 2**-`design.memory` a sample, and all of it where
     there is no force.
 

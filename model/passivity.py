@@ -10,9 +10,9 @@ there still: at the lower end of its count if that has gone up, at the upper end
 sample it is somewhere in its count, whose middle is taken. So what is asked of an ideal wall of any stiffness, at any
 speed of one edge a sample and below, is exactly nothing: a handle that shakes about an edge goes nowhere.
 
-Energy that was taken is a credit, energy that was given a debt. A credit is dropped where the wall renders no force, and
-is forgotten within `MEMORY_S`: an early impact would otherwise pay for a chatter long after it. A debt stays, across
-contacts.
+Energy that was taken is a credit, energy that was given a debt. A credit is dropped where the wall renders no force,
+and is forgotten within `MEMORY_S`: an early impact would otherwise pay for a chatter long after it. A debt stays,
+across contacts.
 
 In debt, where the wall renders a force, the controller adds a damper to it:
 
@@ -21,7 +21,8 @@ In debt, where the wall renders a force, the controller adds a damper to it:
 It takes a force to zero at most, and never turns it: it cannot pull where the wall pushes. The hardware halves the
 damper where float64 divides: the part is passivity_damping 2**-n with the least n for which the bits of the damper's
 force and of the velocity, together with those of the samples until the next actuation, are no more than the bits of
-the debt. What is dissipated until then is between a quarter of the debt and twice the debt, unless n is 0.
+the debt. Unless n is 0, less than twice the debt is dissipated until then, and a quarter of it at least where the
+samples of an actuation are a power of two, else an eighth.
 
 Formats, derived, with the force LSB r and the count q:
 
@@ -38,7 +39,7 @@ IEEE Transactions on Control Systems Technology 13(5), 2005; the place by edges,
 import math
 from typing import NamedTuple
 
-from .arithmetic.fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
+from .arithmetic.fixed import SQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from .compiled import by_type, compiled, inlined
 from .requirements import AxisRequirements
 from .words import Word, gain_format

@@ -1,16 +1,24 @@
-"""The passivity controller: RTL against model, the model against its words, and what observer and controller promise."""
+"""The passivity controller: RTL against model, the model against its words, and what both parts promise."""
+
+import dataclasses
+import math
+from fractions import Fraction
 
 import cocotb
 import numpy as np
 import pytest
 
 from hardwall.hdl.passivity import Passivity
-from hardwall.model import passivity
+from hardwall.model import passivity, wall
+from hardwall.model.axes import AxesSpec
+from hardwall.model.spec import AxisSpec
+from hardwall.sim.scene.load import load
+from hardwall.sim.walls import hit
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from stimuli.lengths import some_of
 from stimuli.magnitudes import magnitudes
 from stimuli.observed import Observed
-from stimuli.specs import spec
+from stimuli.specs import NARROW, spec
 
 NAMES = "count", "restart", "velocity", "drive", "passivity_damping", "force"
 
@@ -50,7 +58,7 @@ def stimulus(d: passivity.Design, samples: int):
     while rows < samples:
         length = int(random.integers(4, 60))
         rows += length
-        one, gives, way = random.random() < 0.6, random.random(), random.choice((-1, 1))
+        one, gives, way = random.random() < 0.6, random.random(), int(random.choice((-1, 1)))
         largest = int(magnitudes(random, 1, top, 1)[0])
         words = zip(
             magnitudes(random, 0, fastest(d), length).tolist(),
@@ -75,7 +83,7 @@ def stimulus(d: passivity.Design, samples: int):
 
 
 def model(d: passivity.Design, rows, state: passivity.State = passivity.START) -> tuple[list[tuple], passivity.State]:
-    """Return (what is given, whether the controller acts, energy at the sample) for rows, and the state behind them."""
+    """Return what is given, and whether the controller acts, for rows of NAMES, and the state behind them."""
     out = []
     for count, restart, velocity, drive, damping, force in rows:
         params = d.params({"passivity_damping": damping})
@@ -110,3 +118,185 @@ SIZES = [("paper", 2, 3), ("mhz", 3, 5), ("narrow", 8, 3), ("wide", 5, 4)]
 @pytest.mark.parametrize(("name", "after", "behind"), some_of(SIZES, 1, 2))
 def test_rtl(name, after, behind):
     simulate(__file__, make, name=name, after=after, behind=behind)
+
+
+def bits(value: int) -> int:
+    """Return the bits of a value's two's complement without its signs."""
+    return (value if value >= 0 else -value - 1).bit_length()
+
+
+def oracle(d: passivity.Design, rows) -> list[tuple[int, int]]:
+    """Return what is given, and whether the controller acts, by the module's words, in exact integers and rationals."""
+    energy, place, last, out, half = 0, 1, 0, [], 1 << d.count_width - 1
+    for count, restart, velocity, drive, damping, force in rows:
+        moved = (count - last + half) % (2 * half) - half
+        if restart:
+            place, last, moved = 1, count, 0
+        # Half counts above the lower end of the last count, then of this one.
+        now = {0: place, 1: 0, -1: 2}.get(moved, 1)
+        energy = max(-d.energy.max, min(energy - drive * (2 * moved + now - place), d.energy.max))
+        place, last, part = now, count, 0
+        if energy < 0 and force:
+            coarse = math.floor(Fraction(velocity) / 2 ** (d.velocity.f - d.coarse.f))
+            damper = math.floor(Fraction(damping * coarse) / Fraction(2) ** d.shift + Fraction(1, 2))
+            damper = max(-d.force.max, min(damper, d.force.max))
+            samples = (d.decimation - 1).bit_length()
+            n = 0
+            while bits(damper) + bits(coarse) - d.coarse.f + 1 + samples - n > bits(energy):
+                n += 1
+            part = math.copysign(1, damper) * (abs(damper) // 2**n)
+        low, high = (0, d.force.max) if force > 0 else (-d.force.max, 0)
+        out.append((int(max(low, min(force - part, high))) if force else 0, int(part != 0)))
+        if energy > 0:
+            energy = energy - math.ceil(Fraction(energy, 2**d.memory)) if force else 0
+    return out
+
+
+@pytest.mark.parametrize("name", ["paper", "mhz", "narrow", "wide"])
+def test_model_is_its_words_in_exact_arithmetic(name):
+    d = design(name)
+    rows = list(stimulus(d, 10_000))
+    assert model(d, rows)[0] == oracle(d, rows)
+
+
+@pytest.mark.parametrize("name", ["paper", "mhz"])
+def test_a_damper_that_is_halved_dissipates_less_than_twice_the_debt_and_a_share_of_it_at_least(name):
+    d, random, ratios, rows = design(name), rng(), [], 50_000
+    # The samples of an actuation count as a power of two; a part of a few LSB is what rounding leaves of it.
+    share, rounding = d.decimation / (1 << (d.decimation - 1).bit_length()), 1 / 50
+    words = zip(
+        (-1 - magnitudes(random, 0, d.energy.max - 1, rows, d.energy.width)).tolist(),
+        magnitudes(random, d.velocity.min, d.velocity.max, rows, d.velocity.width).tolist(),
+        magnitudes(random, 0, d.damping.max, rows).tolist(),
+        strict=True,
+    )
+    for energy, velocity, damping in words:
+        speed = abs(velocity) * d.velocity.lsb
+        part = abs(passivity.part_of(d.params({"passivity_damping": damping}), energy, velocity))
+        if 50 < part < 0.45 * min(damping * 2.0**-d.damping.f * speed, d.force.max):
+            ratios.append(2 * part * speed * d.decimation / -energy)
+    assert len(ratios) > 100
+    assert 1 / 4 * (1 - rounding) < min(ratios) / share < 1 / 3
+    assert 3 / 2 < max(ratios) / share < 2 * (1 + rounding)
+
+
+def energies(params, counts, drives) -> list[float]:
+    """Return the energy at every sample of a way, from a debt that is never paid: nothing of it is forgotten."""
+    debt, kept = -(1 << 30), []
+    state = passivity.START._replace(energy=debt * (1.0 if isinstance(params, passivity.FloatParams) else 1))
+    for k, count in enumerate(counts):
+        drive = drives[k - 1] if k else 0 * drives[0]
+        state, _, _ = passivity.step(params, state, count, int(k == 0), 0 * drive, drive, drive)
+        kept.append(state.energy - debt)
+    return kept
+
+
+def test_an_ideal_spring_edge_by_edge_takes_and_gives_nothing_in_all():
+    """Whatever the way, the energy depends on the last edge alone, as the potential of the spring does."""
+    d, random = design("mhz"), rng()
+    counts = np.cumsum(random.choice([-1, 0, 1], 5_000)).tolist()
+    drives = [-37 * count for count in counts]
+    at_edge: dict[int, set[int]] = {}
+    within = passivity.MIDDLE
+    found = energies(d.params({"passivity_damping": 0}), counts, drives)
+    for before, count, energy in zip(counts[:-1], counts[1:], found[1:], strict=True):
+        within = {0: within, 1: passivity.LOWER, -1: passivity.UPPER}[count - before]
+        if within != passivity.MIDDLE:
+            at_edge.setdefault(2 * count + within, set()).add(energy)
+    assert len(at_edge) > 50
+    assert all(len(found) == 1 for found in at_edge.values())
+
+
+HITS = {
+    "at 1 MHz, edge by edge": ("mhz", 20e3, 0.02),
+    "at 10 kHz, many counts a sample": ("seed-2011", 20e3, 0.01),
+}
+
+
+@pytest.mark.parametrize("name", HITS)
+def test_the_energy_is_the_work_of_the_force_on_the_true_motion(name):
+    """Where the handle leaves the wall, both are known; its true positions and the forces give the work."""
+    scene, stiffness, share = HITS[name]
+    changes = {
+        "wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": 0.0, "protocol.start_m": -2e-3,
+        "protocol.settle_s": 0.3, "protocol.longest_s": 0.4, "protocol.mean_s": 0.1, "protocol.measure_s": 0.1,
+        "amplifier.delay_s": None,
+    }  # fmt: skip
+    changes = changes if scene == "seed-2011" else {k: v for k, v in changes.items() if "delay" not in k}
+    loaded = load(scene, changes)
+    trace = hit.run(loaded, "fixed", True).detail
+    q, r = loaded.encoder.count_m, loaded.spec.force_resolution_n
+    work = -np.cumsum(trace.force_n[:-1] * np.diff(trace.position_m))
+    counts, drives = np.floor(trace.position_m / q).astype(int), np.rint(trace.force_n / r).astype(int)
+    d = passivity.Design(loaded.spec, loaded.spec.design.estimator.velocity)
+    found = np.array(energies(d.params({"passivity_damping": 0}), counts.tolist(), drives.tolist())[1:]) * r * q / 2
+    entered = int(np.argmax(trace.position_m > 0))
+    left = entered + int(np.argmax(trace.position_m[entered:] < 0))
+    assert entered < left < len(work)
+    moved = float(np.abs(trace.force_n[:-1] * np.diff(trace.position_m))[:left].sum())
+    assert abs(found[left] - work[left]) < share * moved
+
+
+def test_in_float_the_debt_is_dissipated_until_the_next_actuation_exactly():
+    d = design("paper")
+    params = d.float_params(30.0)
+    damping = 30.0 / d.words[0].si_per_unit
+    state = passivity.FLOAT_START._replace(energy=-500.0)
+    _, given, active = passivity.step(params, state, 0, 0, 2.0, 1000.0, 0.0)
+    assert active
+    assert 2.0 * (1000.0 - given) * 2.0 * d.decimation == pytest.approx(500.0)
+    _, given, active = passivity.step(params, state._replace(energy=-1e9), 0, 0, 2.0, 1000.0, 0.0)
+    assert given == 1000.0 - 2.0 * damping
+    assert passivity.step(params, state, 0, 0, 0.0, 1000.0, 0.0)[1:] == (1000.0, 0)
+
+
+@pytest.mark.parametrize("floating", [False, True])
+def test_a_credit_is_forgotten_and_a_debt_is_not(floating):
+    d = design("paper")
+    params = d.float_params(0.0) if floating else d.params({"passivity_damping": 0})
+    number = float if floating else int
+    memory_samples = 1 << d.memory
+    assert memory_samples == pytest.approx(passivity.MEMORY_S * 10e3, rel=0.5)
+    for energy in (10**8, -(10**8)):
+        state = (passivity.FLOAT_START if floating else passivity.START)._replace(energy=number(energy))
+        for _ in range(memory_samples):
+            state = passivity.step(params, state, 0, 0, number(0), number(1), number(0))[0]
+        assert state.energy / energy == pytest.approx(math.exp(-1) if energy > 0 else 1, rel=1e-3)
+        state = passivity.step(params, state, 0, 0, number(0), number(0), number(0))[0]
+        assert state.energy == min(energy, 0)
+
+
+def test_a_force_is_taken_to_zero_at_most_and_in_range():
+    for name in ("paper", "narrow"):
+        d = design(name)
+        rows = list(stimulus(d, 5_000))
+        for (*_, force), (given, active) in zip(rows, model(d, rows)[0], strict=True):
+            assert -d.force.max <= given <= 0 if force < 0 else 0 <= given <= d.force.max
+            assert active or given == force
+
+
+def test_an_axis_says_whether_it_has_a_controller():
+    axis = spec("paper")
+    passive = dataclasses.replace(axis, passivity=True)
+    assert "passivity" not in axis.facts
+    assert passive.facts["passivity"] is True
+    assert axis.design.passivity is None
+    assert "passivity_damping" not in {word.name for word in axis.design.words}
+    assert passive.design.latency_to_drive == axis.design.latency_to_drive + passivity.LATENCY
+    assert passive.design.flags == (*axis.design.flags, "passivity_active")
+    with pytest.raises(TypeError, match=r"^passivity must be a bool, not 1$"):
+        dataclasses.replace(axis, passivity=1)
+    with pytest.raises(ValueError, match=r"^passivity must be False, for axes that share their logic"):
+        AxesSpec(**NARROW, axes=2, estimator="fdm", passivity=True)
+
+
+def test_a_wall_that_is_too_quick_for_the_controller_is_refused(monkeypatch):
+    monkeypatch.setattr(wall.Design, "latency", 2)
+    assert AxisSpec(**NARROW).design.wall.latency == 2
+    with pytest.raises(ValueError, match=r"^wall must take 3 clocks or more before a passivity controller, not 2$"):
+        AxisSpec(**NARROW, passivity=True)
+
+
+def test_wrong_design_is_refused():
+    with pytest.raises(TypeError, match=r"not 3$"):
+        Passivity(3)

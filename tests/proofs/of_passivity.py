@@ -19,10 +19,10 @@ def passivity(axis: str) -> Passivity:
 
 
 def samples(bench: Bench, block: Passivity) -> None:
-    """Assume that samples come as the controller promises to take them, and that the force is constant while it is used.
+    """Assume that samples come as the controller promises to take them, and a force that is constant while it is used.
 
-    The force comes `BEHIND` clocks or more behind the strobe, and once; the next strobe with it or later. A clock counts
-    one edge at most.
+    The force comes `BEHIND` clocks or more behind the strobe, and once; the next strobe with it or later. A clock
+    counts one edge at most.
     """
     age, inner = Signal(range(BEHIND + 1)), bench.inner
     with bench.m.If(block.strobe):
