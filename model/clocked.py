@@ -47,7 +47,7 @@ class Outputs(NamedTuple):
 class UnderWay(NamedTuple):
     """A sample from its strobe to its changed drive, for which its words are kept."""
 
-    count: int
+    sampled_count: int
     restart: int
     velocity: int
     force: int
@@ -90,7 +90,13 @@ def _drive(now, outputs, k, sample, enable):
     params = sample.params
     outputs.actuated[k] = now.output.phase == 0
     observed, given, acted = passivity.step(
-        params.passivity, now.passivity, sample.count, sample.restart, sample.velocity, sample.force, now.output.drive
+        params.passivity,
+        now.passivity,
+        sample.sampled_count,
+        sample.restart,
+        sample.velocity,
+        sample.force,
+        now.output.drive,
     )
     driven, limited = output.step(params.output, now.output, given, enable and sample.enable)
     flags = now.flags | sample.flags | limited << params.output_bit | acted << params.passivity_bit

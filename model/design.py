@@ -173,7 +173,7 @@ class Design:
     def float_params(self, words: dict[str, int], si: dict[str, float]) -> Params:
         """Return the float64 kernel's parameters: gains unrounded, as given in `si` by the name of their word."""
         selected = self.estimator.outputs[words.get(self.estimator.output_word(), 0)]
-        controller = passivity.ABSENT
+        controller: passivity.FloatParams | passivity.Absent = passivity.ABSENT
         if self.passivity:
             controller = self.passivity.float_params(si.get("passivity_damping", 0.0))
         return Params(

@@ -89,7 +89,7 @@ class State(NamedTuple):
     """The energy that the drive has taken, force LSB half counts; the last count, and where in it the handle was."""
 
     energy: float
-    count: int
+    last_count: int
     within: int
 
 
@@ -185,7 +185,7 @@ def _nothing(params, state, count, restart, velocity, force, drive):
 
 @compiled
 def _step(params, state, count, restart, velocity, force, drive):
-    moved = wrap(count - state.count, params.count_width)
+    moved = wrap(count - state.last_count, params.count_width)
     within = LOWER if moved == 1 else UPPER if moved == -1 else MIDDLE
     if moved == 0:
         within = state.within

@@ -95,6 +95,7 @@ BROAD = {
     "test_typing": "the model's types",
     "testing/test_examples": "the bench as others use it",
     "world/test_shunt": "a device whose motor has a damping circuit",
+    "walls/test_contact_energy": "the energy that passivity sees in a hit",
 }
 # Modules of studies/ without a test of their own name, and the test that covers them.
 COVERED = {

@@ -12,13 +12,12 @@ from hardwall.hdl.passivity import Passivity
 from hardwall.model import passivity, wall
 from hardwall.model.axes import AxesSpec
 from hardwall.model.spec import AxisSpec
-from hardwall.sim.scene.load import load
-from hardwall.sim.walls import hit
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from stimuli.lengths import some_of
 from stimuli.magnitudes import magnitudes
 from stimuli.observed import Observed
 from stimuli.specs import NARROW, spec
+from stimuli.ways import energies
 
 NAMES = "count", "restart", "velocity", "drive", "passivity_damping", "force"
 
@@ -180,17 +179,6 @@ def test_a_damper_that_is_halved_dissipates_less_than_twice_the_debt_and_a_share
     assert 3 / 2 < max(ratios) / share < 2 * (1 + rounding)
 
 
-def energies(params, counts, drives) -> list[float]:
-    """Return the energy at every sample of a way, from a debt that is never paid: nothing of it is forgotten."""
-    debt, kept = -(1 << 30), []
-    state = passivity.START._replace(energy=debt * (1.0 if isinstance(params, passivity.FloatParams) else 1))
-    for k, count in enumerate(counts):
-        drive = drives[k - 1] if k else 0 * drives[0]
-        state, _, _ = passivity.step(params, state, count, int(k == 0), 0 * drive, drive, drive)
-        kept.append(state.energy - debt)
-    return kept
-
-
 def test_an_ideal_spring_edge_by_edge_takes_and_gives_nothing_in_all():
     """Whatever the way, the energy depends on the last edge alone, as the potential of the spring does."""
     d, random = design("mhz"), rng()
@@ -205,36 +193,6 @@ def test_an_ideal_spring_edge_by_edge_takes_and_gives_nothing_in_all():
             at_edge.setdefault(2 * count + within, set()).add(energy)
     assert len(at_edge) > 50
     assert all(len(found) == 1 for found in at_edge.values())
-
-
-HITS = {
-    "at 1 MHz, edge by edge": ("mhz", 20e3, 0.02),
-    "at 10 kHz, many counts a sample": ("seed-2011", 20e3, 0.01),
-}
-
-
-@pytest.mark.parametrize("name", HITS)
-def test_the_energy_is_the_work_of_the_force_on_the_true_motion(name):
-    """Where the handle leaves the wall, both are known; its true positions and the forces give the work."""
-    scene, stiffness, share = HITS[name]
-    changes = {
-        "wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": 0.0, "protocol.start_m": -2e-3,
-        "protocol.settle_s": 0.3, "protocol.longest_s": 0.4, "protocol.mean_s": 0.1, "protocol.measure_s": 0.1,
-        "amplifier.delay_s": None,
-    }  # fmt: skip
-    changes = changes if scene == "seed-2011" else {k: v for k, v in changes.items() if "delay" not in k}
-    loaded = load(scene, changes)
-    trace = hit.run(loaded, "fixed", True).detail
-    q, r = loaded.encoder.count_m, loaded.spec.force_resolution_n
-    work = -np.cumsum(trace.force_n[:-1] * np.diff(trace.position_m))
-    counts, drives = np.floor(trace.position_m / q).astype(int), np.rint(trace.force_n / r).astype(int)
-    d = passivity.Design(loaded.spec, loaded.spec.design.estimator.velocity)
-    found = np.array(energies(d.params({"passivity_damping": 0}), counts.tolist(), drives.tolist())[1:]) * r * q / 2
-    entered = int(np.argmax(trace.position_m > 0))
-    left = entered + int(np.argmax(trace.position_m[entered:] < 0))
-    assert entered < left < len(work)
-    moved = float(np.abs(trace.force_n[:-1] * np.diff(trace.position_m))[:left].sum())
-    assert abs(found[left] - work[left]) < share * moved
 
 
 def test_in_float_the_debt_is_dissipated_until_the_next_actuation_exactly():

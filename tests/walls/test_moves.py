@@ -61,6 +61,7 @@ def test_undecided_hits_make_both_edges_uncertain():
     assert move(made(25e3, 35e3, 25e3), there).dampings == 3
     assert move(made(25e3, 35e3, 25e3, undecided=6e3), there).dampings == 0
     assert move(made(25e3, 35e3, 25e3), made(20e3, 30e3, 20e3, undecided=6e3)).dampings == 3
+    assert move(made(25e3, 35e3, 25e3, undecided=6e3), made(20e3, 30e3, 20e3, undecided=6e3)).dampings == 0
 
 
 def test_an_edge_where_there_was_none_has_moved():

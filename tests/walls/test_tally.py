@@ -86,8 +86,8 @@ def test_pieces_do_not_matter():
 
 def test_a_handle_is_still_since_its_last_change():
     tally = Tally(load("seed-2011", PROTOCOL), False)
-    for first, positions in ((0, [1.0, 2.0, 2.0]), (3, [2.0, 2.0]), (5, [3.0, 3.0, 2.0]), (8, [2.0])):
+    for first, positions, since in ((0, [1, 2, 2], 1), (3, [2, 2], 1), (5, [3, 3, 2], 7), (8, [2], 7)):
         tally.add(first, np.array(positions) * 1e-3, np.zeros(len(positions)))
-    assert tally.still_from == 7
+        assert tally.still_from == since
     tally.rest()
     assert (tally.verdict, tally.rms_m, tally.mean_m, tally.offset_m, tally.drift_m_per_s) == ("stable", 0, 2e-3, 0, 0)
