@@ -169,13 +169,15 @@ class Passivity(Block):
         with m.If(self.strobe):
             m.d.sync += [*braked, speed_bits.eq(significant_bits(coarse))]
 
-        half = 1 << design.shift - 1 if design.shift > 0 else 0
-        total, damper = Signal(signed(len(product) + 1)), Signal(shape(design.force))
+        up, down = max(-design.shift, 0), max(design.shift, 0)
+        half, top = 1 << down - 1 if down else 0, down + design.force.width - 1
+        total = Signal(signed(max(len(product) + up + 1, top + 2)))
+        damper = Signal(shape(design.force))
         with m.If(multiplied):
-            m.d.sync += total.eq(product + half)
-        sign, top = total[-1], design.shift + design.force.width - 1
-        limited = (total[top:] != sign.replicate(len(total) - top)) | sign & ~total[max(design.shift, 0) : top].any()
-        within = shift_floor(total, design.shift)[: design.force.width].as_signed()
+            m.d.sync += total.eq((product << up) + half)
+        sign = total[-1]
+        limited = (total[top:] != sign.replicate(len(total) - top)) | sign & ~total[down:top].any()
+        within = (total >> down)[: design.force.width].as_signed()
         with m.If(summed):
             m.d.sync += damper.eq(Mux(limited, Mux(sign, -design.force.max, design.force.max), within))
 

@@ -10,6 +10,7 @@ import pytest
 
 from hardwall.hdl.passivity import Passivity
 from hardwall.model import passivity, wall
+from hardwall.model.arithmetic.fixed import shift_floor
 from hardwall.model.axes import AxesSpec
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
@@ -22,8 +23,16 @@ from stimuli.ways import energies
 NAMES = "count", "restart", "velocity", "drive", "passivity_damping", "force"
 
 
+AXES = {
+    "gentle": dataclasses.replace(spec("paper"), damping_max_n_s_per_m=1e-3),
+    "whole": spec("mhz", "fdm"),
+}
+"""A damper whose largest force is far below the axis's, and a velocity of whole counts, so that no bit is dropped."""
+
+
 def design(name: str) -> passivity.Design:
-    return passivity.Design(spec(name), spec(name).design.estimator.velocity)
+    axis = AXES[name] if name in AXES else spec(name)
+    return passivity.Design(axis, axis.design.estimator.velocity)
 
 
 def make(name: str, after: int, behind: int) -> Observed:
@@ -106,12 +115,14 @@ async def follows_model(dut):
         )
         expected, state = model(d, inputs.rows, state)
         given, active = np.array(expected).T
-        assert 0.05 < active.mean() < 0.95
-        assert {-d.force.max, 0, d.force.max} <= set(given[active == 1].tolist())
+        assert 0.01 < active.mean() < 0.95
+        # A damper that is weaker than every force neither ends one nor saturates with it.
+        strong = shift_floor(d.damping.max * d.coarse.max, d.shift) > d.force.max
+        assert not strong or {-d.force.max, 0, d.force.max} <= set(given[active == 1].tolist())
         check(inputs, outputs, {"given": given, "active": active}, component.latency)
 
 
-SIZES = [("paper", 2, 3), ("mhz", 3, 5), ("narrow", 8, 3), ("wide", 5, 4)]
+SIZES = [("paper", 2, 3), ("mhz", 3, 5), ("narrow", 8, 3), ("wide", 5, 4), ("gentle", 4, 3), ("whole", 2, 4)]
 
 
 @pytest.mark.parametrize(("name", "after", "behind"), some_of(SIZES, 1, 2))
@@ -151,7 +162,7 @@ def oracle(d: passivity.Design, rows) -> list[tuple[int, int]]:
     return out
 
 
-@pytest.mark.parametrize("name", ["paper", "mhz", "narrow", "wide"])
+@pytest.mark.parametrize("name", ["paper", "mhz", "narrow", "wide", *AXES])
 def test_model_is_its_words_in_exact_arithmetic(name):
     d = design(name)
     rows = list(stimulus(d, 10_000))
