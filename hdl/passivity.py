@@ -17,7 +17,7 @@ def significant_bits(value: Value) -> Value:
 
 def _length(bits: Value) -> Value:
     """Return the place behind the highest bit that is set; 0 if none is."""
-    if len(bits) == 1:
+    if len(bits) < 2:
         return bits
     half = 1 << (len(bits) - 1).bit_length() - 1
     high = bits[half:]
@@ -27,14 +27,14 @@ def _length(bits: Value) -> Value:
 class Passivity(Block):
     """The observer of the energy that the drive takes from the handle, and a damper while it has given more than taken.
 
-    Equation, at every sample, with `drive` as it has been since the last one:
+    Equation, at every sample, with `drive` as the answer to the last one:
 
         energy <- energy - drive (place - last place),    place: the count, and where in it the handle is
         given  =  force - part velocity                   for energy < 0 and a force, not beyond zero, else force
 
     The part is passivity_damping 2**-n; what it dissipates until the next actuation is an eighth of the debt to twice
-    the debt, unless n is 0. A debt stays. A credit loses a share of 2**-`design.memory` a sample, and all of it where
-    there is no force.
+    the debt, unless n is 0, but for its rounding to zero. A debt stays. A credit loses a share of 2**-`design.memory`
+    a sample, and all of it where there is no force.
 
     Latency: `latency` clocks from `forced` to `valid`. A sample's `lead` comes 2 clocks or more before its `strobe`,
     and not before the last one's; `forced` comes `behind` clocks or more behind the `strobe`, and the next `strobe`
@@ -61,7 +61,7 @@ class Passivity(Block):
     velocity : In(SQ)
         With `strobe`: velocity, counts a sample.
     drive : In(SQ)
-        With `strobe`: the drive since the last sample, force LSB.
+        With `strobe`: the drive that answers the last sample, force LSB.
     passivity_damping : In(UQ)
         With `strobe`: force LSB a count/sample.
     forced : In(1)
@@ -71,7 +71,7 @@ class Passivity(Block):
     given : Out(SQ)
         The force that is given on, force LSB; constant from one `valid` to the next.
     active : Out(1)
-        With `given`: whether it is another than the wall's.
+        With `given`: whether the damper's part is not zero.
     valid : Out(1)
         High for one clock.
 

@@ -3,7 +3,7 @@
 The observer adds up the energy that the drive has taken from the handle. The drive holds from sample to sample, so with
 the place of the handle at a sample that is a product, without a velocity:
 
-    energy <- energy - drive (place - last place)            drive: the one that has acted between the two samples
+    energy <- energy - drive (place - last place)            drive: the one that answers the last sample
 
 The place is known better than a count. A sample at which the count has gone by one has seen one edge, and the handle is
 there still: at the lower end of its count if that has gone up, at the upper end if down. After several edges in a
@@ -22,7 +22,8 @@ It takes a force to zero at most, and never turns it: it cannot pull where the w
 damper where float64 divides: the part is passivity_damping 2**-n with the least n for which the bits of the damper's
 force and of the velocity, together with those of the samples until the next actuation, are no more than the bits of
 the debt. Unless n is 0, less than twice the debt is dissipated until then, and a quarter of it at least where the
-samples of an actuation are a power of two, else an eighth.
+samples of an actuation are a power of two, else an eighth, but for the rounding of the part to zero: a debt of less
+than the work of one force LSB stays.
 
 Formats, derived, with the force LSB r and the count q:
 
@@ -173,7 +174,7 @@ def step(params, state, count, restart, velocity, force, drive):
         restart: true if the count was preloaded since the last sample.
         velocity: word of the estimator's velocity format (float: counts a sample).
         force: the wall's force on the handle, force LSB.
-        drive: the drive since the last sample, force LSB.
+        drive: the drive that answers the last sample, force LSB, as if it acted from that sample on.
     """
 
 

@@ -8,6 +8,7 @@ import cocotb
 import numpy as np
 import pytest
 
+from hardwall.hdl.export import to_verilog
 from hardwall.hdl.passivity import Passivity
 from hardwall.model import passivity, wall
 from hardwall.model.arithmetic.fixed import shift_floor
@@ -264,6 +265,14 @@ def test_a_wall_that_is_too_quick_for_the_controller_is_refused(monkeypatch):
     assert AxisSpec(**NARROW).design.wall.latency == 2
     with pytest.raises(ValueError, match=r"^wall must take 3 clocks or more before a passivity controller, not 2$"):
         AxisSpec(**NARROW, passivity=True)
+
+
+@pytest.mark.parametrize("damping", [1e-5, 1e-7])
+def test_a_velocity_of_one_bit_is_elaborated(damping):
+    axis = dataclasses.replace(spec("mhz"), damping_max_n_s_per_m=damping)
+    d = passivity.Design(axis, axis.design.estimator.velocity)
+    assert d.coarse.width == 1
+    assert "module" in to_verilog(Passivity(d), "passivity")
 
 
 def test_wrong_design_is_refused():
