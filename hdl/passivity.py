@@ -1,27 +1,26 @@
 """The passivity observer and controller: what the drive has taken and given, and a damper while it has given more."""
 
-from amaranth.hdl import Module, Mux, Signal, Value, signed
+from amaranth.hdl import Const, Module, Mux, Signal, Value, signed
 from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.passivity import LOWER, MIDDLE, UPPER, Design
 
-from .arithmetic.fixed import shape, shift_floor
+from .arithmetic.fixed import fits, length_of, shape, shift_floor
 from .block import Block
 from .wall import products
 
 
 def significant_bits(value: Value) -> Value:
     """Return the number of bits of a signed value but for those that are all as its sign."""
-    return _length(value[:-1] ^ value[-1].replicate(len(value) - 1))
+    rest = len(value) - 1
+    return length_of(value[:-1] ^ value[-1].replicate(rest)) if rest else Const(0)
 
 
-def _length(bits: Value) -> Value:
-    """Return the place behind the highest bit that is set; 0 if none is."""
-    if len(bits) < 2:
-        return bits
-    half = 1 << (len(bits) - 1).bit_length() - 1
-    high = bits[half:]
-    return Mux(high.any(), half + _length(high), _length(bits[:half]))
+def held(value: Value, down: int, width: int) -> Value:
+    """Return a signed value without its `down` lowest bits, held within the words of `width` bits but the least."""
+    floor, most = value[down:], (1 << width - 1) - 1
+    least = floor[width - 1] & ~floor[: width - 1].any()
+    return Mux(fits(floor, width) & ~least, floor[:width].as_signed(), Mux(value[-1], -most, most))
 
 
 class Passivity(Block):
@@ -109,17 +108,14 @@ class Passivity(Block):
         self._observe(m, energy)
         part, back = self._damp(m, energy)
 
-        # A sum that is past zero is zero, and the force's least word is out of range.
-        sign, top = self.force[-1], len(self.force) - 1
-        total = Signal(signed(top + 2))
+        # A sum that is past zero is zero.
+        total = Signal(signed(len(self.force) + 1))
         m.d.comb += total.eq(Mux(back, self.force + part, self.force - part))
-        limited = (total[-1] != total[top]) | total[top] & ~total[:top].any()
-        limit = Mux(sign, -self._design.force.max, self._design.force.max)
         halved, given = Signal(), Signal()
         m.d.sync += [halved.eq(self.forced), given.eq(halved), self.valid.eq(given)]
         with m.If(given):
-            within = Mux(limited, limit, total[: top + 1].as_signed())
-            m.d.sync += [self.given.eq(Mux(total[-1] == sign, within, 0)), self.active.eq(part.any())]
+            within = held(total, 0, len(self.force))
+            m.d.sync += [self.given.eq(Mux(total[-1] == self.force[-1], within, 0)), self.active.eq(part.any())]
         return m
 
     def _observe(self, m: Module, energy: Signal) -> None:
@@ -150,11 +146,8 @@ class Passivity(Block):
         m.d.sync += [forgets.eq(self.forced), loss.eq(Mux(energy[-1], 0, Mux(self.force.any(), share, energy)))]
         total = Signal((energy - work).shape())
         m.d.comb += total.eq(energy - work)
-        sign, most = total[-1], design.energy.max
-        limited = total[len(energy) - 1 :] != sign.replicate(len(total) - len(energy) + 1)
-        least = sign & ~total[: len(energy) - 1].any()
         with m.If(summed):
-            m.d.sync += energy.eq(Mux(limited | least, Mux(sign, -most, most), total[: len(energy)].as_signed()))
+            m.d.sync += energy.eq(held(total, 0, len(energy)))
         with m.If(forgets):
             m.d.sync += energy.eq(energy - loss)
 
@@ -170,16 +163,13 @@ class Passivity(Block):
             m.d.sync += [*braked, speed_bits.eq(significant_bits(coarse))]
 
         up, down = max(-design.shift, 0), max(design.shift, 0)
-        half, top = 1 << down - 1 if down else 0, down + design.force.width - 1
-        total = Signal(signed(max(len(product) + up + 1, top + 2)))
+        half = 1 << down - 1 if down else 0
+        total = Signal(signed(max(len(product) + up + 1, down + design.force.width)))
         damper = Signal(shape(design.force))
         with m.If(multiplied):
             m.d.sync += total.eq((product << up) + half)
-        sign = total[-1]
-        limited = (total[top:] != sign.replicate(len(total) - top)) | sign & ~total[down:top].any()
-        within = (total >> down)[: design.force.width].as_signed()
         with m.If(summed):
-            m.d.sync += damper.eq(Mux(limited, Mux(sign, -design.force.max, design.force.max), within))
+            m.d.sync += damper.eq(held(total, down, design.force.width))
 
         # Without a debt, or a force, there is no part.
         taken = significant_bits(damper) + speed_bits + design.spare_bits

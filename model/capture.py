@@ -182,7 +182,7 @@ class Design:
         # The next velocity comes before the next drive, and the next force of the wall in between.
         behind = axis.latency_to_drive - axis.estimator.latency
         # The ring is frozen a clock behind its last record, before another begins.
-        return max(behind + TAKEN_AT["velocity"] + 1, axis.output.latency + TAKEN_AT["flags"] + 1, RECORD_REGISTERS + 1)
+        return max(behind + TAKEN_AT["velocity"] + 1, axis.force_to_drive + TAKEN_AT["flags"] + 1, RECORD_REGISTERS + 1)
 
     def registers(self) -> tuple[Register, ...]:
         """Return what a host sees of the capture memory, but for its window, and what it asks of it, as registers."""

@@ -90,6 +90,7 @@ class Design:
         words: every run-time word, in the order of the hardware's ports.
         flags: names of the sticky flags, bit 0 first.
         latency_to_drive: clocks from the sample strobe to the changed drive.
+        force_to_drive: those of them from the wall's force on.
         interval: the fewest clocks from a sample strobe to the next.
         timing: the `Timing` of the axis alone, whose first sample ends the first `clocks_per_sample` clocks.
     """
@@ -145,7 +146,8 @@ class Design:
                 f"wall must take {self.passivity.behind} clocks or more before a passivity controller, "
                 f"not {self.wall.latency}"
             )
-        behind = self.wall.latency + (self.passivity.latency if self.passivity else 0) + self.output.latency
+        self.force_to_drive = (self.passivity.latency if self.passivity else 0) + self.output.latency
+        behind = self.wall.latency + self.force_to_drive
         self.latency_to_drive = self.estimator.latency + behind
         self.interval = max(self.estimator.interval, self.wall.interval, self.output.interval, behind + 1)
         per_sample = requirements.clocks_per_sample

@@ -40,10 +40,11 @@ IEEE Transactions on Control Systems Technology 13(5), 2005; the place by edges,
 import math
 from typing import NamedTuple
 
-from .arithmetic.fixed import SQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
+from .arithmetic.fixed import SQ, bits_for, length_of, saturate, shift_floor, shift_round_half_up, wrap
 from .compiled import by_type, compiled, inlined
 from .requirements import AxisRequirements
-from .words import Word, gain_format
+from .wall import damper_formats
+from .words import Word
 
 FLAGS = ("passivity_active",)
 LATENCY = 3
@@ -123,8 +124,7 @@ class Design:
         self.decimation = axis.samples_per_actuation
         self.force = axis.force
         self.velocity = velocity
-        self.damping = gain_format(axis.damping_max_n_s_per_m * q / tau / r)
-        self.coarse = SQ(velocity.i, max(min(velocity.f, 1 + self.damping.i), 1 - velocity.i))
+        self.damping, self.coarse = damper_formats(axis, velocity)
         self.shift = self.damping.f + self.coarse.f
         # A clock counts one edge at most. A sample's largest change begins and ends anywhere in a count.
         self.place = SQ(1 + bits_for(2 * min(axis.clocks_per_sample, 1 << axis.count_width - 1) + 3), 0)
@@ -219,10 +219,7 @@ def forgotten(params, energy):
 @compiled
 def significant_bits(value):
     """Return the number of bits of a value but for those that are all as its sign: 0 for 0 and -1."""
-    bits, left = 0, value if value >= 0 else ~value
-    while left:
-        bits, left = bits + 1, left >> 1
-    return bits
+    return length_of(value if value >= 0 else ~value)
 
 
 @part_of.register(Params)

@@ -61,6 +61,13 @@ class FloatParams(NamedTuple):
     count_width: int
 
 
+def damper_formats(axis: AxisRequirements, velocity: SQ) -> tuple[UQ, SQ]:
+    """Return the formats of a damping word, in force LSB a count/sample, and of the velocity as the damper takes it."""
+    tau = 1 / axis.sample_hz
+    damping = gain_format(axis.damping_max_n_s_per_m * axis.count_m / tau / axis.force_resolution_n)
+    return damping, SQ(velocity.i, max(min(velocity.f, 1 + damping.i), 1 - velocity.i))
+
+
 class Design:
     """Formats and run-time words of the wall for an axis, with a velocity of format `velocity`.
 
@@ -84,9 +91,7 @@ class Design:
         self.force = axis.force
         self.velocity = velocity
         self.stiffness = gain_format(axis.stiffness_max_n_per_m * q / r)
-        self.damping = gain_format(axis.damping_max_n_s_per_m * q / tau / r)
-        needed = 1 + self.damping.i
-        self.coarse = SQ(velocity.i, max(min(velocity.f, needed), 1 - velocity.i))
+        self.damping, self.coarse = damper_formats(axis, velocity)
         self.push = max(self.stiffness.f, self.damping.f + self.coarse.f, 0)
         spring_bits = 16 + axis.count_width + self.push - self.stiffness.f
         damper_bits = 16 + self.coarse.width + self.push - self.damping.f - self.coarse.f

@@ -324,11 +324,9 @@ def captured(design: Design, apart: int) -> list[Record]:
     """Return the records of an axis with so many clocks from a sample to the next, which overlap: all of sample k is k,
     but its wall has a force if k is odd."""
     memory, state, path = design.memory(), START, design.spec.design
-    behind = path.wall.latency + path.output.latency
+    behind = path.wall.latency + path.force_to_drive
     for clock in range((RECORDS + 4) * apart):
-        estimated, walled, drive = (
-            (clock + ahead) // apart for ahead in (behind, path.output.latency, -1)
-        )  # fmt: skip
+        estimated, walled, drive = ((clock + ahead) // apart for ahead in (behind, path.force_to_drive, -1))
         values = {"count": estimated, "velocity": estimated, "wall_force": walled % 2, "driven": drive}
         begins = int(clock == apart // 2)
         pulses = {"sampled": int(clock % apart == 0), "capture_start": begins, "capture_trigger": begins}
@@ -337,9 +335,10 @@ def captured(design: Design, apart: int) -> list[Record]:
     return [design.record(tuple(registers)) for registers in np.roll(memory, -state.ring, axis=0).tolist()]
 
 
-def test_records_of_samples_that_overlap_are_of_one_sample_each():
+@pytest.mark.parametrize("passive", [False, True])
+def test_records_of_samples_that_overlap_are_of_one_sample_each(passive):
     """With the fewest clocks that are not refused; one less would be too few."""
-    slow = spec("mhz", "fdm")
+    slow = dataclasses.replace(spec("mhz", "fdm"), passivity=passive)
     for apart in count(slow.design.interval):
         with suppress(FieldError):
             design = Design(dataclasses.replace(slow, clock_hz=apart * slow.sample_hz), RECORDS)

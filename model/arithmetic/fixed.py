@@ -119,3 +119,12 @@ def shift_floor(value, shift):
 def shift_round_half_up(value, shift):
     """Return floor(value * 2**-shift + 1/2); a negative shift is exact."""
     return (value + (1 << (shift - 1))) >> shift if shift > 0 else value << -shift
+
+
+@compiled
+def length_of(value):
+    """Return the number of bits of a word: the least n with value < 2**n."""
+    n = 0
+    while value >> n:
+        n += 1
+    return n

@@ -52,7 +52,7 @@ with Applications to Tracking and Navigation (2001), section 11.2; its use on st
 the time between them, is this project's.
 """
 
-from ..arithmetic.fixed import saturate, shift_floor, shift_round_half_up, wrap
+from ..arithmetic.fixed import length_of, saturate, shift_floor, shift_round_half_up, wrap
 from ..compiled import compiled
 from ..quadrature import stamp_of
 from ..scale_map import FRACTION_BITS, place_of
@@ -75,7 +75,7 @@ from .edge_kalman_design import (
 )
 from .estimate import estimate
 from .levant_edge import within
-from .levant_edge_anchor import length_of, number_of
+from .levant_edge_anchor import number_of
 
 __all__ = ["Design", "Gains"]
 AGILE_LEVEL = LEVELS - 1

@@ -89,7 +89,7 @@ causes no transient. An interval of half the stamp's range or more only sets a n
 import math
 
 from ..arithmetic.divide import divide
-from ..arithmetic.fixed import saturate, shift_floor, shift_round_half_up
+from ..arithmetic.fixed import length_of, saturate, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import isqrt
 from ..compiled import compiled
 from ..quadrature import RUN_MAX
@@ -102,7 +102,6 @@ from .levant_edge_anchor import (
     TIMED,
     anchored,
     kind_of,
-    length_of,
     meet,
     started,
 )

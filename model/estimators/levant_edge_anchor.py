@@ -17,15 +17,6 @@ which has long stayed the last and becomes the anchor; an edge that is still too
 
 
 @compiled
-def length_of(value):
-    """Return the number of bits of a word: the least n with value < 2**n."""
-    n = 0
-    while value >> n:
-        n += 1
-    return n
-
-
-@compiled
 def number_of(params, seen):
     """Return the number of the last edge on the scale."""
     return wrap(seen.count + seen.down, params.count_width)

@@ -45,6 +45,7 @@ def _parts(sample_s: float) -> dict[str, dict]:
         "bristles, LuGre's model": bare | alone | bristles | lugre,
         "amplifier delay": {"handle.coulomb_n": None, "amplifier.delay_s": sample_s},
         "encoder phase error": bare | {"encoder.phase_error_counts": 1e-9},
+        "passivity controller": bare | {"passivity.damping_n_s_per_m": 1e-2},
         "converter": bare | {"output.full_scale_n": 64.0, "output.dac_bits": 32},
         "amplifier lag": bare | {"amplifier.bandwidth_hz": 1e5},
         "amplifier lag, motor, cable, friction": {

@@ -4,7 +4,7 @@ from functools import partial
 
 from amaranth.hdl import Mux, Signal
 
-from hardwall.hdl.passivity import Passivity
+from hardwall.hdl.passivity import Passivity, held
 from hardwall.model.passivity import BEHIND, Design
 from stimuli.specs import spec
 
@@ -86,8 +86,8 @@ PROPERTIES = [
         depth=8,
         quick=True,
         bugs=(
-            Bug(Passivity.elaborate, "Mux(total[-1] == sign, within, 0)", "within"),
-            Bug(Passivity.elaborate, " | total[top] & ~total[:top].any()", ""),
+            Bug(Passivity.elaborate, "Mux(total[-1] == self.force[-1], within, 0)", "within"),
+            Bug(held, " & ~least", ""),
         ),
     ),
     Property(
