@@ -28,12 +28,12 @@ class Passivity(Block):
 
     Equation, at every sample, with `drive` as the answer to the last one:
 
-        energy <- energy - drive (place - last place),    place: the count, and where in it the handle is
-        given  =  force - part velocity                   for energy < 0 and a force, not beyond zero, else force
+        energy <- energy - drive (position - last position)    position: the count, and where in it the handle is
+        given  =  force - part velocity                        for energy < 0 and a force, not beyond zero, else force
 
     The part is passivity_damping 2**-n; what it dissipates until the next actuation is an eighth of the debt to twice
     the debt, unless n is 0, but for its rounding to zero. A debt stays. A credit loses a share of 2**-`design.memory`
-    a sample, and all of it where there is no force.
+    a sample, and all of it where there is no force. After a preload there is neither.
 
     Latency: `latency` clocks from `forced` to `valid`. A sample's `lead` comes 2 clocks or more before its `strobe`,
     and not before the last one's; `forced` comes `behind` clocks or more behind the `strobe`, and the next `strobe`
@@ -121,9 +121,9 @@ class Passivity(Block):
     def _observe(self, m: Module, energy: Signal) -> None:
         """Let the energy follow the samples: it is a sample's 3 clocks behind the strobe, up to `forced`."""
         design = self._design
-        last, moved = Signal(signed(design.count_width)), Signal(shape(design.place))
-        within, half_counts = Signal(range(UPPER + 1), init=MIDDLE), Signal(shape(design.place))
-        restarted, known = Signal(), Signal()
+        last, moved = Signal(signed(design.count_width)), Signal(shape(design.displacement))
+        within, half_counts = Signal(range(UPPER + 1), init=MIDDLE), Signal(shape(design.displacement))
+        restarted, begins, known = Signal(), Signal(), Signal()
         m.d.sync += known.eq(self.lead)
         turned = (self.count - last)[: design.count_width].as_signed()
         with m.If(self.lead):
@@ -131,14 +131,14 @@ class Passivity(Block):
         with m.If(known):
             now = Mux(moved == 0, within, Mux(moved == 1, LOWER, Mux(moved == -1, UPPER, MIDDLE)))
             m.d.sync += within.eq(Mux(restarted, MIDDLE, now))
-            m.d.sync += half_counts.eq(Mux(restarted, 0, 2 * moved + now - within))
+            m.d.sync += half_counts.eq(2 * moved + now - within)
 
         worked, taken = products("worked", self.drive, half_counts)
         multiplied, summed = Signal(), Signal()
         work = Signal.like(taken)
         m.d.sync += [multiplied.eq(self.strobe), summed.eq(multiplied), work.eq(taken)]
         with m.If(self.strobe):
-            m.d.sync += worked
+            m.d.sync += [*worked, begins.eq(restarted)]
 
         # What a sample leaves of a credit comes behind its force, and before the next sample's work.
         loss, forgets = Signal.like(energy), Signal()
@@ -147,7 +147,7 @@ class Passivity(Block):
         total = Signal((energy - work).shape())
         m.d.comb += total.eq(energy - work)
         with m.If(summed):
-            m.d.sync += energy.eq(held(total, 0, len(energy)))
+            m.d.sync += energy.eq(Mux(begins, 0, held(total, 0, len(energy))))
         with m.If(forgets):
             m.d.sync += energy.eq(energy - loss)
 

@@ -1,4 +1,4 @@
-"""The virtual wall: a unilateral spring and damper."""
+"""The virtual wall: a unilateral spring and damper, or a virtual coupling."""
 
 from amaranth.hdl import Module, Mux, Signal, Value, signed
 from amaranth.lib.wiring import In, Member, Out
@@ -30,7 +30,7 @@ def products(name: str, gain: Value, operand: Value) -> tuple[list, Value]:
 
 
 class Wall(Block):
-    """The force of a unilateral spring and damper on the handle.
+    """The force of a unilateral spring and damper on the handle; of a virtual coupling if the design is one.
 
     Equation, with side = +1 if the wall fills greater positions, else -1:
 
@@ -38,7 +38,8 @@ class Wall(Block):
         push  = wall_stiffness depth + wall_damping side velocity     for depth > 0, else 0
         force = -side push
 
-    `wall_forbid_pull` holds push at 0 or more.
+    `wall_forbid_pull` holds push at 0 or more. In a coupling it is the velocity beyond `wall_velocity`, and with
+    `wall_two_sided` the push is that of every depth.
 
     Latency: `latency` clocks from `strobe` to `valid`. A sample's `lead` comes `design.lead` clocks or more before its
     `strobe`, and not before the last sample's `strobe`; it may come with that one.
@@ -69,6 +70,10 @@ class Wall(Block):
         1: side is -1.
     wall_forbid_pull : In(1)
         1: the wall only pushes.
+    wall_velocity : In(SQ)
+        Of a coupling: the surface's velocity, counts a sample, with the bits of `design.coarse`.
+    wall_two_sided : In(1)
+        Of a coupling. 1: the wall holds on both sides.
         All these words are constant from the clock after a sample's `lead` to its `strobe`.
     force : Out(SQ)
         Force on the handle, force LSB; constant from one `valid` to the next.
@@ -114,6 +119,8 @@ class Wall(Block):
             m.d.sync += offset.eq((self.wall_position - counted)[: len(offset)].as_signed())
         pulled, spring = products("spring", self.wall_stiffness, offset)
         inside = offset[:-1].any() & (offset[-1] != self.wall_left)
+        if design.coupling:
+            inside |= self.wall_two_sided
         with m.If(placed):
             m.d.sync += [
                 *pulled,
@@ -131,10 +138,19 @@ class Wall(Block):
         # A push of half a force LSB is rounded up. The sum rounded down is -side push where the side is -1; where it is
         # +1, half an LSB is rounded the other way if it is added but for a unit.
         spring_shift, damper_shift = design.push - design.stiffness.f, design.push - design.damping.f - design.coarse.f
-        half = (1 << (design.push - 1)) - 1 + left if design.push > 0 else 0
         total = Signal(signed(design.total_bits))
+        half = (1 << (design.push - 1)) - 1 if design.push > 0 else 0
+        lean = half + left if design.push > 0 else 0
+        if design.coupling:
+            # What the surface's velocity adds is known before the strobe, so that the sum has no more terms than without.
+            carried, surface = products("surface", self.wall_damping, self.wall_velocity)
+            lean = Signal(signed(design.total_bits))
+            with m.If(known):
+                m.d.sync += carried
+            with m.If(placed):
+                m.d.sync += lean.eq((surface << damper_shift) + half + (self.wall_left if design.push > 0 else 0))
         with m.If(damped):
-            m.d.sync += total.eq((spring << spring_shift) - (damper << damper_shift) + half)
+            m.d.sync += total.eq((spring << spring_shift) - (damper << damper_shift) + lean)
 
         # A sum is in range if its bits above the force are all as its sign; the force's least word is out of range.
         sign, top = total[-1], design.push + design.force.width - 1

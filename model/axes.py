@@ -85,6 +85,8 @@ class AxesSpec(DesignedAxis):
         super().__post_init__()
         if self.passivity:
             raise FieldError("passivity", "must be False, for axes that share their logic have no such controller")
+        if self.coupling:
+            raise FieldError("coupling", "must be False, for axes that share their logic have no moving surfaces")
         if self.estimator not in PIPELINES:
             raise FieldError("estimator", f"must be one of {', '.join(PIPELINES)}, not {self.estimator!r}")
         if self.clocks_per_sample < self.slots:

@@ -82,6 +82,7 @@ class Design:
         estimator: name of the velocity estimator.
         gains: that estimator's `Gains`, or None for its default ones.
         passive: whether a passivity observer and controller follow the wall.
+        coupling: whether the wall can be a virtual coupling.
 
     Attributes:
         decoder: the decoder's `quadrature.Params`.
@@ -104,6 +105,7 @@ class Design:
         estimator: str,
         gains: EstimatorGains | None = None,
         passive: bool = False,
+        coupling: bool = False,
     ):
         chosen = registry.design_of(estimator)
         gains = chosen.gains_class.default(requirements) if gains is None else gains
@@ -114,7 +116,7 @@ class Design:
         self.gains = gains
         self.decoder = quadrature.Params(requirements.count_width, requirements.stamp_width, ILLEGAL_WIDTH)
         self.estimator = chosen(requirements, gains)
-        self.wall = wall.Design(requirements, self.estimator.velocity)
+        self.wall = wall.Design(requirements, self.estimator.velocity, coupling)
         self.passivity = passivity.Design(requirements, self.estimator.velocity) if passive else None
         self.output = output.Design(requirements)
         self.words = (

@@ -10,7 +10,7 @@ from .design import Design
 from .estimators.estimate import EstimatorGains
 from .requirements import EDGE_ERROR_COUNTS, AxisRequirements
 
-USUAL = {"jerk_max_m_per_s3": None, "edge_error_max_counts": EDGE_ERROR_COUNTS, "passivity": False}
+USUAL = {"jerk_max_m_per_s3": None, "edge_error_max_counts": EDGE_ERROR_COUNTS, "passivity": False, "coupling": False}
 """What is no fact of an axis unless it is another than this."""
 
 
@@ -22,6 +22,7 @@ class DesignedAxis(AxisRequirements):
         estimator: name of the velocity estimator.
         gains: that estimator's `Gains`, or None for its default ones.
         passivity: whether a passivity observer and controller follow the wall: see `passivity`.
+        coupling: whether the wall can be a virtual coupling, whose surface moves and holds on both sides: see `wall`.
 
     The other attributes, and the errors, are those of `requirements.AxisRequirements`.
     """
@@ -29,16 +30,19 @@ class DesignedAxis(AxisRequirements):
     estimator: str = "levant"
     gains: EstimatorGains | None = None
     passivity: bool = False
+    coupling: bool = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if not isinstance(self.passivity, bool):
-            raise TypeError(f"passivity must be a bool, not {shown(self.passivity)}")
+        for name in ("passivity", "coupling"):
+            value = getattr(self, name)
+            if not isinstance(value, bool):
+                raise TypeError(f"{name} must be a bool, not {shown(value)}")
 
     @cached_property
     def design(self) -> Design:
         """Every derived format, word and flag, and the latency of an axis that is alone."""
-        return Design(self, self.estimator, self.gains, self.passivity)
+        return Design(self, self.estimator, self.gains, self.passivity, self.coupling)
 
     @property
     def facts(self) -> dict[str, Any]:

@@ -1,24 +1,25 @@
 """The passivity observer and controller: what the drive has taken and given, and a damper while it has given more.
 
 The observer adds up the energy that the drive has taken from the handle. The drive holds from sample to sample, so with
-the place of the handle at a sample that is a product, without a velocity:
+the position of the handle at a sample that is a product, without a velocity:
 
-    energy <- energy - drive (place - last place)            drive: the one that answers the last sample
+    energy <- energy - drive (position - last position)      drive: the one that answers the last sample
 
-The place is known better than a count. A sample at which the count has gone by one has seen one edge, and the handle is
+The position is known better than a count. A sample at which the count has gone by one has seen one edge, and the handle is
 there still: at the lower end of its count if that has gone up, at the upper end if down. After several edges in a
 sample it is somewhere in its count, whose middle is taken. So what is asked of an ideal wall of any stiffness, at any
 speed of one edge a sample and below, is exactly nothing: a handle that shakes about an edge goes nowhere.
 
 Energy that was taken is a credit, energy that was given a debt. A credit is dropped where the wall renders no force,
 and is forgotten within `MEMORY_S`: an early impact would otherwise pay for a chatter long after it. A debt stays,
-across contacts.
+across contacts, disables and faults. A preload, after which the position is another, begins with neither.
 
 In debt, where the wall renders a force, the controller adds a damper to it:
 
     given = force - part velocity,     part = min(passivity_damping, what dissipates the debt until the next actuation)
 
-It takes a force to zero at most, and never turns it: it cannot pull where the wall pushes. The hardware halves the
+It takes a force to zero at most, and never turns it: it cannot pull where the wall pushes. The force is within the
+axis's range before the damper is taken off; in float64, where a wall has no range, behind it. The hardware halves the
 damper where float64 divides: the part is passivity_damping 2**-n with the least n for which the bits of the damper's
 force and of the velocity, together with those of the samples until the next actuation, are no more than the bits of
 the debt. Unless n is 0, less than twice the debt is dissipated until then, and a quarter of it at least where the
@@ -27,14 +28,14 @@ than the work of one force LSB stays.
 
 Formats, derived, with the force LSB r and the count q:
 
-- The energy has the unit r q / 2, in which force times place is whole. It saturates at the work of the largest drive
+- The energy has the unit r q / 2, in which force times position is whole. It saturates at the work of the largest drive
   over the whole travel, or up to twice that, where its word ends.
 - `passivity_damping` has the format of the wall's largest damping. The velocity keeps the fraction bits that can move
   the damper's force by half a force LSB; the damper's force is rounded once, half up, and saturates with the force.
 
 Source: Hannaford and Ryu, Time-domain passivity control of haptic interfaces, IEEE Transactions on Robotics and
 Automation 18(1), 2002. The energy by positions, not velocities, is that of Ryu, Preusche, Hannaford and Hirzinger,
-IEEE Transactions on Control Systems Technology 13(5), 2005; the place by edges, and the halving, are our own.
+IEEE Transactions on Control Systems Technology 13(5), 2005; the position by edges, and the halving, are our own.
 """
 
 import math
@@ -106,7 +107,7 @@ class Design:
     Attributes:
         damping: format of the controller's damping.
         coarse: format of the velocity as the damper takes it.
-        place: format of a change of place in a sample, half counts.
+        displacement: format of the change of position in a sample, half counts.
         energy: format of the energy, force LSB half counts; its least word is not used.
         shift: fraction bits of the product of damping and velocity.
         spare_bits: bits of the dissipation until the next actuation beyond those of its factors' magnitudes.
@@ -127,7 +128,7 @@ class Design:
         self.damping, self.coarse = damper_formats(axis, velocity)
         self.shift = self.damping.f + self.coarse.f
         # A clock counts one edge at most. A sample's largest change begins and ends anywhere in a count.
-        self.place = SQ(1 + bits_for(2 * min(axis.clocks_per_sample, 1 << axis.count_width - 1) + 3), 0)
+        self.displacement = SQ(1 + bits_for(2 * min(axis.clocks_per_sample, 1 << axis.count_width - 1) + 3), 0)
         self.energy = SQ(1 + (axis.force_limit_word * math.ceil(2 * axis.travel_m / q)).bit_length(), 0)
         self.spare_bits = 1 - self.coarse.f + (self.decimation - 1).bit_length()
         self.memory = max(round(math.log2(MEMORY_S * axis.sample_hz)), 1)
@@ -191,9 +192,9 @@ def _step(params, state, count, restart, velocity, force, drive):
     if moved == 0:
         within = state.within
     half_counts = 2 * moved + within - state.within
-    if restart:
-        within, half_counts = MIDDLE, 0
     energy = saturate(state.energy - drive * half_counts, -params.energy_max, params.energy_max)
+    if restart:
+        within, energy = MIDDLE, 0 * energy
     damper = part_of(params, energy, velocity) if energy < 0 and force != 0 else 0 * force
     most = params.force_max
     given = saturate(force - damper, -most if force < 0 else 0 * most, most if force > 0 else 0 * most)

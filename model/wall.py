@@ -1,17 +1,22 @@
-"""The virtual wall: a unilateral spring and damper.
+"""The virtual wall: a unilateral spring and damper; or a virtual coupling, whose surface moves and holds on both sides.
 
-    depth = side (count - wall)            side = +1: the wall fills position > wall; -1: position < wall
-    push  = K depth + B side velocity      for depth > 0, else 0
-    force = -side push                     on the handle
+    depth = side (count - wall)                            side = +1: the wall fills position > wall; -1: position < wall
+    push  = K depth + B side (velocity - wall_velocity)    for depth > 0, else 0
+    force = -side push                                     on the handle
 
 With `forbid_pull`, push is never negative: a damper that pulls back a leaving handle would make the wall sticky.
+
+A `Design` with `coupling` has two words more. `wall_velocity` is that of the surface, else 0; with `two_sided` the push
+is that of every depth. So whoever simulates a tool can couple the handle to it, by a spring and a damper at the rate of
+the axis: the tool may then be simulated at a lower one. (Colgate, Stanley and Brown, Issues in the haptic display of
+tool use, IROS 1995.)
 
 Formats, derived, with the force LSB r, the count q and the sample period tau:
 
 - `stiffness` and `damping` are gain words in force LSB a count and a count/sample.
 - The velocity keeps only as many fraction bits as can move the push by half a force LSB at the largest damping; the
-  other bits are dropped (floor).
-- The two products are added exactly and rounded once, half up, to a force LSB; then push saturates at the largest
+  other bits are dropped (floor). The surface's velocity is a word with these bits.
+- The products are added exactly and rounded once, half up, to a force LSB; then push saturates at the largest
   magnitude of the force format.
 
 In total, fixed point differs from the exact equation on the same words by at most one force LSB.
@@ -42,6 +47,8 @@ class Params(NamedTuple):
     position: int
     left: int
     forbid_pull: int
+    velocity: int
+    two_sided: int
     count_width: int
     velocity_shift: int
     spring_shift: int
@@ -51,14 +58,18 @@ class Params(NamedTuple):
 
 
 class FloatParams(NamedTuple):
-    """Float64 parameters: stiffness in force LSB a count, damping in force LSB a count/sample, both unrounded."""
+    """Float64 parameters: stiffness in force LSB a count, damping in force LSB a count/sample, both unrounded; the
+    surface's velocity in counts/sample, and what a unit of its word is."""
 
     stiffness: float
     damping: float
     position: int
     left: int
     forbid_pull: int
+    velocity: float
+    two_sided: int
     count_width: int
+    velocity_lsb: float
 
 
 def damper_formats(axis: AxisRequirements, velocity: SQ) -> tuple[UQ, SQ]:
@@ -71,25 +82,33 @@ def damper_formats(axis: AxisRequirements, velocity: SQ) -> tuple[UQ, SQ]:
 class Design:
     """Formats and run-time words of the wall for an axis, with a velocity of format `velocity`.
 
+    Args:
+        axis: the axis.
+        velocity: format of the estimator's velocity.
+        coupling: whether the surface may move, and hold on both sides.
+
     Attributes:
+        coupling: as given.
         stiffness, damping: gain formats.
         coarse: format of the velocity as the damper takes it.
-        push: fraction bits in which the two products are added.
+        push: fraction bits in which the products are added.
         total_bits: bits of their sum, with half a force LSB.
-        words: `wall_stiffness`, `wall_damping`, `wall_position`, `wall_left`, `wall_forbid_pull`.
+        words: `wall_stiffness`, `wall_damping`, `wall_position`, `wall_left`, `wall_forbid_pull`; for a coupling
+            `wall_velocity` and `wall_two_sided`, too.
 
     Raises:
-        ValueError: if the sum would not fit the model's int64.
+        FieldError: if the sum would not fit the model's int64.
     """
 
     latency = LATENCY
     lead = interval = LEAD
 
-    def __init__(self, axis: AxisRequirements, velocity: SQ):
+    def __init__(self, axis: AxisRequirements, velocity: SQ, coupling: bool = False):
         q, r, tau = axis.count_m, axis.force_resolution_n, 1 / axis.sample_hz
         self.count_width = axis.count_width
         self.force = axis.force
         self.velocity = velocity
+        self.coupling = coupling
         self.stiffness = gain_format(axis.stiffness_max_n_per_m * q / r)
         self.damping, self.coarse = damper_formats(axis, velocity)
         self.push = max(self.stiffness.f, self.damping.f + self.coarse.f, 0)
@@ -103,6 +122,14 @@ class Design:
                     name,
                     f"must be at least {least:g} beside the other gain's largest and the largest speed, not {value!r}",
                 )
+        for name, fraction in (
+            ("stiffness_max_n_per_m", self.stiffness.f),
+            ("damping_max_n_s_per_m", self.damping.f + self.coarse.f),
+        ):
+            if fraction + self.force.width > 61:
+                value = getattr(axis, name)
+                least = value * 2.0 ** (fraction + self.force.width - 61)
+                raise FieldError(name, f"must be at least {least:g} beside the force's resolution, not {value!r}")
         self.total_bits = max(spring_bits, damper_bits, self.push + self.force.width) + 2
         self.words = (
             Word("wall_stiffness", self.stiffness, r / q, "N/m", 0, "spring of the wall"),
@@ -111,6 +138,11 @@ class Design:
             Word("wall_left", UQ(1, 0), 1.0, "", 0, "0: the wall fills greater positions; 1: smaller ones"),
             Word("wall_forbid_pull", UQ(1, 0), 1.0, "", 1, "1: the wall never pulls the handle in"),
         )
+        if coupling:
+            self.words += (
+                Word("wall_velocity", self.coarse, q / tau, "m/s", 0, "velocity of the surface"),
+                Word("wall_two_sided", UQ(1, 0), 1.0, "", 0, "1: the wall holds the handle on both sides"),
+            )
 
     def params(self, words: dict[str, int]) -> Params:
         """Return the kernel's parameters for the given run-time words."""
@@ -120,6 +152,8 @@ class Design:
             position=words["wall_position"],
             left=words["wall_left"],
             forbid_pull=words["wall_forbid_pull"],
+            velocity=words.get("wall_velocity", 0),
+            two_sided=words.get("wall_two_sided", 0),
             count_width=self.count_width,
             velocity_shift=self.velocity.f - self.coarse.f,
             spring_shift=self.push - self.stiffness.f,
@@ -137,7 +171,10 @@ class Design:
             words["wall_position"],
             words["wall_left"],
             words["wall_forbid_pull"],
+            words.get("wall_velocity", 0) * self.coarse.lsb,
+            words.get("wall_two_sided", 0),
             self.count_width,
+            self.coarse.lsb,
         )
 
 
@@ -154,17 +191,23 @@ def render(params, count, velocity):
 
 @compiled
 def _depth(params, count):
-    offset = params.position - count if params.left else count - params.position
-    return wrap(offset, params.count_width)
+    offset = wrap(params.position - count, params.count_width)
+    return offset if params.left else -offset
+
+
+@compiled
+def _acts(params, depth):
+    # Half of the count's range away is on neither side, and for what holds on both sides at the surface plus that half.
+    return params.two_sided or 0 < depth < 1 << (params.count_width - 1)
 
 
 @render.register(Params)
 @compiled
 def step(params, count, velocity):
     depth = _depth(params, count)
-    if depth <= 0:
+    if not _acts(params, depth):
         return 0
-    coarse = shift_floor(velocity, params.velocity_shift)
+    coarse = shift_floor(velocity, params.velocity_shift) - params.velocity
     inward = -coarse if params.left else coarse
     spring = (params.stiffness * depth) << params.spring_shift
     damper = (params.damping * inward) << params.damper_shift
@@ -177,10 +220,57 @@ def step(params, count, velocity):
 @compiled
 def float_step(params, count, velocity):
     depth = _depth(params, count)
-    if depth <= 0:
+    if not _acts(params, depth):
         return 0.0
-    inward = -velocity if params.left else velocity
+    relative = velocity - params.velocity
+    inward = -relative if params.left else relative
     push = params.stiffness * depth + params.damping * inward
     if params.forbid_pull:
         push = max(push, 0.0)
     return push if params.left else -push
+
+
+@by_type
+def moved(params, position, velocity):
+    """Return the parameters with the words `wall_position` and `wall_velocity` changed.
+
+    Args:
+        params: `Params` or `FloatParams` of a coupling.
+        position, velocity: the words.
+    """
+
+
+@moved.register(Params)
+@compiled
+def word_moved(params, position, velocity):
+    return Params(
+        params.stiffness,
+        params.damping,
+        position,
+        params.left,
+        params.forbid_pull,
+        velocity,
+        params.two_sided,
+        params.count_width,
+        params.velocity_shift,
+        params.spring_shift,
+        params.damper_shift,
+        params.push_shift,
+        params.force_max,
+    )
+
+
+@moved.register(FloatParams)
+@compiled
+def float_moved(params, position, velocity):
+    return FloatParams(
+        params.stiffness,
+        params.damping,
+        position,
+        params.left,
+        params.forbid_pull,
+        velocity * params.velocity_lsb,
+        params.two_sided,
+        params.count_width,
+        params.velocity_lsb,
+    )

@@ -46,8 +46,8 @@ def wrapped(d: passivity.Design, count: int) -> int:
 
 
 def fastest(d: passivity.Design) -> int:
-    """Return the largest change of the count in a sample, so that its change of place fits."""
-    return d.place.max // 2 - 1
+    """Return the largest change of the count in a sample, so that its displacement fits."""
+    return d.displacement.max // 2 - 1
 
 
 def stimulus(d: passivity.Design, samples: int):
@@ -82,7 +82,7 @@ def stimulus(d: passivity.Design, samples: int):
             way = -way if turn < 0.2 else way
             count += way * (int(turn < 0.7) if one else step)
             drive = drive if (giving < 0.9) == (gives < 0.6) else -drive  # noqa: PLW2901
-            restart = int(nothing > 0.99)
+            restart = int(nothing > 0.997)
             if restart:
                 count = int(random.integers(-(1 << d.count_width - 1), 1 << d.count_width - 1))
             velocity = d.velocity.min if extreme > 0.99 else way * speed
@@ -141,12 +141,12 @@ def oracle(d: passivity.Design, rows) -> list[tuple[int, int]]:
     energy, place, last, out, half = 0, 1, 0, [], 1 << d.count_width - 1
     for count, restart, velocity, drive, damping, force in rows:
         moved = (count - last + half) % (2 * half) - half
-        if restart:
-            place, last, moved = 1, count, 0
         # Half counts above the lower end of the last count, then of this one.
         now = {0: place, 1: 0, -1: 2}.get(moved, 1)
         energy = max(-d.energy.max, min(energy - drive * (2 * moved + now - place), d.energy.max))
         place, last, part = now, count, 0
+        if restart:
+            place, energy = 1, 0
         if energy < 0 and force:
             coarse = math.floor(Fraction(velocity) / 2 ** (d.velocity.f - d.coarse.f))
             damper = math.floor(Fraction(damping * coarse) / Fraction(2) ** d.shift + Fraction(1, 2))

@@ -1,5 +1,7 @@
 """The virtual wall: RTL against model, model against exact rationals, and a wall that may not pull never pulls."""
 
+import dataclasses
+import itertools
 import math
 from fractions import Fraction
 
@@ -16,18 +18,40 @@ from stimuli.magnitudes import magnitudes
 from stimuli.sampled import Sampled
 from stimuli.specs import spec
 
-NAMES = ("wall_stiffness", "wall_damping", "wall_position", "wall_left", "wall_forbid_pull")
+def design(name: str, estimator: str = "levant", coupling: bool = False) -> wall.Design:
+    return dataclasses.replace(spec(name, estimator), coupling=coupling).design.wall
 
 
-def design(name: str, estimator: str = "levant") -> wall.Design:
-    return spec(name, estimator).design.wall
+def make(name: str, estimator: str, after: int, coupling: bool) -> Sampled:
+    return Sampled(Wall(design(name, estimator, coupling)), after)
 
 
-def make(name: str, estimator: str, after: int) -> Sampled:
-    return Sampled(Wall(design(name, estimator)), after)
+def names_of(d: wall.Design) -> tuple[str, ...]:
+    return tuple(word.name for word in d.words)
 
 
 def stimulus(d: wall.Design, samples: int):
+    """Yield (count, velocity, *words): for a coupling, what a surface at rest has, and surfaces that move or hold."""
+    if not d.coupling:
+        yield from of_a_wall(d, samples)
+        return
+    least, most = d.coarse.min, d.coarse.max
+    for row in of_a_wall(d, samples // 2):
+        yield *row, 0, 0
+    half = 1 << (d.count_width - 1)
+    extremes = (
+        (-half, -1, 0, 1, half - 1), (d.velocity.min, 0, d.velocity.max), (0, 1, d.stiffness.max),
+        (0, 1, d.damping.max), (0,), (0, 1), (0, 1), (least, -1, 0, 1, most), (0, 1),
+    )  # fmt: skip
+    yield from itertools.product(*extremes)
+    random = rng()
+    surface = magnitudes(random, least, most, samples // 2, d.coarse.width).tolist()
+    sides = random.integers(0, 2, samples // 2).tolist()
+    for row, *moving in zip(of_a_wall(d, samples // 2), surface, sides, strict=False):
+        yield *row, *moving
+
+
+def of_a_wall(d: wall.Design, samples: int):
     """Yield (count, velocity, *words): every combination of extremes, rounding ties, random rows near and far."""
     half = 1 << (d.count_width - 1)
     gains = d.stiffness.max, d.damping.max
@@ -81,7 +105,8 @@ def beside_ties(d: wall.Design, samples: int, random: np.random.Generator):
 
 
 def model(d: wall.Design, rows) -> list[int]:
-    return [wall.render(d.params(dict(zip(NAMES, words, strict=True))), c, v) for c, v, *words in rows]
+    names = names_of(d)
+    return [wall.render(d.params(dict(zip(names, words, strict=True))), c, v) for c, v, *words in rows]
 
 
 @cocotb.test(**CAMPAIGN)
@@ -89,7 +114,7 @@ async def follows_model(dut):
     component = make(**parameters())
     bench = Bench(dut, component)
     await bench.reset()
-    names, top = ("count", "velocity", *NAMES), component.design.force.max
+    names, top = ("count", "velocity", *names_of(component.design)), component.design.force.max
     # The next sample comes with this one's velocity, or later by any number of clocks until it comes behind its force.
     gaps = range(component.after, component.latency + 2, 2)
     for every in gaps:
@@ -106,7 +131,7 @@ async def the_force_is_constant_from_one_valid_to_the_next(dut):
     d, bench, before = component.design, Bench(dut, component), 0
     await bench.reset()
     force = bench.reader("force")
-    words = dict.fromkeys(NAMES, 0) | {"wall_stiffness": d.stiffness.max, "wall_damping": d.damping.max}
+    words = dict.fromkeys(names_of(d), 0) | {"wall_stiffness": d.stiffness.max, "wall_damping": d.damping.max}
     deepest = (1 << (d.count_width - 1)) - 1
     for count, velocity, left in ((deepest, d.velocity.max, 0), (-deepest, d.velocity.min, 1), (0, 0, 0), (-1, 0, 1)):
         row = {"count": count, "velocity": velocity, **words, "wall_left": left}
@@ -116,25 +141,35 @@ async def the_force_is_constant_from_one_valid_to_the_next(dut):
             bench.drive(strobe=0)
             assert force() == before, f"the force changed {clock} clocks after the strobe"
             if clock == component.latency - 1:
-                before = wall.render(d.params({name: row[name] for name in NAMES}), count, velocity)
+                before = wall.render(d.params({name: row[name] for name in names_of(d)}), count, velocity)
 
 
-SIZES = [("paper", "fdm", wall.LEAD), ("mhz", "levant", wall.LEAD + 1), ("narrow", "levant", 8), ("wide", "levant", 5)]
+SIZES = [
+    ("paper", "fdm", wall.LEAD, False),
+    ("mhz", "levant", wall.LEAD + 1, False),
+    ("narrow", "levant", 8, False),
+    ("wide", "levant", 5, False),
+    ("paper", "fdm", wall.LEAD, True),
+    ("narrow", "levant", wall.LEAD + 1, True),
+    ("wide", "levant", 5, True),
+]
 
 
-@pytest.mark.parametrize(("name", "estimator", "after"), some_of(SIZES, 1, 2))
-def test_rtl(name, estimator, after):
-    simulate(__file__, make, name=name, estimator=estimator, after=after)
+@pytest.mark.parametrize(("name", "estimator", "after", "coupling"), some_of(SIZES, 1, 2, 4))
+def test_rtl(name, estimator, after, coupling):
+    simulate(__file__, make, name=name, estimator=estimator, after=after, coupling=coupling)
 
 
 def oracle(d: wall.Design, row) -> int:
     """Return the force by the module's equations in exact rationals, rounded only where the module documents it."""
-    count, velocity, k, b, position, left, forbid_pull = row
+    count, velocity, k, b, position, left, forbid_pull, *moving = row
+    surface, two_sided = moving or (0, 0)
     side, half = (-1 if left else 1), 1 << (d.count_width - 1)
-    depth = (side * (count - position) + half) % (2 * half) - half
-    if depth <= 0:
+    depth = side * ((count - position - 1 + half) % (2 * half) - half + 1)
+    if not two_sided and (depth <= 0 or depth == half):
         return 0
-    coarse = math.floor(Fraction(velocity) / 2 ** (d.velocity.f - d.coarse.f)) * Fraction(2) ** -d.coarse.f
+    coarse = math.floor(Fraction(velocity) / 2 ** (d.velocity.f - d.coarse.f)) - surface
+    coarse *= Fraction(2) ** -d.coarse.f
     push = k * Fraction(2) ** -d.stiffness.f * depth + b * Fraction(2) ** -d.damping.f * side * coarse
     push = math.floor(push + Fraction(1, 2))
     if forbid_pull:
@@ -142,21 +177,23 @@ def oracle(d: wall.Design, row) -> int:
     return -side * max(-d.force.max, min(d.force.max, push))
 
 
+@pytest.mark.parametrize("coupling", [False, True])
 @pytest.mark.parametrize(
     ("name", "estimator"), [("paper", "fdm"), ("proposed", "levant"), ("mhz", "levant"), ("wide", "levant")]
 )
-def test_model_is_the_exact_equation_rounded_as_documented(name, estimator):
-    d = design(name, estimator)
+def test_model_is_the_exact_equation_rounded_as_documented(name, estimator, coupling):
+    d = design(name, estimator, coupling)
     rows = list(stimulus(d, 20_000))
     assert model(d, rows) == [oracle(d, row) for row in rows]
 
 
+@pytest.mark.parametrize("coupling", [False, True])
 @pytest.mark.parametrize("name", ["paper", "mhz", "wide"])
-def test_fixed_point_is_within_a_force_lsb_of_float(name):
+def test_fixed_point_is_within_a_force_lsb_of_float(name, coupling):
     """The module's docstring promises this on the same words, wherever neither saturates."""
-    d, compared = design(name), 0
+    d, compared = design(name, coupling=coupling), 0
     for count, velocity, *words in stimulus(d, 20_000):
-        named = dict(zip(NAMES, words, strict=True))
+        named = dict(zip(names_of(d), words, strict=True))
         si = [word.to_si(named[word.name]) for word in d.words[:2]]
         exact = wall.render(d.float_params(*si, named), count, velocity * d.velocity.lsb)
         fixed = wall.render(d.params(named), count, velocity)
@@ -167,11 +204,31 @@ def test_fixed_point_is_within_a_force_lsb_of_float(name):
 
 
 def test_a_wall_that_may_not_pull_never_pulls():
-    d = design("paper")
-    for count, velocity, k, b, position, left, _ in stimulus(d, 5_000):
-        words = dict(zip(NAMES, (k, b, position, left, 1), strict=True))
-        force = wall.render(d.params(words), count, velocity)
-        assert force >= 0 if left else force <= 0
+    d = design("paper", coupling=True)
+    for count, velocity, *words in stimulus(d, 5_000):
+        named = dict(zip(names_of(d), words, strict=True)) | {"wall_forbid_pull": 1}
+        force = wall.render(d.params(named), count, velocity)
+        assert force >= 0 if named["wall_left"] else force <= 0
+
+
+@pytest.mark.parametrize("floating", [False, True])
+def test_a_surface_that_is_moved_is_that_of_its_words(floating):
+    d = design("mhz", coupling=True)
+    words = dict(zip(names_of(d), (700, 900, -3, 1, 0, 5, 1), strict=True))
+
+    def params(changes):
+        made = words | changes
+        return d.float_params(20e3, 30.0, made) if floating else d.params(made)
+
+    changes = {"wall_position": 1234, "wall_velocity": -77}
+    assert wall.moved(params({}), *changes.values()) == params(changes)
+
+
+def test_gains_of_an_axis_that_are_too_small_are_refused_by_name():
+    for name in ("stiffness_max_n_per_m", "damping_max_n_s_per_m"):
+        least = {"stiffness_max_n_per_m": 1e-17, "damping_max_n_s_per_m": 1e-20}
+        with pytest.raises(ValueError, match=f"^{name} must be at least "):
+            dataclasses.replace(spec("paper"), **(least | ({} if name.startswith("s") else {"stiffness_max_n_per_m": 1e3}))).design
 
 
 def test_wrong_design_is_refused():

@@ -102,7 +102,7 @@ class PassivitySection(Section):
     """An observer of the energy that the drive gives, and a controller that damps by this much at most while it has
     given more than it has taken: see `hardwall.model.passivity`."""
 
-    damping_n_s_per_m: Damping
+    damping_n_s_per_m: or_none(Damping)
 
 
 class AmplifierSection(Section):

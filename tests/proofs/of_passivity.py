@@ -37,7 +37,7 @@ def samples(bench: Bench, block: Passivity) -> None:
     bench.m.d.sync += used.eq(used << 1 | block.forced)
     bench.assume(~used.any() | (block.force == bench.past(block.force)))
     bench.assume(~used.any() | ~block.forced)
-    fastest = block.design.place.max // 2 - 1
+    fastest = block.design.displacement.max // 2 - 1
     bench.assume(inner["restarted"] | (inner["moved"] <= fastest) & (inner["moved"] >= -fastest))
 
 

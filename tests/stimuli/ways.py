@@ -12,9 +12,9 @@ def energies(params: passivity.Params, counts: list[int], drives: list[int]) -> 
         drives: from every sample on, force LSB.
     """
     debt, kept = -(1 << 30), []
-    state = passivity.START._replace(energy=debt)
+    state = passivity.START._replace(energy=debt, last_count=counts[0])
     for k, count in enumerate(counts):
         drive = drives[k - 1] if k else 0
-        state, _, _ = passivity.step(params, state, count, int(k == 0), 0, drive, drive)
+        state, _, _ = passivity.step(params, state, count, 0, 0, drive, drive)
         kept.append(state.energy - debt)
     return kept
