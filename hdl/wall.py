@@ -142,9 +142,9 @@ class Wall(Block):
         half = (1 << (design.push - 1)) - 1 if design.push > 0 else 0
         lean = half + left if design.push > 0 else 0
         if design.coupling:
-            # What the surface's velocity adds is known before the strobe, so that the sum has no more terms than without.
+            # What the surface's velocity adds is known before the strobe: the sum has no more terms than without.
             carried, surface = products("surface", self.wall_damping, self.wall_velocity)
-            lean = Signal(signed(design.total_bits))
+            lean = Signal(signed(design.lean_bits))
             with m.If(known):
                 m.d.sync += carried
             with m.If(placed):

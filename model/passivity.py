@@ -5,10 +5,10 @@ the position of the handle at a sample that is a product, without a velocity:
 
     energy <- energy - drive (position - last position)      drive: the one that answers the last sample
 
-The position is known better than a count. A sample at which the count has gone by one has seen one edge, and the handle is
-there still: at the lower end of its count if that has gone up, at the upper end if down. After several edges in a
-sample it is somewhere in its count, whose middle is taken. So what is asked of an ideal wall of any stiffness, at any
-speed of one edge a sample and below, is exactly nothing: a handle that shakes about an edge goes nowhere.
+The position is known better than a count. A sample at which the count has gone by one has seen one edge, and the
+handle is there still: at the lower end of its count if that has gone up, at the upper end if down. After several edges
+in a sample it is somewhere in its count, whose middle is taken. So what is asked of an ideal wall of any stiffness, at
+any speed of one edge a sample and below, is exactly nothing: a handle that shakes about an edge goes nowhere.
 
 Energy that was taken is a credit, energy that was given a debt. A credit is dropped where the wall renders no force,
 and is forgotten within `MEMORY_S`: an early impact would otherwise pay for a chatter long after it. A debt stays,

@@ -1,6 +1,6 @@
 """The virtual wall: a unilateral spring and damper; or a virtual coupling, whose surface moves and holds on both sides.
 
-    depth = side (count - wall)                            side = +1: the wall fills position > wall; -1: position < wall
+    depth = side (count - wall)                            side = +1: the wall fills greater positions; -1: smaller ones
     push  = K depth + B side (velocity - wall_velocity)    for depth > 0, else 0
     force = -side push                                     on the handle
 
@@ -92,7 +92,8 @@ class Design:
         stiffness, damping: gain formats.
         coarse: format of the velocity as the damper takes it.
         push: fraction bits in which the products are added.
-        total_bits: bits of their sum, with half a force LSB.
+        lean_bits: bits of what the surface's velocity adds, with half a force LSB.
+        total_bits: bits of the whole sum.
         words: `wall_stiffness`, `wall_damping`, `wall_position`, `wall_left`, `wall_forbid_pull`; for a coupling
             `wall_velocity` and `wall_two_sided`, too.
 
@@ -130,7 +131,8 @@ class Design:
                 value = getattr(axis, name)
                 least = value * 2.0 ** (fraction + self.force.width - 61)
                 raise FieldError(name, f"must be at least {least:g} beside the force's resolution, not {value!r}")
-        self.total_bits = max(spring_bits, damper_bits, self.push + self.force.width) + 2
+        self.lean_bits = max(damper_bits, self.push + self.force.width) + 1
+        self.total_bits = max(spring_bits + 1, self.lean_bits) + 1
         self.words = (
             Word("wall_stiffness", self.stiffness, r / q, "N/m", 0, "spring of the wall"),
             Word("wall_damping", self.damping, r * tau / q, "N s/m", 0, "damper of the wall"),

@@ -26,8 +26,8 @@ ACTS, CHANCES = ("", "words", "drive_enable", *STROBES), (0.968, 0.006, 0.006, *
 """What a host does at a clock, and the chance of each."""
 
 
-def make(estimator: str, overlaps: bool, passive: bool) -> Axis:
-    axis = busy(estimator, passive)
+def make(estimator: str, overlaps: bool, parts: str) -> Axis:
+    axis = busy(estimator, **dict.fromkeys(parts.split(), True))
     return Axis(fastest(axis) if overlaps else axis)
 
 
@@ -213,17 +213,17 @@ async def late_edges_have_late_stamps(dut):
 
 # One estimator on the count and one on the stamps. `test_loop` runs all estimators.
 SIZES = [
-    ("levant", False, False),
-    ("levant", True, False),
-    ("levant", True, True),
-    ("levant-edge", False, True),
-    ("levant-edge", True, False),
+    ("levant", False, ""),
+    ("levant", True, ""),
+    ("levant", True, "passivity"),
+    ("levant-edge", False, "passivity coupling"),
+    ("levant-edge", True, "coupling"),
 ]
 
 
-@pytest.mark.parametrize(("estimator", "overlaps", "passive"), some_of(SIZES, 1, 3))
-def test_rtl(estimator, overlaps, passive):
-    simulate(__file__, make, estimator=estimator, overlaps=overlaps, passive=passive)
+@pytest.mark.parametrize(("estimator", "overlaps", "parts"), some_of(SIZES, 1, 3))
+def test_rtl(estimator, overlaps, parts):
+    simulate(__file__, make, estimator=estimator, overlaps=overlaps, parts=parts)
 
 
 def test_wrong_spec_is_refused():

@@ -26,6 +26,8 @@ LABELS = {
     "wall_position": "Wall begins at",
     "wall_left": "Wall on the lower side",
     "wall_forbid_pull": "Never pull",
+    "wall_velocity": "Velocity of the surface",
+    "wall_two_sided": "Hold on both sides",
     "supervisor_force_limit": "Force limit",
     "supervisor_ramp": "Rise of the limit",
     "supervisor_watchdog": "Watchdog",

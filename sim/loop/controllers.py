@@ -45,7 +45,7 @@ sample_quietly.register(stamped.Controller)(stamped.sample_quietly)
 
 
 # The values that `read` of sim/rtl/library.cpp returns, by number.
-READ_DRIVE, READ_VELOCITY, READ_FLAGS = 0, 1, 2
+READ_DRIVE, READ_VELOCITY, READ_FLAGS, READ_COUNT = 0, 1, 2, 3
 
 
 @compiled

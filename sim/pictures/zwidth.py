@@ -59,7 +59,8 @@ def draw(found: ZWidth) -> Figure:
     if any(each.leaves for each in maps):
         notes.append("a region whose line meets the right or the upper border of the map (grey) goes on beyond it")
     notes += [f"{each.case.label}: {worst.told(each.variants, each.boundary)} N s/m" for each in maps if each.variants]
-    notes += _passive(axes, scene, grid.dampings)
+    if scene.coupling is None:
+        notes += _passive(axes, scene, grid.dampings)
     picture.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)
     if len(maps) > ROOM:
         _name_beside(axes, maps)

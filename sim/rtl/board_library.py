@@ -168,6 +168,8 @@ class BoardHardware:
         def address(name: str) -> int:
             return ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value
 
-        return Rtl(address("board_advance"), address("board_read"), self._context, self._spec.design.latency_to_drive)
+        # A host moves the surface of a board's wall over its link.
+        calls = address("board_advance"), address("board_read"), 0
+        return Rtl(*calls, self._context, self._spec.design.latency_to_drive)
 
     start = RtlState(0, 0, 0)

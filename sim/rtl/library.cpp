@@ -62,6 +62,7 @@ struct Context {
     int64_t clock = 0;
     int64_t evaluated = 0;  // of all clocks, those that were not skipped
     bool skips = SKIPS;
+    bool commits = false;  // whether words wait for the next clock to be committed
 #if VM_TRACE
     std::unique_ptr<VerilatedVcdC> trace;  // its destructor closes the file
     double period_ps = 0;
@@ -198,6 +199,14 @@ int64_t axis_advance(int64_t context_address, int64_t clocks_address, int64_t le
             ++taken;
             context.changed();
         }
+        if (context.commits) {
+            context.axis.commit = 1;
+            context.run(1);
+            context.axis.commit = 0;
+            context.commits = false;
+            context.changed();
+            continue;
+        }
         const bool more = taken < count && clocks[taken] < until;
         context.run((more ? clocks[taken] : until) - context.clock);
     }
@@ -211,9 +220,20 @@ int64_t axis_read(int64_t context_address, int64_t what, int64_t, int64_t, int64
             return extend(context.axis.drive, DRIVE_WIDTH);
         case 1:
             return extend(context.axis.velocity, VELOCITY_WIDTH);
-        default:
+        case 2:
             return context.axis.flags;
+        default:
+            return SAMPLED_COUNT;
     }
+}
+
+// Let the surface of the wall be at another place from the next sample on: see `sim/loop/coupled.py`.
+int64_t axis_move(int64_t context_address, [[maybe_unused]] int64_t position, [[maybe_unused]] int64_t velocity, int64_t,
+                  int64_t) {
+    Context& context = *reinterpret_cast<Context*>(context_address);
+    MOVE(context.axis, position, velocity)
+    context.commits = true;
+    return 0;
 }
 
 #if VM_TRACE

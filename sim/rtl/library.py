@@ -22,8 +22,9 @@ from .verilated import Rtl, RtlState
 SHIM = Path(__file__).with_name("library.cpp")
 
 
-SHOWN = ("drive", "velocity", "flags")
-"""The outputs of an axis that the compiled loop reads."""
+def shown_by(spec: AxisSpec) -> tuple[str, ...]:
+    """Return the outputs of an axis that the compiled loop reads."""
+    return ("drive", "velocity", "flags", *(("sampled_count",) if spec.coupling else ()))
 
 
 def resting_of(spec: AxisSpec) -> Resting:
@@ -32,7 +33,7 @@ def resting_of(spec: AxisSpec) -> Resting:
     Raises:
         RestsNotError: if none of its clocks may be skipped.
     """
-    return resting.check(to_netlist(Axis(spec), "axis"), SHOWN)
+    return resting.check(to_netlist(Axis(spec), "axis"), shown_by(spec))
 
 
 def _header(spec: AxisSpec, rest: Resting | None) -> str:
@@ -47,7 +48,15 @@ def _header(spec: AxisSpec, rest: Resting | None) -> str:
         for name in counter.names
         if "$" not in name and "__" not in name
     ]
+    masks = {word.name: (1 << word.format.width) - 1 for word in spec.design.words}
+    move, count = "", "0"
+    if spec.coupling:
+        surface = {"wall_position": "position", "wall_velocity": "velocity"}
+        move = " ".join(f"axis.{name} = {value} & {masks[name]};" for name, value in surface.items())
+        count = f"extend(context.axis.sampled_count, {spec.count_width})"
     return (
+        f"#define MOVE(axis, position, velocity) {move}\n"
+        f"#define SAMPLED_COUNT {count}\n"
         f"#define DRIVE_WIDTH {spec.force.width}\n"
         f"#define VELOCITY_WIDTH {spec.design.estimator.velocity.width}\n"
         f"#define AXIS_WORDS {words}\n"
@@ -71,9 +80,10 @@ def _harness(component: Axis) -> str:
     words = [word.name for word in component.spec.design.words]
     ports = ["input clk", "input encoder_a", "input encoder_b", "input commit"]
     ports += [f"input [{widths[name] - 1}:0] {name}" for name in words]
-    ports += [f"output [{widths[name] - 1}:0] {name}" for name in SHOWN]
+    shown = shown_by(component.spec)
+    ports += [f"output [{widths[name] - 1}:0] {name}" for name in shown]
     given = {"clk": "clk", "rst": "1'b0", "encoder_a": "encoder_a", "encoder_b": "encoder_b", "drive_enable": "1'b1"}
-    given |= {"commit": "committed"} | {name: f"held_{name}" for name in words} | {name: name for name in SHOWN}
+    given |= {"commit": "committed"} | {name: f"held_{name}" for name in words} | {name: name for name in shown}
     others = {name: f"{widths[name]}'b0" if member.flow == In else "" for name, member in members.items()}
     connected = ", ".join(f".{name}({value})" for name, value in (others | given).items())
     held = "".join(f"  reg [{widths[name] - 1}:0] held_{name} = 0;\n" for name in words)
@@ -192,6 +202,6 @@ class Hardware:
             return ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value
 
         latency = self.spec.design.latency_to_drive
-        return Rtl(address("axis_advance"), address("axis_read"), self._context, latency)
+        return Rtl(address("axis_advance"), address("axis_read"), address("axis_move"), self._context, latency)
 
     start = RtlState(0, 0, 0)

@@ -4,10 +4,11 @@ from typing import NamedTuple
 
 
 class Rtl(NamedTuple):
-    """The addresses of two functions of `sim/rtl/library.cpp`, and of the context that holds the Verilated axis."""
+    """The addresses of three functions of `sim/rtl/library.cpp`, and of the context that holds the Verilated axis."""
 
     advance: int
     read: int
+    move: int  # of a coupling; else it does nothing
     context: int
     latency: int  # clocks of the axis from a strobe to the changed drive
 

@@ -5,6 +5,8 @@ import math
 from ...model import quadrature
 from ...model.design import overlap_of
 from ...model.stamped import Controller, room_for
+from ..loop.backends import is_exact
+from ..loop.coupled import Tool
 from ..loop.values import EDGE_CAPACITY, Plant, Progress, Sweep, World
 from ..world import device
 from ..world.advance import Interval, Moment, advance
@@ -129,6 +131,31 @@ def world_of(scene: Scene) -> World:
         timing=timing,
         before=before,
         after=after,
+    )
+
+
+def tool_of(scene: Scene, backend: str) -> Tool:
+    """Return the tool of a scene with a section `coupling`, for a controller on a backend."""
+    spec, coupling, words = scene.spec, scene.coupling, {word.name: word for word in scene.spec.design.words}
+    position, surface = words["wall_position"], words["wall_velocity"]
+    estimate = spec.design.estimator.velocity.lsb if is_exact(backend) else 1.0
+    return Tool(
+        period=coupling.period(spec.sample_hz),
+        latency=coupling.latency(spec.sample_hz),
+        period_s=1 / coupling.sample_hz,
+        ahead_s=coupling.ahead_s,
+        mass_kg=coupling.mass_kg,
+        stiffness_n_per_m=coupling.stiffness_n_per_m,
+        damping_n_s_per_m=coupling.damping_n_s_per_m,
+        wall_stiffness_n_per_m=scene.wall.stiffness_n_per_m,
+        wall_damping_n_s_per_m=scene.wall.damping_n_s_per_m,
+        forbid_pull=scene.wall.forbid_pull,
+        start_m=scene.protocol.start_m,
+        count_m=spec.count_m,
+        velocity_m_per_s=estimate * spec.velocity_unit_m_per_s,
+        surface_m_per_s=surface.to_si(1),
+        position_max=position.format.max,
+        velocity_max=surface.format.max,
     )
 
 

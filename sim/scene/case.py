@@ -50,6 +50,11 @@ class Case:
         except SceneError as error:
             raise SceneError(f"{error} ({self.label})" if self.label else str(error)) from None
 
+    def without_coupling(self, why: str) -> None:
+        """Raise SceneError if the scene has a virtual coupling, with the reason why it must not."""
+        if self.scene.coupling is not None:
+            raise SceneError(f"{self.scene.name}: coupling must be absent: {why}")
+
     @property
     def variants(self) -> dict[str, "Case"]:
         """The cases, by name, that are hit for this one: itself, without a name. See `walls.worst.WorstCase`."""

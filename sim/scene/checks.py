@@ -32,6 +32,8 @@ OF_THE_STAGE = "stage."
 """How the names of the fields of a drive stage begin in messages."""
 WALL_MAX = {"wall_stiffness": "stiffness_max_n_per_m", "wall_damping": "damping_max_n_s_per_m"}
 """The field of the axis that limits each word of the wall, more narrowly than the word itself."""
+COUPLING_CLOCKS = 2
+"""Clocks from a changed drive to the next strobe that a surface takes to move."""
 
 
 def _key_of(field: str, scene: Scene) -> str:
@@ -39,7 +41,7 @@ def _key_of(field: str, scene: Scene) -> str:
     if scene.drive is not None and field.startswith(OF_THE_STAGE):
         return f"drive.{scene.drive.key_of(field.removeprefix(OF_THE_STAGE))}"
     if field in KEYS:
-        return KEYS[field]
+        return KEYS[field] if scene.coupling is None else KEYS[field].replace("wall.", "coupling.")
     controller, field = scene.controller, GAIN_WORDS.get(field, field)
     section = "controller" if field in type(controller).model_fields else f"controller.gains.{controller.estimator}"
     return f"{section}.{field}"
@@ -74,6 +76,8 @@ def _check_axis(scene: Scene) -> None:
         if scene.estimator_output not in outputs:
             raise FieldError("output", f"must be one of {', '.join(outputs)}, not {scene.estimator_output!r}")
         _check_start(scene)
+        if scene.coupling is not None:
+            _check_coupling(scene)
         # A word holds more than the wall may have.
         _check_wall(scene)
         _check_words(scene)
@@ -148,10 +152,21 @@ def _check_protocol(scene: Scene) -> None:
 
 def _check_wall(scene: Scene) -> None:
     for name, limit in WALL_MAX.items():
-        value = getattr(scene.wall, KEYS[name].removeprefix("wall."))
+        value = getattr(scene.held_by, KEYS[name].removeprefix("wall."))
         if not 0 <= value <= getattr(scene.spec, limit):
             word = next(word for word in scene.spec.design.words if word.name == name)
-            raise ValueError(f"{KEYS[name]} must be {_range_of(word, scene)}, not {shown(value)}")
+            raise ValueError(f"{_key_of(name, scene)} must be {_range_of(word, scene)}, not {shown(value)}")
+
+
+def _check_coupling(scene: Scene) -> None:
+    spec = scene.spec
+    scene.coupling.check(spec.sample_hz)
+    clocks = spec.design.latency_to_drive + COUPLING_CLOCKS
+    if spec.clocks_per_sample < clocks:
+        raise ValueError(
+            f"controller.sample_hz must be at most {spec.clock_hz // clocks} beside a coupling, whose surface moves "
+            f"between a drive and the next sample, not {spec.sample_hz!r}"
+        )
 
 
 def _check_amplifier(scene: Scene) -> None:
@@ -260,7 +275,7 @@ def _check_map(scene: Scene) -> None:
         value, least, most = getattr(steps, key), getattr(steps, least_key), getattr(spec, most_key)
         if value < least:
             raise ValueError(f"zwidth.{key} must be at least zwidth.{least_key}, {least:g}, not {value!r}")
-        if value > most:
+        if value > most and scene.coupling is None:
             raise ValueError(f"zwidth.{key} must be at most controller.{most_key}, {most:g}, not {value!r}")
     for key, span in (
         ("stiffness_step_n_per_m", steps.stiffness_to_n_per_m),

@@ -16,6 +16,7 @@ from ...model.estimators import registry
 from ...model.quadrature_speed import GLITCH_CLOCKS_MAX, SPEED_MARGIN, glitch_clocks_for
 from ...model.requirements import EDGE_ERROR_COUNTS
 from ...model.spec import AxisSpec
+from .coupling_section import CouplingSection
 from .drive import DriveSection
 from .encoder_section import EncoderSection
 from .hand_section import HandSection
@@ -181,6 +182,7 @@ class Scene(Section):
     encoder: EncoderSection
     controller: ControllerSection
     wall: WallSection
+    coupling: CouplingSection | None = None
     passivity: PassivitySection | None = None
     amplifier: AmplifierSection | None = None
     motor: MotorSection | None = None
@@ -200,7 +202,8 @@ class Scene(Section):
         gains = self.gains
         if gains is not None:
             gains = registry.design_of(self.controller.estimator).gains_class(**gains.model_dump())
-        derived = {"glitch_clocks": self.glitch_clocks, "passivity": self.passivity is not None}
+        parts = {name: getattr(self, name) is not None for name in ("passivity", "coupling")}
+        derived = {"glitch_clocks": self.glitch_clocks, **parts}
         return fields | derived | {"count_m": self.encoder.count_m, "gains": gains}
 
     @cached_property
@@ -212,6 +215,20 @@ class Scene(Section):
     def gains(self) -> Section | None:
         """The gains of the scene's estimator; None for its default ones."""
         return getattr(self.controller.gains, self.controller.estimator)
+
+    @property
+    def held_by(self) -> WallSection | CouplingSection:
+        """What the axis renders a spring and a damper of: the wall, or the coupling to a tool that touches the wall."""
+        return self.wall if self.coupling is None else self.coupling
+
+    @property
+    def felt_n_per_m(self) -> float:
+        """The stiffness that is felt at rest: the wall's, or that of wall and coupling one behind the other."""
+        wall = self.wall.stiffness_n_per_m
+        if self.coupling is None:
+            return wall
+        coupling = self.coupling.stiffness_n_per_m
+        return wall * coupling / (wall + coupling)
 
     @property
     def timing(self) -> Timing:
@@ -240,14 +257,19 @@ class Scene(Section):
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Run-time parameters in SI units, by word; the count is 0 at the start, so the wall is at -`start_m`."""
+        """Run-time parameters in SI units, by word; the count is 0 at the start, so the wall is at -`start_m`.
+
+        The surface of a coupling is a tool that is at the start, too, and the wall is that tool's.
+        """
         si = {
             "encoder_glitch_clocks": self.glitch_clocks,
-            "wall_stiffness": self.wall.stiffness_n_per_m,
-            "wall_damping": self.wall.damping_n_s_per_m,
-            "wall_position": -self.protocol.start_m,
-            "wall_forbid_pull": self.wall.forbid_pull,
+            "wall_stiffness": self.held_by.stiffness_n_per_m,
+            "wall_damping": self.held_by.damping_n_s_per_m,
         }
+        if self.coupling is None:
+            si |= {"wall_position": -self.protocol.start_m, "wall_forbid_pull": self.wall.forbid_pull}
+        else:
+            si |= {"wall_two_sided": True, "wall_forbid_pull": False}
         si |= self.spec.design.estimator.choose(self.estimator_output)
         if self.passivity is not None:
             si["passivity_damping"] = self.passivity.damping_n_s_per_m

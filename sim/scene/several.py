@@ -14,6 +14,7 @@ from .schema import ControllerSection, Scene
 
 ABSENT = {
     "drive": "the pipeline of several axes has no drive stages",
+    "coupling": "the pipeline of several axes has no moving surfaces",
     "passivity": "the pipeline of several axes has no passivity controller",
     "zwidth": "no map is made of several axes",
 }

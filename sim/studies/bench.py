@@ -38,6 +38,7 @@ def _parts(sample_s: float) -> dict[str, dict]:
     bristles = {"handle.coulomb_n": 0.1, "presliding.stiffness_n_per_m": 1e5}
     lugre = {"model": "lugre", "damping_n_s_per_m": 300.0, "static_n": 0.15, "stribeck_m_per_s": 1e-3}
     lugre = {f"presliding.{key}": value for key, value in lugre.items()}
+    coupling = {"coupling.stiffness_n_per_m": 1e4, "coupling.sample_hz": round(1 / sample_s)}
     return {
         "none": bare,
         "coulomb friction": bare | {"handle.coulomb_n": 1e-12},
@@ -46,6 +47,7 @@ def _parts(sample_s: float) -> dict[str, dict]:
         "amplifier delay": {"handle.coulomb_n": None, "amplifier.delay_s": sample_s},
         "encoder phase error": bare | {"encoder.phase_error_counts": 1e-9},
         "passivity controller": bare | {"passivity.damping_n_s_per_m": 1e-2},
+        "virtual coupling, a tool at every sample": bare | coupling,
         "converter": bare | {"output.full_scale_n": 64.0, "output.dac_bits": 32},
         "amplifier lag": bare | {"amplifier.bandwidth_hz": 1e5},
         "amplifier lag, motor, cable, friction": {
@@ -167,7 +169,9 @@ def study(case: Case, progress: Callable[[str], None], against: Path | None = No
 
     Raises:
         RuntimeError: if the force words of the RTL under cocotb differ from the model's.
+        SceneError: if the scene has a coupling.
     """
+    case.without_coupling("under cocotb nobody moves a tool")
     spec = case.scene.spec
     progress("compiling and building")
     speeds = {backend: _hits(_scene(case, {}, seconds), backend) for backend, seconds in SECONDS_OF_SCENE.items()}

@@ -11,6 +11,7 @@ from ..jobs.result import Table, table_of
 from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls import theory
+from ..walls.coupled_theory import loop_of
 from ..walls.grid import grid_of
 from ..walls.methods import Curve
 from ..walls.zwidth import Effort, Map, Mapper
@@ -193,7 +194,7 @@ def linear_limits(case: Case, rates_hz: list[int]) -> dict[str, list[float]]:
 
 def _limit(scene: Scene) -> float:
     """Return the linear loop's largest stiffness (N/m) over all dampings of a scene's map."""
-    loop = theory.Loop(scene)
+    loop = loop_of(scene)
     return max(theory.linear_limit_n_per_m(loop, damping) for damping in grid_of(scene).dampings)
 
 

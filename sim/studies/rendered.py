@@ -51,10 +51,11 @@ def study(
         run: what does the jobs.
 
     Raises:
-        SceneError: if there is no such axis.
+        SceneError: if there is no such axis, or the scene has a coupling.
         MotionError: if the handle cannot be moved so.
         RuntimeError: if the RTL could not be built.
     """
+    case.without_coupling("what is rendered is a wall's, and not that of a tool")
     places = [
         (curve, rate, case.changed(curve.changes | (at_rate(rate) if rate else {}), curve.label))
         for curve in curves

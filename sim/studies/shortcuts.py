@@ -34,6 +34,10 @@ LACKED = {
     },
     "with a passivity controller of 10 N s/m": {"passivity.damping_n_s_per_m": 10.0},
     "with a passivity controller of 50 N s/m": {"passivity.damping_n_s_per_m": 50.0},
+    "with a resistor and 20 mF across the motor": {
+        "motor.damping_resistance_ohm": 2.0,
+        "motor.damping_capacitance_f": 0.02,
+    },
     "with hysteresis and jitter": {"encoder.hysteresis_counts": 0.2, "encoder.jitter_s": 50e-9},
 }
 """Parts that a device or a controller has and a scene may lack, with figures of `docs/scenes.md` where a data sheet or

@@ -13,6 +13,7 @@ from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls import theory, worst
 from ..walls.boundary import UNDECIDED
+from ..walls.coupled_theory import loop_of
 from ..walls.figure_5 import Fact, with_shares
 from ..walls.grid import grid_of
 from ..walls.likelihood import Wall
@@ -154,7 +155,7 @@ def _held(fact: Fact) -> str:
 def _linear_limits(case: Case) -> list[float] | None:
     if case.scene.controller.estimator not in theory.LINEAR:
         return None
-    loops = [theory.Loop(each.scene) for each in case.variants.values()]
+    loops = [loop_of(each.scene) for each in case.variants.values()]
     dampings = grid_of(case.scene).dampings
     return [min(theory.linear_limit_n_per_m(loop, damping) for loop in loops) for damping in dampings]
 

@@ -17,8 +17,9 @@ from ..jobs.result import Summary
 from ..jobs.stages import stage
 from ..loop import loop, record
 from ..loop.backends import Opened, is_exact, number_of, opened
+from ..loop.coupled import coupled
 from ..loop.values import EDGE_CAPACITY, Memory
-from ..scene.build import output_step_n, start_of, sweep_of, work_of, world_of
+from ..scene.build import output_step_n, start_of, sweep_of, tool_of, work_of, world_of
 from ..scene.schema import Scene
 from ..world.encoder import level
 from ..world.lines import waiting
@@ -97,7 +98,7 @@ class Hit(Summary):
         0 at rest, its damper carries a part. In the literal protocol, the mean after the settling mark is not farther
         from the mean before it than the RMS.
         """
-        scene, stiffness = self.scene, self.scene.wall.stiffness_n_per_m
+        scene, stiffness = self.scene, self.scene.felt_n_per_m
         hand, cable = scene.hand, scene.transmission
         held = hand and hand.parts
         pull_n = held["stiffness_n_per_m"] * (held["rest_m"] - self.mean_m) if held else 0.0
@@ -323,7 +324,8 @@ class Loop:
             offset_m=tally.offset_m,
             drift_m_per_s=tally.drift_m_per_s,
             judged=UNSTABLE if self.lost_edges or tally.verdict is None else tally.verdict,
-            touched=tally.farthest_m > 0 or tally.largest_drive > 0,
+            # A tool is felt in free motion, too.
+            touched=tally.farthest_m > 0 or (tally.largest_drive > 0 and scene.coupling is None),
             max_force_n=tally.largest_drive * scene.spec.force_resolution_n,
             flags=scene.spec.design.flag_names(flags),
             force_sha256=tally.force_sha256,
@@ -356,6 +358,8 @@ def run(
     """
     closed = Loop(scene, backend, traces, until_sure)
     with opened(scene.spec, backend, scene.parameters, closed.start_level, traced=vcd is not None) as axis:
+        if scene.coupling is not None:
+            axis = coupled(axis, tool_of(scene, backend))  # noqa: PLW2901
         # The contact is known before the hardware runs, because the bit-accurate model has it at the same sample.
         result = closed.run(axis, _waveform_marks(scene, axis.hardware, vcd) if vcd else (), progress)
         if vcd:

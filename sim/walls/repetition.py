@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...model.stamped import State
+from ..loop.coupled import CoupledState
 from ..loop.values import Memory, Progress, World
 from ..scene.schema import Scene
 
@@ -26,14 +27,16 @@ PERIOD = 2520
 def period_of(scene: Scene, world: World, state: Any) -> int | None:
     """Return the number of samples after which a resting loop of a scene is as before; None if that cannot be seen."""
     pulse = getattr(world.plant, "pulse", None)
-    if not isinstance(state, State) or scene.spec.design.estimator.uses_stamps() or (pulse and pulse.period):
+    own = state.controller if isinstance(state, CoupledState) else state
+    if not isinstance(own, State) or scene.spec.design.estimator.uses_stamps() or (pulse and pulse.period):
         return None
     if world.encoder.lines is not None:
         return None
-    return math.lcm(PERIOD, scene.spec.samples_per_actuation, max(scene.delay_samples, 1))
+    host = scene.coupling.period(scene.spec.sample_hz) if scene.coupling else 1
+    return math.lcm(PERIOD, scene.spec.samples_per_actuation, max(scene.delay_samples, 1), host)
 
 
-def seen(state: State, progress: Progress, memory: Memory, clocks_per_sample: int) -> Any:
+def seen(state: State | CoupledState, progress: Progress, memory: Memory, clocks_per_sample: int) -> Any:
     """Return all that the future of a loop depends on, for `==`.
 
     Args:
@@ -41,6 +44,8 @@ def seen(state: State, progress: Progress, memory: Memory, clocks_per_sample: in
         memory: what it wrote to.
         clocks_per_sample: the scene's.
     """
+    if isinstance(state, CoupledState):
+        return *seen(state.controller, progress, memory, clocks_per_sample), state.tool
     stamps = {name: 0 for name in state.decoder._fields if name.startswith("stamp")}
     clock = state.clock - progress.sample * clocks_per_sample
     still = state._replace(decoder=state.decoder._replace(**stamps), clock=clock)

@@ -152,8 +152,9 @@ class Loop:
             applied[first + delay - 1, self._drive] = 1
         else:
             applied[command, self._drive] = 1
-        after = rest @ applied @ early
-        self._after_first = np.linalg.matrix_power(after @ self._sampled(), spec.samples_per_actuation - 1) @ after
+        self._after = rest @ applied @ early
+        later = np.linalg.matrix_power(self._after @ self._sampled(), spec.samples_per_actuation - 1)
+        self._after_first = later @ self._after
 
     def _sampled(self) -> np.ndarray:
         """Return the matrix of the estimator's update at a sample."""

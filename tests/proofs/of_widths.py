@@ -4,6 +4,7 @@ Induction needs the ranges of the registers, which the formats are derived from:
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -127,13 +128,20 @@ CASES = {
     "wall": Case(
         lambda axis: Wall(spec(axis).design.wall),
         ("offset",),
-        Bug(Wall.elaborate, "signed(design.total_bits)", "signed(design.total_bits - 3)"),
+        Bug(
+            Wall.elaborate, "total = Signal(signed(design.total_bits))", "total = Signal(signed(design.total_bits - 3))"
+        ),
+    ),
+    "wall coupling": Case(
+        lambda axis: Wall(replace(spec(axis), coupling=True).design.wall),
+        ("offset",),
+        Bug(Wall.elaborate, "lean = Signal(signed(design.lean_bits))", "lean = Signal(signed(design.push + 2))"),
     ),
     # A count that goes by more than one a clock, which a restart alone does, is not used.
     "passivity": Case(
         of_passivity.passivity,
         MOVED,
-        Bug(Passivity._observe, "init=MIDDLE), Signal(shape(design.place))", "init=MIDDLE), Signal(len(moved))"),
+        Bug(Passivity._observe, "init=MIDDLE), Signal(shape(design.displacement))", "init=MIDDLE), Signal(len(moved))"),
         of_passivity.keeps,
     ),
     "output": Case(

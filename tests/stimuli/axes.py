@@ -22,13 +22,18 @@ HASTY = levant.Gains(4 * ADJUSTED.lambda_sqrt_m_per_s, 2_000.0)
 """Gains that drive a differentiator to its limits within a few samples."""
 
 
-def busy(estimator: str, passive: bool = False) -> AxisSpec:
-    """Return an axis that samples nearly as fast as its latency allows, and is moved faster than it is made for."""
-    latency = dataclasses.replace(spec("mhz", estimator), passivity=passive).design.latency_to_drive
+def busy(estimator: str, **parts: bool) -> AxisSpec:
+    """Return an axis that samples nearly as fast as its latency allows, and is moved faster than it is made for.
+
+    Args:
+        estimator: name of its estimator.
+        parts: what it has beyond the usual parts, by the field of the axis.
+    """
+    latency = dataclasses.replace(spec("mhz", estimator), **parts).design.latency_to_drive
     gains = ADJUSTED if estimator == "levant" else None
     rates = {"clock_hz": 100_000 * (latency + SLACK), "sample_hz": 100_000, "actuation_hz": 50_000}
     moved = {"speed_max_m_per_s": 0.05, "travel_m": 1e-3}
-    return AxisSpec(**{**MHZ, **rates, **moved}, estimator=estimator, gains=gains, passivity=passive)
+    return AxisSpec(**{**MHZ, **rates, **moved}, estimator=estimator, gains=gains, **parts)
 
 
 def with_clocks(axis: AxisSpec, clocks: int) -> AxisSpec:
@@ -55,6 +60,10 @@ def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
         words[name] = int(random.integers(0, int(top * 2.0 ** -random.integers(0, 16)) + 1))
     words["wall_position"] = int(random.integers(-30, 30))
     words["wall_left"], words["wall_forbid_pull"] = random.integers(0, 2, 2).tolist()
+    if design.wall.coupling:
+        least, most, width = design.wall.coarse.min, design.wall.coarse.max, design.wall.coarse.width
+        words["wall_velocity"] = int(random.integers(least, most + 1)) >> int(random.integers(0, width))
+        words["wall_two_sided"] = int(random.random() < 0.5)
     words["encoder_glitch_clocks"] = int(random.choice([0, 1, 2, 5, 15]))
     words["encoder_invert"] = int(random.random() < 0.2)
     outputs, selector = design.estimator.outputs, design.estimator.output_word()

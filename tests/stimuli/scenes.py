@@ -23,6 +23,11 @@ ONE_SECOND = {
 TWO_SECONDS = {
     "protocol.settle_s": 1.5, "protocol.mean_s": 0.2, "protocol.measure_s": 0.5, "protocol.longest_s": 2.0,
 }  # fmt: skip
+COUPLING = {
+    "coupling.stiffness_n_per_m": 20e3, "coupling.damping_n_s_per_m": 10.0, "coupling.mass_kg": 0.05,
+    "coupling.sample_hz": 1_000,
+}  # fmt: skip
+"""A tool of 50 g that a host simulates a thousand times a second."""
 ODD = {"controller.sample_hz": 11_000, "controller.clock_hz": 9_900_000}
 SHORT_OF_AXES = {
     "protocol.settle_s": 0.02,
