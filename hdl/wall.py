@@ -38,8 +38,8 @@ class Wall(Block):
         push  = wall_stiffness depth + wall_damping side velocity     for depth > 0, else 0
         force = -side push
 
-    `wall_forbid_pull` holds push at 0 or more. In a coupling it is the velocity beyond `wall_velocity`, and with
-    `wall_two_sided` the push is that of every depth.
+    `wall_forbid_pull` holds push at 0 or more. In a coupling the velocity is that beyond `wall_velocity`, and with
+    `wall_two_sided` the push is that of every depth; both sides are held if `wall_forbid_pull` is 0.
 
     Latency: `latency` clocks from `strobe` to `valid`. A sample's `lead` comes `design.lead` clocks or more before its
     `strobe`, and not before the last sample's `strobe`; it may come with that one.
@@ -73,7 +73,7 @@ class Wall(Block):
     wall_velocity : In(SQ)
         Of a coupling: the surface's velocity, counts a sample, with the bits of `design.coarse`.
     wall_two_sided : In(1)
-        Of a coupling. 1: the wall holds on both sides.
+        Of a coupling. 1: the wall holds on both sides, if it may pull.
         All these words are constant from the clock after a sample's `lead` to its `strobe`.
     force : Out(SQ)
         Force on the handle, force LSB; constant from one `valid` to the next.

@@ -82,7 +82,7 @@ class Wall(Group):
     left = Value("1 if the wall is on the side of lower positions, else 0.")
     forbid_pull = Value("1 if the wall may not pull the handle in, else 0.")
     velocity = Value("The velocity of its surface, m/s; of a board with a coupling alone.")
-    two_sided = Value("1 if the wall holds on both sides, else 0; of a board with a coupling alone.")
+    two_sided = Value("1 if the wall holds on both sides, if it may pull, else 0; of a board with a coupling alone.")
 
 
 class Supervisor(Group):

@@ -143,7 +143,7 @@ class Design:
         if coupling:
             self.words += (
                 Word("wall_velocity", self.coarse, q / tau, "m/s", 0, "velocity of the surface"),
-                Word("wall_two_sided", UQ(1, 0), 1.0, "", 0, "1: the wall holds the handle on both sides"),
+                Word("wall_two_sided", UQ(1, 0), 1.0, "", 0, "1: the wall holds on both sides, if it may pull"),
             )
 
     def params(self, words: dict[str, int]) -> Params:

@@ -12,11 +12,12 @@ from cocotb.triggers import RisingEdge
 
 from hardwall.hdl.wall import Wall
 from hardwall.model import wall
+from hardwall.model.axes import AxesSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from stimuli.lengths import some_of
 from stimuli.magnitudes import magnitudes
 from stimuli.sampled import Sampled
-from stimuli.specs import spec
+from stimuli.specs import NARROW, spec
 
 
 def design(name: str, estimator: str = "levant", coupling: bool = False) -> wall.Design:
@@ -229,6 +230,11 @@ def test_gains_of_an_axis_that_are_too_small_are_refused_by_name():
     for stiffness, name in ((1e-17, "stiffness_max_n_per_m"), (1e3, "damping_max_n_s_per_m")):
         with pytest.raises(ValueError, match=f"^{name} must be at least "):
             dataclasses.replace(spec("paper"), stiffness_max_n_per_m=stiffness, damping_max_n_s_per_m=1e-20)
+
+
+def test_several_axes_have_no_moving_surfaces():
+    with pytest.raises(ValueError, match=r"^coupling must be False, for axes that share their logic"):
+        AxesSpec(**NARROW, axes=2, estimator="fdm", coupling=True)
 
 
 def test_wrong_design_is_refused():

@@ -65,10 +65,12 @@ def _title(hit: Hit) -> str:
     scene, spec = hit.scene, hit.scene.spec
     moves = length_text(hit.rms_m)
     settled = moves if moves == "at rest" else f"RMS of position {moves}"
+    through = "" if scene.coupling is None else f" behind {scene.coupling.stiffness_n_per_m / 1e3:g} kN/m"
     return (
         f"{scene.name}: {scene.controller.estimator}, output {scene.estimator_output}, on {hit.backend}; samples at "
         f"{spec.sample_hz / 1e3:g} kHz, force at {spec.actuation_hz / 1e3:g} kHz\n"
-        f"wall of {scene.wall.stiffness_n_per_m / 1e3:g} kN/m, {scene.wall.damping_n_s_per_m:g} N s/m: {hit.verdict}; "
+        f"wall of {scene.wall.stiffness_n_per_m / 1e3:g} kN/m, {scene.wall.damping_n_s_per_m:g} N s/m{through}: "
+        f"{hit.verdict}; "
         f"{settled} (the threshold is {length_text(scene.protocol.threshold_mm * 1e-3)})"
     )
 

@@ -31,9 +31,10 @@ def draw(found: ZWidth) -> Figure:
     maps = found.maps
     scenes = [each.case.scene for each in maps]
     scene, controller, grid = scenes[0], scenes[0].controller, grid_of(scenes[0])
+    through = "" if scene.coupling is None else f" behind {scene.coupling.stiffness_n_per_m / 1e3:g} kN/m"
     title = (
-        f"{scene.name}: samples at {controller.sample_hz / 1e3:g} kHz, force at {controller.actuation_hz / 1e3:g} kHz; "
-        f"map in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, {grid.damping_step_n_s_per_m:.3g} N s/m"
+        f"{scene.name}{through}: samples at {controller.sample_hz / 1e3:g} kHz, "
+        f"force at {controller.actuation_hz / 1e3:g} kHz; map in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, {grid.damping_step_n_s_per_m:.3g} N s/m"
     )
     picture = new_figure(5.2, title)
     axes = picture.subplots()
@@ -46,7 +47,7 @@ def draw(found: ZWidth) -> Figure:
         low, high = np.array(each.intervals).T / 1e3
         dampings = [point.damping_n_s_per_m for point in each.boundary]
         axes.fill_between(dampings, low, high, color=style["color"], alpha=BAND, lw=0)
-        if limit:
+        if limit and np.isfinite(limit).any():
             axes.plot(grid.dampings, np.array(limit) / 1e3, color=style["color"], ls=":", lw=1.1)
     axes.set_xlabel("damping B of the wall (N s/m)")
     axes.set_ylabel("stiffness K up to which half are stable (kN/m)")
@@ -55,7 +56,10 @@ def draw(found: ZWidth) -> Figure:
     border = _border(axes, grid)
     starts = maps[0].starts
     notes = [f"band: 95 of 100 draws of the {starts} starts of every wall"] if starts > 1 else []
-    notes += ["dotted: limit of the linear loop without friction, in the colour of its method"] if any(limits) else []
+    drawn = [limit for limit in limits if limit and np.isfinite(limit).any()]
+    notes += ["dotted: limit of the linear loop without friction, in the colour of its method"] if drawn else []
+    if len(drawn) < sum(map(bool, limits)):
+        notes.append("the linear loop of a method without a dotted line has no limit")
     if any(each.leaves for each in maps):
         notes.append("a region whose line meets the right or the upper border of the map (grey) goes on beyond it")
     notes += [f"{each.case.label}: {worst.told(each.variants, each.boundary)} N s/m" for each in maps if each.variants]
@@ -67,7 +71,10 @@ def draw(found: ZWidth) -> Figure:
     else:
         inks = [ink(own.controller.estimator) for own in scenes]
         labels = [(each.case.label, *where) for each, *where in zip(maps, boundaries, inks, strict=True)]
-        dotted = [list(zip(grid.dampings, np.array(limit) / 1e3, strict=True)) for limit in limits if limit]
+        dotted = [
+            [(damping, most / 1e3) for damping, most in zip(grid.dampings, limit, strict=True) if np.isfinite(most)]
+            for limit in drawn
+        ]
         lay_out(picture)
         label_points(axes, labels, lines=[*dotted, border])
     return picture

@@ -233,6 +233,7 @@ int64_t axis_move(int64_t context_address, [[maybe_unused]] int64_t position, [[
     Context& context = *reinterpret_cast<Context*>(context_address);
     MOVE(context.axis, position, velocity)
     context.commits = true;
+    context.changed();
     return 0;
 }
 

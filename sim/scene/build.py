@@ -138,15 +138,20 @@ def tool_of(scene: Scene, backend: str) -> Tool:
     """Return the tool of a scene with a section `coupling`, for a controller on a backend."""
     spec, coupling, words = scene.spec, scene.coupling, {word.name: word for word in scene.spec.design.words}
     position, surface = words["wall_position"], words["wall_velocity"]
-    estimate = spec.design.estimator.velocity.lsb if is_exact(backend) else 1.0
+    exact = is_exact(backend)
+    estimate = spec.design.estimator.velocity.lsb if exact else 1.0
+    # What acts on the tool is what acts on the handle: the words' values, where the axis has words.
+    gains = {"wall_stiffness": coupling.stiffness_n_per_m, "wall_damping": coupling.damping_n_s_per_m}
+    if exact:
+        gains = {name: words[name].to_si(scene.words[name]) for name in gains}
     return Tool(
         period=coupling.period(spec.sample_hz),
         latency=coupling.latency(spec.sample_hz),
         period_s=1 / coupling.sample_hz,
         ahead_s=coupling.ahead_s,
         mass_kg=coupling.mass_kg,
-        stiffness_n_per_m=coupling.stiffness_n_per_m,
-        damping_n_s_per_m=coupling.damping_n_s_per_m,
+        stiffness_n_per_m=gains["wall_stiffness"],
+        damping_n_s_per_m=gains["wall_damping"],
         wall_stiffness_n_per_m=scene.wall.stiffness_n_per_m,
         wall_damping_n_s_per_m=scene.wall.damping_n_s_per_m,
         forbid_pull=scene.wall.forbid_pull,

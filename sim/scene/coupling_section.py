@@ -8,8 +8,8 @@ from .section import Section
 
 class CouplingSection(Section):
     """A spring and a damper between the handle and a tool, which touches the wall in its place; without `mass_kg` the
-    tool has no mass. A host simulates it `sample_hz` times a second; its motion comes `delay_s` late, and the surface
-    that the handle is coupled to is put `ahead_s` ahead of it."""
+    tool has no mass. A host simulates it `sample_hz` times a second; its motion comes `delay_s` late, a sample at
+    least, and the surface that the handle is coupled to is put `ahead_s` ahead of it."""
 
     stiffness_n_per_m: Stiffness
     damping_n_s_per_m: or_none(Damping) = 0.0

@@ -110,8 +110,9 @@ def study(case: Case, backend: str, striking: Striking, mapper: Mapper) -> Drop:
         mapper: function that makes maps, on the same backend.
 
     Raises:
-        SceneError: if the scene is not valid, or has no section `zwidth`, or no Coulomb friction.
+        SceneError: if the scene is not valid, or has no section `zwidth`, no Coulomb friction, or a coupling.
     """
+    case.without_coupling("the law of rest is of the damper that the axis renders, and here that is the coupling's")
     soft = case.changed({"wall.stiffness_n_per_m": STIFFNESS_N_PER_M})
     plain = soft.scene
     if not plain.handle.coulomb_n:

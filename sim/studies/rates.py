@@ -11,7 +11,6 @@ from ..jobs.result import Table, table_of
 from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls import theory
-from ..walls.coupled_theory import loop_of
 from ..walls.grid import grid_of
 from ..walls.methods import Curve
 from ..walls.zwidth import Effort, Map, Mapper
@@ -157,8 +156,9 @@ def study(case: Case, curves: list[Curve], rates_hz: list[int], mapper: Mapper) 
         mapper: function that makes the maps.
 
     Raises:
-        SceneError: if a case is not valid.
+        SceneError: if a case is not valid, or has a coupling.
     """
+    case.without_coupling("the linear loop that tells which part ends the gain is a wall's")
     limits, common = linear_limits(case, rates_hz), case.with_defaults(FINE | SHORT)
     step = "zwidth.stiffness_step_n_per_m"
     at = [{step: common.changes[step] / FINER}, *(at_rate(rate_hz) for rate_hz in rates_hz)]
@@ -194,7 +194,7 @@ def linear_limits(case: Case, rates_hz: list[int]) -> dict[str, list[float]]:
 
 def _limit(scene: Scene) -> float:
     """Return the linear loop's largest stiffness (N/m) over all dampings of a scene's map."""
-    loop = loop_of(scene)
+    loop = theory.Loop(scene)
     return max(theory.linear_limit_n_per_m(loop, damping) for damping in grid_of(scene).dampings)
 
 

@@ -29,11 +29,14 @@ def wider_grid(scene: Scene, coarser: float) -> dict[str, Any]:
     """
     grid = grid_of(scene)
     stiffness, damping = WIDER * grid.stiffness_to_n_per_m, WIDER * grid.damping_to_n_s_per_m
-    return {
+    # The largest gains of an axis with a coupling are the coupling's, which a wider map leaves as they are.
+    limits = {
+        "controller.stiffness_max_n_per_m": max(stiffness, scene.controller.stiffness_max_n_per_m),
+        "controller.damping_max_n_s_per_m": max(damping, scene.controller.damping_max_n_s_per_m),
+    }
+    return (limits if scene.coupling is None else {}) | {
         "zwidth.stiffness_step_n_per_m": coarser * grid.stiffness_step_n_per_m,
         "zwidth.stiffness_to_n_per_m": stiffness,
         "zwidth.damping_step_n_s_per_m": coarser * grid.damping_step_n_s_per_m,
         "zwidth.damping_to_n_s_per_m": damping,
-        "controller.stiffness_max_n_per_m": max(stiffness, scene.controller.stiffness_max_n_per_m),
-        "controller.damping_max_n_s_per_m": max(damping, scene.controller.damping_max_n_s_per_m),
     }

@@ -108,6 +108,9 @@ class Hit(Summary):
         if cable and cable.encoder_at == "motor":
             hidden_m += (abs(carried_n) + slack_n) / cable.stiffness_n_per_m
         slack_n += stiffness * hidden_m
+        if scene.coupling is not None:
+            # The surface is at a whole count.
+            slack_n += scene.coupling.stiffness_n_per_m * scene.encoder.count_m / 2
         return abs(stiffness * self.mean_m - carried_n) <= slack_n
 
     @property

@@ -13,6 +13,8 @@ The first two are for a rigid handle. A passive wall is stable with any hand, so
 boundary without a hand.
 """
 
+import math
+
 import numpy as np
 import scipy
 
@@ -182,7 +184,7 @@ def linear_limit_n_per_m(loop: Loop, damping_n_s_per_m: float, least: float = 1.
 
     Returns:
         That stiffness, refined between two neighbours of a search: stable islands above it, and unstable islands
-        between two neighbours, are not searched for. 0 if even the least is unstable, `most` if none is found.
+        between two neighbours, are not searched for. 0 if even the least is unstable, infinite if none is found.
     """
     stable = least
     for stiffness in np.geomspace(least, most, SEARCH):
@@ -191,4 +193,4 @@ def linear_limit_n_per_m(loop: Loop, damping_n_s_per_m: float, least: float = 1.
                 return 0.0
             return scipy.optimize.brentq(lambda k: loop.radius(k, damping_n_s_per_m) - 1, stable, stiffness, rtol=1e-9)
         stable = stiffness
-    return most
+    return math.inf

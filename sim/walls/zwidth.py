@@ -227,7 +227,11 @@ def verdict(
     result = hit.run(case.hitting(*wall, start), backend, until_sure=True)
     if not result.touched:
         stiffness, damping = wall
-        raise NeverReached(f"the handle did not reach the wall: nothing is said of K {stiffness:g}, B {damping:g}")
+        held = "" if case.scene.coupling is None else ", for its coupling holds it back or shakes it"
+        raise NeverReached(
+            f"the handle did not reach the wall{held}: nothing is said of K {stiffness:g}, B {damping:g} "
+            f"with {case.scene.controller.estimator}"
+        )
     return {
         "verdict": result.verdict,
         "in_place": result.stable and result.in_place,

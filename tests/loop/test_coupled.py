@@ -1,5 +1,6 @@
 """A virtual coupling: the tool against its own equations, and the RTL, whose surface moves, against the model."""
 
+import dataclasses
 import math
 from fractions import Fraction
 
@@ -13,8 +14,9 @@ from hardwall.sim.loop.backends import opened
 from hardwall.sim.loop.controllers import sample, sample_quietly
 from hardwall.sim.loop.coupled import Tool, ToolState, advanced, coupled
 from hardwall.sim.scene.build import start_of, tool_of, world_of
+from hardwall.sim.scene.checks import COUPLING_CLOCKS
 from hardwall.sim.scene.load import load
-from hardwall.sim.walls import hit
+from hardwall.sim.walls import hit, repetition
 from hardwall.sim.world.encoder import level
 from hardwall.testing import rng
 from stimuli.lengths import LONG
@@ -125,15 +127,28 @@ def test_rtl_gives_the_models_force_words_with_an_observer_and_a_tool_of_no_mass
     assert "passivity_active" in result.flags
 
 
-def test_a_handle_at_rest_is_as_deep_as_wall_and_coupling_one_behind_the_other():
-    changes = COUPLING | {"wall.stiffness_n_per_m": 20e3, "handle.coulomb_n": None, "wall.damping_n_s_per_m": 50.0}
-    scene = load("mhz", changes | {"controller.estimator": "kalman"})
-    result = hit.run(scene, "fixed", until_sure=True)
+@pytest.mark.parametrize("backend", ["float", "fixed"])
+@pytest.mark.parametrize("stiffness", [500.0, 2e3, 5e3, 20e3, 200e3])
+def test_a_handle_at_rest_is_as_deep_as_wall_and_coupling_one_behind_the_other(stiffness, backend):
+    changes = COUPLING | {"wall.stiffness_n_per_m": stiffness, "wall.damping_n_s_per_m": 50.0}
+    changes |= {"handle.coulomb_n": None, "controller.estimator": "kalman", "coupling.stiffness_n_per_m": 50e3}
+    scene = load("mhz", changes | {"coupling.sample_hz": 10_000})
+    result = hit.run(scene, backend, until_sure=True)
     assert result.stable
     assert result.in_place
-    assert scene.felt_n_per_m == pytest.approx(10e3)
-    # A spring that holds a push between two words holds it to a count of the handle and one of the tool.
-    assert result.mean_m == pytest.approx(scene.protocol.push_n / 10e3, abs=2e-6)
+    assert scene.felt_n_per_m == pytest.approx(1 / (1 / stiffness + 1 / 50e3))
+    # The surface is at a whole count, and the handle within one.
+    off_m = 50e3 * 0.5e-6 / scene.felt_n_per_m + 1e-6
+    assert result.mean_m == pytest.approx(scene.protocol.push_n / scene.felt_n_per_m, abs=off_m)
+    assert not dataclasses.replace(result, mean_m=result.mean_m + 2 * off_m).in_place
+
+
+def test_a_handle_that_a_coupling_holds_back_has_not_touched_its_wall():
+    dragged = {"coupling.stiffness_n_per_m": 200e3, "coupling.sample_hz": 100, "protocol.settle_s": 0.5}
+    short = {"protocol.mean_s": 0.1, "protocol.measure_s": 0.1, "protocol.longest_s": 0.6}
+    result = hit.run(load("mhz", COUPLING | dragged | short), "fixed")
+    assert result.max_force_n > 0.1
+    assert not result.touched
 
 
 def test_a_hit_that_repeats_ends_as_one_that_goes_on():
@@ -142,3 +157,27 @@ def test_a_hit_that_repeats_ends_as_one_that_goes_on():
     assert short.samples < whole.samples
     assert (short.verdict, short.mean_m) == (whole.verdict, pytest.approx(whole.mean_m, abs=1e-12))
     assert math.isclose(short.rms_m, whole.rms_m, abs_tol=1e-15)
+
+
+def test_a_loop_whose_tool_is_elsewhere_is_another_one():
+    scene = load("seed-2011", COUPLING)
+    world = world_of(scene)
+    progress = start_of(scene, world)
+    with opened(scene.spec, "fixed", scene.parameters, 0) as plain:
+        state = coupled(plain, tool_of(scene, "fixed")).state
+    memory = hit.Loop(scene, "fixed", False, True).memory
+    moving = state._replace(tool=state.tool._replace(velocity_m_per_s=1e-9))
+    clocks = scene.spec.clocks_per_sample
+    seen = [repetition.seen(each, progress, memory, clocks) for each in (state, state, moving)]
+    assert seen[0] == seen[1] != seen[2]
+    assert repetition.period_of(scene, world, state) % 10 == 0
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 2e-5])
+def test_rtl_gives_the_models_force_words_with_the_fewest_clocks_a_sample(delay_s):
+    changes = COUPLING | {"coupling.sample_hz": 10_000, "coupling.delay_s": delay_s, "controller.sample_hz": 100_000}
+    changes |= {"controller.actuation_hz": 100_000, "amplifier": None, "protocol.start_m": -2e-4}
+    changes |= {"controller.speed_max_m_per_s": 0.1, "controller.clock_hz": 2_000_000}
+    latency = load("seed-2011", changes).spec.design.latency_to_drive
+    changes["controller.clock_hz"] = (latency + COUPLING_CLOCKS) * 100_000
+    assert same_words("seed-2011", changes | ONE_SECOND).touched

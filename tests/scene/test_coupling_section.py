@@ -3,9 +3,11 @@
 import pytest
 
 from hardwall.sim.scene.build import sweep_of, tool_of, world_of
+from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load
 from hardwall.sim.scene.tables import load_any
+from hardwall.sim.studies import bench, drop, rates, rendered
 from hardwall.sim.walls.grid import grid_of
 from stimuli.scenes import COUPLING
 
@@ -58,13 +60,21 @@ OVERLAPPING = {"controller.sample_hz": 1_000_000, "controller.actuation_hz": 1_0
         ({"coupling.sample_hz": 20_000}, "coupling.sample_hz must be controller.sample_hz 10000 divided by a whole"),
         ({"coupling.delay_s": 1.1e-3}, "coupling.delay_s must be at most 0.001, one of the host's periods, not 0.0011"),
         ({"coupling.delay_s": 1.5e-4}, "coupling.delay_s must be a whole number of samples of 0.0001 s, not 0.00015"),
-        (OVERLAPPING, "controller.sample_hz must be at most [0-9]* beside a coupling, whose surface moves between a "),
+        (OVERLAPPING, "controller.sample_hz must be at most 800000 beside a coupling, whose surface moves between a "),
         ({"coupling.tool": 1}, "coupling.tool is not a key of a scene; its section has stiffness_n_per_m"),
     ],
 )
 def test_what_does_not_fit_is_said_in_a_line(changes, told):
     with pytest.raises(SceneError, match=f"^seed-2011: {told}"):
         load("seed-2011", COUPLING | changes)
+
+
+@pytest.mark.parametrize(
+    ("study", "arguments"), [(bench.study, 1), (drop.study, 3), (rates.study, 3), (rendered.study, 6)]
+)
+def test_studies_of_what_the_axis_renders_refuse_a_coupling(study, arguments):
+    with pytest.raises(SceneError, match=r"^seed-2011: coupling must be absent: "):
+        study(Case.of("seed-2011", COUPLING), *[None] * arguments)
 
 
 def test_several_axes_have_none():
