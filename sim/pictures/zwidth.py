@@ -34,7 +34,8 @@ def draw(found: ZWidth) -> Figure:
     through = "" if scene.coupling is None else f" behind {scene.coupling.stiffness_n_per_m / 1e3:g} kN/m"
     title = (
         f"{scene.name}{through}: samples at {controller.sample_hz / 1e3:g} kHz, "
-        f"force at {controller.actuation_hz / 1e3:g} kHz; map in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, {grid.damping_step_n_s_per_m:.3g} N s/m"
+        f"force at {controller.actuation_hz / 1e3:g} kHz; "
+        f"map in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, {grid.damping_step_n_s_per_m:.3g} N s/m"
     )
     picture = new_figure(5.2, title)
     axes = picture.subplots()
@@ -58,8 +59,8 @@ def draw(found: ZWidth) -> Figure:
     notes = [f"band: 95 of 100 draws of the {starts} starts of every wall"] if starts > 1 else []
     drawn = [limit for limit in limits if limit and np.isfinite(limit).any()]
     notes += ["dotted: limit of the linear loop without friction, in the colour of its method"] if drawn else []
-    if len(drawn) < sum(map(bool, limits)):
-        notes.append("the linear loop of a method without a dotted line has no limit")
+    endless = [each.case.label for each, limit in zip(maps, limits, strict=True) if limit and limit not in drawn]
+    notes += [f"no limit of the linear loop: {', '.join(endless)}"] if endless else []
     if any(each.leaves for each in maps):
         notes.append("a region whose line meets the right or the upper border of the map (grey) goes on beyond it")
     notes += [f"{each.case.label}: {worst.told(each.variants, each.boundary)} N s/m" for each in maps if each.variants]
