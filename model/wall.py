@@ -133,18 +133,18 @@ class Design:
                 raise FieldError(name, f"must be at least {least:g} beside the force's resolution, not {value!r}")
         self.lean_bits = max(damper_bits, self.push + self.force.width) + 1
         self.total_bits = max(spring_bits + 1, self.lean_bits) + 1
+        moving = (
+            Word("wall_velocity", self.coarse, q / tau, "m/s", 0, "velocity of the surface"),
+            Word("wall_two_sided", UQ(1, 0), 1.0, "", 0, "1: the wall holds on both sides, if it may pull"),
+        )
         self.words = (
             Word("wall_stiffness", self.stiffness, r / q, "N/m", 0, "spring of the wall"),
             Word("wall_damping", self.damping, r * tau / q, "N s/m", 0, "damper of the wall"),
             Word("wall_position", SQ(axis.count_width, 0), q, "m", 0, "surface of the wall"),
             Word("wall_left", UQ(1, 0), 1.0, "", 0, "0: the wall fills greater positions; 1: smaller ones"),
             Word("wall_forbid_pull", UQ(1, 0), 1.0, "", 1, "1: the wall never pulls the handle in"),
+            *(moving if coupling else ()),
         )
-        if coupling:
-            self.words += (
-                Word("wall_velocity", self.coarse, q / tau, "m/s", 0, "velocity of the surface"),
-                Word("wall_two_sided", UQ(1, 0), 1.0, "", 0, "1: the wall holds on both sides, if it may pull"),
-            )
 
     def params(self, words: dict[str, int]) -> Params:
         """Return the kernel's parameters for the given run-time words."""
