@@ -361,10 +361,9 @@ def run(
     """
     closed = Loop(scene, backend, traces, until_sure)
     with opened(scene.spec, backend, scene.parameters, closed.start_level, traced=vcd is not None) as axis:
-        if scene.coupling is not None:
-            axis = coupled(axis, tool_of(scene, backend))  # noqa: PLW2901
+        driven = axis if scene.coupling is None else coupled(axis, tool_of(scene, backend))
         # The contact is known before the hardware runs, because the bit-accurate model has it at the same sample.
-        result = closed.run(axis, _waveform_marks(scene, axis.hardware, vcd) if vcd else (), progress)
+        result = closed.run(driven, _waveform_marks(scene, axis.hardware, vcd) if vcd else (), progress)
         if vcd:
             axis.hardware.end_trace()
     return result

@@ -34,6 +34,7 @@ from hardwall.sim.studies.published import LOOPS
 from stimuli import results
 from stimuli.lengths import LONG
 from stimuli.replays import BOUND, COARSEN, swing
+from stimuli.scenes import COUPLING
 
 SECOND = {"encoder_phase_error_counts": 0.0, "acceleration_max_mm_s2": 2000.0, "backend": "float", "rms_mm_s": 1.0}
 
@@ -239,6 +240,18 @@ def test_the_passivity_limit_is_seen_or_said_to_be_absent(picture):
     seen = zwidth.draw(results.zwidth([viscous]))
     assert "below the dash-dotted line" in " ".join(text.get_text() for text in words(seen))
     assert "-." in [line.get_linestyle() for line in seen.axes[0].lines]
+
+
+def test_a_loop_without_a_limit_has_no_line_and_is_named():
+    """A line at infinity, or at the end of a search, would make the map a line upon the axis."""
+    plain = results.map_of("fdm-500", 2e4, 200)
+    coupled = replace(plain, case=plain.case.changed(COUPLING | {"amplifier": None}))
+    axes = zwidth.draw(results.zwidth([coupled])).axes[0]
+    said = " ".join(text.get_text() for text in words(axes.figure))
+    assert f"no limit of the linear loop: {plain.case.label}" in said
+    assert "behind 20 kN/m" in said
+    assert ":" not in [line.get_linestyle() for line in axes.lines]
+    assert axes.get_ylim()[1] < 1e3
 
 
 @pytest.mark.parametrize("picture", ["zwidth"], indirect=True)

@@ -31,7 +31,11 @@ def test_the_axis_holds_the_handle_to_the_tool_and_the_tool_has_the_wall():
     assert (tool.period, tool.latency, tool.period_s, tool.ahead_s) == (10, 1, 1e-3, 0.0)
     assert (tool.wall_stiffness_n_per_m, tool.wall_damping_n_s_per_m, tool.forbid_pull) == (60e3, 20.0, True)
     assert tool.velocity_m_per_s == scene.spec.design.estimator.velocity.lsb * 1e-6 * 10e3
-    assert tool_of(scene, "float").velocity_m_per_s == pytest.approx(0.01)
+    assert (tool.stiffness_n_per_m, tool.damping_n_s_per_m) == (si["wall_stiffness"], si["wall_damping"])
+    exact = tool_of(scene, "float")
+    assert exact.velocity_m_per_s == pytest.approx(0.01)
+    assert (exact.stiffness_n_per_m, exact.damping_n_s_per_m) == (20e3, 10.0)
+    assert si["wall_stiffness"] != 20e3
     assert tool_of(load("seed-2011", COUPLING | {"coupling.delay_s": 1e-3}), "fixed").latency == 10
     assert scene.felt_n_per_m == pytest.approx(15e3)
     assert sweep_of(scene, world_of(scene), None) is None

@@ -1,5 +1,8 @@
 """The linear loop with a virtual coupling, against the simulation and against the same loop run in time."""
 
+import math
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import scipy
@@ -7,10 +10,13 @@ import scipy
 from hardwall.model.quadrature import latency
 from hardwall.sim.loop.coupled import ToolState, advanced
 from hardwall.sim.scene.build import tool_of
+from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load
+from hardwall.sim.studies.zwidth import ZWidth
 from hardwall.sim.walls import hit, theory
 from hardwall.sim.walls.coupled_theory import CoupledLoop, loop_of
 from stimuli.lengths import LONG
+from stimuli.scenes import COUPLING
 
 from .test_theory import LINEAR, PROMPT
 
@@ -23,12 +29,12 @@ STEEP = {
     "a tool of 50 g": (3e3, 0.0, 2.0, 0.05, 500, 0.0),
     "no mass, no damper": (3e3, 0.0, 0.0, 0.0, 500, 1e-3),
 }
-"""Couplings whose radius rises steeply where they turn unstable, so that a hit of a minute tells."""
+"""Couplings whose radius rises steeply where they turn unstable, so that a hit of seconds tells."""
 
 
 def scene(stiffness_n_per_m: float, *values: float, **others: float):
     changes = LINEAR | PROMPT | dict(zip(KEYS, values, strict=True)) | {"controller.estimator": "fdm"}
-    changes |= {"coupling.stiffness_n_per_m": stiffness_n_per_m}
+    changes |= {"coupling.stiffness_n_per_m": stiffness_n_per_m, "protocol.settle_s": 5.0}
     return load("seed-2011", changes | {f"coupling.{key}": value for key, value in others.items()})
 
 
@@ -89,6 +95,22 @@ def test_the_radius_is_the_growth_of_the_loop_in_time(mass, damping, delay_s, ah
     assert np.exp((last - first) / (grown[-200:].argmax() + len(grown) - 200 - grown[100:300].argmax() - 100)) == (
         pytest.approx(found, abs=1e-3)
     )
+
+
+@pytest.mark.parametrize("damping", [0.0, 10.0, 30.0])
+@pytest.mark.parametrize(("ahead_s", "growth"), [(0.0, 0.0), (0.55e-3, 0.0), (0.6e-3, 1.2e-3), (1e-3, 0.03)])
+def test_a_surface_that_is_too_far_ahead_is_unstable_in_free_motion(ahead_s, growth, damping):
+    """A handle that goes anywhere has a radius of 1."""
+    known = scene(30e3, 0.0, 0.0, damping, 0.05, 1_000, 0.0, ahead_s=ahead_s)
+    assert CoupledLoop(known).radius(0.0, 0.0) - 1 == pytest.approx(growth, rel=0.2, abs=1e-9)
+
+
+def test_a_map_has_the_limits_of_the_loop_with_its_coupling():
+    plain = Case.of("seed-2011", {"controller.estimator": "fdm", "zwidth.damping_step_n_s_per_m": 98.0})
+    maps = [SimpleNamespace(case=plain.changed(changes)) for changes in ({}, COUPLING | {"amplifier": None})]
+    without, endless = ZWidth(plain.scene, maps, [], None).linear_limits
+    assert all(math.isfinite(limit) for limit in without)
+    assert set(endless) == {math.inf}
 
 
 def test_a_scene_without_a_coupling_has_the_loop_without_one():

@@ -4,6 +4,7 @@ import pytest
 
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls.grid import grid_of, wider_grid
+from stimuli.scenes import COUPLING
 
 
 def test_a_study_s_grid_is_three_times_as_large_on_a_controller_made_for_it():
@@ -19,6 +20,13 @@ def test_a_study_s_grid_is_three_times_as_large_on_a_controller_made_for_it():
 def test_a_controller_that_is_made_for_more_stays_as_it_is():
     scene = load("seed-2011", {"controller.stiffness_max_n_per_m": 1e6})
     assert wider_grid(scene, 1.0)["controller.stiffness_max_n_per_m"] == 1e6
+
+
+def test_the_words_of_a_coupling_stay_as_they_are():
+    scene = load("seed-2011", COUPLING)
+    wider = load("seed-2011", COUPLING | wider_grid(scene, 4.0))
+    assert grid_of(wider).stiffness_to_n_per_m == 300e3
+    assert wider.spec == scene.spec
 
 
 def test_a_scene_without_steps_has_no_study():
