@@ -131,7 +131,9 @@ class Passivity(Block):
         with m.If(known):
             now = Mux(moved == 0, within, Mux(moved == 1, LOWER, Mux(moved == -1, UPPER, MIDDLE)))
             m.d.sync += within.eq(Mux(restarted, MIDDLE, now))
-            m.d.sync += half_counts.eq(2 * moved + now - within)
+            # How far a preload is from the last count is no displacement, and may be more than one has bits for.
+            with m.If(~restarted):
+                m.d.sync += half_counts.eq(2 * moved + now - within)
 
         worked, taken = products("worked", self.drive, half_counts)
         multiplied, summed = Signal(), Signal()

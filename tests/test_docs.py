@@ -59,7 +59,6 @@ EXAMPLES = [example for example in GATES if not _is_wired(example) and (LONG or 
 SHOWN = [name for name in PAGES if any(not block.marked for block in blocks(name)) and name not in PARSED]
 
 
-@pytest.mark.usefixtures("fresh")
 @pytest.mark.parametrize("name", SHOWN)
 def test_what_a_page_shows_runs(name, tmp_path, monkeypatch, capsys):
     """The blocks run in order, in one folder and one namespace, as a reader would run them."""

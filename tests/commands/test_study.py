@@ -11,10 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hardwall.model.build_folder import build_dir
 from hardwall.sim.commands import terminal
 from hardwall.sim.commands.study import StudyOptions, _do_all, _write
 from hardwall.sim.jobs.result import Values
 from hardwall.sim.jobs.stages import logger
+from hardwall.sim.jobs.store import Store
 from hardwall.sim.rtl.waveform import vcd_to_fst
 from stimuli import results
 from stimuli.command_line import call
@@ -162,3 +164,7 @@ def test_several_failures_are_one_error():
     with pytest.raises(TypeError, match=r"^a fault$"):
         _do_all([*steps, lambda: fails(TypeError("a fault"))])
     _do_all([])
+
+
+def test_no_test_reads_a_user_s_results_or_writes_among_them():
+    assert not Store("verdicts").path.is_relative_to(build_dir())

@@ -26,14 +26,14 @@ def test_no_tool_of_a_job_is_left(tmp_path, monkeypatch, number):
         assert ended_by(number, process) == ("", "", "" if number == "SIGKILL" else kept)
 
 
-def test_a_job_that_fails_ends_the_others(tmp_path, monkeypatch, fresh):
+def test_a_job_that_fails_ends_the_others(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(ValueError, match=r"^this job fails$"):
         parallel.run(jobs.fail_beside_a_long_job, [{"number": 0}, {"number": 1}], Store("failures"), 2)
     assert Path("begun-1").exists()
 
 
-def test_a_tool_that_begins_behind_the_failure_ends_too(fresh):
+def test_a_tool_that_begins_behind_the_failure_ends_too():
     """The other job is in Python of its own when the first fails."""
     failed = threading.Event()
 

@@ -11,7 +11,9 @@ from hardwall.sim.jobs.store import Store
 
 
 @pytest.fixture(autouse=True)
-def elsewhere(tmp_path, monkeypatch):
+def elsewhere(fresh, tmp_path, monkeypatch):
+    """Let the folder be the one that a user names, as it is outside of tests."""
+    monkeypatch.setattr(store, "build_dir", build_folder.build_dir)
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path))
 
 

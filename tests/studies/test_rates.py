@@ -13,8 +13,6 @@ from hardwall.sim.walls.zwidth import Map
 from stimuli.command_line import call
 from stimuli.maps import Known
 
-pytestmark = pytest.mark.usefixtures("fresh")
-
 CURVES = [methods.Curve("kalman", "kalman", "u"), methods.Curve("fdm", "fdm", "u")]
 FEW = {
     "zwidth.damping_from_n_s_per_m": 30.0, "zwidth.damping_to_n_s_per_m": 30.0,

@@ -24,8 +24,6 @@ from stimuli.lengths import long_form
 from stimuli.reports import check
 from stimuli.scenes import HAND
 
-pytestmark = pytest.mark.usefixtures("fresh")
-
 STEP = 1e3
 GRID = {
     "zwidth.stiffness_step_n_per_m": STEP, "zwidth.stiffness_to_n_per_m": 40e3,

@@ -23,8 +23,6 @@ from stimuli.command_line import call
 from stimuli.lengths import long_form
 from stimuli.processes import HARDWALL, ended_by, session, started, stored, wait_until
 
-pytestmark = pytest.mark.usefixtures("fresh")
-
 SMALL = {
     "zwidth.stiffness_step_n_per_m": 4e3,
     "zwidth.damping_from_n_s_per_m": 10.0,
