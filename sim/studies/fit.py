@@ -1,4 +1,4 @@
-"""A fit of the parameters that the founding paper does not give, so that the eight facts of its Figure 5 hold.
+"""A fit of the parameters that the founding paper does not give, so that the facts of its Figure 5 hold.
 
 The search is SciPy's differential evolution, seeded, over the ranges of `PARAMETERS`. It minimises a sum: the
 shortfalls of the facts (`figure_5`), `MISSED` for every fact that does not hold, and two distances of the maps from the
@@ -27,7 +27,7 @@ from ..jobs.result import Table, table_of
 from ..scene.case import Case
 from ..scene.errors import SceneError
 from ..scene.schema import Scene
-from ..walls.figure_5 import ABOUT, Fact, facts
+from ..walls.figure_5 import ABOUT, NUMBER, Fact, facts
 from ..walls.methods import Curve, methods
 from ..walls.zwidth import Effort, Map, Mapper, NeverReached
 
@@ -44,7 +44,6 @@ MISSED = 0.05
 FAR = math.log(1.5)
 HOPELESS = math.log(1e3)
 """The distance from the axes where there are no maps: the scene is not valid, or the handle does not reach walls."""
-EIGHT = 8
 FINALISTS = 4
 MEMBERS = 4
 """The number of members of the population for every parameter."""
@@ -90,7 +89,7 @@ class Trial:
 
     Attributes:
         values: values of the parameters, by key of the scene.
-        facts: the eight facts; empty where only Levant with adjusted gains was mapped, or no map was possible.
+        facts: the paper's facts; empty where only Levant with adjusted gains was mapped, or no map was possible.
         off_b, off_k: distances of the maps from the ends of the axes, logarithms of ratios.
         maps: maps by the names of `methods`.
     """
@@ -109,8 +108,8 @@ class Trial:
     @property
     def score(self) -> float:
         """The sum that the search minimises."""
-        lacking = sum(fact.shortfall for fact in self.facts) if self.facts else EIGHT
-        return lacking + MISSED * (EIGHT - self.held) + self.off_b + self.off_k
+        lacking = sum(fact.shortfall for fact in self.facts) if self.facts else NUMBER
+        return lacking + MISSED * (NUMBER - self.held) + self.off_b + self.off_k
 
     def report(self) -> dict[str, Any]:
         """Return the trial as the command line prints it."""
@@ -148,7 +147,7 @@ class Fit:
         A fact with more than 0 there is in conflict with the others.
         """
         least: list[float | None] = []
-        for number in range(EIGHT):
+        for number in range(NUMBER):
             among = [trial.facts for trial in self.trials if trial.facts]
             lacks = [
                 each[number].shortfall

@@ -38,6 +38,13 @@ LACKED = {
         "motor.damping_resistance_ohm": 2.0,
         "motor.damping_capacitance_f": 0.02,
     },
+    "with a virtual coupling of 20 kN/m": {
+        "coupling.stiffness_n_per_m": 20e3,
+        "coupling.damping_n_s_per_m": 20.0,
+        "coupling.mass_kg": 0.05,
+        "coupling.sample_hz": 1000,
+        "coupling.ahead_s": 0.5e-3,
+    },
     "with hysteresis and jitter": {"encoder.hysteresis_counts": 0.2, "encoder.jitter_s": 50e-9},
 }
 """Parts that a device or a controller has and a scene may lack, with figures of `docs/scenes.md` where a data sheet or

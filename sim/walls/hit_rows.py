@@ -11,7 +11,8 @@ NUMBERS = ("K (N/m)", "B (N s/m)", "wall", "RMS (mm)", "peak force (N)", "veloci
 """The headings of a row behind its name."""
 NOTES = (
     "RMS: distance of the handle from its line over the judged window (literal protocol: from its mean before); "
-    "less than a nanometre is at rest.",
+    "less than a nanometre is at rest. A handle that the wall does not hold, so that it leaves the device's travel at "
+    "its drift, is unstable, whatever the RMS.",
     "velocity error: RMS of the estimate against the true velocity while the handle is in the wall for the first time, "
     "0.1 s at most; known of hits with --plot or --trace.",
     "force words: the first digits of the SHA-256 of every force word; runs of equal words took the same path.",

@@ -2,8 +2,10 @@
 
 The wall is judged over windows of `measure_s`, the first of which begins at the settling mark:
 
-- *stable* if the RMS distance of the position from its least-squares line over a window is under the threshold;
-- *unstable* if it is not, and is more than `FALLING` of that over the window before;
+- *stable* if the RMS distance of the position from its least-squares line over a window is under the threshold, and
+  the wall holds the handle;
+- *unstable* if it is not under the threshold, and is more than `FALLING` of that over the window before; or if the
+  wall does not hold the handle: where the line goes on for `longest_s`, it leaves the device's travel;
 - else it still falls: the run goes on with another window, and is *undecided* if no other ends within `longest_s`.
 
 The first window has one before it too, which ends at the settling mark. A handle that creeps or has come to rest in
@@ -47,7 +49,7 @@ class Tally:
         self._literal, self._threshold_m = protocol.verdict == "literal", protocol.threshold_mm * 1e-3
         self._hopeless = scene.measured * self._threshold_m**2
         self._settled, self._measured, self._most = scene.settled, scene.measured, scene.most_samples
-        self._rate = spec.sample_hz
+        self._rate, self._travel_m = spec.sample_hz, spec.travel_m
         self._mean_from = self._settled - round(protocol.mean_s * spec.sample_hz)
         self._decimation = spec.samples_per_actuation
         self._digest = hashlib.sha256() if exact else None
@@ -146,16 +148,23 @@ class Tally:
                 return
             self.rms_m = window.rms_m
             if self.rms_m < self._threshold_m:
-                self.verdict = STABLE
+                self.verdict = self._verdict_of(window)
             elif self.rms_m >= FALLING * self._before:
                 self.verdict = UNSTABLE
             elif end + self._measured > self._most:
                 self.verdict = UNDECIDED
         self._before = window.rms_m
 
+    def _verdict_of(self, still: Window) -> str:
+        """Return what is said of a wall whose handle does not oscillate: stable if the wall holds it.
+
+        A handle that nothing holds soon has a constant speed, and is on its line, too.
+        """
+        return STABLE if abs(still.mean_m + still.drift_m * self._most) <= self._travel_m else UNSTABLE
+
     def rest(self) -> None:
         """Judge a handle that stays at rest where it is: see `repetition`."""
         self._judged = Window(1, self._room)
         self._judged.add(np.array([self._position_m]))
         self._sum = self._position_m * (self._settled - self._mean_from)
-        self.rms_m, self.verdict = 0.0, STABLE
+        self.rms_m, self.verdict = 0.0, self._verdict_of(self._judged)

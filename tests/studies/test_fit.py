@@ -60,9 +60,9 @@ def found(evaluations: int, mapper: KnownDevice, seed: int = 1) -> fit.Fit:
 def test_a_known_device_is_found_again():
     known = KnownDevice()
     result = found(240, known)
-    assert result.before.held < 8
+    assert result.before.held < fit.NUMBER
     best = result.finalists[0]
-    assert best.held == 8
+    assert best.held == fit.NUMBER
     assert best.score == pytest.approx(best.off_b, abs=1e-9)
     assert best.off_b < 0.05
     assert best.values["handle.mass_kg"] == pytest.approx(MASS_KG, rel=0.2)
@@ -77,7 +77,7 @@ def test_a_known_device_is_found_again():
     assert len(known.cases) == 6 + coarse + again + 6 * len(result.finalists)
     far = [trial for trial in result.trials if not trial.facts]
     assert far
-    assert all(trial.off_b > fit.FAR and trial.score > 8 for trial in far)
+    assert all(trial.off_b > fit.FAR and trial.score > fit.NUMBER for trial in far)
 
 
 def test_a_search_is_its_seed_s():
@@ -115,10 +115,10 @@ def test_what_lacks_least_beside_the_others_is_what_stood_in_the_way():
     def trial(*shortfalls: float) -> fit.Trial:
         return fit.Trial({}, [Fact("", lack == 0, lack, "") for lack in shortfalls], 0.0, 0.0, {})
 
-    trials = [trial(0, 0.3, *[0] * 6), trial(0, 0.2, *[0] * 6), trial(0.5, 0, 0, 0.1, *[0] * 4), trial()]
-    assert fit.Fit("3-30", {}, trials[0], trials, []).least_shortfalls() == [None, 0.2, *[None] * 6]
+    trials = [trial(0, 0.3, *[0] * 5), trial(0, 0.2, *[0] * 5), trial(0.5, 0, 0, 0.1, *[0] * 3), trial()]
+    assert fit.Fit("3-30", {}, trials[0], trials, []).least_shortfalls() == [None, 0.2, *[None] * 5]
     assert trials[2].score == pytest.approx(0.6 + 2 * fit.MISSED)
-    assert trials[3].score == pytest.approx(8 + 8 * fit.MISSED)
+    assert trials[3].score == pytest.approx(fit.NUMBER * (1 + fit.MISSED))
 
 
 def verdict(changes: dict, wall: tuple[float, float], **_) -> dict:
@@ -141,7 +141,7 @@ def test_report_and_table_and_what_is_known_is_not_hit_again(monkeypatch, capsys
     (of_axis,) = report["fits"]
     assert (report["seed"], of_axis["b_axis"], of_axis["evaluations"]) == (1, "3-30", 24)
     assert of_axis["values_before"]["handle.mass_kg"] == 0.35
-    assert len(of_axis["before"]["facts"]) == 8
+    assert len(of_axis["before"]["facts"]) == fit.NUMBER
     assert of_axis["finalists"][0]["score"] == min(each["score"] for each in of_axis["finalists"])
     assert set(of_axis["finalists"][0]["values"]) == set(fit.PARAMETERS)
     monkeypatch.setattr("hardwall.sim.walls.zwidth.verdict", None)
@@ -178,7 +178,7 @@ def test_nothing_stable_is_far_off():
 
     result = found(24, Nothing())
     assert all(trial.off_b == fit.HOPELESS for trial in result.trials)
-    assert result.finalists[0].score == pytest.approx(8 + 8 * fit.MISSED + fit.HOPELESS)
+    assert result.finalists[0].score == pytest.approx(fit.NUMBER * (1 + fit.MISSED) + fit.HOPELESS)
     assert math.isfinite(result.finalists[0].score)
 
 

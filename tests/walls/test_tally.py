@@ -74,6 +74,26 @@ def test_a_handle_that_has_moved_away_or_creeps_is_stable_and_that_is_said():
     assert literal.rms_m**2 == pytest.approx(tally.rms_m**2 + tally.offset_m**2 + spread, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("from_m", "drift_m_per_s", "verdict"),
+    [
+        # The last window of the longest hit ends at 0.3 s, and 150 mm is as far as the device travels.
+        (0.0, 0.49, "stable"),
+        (0.0, 0.51, "unstable"),
+        (0.0, -0.51, "unstable"),
+        (0.149, 0.0, "stable"),
+        (0.151, 0.0, "unstable"),
+        (-0.151, 0.0, "unstable"),
+    ],
+)
+def test_a_handle_that_the_wall_does_not_hold_is_unstable_however_straight_its_way(from_m, drift_m_per_s, verdict):
+    middle = 0.125  # s, of the window from 100 to 150 ms
+    positions = from_m + drift_m_per_s * (np.arange(len(BUZZ)) * 1e-3 - middle)
+    tally, end = judged(positions)
+    assert (tally.verdict, end) == (verdict, 150)
+    assert tally.rms_m < 1e-9
+
+
 def test_pieces_do_not_matter():
     for changes in (PROTOCOL, LITERAL):
         ways = [judged(5e-3 + falling(0.6), changes, piece) for piece in (1, 7, 50, 400)]
@@ -91,3 +111,6 @@ def test_a_handle_is_still_since_its_last_change():
         assert tally.still_from == since
     tally.rest()
     assert (tally.verdict, tally.rms_m, tally.mean_m, tally.offset_m, tally.drift_m_per_s) == ("stable", 0, 2e-3, 0, 0)
+    tally.add(9, np.array([0.2]), np.zeros(1))
+    tally.rest()
+    assert (tally.verdict, tally.mean_m) == ("unstable", 0.2), "it rests beyond the device's travel"
