@@ -115,6 +115,8 @@ def _range_of(word: Word, scene: Scene) -> str:
     half = word.to_si(1) / 2
     least = f"{half:g}" if word.from_si(float(f"{half:g}")) else repr(half)
     above_0 = f"{least} (half of its word's LSB) to "
+    if word.name == "passivity_damping":
+        return f"0, or {above_0}{word.si_max:g}"
     if word.name not in WALL_MAX:
         return f"{above_0}{word.si_max:g}"
     return f"0, or {above_0}{plain(getattr(scene.spec, WALL_MAX[word.name]))} (what the controller is for)"

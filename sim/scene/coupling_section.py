@@ -5,6 +5,9 @@ import math
 from .quantities import Damping, Mass, Rate, Stiffness, Time, or_none
 from .section import Section
 
+AHEAD_MAX = 10
+"""The most of the host's periods by which the surface may be ahead; half of one, and the delay, are of use."""
+
 
 class CouplingSection(Section):
     """A spring and a damper between the handle and a tool, which touches the wall in its place; without `mass_kg` the
@@ -34,6 +37,11 @@ class CouplingSection(Section):
                 f"not {self.sample_hz!r}"
             )
         latency, most_s = self.latency(sample_hz), 1 / self.sample_hz
+        if self.ahead_s > AHEAD_MAX * most_s:
+            raise ValueError(
+                f"coupling.ahead_s must be at most {AHEAD_MAX * most_s:g}, {AHEAD_MAX} of the host's periods, "
+                f"not {self.ahead_s!r}"
+            )
         if latency > self.period(sample_hz):
             raise ValueError(
                 f"coupling.delay_s must be at most {most_s:g}, one of the host's periods, not {self.delay_s!r}"

@@ -64,6 +64,7 @@ OVERLAPPING = {"controller.sample_hz": 1_000_000, "controller.actuation_hz": 1_0
         ({"coupling.sample_hz": 20_000}, "coupling.sample_hz must be controller.sample_hz 10000 divided by a whole"),
         ({"coupling.delay_s": 1.1e-3}, "coupling.delay_s must be at most 0.001, one of the host's periods, not 0.0011"),
         ({"coupling.delay_s": 1.5e-4}, "coupling.delay_s must be a whole number of samples of 0.0001 s, not 0.00015"),
+        ({"coupling.ahead_s": 0.0101}, "coupling.ahead_s must be at most 0.01, 10 of the host's periods, not 0.0101"),
         (OVERLAPPING, "controller.sample_hz must be at most 800000 beside a coupling, whose surface moves between a "),
         ({"coupling.tool": 1}, "coupling.tool is not a key of a scene; its section has stiffness_n_per_m"),
     ],

@@ -92,6 +92,7 @@ def test_a_file_that_is_no_regular_one_or_too_large_is_refused(tmp_path, monkeyp
             {"controller.slew_limit_n_per_s": 1e-9},
             "controller.slew_limit_n_per_s must be 0.5 (half of its word's LSB) to",
         ),
+        ({"passivity.damping_n_s_per_m": 1e7}, "passivity.damping_n_s_per_m must be 0, or 0.003125 (half of its"),
         ({"wall.stiffness_n_per_m": 1.0}, "wall.stiffness_n_per_m must be 0, or 1.95313 (half of its word's LSB) to"),
         ({"wall.stiffness_n_per_m": 10**400}, "wall.stiffness_n_per_m must be 0, or 1.95313 (half of its word's LSB)"),
         (

@@ -167,7 +167,7 @@ def test_every_shortcut_is_a_scene_of_its_own():
 
     scene = load("drive-2011", GRID)
     every = shortcuts(scene, lambda _: True)
-    assert len({each.label for each in every}) == len(every) == 33
+    assert len({each.label for each in every}) == len(every) == 34
     scenes = {each.label: changed(each) for each in every if each.label != "with friction that bends"}
     rigid = scenes["rigid handle only"]
     assert rigid.handle.mass_kg == pytest.approx(0.35)
