@@ -78,8 +78,9 @@ def _draw(axes: Axes, trade: Trade, label: str) -> None:
         )
     axes.set_xscale("log")
     plain_decades(axes.xaxis)
-    most = max(min(point.moves[label].high, MOST) for point in trade.points)
-    least = min(point.moves[label].low for point in trade.points)
+    moves = [point.moves[label] for point in trade.points]
+    most = max(max(move.area, min(move.high, MOST)) for move in moves)
+    least = min(move.low for move in moves)
     room = 0.12 * (most - least) + 0.02
     axes.set_ylim(least - room, most + room)
     axes.margins(x=0.12)

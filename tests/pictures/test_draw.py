@@ -231,6 +231,14 @@ def test_a_panel_of_the_trade_names_its_best_and_few_others(picture):
         assert not any(text.isdigit() for text in names)
 
 
+def test_an_area_that_is_far_from_the_others_is_on_its_panel():
+    made = results.traded()
+    far = made.points[3]
+    far.moves["adjusted"] = far.moves["adjusted"]._replace(area=4.0, high=float("inf"))
+    low, high = trade.draw(made).axes[0].get_ylim()
+    assert low < 4.0 < high < 5.0
+
+
 @pytest.mark.parametrize("picture", ["zwidth"], indirect=True)
 def test_the_passivity_limit_is_seen_or_said_to_be_absent(picture):
     absent = " ".join(text.get_text() for text in words(picture))
