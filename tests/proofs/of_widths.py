@@ -46,7 +46,7 @@ from .widths import Widths
 AXES = ("paper", "mhz", "narrow", "wide")
 """The axes of the tests: the paper's rates, a megahertz, and formats at both extremes."""
 ALONE = ("",)
-QUICK = ("wall", "passivity")
+QUICK = ("wall",)
 
 
 def estimator(name: str, axis: str) -> EstimatorBlock:
