@@ -8,7 +8,7 @@ from hardwall.host.axis import Axis
 from hardwall.host.connect import connect
 from hardwall.model.registers import RegisterMap
 from hardwall.sim.scene.load import load
-from host.twin_board import TwinBoard
+from host.twin_board import PATIENT, TwinBoard
 
 
 @pytest.fixture(scope="session")
@@ -24,5 +24,5 @@ def board(registers) -> Iterator[TwinBoard]:
 
 @pytest.fixture
 def axis(board) -> Iterator[Axis]:
-    with connect(board.name, answer_s=0.2) as found:
+    with connect(board.name, **PATIENT) as found:
         yield found

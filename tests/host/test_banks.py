@@ -24,7 +24,7 @@ from hardwall.model.link import banked_file
 from hardwall.model.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.model.supervisor import ARMED, CAUSES, DISARMED, TRIPPED
-from host.twin_board import TwinBoard
+from host.twin_board import PATIENT, TwinBoard
 from oracles.banked_server import BankedServer
 from stimuli.captures import records, window
 from stimuli.specs import MHZ
@@ -81,7 +81,7 @@ def board() -> Iterator[Board]:
 
 @pytest.fixture
 def axes(board) -> Iterator[Axes]:
-    with connect_axes(board.name, answer_s=0.2) as found:
+    with connect_axes(board.name, **PATIENT) as found:
         yield found
 
 
@@ -167,7 +167,7 @@ def test_no_axis_beats_beside_one_that_is_left_armed(board, axes, monkeypatch):
 
 def test_an_axis_that_an_earlier_host_has_left_armed_is_in_the_way_until_it_is_disarmed(board):
     board.show_of(2, state=ARMED, ready=0)
-    with connect_axes(board.name, answer_s=0.2) as axes:
+    with connect_axes(board.name, **PATIENT) as axes:
         with pytest.raises(SilentError, match="axis 2"):
             axes[0].arm()
         axes[2].disarm()
@@ -205,7 +205,7 @@ def test_a_capture_takes_the_axis_that_was_started(board, axes):
 def test_who_has_the_first_axis_alone_captures_that(board, axes):
     axes[1].capture.start()
     axes.close()
-    with connect(board.name, answer_s=0.2) as axis:
+    with connect(board.name, **PATIENT) as axis:
         assert axis.capture.state == "IDLE"
         axis.capture.start()
         assert [started["capture_axis"] for started in board.started] == [1, 0]
@@ -213,19 +213,19 @@ def test_who_has_the_first_axis_alone_captures_that(board, axes):
 
 
 def test_all_are_disarmed_at_the_end(board):
-    with connect_axes(board.name, answer_s=0.2) as axes:
+    with connect_axes(board.name, **PATIENT) as axes:
         for axis in axes:
             axis.arm()
     assert [status["state"] for status in board.server.file.statuses] == [DISARMED] * AXES
 
 
 def test_the_first_axis_is_had_alone_and_one_axis_is_several(board):
-    with connect(board.name, answer_s=0.2) as axis:
+    with connect(board.name, **PATIENT) as axis:
         axis.set(wall_stiffness=5e3)
     file = board.server.file
     place = file.design.registers["active_wall_stiffness"].address + 1
     assert [file.live[BANK * number + place] > 0 for number in range(AXES)] == [True, False, False]
-    with TwinBoard(RegisterMap(AxisSpec(**MHZ))) as alone, connect_axes(alone.name, answer_s=0.2) as found:
+    with TwinBoard(RegisterMap(AxisSpec(**MHZ))) as alone, connect_axes(alone.name, **PATIENT) as found:
         assert (len(found), found.device.axes) == (1, 1)
         found[0].set(wall_stiffness=5e3)
         assert found[0].get("wall_stiffness") == pytest.approx(5e3, rel=1e-2)
@@ -234,4 +234,4 @@ def test_the_first_axis_is_had_alone_and_one_axis_is_several(board):
 def test_too_many_axes_are_none_of_ours(board):
     board.server.file.live[AXES_AT + 1] = 33
     with pytest.raises(ForeignError, match="must have at most 32 axes, not 33"):
-        connect_axes(board.name, answer_s=0.2)
+        connect_axes(board.name, **PATIENT)

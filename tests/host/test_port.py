@@ -17,11 +17,12 @@ from hardwall.host.port import BAUD, BRIDGE_S, DEVICE_BITS, MACHINE_S, Port
 from hardwall.model.checks import FieldError
 from hardwall.model.link.server import WRITE_MAX
 from hardwall.model.link.told_pace import Teller
+from host.twin_board import PATIENT
 
 
 @pytest.fixture
 def port(board):
-    line = Port(board.name, answer_s=0.2)
+    line = Port(board.name, **PATIENT)
     yield line
     line.close()
 
@@ -58,13 +59,13 @@ def test_a_refusal_says_what_was_refused_and_why(board, port, ask, code, message
 
 def test_an_answer_that_is_late_is_not_taken_for_the_next(board, port, registers):
     port.read(0, 2)
-    board.late_s = 0.5
+    late_s = board.late_s = 2.0 * PATIENT["answer_s"] / PATIENT["pace"]
     with pytest.raises(SilentError, match=r"any more at tcp.* to read 2 registers from 0x4000 on, which may have been"):
         port.read(0x4000, 2)
     # It may ask again until the board is in step.
     with suppress(SilentError):
         port.read(0, 2)
-    time.sleep(0.5)
+    time.sleep(late_s)
     for _ in range(20):
         assert port.read(0, 2) == (0, registers["layout"].reset)
 

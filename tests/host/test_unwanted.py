@@ -3,6 +3,7 @@
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from hardwall.host.errors import ChangedError, HostError, NotReadyError, SilentE
 from hardwall.host.status import State
 from hardwall.model.checks import FieldError
 from hardwall.model.supervisor import CAUSES
-from host.twin_board import TwinBoard
+from host.twin_board import PATIENT, TwinBoard
 
 PATIENCE_S = 60.0
 FOR_GOOD = 1 << 30
@@ -69,7 +70,7 @@ def armed(board, supervised, axis) -> Axis:
 
 def test_a_board_that_another_host_left_armed_is_disarmed_before_the_first_beat(board, supervised):
     board.show(state=State.ARMED)
-    with connect(board.name, answer_s=0.2) as axis:
+    with connect(board.name, **PATIENT) as axis:
         # Who only looks changes nothing, and lets the watchdog end it.
         assert axis.status.state is State.ARMED
         assert supervised.heard == []
@@ -82,7 +83,7 @@ def test_a_board_that_another_host_left_armed_is_disarmed_before_the_first_beat(
 
 def test_words_are_not_written_to_a_board_that_another_host_left_armed(board, supervised):
     board.show(state=State.ARMED)
-    with connect(board.name, answer_s=0.2) as axis:
+    with connect(board.name, **PATIENT) as axis:
         axis.set(wall_stiffness=5e3)
         assert supervised.heard == ["disarm", "commit"]
 
@@ -192,8 +193,8 @@ def test_a_reset_behind_a_beat_whose_answer_was_lost_is_found_out(board, axis):
 
 
 @pytest.mark.parametrize("fault", ["lost", "spoilt"])
-def test_one_lost_answer_leaves_no_gap_that_would_trip(board, supervised, armed, fault):
-    """Of some runs, for the machine may be busy in one."""
+def test_one_lost_answer_leaves_no_gap_that_would_trip(board, supervised, fault):
+    """Of some runs, for the machine may be busy in one: this host is not patient."""
     gaps = []
     for _ in range(5):
         numbers, times = [], []
@@ -205,11 +206,14 @@ def test_one_lost_answer_leaves_no_gap_that_would_trip(board, supervised, armed,
                 if len(times) == 3:
                     setattr(board, fault, 1)
 
-        board.react = hear
-        armed.sleep(0.4)
+        with connect(board.name) as axis, suppress(HostError):
+            watchdog_s = axis.supervisor.watchdog
+            board.react = hear
+            axis.sleep(3 * watchdog_s)
         board.react = lambda pulses: None
-        gaps.append(max(np.diff(times)))
-    assert min(gaps) < 0.8 * armed.supervisor.watchdog
+        if len(times) > 3:
+            gaps.append(max(np.diff(times)))
+    assert min(gaps) < 0.8 * watchdog_s
 
 
 def lose_the_answer_of_a_beat(board: TwinBoard) -> None:
@@ -225,7 +229,7 @@ def lose_the_answer_of_a_beat(board: TwinBoard) -> None:
 
 def test_leaving_disarms_though_the_application_failed(supervised, board):
     def fail() -> None:
-        with connect(board.name, answer_s=0.2) as axis:
+        with connect(board.name, **PATIENT) as axis:
             axis.arm()
             raise ZeroDivisionError
 

@@ -12,6 +12,8 @@ from hardwall.model.registers import RegisterMap
 
 SILENCE_S = 0.02
 """The silence that ends a request which was cut short."""
+PATIENT = {"answer_s": 0.2, "pace": 0.1}
+"""How its host waits for it: ten times as long, for what is late on a busy machine is not lost."""
 
 
 class TwinBoard:
