@@ -119,7 +119,9 @@ def _range_of(word: Word, scene: Scene) -> str:
         return f"0, or {above_0}{word.si_max:g}"
     if word.name not in WALL_MAX:
         return f"{above_0}{word.si_max:g}"
-    return f"0, or {above_0}{plain(getattr(scene.spec, WALL_MAX[word.name]))} (what the controller is for)"
+    # A wall of no stiffness is free space; a coupling of none couples nothing.
+    or_0 = "" if scene.coupling is not None and word.name == "wall_stiffness" else "0, or "
+    return f"{or_0}{above_0}{plain(getattr(scene.spec, WALL_MAX[word.name]))} (what the controller is for)"
 
 
 def check_hit(scene: Scene) -> None:
