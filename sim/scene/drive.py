@@ -7,7 +7,7 @@ from pydantic import Field
 from ...model.drive import dac, pdm, pwm
 from ...model.drive.registry import STAGES
 from ...model.drive.stage import UNITS, Amplifier, Stage, Unit
-from .quantities import Current, ForcePerUnit, Offset, Rate, Voltage, number
+from .quantities import Current, ForcePerUnit, Offset, Rate, Voltage, number, whole
 from .section import Section
 
 AMPLIFIER = {
@@ -39,16 +39,16 @@ class DriveSection(Section):
     inverted: bool = False
     pwm_hz: Rate | None = None
     dead_time_s: number(*pwm.DEAD_TIME_S) | None = None
-    dac_bits: Annotated[int, Field(ge=dac.BITS[0], le=dac.BITS[1])] | None = None
+    dac_bits: whole(*dac.BITS) | None = None
     dac_serial_hz: Rate | None = None
     dac_coding: Literal[dac.CODINGS] | None = None
-    dac_header_bits: Annotated[int, Field(ge=dac.HEADER_BITS[0], le=dac.HEADER_BITS[1])] | None = None
-    dac_header: Annotated[int, Field(ge=0, le=(1 << dac.HEADER_BITS[1]) - 1)] | None = None
-    dac_trailing_bits: Annotated[int, Field(ge=dac.TRAILING_BITS[0], le=dac.TRAILING_BITS[1])] | None = None
-    dac_mode: Annotated[int, Field(ge=dac.MODES[0], le=dac.MODES[1])] | None = None
+    dac_header_bits: whole(*dac.HEADER_BITS) | None = None
+    dac_header: whole(0, (1 << dac.HEADER_BITS[1]) - 1) | None = None
+    dac_trailing_bits: whole(*dac.TRAILING_BITS) | None = None
+    dac_mode: whole(*dac.MODES) | None = None
     dac_setup: (
         Annotated[
-            list[Annotated[int, Field(ge=0, le=(1 << dac.FRAME_BITS_MAX) - 1)]],
+            list[whole(0, (1 << dac.FRAME_BITS_MAX) - 1)],
             Field(min_length=1, max_length=dac.SETUP_MAX),
         ]
         | None

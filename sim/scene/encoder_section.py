@@ -14,25 +14,27 @@ from pydantic import Field
 from ..world.encoder import Errors, offsets
 from ..world.lines import Lines
 from ..world.scale import CUT_SIGMAS, MOST_COUNTS, WAVES, Scale, Wave, cut_of, spread
-from .quantities import EdgeError, Length, number, or_none
+from .quantities import EdgeError, Length, number, or_none, whole
 from .section import Section
 
 ERROR_MAX_COUNTS = 0.5
 """The distance of an edge from its ideal place from which the decoder promises nothing."""
 LEAST_CUT_SIGMAS = 2.0
 """The random displacement of edges is cut no nearer than this, for it would be normal no more."""
+EDGE_ERROR_MAX_COUNTS = MOST_COUNTS / LEAST_CUT_SIGMAS
+"""The largest sigma of edges that have no other errors."""
 TOGETHER_MAX = 1000
 """The most glitches in a sample, or at the same time."""
 PERIOD_MAX = 10**9
 
 Counts = number(1e-9, 1e6)
-Period = Annotated[int, Field(ge=2, le=PERIOD_MAX)]
+Period = whole(2, PERIOD_MAX)
 Phase = number(0.0, 1.0)
 Jitter = number(1e-12, 1e-4)
 Pulse = number(1e-9, 1e-3)
 GlitchRate = number(1e-3, 1e8)
 DeadTime = number(0.0, 1e6)
-Seed = Annotated[int, Field(ge=0, le=2**32 - 1)]
+Seed = whole(0, 2**32 - 1)
 
 TOGETHER = {"eccentricity_counts": "counts_per_turn", "glitches_hz": "glitch_s", "dead": "dead_s"}
 """Keys that are given together."""
@@ -52,7 +54,7 @@ class EncoderSection(Section):
     count_m: Length
     phase_error_counts: EdgeError | Annotated[list[EdgeError], Field(min_length=4, max_length=4)] = 0.0
     duty_error_counts: EdgeError = 0.0
-    edge_error_counts: number(0.0, 0.25) = 0.0
+    edge_error_counts: number(0.0, EDGE_ERROR_MAX_COUNTS) = 0.0
     cycles: Annotated[list[CycleSection], Field(min_length=1, max_length=WAVES - 1)] | None = None
     counts_per_turn: Period | None = None
     eccentricity_counts: Counts | None = None
@@ -141,8 +143,8 @@ class EncoderSection(Section):
         most = (MOST_COUNTS - known) / LEAST_CUT_SIGMAS
         if not self.edge_error_counts <= max(most, 0.0):
             raise ValueError(
-                f"encoder.edge_error_counts must be at most {max(most, 0.0):g}: with the other errors of the encoder "
-                f"edges could come too close, not {self.edge_error_counts!r}"
+                f"encoder.edge_error_counts must be at most {max(most, 0.0):g}, for with the other errors of the "
+                f"encoder edges could come too close, not {self.edge_error_counts!r}"
             )
 
     def check_at(self, edges_hz: float, sample_hz: float) -> None:

@@ -30,7 +30,10 @@ class HandSection(Section):
             if given and self.model:
                 raise ValueError(f"hand.{key} must be absent, for hand.model is {self.model}, which has its own")
             if not given and not self.model:
-                raise ValueError(f"hand.{key} is missing, and hand.model, one of {', '.join(HANDS)}")
+                raise ValueError(
+                    f"hand.{key} is missing: a hand has {', '.join(OF_A_HAND)}, or is a published one by hand.model, "
+                    f"one of {', '.join(HANDS)}"
+                )
 
     @property
     def parts(self) -> dict[str, float]:

@@ -6,7 +6,7 @@ that a hand touches, and narrow enough that no sum or product of such numbers le
 
 from typing import Annotated, Any
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from ...model.requirements import RATES_HZ
 
@@ -14,6 +14,16 @@ from ...model.requirements import RATES_HZ
 def number(least: float, most: float) -> Any:
     """Return the type of a number from `least` to `most`."""
     return Annotated[float, Field(ge=least, le=most, allow_inf_nan=False)]
+
+
+def _as_int(value: Any) -> Any:
+    """Return a float that is a whole number as an int, for that is how one writes a clock of `12e6`; else the value."""
+    return int(value) if type(value) is float and value.is_integer() else value
+
+
+def whole(least: int, most: int) -> Any:
+    """Return the type of a whole number from `least` to `most`, which may be written as `1e3`."""
+    return Annotated[int, Field(ge=least, le=most), BeforeValidator(_as_int)]
 
 
 def or_none(quantity: Any) -> Any:
@@ -49,4 +59,4 @@ Radius = number(1e-4, 1e1)
 EdgeError = number(-1.0, 1.0)  # counts: a whole one puts an edge upon its neighbour
 EdgeErrorMax = number(1e-6, 1.0)  # counts: below what any stamp resolves, to a whole one
 Gain = number(1e-15, 1e15)  # in various units; the words of each estimator hold less, and say so
-Rate = Annotated[int, Field(ge=RATES_HZ[0], le=RATES_HZ[1])]
+Rate = whole(*RATES_HZ)

@@ -43,6 +43,7 @@ from .quantities import (
     Threshold,
     Time,
     or_none,
+    whole,
 )
 from .section import Section
 
@@ -86,7 +87,7 @@ class ControllerSection(Section):
     damping_max_n_s_per_m: Damping
     estimator: Literal[tuple(registry.ESTIMATORS)] = "levant"
     output: str | None = None
-    glitch_clocks: Annotated[int, Field(ge=0, le=GLITCH_CLOCKS_MAX)] | None = None
+    glitch_clocks: whole(0, GLITCH_CLOCKS_MAX) | None = None
     slew_limit_n_per_s: SlewRate | None = None
     gains: GainsSection = GainsSection()
 
@@ -128,9 +129,9 @@ class OutputSection(Section):
     """Steps of a converter (`dac_bits`), or pulses (`pwm_carrier_hz`, `pwm_steps` a period), up to +- full scale."""
 
     full_scale_n: Force
-    dac_bits: Annotated[int, Field(ge=2, le=32)] | None = None
+    dac_bits: whole(2, 32) | None = None
     pwm_carrier_hz: Rate | None = None
-    pwm_steps: Annotated[int, Field(ge=2, le=10**9)] | None = None
+    pwm_steps: whole(2, 10**9) | None = None
 
 
 class SolverSection(Section):

@@ -17,9 +17,9 @@ from stimuli.scenes import ONE_SECOND
 CYCLE = {"edges": 16, "error_counts": 0.1}
 GLITCHES = {"encoder.glitches_hz": 50.0, "encoder.glitch_s": 1e-7}
 REFUSED = [
-    ({"edge_error_counts": 0.24}, "edge_error_counts must be at most 0.2375: with the other errors"),
-    ({"edge_error_counts": 0.1, "phase_error_counts": 0.4}, "edge_error_counts must be at most 0.0375: with the other"),
-    ({"edge_error_counts": -0.1}, "edge_error_counts must be a number of 0 to 0.25, not -0.1"),
+    ({"edge_error_counts": 0.24}, "edge_error_counts must be a number of 0 to 0.2375, not 0.24"),
+    ({"edge_error_counts": 0.1, "phase_error_counts": 0.4}, "edge_error_counts must be at most 0.0375, for with the"),
+    ({"edge_error_counts": -0.1}, "edge_error_counts must be a number of 0 to 0.2375, not -0.1"),
     ({"cycles": []}, "cycles must be a list of 1 to 4, each a section, not []"),
     ({"cycles": [CYCLE] * 5}, "cycles must be a list of 1 to 4, each a section, not "),
     ({"cycles": [CYCLE, 3]}, "cycles[1] must be a section, not 3"),

@@ -13,6 +13,7 @@ from stimuli.moves import moved
 from stimuli.scenes import HAND
 
 FREE = {"handle.coulomb_n": None}
+NEEDED = f"a hand has {', '.join(OF_A_HAND)}"
 
 
 @pytest.mark.parametrize("name", HANDS)
@@ -46,8 +47,8 @@ def test_a_published_hand_moves_the_handle_as_the_linear_system_does(name):
             {"hand.model": "hogan-1989", "hand.mass_kg": 0.0},
             "hand.mass_kg must be absent, for hand.model is hogan-1989, which has its own",
         ),
-        ({"hand.rest_m": 1e-3}, f"hand.mass_kg is missing, and hand.model, one of {', '.join(HANDS)}"),
-        (HAND | {"hand.damping_n_s_per_m": None}, "hand.damping_n_s_per_m is missing, and hand.model, one of "),
+        ({"hand.rest_m": 1e-3}, f"hand.mass_kg is missing: {NEEDED}, or is a published one by hand.model, one of"),
+        (HAND | {"hand.damping_n_s_per_m": None}, f"hand.damping_n_s_per_m is missing: {NEEDED}, or is"),
     ],
 )
 def test_what_is_no_hand_is_refused(changes, message):

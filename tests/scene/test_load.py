@@ -1,5 +1,6 @@
 """Files and changes of scenes that are refused: in a line, and at once."""
 
+import math
 import os
 import re
 
@@ -110,6 +111,19 @@ def test_keys_that_contradict_each_other_are_both_named(changes, said):
     with pytest.raises(SceneError) as refusal:
         load("seed-2011", changes)
     assert str(refusal.value).startswith(f"seed-2011: {said}")
+
+
+def test_a_whole_number_may_be_written_as_a_float():
+    clocks = {"controller.clock_hz": 24e6, "encoder.seed": 3.0, "output.dac_bits": 1.2e1, "output.full_scale_n": 40.0}
+    scene = load("seed-2011", clocks)
+    assert scene.controller.clock_hz == 24_000_000
+    assert type(scene.controller.clock_hz) is int
+    assert (scene.encoder.seed, scene.output.dac_bits) == (3, 12)
+    for value, said in ((1.5, "1.5"), (math.inf, "inf"), (True, "True"), ("24e6", "'24e6'"), (2e9, "2000000000")):
+        with pytest.raises(SceneError) as refusal:
+            load("seed-2011", {"controller.clock_hz": value})
+        accepted = "controller.clock_hz must be a whole number of 1 to 1e+09"
+        assert str(refusal.value) == f"seed-2011: {accepted}, not {said}"
 
 
 def test_a_run_is_too_long_only_by_what_its_scene_says(monkeypatch):
