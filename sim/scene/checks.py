@@ -9,6 +9,7 @@ from ..world import device
 from ..world.euler import longest_s
 from ..world.presliding import fastest_per_s
 from .build import bristled_of, device_of
+from .quantities import MARGIN, rounded_down
 from .schema import Scene
 from .sentences import plain
 from .several import GAIN_WORDS
@@ -85,10 +86,10 @@ def _check_axis(scene: Scene) -> None:
         raise ValueError(f"{_key_of(error.field, scene)} {error.message}") from None
     error_counts = scene.encoder.error_counts_at(scene.edges_hz)
     fastest = spec.count_m * max_edge_rate(spec.clock_hz, scene.glitch_clocks, error_counts)
-    if spec.speed_max_m_per_s > fastest:
+    if spec.speed_max_m_per_s > fastest * MARGIN:
         raise ValueError(
-            f"controller.speed_max_m_per_s must be at most {fastest:g}, the decoder's limit at this clock, count size, "
-            f"glitch_clocks and edge error, not {spec.speed_max_m_per_s!r}"
+            f"controller.speed_max_m_per_s must be at most {rounded_down(fastest)}, the decoder's limit at this clock, "
+            f"count size, glitch_clocks and edge error, not {spec.speed_max_m_per_s!r}"
         )
 
 
@@ -212,8 +213,9 @@ def _check_output(scene: Scene) -> None:
     parts = device_of(scene)
     if output.full_scale_n > parts.command_limit_n:
         raise ValueError(
-            f"output.full_scale_n must be at most {parts.command_limit_n:g} N with pulses, all that the amplifier's "
-            f"current or the motor's voltage gives: cut pulses are another force, not {output.full_scale_n!r}"
+            f"output.full_scale_n must be at most {rounded_down(parts.command_limit_n)} N with pulses, all that the "
+            "amplifier's current or the motor's voltage gives: cut pulses are another force, "
+            f"not {output.full_scale_n!r}"
         )
     if period % output.pwm_steps:
         raise ValueError(
@@ -265,7 +267,7 @@ def _check_solver(scene: Scene, parts: device.Device) -> None:
         )
     if stable_s < step_s:
         raise ValueError(
-            f"solver.step_s must be at most {stable_s:.4g}, in longer steps this device diverges of itself, "
+            f"solver.step_s must be at most {rounded_down(stable_s)}, in longer steps this device diverges of itself, "
             f"not {step_s!r}"
         )
 

@@ -14,7 +14,7 @@ from pydantic import Field
 from ..world.encoder import Errors, offsets
 from ..world.lines import Lines
 from ..world.scale import CUT_SIGMAS, MOST_COUNTS, WAVES, Scale, Wave, cut_of, spread
-from .quantities import EdgeError, Length, number, or_none, whole
+from .quantities import MARGIN, EdgeError, Length, number, or_none, rounded_down, whole
 from .section import Section
 
 ERROR_MAX_COUNTS = 0.5
@@ -140,10 +140,10 @@ class EncoderSection(Section):
                 keys = "phase_error_counts, duty_error_counts, cycles and eccentricity_counts must move each edge"
                 keys += " against its neighbours"
             raise ValueError(f"encoder.{keys} by less than {ERROR_MAX_COUNTS:g} counts, not {known:g}")
-        most = (MOST_COUNTS - known) / LEAST_CUT_SIGMAS
-        if not self.edge_error_counts <= max(most, 0.0):
+        largest = max((MOST_COUNTS - known) / LEAST_CUT_SIGMAS, 0.0)
+        if not self.edge_error_counts <= largest * MARGIN:
             raise ValueError(
-                f"encoder.edge_error_counts must be at most {max(most, 0.0):g}, for with the other errors of the "
+                f"encoder.edge_error_counts must be at most {rounded_down(largest)}, for with the other errors of the "
                 f"encoder edges could come too close, not {self.edge_error_counts!r}"
             )
 
@@ -159,6 +159,6 @@ class EncoderSection(Section):
             most_hz = TOGETHER_MAX / max(1 / sample_hz, self.glitch_s)
             if self.glitches_hz > most_hz:
                 raise ValueError(
-                    f"encoder.glitches_hz must be at most {most_hz:g}, {TOGETHER_MAX} in a sample or at the same time, "
-                    f"not {self.glitches_hz!r}"
+                    f"encoder.glitches_hz must be at most {rounded_down(most_hz)}, {TOGETHER_MAX} in a sample or at "
+                    f"the same time, not {self.glitches_hz!r}"
                 )

@@ -4,6 +4,7 @@
 that a hand touches, and narrow enough that no sum or product of such numbers leaves the range of float64.
 """
 
+from decimal import ROUND_FLOOR, Context
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
@@ -24,6 +25,15 @@ def _as_int(value: Any) -> Any:
 def whole(least: int, most: int) -> Any:
     """Return the type of a whole number from `least` to `most`, which may be written as `1e3`."""
     return Annotated[int, Field(ge=least, le=most), BeforeValidator(_as_int)]
+
+
+MARGIN = 1 + 1e-12
+"""What a computed limit is multiplied by, for the last bits of its products: a limit of few digits is accepted."""
+
+
+def rounded_down(limit: float) -> str:
+    """Return an upper limit in six digits, not above it: what a message says is accepted."""
+    return f"{float(Context(6, ROUND_FLOOR).create_decimal(repr(float(limit * MARGIN)))):g}"
 
 
 def or_none(quantity: Any) -> Any:

@@ -151,6 +151,27 @@ def test_the_bounds_that_a_refused_wall_is_told_are_accepted(scene, changes, key
         load(scene, changes | {key: bound})
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "changes"),
+    [
+        ("controller.speed_max_m_per_s", 2.0, {"encoder.duty_error_counts": 0.11, "encoder.phase_error_counts": 0.4}),
+        ("controller.speed_max_m_per_s", 9.0, {"encoder.phase_error_counts": 0.1234567}),
+        (
+            "encoder.edge_error_counts",
+            0.2,
+            {"encoder.phase_error_counts": 0.1234567, "controller.speed_max_m_per_s": 0.2},
+        ),
+        ("solver.step_s", 1e-4, {"transmission.stiffness_n_per_m": 3.3e8}),
+    ],
+)
+def test_the_bound_that_a_refused_number_is_told_is_accepted(key, value, changes):
+    scene = "drive-2011" if key.startswith("solver.") else "seed-2011"
+    with pytest.raises(SceneError) as refusal:
+        load(scene, changes | {key: value})
+    bound = re.search(rf"{key} must be at most (\S+), ", str(refusal.value)).group(1)
+    load(scene, changes | {key: float(bound)})
+
+
 def test_a_wall_of_very_many_digits_is_refused_in_a_short_line():
     with pytest.raises(SceneError, match=r", not 10{56}\.\.\.$"):
         load("seed-2011", {"wall.stiffness_n_per_m": 10**400})
