@@ -201,7 +201,7 @@ def _maps(drop: Drop) -> Figure:
     """Return the picture of the stable regions: a panel for every method, with the others pale behind it."""
     grid = grid_of(next(iter(drop.maps.values())).case.scene)
     title = (
-        "The stable region of each method; in brackets its area, as a multiple of the paper's best\n"
+        "The stable region of each method; in brackets its area, as a multiple of Levant u's, adjusted\n"
         f"{drop.scene.name}, maps in steps of {grid.stiffness_step_n_per_m / 1e3:g} kN/m, "
         f"{grid.damping_step_n_s_per_m:.3g} N s/m"
     )

@@ -97,7 +97,7 @@ class Drop:
         return None if boundary[-1].stable_n_per_m or len(stable) < 2 else stable[-2] / max(stable)
 
     def of_papers(self, name: str) -> float | None:
-        """Return a map's area over that of Levant with adjusted gains, the paper's best; None where that is 0."""
+        """Return a map's area over that of Levant u with the paper's adjusted gains; None where that is 0."""
         papers = self.maps["adjusted"].area
         return self.maps[name].area / papers if papers else None
 
@@ -162,5 +162,5 @@ class Drop:
             areas = f"{each.area / 1e3:.0f}", "" if times is None else f"{times:.2f}", f"{each.area_in_place / 1e3:.0f}"
             end = f"{each.damping_n_s_per_m:g}", "" if before is None else f"{before:.2f}"
             rows.append([each.case.label, *areas, *end])
-        areas = ("area (kN/m N s/m)", "of the paper's best", "in place")
+        areas = ("area (kN/m N s/m)", "of Levant u, adjusted", "in place")
         return table_of(("method",), (*areas, "to B (N s/m)", "K near its end / largest"), rows)
