@@ -14,9 +14,9 @@ edge alone: where edges come faster than samples, T is the time between edges in
 
 The gains are those of the steady-state Kalman filter of a white jerk and of edges displaced at random, for a memory M
 (the time in which the past fades by e): K_x = 2 T / M, K_v = 2 T / M**2 and K_a = T / M**3 for T far below M; from
-T = M on nearly those that take the last three edges for exact. So one filter is a mean over many edges where they are
-dense, and a second difference of edges where they are rare. Gains come from a table, by the top two bits of T and by
-the level of the memory: a gain needs no precision, only the same sign of mistake everywhere.
+T = 2 M on they are kept at those of 2 M, which nearly take the last three edges for exact. So one filter is a mean over
+many edges where they are dense, and a second difference of edges where they are rare. Gains come from a table, by the
+top two bits of T and by the level of the memory: a gain needs no precision, only the same sign of mistake everywhere.
 
 The memory. There are two bounds on what the motion may do, its jerk between impacts and its acceleration at one; they
 give a quiet and an agile memory (`edge_kalman_design` has the rule). The quiet one is used until |z| passes a bound,
@@ -24,10 +24,11 @@ ALARM standard deviations of the mean of that many innovations for edges that er
 is the agile one at once, and grows again at GROWTH, a quarter, of the time that passes. An impact is noticed by some
 tenths of a count, and what came before it is forgotten in an agile memory; edges that err alone are no alarm.
 
-Silence. Without an edge the axis is within its cell. The line is held as that of `levant_edge` is: within -v and
-(5/2) D 2**-l - v, where 2**l <= s < 2**(l+1). An axis is at rest, v = a = 0, once s has more than REST_BITS bits more
-than the last T, or is half the range of the stamp, since slower edges cannot be distinguished from rest; the memory is
-then agile, and the next edge begins a motion. At standstill the velocity is exactly 0.
+Silence. Without an edge the axis is within its cell, which is as long as two edges may be apart, 1 + m counts. The line
+is held as that of `levant_edge` is: within -v and (2 + 2 m) D 2**-l - v, where 2**l <= s < 2**(l+1). An axis is at
+rest, v = a = 0, once s has more than REST_BITS bits more than the last T, or is half the range of the stamp, since
+slower edges cannot be distinguished from rest; the memory is then agile, and the next edge begins a motion. At
+standstill the velocity is exactly 0.
 
 A turn needs no care: an edge has one place, whichever way it is crossed.
 
@@ -233,5 +234,5 @@ def float_step(params, state, seen, restart):
         level, mean, velocity, acceleration = float(AGILE_LEVEL), 0.0, 0.0, 0.0
         known = int(known and not gone)
     line = velocity + acceleration * age
-    line = within(line, velocity, 2.5 * params.per_sample * 2.0 ** -max(length_of(age) - 1, 0))
+    line = within(line, velocity, params.bound * 2.0 ** -max(length_of(age) - 1, 0))
     return State(1, known, number, stamp, length, level, place, mean, velocity, acceleration), line, 0

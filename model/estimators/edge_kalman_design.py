@@ -16,7 +16,10 @@ T (`riccati`), for a bandwidth of T / M a sample. QUIET, AGILE, ALARM and GROWTH
 impact's C and the jerk of the paper's swing, and are the same for every axis.
 
 A row of the table is for a level and the top two bits of T, so M and T are those of the middle of the row, off by a
-fifth at most. Its columns are words of fixed formats, whose range follows from the largest entry:
+fifth at most. K_v T and K_a T**2 are then too large by up to 1.22 and 1.5 at the row's longest T. The filter bears that
+for T up to 2.5 M, and diverges from 2.8 M on, where its gains hardly leave room above those of the last three edges. So
+they are those of T / M = INDEX_MAX at most. The columns are words of fixed formats, whose range follows from the
+largest entry:
 
 - `blend` UQ(0, 16): the share of r that the mean of r takes; `alarm`: the bound on that mean; `fall` UQ(2, 16): the
   levels by which the memory grows over T;
@@ -33,6 +36,8 @@ Formats.
   the bits of D: a place off by half an LSB at every edge is a velocity off by a quarter of the output's LSB.
 - `acceleration`, in counts a sample per unit: i holds 2**ACCELERATION_BITS C, f turns the velocity by a quarter of its
   LSB over the longest memory.
+- The next edge is at most 1 + m counts from the last one, m = ROOM s and at least LEAST_ROOM: ROOM s are 3.5 standard
+  deviations of the difference of two edges' errors. The silence of `edge_kalman` has (2 + 2 m) D as its `bound`.
 - int64 holds every product: with a time of 26 bits motion has at most 35 and acceleration too, with a gain of 24 bits
   the error at most 38.
 """
@@ -45,7 +50,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import scale_map
-from ..arithmetic.fixed import SQ, UQ, bits_for, shift_floor
+from ..arithmetic.fixed import SQ, UQ, bits_for
 from ..checks import FieldError
 from ..quadrature import Seen
 from ..requirements import AxisRequirements
@@ -60,6 +65,12 @@ ALARM = 4.0
 """The mean of r that is an alarm, in its own standard deviations."""
 GROWTH = 0.25
 """How fast the memory grows, in memory per time: what has just begun is remembered from its beginning, at most."""
+INDEX_MAX = 2.0
+"""The largest T / M of the gains: at this one the filter is stable, with some room, over all times of a row."""
+ROOM = 5.0
+"""By how much farther apart than a count two edges may be, in errors of an edge."""
+LEAST_ROOM = 0.25
+"""The least such distance, counts: the line has errors of its own."""
 LEVELS = 4
 """Memories: level 0 is the quiet one, the last is the agile one."""
 LEVEL_BITS = 16
@@ -131,6 +142,7 @@ class FloatParams(NamedTuple):
     unit: int
     time_bits: int
     per_sample: float
+    bound: float
     steepest: float
     row_bits: int
     table: np.ndarray
@@ -200,6 +212,7 @@ class Design(EstimatorDesign):
         self.row_bits = bits_for(2 * self.time_bits)
         self._unit_s = 2.0**self.unit / axis.clock_hz
         self._per_sample = self.clocks * 2.0**-self.unit
+        self._apart = 1 + max(ROOM * gains.edge_error_counts, LEAST_ROOM)
         self._derive_table(axis, gains)
         self._derive_motion(axis)
         self._derive_words()
@@ -224,7 +237,7 @@ class Design(EstimatorDesign):
         share = np.linspace(0, 1, LEVELS)[:, None]
         self.memories_s = quiet ** (1 - share) * agile**share
         index = times_s / self.memories_s
-        gain = np.array([steady_state(each) for each in index.ravel()]).reshape(*index.shape, 3)
+        gain = np.array([steady_state(min(each, INDEX_MAX)) for each in index.ravel()]).reshape(*index.shape, 3)
         blend = np.broadcast_to(-np.expm1(-times_s / agile), index.shape)
         # In the steady state r has the variance s**2 / (1 - K_x), and is white.
         free = np.maximum(1 - gain[..., 0], np.finfo(float).eps)
@@ -300,7 +313,7 @@ class Design(EstimatorDesign):
             velocity_max=self.velocity.max << GUARD_BITS,
             acceleration_max=a.max,
             output_shift=GUARD_BITS,
-            bound=shift_floor(5 * self.clocks, 1 + self.unit - v.f),
+            bound=math.floor(2 * self._apart * self._per_sample * 2.0**v.f),
             row_bits=self.row_bits,
             table=self.table,
             scale=scale_map.nothing(),
@@ -310,7 +323,8 @@ class Design(EstimatorDesign):
         """Return the float64 kernel's parameters: unrounded gains."""
         steepest = 2.0 ** (self.acceleration.i - 1)
         sizes = self.count_width, self.unit, self.time_bits
-        return FloatParams(*sizes, self._per_sample, steepest, self.row_bits, self.rates, scale_map.nothing(True))
+        held = self._per_sample, 2 * self._apart * self._per_sample, steepest
+        return FloatParams(*sizes, *held, self.row_bits, self.rates, scale_map.nothing(True))
 
     def start(self, floating: bool = False) -> State:
         return FLOAT_START if floating else START

@@ -13,7 +13,7 @@ from cocotb.triggers import ClockCycles
 
 from hardwall.hdl.estimators.edge_kalman import Estimator
 from hardwall.model.estimators import edge_kalman
-from hardwall.model.estimators.edge_kalman_design import LEVELS, START
+from hardwall.model.estimators.edge_kalman_design import KA, KX, LEVELS, START
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model, names
 from stimuli.lengths import some_of
@@ -197,7 +197,8 @@ class Oracle:
         straight = self.v + self.turn(age)
         line = self.limited(straight)
         flags |= 2 * (line != straight)
-        bound = Fraction(5 * d.clocks, 2 << d.unit) / 2 ** max(age.bit_length() - 1, 0)
+        # The usual error of an edge is 0.1 counts, so two are at most 1.5 counts apart.
+        bound = Fraction(3 * d.clocks, 1 << d.unit) / 2 ** max(age.bit_length() - 1, 0)
         bound = min(self.to(bound, d.motion.f), self.fastest)
         sign = -1 if self.v < 0 else 1
         line = sign * max(-abs(self.v), min(sign * line, max(bound - abs(self.v), 0)))
@@ -260,7 +261,7 @@ def test_gains_are_those_of_the_riccati_equation():
         for length in (6, 9, 13, 18):
             row = level * (1 << d.row_bits) + 2 * length
             units = 2.0 ** (length - 1) * math.sqrt(1.5)
-            h = units / (d.memories_s[level, 2 * length] * axis.clock_hz)
+            h = min(units / (d.memories_s[level, 2 * length] * axis.clock_hz), 2.0)
             moved = np.array([[1, 1, 0.5], [0, 1, 1], [0, 0, 1]])
             jerk = h**6 * np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1]])
             p = scipy.linalg.solve_discrete_are(moved.T, np.array([[1.0, 0, 0]]).T, jerk, np.eye(1))
@@ -268,6 +269,26 @@ def test_gains_are_those_of_the_riccati_equation():
             words = [int(d.table[row, n]) * d.columns[n].lsb for n in (3, 4, 5)]
             for word, gain, fmt in zip(words, gains, d.columns[3:], strict=True):
                 assert word == pytest.approx(gain, rel=1e-4, abs=0.51 * fmt.lsb)
+
+
+def growth(gains: np.ndarray, time: float) -> float:
+    """Return the largest factor by which the filter's error grows from edge to edge, edges being `time` apart."""
+    moved = np.array([[1, time, time**2 / 2], [0, 1, time], [0, 0, 1]])
+    return max(abs(np.linalg.eigvals((np.eye(3) - np.outer(gains, [1, 0, 0])) @ moved)))
+
+
+@pytest.mark.parametrize("edge_error_counts", [1e-3, 1e-2, 0.1, 1.0])
+@pytest.mark.parametrize("name", ["paper", "mhz", "wide"])
+def test_the_gains_of_every_row_are_stable_over_all_of_its_times(name, edge_error_counts):
+    """A row has one set of gains for times of 2 to 3, or 3 to 4, times a power of two."""
+    d = replace(spec(name, "edge-kalman"), edge_error_max_counts=edge_error_counts).design.estimator
+    lsb = [column.lsb for column in d.columns]
+    for level in range(LEVELS):
+        for number in range(4, 2 * d.time_bits):
+            row = d.table[level << d.row_bits | number] * lsb
+            first = 2.0 ** (number // 2 - 1) * (1.5 if number % 2 else 1.0)
+            for time in first * np.array([1.0, 4 / 3 if number % 2 else 1.5]):
+                assert growth(row[KX : KA + 1], time) < 1.0, f"level {level}, {time} units"
 
 
 def test_bounds_of_the_axis_are_the_gains():
@@ -317,6 +338,27 @@ def test_a_constant_speed_is_read_to_a_few_words():
     exact, rounding = 2**d.velocity.f / 20, 2.0 ** (d.velocity.f - d.error.f - 1) / (20 * d.clocks) + 1
     assert max(abs(velocity - exact) for velocity, _ in seen[50_000:]) <= rounding
     assert {flags for _, flags in seen} == {0}
+
+
+def test_a_slow_speed_whose_edges_are_at_the_end_of_a_row_is_read():
+    """Edges much farther apart than the agile memory, where gains of the last three edges would diverge."""
+    axis = replace(spec("mhz", "edge-kalman"), edge_error_max_counts=1e-3)
+    d, every = axis.design.estimator, 3900
+    assert 1.4 < every * d.clocks / 2 ** int(math.log2(every * d.clocks)) < 1.5
+    assert every * d.clocks / axis.clock_hz > 4 * d.memories_s[-1, 2 * (every * d.clocks).bit_length()]
+    seen = walk(d, steady(d, 40 * every, every))
+    assert all(velocity * d.velocity.lsb == pytest.approx(1 / every, rel=1e-3) for velocity, _ in seen[20 * every :])
+
+
+def test_silence_between_edges_in_pairs_does_not_bound_the_velocity():
+    """Every second edge is 0.45 counts late at a constant speed: the silence before it is no sign of a slower axis."""
+    d, every, samples = design("mhz"), 16, 60_000
+    late = int(0.45 * every * d.clocks / 2)
+    assert (every * d.clocks + 2 * late).bit_length() > (every * d.clocks).bit_length()
+    displaced = np.zeros(samples, int)
+    displaced[every - 1 :: 2 * every], displaced[2 * every - 1 :: 2 * every] = late, -late
+    seen = np.array([v for v, _ in walk(d, steady(d, samples, every, displaced=displaced))[samples // 2 :]])
+    assert seen.min() * d.velocity.lsb * every > 0.99
 
 
 def test_edges_that_err_are_averaged_over_the_memory():
