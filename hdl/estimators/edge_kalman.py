@@ -157,7 +157,8 @@ class Estimator(EstimatorBlock):
                 s.waits(0),
                 *s.displaced,
                 s.row.eq(s.of_time | (s.level + HALF) >> LEVEL_BITS << d.row_bits),
-                s.age_size.eq(length_of(s.age)),
+                # An age of half the range of the stamp is at rest, however long it is.
+                s.age_size.eq(length_of(s.age[:-1])),
             ],
             "TURN SUM": [s.summed, s.way.eq(shift_floor(s.exact * d.clocks, s.place_shift))],
         }

@@ -34,7 +34,7 @@ class Signals:
         self.interval, self.passed = Signal(time), Signal(count)
         self.distance, self.beyond = Signal(shape(d.distance)), Signal()
         self.age, self.rest, self.gone = Signal(time), Signal(), Signal()
-        self.size, self.age_size = Signal(range(d.time_bits + 1)), Signal(range(d.time_bits + 1))
+        self.size, self.age_size = Signal(range(d.time_bits + 1)), Signal(range(d.time_bits))
         self.flags = Signal(2)
 
         self._place(d)

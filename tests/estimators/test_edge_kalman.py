@@ -3,13 +3,13 @@
 import math
 from dataclasses import replace
 from fractions import Fraction
-from itertools import chain
+from itertools import chain, islice
 
 import cocotb
 import numpy as np
 import pytest
 import scipy.linalg
-from cocotb.triggers import ClockCycles
+from cocotb.triggers import ClockCycles, ReadOnly, RisingEdge
 
 from hardwall.hdl.estimators.edge_kalman import Estimator
 from hardwall.model.estimators import edge_kalman
@@ -98,6 +98,30 @@ async def follows_model(dut):
     # The campaign must reach both saturations, and the quiet track too.
     assert 0 in expected["saturated"]
     assert np.bitwise_or.reduce(expected["saturated"]) == 0b11
+
+
+@cocotb.test()
+async def outputs_change_with_valid_alone(dut):
+    """What a sample has found is shown at once and whole, not as it is found."""
+    d = design(parameters()["name"])
+    bench, shown = Bench(dut, Estimator(d)), set()
+    await bench.reset()
+
+    async def watch():
+        before = None
+        while True:
+            await RisingEdge(dut.clk)
+            await ReadOnly()
+            now = int(dut.velocity.value), int(dut.saturated.value)
+            assert before in (None, now) or dut.valid.value == 1, f"{before} becomes {now} without valid"
+            before = now
+            shown.add(now[1])
+
+    watching = cocotb.start_soon(watch())
+    for row in islice(rows_of(d, 1), 400):
+        await bench.transact("strobe", "valid", **dict(zip(names(d), row, strict=True)))
+    watching.cancel()
+    assert len(shown) > 1
 
 
 @cocotb.test()
