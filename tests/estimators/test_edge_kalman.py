@@ -85,9 +85,38 @@ def drifting(d: edge_kalman.Design, samples: int):
         samples -= quiet + 40
 
 
+def braking(d: edge_kalman.Design, samples: int):
+    """Yield rows of an axis that brakes evenly and stays behind its last edge, or stops at once.
+
+    Where it stays, silence tells that the line, which goes on to brake, is wrong: at first it is held at the speed with
+    which the edge would be passed again, and then by the bound, which becomes smaller. After a stop it is the bound
+    alone.
+    """
+    random, scale = seeded(), Scale(d)
+    # In counts a clock per clock.
+    steepest = d.acceleration.max * d.acceleration.lsb / d.clocks / (1 << d.unit)
+    while samples > 0:
+        up, begin = random.random() < 0.5, scale.now + 1
+        if random.random() < 0.5:
+            edges, brake = random.randrange(8, 80), steepest * random.uniform(0.05, 0.9)
+            speed = math.sqrt(2 * brake * (edges + random.random()))
+            passed = [(speed - math.sqrt(speed**2 - 2 * brake * n)) / brake for n in range(edges)]
+        else:  # as many edges as it takes to catch up with their speed
+            every = d.clocks * random.uniform(0.4, 1.6)
+            passed = [n * every for n in range(random.randrange(120, 200))]
+        waiting = [begin + int(time) for time in passed]
+        end = waiting[-1] + random.uniform(0.5, 4) * (passed[-1] - passed[-2] + d.clocks)
+        while scale.now < end:
+            scale.now += d.clocks
+            while waiting and waiting[0] < scale.now:
+                scale.pass_edge(up, waiting.pop(0))
+            yield *scale.row(), 0
+            samples -= 1
+
+
 def rows_of(d: edge_kalman.Design, samples: int):
-    """Yield the rows of both stimuli without the run of edges, which this estimator does not use."""
-    for row in chain(stimulus(d, samples - samples // 3), drifting(d, samples // 3)):
+    """Yield the rows of all stimuli without the run of edges, which this estimator does not use."""
+    for row in chain(stimulus(d, samples // 2), drifting(d, samples // 4), braking(d, samples // 4)):
         yield *row[:8], row[9]
 
 
