@@ -13,10 +13,10 @@ and at every sample, s clocks after the last edge, u = v + a s; this line is the
 edge alone: where edges come faster than samples, T is the time between edges in use.
 
 The gains are those of the steady-state Kalman filter of a white jerk and of edges displaced at random, for a memory M
-(the time in which the past fades by e): K_x = 2 T / M, K_v = 2 T / M**2 and K_a = T / M**3 for T far below M; from
-T = 2 M on they are kept at those of 2 M, which nearly take the last three edges for exact. So one filter is a mean over
-many edges where they are dense, and a second difference of edges where they are rare. Gains come from a table, by the
-top two bits of T and by the level of the memory: a gain needs no precision, only the same sign of mistake everywhere.
+(the time in which the past fades by e): K_x = 2 T / M, K_v = 2 T / M**2 and K_a = T / M**3 for T far below M; from T =
+2 M on they are kept at those of 2 M, about those of the last three edges. So one filter is a mean over many edges where
+they are dense, and a second difference of edges where they are rare. Gains come from a table, by the top two bits of T
+and by the level of the memory: a gain needs no precision, only the same sign of mistake everywhere.
 
 The memory. There are two bounds on what the motion may do, its jerk between impacts and its acceleration at one; they
 give a quiet and an agile memory (`edge_kalman_design` has the rule). The quiet one is used until |z| passes a bound,

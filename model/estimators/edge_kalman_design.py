@@ -17,9 +17,9 @@ impact's C and the jerk of the paper's swing, and are the same for every axis.
 
 A row of the table is for a level and the top two bits of T, so M and T are those of the middle of the row, off by a
 fifth at most. K_v T and K_a T**2 are then too large by up to 1.22 and 1.5 at the row's longest T. The filter bears that
-for T up to 2.5 M, and diverges from 2.8 M on, where its gains hardly leave room above those of the last three edges. So
-they are those of T / M = INDEX_MAX at most. The columns are words of fixed formats, whose range follows from the
-largest entry:
+for T up to 2.6 M, and diverges from 2.8 M on: for ever rarer edges the gains of a white jerk go to K_v T = 1.73 and
+K_a T**2 = 1.49, beyond the 1.5 and 1 of the last three edges. So they are those of T / M = INDEX_MAX at most, 1.46 and
+1.08. The columns are words of fixed formats, whose range follows from the largest entry:
 
 - `blend` UQ(0, 16): the share of r that the mean of r takes; `alarm`: the bound on that mean; `fall` UQ(2, 16): the
   levels by which the memory grows over T;

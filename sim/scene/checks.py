@@ -211,7 +211,7 @@ def _check_output(scene: Scene) -> None:
             f"not {output.pwm_carrier_hz!r}"
         )
     parts = device_of(scene)
-    if output.full_scale_n > parts.command_limit_n:
+    if output.full_scale_n > parts.command_limit_n * MARGIN:
         raise ValueError(
             f"output.full_scale_n must be at most {rounded_down(parts.command_limit_n)} N with pulses, all that the "
             "amplifier's current or the motor's voltage gives: cut pulses are another force, "
@@ -265,7 +265,7 @@ def _check_solver(scene: Scene, parts: device.Device) -> None:
             f"solver must be left out: this device diverges of itself in steps longer than {stable_s:.4g} s, "
             f"more than {STEPS_MAX} a sample"
         )
-    if stable_s < step_s:
+    if step_s > stable_s * MARGIN:
         raise ValueError(
             f"solver.step_s must be at most {rounded_down(stable_s)}, in longer steps this device diverges of itself, "
             f"not {step_s!r}"

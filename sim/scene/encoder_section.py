@@ -157,7 +157,7 @@ class EncoderSection(Section):
             )
         if self.glitches_hz:
             most_hz = TOGETHER_MAX / max(1 / sample_hz, self.glitch_s)
-            if self.glitches_hz > most_hz:
+            if self.glitches_hz > most_hz * MARGIN:
                 raise ValueError(
                     f"encoder.glitches_hz must be at most {rounded_down(most_hz)}, {TOGETHER_MAX} in a sample or at "
                     f"the same time, not {self.glitches_hz!r}"

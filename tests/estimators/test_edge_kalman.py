@@ -333,7 +333,7 @@ def growth(gains: np.ndarray, time: float) -> float:
 @pytest.mark.parametrize("edge_error_counts", [1e-3, 1e-2, 0.1, 1.0])
 @pytest.mark.parametrize("name", ["paper", "mhz", "wide"])
 def test_the_gains_of_every_row_are_stable_over_all_of_its_times(name, edge_error_counts):
-    """A row has one set of gains for times of 2 to 3, or 3 to 4, times a power of two."""
+    """A row has one set of gains for times of 2 to 3, or 3 to 4, times a power of two: they fit its ends the least."""
     d = replace(spec(name, "edge-kalman"), edge_error_max_counts=edge_error_counts).design.estimator
     lsb = [column.lsb for column in d.columns]
     for level in range(LEVELS):
@@ -394,7 +394,7 @@ def test_a_constant_speed_is_read_to_a_few_words():
 
 
 def test_a_slow_speed_whose_edges_are_at_the_end_of_a_row_is_read():
-    """Edges much farther apart than the agile memory, where gains of the last three edges would diverge."""
+    """Edges much farther apart than the agile memory, where the gains of a white jerk would diverge."""
     axis = replace(spec("mhz", "edge-kalman"), edge_error_max_counts=1e-3)
     d, every = axis.design.estimator, 3900
     assert 1.4 < every * d.clocks / 2 ** int(math.log2(every * d.clocks)) < 1.5
@@ -404,7 +404,7 @@ def test_a_slow_speed_whose_edges_are_at_the_end_of_a_row_is_read():
 
 
 def test_silence_between_edges_in_pairs_does_not_bound_the_velocity():
-    """Every second edge is 0.45 counts late at a constant speed: the silence before it is no sign of a slower axis."""
+    """Edges in turns early and late, 0.55 and 1.45 counts apart: a long silence is no sign of a slower axis."""
     d, every, samples = design("mhz"), 16, 60_000
     late = int(0.45 * every * d.clocks / 2)
     assert (every * d.clocks + 2 * late).bit_length() > (every * d.clocks).bit_length()

@@ -15,6 +15,8 @@ from hardwall.sim.scene.sentences import sections_of
 from stimuli.scenes import OF_ONE_AXIS
 
 SEED = read("seed-2011")
+SEVEN_KHZ = {"controller.clock_hz": 14_000_000, "controller.sample_hz": 7000, "controller.actuation_hz": 7000}
+PULSES = {"output.dac_bits": None, "output.pwm_carrier_hz": 60_000, "output.pwm_steps": 200}
 
 
 @pytest.mark.parametrize(
@@ -162,13 +164,15 @@ def test_the_bounds_that_a_refused_wall_is_told_are_accepted(scene, changes, key
             {"encoder.phase_error_counts": 0.1234567, "controller.speed_max_m_per_s": 0.2},
         ),
         ("solver.step_s", 1e-4, {"transmission.stiffness_n_per_m": 3.3e8}),
+        ("encoder.glitches_hz", 1e8, {"encoder.glitch_s": 1e-7, **SEVEN_KHZ}),
+        ("output.full_scale_n", 1e5, {"motor.voltage_limit_v": 23.7, **PULSES}),
     ],
 )
 def test_the_bound_that_a_refused_number_is_told_is_accepted(key, value, changes):
-    scene = "drive-2011" if key.startswith("solver.") else "seed-2011"
+    scene = "drive-2011" if key.startswith(("solver.", "output.")) else "seed-2011"
     with pytest.raises(SceneError) as refusal:
         load(scene, changes | {key: value})
-    bound = re.search(rf"{key} must be at most (\S+), ", str(refusal.value)).group(1)
+    bound = re.search(rf"{key} must be at most ([^ ,]+)", str(refusal.value)).group(1)
     load(scene, changes | {key: float(bound)})
 
 
