@@ -199,7 +199,7 @@ REFUSED = {
     "solver.step_s must be a number of 1e-13 to 1, not 0.0": {"solver.step_s": 0.0},
     "solver.step_s must be 1e-08 to 0.0001, from 10000 steps a sample to one, not 0.001": {"solver.step_s": 1e-3},
     "solver.step_s must be 1e-08 to 0.0001, from 10000 steps a sample to one, not 1e-09": {"solver.step_s": 1e-9},
-    "solver.step_s must be at most 6.366e-05, in longer steps this device diverges of itself, not 0.0001":
+    "solver.step_s must be at most 6.3662e-05, in longer steps this device diverges of itself, not 0.0001":
         {"solver.step_s": 1e-4, "amplifier.bandwidth_hz": 5000.0},
     "solver.stepp_s is not a key of a scene; did you mean step_s?": {"solver.step_s": 1e-4, "solver.stepp_s": 1.0},
 }  # fmt: skip
