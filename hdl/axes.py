@@ -82,7 +82,7 @@ class Axes(wiring.Component):
         High in a clock in which an axis is sampled, and which one.
     estimated : Out(axes), velocity, saturated, estimated_count : Out
         High for one clock with a sample's velocity; the velocity, whether the estimator is saturated, and the count.
-    illegal, overspeed : Out(axes), illegal_count : Out(array)
+    illegal, overspeed, wrapped : Out(axes), illegal_count : Out(array)
         The encoder's sticky flags, now, and the illegal transitions since the last clear; saturates.
     index_count : Out(array), index_armed, index_latched : Out(axes)
         The index latch.
@@ -107,7 +107,7 @@ class Axes(wiring.Component):
         self._spec = spec
         design, axes, count, number = spec.design, spec.axes, signed(spec.count_width), range(max(spec.axes, 2))
         bits = ("encoder_a", "encoder_b", "encoder_z", "drive_enable", "clear_flags", "preload", "index_arm", "commit")
-        shown = ("sampled", "actuated", "stepped", "indexed", "estimated", "illegal", "overspeed")
+        shown = ("sampled", "actuated", "stepped", "indexed", "estimated", "illegal", "overspeed", "wrapped")
         shown += ("index_armed", "index_latched", "commit_pending")
         arrays = {
             "drive": shape(spec.force),
@@ -270,6 +270,7 @@ class Axes(wiring.Component):
                 self.indexed[number].eq(decoder.indexed),
                 self.illegal[number].eq(decoder.illegal),
                 self.overspeed[number].eq(decoder.overspeed),
+                self.wrapped[number].eq(decoder.wrapped),
                 self.illegal_count[number].eq(decoder.illegal_count),
                 self.index_count[number].eq(decoder.index_count),
                 self.index_armed[number].eq(decoder.index_armed),
@@ -279,13 +280,14 @@ class Axes(wiring.Component):
         return decoders
 
     def _entered(self, pipe: Pipe, decoders: list[Any], first: Value, word) -> tuple[Entered, Value]:
-        """Return the sample that is in stage `FRONT_LATENCY`, and its encoder's two flags."""
+        """Return the sample that is in stage `FRONT_LATENCY`, and its encoder's flags."""
         m = pipe.m
         # A preload changes the count without a motion.
         restart = Signal(self._spec.axes)
         m.d.sync += restart.eq(self.preload | (restart & ~Cat(pipe.turns(0))))
         rows = [
-            Cat(each.seen.count, restart[number], each.illegal, each.overspeed) for number, each in enumerate(decoders)
+            Cat(each.seen.count, restart[number], each.illegal, each.overspeed, each.wrapped)
+            for number, each in enumerate(decoders)
         ]
         groups = [rows[low : low + (1 << GROUP_BITS)] for low in range(0, len(rows), 1 << GROUP_BITS)]
         of_groups = [pipe.taken(chosen(m, group, pipe.axis(0)[:GROUP_BITS]), "of_group") for group in groups]

@@ -26,9 +26,10 @@ class Axis(wiring.Component):
     takes its words with the velocity of that sample, for until then it may be at work on the one before. After reset
     every parameter has its reset word (the wall is off).
 
-    Faults: after an illegal transition, or if the encoder is too fast for the decoder, the position is unknown, so the
-    drive is zero from the next sample on until `clear_flags`. `drive_enable` low makes the drive zero at the next
-    clock. Saturation in the path raises sticky `flags` and otherwise acts as the block's docstring says.
+    Faults: after an illegal transition, if the encoder is too fast for the decoder, or if the count has wrapped, the
+    position is unknown. The drive is then zero from the next sample on until `clear_flags`. `drive_enable` low makes
+    the drive zero at the next clock. Saturation in the path raises sticky `flags` and otherwise acts as the block's
+    docstring says.
 
     Latency: `latency` clocks from the strobe to the changed drive; the decoder's latency from a pin to the strobe. A
     strobe may follow the last one after `spec.design.interval` clocks.
@@ -70,7 +71,7 @@ class Axis(wiring.Component):
         High for one clock with a sample's velocity; with it, the estimator is saturated.
     strobe_busy : Out(1)
         High for one clock behind a strobe that came before the last sample's velocity, which no spec allows.
-    illegal, overspeed : Out(1)
+    illegal, overspeed, wrapped : Out(1)
         The encoder's sticky flags, now.
     illegal_count : Out
         Illegal transitions since the last clear; saturates.
@@ -121,6 +122,7 @@ class Axis(wiring.Component):
                 "strobe_busy": Out(1),
                 "illegal": Out(1),
                 "overspeed": Out(1),
+                "wrapped": Out(1),
                 "illegal_count": Out(ILLEGAL_WIDTH),
                 "index_count": Out(count),
                 "index_armed": Out(1),
@@ -175,7 +177,8 @@ class Axis(wiring.Component):
         taken_count = Signal.like(self.sampled_count)
         taken_fault, fault = Signal(len(ENCODER_FLAGS)), Signal()
         with m.If(strobe):
-            m.d.sync += [taken_count.eq(decoder.seen.count), taken_fault.eq(Cat(decoder.illegal, decoder.overspeed))]
+            faults = Cat(decoder.illegal, decoder.overspeed, decoder.wrapped)
+            m.d.sync += [taken_count.eq(decoder.seen.count), taken_fault.eq(faults)]
         with m.If(estimator.valid):
             m.d.sync += [self.sampled_count.eq(taken_count), fault.eq(taken_fault.any())]
 
@@ -211,6 +214,7 @@ class Axis(wiring.Component):
             self.saturated.eq(estimator.valid & estimator.saturated.any()),
             self.illegal.eq(decoder.illegal),
             self.overspeed.eq(decoder.overspeed),
+            self.wrapped.eq(decoder.wrapped),
             self.illegal_count.eq(decoder.illegal_count),
             self.index_count.eq(decoder.index_count),
             self.index_armed.eq(decoder.index_armed),

@@ -51,6 +51,7 @@ MEANINGS = {
     "strobe_busy": "high for one clock behind a sample that began before the last one's velocity was there",
     "illegal": "sticky: both channels changed at once; the position is unknown",
     "overspeed": "sticky: edges came faster than the filter passes; the position is unknown",
+    "wrapped": "sticky: the count has gone beyond an end of its range; the position is unknown",
     "illegal_count": "illegal transitions since the last clear; saturates",
     "index_count": "count at the index, once index_latched",
     "index_armed": "an index is waited for",

@@ -73,14 +73,15 @@ class Quadrature(wiring.Component):
     lasts a clock or more (below 2 edges a clock), `fault` is up no later than the first wrong count, whatever the
     motion. At a steady rate of ideal quadrature above 2 edges a clock it is up within `clocks_to_fault` of the model,
     unless the rate is within the exact range of a multiple of 4, where the samples equal those of a slow motion. Two
-    flags make up `fault`. `illegal`: A and B changed in one clock; nothing is counted or stamped. `overspeed`: the
+    flags are for that. `illegal`: A and B changed in one clock; nothing is counted or stamped. `overspeed`: the
     filter rejected a pulse on A or B during which, its first and last clocks included, the other channel had an edge.
     A lone glitch raises neither flag; a glitch that meets an edge of the other channel cannot be distinguished from
     speed, and raises `overspeed`.
 
     Start: counting starts from the pins as sampled by the first clock after a reset, whatever their levels.
 
-    Rounding and overflow: nothing is rounded. `count`, `index_count` and the stamps wrap, `illegal_count` saturates.
+    Rounding and overflow: nothing is rounded. `count`, `index_count` and the stamps wrap, `illegal_count` saturates. An
+    edge that takes the count beyond an end of its range raises `wrapped` with the wrong count.
 
     Coincidences: an edge decoded in the clock of `preload` is added to `preload_count`, so no motion is lost; an edge
     decoded in the clock of the index is in `index_count`; `arm` has priority over an index, which is then not latched;
@@ -112,7 +113,7 @@ class Quadrature(wiring.Component):
     arm : In(1)
         Strobe: arms the index latch.
     clear : In(1)
-        Strobe: clears `illegal`, `overspeed` and `illegal_count`.
+        Strobe: clears `illegal`, `overspeed`, `wrapped` and `illegal_count`.
     seen : Out(Seen)
         Count, stamps and the last edges.
     index_count : Out(signed(count_width))
@@ -123,10 +124,10 @@ class Quadrature(wiring.Component):
         High for one clock with the count of a new edge.
     indexed : Out(1)
         High for one clock with the count at a rising edge of Z.
-    illegal, overspeed : Out(1)
+    illegal, overspeed, wrapped : Out(1)
         Sticky flags, see above.
     fault : Out(1)
-        `illegal` or `overspeed`.
+        Any of them.
     illegal_count : Out(fault_width)
         Illegal changes since `clear`.
 
@@ -170,6 +171,7 @@ class Quadrature(wiring.Component):
                 "indexed": Out(1),
                 "illegal": Out(1),
                 "overspeed": Out(1),
+                "wrapped": Out(1),
                 "fault": Out(1),
                 "illegal_count": Out(fault_width),
             }
@@ -247,16 +249,20 @@ class Quadrature(wiring.Component):
         both = moved[0] & moved[1]
         down = Signal()
         change = Signal(signed(2))
-        count = Signal(signed(self._count_width))
+        base, count = Signal.like(seen.count), Signal.like(seen.count)
         m.d.comb += [
             down.eq(~(up ^ self.invert)),
             change.eq(Mux(one, Mux(down, -1, 1), 0)),
-            count.eq((Mux(self.preload, self.preload_count, seen.count) + change)[: self._count_width]),
+            base.eq(Mux(self.preload, self.preload_count, seen.count)),
+            count.eq((base + change)[: self._count_width]),
         ]
+        # A step of one changes the first two bits from 01 to 10, or back, only at the ends of the range.
+        beyond = (base[-1] ^ count[-1]) & (count[-1] ^ count[-2])
         m.d.sync += [
             seen.count.eq(count),
             self.stepped.eq(one),
             self.indexed.eq(moved[2] & level[2]),
+            self.wrapped.eq(beyond | (self.wrapped & ~self.clear)),
             seen.stamp.eq((seen.stamp + 1)[: self._stamp_width]),
         ]
         for bit, rise, fall in ((0, seen.stamp_a_rise, seen.stamp_a_fall), (1, seen.stamp_b_rise, seen.stamp_b_fall)):
@@ -282,7 +288,10 @@ class Quadrature(wiring.Component):
             m.d.sync += [self.index_armed.eq(0), self.index_latched.eq(1), self.index_count.eq(count)]
 
         kept = Signal(self._fault_width)
-        m.d.comb += [kept.eq(Mux(self.clear, 0, self.illegal_count)), self.fault.eq(self.illegal | self.overspeed)]
+        m.d.comb += [
+            kept.eq(Mux(self.clear, 0, self.illegal_count)),
+            self.fault.eq(self.illegal | self.overspeed | self.wrapped),
+        ]
         m.d.sync += self.illegal.eq(both | (self.illegal & ~self.clear))
         with m.If(both & ~kept.all()):
             m.d.sync += self.illegal_count.eq((kept + 1)[: self._fault_width])

@@ -1,6 +1,6 @@
 """An axis that may touch a motor: the axis, its monitors, and the supervisor behind both."""
 
-from amaranth.hdl import Cat, Module, Signal
+from amaranth.hdl import Cat, Const, Module, Signal
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
@@ -148,15 +148,14 @@ class SupervisedAxis(wiring.Component):
         outside = {
             "encoder_illegal": axis.illegal,
             "encoder_overspeed": axis.overspeed,
+            "position_wrap": axis.wrapped,
             "strobe_busy": axis.strobe_busy,
             "word_range": Cat(beyond).any(),
             "external_fault": ~levels["external_fault"],
             "emergency_stop": ~levels["emergency_stop"],
         }
         m.d.comb += [
-            supervisor.causes.eq(
-                Cat(outside.get(cause.name, made) for cause, made in zip(CAUSES, monitors.causes, strict=True))
-            ),
+            supervisor.causes.eq(monitors.causes | Cat(outside.get(cause.name, Const(0, 1)) for cause in CAUSES)),
             supervisor.strobe.eq(axis.sampled),
             supervisor.drive.eq(axis.drive),
             supervisor.stamp.eq(axis.stamp),

@@ -185,9 +185,9 @@ class SupervisedAxes(wiring.Component):
                 edges=Cat(waited["edge_a"], waited["edge_b"]),
             )
         )
-        causes = {
-            **{bit: pipe.taken(waited[cause.name]) for bit, cause in enumerate(CAUSES) if cause.name in waited},
-            BITS["word_range"]: pipe.taken(self._out_of_range(words, look + 1)),
+        outside = {bit: pipe.taken(waited[cause.name]) for bit, cause in enumerate(CAUSES) if cause.name in waited}
+        outside[BITS["word_range"]] = pipe.taken(self._out_of_range(words, look + 1))
+        made = {
             **monitors.of_sample(sample, end),
             **monitors.runaway(moved, pipe.later(first, look), supervisors.let_out, look - 1),
             **lost,
@@ -199,7 +199,7 @@ class SupervisedAxes(wiring.Component):
                 stamp=axes.stamp,
                 first=pipe.later(first, end),
                 live=self._watchdog.live,
-                causes=Cat(causes.get(bit, Const(0, 1)) for bit in range(COUNT)),
+                causes=Cat(outside.get(bit, Const(0, 1)) | made.get(bit, Const(0, 1)) for bit in range(COUNT)),
                 enable=~pipe.taken(waited["drive_enable"]),
                 **{name: pipe.taken(waited[name]) for name in ("referenced", *REQUESTS, "acknowledged")},
             )

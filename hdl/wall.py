@@ -44,8 +44,8 @@ class Wall(Block):
     Latency: `latency` clocks from `strobe` to `valid`. A sample's `lead` comes `design.lead` clocks or more before its
     `strobe`, and not before the last sample's `strobe`; it may come with that one.
 
-    Rounding and overflow: low bits of the velocity beyond `design.coarse` are dropped; the exact sum of the products
-    is rounded once, half of a push up, to a force LSB, then saturates at the force format.
+    Rounding and overflow: the depth is exact. Low bits of the velocity beyond `design.coarse` are dropped; the exact
+    sum of the products is rounded once, half of a push up, to a force LSB, then saturates at the force format.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Wall(Block):
     lead : In(1)
         Pulse: take a sample's count.
     count : In(signed)
-        With `lead`: position, counts; may wrap.
+        With `lead`: position, counts.
     strobe : In(1)
         Pulse: take the same sample's velocity.
     velocity : In(SQ)
@@ -106,7 +106,7 @@ class Wall(Block):
         m = Module()
         design = self._design
         counted = Signal(signed(design.count_width))
-        offset = Signal(signed(design.count_width))
+        offset = Signal(shape(design.depth))
         left, positive, negative = Signal(), Signal(), Signal()
         known, placed, damped, summed = Signal(), Signal(), Signal(), Signal()
 
@@ -116,9 +116,9 @@ class Wall(Block):
         # The force is that of a spring to the surface and a damper, whatever the side: -side push = stiffness offset -
         # damping velocity. The side says where it acts.
         with m.If(known):
-            m.d.sync += offset.eq((self.wall_position - counted)[: len(offset)].as_signed())
+            m.d.sync += offset.eq(self.wall_position - counted)
         pulled, spring = products("spring", self.wall_stiffness, offset)
-        inside = offset[:-1].any() & (offset[-1] != self.wall_left)
+        inside = (offset != 0) & (offset[-1] != self.wall_left)
         if design.coupling:
             inside |= self.wall_two_sided
         with m.If(placed):

@@ -28,6 +28,7 @@ from .designed import DesignedAxis
 from .drive import registry
 from .drive.pdm import USUAL
 from .drive.stage import Stage, StageDesign
+from .quadrature import WRAPPED
 
 AXES_MAX = 32
 """The most axes of one pipeline."""
@@ -165,18 +166,21 @@ class Axes:
         """Run a record of counts of every axis from the start state.
 
         Args:
-            counts: integers, shape (axes, samples). A count may exceed the count's width: it wraps, as in the hardware.
-                It may not jump by half of its range.
+            counts: integers, shape (axes, samples). A count may exceed the count's width: it wraps, as in the hardware,
+                and from there on the flag count_wrapped is up and the drive is zero. It may not jump by half of its
+                range.
 
         Raises:
             TypeError: if the counts are not integers.
             ValueError: if the counts have no row for every axis, or jump.
         """
         spec = self.spec
-        lanes = checks.lanes_of_counts(counts, spec.count_width, spec.clocks_per_sample)
+        lanes, wrapped = checks.lanes_of_counts(counts, spec.count_width, spec.clocks_per_sample)
         if lanes.ndim != 2 or len(lanes) != spec.axes:
             raise ValueError(f"counts must have a row for each of the {spec.axes} axes, not the shape {lanes.shape}")
+        faults = wrapped * WRAPPED
         velocity, force, drive, flags = (np.zeros(lanes.shape, np.int64) for _ in range(4))
         for lane, params in enumerate(self.params):
-            run(params, self.design.start(), lanes[lane], velocity[lane], force[lane], drive[lane], flags[lane])
+            made = velocity[lane], force[lane], drive[lane], flags[lane]
+            run(params, self.design.start(), lanes[lane], faults[lane], *made)
         return Record(self.design, velocity, force, drive, flags)

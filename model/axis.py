@@ -32,7 +32,7 @@ def step(
         state: what `Design.start` or the previous call returned, of the same number type.
         seen: what the decoder shows at the strobe.
         restart: true if the count was preloaded since the last sample; the estimator then starts afresh.
-        fault: the encoder's two sticky flags; either of them forces the drive to zero.
+        fault: the encoder's sticky flags; any of them forces the drive to zero.
         enable: false forces the drive to zero.
     """
     estimator, velocity, estimator_flags = estimate(params.estimator, state.estimator, seen, restart)
@@ -47,10 +47,16 @@ def step(
 
 
 @compiled
-def run(params, state, counts, velocity, force, drive, flags):
-    """Take a record of `counts` sample by sample, fill the other arrays (of the same length) and return the state."""
+def run(params, state, counts, faults, velocity, force, drive, flags):
+    """Take a record sample by sample, fill the arrays from `velocity` on (of the same length) and return the state.
+
+    Args:
+        params, state: as of `step`.
+        counts, faults: the count of every sample, and the encoder's sticky flags.
+        velocity, force, drive, flags: what comes of every sample.
+    """
     for k in range(len(counts)):
-        state, velocity[k], force[k] = step(params, state, quadrature.seen_count(counts[k]), 0, 0, 1)
+        state, velocity[k], force[k] = step(params, state, quadrature.seen_count(counts[k]), 0, faults[k], 1)
         drive[k] = state.output.drive
         flags[k] = state.flags
     return state
@@ -117,7 +123,8 @@ class Axis:
 
         Args:
             counts: integers, shape (samples,), or (lanes, samples) for independent axes side by side. A count may
-                exceed the count's width: it wraps, as in the hardware. It may not jump by half of its range.
+                exceed the count's width: it wraps, as in the hardware, and from there on the flag count_wrapped is up
+                and the drive is zero. It may not jump by half of its range.
 
         Raises:
             TypeError: if the counts are not integers.
@@ -130,12 +137,13 @@ class Axis:
                 f"hardwall.model.stamped.run takes the edges that it needs"
             )
         spec = self.spec
-        checked = checks.lanes_of_counts(counts, spec.count_width, spec.clocks_per_sample)
-        lanes = np.atleast_2d(checked)
+        checked, wrapped = checks.lanes_of_counts(counts, spec.count_width, spec.clocks_per_sample)
+        lanes, faults = np.atleast_2d(checked), np.atleast_2d(wrapped) * quadrature.WRAPPED
         number = np.float64 if self.floating else np.int64
         velocity, force, drive = (np.zeros(lanes.shape, number) for _ in range(3))
         flags = np.zeros(lanes.shape, np.int64)
         for lane in range(len(lanes)):
             start = self.design.start(self.floating)
-            run(self.params, start, lanes[lane], velocity[lane], force[lane], drive[lane], flags[lane])
+            made = velocity[lane], force[lane], drive[lane], flags[lane]
+            run(self.params, start, lanes[lane], faults[lane], *made)
         return Record(self.design, *(array.reshape(checked.shape) for array in (velocity, force, drive, flags)))

@@ -79,11 +79,12 @@ def integers(name: str, values: ArrayLike, least: int = -LARGEST - 1, most: int 
     return array.astype(np.int64)
 
 
-def lanes_of_counts(counts: ArrayLike, width: int, most: int) -> np.ndarray:
-    """Return records of counts as int64 words of `width` bits, shape (samples,) or (lanes, samples).
+def lanes_of_counts(counts: ArrayLike, width: int, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return records of counts as int64 words of `width` bits, and at which samples a count has wrapped.
 
-    Counts beyond the width wrap. From one sample to the next a count may change by less than half of its range, or
-    wrap around the end of the range; a wrapped change is at most `most`, the counts that the decoder can make in a
+    Both have the shape of the records, (samples,) or (lanes, samples). A count beyond the width wraps, and has then
+    wrapped for the rest of its record. From one sample to the next a count may change by less than half of its range,
+    or wrap around the end of the range; a wrapped change is at most `most`, the counts that the decoder can make in a
     sample.
 
     Raises:
@@ -105,7 +106,8 @@ def lanes_of_counts(counts: ArrayLike, width: int, most: int) -> np.ndarray:
                 f"counts must change by less than {half}, half of their range, from sample to sample, "
                 f"not by {changes[*lane, before]} at sample {before + 1}{f' of lane {lane[0]}' if lane else ''}"
             )
-    return ((array + half) & (2 * half - 1)) - half
+    beyond = (array < -half) | (array >= half) | np.pad(far, [(0, 0)] * (array.ndim - 1) + [(1, 0)])
+    return ((array + half) & (2 * half - 1)) - half, np.logical_or.accumulate(beyond, axis=-1)
 
 
 def edges(edge_clocks: ArrayLike, edge_levels: ArrayLike) -> tuple[np.ndarray, np.ndarray]:

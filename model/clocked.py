@@ -78,7 +78,7 @@ def _take(params, state, outputs, k):
     seen = quadrature.seen(state.decoder)
     estimator, velocity, raised = estimate(params.estimator, state.axis.estimator, seen, state.restart)
     force = wall.render(params.wall, seen.count, velocity)
-    fault = state.decoder.illegal | state.decoder.overspeed << 1
+    fault = quadrature.fault(state.decoder)
     outputs.velocity[k], outputs.wall_force[k] = velocity, force
     flags = fault | raised << params.estimator_bit
     return estimator, UnderWay(seen.count, state.restart, velocity, force, int(fault == 0), flags, params)

@@ -41,6 +41,7 @@ class Outputs(NamedTuple):
     index_latched: np.ndarray
     illegal: np.ndarray
     overspeed: np.ndarray
+    wrapped: np.ndarray
     illegal_count: np.ndarray
 
 
@@ -74,7 +75,7 @@ def _show(outputs, n, state):
     outputs.count[n], outputs.stepped[n], outputs.edge_kind[n] = decoder.count, decoder.stepped, decoder.edge
     outputs.stamp[n], outputs.indexed[n], outputs.index_count[n] = decoder.stamp, decoder.indexed, decoder.index_count
     outputs.index_armed[n], outputs.index_latched[n] = decoder.index_armed, decoder.index_latched
-    outputs.illegal[n], outputs.overspeed[n] = decoder.illegal, decoder.overspeed
+    outputs.illegal[n], outputs.overspeed[n], outputs.wrapped[n] = decoder.illegal, decoder.overspeed, decoder.wrapped
     outputs.illegal_count[n] = decoder.illegal_count
 
 

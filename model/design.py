@@ -16,7 +16,7 @@ GLITCH_WIDTH = GLITCH_CLOCKS_MAX.bit_length()
 """Bits of the glitch filter's length."""
 ILLEGAL_WIDTH = 8
 """Bits of the count of illegal transitions, which saturates: a count of one is a fault, a full count a broken cable."""
-ENCODER_FLAGS = ("encoder_illegal", "encoder_overspeed")
+ENCODER_FLAGS = ("encoder_illegal", "encoder_overspeed", "count_wrapped")
 
 
 class Params(NamedTuple):

@@ -62,6 +62,7 @@ class State(NamedTuple):
     run: int  # successive edges that counted in that direction, at most RUN_MAX; 0: none, or the past is not known
     illegal: int
     overspeed: int
+    wrapped: int  # the count has gone beyond an end of its range, since the last clear
     illegal_count: int
     first: int  # stages of the synchronisers
     second: int
@@ -77,6 +78,8 @@ class State(NamedTuple):
     starting: int  # clocks until the synchronisers are filled
 
 
+WRAPPED = 1 << 2
+"""The sticky flag `wrapped` in the word of `fault`."""
 A_RISE, B_RISE, A_FALL, B_FALL = range(4)
 RUN_MAX = 4
 """Edges in a full cycle of the encoder: after this many in one direction, all four stamps are of the last cycle."""
@@ -124,7 +127,7 @@ def seen(state: State) -> Seen:
 @compiled
 def fault(state):
     """Return the sticky flags of a state as a word, `illegal` first."""
-    return state.illegal | state.overspeed << 1
+    return state.illegal | state.overspeed << 1 | (WRAPPED if state.wrapped else 0)
 
 
 @compiled
@@ -192,7 +195,8 @@ def step(params, state, inputs, strobes):
     both = state.moved & state.moved >> 1 & 1
     base = strobes.preload_count if strobes.preload else state.count
     down = ~(state.up ^ inputs.invert) & 1
-    count = wrap(base + one * (1 - 2 * down), params.count_width)
+    onward = base + one * (1 - 2 * down)
+    count = wrap(onward, params.count_width)
     one_a = one & state.moved
     one_b = one & state.moved >> 1
     risen = level & state.moved & 3
@@ -218,6 +222,7 @@ def step(params, state, inputs, strobes):
         run=_either(one, run, _either(both, 0, state.run)),
         illegal=both | (state.illegal & ~strobes.clear),
         overspeed=outrun | (state.overspeed & ~strobes.clear),
+        wrapped=int(count != onward) | (state.wrapped & ~strobes.clear),
         illegal_count=min(illegal_count, (1 << params.fault_width) - 1),
         first=inputs.a | inputs.b << 1 | inputs.z << 2,
         second=state.first,
@@ -262,6 +267,7 @@ def resting(params, state, count, pins, clocks):
         run=state.run,
         illegal=state.illegal,
         overspeed=state.overspeed,
+        wrapped=state.wrapped,
         illegal_count=state.illegal_count,
         first=pins,
         second=pins,
@@ -293,8 +299,10 @@ def _edge(params, state, inputs, pins, clocks):
     decoded = (state.stamp + LATENCY + inputs.glitch_clocks - 1) & mask
     down = ~(pins ^ state.level >> 1 ^ inputs.invert) & 1
     kind = (changed >> 1) + 2 * int((changed & pins) == 0)
+    onward = state.count + 1 - 2 * down
+    count = wrap(onward, params.count_width)
     return State(
-        count=wrap(state.count + 1 - 2 * down, params.count_width),
+        count=count,
         index_count=state.index_count,
         index_armed=state.index_armed,
         index_latched=state.index_latched,
@@ -310,6 +318,7 @@ def _edge(params, state, inputs, pins, clocks):
         run=_either(state.down == down, min(state.run + 1, RUN_MAX), 1),
         illegal=state.illegal,
         overspeed=state.overspeed,
+        wrapped=state.wrapped | int(count != onward),
         illegal_count=state.illegal_count,
         first=pins,
         second=pins,

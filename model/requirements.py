@@ -8,7 +8,8 @@ Units inside the axis are counts and sample periods, so with q the count size an
 
 Counts. Positions and the wall may lie anywhere in the travel whatever the origin (twice the travel), and an overshoot
 as large again must not alias: the count covers plus and minus four times the travel, halved on each side, which is
-`1 + ceil(log2(4 travel / q))` bits with the sign. The count wraps, and all differences are taken modulo its width.
+`1 + ceil(log2(4 travel / q))` bits with the sign. An edge beyond an end of that range wraps the count and raises a
+flag. Differences of two counts of the handle are taken modulo the width. The wall's depth is not: it has a bit more.
 
 Force. The force LSB is `force_resolution_n`; `force` is the format between wall and output stage, with one bit more
 than the largest drive needs, so that a saturated wall force is always beyond the limit that the output stage applies.

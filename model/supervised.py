@@ -12,9 +12,10 @@ from .words import Word
 
 FIXED = ("output_force_limit",)
 """Words of the axis that no host writes: the supervisor's force limit holds at once, and after everything."""
-FROM_AXIS = ("encoder_illegal", "encoder_overspeed", "strobe_busy")
+FROM_AXIS = ("encoder_illegal", "encoder_overspeed", "position_wrap", "strobe_busy")
 FROM_OUTSIDE = ("word_range", "external_fault", "emergency_stop")
-"""Causes that the axis shows, and causes that the live words and pins show; the others are the monitors'."""
+"""Causes that the axis shows, and causes that the live words and pins show. The monitors show the others, and with the
+axis position_wrap."""
 
 
 class Design:

@@ -62,7 +62,7 @@ CAUSES = (
     Cause("encoder_loss", True, False, "a channel and its complement are equal for longer than an edge takes"),
     Cause("index_spacing", True, False, "two index pulses are no multiple of the counts of a turn apart"),
     Cause("position_range", False, False, "the count is beyond the range that the host has set"),
-    Cause("position_wrap", False, True, "the count is about to wrap, and a wall would change its side"),
+    Cause("position_wrap", False, True, "the count is about to wrap, or has wrapped: the position is then unknown"),
     Cause("velocity_limit", False, False, "the estimated speed is beyond the limit that the host has set"),
     Cause("runaway", False, False, "the drive is at its limit and the handle moves with it: polarity is reversed"),
     Cause("estimator_saturated", False, False, "the estimator's output is saturated for longer than the host allows"),

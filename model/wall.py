@@ -13,6 +13,8 @@ tool use, IROS 1995.)
 
 Formats, derived, with the force LSB r, the count q and the sample period tau:
 
+- The depth has a bit more than the count, so that it is exact: a wall is at a place, and a far one is far. Differences
+  of two counts of a handle are taken modulo the count's width; this one is none.
 - `stiffness` and `damping` are gain words in force LSB a count and a count/sample.
 - The velocity keeps only as many fraction bits as can move the push by half a force LSB at the largest damping; the
   other bits are dropped (floor). The surface's velocity is a word with these bits.
@@ -24,7 +26,7 @@ In total, fixed point differs from the exact equation on the same words by at mo
 
 from typing import NamedTuple
 
-from .arithmetic.fixed import SQ, UQ, saturate, shift_floor, shift_round_half_up, wrap
+from .arithmetic.fixed import SQ, UQ, saturate, shift_floor, shift_round_half_up
 from .checks import FieldError
 from .compiled import by_type, compiled
 from .requirements import AxisRequirements
@@ -49,7 +51,6 @@ class Params(NamedTuple):
     forbid_pull: int
     velocity: int
     two_sided: int
-    count_width: int
     velocity_shift: int
     spring_shift: int
     damper_shift: int
@@ -68,7 +69,6 @@ class FloatParams(NamedTuple):
     forbid_pull: int
     velocity: float
     two_sided: int
-    count_width: int
     velocity_lsb: float
 
 
@@ -90,6 +90,7 @@ class Design:
     Attributes:
         coupling: as given.
         stiffness, damping: gain formats.
+        depth: format of the depth.
         coarse: format of the velocity as the damper takes it.
         push: fraction bits in which the products are added.
         lean_bits: bits of what the surface's velocity adds, with half a force LSB.
@@ -113,7 +114,8 @@ class Design:
         self.stiffness = gain_format(axis.stiffness_max_n_per_m * q / r)
         self.damping, self.coarse = damper_formats(axis, velocity)
         self.push = max(self.stiffness.f, self.damping.f + self.coarse.f, 0)
-        spring_bits = 16 + axis.count_width + self.push - self.stiffness.f
+        self.depth = SQ(axis.count_width + 1, 0)
+        spring_bits = 16 + self.depth.width + self.push - self.stiffness.f
         damper_bits = 16 + self.coarse.width + self.push - self.damping.f - self.coarse.f
         for name, bits in (("stiffness_max_n_per_m", damper_bits), ("damping_max_n_s_per_m", spring_bits)):
             if bits > 61:
@@ -156,7 +158,6 @@ class Design:
             forbid_pull=words["wall_forbid_pull"],
             velocity=words.get("wall_velocity", 0),
             two_sided=words.get("wall_two_sided", 0),
-            count_width=self.count_width,
             velocity_shift=self.velocity.f - self.coarse.f,
             spring_shift=self.push - self.stiffness.f,
             damper_shift=self.push - self.damping.f - self.coarse.f,
@@ -175,7 +176,6 @@ class Design:
             words["wall_forbid_pull"],
             words.get("wall_velocity", 0) * self.coarse.lsb,
             words.get("wall_two_sided", 0),
-            self.count_width,
             self.coarse.lsb,
         )
 
@@ -186,28 +186,22 @@ def render(params, count, velocity):
 
     Args:
         params: `Params` (integer words) or `FloatParams` (float64).
-        count: position, counts, as a signed word that may have wrapped.
+        count: position, counts, a signed word.
         velocity: word of the estimator's velocity format (float: counts a sample).
     """
 
 
 @compiled
 def _depth(params, count):
-    offset = wrap(params.position - count, params.count_width)
+    offset = params.position - count
     return offset if params.left else -offset
-
-
-@compiled
-def _acts(params, depth):
-    # Half of the count's range away is on neither side, and for what holds on both sides at the surface plus that half.
-    return params.two_sided or 0 < depth < 1 << (params.count_width - 1)
 
 
 @render.register(Params)
 @compiled
 def step(params, count, velocity):
     depth = _depth(params, count)
-    if not _acts(params, depth):
+    if not (params.two_sided or depth > 0):
         return 0
     coarse = shift_floor(velocity, params.velocity_shift) - params.velocity
     inward = -coarse if params.left else coarse
@@ -222,7 +216,7 @@ def step(params, count, velocity):
 @compiled
 def float_step(params, count, velocity):
     depth = _depth(params, count)
-    if not _acts(params, depth):
+    if not (params.two_sided or depth > 0):
         return 0.0
     relative = velocity - params.velocity
     inward = -relative if params.left else relative
@@ -253,7 +247,6 @@ def word_moved(params, position, velocity):
         params.forbid_pull,
         velocity,
         params.two_sided,
-        params.count_width,
         params.velocity_shift,
         params.spring_shift,
         params.damper_shift,
@@ -273,6 +266,5 @@ def float_moved(params, position, velocity):
         params.forbid_pull,
         velocity * params.velocity_lsb,
         params.two_sided,
-        params.count_width,
         params.velocity_lsb,
     )

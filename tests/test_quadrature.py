@@ -49,7 +49,7 @@ def expected(params: Params, inputs: dict[str, np.ndarray]) -> dict[str, np.ndar
         after = run_all(params, {name: inputs[name][begin + 1 : end] for name in INPUTS})
         record[:, begin + 1 : end] = after[:N_OUTPUTS]
     outputs = dict(zip(OUTPUTS, record, strict=False))
-    return {**outputs, "fault": outputs["illegal"] | outputs["overspeed"]}
+    return {**outputs, "fault": outputs["illegal"] | outputs["overspeed"] | outputs["wrapped"]}
 
 
 def run_all(params: Params, columns: dict[str, np.ndarray]) -> State:
@@ -123,6 +123,7 @@ def test_count_and_stamps_wrap(way):
     counts = 4 * way + position[1:-TO_COUNT]
     assert (seen["count"][1 + TO_COUNT :] == wrap(counts, 4)).all()
     assert len(set(seen["count"])) == 16
+    assert (seen["wrapped"][1 + TO_COUNT :] == np.logical_or.accumulate(wrap(counts, 4) != counts)).all()
     assert (seen["stamp"] == clock % 32).all()
     for channel in "ab":
         for kind, change in (("rise", 1), ("fall", -1)):

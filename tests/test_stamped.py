@@ -35,7 +35,7 @@ def test_records_are_the_decoders_clocks_and_the_axis_samples(floating):
     state = of.design.start(floating)
     for k in range(samples):
         before = quadrature.State(*(int(column[(k + 1) * period - 2]) for column in decoded))
-        fault = before.illegal | before.overspeed << 1
+        fault = quadrature.fault(before)
         state, velocity, force = axis.step(of.params, state, quadrature.seen(before), 0, fault, 1)
         assert (velocity, force, state.output.drive, state.flags) == (
             seen.velocity[k], seen.force[k], seen.drive[k], seen.flags[k]

@@ -166,9 +166,9 @@ def oracle(d: wall.Design, row) -> int:
     """Return the force by the module's equations in exact rationals, rounded only where the module documents it."""
     count, velocity, k, b, position, left, forbid_pull, *moving = row
     surface, two_sided = moving or (0, 0)
-    side, half = (-1 if left else 1), 1 << (d.count_width - 1)
-    depth = side * ((count - position - 1 + half) % (2 * half) - half + 1)
-    if not two_sided and (depth <= 0 or depth == half):
+    side = -1 if left else 1
+    depth = side * (count - position)
+    if not two_sided and depth <= 0:
         return 0
     coarse = math.floor(Fraction(velocity) / 2 ** (d.velocity.f - d.coarse.f)) - surface
     coarse *= Fraction(2) ** -d.coarse.f

@@ -38,6 +38,7 @@ def encoders(pipe: Pipe, axes: Axes, levels: Mapping[str, Value], look: int) -> 
     pulses = {
         "encoder_illegal": axes.illegal,
         "encoder_overspeed": axes.overspeed,
+        "position_wrap": axes.wrapped,
         "unlike_a": levels["encoder_a"] ^ levels["encoder_a_n"],
         "unlike_b": levels["encoder_b"] ^ levels["encoder_b_n"],
         "edge_a": axes.stepped & ~kinds,

@@ -24,7 +24,7 @@ def force(
     left, position = word("wall_left", stage), word("wall_position", stage)
     offset = Mux(left, position - count, count - position)
     coarse = shift_floor(velocity, design.velocity.f - design.coarse.f)
-    depth = pipe.taken(offset[: design.count_width].as_signed(), "depth")
+    depth = pipe.taken(offset[: design.depth.width].as_signed(), "depth")
     inward = pipe.taken(Mux(left, -coarse, coarse), "inward")
     left, forbid_pull = pipe.later(left, 4), word("wall_forbid_pull", stage + 4)
     inside = pipe.later(depth > 0, 3)

@@ -11,7 +11,8 @@ the next,
 - the velocity keeps its sign: no turn, no rest, and every level lasts;
 - the speed stays below that at which the closest edges of the scale are so many clocks apart that each is decoded
   before the next one comes (`Sweep.most_m_per_s`);
-- the position that is counted is farther from any edge than the rounding of an edge's time.
+- the position that is counted is farther from any edge than the rounding of an edge's time;
+- the count stays within its range.
 
 All that is known before anything of the sample is done. What is not swept is left to the loop, which needs the decoder
 as the edges leave it: those of the last swept sample are found after all, and decoded from rest.
@@ -20,7 +21,6 @@ as the edges leave it: those of the last swept sample are found after all, and d
 from typing import NamedTuple
 
 from ...model import quadrature, stamped
-from ...model.arithmetic.fixed import wrap
 from ...model.axis import step
 from ...model.compiled import compiled, inlined
 from ...model.design import change_of, strobe_of
@@ -74,9 +74,8 @@ def _sampled(controller, state, count):
 
 @inlined
 def _count(controller, start, number):
-    """Return the count of a cell."""
-    forward = start - number if controller.invert else number - start
-    return wrap(forward, controller.decoder.count_width)
+    """Return the count of a cell, which may be beyond the ends of the count's range."""
+    return start - number if controller.invert else number - start
 
 
 @compiled
@@ -122,6 +121,9 @@ def sweep(constants, world, controller, state, progress, memory, first, until):
     if decoder.illegal_count != state.decoder.illegal_count:
         return state, progress
     start = moment.cell.number + (decoder.count if controller.invert else -decoder.count)
+    # No count of a sample, nor that a sample later, is beyond an end of its range: a clock counts one edge at most.
+    later = world.timing.clocks_per_sample + quadrature.LATENCY + controller.glitch_clocks
+    most = (1 << controller.decoder.count_width - 1) - 1 - later
     swept = Swept(begin, moment.motion, force_n, state, moment.motion, force_n)
     while swept.sample + 1 < until:
         motion, force_n, k = swept.motion, swept.force_n, swept.sample + 1
@@ -134,7 +136,10 @@ def sweep(constants, world, controller, state, progress, memory, first, until):
         unsure_m = constants.margin_m + ROUNDING * abs(counted_m)
         if not (_goes_on(constants, motion, at) and _goes_on(constants, at, after) and apart_m > unsure_m):
             break
-        state = _sampled(controller, swept.state, _count(controller, start, cell.number))
+        count = _count(controller, start, cell.number)
+        if abs(count) > most:
+            break
+        state = _sampled(controller, swept.state, count)
         swept = Swept(k, after, actuated(world, memory, k - first, k, at, state), state, motion, force_n)
     if swept.sample == begin:
         return state, progress

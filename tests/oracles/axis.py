@@ -10,7 +10,7 @@ from hardwall.model.supervised import FIXED, Design
 
 PULSES = ("preload", "preload_count", "index_arm", "clear_flags")
 DECODED = (
-    "count", "stepped", "indexed", "illegal", "overspeed", "illegal_count", "index_count", "index_armed",
+    "count", "stepped", "indexed", "illegal", "overspeed", "wrapped", "illegal_count", "index_count", "index_armed",
     "index_latched", "stamp", "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall",
 )  # fmt: skip
 """Outputs of an axis that are its decoder's, by the same names."""
@@ -82,7 +82,7 @@ class AxisTwin:
             params.estimator, self.estimator, quadrature.seen(decoder), self.restart
         )
         force = wall.render(params.wall, decoder.count, velocity)
-        count, fault, restart = decoder.count, decoder.illegal | decoder.overspeed << 1, self.restart
+        count, fault, restart = decoder.count, quadrature.fault(decoder), self.restart
         driven: list[int] = []
 
         def observe() -> None:

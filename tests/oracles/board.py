@@ -29,7 +29,7 @@ IDLE = (*LOOPS, "encoder_a_n", "encoder_b_n")
 """Pins that are high while the handle rests at its origin and all is well."""
 SEEN = (
     "sampled", "actuated", "stepped", "edge_kind", "indexed", "estimated", "saturated", "strobe_busy", "illegal",
-    "overspeed", "count", "velocity", "drive", "stamp", "index_latched", *SHOWN, "referenced",
+    "overspeed", "wrapped", "count", "velocity", "drive", "stamp", "index_latched", *SHOWN, "referenced",
     "a_channel_idle", "drive_inverted",
 )  # fmt: skip
 """Ports of the axis inside that the models are fed with or held to."""

@@ -70,6 +70,7 @@ class Follower:
             "a": level["encoder_a"], "a_n": level["encoder_a_n"], "b": level["encoder_b"], "b_n": level["encoder_b_n"],
         })  # fmt: skip
         stands = {"encoder_illegal": shown["illegal"], "encoder_overspeed": shown["overspeed"]}
+        stands["position_wrap"] = shown["wrapped"]
         stands |= {"strobe_busy": shown["strobe_busy"], "word_range": self._beyond}
         stands |= {"external_fault": not level["external_fault"], "emergency_stop": not level["emergency_stop"]}
         causes = self._monitors.causes | sum(BITS[name] for name in OTHERS if stands[name])

@@ -16,7 +16,7 @@ from .supervised import SYNCHRONISER
 PINS = ("encoder_a", "encoder_b", *COMPLEMENTS, *LOOPS)
 FAULT = BITS["external_fault"]
 TURN = "state", "ready", "latched", "first", "first_stamp", "counts"
-WATCHED = "encoder_illegal", "encoder_overspeed", *LOOPS[1:]
+WATCHED = "encoder_illegal", "encoder_overspeed", "position_wrap", *LOOPS[1:]
 """Causes that wait for a turn in a bit of their own."""
 
 
@@ -183,6 +183,7 @@ class Follower:
         happens = {
             **self._shut(levels)[0],
             "encoder_illegal": shown["illegal"], "encoder_overspeed": shown["overspeed"],
+            "position_wrap": shown["wrapped"],
             "unlike_a": levels["encoder_a"] ^ levels["encoder_a_n"],
             "unlike_b": levels["encoder_b"] ^ levels["encoder_b_n"],
             "edge_a": shown["stepped"] & ~kinds, "edge_b": shown["stepped"] & kinds,

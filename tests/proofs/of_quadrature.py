@@ -64,17 +64,23 @@ def counts_as_an_ideal_decoder(bench: Bench) -> None:
     bench.promise(bench.inner["level"] == ideal.level)
 
     # The level of the last clock, from which a step of more than one cell has no direction.
-    before, count, illegal = Signal(2), Signal.like(decoder.seen.count), Signal()
-    step = Signal(2)
-    bench.m.d.comb += step.eq(cell(ideal.level) - cell(before))
+    before, count, illegal, wrapped = Signal(2), Signal.like(decoder.seen.count), Signal(), Signal()
+    step, onward = Signal(2), Signal(signed(len(count) + 2))
     change = Mux(step[0], Mux(step[1] ^ decoder.invert, -1, 1), 0)
+    bench.m.d.comb += [
+        step.eq(cell(ideal.level) - cell(before)),
+        onward.eq(Mux(decoder.preload, decoder.preload_count, count) + change),
+    ]
+    most = (1 << len(count) - 1) - 1
     bench.m.d.sync += [
         before.eq(Mux(ideal.starting == 0, ideal.level, ideal.seen)[:2]),
-        count.eq(Mux(decoder.preload, decoder.preload_count, count) + change),
+        count.eq(onward),
         illegal.eq((step == 2) | illegal & ~decoder.clear),
+        wrapped.eq((onward > most) | (onward < -most - 1) | wrapped & ~decoder.clear),
     ]
     bench.promise(decoder.seen.count == count)
     bench.promise(decoder.illegal == illegal)
+    bench.promise(decoder.wrapped == wrapped)
 
 
 def no_wrong_count_before_a_flag(bench: Bench) -> None:
@@ -137,7 +143,7 @@ def no_fault_is_lost(bench: Bench) -> None:
     decoder = bench.block(Quadrature(5, 2, 2, 3))
     moved, most = bench.inner["moved"], decoder.illegal_count.shape().width
     kept = ~bench.past(decoder.clear) & ~bench.past(bench.reset)
-    for flag in (decoder.illegal, decoder.overspeed):
+    for flag in (decoder.illegal, decoder.overspeed, decoder.wrapped):
         bench.promise(~(bench.past(flag) & kept) | flag)
     both = bench.past(moved[:2].all()) & ~bench.past(bench.reset)
     before = Mux(bench.past(decoder.clear), 0, bench.past(decoder.illegal_count))
@@ -145,7 +151,7 @@ def no_fault_is_lost(bench: Bench) -> None:
     bench.promise(
         ~(both | kept) | (decoder.illegal_count == Mux(both & (before != (1 << most) - 1), before + 1, before))
     )
-    bench.promise(decoder.fault == (decoder.illegal | decoder.overspeed))
+    bench.promise(decoder.fault == (decoder.illegal | decoder.overspeed | decoder.wrapped))
 
 
 PROPERTIES = [
@@ -171,6 +177,7 @@ PROPERTIES = [
         depth=4,
         bugs=(
             Bug(Quadrature.elaborate, "Mux(down, -1, 1)", "Mux(down, 1, 1)"),
+            Bug(Quadrature.elaborate, "(base[-1] ^ count[-1]) & (count[-1] ^ count[-2])", "base[-1] ^ count[-1]"),
             Bug(Quadrature.elaborate, "level ^ accepted, pins", "level ^ accepted, 0"),
         ),
     ),

@@ -1,10 +1,12 @@
-"""What the wall promises: its force is in range and pushes, and no bit of the exact sum is lost on the way."""
+"""What the wall promises: its force is the exact equation's, in range, and pushes, wherever wall and handle are."""
 
+import re
+from dataclasses import replace
 from functools import partial
 
 from amaranth.hdl import Mux, Signal, Value
 
-from hardwall.hdl.wall import Wall
+from hardwall.hdl.wall import PART_BITS, Wall
 from stimuli.specs import spec
 
 from .bench import Bench
@@ -42,12 +44,12 @@ def samples(bench: Bench, block: Wall) -> Value:
 
 
 def force_is_in_range(axis: str, bench: Bench) -> None:
-    block = bench.block(wall(axis), Widths(("offset",)))
+    block = bench.block(wall(axis), Widths(()))
     bench.within(force=block.design.force.max)
 
 
 def never_pulls(axis: str, bench: Bench) -> None:
-    block = bench.block(wall(axis), Widths(("offset",)))
+    block = bench.block(wall(axis), Widths(()))
     waits = samples(bench, block)
     left, forbidden = block.wall_left, block.wall_forbid_pull
     for side, allowed in ((0, bench.inner["positive"]), (1, bench.inner["negative"])):
@@ -56,7 +58,71 @@ def never_pulls(axis: str, bench: Bench) -> None:
     bench.promise(~block.valid | ~forbidden | Mux(left, block.force >= 0, block.force <= 0))
 
 
+def whole(bench: Bench, name: str) -> Value:
+    """Return the product of a name, which the block keeps in parts."""
+    parts = [bench.inner[key] for key in bench.inner if re.fullmatch(rf"{name}_\d", key)]
+    return sum(part << place * PART_BITS for place, part in enumerate(parts))
+
+
+def force_is_exact(axis: str, coupling: bool, bench: Bench) -> None:
+    """Promise the force of the equation in the block's docstring, in integers of as many bits as they need.
+
+    The depth is exact for every position word and count. What is made of the two products is, for every product.
+    """
+    block = bench.block(Wall(replace(spec(axis), coupling=coupling).design.wall), Widths(()))
+    waits, inner, design = samples(bench, block), bench.inner, block.design
+    counted, left, forbidden = Signal.like(block.count), block.wall_left, block.wall_forbid_pull
+    with bench.m.If(block.lead):
+        bench.m.d.sync += counted.eq(block.count)
+    outward = block.wall_position - counted
+    inside = Mux(left, outward > 0, outward < 0)
+    if coupling:
+        inside |= block.wall_two_sided
+
+    # A clock after the strobe the products are there: of the stiffness with the way to a wall that fills smaller
+    # positions, and of the damping with the velocity, less what the surface's adds.
+    acts, side, pushes = (bench.past(each) for each in (inside, left, forbidden))
+    spring_shift, damper_shift = design.push - design.stiffness.f, design.push - design.damping.f - design.coarse.f
+    surface = whole(bench, "surface") if coupling else 0
+    outwards = (whole(bench, "spring") << spring_shift) - ((whole(bench, "damper") - surface) << damper_shift)
+    most = design.force.max
+    push = (Mux(side, outwards, -outwards) + (1 << design.push - 1)) >> design.push
+    least = Mux(pushes, 0, -most)
+    limited = Mux(push < least, least, Mux(push > most, most, push))
+    force = Mux(acts, Mux(side, limited, -limited), 0)
+    bench.promise(~block.valid | (block.force == bench.past(force, 2)))
+
+    # For the induction: what a sample that waits for its strobe has left in the registers.
+    bench.promise(inner["counted"] == counted)
+    bench.promise(~(waits | inner["placed"]) | (inner["offset"] == outward))
+    bench.promise(~waits | (inner["left"] == left))
+    bench.promise(~waits | (inner["positive"] == inside & (left | ~forbidden)))
+    bench.promise(~waits | (inner["negative"] == inside & ~(left & forbidden)))
+    if coupling:
+        carried = (surface << damper_shift) + (1 << design.push - 1) - 1 + left
+        bench.promise(~waits | (inner["lean"] == carried))
+
+
 PROPERTIES = [
+    *(
+        Property(
+            "the force is the exact equation's, for every position word and count",
+            f"wall {name}{axis}",
+            partial(force_is_exact, axis, coupling),
+            depth=5,
+            quick=axis == "mhz" and not coupling,
+            bugs=(
+                Bug(
+                    Wall.elaborate,
+                    "offset.eq(self.wall_position - counted)",
+                    "offset.eq((self.wall_position - counted)[: len(counted)].as_signed())",
+                ),
+                Bug(Wall.elaborate, "(offset != 0) & (offset[-1]", "(offset[-1]"),
+            ),
+        )
+        for name, coupling in (("", False), ("coupling ", True))
+        for axis in ("paper", "mhz", "narrow", "wide")
+    ),
     Property(
         "the force is in range",
         "wall mhz",

@@ -127,14 +127,14 @@ CASES = {
     ),
     "wall": Case(
         lambda axis: Wall(spec(axis).design.wall),
-        ("offset",),
+        (),
         Bug(
             Wall.elaborate, "total = Signal(signed(design.total_bits))", "total = Signal(signed(design.total_bits - 3))"
         ),
     ),
     "wall coupling": Case(
         lambda axis: Wall(replace(spec(axis), coupling=True).design.wall),
-        ("offset",),
+        (),
         Bug(Wall.elaborate, "lean = Signal(signed(design.lean_bits))", "lean = Signal(signed(design.push + 2))"),
     ),
     # A count that goes by more than one a clock, which a restart alone does, is not used.

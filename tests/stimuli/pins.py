@@ -94,6 +94,9 @@ def random_stimulus(generator: np.random.Generator, clocks: int, width: int) -> 
 
     rate = 10 ** generator.uniform(-2.5, 0.6, clocks) * generator.choice([-1, 0, 1], clocks)
     position = np.floor(np.cumsum(held(rate, 300)) + generator.uniform(0, 0.2, clocks)).astype(np.int64)
+    # A half of the preloads is at an end of the range, beyond which the count wraps.
+    half = 1 << (width - 1)
+    anywhere, ends = generator.integers(-half, half, clocks), generator.choice([-half, half - 1], clocks)
     return stimulus(
         clocks,
         **{name: level ^ held(generator.random(clocks) < 0.02, 6) for name, level in pins(position).items()},
@@ -101,5 +104,5 @@ def random_stimulus(generator: np.random.Generator, clocks: int, width: int) -> 
         reset=generator.random(clocks) < 1 / 2000,
         glitch_clocks=held((16 ** generator.random(clocks)).astype(np.int64) - 1, 200),
         invert=held(generator.integers(0, 2, clocks), 200),
-        preload_count=generator.integers(-(1 << (width - 1)), 1 << (width - 1), clocks),
+        preload_count=np.where(generator.random(clocks) < 0.5, ends, anywhere),
     )
