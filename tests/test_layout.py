@@ -93,6 +93,7 @@ BROAD = {
     "test_readme": "the README",
     "test_supervised_axes_faults": "every cause of supervised axes, injected alone",
     "test_typing": "the model's types",
+    "test_wheel": "the package that a user installs",
     "testing/test_examples": "the bench as others use it",
     "world/test_shunt": "a device whose motor has a damping circuit",
     "walls/test_contact_energy": "the energy that passivity sees in a hit",
