@@ -12,12 +12,13 @@ from cocotb.triggers import RisingEdge
 
 from hardwall.hdl.wall import Wall
 from hardwall.model import wall
-from hardwall.model.axes import AxesSpec
+from hardwall.model.axes import Axes, AxesSpec
+from hardwall.model.axis import Axis
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from stimuli.lengths import some_of
 from stimuli.magnitudes import magnitudes
 from stimuli.sampled import Sampled
-from stimuli.specs import NARROW, spec
+from stimuli.specs import MHZ, NARROW, spec
 
 
 def design(name: str, estimator: str = "levant", coupling: bool = False) -> wall.Design:
@@ -187,6 +188,64 @@ def test_model_is_the_exact_equation_rounded_as_documented(name, estimator, coup
     d = design(name, estimator, coupling)
     rows = list(stimulus(d, 20_000))
     assert model(d, rows) == [oracle(d, row) for row in rows]
+
+
+@pytest.mark.parametrize("coupling", [False, True])
+def test_the_force_is_exact_for_every_position_and_count(coupling):
+    """A narrow axis has few enough of both that each pair is met, beside gains and velocities at their extremes."""
+    d = design("narrow", coupling=coupling)
+    every = range(-(1 << d.count_width - 1), 1 << d.count_width - 1)
+    gains = (0, d.stiffness.max // 3), (0, d.damping.max)
+    moving = (d.coarse.min, d.coarse.max), (0, 1)
+    rows = itertools.product(
+        every, (d.velocity.min, 0, d.velocity.max), *gains, every, (0, 1), (0, 1), *(moving if coupling else ())
+    )
+    rows = list(rows)
+    assert model(d, rows) == [oracle(d, row) for row in rows]
+
+
+FAR_M, HANDLE_M = 1.0, -0.1
+"""A wall at the end of the positions that an axis with 0.15 m of travel has, and a handle: far from each other."""
+
+
+@pytest.mark.parametrize("left", [0, 1])
+@pytest.mark.parametrize("kind", ["fixed", "float", "coupling", "passivity", "axes"])
+def test_a_wall_far_away_is_far(kind, left):
+    """The depth is more than the count has bits for: nothing of it may come around from the other side."""
+    side = -1 if left else 1
+    words = {"wall_position": side * FAR_M, "wall_stiffness": 1e3, "wall_damping": 0.0, "wall_left": left}
+    counts = np.full(50, round(side * HANDLE_M / 1e-6))
+    if kind == "axes":
+        rates = {"sample_hz": 500_000, "actuation_hz": 500_000}
+        several = AxesSpec(**MHZ | rates, axes=2, estimator="fdm")
+        record = Axes(several, [words, words]).run(np.stack([counts, counts]))
+    else:
+        options = {kind: True} if kind in ("coupling", "passivity") else {}
+        made = dataclasses.replace(spec("mhz", "fdm"), **options)
+        record = Axis(made, kind == "float", **words).run(counts)
+    assert (record.force == 0).all()
+    assert (record.drive == 0).all()
+    assert (record.flags == 0).all()
+    # A wall that holds there, for the handle is beyond it: as deep as that it is exact, too.
+    deep = dataclasses.replace(spec("mhz", "fdm"), force_max_n=4e3)
+    deep = Axis(deep, **words | {"wall_left": 1 - left, "wall_forbid_pull": 0}).run(counts)
+    assert deep.force_n[-1] == pytest.approx(side * 1e3 * (FAR_M - HANDLE_M), abs=1e-3)
+
+
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_count_that_wraps_is_flagged_and_drives_nothing(side, floating):
+    """Beyond the end of its range a count is at the other end, where another wall may be."""
+    axis = Axis(spec("mhz", "fdm"), floating, wall_position=side * 1.0, wall_stiffness=1e3, wall_left=int(side < 0))
+    end = 1 << axis.spec.count_width - 1
+    counts = side * (end - 100 + np.arange(200))
+    record = axis.run(counts)
+    beyond = ~((counts >= -end) & (counts < end))
+    wrapped = 1 << axis.design.flags.index("count_wrapped")
+    assert (np.logical_or.accumulate(beyond) == (record.flags & wrapped != 0)).all()
+    assert (record.drive[~beyond] != 0).all()
+    assert (record.drive[beyond] == 0).all()
+    assert beyond.sum() > 90
 
 
 @pytest.mark.parametrize("coupling", [False, True])

@@ -10,7 +10,6 @@ import zipfile
 from pathlib import Path
 
 import pytest
-
 from test_layout import CONFIG, EXTRAS, MODULES, ROOT
 
 FOLDERS = {name.partition(".")[2]: folder for name, folder in CONFIG["tool"]["setuptools"]["package-dir"].items()}
