@@ -16,6 +16,7 @@ from oracles.axes import Seen, Write, check, lanes_of
 from stimuli import handle
 from stimuli.axes import random_words, rota
 from stimuli.lengths import LONG, REACHING, WHOLE, long_form
+from stimuli.places import place
 from stimuli.specs import MHZ
 
 LEVELS, PULSES = ("encoder_a", "encoder_b", "encoder_z", "drive_enable"), ("preload", "index_arm", "clear_flags")
@@ -80,16 +81,15 @@ class World:
             number, name, word = self.orders.popleft()
             if name:
                 self.writes.append(Write(len(self.given), number, name, word))
-                place = [each.name for each in spec.design.words].index(name)
-                acts |= {"word_write": 1, "word_axis": number, "word_number": place, "word_value": word}
+                row = [each.name for each in spec.design.words].index(name)
+                acts |= {"word_write": 1, "word_axis": number, "word_number": row, "word_value": word}
             else:
                 acts["commit"] = 1 << number
         act, number = random.random(), int(random.integers(spec.axes))
-        half = 1 << spec.count_width - 1
         for name, chance in CHANCES.items():
             if random.random() < chance:
                 acts[name] |= 1 << number
-                acts["preload_count"] = int(random.integers(-half, half))
+                acts["preload_count"] = place(random, spec.count_width)
         if act < 0.01:
             # Most of the time an axis is enabled.
             bit = 1 << int(random.integers(spec.axes))
@@ -133,7 +133,7 @@ async def every_axis_is_a_single_one(dut):
         assert all(each.committed > 5 for each in lanes)
         rose |= int(np.bitwise_or.reduce([np.bitwise_or.reduce(each.outputs.flags) for each in lanes]))
         drives += [each.outputs.drive for each in lanes]
-    # The run must show forces in both directions, both faults of the encoder, a saturated estimator, and both limits.
+    # The run must show forces in both directions, all faults of the encoder, a saturated estimator, and both limits.
     assert any((drive > 0).any() for drive in drives)
     assert any((drive < 0).any() for drive in drives)
     assert spec.design.flag_names(rose) == list(spec.design.flags)

@@ -17,6 +17,7 @@ from oracles.axis import AxisTwin
 from stimuli import handle
 from stimuli.axes import busy, fastest, random_words
 from stimuli.lengths import REACHING, some_of
+from stimuli.places import place
 
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
 LATE_BIT = 20
@@ -94,7 +95,6 @@ async def motion(bench: Bench, spec: AxisSpec, samples: int, random: np.random.G
 async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Generator, commits: list) -> None:
     """Act behind changed drives: commit words, preload, clear, arm, drop the enable and raise it again."""
     dut, sampled, timing = bench.dut, bench.dut.sampled, spec.design.timing
-    half = 1 << (spec.count_width - 1)
     committed = 0
     for sample in range(samples - 1):
         await RisingEdge(sampled)
@@ -114,7 +114,7 @@ async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Gen
             commits.append((strobe_of(timing, committed), words))
         elif act < 0.03:
             pulse = "preload"
-            bench.drive(preload_count=int(random.integers(-half, half)))
+            bench.drive(preload_count=place(random, spec.count_width))
         elif act < 0.06:
             pulse = "clear_flags"
         elif act < 0.08:
@@ -160,13 +160,13 @@ async def follows_model(dut):
         found = seen.column(name)[:kept]
         wrong = np.flatnonzero(found != expected[row, :kept])
         assert not len(wrong), f"{name}: {len(wrong)} of {kept} differ, first at sample {wrong[:1]}"
-    # The run must show forces in both directions, both faults of the encoder, a saturated estimator, and both limits.
+    # The run must show forces in both directions, all faults of the encoder, a saturated estimator, and both limits.
     assert (seen.column("drive") > 0).any()
     assert (seen.column("drive") < 0).any()
     rose = spec.design.flag_names(int(np.bitwise_or.reduce(seen.column("flags"))))
     limits = {"error_saturated", "slew_limited", "force_limited"}
     limits |= {"passivity_active"} if spec.passivity else set()
-    assert {"encoder_illegal", "encoder_overspeed", *limits} <= set(rose)
+    assert {"encoder_illegal", "encoder_overspeed", "count_wrapped", *limits} <= set(rose)
     assert [clock - first_clock for clock in seen.clocks[:kept]] == [change_of(timing, k) for k in range(kept)]
 
 
@@ -175,7 +175,7 @@ async def every_output_is_the_twins_at_every_clock(dut):
     spec, random = make(**parameters()).spec, rng()
     bench, twin, moves = Bench(dut, Axis(spec)), AxisTwin(Design(spec)), handle.edges(random, handle.Habits(index=0.1))
     await bench.reset()
-    pins, words, left, half = dict.fromkeys(PINS, 0), random_words(spec.design, random), 0, 1 << spec.count_width - 1
+    pins, words, left = dict.fromkeys(PINS, 0), random_words(spec.design, random), 0
     for _ in range(300 * spec.clocks_per_sample):
         if left == 0:
             changed, left = next(moves)
@@ -184,7 +184,7 @@ async def every_output_is_the_twins_at_every_clock(dut):
         act = random.choice(ACTS, p=CHANCES)
         if act == "words" and not twin.pending:
             words = random_words(spec.design, random) | twin.fixed()
-            pins["preload_count"] = int(random.integers(-half, half))
+            pins["preload_count"] = place(random, spec.count_width)
         elif act == "drive_enable":
             pins["drive_enable"] ^= 1
         reset = int(random.random() < 2e-4)

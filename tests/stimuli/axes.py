@@ -52,7 +52,11 @@ def fastest(axis: AxisSpec) -> AxisSpec:
 def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
     """Return words for a wall that is often hit, and words of every size for the estimator and the limits."""
     words = {word.name: word.reset for word in design.words}
-    if random.random() < 0.5:
+    kind = random.random()
+    if kind < 0.2:
+        # The estimator follows nothing, and falls behind as far as it can.
+        words |= dict.fromkeys((word.name for word in design.estimator.words), 0)
+    elif kind < 0.6:
         for word in design.estimator.words:
             words[word.name] = int(random.integers(0, int(word.format.max * 2.0 ** -random.integers(0, 8)) + 1))
     of_all_sizes = "wall_stiffness", "wall_damping", "passivity_damping", "output_force_limit", "output_slew_limit"
