@@ -129,8 +129,9 @@ async def an_estimate_that_is_saturated_for_too_long(dut):
         # From here on it is the longest until the count is about to wrap; a turn is of a sample some time ago.
         while await spin.edge() != -3 << spec.count_width - 3:
             assert spin.clocks < 10_000
+        # The count has wrapped on its way, which is a cause of its own.
         for wait in range(run.design.latency):
-            await spin.edge(arm=everyone * (wait == run.design.latency - 1))
+            await spin.edge(clear_flags=everyone * (not wait), arm=everyone * (wait == run.design.latency - 1))
         await spin.until_all(ARMED)
         trips.append(run.follower.states[0].monitors.samples + behind + 1 + len(trips) % 3)
         for axis in range(spec.axes):
