@@ -60,11 +60,13 @@ class Axes(wiring.Component):
         Asynchronous pins.
     drive_enable, clear_flags, commit : In(axes)
         As above; `clear_flags` and `commit` are pulses.
-    preload : In(axes), preload_count : In(signed)
-        A pulse of `preload` sets the count of its axis to `preload_count`; the estimator of the axis starts afresh at
-        the next sample.
+    preload, origin_shift : In(axes), preload_count : In(signed)
+        A pulse of `preload` sets the count of its axis to `preload_count`, one of `origin_shift` adds it; the estimator
+        of the axis starts afresh at the next sample.
+    slip : In(axes)
+        The count has lost its scale, as somebody else has found.
     index_arm : In(axes)
-        Pulse: latch the count at the next index edge.
+        Pulse: latch the place of the next index.
     word_write : In(1), word_axis, word_number, word_value : In
         As above; a signed word is taken modulo its width.
     word_ready : Out(1)
@@ -75,17 +77,17 @@ class Axes(wiring.Component):
     sampled, actuated : Out(axes)
         High for one clock with the changed drive: `sampled` after every sample, `actuated` after a sample at which the
         drive follows the force.
-    stepped : Out(axes), edge_kind : Out(array), indexed : Out(axes)
-        High for one clock with the count of a new edge, and the kind of the last edge; high for one clock with the
-        count at a rising edge of Z.
+    stepped, edge_down : Out(axes), edge_kind : Out(array), indexed : Out(axes)
+        High for one clock with the count of a new edge; whether the last edge counted -1, and its kind; high for one
+        clock with the count at an index.
     strobe, strobe_axis : Out
         High in a clock in which an axis is sampled, and which one.
     estimated : Out(axes), velocity, saturated, estimated_count : Out
         High for one clock with a sample's velocity; the velocity, whether the estimator is saturated, and the count.
     illegal, overspeed, wrapped : Out(axes), illegal_count : Out(array)
         The encoder's sticky flags, now, and the illegal transitions since the last clear; saturates.
-    index_count : Out(array), index_armed, index_latched : Out(axes)
-        The index latch.
+    index_count : Out(array), index_armed, index_latched, referenced : Out(axes)
+        The index latch, and whether the origin was moved by it.
     commit_pending : Out(axes)
         Words wait for the axis's next strobe.
     stamp : Out
@@ -106,9 +108,10 @@ class Axes(wiring.Component):
             raise TypeError(f"spec must be an AxesSpec, not {spec!r}")
         self._spec = spec
         design, axes, count, number = spec.design, spec.axes, signed(spec.count_width), range(max(spec.axes, 2))
-        bits = ("encoder_a", "encoder_b", "encoder_z", "drive_enable", "clear_flags", "preload", "index_arm", "commit")
-        shown = ("sampled", "actuated", "stepped", "indexed", "estimated", "illegal", "overspeed", "wrapped")
-        shown += ("index_armed", "index_latched", "commit_pending")
+        bits = ("encoder_a", "encoder_b", "encoder_z", "drive_enable", "clear_flags", "preload", "origin_shift", "slip")
+        bits += ("index_arm", "commit")
+        shown = ("sampled", "actuated", "stepped", "edge_down", "indexed", "estimated", "illegal", "overspeed")
+        shown += ("wrapped", "index_armed", "index_latched", "referenced", "commit_pending")
         arrays = {
             "drive": shape(spec.force),
             "flags": len(design.flags),
@@ -261,12 +264,15 @@ class Axes(wiring.Component):
                 decoder.b.eq(self.encoder_b[number]),
                 decoder.z.eq(self.encoder_z[number]),
                 decoder.preload.eq(self.preload[number]),
+                decoder.origin_shift.eq(self.origin_shift[number]),
                 decoder.preload_count.eq(self.preload_count),
+                decoder.slip.eq(self.slip[number]),
                 decoder.arm.eq(self.index_arm[number]),
                 decoder.clear.eq(self.clear_flags[number]),
                 self.count[number].eq(decoder.seen.count),
                 self.stepped[number].eq(decoder.stepped),
                 self.edge_kind[number].eq(decoder.seen.edge),
+                self.edge_down[number].eq(decoder.seen.down),
                 self.indexed[number].eq(decoder.indexed),
                 self.illegal[number].eq(decoder.illegal),
                 self.overspeed[number].eq(decoder.overspeed),
@@ -275,6 +281,7 @@ class Axes(wiring.Component):
                 self.index_count[number].eq(decoder.index_count),
                 self.index_armed[number].eq(decoder.index_armed),
                 self.index_latched[number].eq(decoder.index_latched),
+                self.referenced[number].eq(decoder.referenced),
             ]
         m.d.comb += self.stamp.eq(decoders[0].seen.stamp)
         return decoders
@@ -282,9 +289,9 @@ class Axes(wiring.Component):
     def _entered(self, pipe: Pipe, decoders: list[Any], first: Value, word) -> tuple[Entered, Value]:
         """Return the sample that is in stage `FRONT_LATENCY`, and its encoder's flags."""
         m = pipe.m
-        # A preload changes the count without a motion.
+        # A preload or a shift of the origin changes the count without a motion.
         restart = Signal(self._spec.axes)
-        m.d.sync += restart.eq(self.preload | (restart & ~Cat(pipe.turns(0))))
+        m.d.sync += restart.eq(self.preload | self.origin_shift | (restart & ~Cat(pipe.turns(0))))
         rows = [
             Cat(each.seen.count, restart[number], each.illegal, each.overspeed, each.wrapped)
             for number, each in enumerate(decoders)

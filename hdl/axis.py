@@ -47,10 +47,13 @@ class Axis(wiring.Component):
         Asynchronous pins.
     drive_enable, clear_flags, commit : In(1)
         As above; `clear_flags` and `commit` are pulses.
-    preload, preload_count : In
-        A pulse of `preload` sets the count to `preload_count`; the estimator starts afresh at the next sample.
+    preload, origin_shift, preload_count : In
+        A pulse of `preload` sets the count to `preload_count`, one of `origin_shift` adds it; the estimator starts
+        afresh at the next sample.
+    slip : In(1)
+        The count has lost its scale, as somebody else has found.
     index_arm : In(1)
-        Pulse: latch the count at the next index edge.
+        Pulse: latch the place of the next index.
     one input for each word of `spec.design.words` : In
         Run-time parameters.
     drive : Out(signed)
@@ -63,10 +66,10 @@ class Axis(wiring.Component):
         of the sample of the drive.
     flags : Out
         Sticky flags, bits as in `spec.design.flags`; the encoder's flags as the samples saw them, with their velocity.
-    stepped, edge_kind : Out
-        High for one clock with the count of a new edge, and the kind of the last edge.
+    stepped, edge_kind, edge_down : Out
+        High for one clock with the count of a new edge; the kind of the last edge, and whether it counted -1.
     indexed : Out(1)
-        High for one clock with the count at a rising edge of Z.
+        High for one clock with the count at an index.
     estimated, saturated : Out(1)
         High for one clock with a sample's velocity; with it, the estimator is saturated.
     strobe_busy : Out(1)
@@ -75,8 +78,8 @@ class Axis(wiring.Component):
         The encoder's sticky flags, now.
     illegal_count : Out
         Illegal transitions since the last clear; saturates.
-    index_count, index_armed, index_latched : Out
-        The index latch.
+    index_count, index_armed, index_latched, referenced : Out
+        The index latch, and whether the origin was moved by it.
     stamp, stamp_a_rise, stamp_b_rise, stamp_a_fall, stamp_b_fall : Out
         The number of this clock, and the stamp of the last edge of every kind.
     commit_pending : Out(1)
@@ -102,7 +105,9 @@ class Axis(wiring.Component):
                 "drive_enable": In(1),
                 "clear_flags": In(1),
                 "preload": In(1),
+                "origin_shift": In(1),
                 "preload_count": In(count),
+                "slip": In(1),
                 "index_arm": In(1),
                 "commit": In(1),
                 **{word.name: In(shape(word.format)) for word in design.words},
@@ -116,6 +121,7 @@ class Axis(wiring.Component):
                 "flags": Out(len(design.flags)),
                 "stepped": Out(1),
                 "edge_kind": Out(2),
+                "edge_down": Out(1),
                 "indexed": Out(1),
                 "estimated": Out(1),
                 "saturated": Out(1),
@@ -127,6 +133,7 @@ class Axis(wiring.Component):
                 "index_count": Out(count),
                 "index_armed": Out(1),
                 "index_latched": Out(1),
+                "referenced": Out(1),
                 "stamp": Out(spec.stamp_width),
                 "stamp_a_rise": Out(spec.stamp_width),
                 "stamp_b_rise": Out(spec.stamp_width),
@@ -162,9 +169,9 @@ class Axis(wiring.Component):
         for block in (estimator, wall, output):
             m.d.comb += [getattr(block, word.name).eq(active[word.name]) for word in block.design.words]
 
-        # A preload changes the count without a motion.
+        # A preload or a shift of the origin changes the count without a motion.
         restart = Signal()
-        m.d.sync += restart.eq(self.preload | (restart & ~strobe))
+        m.d.sync += restart.eq(self.preload | self.origin_shift | (restart & ~strobe))
 
         working = Signal()
         m.d.sync += [
@@ -190,7 +197,9 @@ class Axis(wiring.Component):
             decoder.glitch_clocks.eq(active["encoder_glitch_clocks"]),
             decoder.invert.eq(active["encoder_invert"]),
             decoder.preload.eq(self.preload),
+            decoder.origin_shift.eq(self.origin_shift),
             decoder.preload_count.eq(self.preload_count),
+            decoder.slip.eq(self.slip),
             decoder.arm.eq(self.index_arm),
             decoder.clear.eq(self.clear_flags),
             estimator.strobe.eq(strobe),
@@ -209,6 +218,7 @@ class Axis(wiring.Component):
             self.wall_force.eq(wall.force),
             self.stepped.eq(decoder.stepped),
             self.edge_kind.eq(decoder.seen.edge),
+            self.edge_down.eq(decoder.seen.down),
             self.indexed.eq(decoder.indexed),
             self.estimated.eq(estimator.valid),
             self.saturated.eq(estimator.valid & estimator.saturated.any()),
@@ -219,6 +229,7 @@ class Axis(wiring.Component):
             self.index_count.eq(decoder.index_count),
             self.index_armed.eq(decoder.index_armed),
             self.index_latched.eq(decoder.index_latched),
+            self.referenced.eq(decoder.referenced),
             self.stamp.eq(decoder.seen.stamp),
             self.stamp_a_rise.eq(decoder.seen.stamp_a_rise),
             self.stamp_b_rise.eq(decoder.seen.stamp_b_rise),

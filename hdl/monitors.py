@@ -28,8 +28,8 @@ class Monitors(Block):
     Latency: `latency` of a cause, from the inputs to `causes`; a new limit of the position acts a clock later.
     `velocity` and `saturated` are looked at with `valid`, `edge_kind` with `stepped`, and the distance to the last
     index edge with `indexed`: velocity_limit and index_spacing are pulses. The others last for as long as what is wrong
-    does, which for the position must be two clocks. Ways are counted edge by edge, the direction by the count's last
-    two bits: a preload is no motion, but the direction of an edge in its very clock is not known.
+    does, which for the position must be two clocks. Ways are counted edge by edge: a preload or a shift of the origin is
+    no motion.
 
     Rounding and overflow: distances are taken modulo the count's width; counters stop at their limits.
 
@@ -42,10 +42,10 @@ class Monitors(Block):
     -------
     count : In(SQ)
         The live count.
-    stepped, edge_kind : In
-        An edge has changed the count, and its kind.
+    stepped, edge_kind, edge_down : In
+        An edge has changed the count, its kind, and whether it counted -1.
     indexed : In(1)
-        Pulse: the index edge was counted.
+        Pulse: there was an index, at the number of an edge that has just changed the count, or else at the count.
     valid, velocity, saturated : In
         The estimator's result, and whether it is saturated.
     at_limit, negative : In(1)
@@ -73,6 +73,7 @@ class Monitors(Block):
             "count": In(signed(design.count_width)),
             "stepped": In(1),
             "edge_kind": In(2),
+            "edge_down": In(1),
             "indexed": In(1),
             "valid": In(1),
             "velocity": In(shape(design.velocity)),
@@ -92,16 +93,15 @@ class Monitors(Block):
     def elaborate(self, platform):
         m = Module()
         top = self.count[-3:]
-        way = self._way(m)
         found = {
             POSITION_RANGE: self._out_of_range(m),
             # Beyond three quarters of the range of two's complement, by the first three bits.
             POSITION_WRAP: (top == 0b011) | (top == 0b100),
             VELOCITY_LIMIT: self.valid & self._too_fast(),
-            RUNAWAY: self._runaway(m, way),
+            RUNAWAY: self._runaway(m),
             ESTIMATOR_SATURATED: self._saturated(m),
             ENCODER_LOSS: self._lost(m, "lost_a", self.a == self.a_n) | self._lost(m, "lost_b", self.b == self.b_n),
-            INDEX_SPACING: self._index_is_wrong(m, way),
+            INDEX_SPACING: self._index_is_wrong(m),
         }
         m.d.sync += self.causes.eq(Cat(found.get(bit, Const(0, 1)) for bit in range(COUNT)))
 
@@ -115,13 +115,6 @@ class Monitors(Block):
                 m.d.sync += edges.eq(edges + 1)
         m.d.comb += self.a_channel_idle.eq(idle)
         return m
-
-    def _way(self, m: Module) -> Signal:
-        """Return whether the edge of this clock counts upwards, by the count's last two bits before and after it."""
-        before, up = Signal(2), Signal()
-        m.d.sync += before.eq(self.count[:2])
-        m.d.comb += up.eq(~(self.count[1] ^ before[1] ^ before[0]))
-        return up
 
     def _out_of_range(self, m: Module) -> Value:
         """Return whether the count is beyond a limit: one comparison, of both limits in turn."""
@@ -143,7 +136,7 @@ class Monitors(Block):
         limit = Cat(Const(0, self._design.params.velocity_shift), self.supervisor_velocity_limit)
         return ~_within(self.velocity, limit)
 
-    def _runaway(self, m: Module, up: Signal) -> Value:
+    def _runaway(self, m: Module) -> Value:
         """Return whether the handle has moved too far against a drive at its limit."""
         pressed_before, negative_before = Signal(), Signal()
         m.d.sync += [pressed_before.eq(self.at_limit), negative_before.eq(self.negative)]
@@ -153,7 +146,7 @@ class Monitors(Block):
         with m.If(~held):
             m.d.sync += way.eq(0)
         with m.Elif(self.stepped):
-            m.d.sync += way.eq(way + _one(way, up == self.negative))
+            m.d.sync += way.eq(way + _one(way, self.edge_down ^ self.negative))
         return self.supervisor_runaway + way < 0
 
     def _saturated(self, m: Module) -> Value:
@@ -178,20 +171,28 @@ class Monitors(Block):
             m.d.sync += passed.eq(passed + 1)
         return wrong & too_long
 
-    def _index_is_wrong(self, m: Module, up: Signal) -> Value:
-        """Return whether an index edge is neither at the last one nor a turn away."""
-        tolerance = self.supervisor_index_tolerance
+    def _index_is_wrong(self, m: Module) -> Value:
+        """Return whether an index is neither at the last one nor a turn away."""
+        tolerance, down = self.supervisor_index_tolerance, self.edge_down
         has_index, indexed, measured = Signal(), Signal(), Signal()
         m.d.sync += [has_index.eq(has_index | self.indexed), indexed.eq(self.indexed)]
         m.d.sync += measured.eq(self.indexed & has_index)
-        # The distance from the last index edge, negative, and its side.
+        # An edge that counts down has the number of the count before it: with an index it is behind that place, and is
+        # counted a clock later.
+        behind, above, counts = Signal(), Signal(), Signal()
+        m.d.comb += [above.eq(self.indexed & down), counts.eq(self.stepped & ~above)]
+        m.d.sync += behind.eq(self.stepped & above)
+        # The distance from the last index, negative, and its side. At an index it begins anew, with the edge behind it
+        # and that of this clock.
         distance, upwards, grows = Signal.like(self.count), Signal(), Signal()
-        m.d.comb += grows.eq(Mux(indexed, self.stepped, (distance == 0) | (up == upwards)))
-        with m.If(self.stepped & grows):
-            m.d.sync += upwards.eq(up)
-        with m.If(self.stepped | indexed):
-            # At an index edge it begins anew, with the edge of this clock.
-            m.d.sync += distance.eq(Mux(indexed, grows.replicate(len(distance)), distance + _one(distance, grows)))
+        begun = Mux(behind, Cat(~counts, (~counts | down).replicate(len(distance) - 1)), counts.replicate(len(distance)))
+        m.d.comb += grows.eq((distance == 0) | (down ^ upwards))
+        with m.If(indexed):
+            m.d.sync += [upwards.eq(~(down | behind)), distance.eq(begun)]
+        with m.Elif(counts):
+            m.d.sync += distance.eq(distance + _one(distance, grows))
+            with m.If(grows):
+                m.d.sync += upwards.eq(~down)
 
         low, high = _halves(distance, len(tolerance))
         near = (distance == 0) | (high.all() & (low + tolerance)[-1])

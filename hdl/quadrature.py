@@ -3,7 +3,7 @@
 `Seen` is the bus from the decoder to the estimators.
 """
 
-from amaranth.hdl import Cat, Module, Mux, Signal, signed
+from amaranth.hdl import Cat, Module, Mux, Signal, Value, signed
 from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
@@ -80,12 +80,23 @@ class Quadrature(wiring.Component):
 
     Start: counting starts from the pins as sampled by the first clock after a reset, whatever their levels.
 
-    Rounding and overflow: nothing is rounded. `count`, `index_count` and the stamps wrap, `illegal_count` saturates. An
-    edge that takes the count beyond an end of its range raises `wrapped` with the wrong count.
+    Index: one edge of Z's pulse, the same from both sides. Z rises there as the count goes up, and falls as it goes
+    down; the pulse's other edge is passed over. The direction is that of an edge of A or B in the same clock, else of
+    the last one. A handle may turn round between two of these: after a change of Z the next one counts only if an edge
+    of A or B came since, and none is an index in the clock of a slip. The index is at the number of an edge in the same
+    clock (the count, or one more if it counted -1), else at the count. A pulse narrower than a count is found upwards
+    only. An edge of Z that lies on an edge of A or B may come a clock before or after it, and is then a count off.
 
-    Coincidences: an edge decoded in the clock of `preload` is added to `preload_count`, so no motion is lost; an edge
-    decoded in the clock of the index is in `index_count`; `arm` has priority over an index, which is then not latched;
-    a fault in the clock of `clear` stays.
+    Slip: after `illegal`, `overspeed`, `wrapped`, another `invert` or `slip` the count belongs no more to the scale. In that
+    clock `index_latched` and `referenced` fall. `preload` makes them fall too, for it moves the count by nobody knows what.
+
+    Rounding and overflow: nothing is rounded. `count`, `index_count` and the stamps wrap, `illegal_count` saturates. An
+    edge or a shift of the origin that takes the count beyond an end of its range raises `wrapped` with the wrong count.
+
+    Coincidences: an edge decoded in the clock of `preload` is added to `preload_count`, and one in the clock of
+    `origin_shift` to the moved count, so no motion is lost. An index latched in the clock of either has the new count.
+    `preload` has priority over `origin_shift`. `arm` has priority over an index, which is then not latched; a fault in
+    the clock of `clear` stays.
 
     Parameters
     ----------
@@ -108,8 +119,12 @@ class Quadrature(wiring.Component):
         Reverses the direction of the edges decoded from now on; neither the count nor the stamps change.
     preload : In(1)
         Strobe: sets the count.
+    origin_shift : In(1)
+        Strobe: moves the origin: adds `preload_count` to the count and to `index_count`.
     preload_count : In(signed(count_width))
-        The new count, counts.
+        The new count, or what is added to it, counts.
+    slip : In(1)
+        The count has lost its scale, as somebody else has found.
     arm : In(1)
         Strobe: arms the index latch.
     clear : In(1)
@@ -117,13 +132,15 @@ class Quadrature(wiring.Component):
     seen : Out(Seen)
         Count, stamps and the last edges.
     index_count : Out(signed(count_width))
-        Position at the first rising edge of Z after `arm`, counts.
+        Position of the first index after `arm`, counts.
     index_armed, index_latched : Out(1)
-        The latch is waiting for that edge; the latch has seen that edge.
+        The latch is waiting for an index; `index_count` is its position.
+    referenced : Out(1)
+        The origin was moved since the index was latched, and nothing has made either void since.
     stepped : Out(1)
         High for one clock with the count of a new edge.
     indexed : Out(1)
-        High for one clock with the count at a rising edge of Z.
+        High for one clock with the count at an index.
     illegal, overspeed, wrapped : Out(1)
         Sticky flags, see above.
     fault : Out(1)
@@ -160,13 +177,16 @@ class Quadrature(wiring.Component):
                 "glitch_clocks": In(glitch_width),
                 "invert": In(1),
                 "preload": In(1),
+                "origin_shift": In(1),
                 "preload_count": In(signed(count_width)),
+                "slip": In(1),
                 "arm": In(1),
                 "clear": In(1),
                 "seen": Out(Seen(count_width, stamp_width)),
                 "index_count": Out(signed(count_width)),
                 "index_armed": Out(1),
                 "index_latched": Out(1),
+                "referenced": Out(1),
                 "stepped": Out(1),
                 "indexed": Out(1),
                 "illegal": Out(1),
@@ -250,18 +270,22 @@ class Quadrature(wiring.Component):
         down = Signal()
         change = Signal(signed(2))
         base, count = Signal.like(seen.count), Signal.like(seen.count)
+        held, added = Mux(self.preload, 0, seen.count), Mux(self.preload | self.origin_shift, self.preload_count, 0)
+        total, beyond = Signal(signed(self._count_width + 2)), Signal()
         m.d.comb += [
             down.eq(~(up ^ self.invert)),
             change.eq(Mux(one, Mux(down, -1, 1), 0)),
-            base.eq(Mux(self.preload, self.preload_count, seen.count)),
-            count.eq((base + change)[: self._count_width]),
+            base.eq((held + added)[: self._count_width]),
+            total.eq(held + added + change),
+            count.eq(total[: self._count_width]),
+            # A count that fits has copies of its sign above it.
+            beyond.eq(total[self._count_width - 1 :].any() & ~total[self._count_width - 1 :].all()),
         ]
-        # A step of one changes the first two bits from 01 to 10, or back, only at the ends of the range.
-        beyond = (base[-1] ^ count[-1]) & (count[-1] ^ count[-2])
+        index, lost = self._index(m, moved, level, down, outrun)
         m.d.sync += [
             seen.count.eq(count),
             self.stepped.eq(one),
-            self.indexed.eq(moved[2] & level[2]),
+            self.indexed.eq(index),
             self.wrapped.eq(beyond | (self.wrapped & ~self.clear)),
             seen.stamp.eq((seen.stamp + 1)[: self._stamp_width]),
         ]
@@ -282,10 +306,21 @@ class Quadrature(wiring.Component):
         with m.Elif(both):
             m.d.sync += seen.run.eq(0)
 
+        latches = self.index_armed & index & ~self.arm
         with m.If(self.arm):
             m.d.sync += [self.index_armed.eq(1), self.index_latched.eq(0)]
-        with m.Elif(self.index_armed & moved[2] & level[2]):
-            m.d.sync += [self.index_armed.eq(0), self.index_latched.eq(1), self.index_count.eq(count)]
+        with m.Elif(latches):
+            m.d.sync += [self.index_armed.eq(0), self.index_latched.eq(~beyond)]
+        with m.Elif(lost | beyond | self.preload):
+            m.d.sync += self.index_latched.eq(0)
+        with m.If(latches):
+            m.d.sync += self.index_count.eq(Mux(one & down, base, count))
+        with m.Elif(self.origin_shift):
+            m.d.sync += self.index_count.eq((self.index_count + self.preload_count)[: self._count_width])
+        with m.If(self.arm | self.preload | lost | beyond):
+            m.d.sync += self.referenced.eq(0)
+        with m.Elif(self.origin_shift & self.index_latched):
+            m.d.sync += self.referenced.eq(1)
 
         kept = Signal(self._fault_width)
         m.d.comb += [
@@ -298,3 +333,17 @@ class Quadrature(wiring.Component):
         with m.Else():
             m.d.sync += self.illegal_count.eq(kept)
         return m
+
+    def _index(self, m: Module, moved: Value, level: Value, down: Value, outrun: Value) -> tuple[Value, Value]:
+        """Return whether there is an index in this clock, and whether the count loses its scale."""
+        one, both = moved[0] ^ moved[1], moved[0] & moved[1]
+        inverted, passed = Signal(), Signal()
+        lost, index = Signal(), Signal()
+        way = Mux(one, down, self.seen.down)
+        m.d.comb += [
+            lost.eq(both | outrun | self.slip | (self.invert ^ inverted)),
+            index.eq(moved[2] & (level[2] ^ way) & (one | passed) & ~lost),
+        ]
+        # Whether an edge came since Z's last change; one in the very clock of a change came before it.
+        m.d.sync += [inverted.eq(self.invert), passed.eq((one | passed) & ~moved[2] & ~lost)]
+        return index, lost

@@ -6,7 +6,7 @@ from amaranth.lib.cdc import FFSynchronizer
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.spec import AxisSpec
-from hardwall.model.supervised import FIXED, Design
+from hardwall.model.supervised import FIXED, SLIPS, Design
 from hardwall.model.supervisor import ARMED, CAUSES
 
 from .arithmetic.fixed import less, shape
@@ -30,7 +30,8 @@ class SupervisedAxis(wiring.Component):
 
     The axis itself computes a drive all the time, and no host limits it; the supervisor's force limit comes last. The
     axis's own enable follows the loop of `drive_enable`, so that its slew limit begins at zero too. A commit of another
-    `encoder_invert` is a `disarm`, which an `arm` in the same clock gives way to.
+    `encoder_invert` is a `disarm`, which an `arm` in the same clock gives way to; it is a `slip` too, and so is a cause
+    of `SLIPS` that is enabled.
 
     Latency: `latency` clocks from the sample strobe to the changed `driven`, one more than the axis's. From a pin of
     `LOOPS` that opens to a drive of zero `loop_latency` clock edges, the first of which sees it.
@@ -57,8 +58,6 @@ class SupervisedAxis(wiring.Component):
         One of the latter beyond its range in `design.ranges` is the cause word_range.
     the outputs of `Supervisor` : Out
         As there; `driven`, or `magnitude` and `negative`, is the drive that may leave the FPGA.
-    referenced : Out(1)
-        The count was preloaded since the index was found: arming may ask for it.
     drive_inverted : Out(1)
         The sign of the drive's pins is to be reversed: `drive_invert`, as it was when the axis was last not ARMED.
     a_channel_idle : Out(1)
@@ -82,7 +81,6 @@ class SupervisedAxis(wiring.Component):
                 **dict.fromkeys((*COMPLEMENTS, *LOOPS), In(1)),
                 **{name: supervisor[name] for name in (*REQUESTS, *SHOWN)},
                 **{word.name: In(shape(word.format)) for word in design.live},
-                "referenced": Out(1),
                 "drive_inverted": Out(1),
                 "a_channel_idle": Out(1),
             }
@@ -119,7 +117,7 @@ class SupervisedAxis(wiring.Component):
                 m.d.comb += getattr(self, name).eq(getattr(axis, name))
             elif name == "drive_enable":
                 m.d.comb += axis.drive_enable.eq(levels[name])
-            elif name not in FIXED:
+            elif name not in (*FIXED, "slip"):
                 m.d.comb += getattr(axis, name).eq(getattr(self, name))
         fixed = {word.name: word.format.max for word in self._design.spec.design.words if word.name in FIXED}
         m.d.comb += [getattr(axis, name).eq(word) for name, word in fixed.items()]
@@ -128,6 +126,7 @@ class SupervisedAxis(wiring.Component):
             monitors.count.eq(axis.count),
             monitors.stepped.eq(axis.stepped),
             monitors.edge_kind.eq(axis.edge_kind),
+            monitors.edge_down.eq(axis.edge_down),
             monitors.indexed.eq(axis.indexed),
             monitors.valid.eq(axis.estimated),
             monitors.velocity.eq(axis.velocity),
@@ -160,18 +159,15 @@ class SupervisedAxis(wiring.Component):
             supervisor.drive.eq(axis.drive),
             supervisor.stamp.eq(axis.stamp),
             supervisor.enable.eq(levels["drive_enable"]),
-            supervisor.referenced.eq(self.referenced),
+            supervisor.referenced.eq(axis.referenced),
         ]
-        # An index that was found is no reference yet: a host may have given up, and the count is what it was.
-        with m.If(self.index_arm):
-            m.d.sync += self.referenced.eq(0)
-        with m.Elif(self.preload & axis.index_latched):
-            m.d.sync += self.referenced.eq(1)
         # The other direction turns the wall around: the drive is zero before the axis takes it.
         inverted = Signal()
         with m.If(self.commit):
             m.d.sync += inverted.eq(self.encoder_invert)
         turned = self.commit & (self.encoder_invert ^ inverted)
+        slips = Cat(monitors.causes[bit] & self.supervisor_causes[bit] for bit in SLIPS)
+        m.d.comb += axis.slip.eq(self.slip | turned | slips.any())
         for name in REQUESTS:
             asked = getattr(self, name)
             m.d.comb += getattr(supervisor, name).eq(asked | turned if name == "disarm" else asked)

@@ -8,7 +8,7 @@ from amaranth.lib.wiring import In, Out
 
 from hardwall.model.axes import FRONT_LATENCY, AxesSpec
 from hardwall.model.monitors import BITS
-from hardwall.model.supervised import FIXED
+from hardwall.model.supervised import FIXED, SLIPS
 from hardwall.model.supervised_axes import LOOK, SAMPLE_WORDS, Design
 from hardwall.model.supervisor import CAUSES, COUNT, COUNT_BITS
 
@@ -50,7 +50,8 @@ class SupervisedAxes(wiring.Component):
 
     Parameters at run time are written as in `Axes`, by the numbers of `design.words`. Those of `spec.design.words`
     wait for a `commit`; the others act in the axis's next turn, so a lower force limit holds with its drive.
-    `output_force_limit` cannot be written. A commit of another `encoder_invert` is a `disarm`. The heartbeat and its
+    `output_force_limit` cannot be written. A commit of another `encoder_invert` is a `disarm` and a `slip`; so is a
+    slip what a turn finds of the causes `SLIPS`, if the axis watches them. The heartbeat and its
     watchdog are those of the one host, for all axes; a word of the watchdog beyond its range is the cause word_range of
     each. Both, and the ranges of the words, are looked at in the turn alone: what lasts for less than a rota is missed.
 
@@ -61,8 +62,9 @@ class SupervisedAxes(wiring.Component):
     loop that opens to a drive of zero `loop_latency` clock edges, the first of which sees it. From a fault of the
     decoder, a word or the host to a drive of zero `trip_latency` clock edges at most: a rota, and the clocks of a turn.
 
-    An acknowledgement within a rota of another one takes its place: the other is void. A preload of an axis that is
-    ARMED moves the count under its wall: whoever speaks for the host has to refuse it.
+    An acknowledgement within a rota of another one takes its place: the other is void. A preload, or a shift of the
+    origin, of an axis that is ARMED moves the count under its wall: whoever speaks for the host has to refuse it. The
+    `preload_count` of a shift stays until the next turn of the axis, when the place of its last index moves.
 
     Rounding and overflow: as in the blocks.
 
@@ -86,7 +88,7 @@ class SupervisedAxes(wiring.Component):
         As of `Watchdog`.
     magnitude : Out(array), negative : Out(axes)
         The drive that may leave the FPGA, force LSB.
-    armed, alive, referenced, drive_inverted : Out(axes)
+    armed, alive, drive_inverted : Out(axes)
         ARMED since the last turn, and nothing has stopped it; a square wave while it is; the others as of a
         `SupervisedAxis`.
     live : Out(1)
@@ -129,7 +131,7 @@ class SupervisedAxes(wiring.Component):
                 "acknowledged": In(COUNT),
                 **{name: watchdog[name] for name in ("heartbeat", "supervisor_watchdog", "live")},
                 "magnitude": Out(ArrayLayout(shape(design.supervisor.limit), axes)),
-                **dict.fromkeys(("negative", "armed", "alive", "referenced", "drive_inverted"), Out(axes)),
+                **dict.fromkeys(("negative", "armed", "alive", "drive_inverted"), Out(axes)),
                 "turn_valid": Out(1),
                 **{f"turn_{name}": Out(each) for name, each in shown.items()},
             }
@@ -172,7 +174,7 @@ class SupervisedAxes(wiring.Component):
         doors = Doors(pipe, levels, words.written("supervisor_causes", BITS["external_fault"]), look)
         turned = gathered.turned(m, words.written("encoder_invert", 0), axes.commit_pending)
         asked = gathered.Asked(self.arm, self.disarm | turned, self.acknowledge, self.acknowledged)
-        waiting = {**doors.waiting, **gathered.encoders(pipe, axes, levels, look), "referenced": self.referenced}
+        waiting = {**doors.waiting, **gathered.encoders(pipe, axes, levels, look), "referenced": axes.referenced}
         waited = gathered.looked_at(pipe, waiting, asked, look)
         monitors, supervisors = Monitors(pipe, design, words), Supervisors(pipe, design.supervisor, words)
         sample = gathered.sample(pipe, axes, first, design.index_bits, sampled)
@@ -192,6 +194,9 @@ class SupervisedAxes(wiring.Component):
             **monitors.runaway(moved, pipe.later(first, look), supervisors.let_out, look - 1),
             **lost,
         }
+        slips = Cat(made[bit] & words("supervisor_causes", end)[bit] for bit in SLIPS).any()
+        found = Cat(pipe.turns(end + 1)) & pipe.taken(slips, "slips").replicate(axes.spec.axes)
+        m.d.comb += axes.slip.eq(self.slip | turned | found)
         judged = supervisors.judged(
             Turn(
                 stage=end,
@@ -226,7 +231,7 @@ class SupervisedAxes(wiring.Component):
         for name, member in axes.signature.members.items():
             if member.flow == Out and name not in HIDDEN:
                 m.d.comb += getattr(self, name).eq(getattr(axes, name))
-            elif member.flow == In and name not in ("drive_enable", "word_write"):
+            elif member.flow == In and name not in ("drive_enable", "word_write", "slip"):
                 mine = Value.cast(getattr(self, name))
                 m.d.comb += getattr(axes, name).eq(mine[: len(Value.cast(getattr(axes, name)))])
         m.d.comb += [
@@ -236,9 +241,6 @@ class SupervisedAxes(wiring.Component):
             watchdog.supervisor_watchdog.eq(self.supervisor_watchdog),
             self.live.eq(watchdog.live),
         ]
-        # An index that was found is no reference yet: a host may have given up, and the count is what it was.
-        found = self.preload & axes.index_latched
-        m.d.sync += self.referenced.eq(~self.index_arm & (self.referenced | found))
 
     def _out_of_range(self, words: LiveWords, stage: int) -> Value:
         """Return whether a word of the axis that is in a stage, or the watchdog's, is beyond its range."""

@@ -31,7 +31,7 @@ def step(
         params: what `Design.params` or `Design.float_params` returns.
         state: what `Design.start` or the previous call returned, of the same number type.
         seen: what the decoder shows at the strobe.
-        restart: true if the count was preloaded since the last sample; the estimator then starts afresh.
+        restart: true if the count was preloaded or shifted since the last sample; the estimator then starts afresh.
         fault: the encoder's sticky flags; any of them forces the drive to zero.
         enable: false forces the drive to zero.
     """

@@ -23,6 +23,8 @@ class Pins(NamedTuple):
     preload_count: np.ndarray
     index_arm: np.ndarray
     clear_flags: np.ndarray
+    origin_shift: np.ndarray
+    slip: np.ndarray
 
 
 class Outputs(NamedTuple):
@@ -38,6 +40,7 @@ class Outputs(NamedTuple):
     index_count: np.ndarray
     index_latched: np.ndarray
     index_armed: np.ndarray
+    referenced: np.ndarray
     stamp_a_rise: np.ndarray
     stamp_b_rise: np.ndarray
     stamp_a_fall: np.ndarray
@@ -61,7 +64,7 @@ class State(NamedTuple):
 
     decoder: quadrature.State
     axis: design.State  # the estimator's after the last strobe; the others' after the last changed drive
-    restart: int  # 1 from a preload until the next sample
+    restart: int  # 1 from a preload or a shift of the origin until the next sample
     older: UnderWay
     newer: UnderWay
 
@@ -110,6 +113,7 @@ def _show(outputs, k, decoder):
     outputs.count[k], outputs.illegal_count[k] = decoder.count, decoder.illegal_count
     outputs.index_count[k] = decoder.index_count
     outputs.index_latched[k], outputs.index_armed[k] = decoder.index_latched, decoder.index_armed
+    outputs.referenced[k] = decoder.referenced
     outputs.stamp_a_rise[k], outputs.stamp_b_rise[k] = decoder.stamp_a_rise, decoder.stamp_b_rise
     outputs.stamp_a_fall[k], outputs.stamp_b_fall[k] = decoder.stamp_a_fall, decoder.stamp_b_fall
 
@@ -148,7 +152,10 @@ def run(controller, timing, state, pins, outputs, first, until):
         inputs = quadrature.Inputs(
             pins.encoder_a[n], pins.encoder_b[n], pins.encoder_z[n], controller.glitch_clocks, controller.invert
         )
-        strobes = quadrature.Strobes(pins.preload[n], pins.preload_count[n], pins.index_arm[n], pins.clear_flags[n])
+        shift = pins.origin_shift[n]
+        strobes = quadrature.Strobes(
+            pins.preload[n], pins.preload_count[n], pins.index_arm[n], pins.clear_flags[n], shift, pins.slip[n]
+        )
         decoder = quadrature.step(controller.decoder, state.decoder, inputs, strobes)
-        state = State(decoder, now, restart | pins.preload[n], older, newer)
+        state = State(decoder, now, restart | pins.preload[n] | shift, older, newer)
     return state

@@ -34,11 +34,13 @@ class Outputs(NamedTuple):
     count: np.ndarray  # type: ignore[assignment]  # a tuple has a method of this name
     stepped: np.ndarray
     edge_kind: np.ndarray
+    edge_down: np.ndarray
     indexed: np.ndarray
     stamp: np.ndarray
     index_count: np.ndarray
     index_armed: np.ndarray
     index_latched: np.ndarray
+    referenced: np.ndarray
     illegal: np.ndarray
     overspeed: np.ndarray
     wrapped: np.ndarray
@@ -48,7 +50,7 @@ class Outputs(NamedTuple):
 class State(NamedTuple):
     """The state of an axis.
 
-    `restart` is 1 from a preload until the next sample. `allowed` is 1 while the force in the output stage may become
+    `restart` is 1 from a preload or a shift of the origin until the next sample. `allowed` is 1 while the force in the output stage may become
     the drive.
     """
 
@@ -75,6 +77,7 @@ def _show(outputs, n, state):
     outputs.count[n], outputs.stepped[n], outputs.edge_kind[n] = decoder.count, decoder.stepped, decoder.edge
     outputs.stamp[n], outputs.indexed[n], outputs.index_count[n] = decoder.stamp, decoder.indexed, decoder.index_count
     outputs.index_armed[n], outputs.index_latched[n] = decoder.index_armed, decoder.index_latched
+    outputs.referenced[n], outputs.edge_down[n] = decoder.referenced, decoder.down
     outputs.illegal[n], outputs.overspeed[n], outputs.wrapped[n] = decoder.illegal, decoder.overspeed, decoder.wrapped
     outputs.illegal_count[n] = decoder.illegal_count
 
@@ -135,8 +138,11 @@ def run(controller, timing, state, pins, samples, outputs, first, until):
         inputs = quadrature.Inputs(
             pins.encoder_a[n], pins.encoder_b[n], pins.encoder_z[n], controller.glitch_clocks, controller.invert
         )
-        strobes = quadrature.Strobes(pins.preload[n], pins.preload_count[n], pins.index_arm[n], clear)
+        shift = pins.origin_shift[n]
+        strobes = quadrature.Strobes(
+            pins.preload[n], pins.preload_count[n], pins.index_arm[n], clear, shift, pins.slip[n]
+        )
         decoder = quadrature.step(controller.decoder, state.decoder, inputs, strobes)
-        restart |= pins.preload[n]
+        restart |= pins.preload[n] | shift
         state = State(decoder, estimator, driven, flags, restart, int(allowed), sampled, int(actuated))
     return state

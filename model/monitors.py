@@ -18,8 +18,8 @@ words whose values after reset follow from the axis:
     estimator_saturated   more than supervisor_saturated samples in a row, after reset those of 10 ms
     encoder_loss          a channel equals its complement for more than supervisor_loss clocks, after reset one more
                           than the glitch filter passes over
-    index_spacing         two index edges in one direction of the same kind are no turn apart: the distance is neither
-                          0 nor a turn, within supervisor_index_tolerance counts
+    index_spacing         two indexes are no turn apart: the distance is neither 0 nor a turn, within
+                          supervisor_index_tolerance counts. The decoder says where an index is
     a_channel_idle        a warning, no cause: a hundred edges in a row were of one channel. A handle that dithers on
                           one edge does that too, so no more is promised for a dead channel without its complement.
 """
@@ -49,8 +49,12 @@ IDLE_EDGES = 100
 """Edges of one channel in a row that raise the warning: so many reversals on one edge are dither, or a dead channel."""
 LOSS_BITS = 8
 REGISTER_BITS = 31
-INDEX_TOLERANCE = 4
-"""Counts that an index edge may be away from its place, after reset: a pulse may be a cycle wide."""
+INDEX_TOLERANCE = 1
+"""Counts that an index may be away from its place, after reset.
+
+The decoder takes one edge of Z from both sides. Where that edge lies on an edge of A or B it may be seen a clock before
+or after it: its place is then either of two counts. The same holds for a handle that passes both within a clock.
+"""
 
 
 class Params(NamedTuple):
@@ -66,6 +70,7 @@ class Inputs(NamedTuple):
     count: int = 0  # type: ignore[assignment]  # a tuple has a method of this name
     stepped: int = 0
     edge_kind: int = 0
+    edge_down: int = 0
     indexed: int = 0
     valid: int = 0
     velocity: int = 0
@@ -91,7 +96,6 @@ class State(NamedTuple):
 
     causes: int
     a_channel_idle: int
-    before: int  # the last two bits of the count at the last clock
     at_low: int  # the limit that the next clock compares is supervisor_position_low
     limit: int  # that limit
     wrong: int  # the count was beyond the limit of the last clock
@@ -104,11 +108,12 @@ class State(NamedTuple):
     channel: int  # channel of the last edge, 1: B
     edges: int  # edges in a row of that channel
     has_index: int
-    indexed: int  # there was an index edge
+    indexed: int  # there was an index
+    behind: int  # with an edge that counted down, which is behind its place and not yet counted
     measured: int  # it has a distance from the last one, `distance`
-    distance: int  # counts from the last index edge, to either side: negative
+    distance: int  # counts from the last index, to either side: negative
     upwards: int  # the side, 1: the count has grown
-    away: int  # an index edge was not at the last one
+    away: int  # an index was not at the last one
     beyond: int  # a turn, less its distance
 
 
@@ -160,7 +165,7 @@ class Design:
             Word("supervisor_turn", distance, 1.0, "", distance.max, "counts from index to index"),
             Word(
                 "supervisor_index_tolerance", UQ(LOSS_BITS, 0), 1.0, "", INDEX_TOLERANCE,
-                "counts that an index edge may be away from its place",
+                "counts that an index may be away from its place",
             ),
         )  # fmt: skip
 
@@ -185,16 +190,17 @@ def _samples(state, inputs):
 
 @compiled
 def _ways(params, state, inputs):
-    """Return the way against the drive, and the distance and side from the last index edge, after a clock edge."""
-    up = inputs.count >> 1 & 1 ^ state.before >> 1 ^ state.before & 1 ^ 1
+    """Return the way against the drive, and the distance and side from the last index, after a clock edge."""
+    up = 1 - inputs.edge_down
     way, distance, upwards = state.way, state.distance, state.upwards
     if not (inputs.at_limit and state.pressed and inputs.negative == state.negative):
         way = 0
     elif inputs.stepped:
         way = wrap(way - 1 if up == inputs.negative else way + 1, params.count_width)
     if state.indexed:
-        distance = 0
-    if inputs.stepped:
+        distance, upwards = -state.behind, 0
+    # An edge that counts down has the number of the count before it: with an index it is behind that place.
+    if inputs.stepped and not (inputs.indexed and inputs.edge_down):
         if distance == 0 or up == upwards:
             distance, upwards = wrap(distance - 1, params.count_width), up
         else:
@@ -241,7 +247,6 @@ def step(params, state, inputs):
     return State(
         causes=causes,
         a_channel_idle=int(edges == IDLE_EDGES),
-        before=count & 3,
         at_low=state.at_low ^ 1,
         limit=limit,
         wrong=int(wrong),
@@ -255,6 +260,7 @@ def step(params, state, inputs):
         edges=edges,
         has_index=state.has_index | inputs.indexed,
         indexed=inputs.indexed,
+        behind=inputs.stepped & inputs.indexed & inputs.edge_down,
         measured=measured,
         distance=distance,
         upwards=upwards,

@@ -12,7 +12,8 @@ any speed of one edge a sample and below, is exactly nothing: a handle that shak
 
 Energy that was taken is a credit, energy that was given a debt. A credit is dropped where the wall renders no force,
 and is forgotten within `MEMORY_S`: an early impact would otherwise pay for a chatter long after it. A debt stays,
-across contacts, disables and faults. A preload, after which the position is another, begins with neither.
+across contacts, disables and faults. A preload or a shift of the origin, after which the
+position is another, begins with neither.
 
 In debt, where the wall renders a force, the controller adds a damper to it:
 
@@ -172,7 +173,7 @@ def step(params, state, count, restart, velocity, force, drive):
         params: `Params`, `FloatParams`, or `ABSENT` for an axis without a controller: its force is given on as it is.
         state: `START`, `FLOAT_START` or `ABSENT`, or the state that the previous call returned.
         count: position, counts, as a signed word that may have wrapped.
-        restart: true if the count was preloaded since the last sample.
+        restart: true if the count was preloaded or shifted since the last sample.
         velocity: word of the estimator's velocity format (float: counts a sample).
         force: the wall's force on the handle, force LSB.
         drive: the drive that answers the last sample, force LSB, as if it acted from that sample on.

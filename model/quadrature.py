@@ -41,6 +41,8 @@ class Strobes(NamedTuple):
     preload_count: int = 0
     arm: int = 0
     clear: int = 0
+    origin_shift: int = 0
+    slip: int = 0
 
 
 class State(NamedTuple):
@@ -50,6 +52,7 @@ class State(NamedTuple):
     index_count: int
     index_armed: int
     index_latched: int
+    referenced: int  # the origin was moved since the index was latched, and nothing has made either void
     stamp: int
     stamp_a_rise: int
     stamp_b_rise: int
@@ -74,6 +77,8 @@ class State(NamedTuple):
     held_a: int  # clocks since the channel left its filtered level
     held_b: int
     held_z: int
+    inverted: int  # `invert` of the last clock
+    passed: int  # there was an edge since Z's last change, and no slip
     crossed: int  # pending channels, of A and B, with an edge of the other channel since they became pending
     starting: int  # clocks until the synchronisers are filled
 
@@ -186,6 +191,16 @@ def _either(condition, new, old):
 
 
 @compiled
+def _index(state, inputs, strobes, one, down, fault):
+    """Return whether the count loses its scale in a clock, and whether there is an index; of an edge its direction."""
+    slipped = fault | strobes.slip | (state.inverted ^ inputs.invert)
+    way = down if one else state.down
+    # Z rises there upwards, and falls downwards. Without an edge since its last change the direction is not known.
+    found = state.moved >> 2 & (state.level >> 2 ^ way) & (one | state.passed) & ~slipped
+    return slipped, found & 1
+
+
+@compiled
 def step(params, state, inputs, strobes):
     """Return the state after one clock of `Inputs` and `Strobes`."""
     level, accepted, pending, crossing, outrun = _filtered(state, inputs)
@@ -193,7 +208,7 @@ def step(params, state, inputs, strobes):
     # Decode. An edge is counted only if exactly one of A and B has moved.
     one = (state.moved ^ state.moved >> 1) & 1
     both = state.moved & state.moved >> 1 & 1
-    base = strobes.preload_count if strobes.preload else state.count
+    base = strobes.preload_count if strobes.preload else state.count + strobes.origin_shift * strobes.preload_count
     down = ~(state.up ^ inputs.invert) & 1
     onward = base + one * (1 - 2 * down)
     count = wrap(onward, params.count_width)
@@ -202,14 +217,20 @@ def step(params, state, inputs, strobes):
     risen = level & state.moved & 3
     kind = one_b + 2 * int(risen == 0)
     run = min(state.run + 1, RUN_MAX) if state.down == down else 1
-    indexed = (state.moved & level) >> 2
+    slipped, indexed = _index(state, inputs, strobes, one, down, both | outrun)
     latches = state.index_armed & ~strobes.arm & indexed
+    # The number of an edge that counts down is that of the count before it.
+    place = wrap(_either(one & down, base, count), params.count_width)
+    moved_place = wrap(state.index_count + strobes.origin_shift * strobes.preload_count, params.count_width)
+    beyond = int(count != onward)
+    void = strobes.arm | strobes.preload | slipped | beyond
     illegal_count = (0 if strobes.clear else state.illegal_count) + both
     return State(
         count=count,
-        index_count=_either(latches, count, state.index_count),
+        index_count=_either(latches, place, moved_place),
         index_armed=strobes.arm | (state.index_armed & ~latches),
-        index_latched=~strobes.arm & (state.index_latched | latches),
+        index_latched=(latches & ~beyond) | (state.index_latched & ~void),
+        referenced=(state.referenced | (strobes.origin_shift & state.index_latched)) & ~void,
         stamp=(state.stamp + 1) & ((1 << params.stamp_width) - 1),
         stamp_a_rise=_either(one_a & level, state.stamp, state.stamp_a_rise),
         stamp_b_rise=_either(one_b & level >> 1, state.stamp, state.stamp_b_rise),
@@ -222,7 +243,7 @@ def step(params, state, inputs, strobes):
         run=_either(one, run, _either(both, 0, state.run)),
         illegal=both | (state.illegal & ~strobes.clear),
         overspeed=outrun | (state.overspeed & ~strobes.clear),
-        wrapped=int(count != onward) | (state.wrapped & ~strobes.clear),
+        wrapped=beyond | (state.wrapped & ~strobes.clear),
         illegal_count=min(illegal_count, (1 << params.fault_width) - 1),
         first=inputs.a | inputs.b << 1 | inputs.z << 2,
         second=state.first,
@@ -234,6 +255,8 @@ def step(params, state, inputs, strobes):
         held_a=(state.held_a + 1) * (pending & 1),
         held_b=(state.held_b + 1) * (pending >> 1 & 1),
         held_z=(state.held_z + 1) * (pending >> 2 & 1),
+        inverted=inputs.invert,
+        passed=(one | state.passed) & ~(state.moved >> 2 | slipped) & 1,
         crossed=pending & crossing & 3,
         starting=state.starting - int(state.starting > 0),
     )
@@ -241,7 +264,8 @@ def step(params, state, inputs, strobes):
 
 @compiled
 def settled(state, pins):
-    """Return whether constant `pins` (a word of A, B, Z) can change only the clock stamp from here on."""
+    """Return whether constant `pins` (a word of A, B, Z), not inverted anew, can change only the clock stamp from here
+    on."""
     away = (state.first ^ pins) | (state.second ^ pins) | (state.level ^ pins)
     return (away | state.moved | state.pending | state.starting) == 0
 
@@ -255,6 +279,7 @@ def resting(params, state, count, pins, clocks):
         index_count=state.index_count,
         index_armed=state.index_armed,
         index_latched=state.index_latched,
+        referenced=state.referenced,
         stamp=(state.stamp + clocks) & ((1 << params.stamp_width) - 1),
         stamp_a_rise=state.stamp_a_rise,
         stamp_b_rise=state.stamp_b_rise,
@@ -279,6 +304,8 @@ def resting(params, state, count, pins, clocks):
         held_a=0,
         held_b=0,
         held_z=0,
+        inverted=state.inverted,
+        passed=state.passed,
         crossed=0,
         starting=0,
     )
@@ -287,8 +314,8 @@ def resting(params, state, count, pins, clocks):
 @compiled
 def _lone(state, pins, inputs, clocks):
     """Return whether a settled state meets the edge of one channel, A or B, that is decoded and settled in `clocks`."""
-    changed = state.level ^ pins
-    return 0 < changed < 3 and clocks > LATENCY + inputs.glitch_clocks and settled(state, state.level)
+    changed, still = state.level ^ pins, state.inverted == inputs.invert and settled(state, state.level)
+    return 0 < changed < 3 and clocks > LATENCY + inputs.glitch_clocks and still
 
 
 @compiled
@@ -301,11 +328,13 @@ def _edge(params, state, inputs, pins, clocks):
     kind = (changed >> 1) + 2 * int((changed & pins) == 0)
     onward = state.count + 1 - 2 * down
     count = wrap(onward, params.count_width)
+    beyond = int(count != onward)
     return State(
         count=count,
         index_count=state.index_count,
         index_armed=state.index_armed,
-        index_latched=state.index_latched,
+        index_latched=state.index_latched & ~beyond,
+        referenced=state.referenced & ~beyond,
         stamp=(state.stamp + clocks) & mask,
         stamp_a_rise=_either(kind == A_RISE, decoded, state.stamp_a_rise),
         stamp_b_rise=_either(kind == B_RISE, decoded, state.stamp_b_rise),
@@ -318,7 +347,7 @@ def _edge(params, state, inputs, pins, clocks):
         run=_either(state.down == down, min(state.run + 1, RUN_MAX), 1),
         illegal=state.illegal,
         overspeed=state.overspeed,
-        wrapped=state.wrapped | int(count != onward),
+        wrapped=state.wrapped | beyond,
         illegal_count=state.illegal_count,
         first=pins,
         second=pins,
@@ -330,6 +359,8 @@ def _edge(params, state, inputs, pins, clocks):
         held_a=0,
         held_b=0,
         held_z=0,
+        inverted=state.inverted,
+        passed=1,
         crossed=0,
         starting=0,
     )
@@ -339,7 +370,7 @@ def _edge(params, state, inputs, pins, clocks):
 def _settle(params, state, inputs, pins, clocks):
     if _lone(state, pins, inputs, clocks):
         return _edge(params, state, inputs, pins, clocks)
-    while clocks > 0 and not settled(state, pins):
+    while clocks > 0 and (state.inverted != inputs.invert or not settled(state, pins)):
         state = step(params, state, inputs, NO_STROBES)
         clocks -= 1
     return resting(params, state, state.count, pins, clocks) if clocks > 0 else state
@@ -353,7 +384,7 @@ def advance(params, state, inputs, clocks):
     separate because it is the common one: it compiles to a few instructions in the caller's loop.
     """
     pins = inputs.a | inputs.b << 1 | inputs.z << 2
-    if clocks > 0 and settled(state, pins):
+    if clocks > 0 and state.inverted == inputs.invert and settled(state, pins):
         return resting(params, state, state.count, pins, clocks)
     return _settle(params, state, inputs, pins, clocks)
 
@@ -366,7 +397,10 @@ def _run(params, start, inputs, strobes, record):
         for clock in range(record.shape[2]):
             at = lane, clock
             given = Inputs(inputs.a[at], inputs.b[at], inputs.z[at], inputs.glitch_clocks[at], inputs.invert[at])
-            asked = Strobes(strobes.preload[at], strobes.preload_count[at], strobes.arm[at], strobes.clear[at])
+            preload, shift = strobes.preload[at], strobes.origin_shift[at]
+            asked = Strobes(
+                preload, strobes.preload_count[at], strobes.arm[at], strobes.clear[at], shift, strobes.slip[at]
+            )
             state = step(params, state, given, asked)
             for field, value in enumerate(state):
                 record[field, lane, clock] = value

@@ -8,15 +8,16 @@ clock. This is what differs, and what is lost by it:
     velocity_limit        the same: it looks at estimates, of which every sample has one.
     runaway               the way is the sum of the differences of sampled counts, while the drive was at its limit on
                           one side after the last two turns. What a handle does and undoes between two samples is no
-                          way. At a sample after a preload the difference is 0, so that the motion of one sample is lost
-                          with every preload: a host that preloads at every sample has no such monitor.
+                          way. At a sample after a preload or a shift of the origin the difference is 0, so that the
+                          motion of one sample is lost: a host that preloads at every sample has no such monitor.
     estimator_saturated   the same: it counts samples.
     encoder_loss          a channel equalled its complement at every clock of a rota, and of the rotas before it
                           without a gap, for more clocks than supervisor_loss in all. It never trips sooner than
                           `monitors`, and less than two rotas later; a loss that ends before is missed.
-    index_spacing         of index edges, the last one before each sample, with the count that it had. One that another
+    index_spacing         of indexes, the last one before each sample, with the place that it had. One that another
                           follows within a rota is missed: it was at most as many counts away as a rota has clocks.
-                          A preload begins anew, and forgets the last index edge.
+                          So is one that a shift of the origin follows before the sample; the last one before it moves
+                          with the origin. A preload begins anew, and forgets the last index.
     a_channel_idle        a hundred samples with edges of one channel alone, those without an edge left out: as many
                           edges or more.
 """
@@ -50,10 +51,12 @@ class Inputs(NamedTuple):
 
     count: int = 0  # type: ignore[assignment]  # a tuple has a method of this name
     fresh: int = 0  # the count was preloaded since the last sample, or there was none
+    shifted: int = 0  # the origin was shifted since the last sample
+    shift: int = 0  # by so many counts, which were added to the count
     velocity: int = 0
     saturated: int = 0
-    indexed: int = 0  # there was an index edge since the last sample, or since a preload after that
-    index_count: int = 0  # the count at the last one
+    indexed: int = 0  # there was an index since the last sample, or since a preload or a shift after that
+    index_count: int = 0  # the place of the last one
     lost_a: int = 0  # channel A has equalled its complement at every clock since the last sample
     lost_b: int = 0
     edge_a: int = 0  # there was an edge of channel A since the last sample
@@ -83,7 +86,7 @@ class State(NamedTuple):
     channel: int  # channel of the last edges, 1: B
     edges: int  # samples in a row with edges of that channel alone
     has_index: int
-    last_index: int  # the count at the last index edge
+    last_index: int  # the place of the last index
 
 
 START = State(*(0 for _ in State._fields))
@@ -109,12 +112,12 @@ def _edges(state, inputs):
 
 
 @compiled
-def _index_is_wrong(params, state, inputs):
-    """Return whether the index edge of a sample is neither at the last one nor a turn away."""
+def _index_is_wrong(params, state, inputs, last_index):
+    """Return whether the index of a sample is neither at the last one nor a turn away."""
     if not (inputs.indexed and state.has_index) or inputs.fresh:
         return False
     distance, tolerance = (
-        abs(wrap(inputs.index_count - state.last_index, params.count_width)),
+        abs(wrap(inputs.index_count - last_index, params.count_width)),
         inputs.supervisor_index_tolerance,
     )
     return distance > tolerance and abs(distance - inputs.supervisor_turn) > tolerance
@@ -131,7 +134,8 @@ def step(params, state, inputs, let_out):
         let_out: the `supervisor.State` after the last sample: `at_limit` and `negative` of the drive that was let out.
     """
     count, last_quarter = inputs.count, 3 << (params.count_width - 3)
-    moved = 0 if inputs.fresh else wrap(count - state.last_count, params.count_width)
+    moved = 0 if inputs.fresh or inputs.shifted else wrap(count - state.last_count, params.count_width)
+    last_index = wrap(state.last_index + inputs.shifted * inputs.shift, params.count_width)
     way = 0
     if let_out.at_limit and state.pressed and let_out.negative == state.negative:
         way = wrap(state.way - moved if let_out.negative else state.way + moved, params.count_width)
@@ -152,7 +156,7 @@ def step(params, state, inputs, let_out):
         | int(-way > inputs.supervisor_runaway) << RUNAWAY
         | int(samples > inputs.supervisor_saturated) << ESTIMATOR_SATURATED
         | int(lost_a > longest or lost_b > longest) << ENCODER_LOSS
-        | int(_index_is_wrong(params, state, inputs)) << INDEX_SPACING
+        | int(_index_is_wrong(params, state, inputs, last_index)) << INDEX_SPACING
     )
     return State(
         causes=causes,
@@ -167,5 +171,5 @@ def step(params, state, inputs, let_out):
         channel=channel,
         edges=edges,
         has_index=int(inputs.indexed or (state.has_index and not inputs.fresh)),
-        last_index=inputs.index_count if inputs.indexed else state.last_index,
+        last_index=inputs.index_count if inputs.indexed else last_index,
     )

@@ -18,6 +18,10 @@ FROM_OUTSIDE = ("word_range", "external_fault", "emergency_stop")
 axis position_wrap."""
 
 
+SLIPS = monitors.ENCODER_LOSS, monitors.INDEX_SPACING
+"""Causes of the monitors by which an axis that watches them has lost its scale, and with it its reference."""
+
+
 class Design:
     """The designs of an axis's parts, and all their run-time words.
 
@@ -69,7 +73,7 @@ def registers_of(
         ("state", UQ(2, 0), "The state of the supervisor: 0 DISARMED, 1 ARMED, 2 TRIPPED."),
         ("live", UQ(1, 0), "The host's heartbeat is not overdue."),
         ("ready", UQ(1, 0), "The axis can be armed."),
-        ("referenced", UQ(1, 0), "The count was preloaded since the index was found."),
+        ("referenced", UQ(1, 0), "The origin was shifted since the index was latched, and the scale has not slipped."),
         ("latched", UQ(COUNT, 0), f"The causes since the last acknowledgement: {causes}."),
         ("first", UQ(COUNT, 0), "The causes of the clock that led to the last trip."),
         ("a_channel_idle", UQ(1, 0), "A warning: the last edges were all of one channel."),

@@ -22,8 +22,8 @@ from stimuli.places import place
 PINS, OUTPUTS = clocked.Pins._fields, clocked.Outputs._fields
 LATE_BIT = 20
 """The bit of a clock's number that the others' numbers have not; the top bit where a stamp has fewer."""
-STROBES = "commit", "preload", "clear_flags", "index_arm"
-ACTS, CHANCES = ("", "words", "drive_enable", *STROBES), (0.968, 0.006, 0.006, *[0.005] * len(STROBES))
+STROBES = "commit", "preload", "clear_flags", "index_arm", "origin_shift", "slip"
+ACTS, CHANCES = ("", "words", "drive_enable", *STROBES), (0.958, 0.006, 0.006, *[0.005] * len(STROBES))
 """What a host does at a clock, and the chance of each."""
 
 
@@ -112,13 +112,13 @@ async def host(bench: Bench, spec: AxisSpec, samples: int, random: np.random.Gen
             # The commit is seen a clock behind the changed drive, and waits from the next clock on.
             committed = next(k for k in count(sample) if strobe_of(timing, k) >= change_of(timing, sample) + 2)
             commits.append((strobe_of(timing, committed), words))
-        elif act < 0.03:
-            pulse = "preload"
+        elif act < 0.035:
+            pulse = "preload" if act < 0.03 else "origin_shift"
             bench.drive(preload_count=place(random, spec.count_width))
         elif act < 0.06:
             pulse = "clear_flags"
         elif act < 0.08:
-            pulse = "index_arm"
+            pulse = "index_arm" if act < 0.078 else "slip"
         else:
             bench.drive(drive_enable=int(random.random() < 0.8))
         if pulse:

@@ -57,6 +57,11 @@ def run_all(params: Params, columns: dict[str, np.ndarray]) -> State:
     return run(params, *(kind(*(columns[name] for name in kind._fields)) for kind in (Inputs, Strobes)))
 
 
+def meeting_steps() -> int:
+    """Return the counts that `meeting` makes."""
+    return int(expected(PARAMS, meeting("clear", 1))["count"][-1])
+
+
 # RTL against model.
 
 
@@ -97,9 +102,11 @@ def test_rtl(widths):
 @pytest.mark.parametrize("channel", "abz")
 def test_only_pulses_longer_than_the_limit_pass(channel, glitch_clocks):
     seen = expected(PARAMS, pulses(channel, glitch_clocks))
-    assert seen["stepped"].sum() == (0 if channel == "z" else 4)
+    steps = (glitch_clocks + 3 if channel == "z" else 4)
+    assert seen["stepped"].sum() == steps
     assert (np.diff(seen["index_latched"]) > 0).sum() == seen["indexed"].sum() == (2 if channel == "z" else 0)
-    assert seen["count"][-1] == seen["fault"][-1] == 0
+    assert seen["count"][-1] == (wrap(steps, 4) if channel == "z" else 0)
+    assert seen["fault"][-1] == 0
 
 
 @pytest.mark.parametrize("glitch_clocks", range(4))
@@ -189,9 +196,20 @@ def test_strobes_that_meet_what_they_act_on(when):
     assert seen["count"][-1] == wrap(5 + steps, 4)
 
     seen = expected(PARAMS, meeting("arm", when))
-    index = 16 + TO_COUNT  # position 5
-    assert (seen["index_armed"][-1], seen["index_latched"][-1]) == ((0, 1) if when < index else (1, 0))
+    # Position 5; the jump is behind it.
+    index, now = 16 + TO_COUNT, max(when, 29)
+    assert (seen["index_armed"][now], seen["index_latched"][now]) == ((0, 1) if when < index else (1, 0))
     assert seen["index_count"][-1] == (0 if when == index else 5)
+    assert seen["index_latched"][-1] == 0
+
+    # Whenever the origin is shifted, no edge is lost, and the index is where it is.
+    seen = expected(PARAMS, meeting("origin_shift", when))
+    assert seen["count"][-1] == wrap(5 + meeting_steps(), 4)
+    assert seen["index_count"][-1] == wrap(5 + 5, 4)
+    assert seen["referenced"].any() == (index < when < 30 + TO_COUNT)
+
+    seen = expected(PARAMS, meeting("slip", when))
+    assert seen["index_latched"][29] == (when != index and not index < when <= 29)
 
     seen = expected(PARAMS, meeting("clear", when))
     assert seen["illegal"][-1] == seen["illegal_count"][-1] == (when <= 30 + TO_COUNT)

@@ -61,7 +61,7 @@ async def follows_models(dut):
             axis.restarted()
             resets += 1
         else:
-            axis.advance(given, follower.level("drive_enable"))
+            axis.advance(given | {"slip": follower.slip(given)}, follower.level("drive_enable"))
             follower.edge(given, shown)
         states.add((follower.supervisor.state, follower.supervisor.driven != 0))
     assert compared == clocks - 1

@@ -73,7 +73,7 @@ def looked_at(pipe: Pipe, waiting: Mapping[str, Value], asked: Asked, look: int)
 
 
 def sample(pipe: Pipe, axes: Axes, first: Value, index_bits: int, stage: int) -> Sample:
-    """Return the sample whose velocity is there in a stage, with the last index edge before it.
+    """Return the sample whose velocity is there in a stage, with the last index before it.
 
     Args:
         pipe: the pipeline.
@@ -83,21 +83,26 @@ def sample(pipe: Pipe, axes: Axes, first: Value, index_bits: int, stage: int) ->
         stage: the stage.
     """
     m, indexed = pipe.m, Signal(pipe.axes)
-    # A preload makes the count of an index edge before it void.
-    m.d.sync += indexed.eq((axes.indexed | (indexed & ~Cat(pipe.turns(0)))) & ~axes.preload)
+    # A preload or a shift of the origin makes the place of an index before it void.
+    m.d.sync += indexed.eq((axes.indexed | (indexed & ~Cat(pipe.turns(0)))) & ~(axes.preload | axes.origin_shift))
+    marks = pipe.waits("preload", axes.preload, 0), pipe.waits("shift", axes.origin_shift, 0), indexed
     rows = []
-    for number, (mark, preloaded) in enumerate(zip(indexed, pipe.waits("preload", axes.preload, 0), strict=True)):
+    for number, mine in enumerate(zip(*marks, strict=True)):
         low = Signal(index_bits, name=f"index_low_{number}")
+        # An edge that counted down has the number of the count before it.
+        above = axes.stepped[number] & axes.edge_down[number]
         with m.If(axes.indexed[number]):
-            m.d.sync += low.eq(axes.count[number][:index_bits])
-        rows.append(Cat(preloaded, mark, low))
+            m.d.sync += low.eq((axes.count[number] + above)[:index_bits])
+        rows.append(Cat(*mine, low))
     row, first = pipe.later(pipe.of(rows, 0), stage), pipe.later(first, stage)
     return Sample(
         stage=stage,
         first=first,
         fresh=row[0] | first,
-        indexed=row[1],
-        index_low=row[2:],
+        shifted=row[1],
+        shift=axes.preload_count,
+        indexed=row[2],
+        index_low=row[3:],
         count=axes.estimated_count,
         velocity=axes.velocity,
         saturated=axes.saturated,

@@ -27,13 +27,17 @@ class Sample(NamedTuple):
         stage: the stage in which it does.
         first: whether it is its axis's first one after a reset.
         fresh: whether it is, or comes after a preload.
-        indexed: whether an index edge came since the axis's last sample.
-        index_low: the low bits of the count at that edge: enough to tell how far the sample is from it.
+        shifted: whether it comes after a shift of the origin.
+        shift: the counts of that shift, a stage later.
+        indexed: whether an index came since the axis's last sample.
+        index_low: the low bits of its place: enough to tell how far the sample is from it.
     """
 
     stage: int
     first: Value
     fresh: Value
+    shifted: Value
+    shift: Value
     indexed: Value
     index_low: Value
     count: Value
@@ -99,14 +103,15 @@ class Monitors:
         return saturated & enough
 
     def _index_is_wrong(self, sample: Sample) -> Value:
-        """Return whether an index edge is neither at the last one nor a turn away, 4 stages later."""
+        """Return whether an index is neither at the last one nor a turn away, 4 stages later."""
         pipe, width, now = self._pipe, self._width, sample.stage
         bits = len(sample.index_low)
         since = (sample.count[:bits] - sample.index_low)[:bits].as_signed()
         place = pipe.taken((sample.count - since)[:width], "index_place")
         indexed, fresh = pipe.taken(sample.indexed), pipe.taken(sample.fresh)
         kept = pipe.kept("last_index", width + 1)
-        last, known = kept.read(now + 1)[:width], kept.read(now + 1)[-1] & ~fresh
+        shift = Mux(pipe.taken(sample.shifted), sample.shift, 0)
+        last, known = (kept.read(now + 1)[:width] + shift)[:width], kept.read(now + 1)[-1] & ~fresh
         kept.leave(now + 1, Cat(Mux(indexed, place, last), indexed | known))
 
         distance = pipe.taken((place - last)[:width].as_signed(), "index_distance")
@@ -118,11 +123,11 @@ class Monitors:
         return measured & far & ~_within(beyond, tolerance)
 
     def moved(self, sample: Sample) -> Value:
-        """Return the counts since the axis's last sample, 0 at a fresh one, one stage later."""
+        """Return the counts since the axis's last sample, 0 at a fresh or shifted one, one stage later."""
         kept = self._pipe.kept("monitored_count", self._width)
         kept.leave(sample.stage, sample.count)
         moved = (sample.count - kept.read(sample.stage).as_signed())[: self._width]
-        return self._pipe.taken(Mux(sample.fresh, 0, moved), "moved").as_signed()
+        return self._pipe.taken(Mux(sample.fresh | sample.shifted, 0, moved), "moved").as_signed()
 
     def runaway(self, moved: Value, first: Value, let_out: Kept, stage: int) -> dict[int, Value]:
         """Return whether the handle has moved too far against a drive at its limit, by the cause's bit, 3 stages later.

@@ -8,10 +8,10 @@ from hardwall.model import output, passivity, quadrature, wall
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.supervised import FIXED, Design
 
-PULSES = ("preload", "preload_count", "index_arm", "clear_flags")
+PULSES = ("preload", "preload_count", "index_arm", "clear_flags", "origin_shift", "slip")
 DECODED = (
     "count", "stepped", "indexed", "illegal", "overspeed", "wrapped", "illegal_count", "index_count", "index_armed",
-    "index_latched", "stamp", "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall",
+    "index_latched", "referenced", "stamp", "stamp_a_rise", "stamp_b_rise", "stamp_a_fall", "stamp_b_fall",
 )  # fmt: skip
 """Outputs of an axis that are its decoder's, by the same names."""
 OWN = "drive", "sampled_count", "velocity", "wall_force", "flags"
@@ -72,7 +72,7 @@ class AxisTwin:
         """Return every output of the axis now, by name."""
         own = dict(zip(OWN, OWN_OF(self), strict=True))
         decoded = dict(zip(DECODED, DECODED_OF(self.decoder), strict=True))
-        decoded["edge_kind"] = self.decoder.edge
+        decoded |= {"edge_kind": self.decoder.edge, "edge_down": self.decoder.down}
         return {**own, **decoded, **NO_PULSES, **self.pulses.get(self.clocks, {}), "commit_pending": int(self.pending)}
 
     def _sample(self) -> None:
@@ -138,6 +138,6 @@ class AxisTwin:
             act()
         if not enabled:
             self.drive = 0
-        if given["preload"]:
+        if given["preload"] or given["origin_shift"]:
             self.restart = 1
         self.clocks += 1

@@ -28,8 +28,8 @@ from .supervised import Follower
 IDLE = (*LOOPS, "encoder_a_n", "encoder_b_n")
 """Pins that are high while the handle rests at its origin and all is well."""
 SEEN = (
-    "sampled", "actuated", "stepped", "edge_kind", "indexed", "estimated", "saturated", "strobe_busy", "illegal",
-    "overspeed", "wrapped", "count", "velocity", "drive", "stamp", "index_latched", *SHOWN, "referenced",
+    "sampled", "actuated", "stepped", "edge_kind", "edge_down", "indexed", "estimated", "saturated", "strobe_busy",
+    "illegal", "overspeed", "wrapped", "count", "velocity", "drive", "stamp", "index_latched", *SHOWN, "referenced",
     "a_channel_idle", "drive_inverted",
 )  # fmt: skip
 """Ports of the axis inside that the models are fed with or held to."""
@@ -145,11 +145,13 @@ class Twin(AxisTwin):
         self.actuated = seen["actuated"]
 
         enabled = self.follower.level("drive_enable")
-        given = pins | asked
+        # The clock runs.
+        given = pins | asked | {"slip": 0}
+        slip = self.follower.slip(given)
         self.follower.edge(given, seen)
         if self.strobe and self.pending:
             assert self.asked.items() <= asked.items(), "words moved before the axis had them"
-        self.advance(given, enabled)
+        self.advance(given | {"slip": slip}, enabled)
         if asked["commit"]:
             self.asked = {name: asked[name] for name in self.words if name in asked}
 

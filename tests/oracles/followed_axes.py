@@ -65,13 +65,14 @@ class Run:
             wanted = self.follower.wanted()
             assert {name: shown[name] for name in wanted} == wanted, f"clock {self.compared}"
             self.compared += 1
-        if not reset and len(self.given) == self.compared - 1 < AXES_CLOCKS:
-            self.given.append(given)
-            self.seen.words.append(word)
+        kept = not reset and len(self.given) == self.compared - 1 < AXES_CLOCKS
         if reset:
             self.follower.restart(given)
         else:
             self.follower.edge(given, shown)
+        if kept:
+            self.given.append(given | {"slip": self.follower.slips})
+            self.seen.words.append(word)
         return shown
 
     async def until_ready(self) -> None:

@@ -13,7 +13,7 @@ PINS = ("encoder_a", "encoder_b", *COMPLEMENTS, *LOOPS)
 BITS = {cause.name: 1 << bit for bit, cause in enumerate(CAUSES)}
 SHOWING = attrgetter(*SHOWN)
 OTHERS = *FROM_AXIS, *FROM_OUTSIDE
-WATCHED = "count", "stepped", "edge_kind", "indexed", "velocity", "saturated", "negative"
+WATCHED = "count", "stepped", "edge_kind", "edge_down", "indexed", "velocity", "saturated", "negative"
 """Inputs of the monitors that the axis shows by the same names."""
 OWN = "strobe", "drive", "causes", "stamp", "enable", "referenced"
 HEARD = tuple(name for name in supervisor.Inputs._fields if name not in OWN)
@@ -29,7 +29,6 @@ class Follower:
 
     Attributes:
         supervisor: the supervisor's state.
-        referenced: whether the count was preloaded since the index was found.
         inverted: whether the sign of the drive's pins is to be reversed.
         reached: every cause that was latched so far.
     """
@@ -38,7 +37,7 @@ class Follower:
         self._design = design
         self._monitors, self.supervisor = monitors.START, supervisor.START
         self._pins = [{name: int(name in high) for name in PINS}] * (SYNCHRONISER + 1)
-        self.referenced = self.inverted = self.reached = self._encoder_inverted = 0
+        self.inverted = self.reached = self._encoder_inverted = 0
         self._asked = itemgetter(*(word.name for word in design.monitors.words), *design.ranges, *HEARD)
         self._last: tuple[int, ...] = ()
 
@@ -46,17 +45,27 @@ class Follower:
         """Advance by a clock edge under reset, which the synchronisers of the pins do not have."""
         self._pins = [*self._pins[1:], {name: given[name] for name in PINS}]
         self._monitors, self.supervisor = monitors.START, supervisor.START
-        self.referenced = self.inverted = self._encoder_inverted = 0
+        self.inverted = self._encoder_inverted = 0
 
     def wanted(self) -> dict[str, int]:
         """Return the outputs now, by name."""
         shown = dict(zip(SHOWN, SHOWING(self.supervisor), strict=True))
-        own = {"referenced": self.referenced, "drive_inverted": self.inverted}
-        return shown | own | {"a_channel_idle": self._monitors.a_channel_idle}
+        own = {"drive_inverted": self.inverted, "a_channel_idle": self._monitors.a_channel_idle}
+        return shown | own
 
     def level(self, pin: str) -> int:
         """Return the level of a pin as the axis sees it at the next edge."""
         return self._pins[1][pin]
+
+    def _turns(self, given: dict[str, int]) -> bool:
+        """Return whether a commit takes another direction."""
+        return bool(given["commit"]) and given["encoder_invert"] != self._encoder_inverted
+
+    def slip(self, given: dict[str, int]) -> int:
+        """Return whether the axis loses its scale at the next edge by what is around it, with the inputs before it."""
+        watched = self._monitors.causes & given["supervisor_causes"]
+        found = any(watched & BITS[name] for name in ("encoder_loss", "index_spacing"))
+        return int(given["slip"] or self._turns(given) or found)
 
     def edge(self, given: dict[str, int], shown: dict[str, int]) -> None:
         """Advance by a clock edge, with the inputs just before it, and what the axis shows then."""
@@ -76,12 +85,10 @@ class Follower:
         causes = self._monitors.causes | sum(BITS[name] for name in OTHERS if stands[name])
         heard = self._heard._replace(
             strobe=shown["sampled"], drive=shown["drive"], causes=causes, stamp=shown["stamp"],
-            enable=level["drive_enable"], referenced=self.referenced,
+            enable=level["drive_enable"], referenced=shown["referenced"],
         )  # fmt: skip
-        if given["commit"] and given["encoder_invert"] != self._encoder_inverted:
+        if self._turns(given):
             self._encoder_inverted, heard = given["encoder_invert"], heard._replace(disarm=1)
-        if given["index_arm"] or (given["preload"] and shown["index_latched"]):
-            self.referenced = int(not given["index_arm"])
         if self.supervisor.state != supervisor.ARMED:
             self.inverted = given["drive_invert"]
         self._monitors = monitors.step(self._design.monitors.params, self._monitors, seen)

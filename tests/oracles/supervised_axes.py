@@ -4,10 +4,11 @@ from collections import defaultdict
 
 from hardwall.hdl.supervised import COMPLEMENTS, LOOPS
 from hardwall.model import supervised_axes, watchdog
+from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.axes import FRONT_LATENCY
 from hardwall.model.monitors import BITS
 from hardwall.model.sampled_monitors import Inputs
-from hardwall.model.supervised import FIXED
+from hardwall.model.supervised import FIXED, SLIPS
 from hardwall.model.supervised_axes import LOOK, SAMPLE_WORDS, Design, Turn
 from hardwall.model.supervisor import ARMED
 
@@ -29,6 +30,7 @@ class Follower:
     Attributes:
         states: for every axis its `supervised_axes.State`.
         reached: every cause that was latched so far.
+        slips: the axes that lost their scale at the last edge by what is around them.
     """
 
     def __init__(self, design: Design):
@@ -50,7 +52,7 @@ class Follower:
         self._passes: dict[tuple[int, int], dict] = defaultdict(dict)
         self._waiting: dict[str, int] = defaultdict(int)
         self._index, self._acknowledged, self._inverted = [0] * self._axes, 0, 0
-        self._indexed = self._preloaded = self.referenced = 0
+        self._indexed = self._preloaded = self._shifted = self.slips = self._found = 0
         self._doors = {"magnitude": [0] * self._axes, "negative": 0, "armed": 0, "alive": 0, "drive_inverted": 0}
         self._turn: dict[str, int] = {"turn_valid": 0}
 
@@ -58,7 +60,7 @@ class Follower:
         """Return the outputs now, by name; those of a turn only with one."""
         width = self._design.supervisor.limit.width
         magnitude = sum(word << width * axis for axis, word in enumerate(self._doors["magnitude"]))
-        own = {"referenced": self.referenced, "live": self._watchdog.live, "magnitude": magnitude}
+        own = {"live": self._watchdog.live, "magnitude": magnitude}
         return {**self._doors, **own, **self._turn}
 
     def _at(self, stage: int) -> tuple[int, dict] | None:
@@ -71,6 +73,7 @@ class Follower:
         levels, self._pins = self._pins[0], [*self._pins[1:], {name: given[name] for name in PINS}]
         self._sample(given, shown)
         self._look(given, levels, shown)
+        self._found = 0
         if at := self._at(self._end):
             at[1]["live"] = self._watchdog.live
         if at := self._at(self._end + 1):
@@ -80,8 +83,6 @@ class Follower:
         self._write(given, shown)
         if given["acknowledge"]:
             self._acknowledged = given["acknowledged"]
-        asked = given["preload"] & shown["index_latched"]
-        self.referenced = ~given["index_arm"] & (self.referenced | asked)
         beat = watchdog.Inputs(given["heartbeat"], given["supervisor_watchdog"])
         self._watchdog = watchdog.step(self._design.watchdog.params, self._watchdog, beat)
         self._clock += 1
@@ -93,25 +94,31 @@ class Follower:
             axis, now = at
             strobed = 1 << axis
             now["fresh"] = int(self._preloaded >> axis & 1 or self._clock < self._rota)
+            now["shifted"] = self._shifted >> axis & 1
             now["indexed"], now["index_count"] = self._indexed >> axis & 1, self._index[axis]
         self._preloaded = given["preload"] | (self._preloaded & ~strobed)
-        self._indexed = (shown["indexed"] | (self._indexed & ~strobed)) & ~given["preload"]
+        self._shifted = given["origin_shift"] | (self._shifted & ~strobed)
+        moved = given["preload"] | given["origin_shift"]
+        self._indexed = (shown["indexed"] | (self._indexed & ~strobed)) & ~moved
         width = self._design.spec.count_width
         for axis in range(self._axes):
             if shown["indexed"] >> axis & 1:
-                count = shown["count"] >> width * axis & (1 << width) - 1
-                self._index[axis] = count - (count >> width - 1 << width)
+                # An edge that counted down has the number of the count before it.
+                above = shown["stepped"] & shown["edge_down"]
+                self._index[axis] = wrap((shown["count"] >> width * axis) + (above >> axis & 1), width)
         if at := self._at(self._sampled - 1):
             at[1].update({name: self._words[at[0]][name] for name in SAMPLE_WORDS})
         if at := self._at(self._sampled):
             at[1].update({name: shown[name] for name in ("velocity", "saturated")}, count=shown["estimated_count"])
+        if at := self._at(self._sampled + 1):
+            at[1]["shift"] = given["preload_count"]
 
     def _look(self, given: dict[str, int], levels: dict[str, int], shown: dict[str, int]) -> None:
         """Take what waits for the turn of the axis that is in the stage of the look, and its words."""
         if at := self._at(self._end - LOOK):
             axis, now = at
             now["waited"] = {name: bits >> axis & 1 for name, bits in self._waiting.items()}
-            now["waited"]["referenced"] = self.referenced >> axis & 1
+            now["waited"]["referenced"] = shown["referenced"] >> axis & 1
             now["acknowledged"] = self._acknowledged
             now.update({name: self._words[axis][name] for name in self._looked_at})
         if at := self._at(self._end - LOOK + 1):
@@ -137,6 +144,8 @@ class Follower:
         before = self.states[axis]
         self.states[axis] = supervised_axes.step(self._design.params, before, turn)
         after = self.states[axis].supervisor
+        watched = self.states[axis].monitors.causes & now["supervisor_causes"]
+        self._found = int(any(watched >> bit & 1 for bit in SLIPS)) << axis
         now["drives"] = int(before.supervisor.state == after.state == ARMED)
         self.reached |= after.latched
 
@@ -179,6 +188,7 @@ class Follower:
         for axis, words in enumerate(self._words):
             written |= words["encoder_invert"] << axis
         turned, self._inverted = pending & (written ^ self._inverted), pending & written | ~pending & self._inverted
+        self.slips = given["slip"] | turned | self._found
         kinds = sum((shown["edge_kind"] >> 2 * axis & 1) << axis for axis in range(self._axes))
         happens = {
             **self._shut(levels)[0],

@@ -5,6 +5,8 @@ import numpy as np
 from hardwall.model.quadrature import Inputs, Strobes
 
 INPUTS = (*Inputs._fields, *Strobes._fields)
+STROBES = {"preload": 0.004, "origin_shift": 0.02, "arm": 0.02, "clear": 0.02, "slip": 0.002}
+"""The strobes, and the chance of each at a clock."""
 
 
 def stimulus(clocks: int, **columns) -> dict[str, np.ndarray]:
@@ -30,11 +32,15 @@ def at(clocks: int, *when: int) -> np.ndarray:
 
 
 def pulses(channel: str, glitch_clocks: int) -> dict[str, np.ndarray]:
-    """Return pulses of every width from 1 to glitch_clocks + 2 on one channel, the others low."""
+    """Return pulses of every width from 1 to glitch_clocks + 2 on one channel, the others low.
+
+    Between two pulses on Z the handle moves on by a count.
+    """
     apart = 2 * glitch_clocks + 9
     clock = np.arange(apart * (glitch_clocks + 3))
-    level = clock % apart < clock // apart
-    return stimulus(len(clock), glitch_clocks=glitch_clocks, arm=clock % apart == apart - 1, **{channel: level})
+    levels = pins((clock - glitch_clocks - 4) // apart + 1) if channel == "z" else {}
+    levels[channel] = clock % apart < clock // apart
+    return stimulus(len(clock), glitch_clocks=glitch_clocks, arm=clock % apart == apart - 1, **levels)
 
 
 def turning(way: int) -> dict[str, np.ndarray]:
@@ -82,7 +88,7 @@ def directed() -> dict[str, np.ndarray]:
         *(jumping(state) for state in range(4)),
         *(faulty(state) for state in range(4)),
         *(starting(levels, edge, length) for levels in range(8) for edge in range(6) for length in (0, 1, 15)),
-        *(meeting(strobe, when) for strobe in ("preload", "arm", "clear", "reset") for when in range(1, 60)),
+        *(meeting(strobe, when) for strobe in (*STROBES, "reset") for when in range(1, 60)),
     )
 
 
@@ -100,7 +106,7 @@ def random_stimulus(generator: np.random.Generator, clocks: int, width: int) -> 
     return stimulus(
         clocks,
         **{name: level ^ held(generator.random(clocks) < 0.02, 6) for name, level in pins(position).items()},
-        **{name: generator.random(clocks) < 0.02 for name in ("preload", "arm", "clear")},
+        **{name: generator.random(clocks) < chance for name, chance in STROBES.items()},
         reset=generator.random(clocks) < 1 / 2000,
         glitch_clocks=held((16 ** generator.random(clocks)).astype(np.int64) - 1, 200),
         invert=held(generator.integers(0, 2, clocks), 200),

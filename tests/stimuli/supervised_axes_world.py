@@ -95,7 +95,8 @@ class AxesWorld:
         self.lanes = [Lane(design, seed + axis) for axis in range(axes)]
         self.numbers = {word.name: number for number, word in enumerate(design.words)}
         self.written = [{word.name: word.reset for word in design.words} for _ in range(axes)]
-        self.heartbeat = self.silent = 0
+        self.heartbeat = self.silent = self.shifting = self.shift = 0
+        self.turn = design.spec.clocks_per_sample + design.latency
         self.place = 0
 
     def act(self, states: list[tuple[int, int]], ready: int) -> dict[str, int]:
@@ -109,8 +110,16 @@ class AxesWorld:
         asks = min(1.0, ASKS / len(lanes))
         acts = [lane.act_of(*state, asks) for lane, state in zip(lanes, states, strict=True)]
         given = {name: sum(act[name] << axis for axis, act in enumerate(acts)) for name in BITS}
-        for name, pulse in (("preload_count", "preload"), ("acknowledged", "acknowledge")):
-            given[name] = next((act[name] for act in acts if act[pulse]), random.choice(acts)[name])
+        pulses = {"preload_count": ("origin_shift", "preload"), "acknowledged": ("acknowledge",)}
+        for name, those in pulses.items():
+            asked = [act[name] for pulse in those for act in acts if act[pulse]]
+            given[name] = asked[0] if asked else random.choice(acts)[name]
+        # What an origin is shifted by stays until every axis has had its turn; another shift waits for that.
+        self.shifting -= self.shifting > 0
+        if self.shifting:
+            given |= {"origin_shift": 0, "preload_count": self.shift}
+        elif given["origin_shift"]:
+            self.shifting, self.shift = self.turn, given["preload_count"]
         if random.random() < 0.0005:
             self.silent = random.randrange(SILENT_CLOCKS_PER_MS * WATCHDOG_MS[0])
         self.silent -= self.silent > 0

@@ -9,10 +9,14 @@ from hardwall.hdl.supervised import LOOPS
 from hardwall.model.supervised import FIXED, Design
 from hardwall.model.supervisor import ALL, ARMED, DISARMED, TRIPPED, WATCHDOG_MS
 
-STROBES = ("commit", "arm", "disarm", "acknowledge", "index_arm", "preload", "clear_flags")
+STROBES = (
+    "commit", "arm", "disarm", "acknowledge", "index_arm", "preload", "origin_shift", "clear_flags", "slip",
+)  # fmt: skip
 QUARTERS = ((0, 0), (1, 0), (1, 1), (0, 1))
-ACTS = ("", "disarm", "commit", "committed", "live", "settle", "index_arm", "preload", "acknowledge")
-CHANCES = (0.9831, 0.0005, 0.002, 0.003, 0.0045, 0.0035, 0.002, 0.0013, 0.0002)
+ACTS = (
+    "", "disarm", "commit", "committed", "live", "settle", "index_arm", "preload", "acknowledge", "origin_shift", "slip",
+)  # fmt: skip
+CHANCES = (0.9814, 0.0005, 0.002, 0.003, 0.0045, 0.0035, 0.002, 0.0013, 0.0002, 0.0015, 0.0002)
 """What a host does beside bringing the axis to ARMED, and the chance of each in a clock."""
 FILTERS = (0, 0, 1, 2, 5, 15, 15)
 
@@ -122,8 +126,9 @@ class World:
             return {"commit": 1}
         if act in ("committed", "live"):
             self._choose(random.choice(self.committed if act == "committed" else self.live))
-        elif act == "preload":
-            return {"preload": 1, "preload_count": random.randrange(-half, half)}
+        elif act in ("preload", "origin_shift"):
+            far = half if act == "preload" or random.random() < 0.2 else 2
+            return {act: 1, "preload_count": random.randrange(-far, far)}
         elif act == "acknowledge":
             return {"acknowledge": 1, "acknowledged": random.randrange(ALL + 1)}
         elif act:
