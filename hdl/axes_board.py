@@ -24,7 +24,8 @@ class AxesBoard(wiring.Component):
     """Supervised axes behind their pins: `SupervisedAxes`, their link, a capture memory and a stage of pulses for each.
 
     A host reads and writes the registers of `registers`, a bank for each axis; what it asks of an axis in one frame
-    happens at one clock. It is refused an `arm` of an axis that is not `ready`, and a `preload` of one that is ARMED.
+    happens at one clock. It is refused an `arm` of an axis that is not `ready`, and a `preload` or an `origin_shift` of
+    one that is ARMED.
 
     One set of loops serves all axes: `drive_enable`, `emergency_stop` and `external_fault`, which an axis takes part in
     as its `supervisor_causes` says. Encoders have no complements here: each is taken to be unlike its channel, so
@@ -125,10 +126,11 @@ class AxesBoard(wiring.Component):
     def elaborate(self, platform):
         m = Module()
         m.submodules.axes, m.submodules.link = axes, link = self.axes, self.link
-        running, reset = board_clocks(m, self)
+        running, stood, reset = board_clocks(m, self)
 
         loops = {"drive_enable": self.drive_enable & running}
         m.d.comb += lead_out(axes, self, ENCODER)
+        m.d.comb += axes.slip.eq(stood.replicate(self.spec.axes))
         m.d.comb += lead_out(link, self, link.PINS)
         # A channel without a complement is unlike what stands for that, whatever the clock edge sees.
         m.d.comb += [getattr(axes, name).eq(~getattr(axes, name[:-2])) for name in COMPLEMENTS]

@@ -28,7 +28,8 @@ class Board(wiring.Component):
     """A supervised axis behind a dozen pins: `SupervisedAxis`, its link and its capture memory, which say what they do.
 
     A host reads and writes the registers of `registers`; what it asks for in one frame happens at one clock. It is
-    refused an `arm` unless the axis is `ready`, and a `preload` while ARMED.
+    refused an `arm` unless the axis is `ready`, and a `preload` or an `origin_shift` while ARMED. Neither is answered
+    before a sample of the new count has changed the drive.
 
     Drive: the drive stage of `spec.stage`, a block of `hdl/drive/`, makes pins of `driven`. The word `drive_invert`
     reverses the sign; it is taken in every state but ARMED.
@@ -36,7 +37,7 @@ class Board(wiring.Component):
     Safe are the pins of the drive as the stage says, and `alive` low; they are so from power-up on. A clock that stops
     would keep them as they were: the oscillator, a second clock, finds that out, at most
     `clock_monitor.Design.stop_latency_s` later, makes them safe, and acts as the loop of `drive_enable` does, so that
-    the axis is DISARMED when the clock comes back. Until both clocks run and the reset has ended, `outputs_enable` is
+    the axis is DISARMED when the clock comes back, and without a reference: edges may have been missed. Until both clocks run and the reset has ended, `outputs_enable` is
     low: the outputs may be left to their pulls.
 
     Latency: at most `latency` clocks from the sample strobe to pins that follow the changed drive. `drive_enable` or
@@ -137,9 +138,10 @@ class Board(wiring.Component):
         m = Module()
         m.submodules.axis = axis = self.axis
         m.submodules.link = link = self.link
-        running, reset = board_clocks(m, self)
+        running, stood, reset = board_clocks(m, self)
         m.d.comb += lead_out(axis, self, (*ENCODER, "external_fault", "emergency_stop"))
         m.d.comb += [axis.drive_enable.eq(self.drive_enable & running), self.outputs_enable.eq(running & ~reset)]
+        m.d.comb += axis.slip.eq(stood)
         m.d.comb += lead_out(link, self, link.PINS)
 
         registers = self.registers
@@ -168,12 +170,18 @@ class Board(wiring.Component):
             value = parts[shown.name] if shown.name in parts else has[shown.name]
             m.d.comb += getattr(link, shown.name).eq(value >> max(len(value) - shown.format.width, 0))
         armed = axis.state == ARMED
-        refused = {"arm": ~axis.ready, "preload": armed}
+        refused = {"arm": ~axis.ready, "preload": armed, "origin_shift": armed}
+        # At most two samples of the old count are under way.
+        old = Signal(2)
+        with m.If(axis.preload | axis.origin_shift):
+            m.d.sync += old.eq(3)
+        with m.Elif(axis.sampled):
+            m.d.sync += old.eq(old - old.any())
         m.d.comb += [
             link.stepped.eq(axis.stepped),
             link.edge_kind.eq(axis.edge_kind),
             link.refuse.eq(Cat(refused.get(pulse.name, 0) for pulse in registers.pulses)),
-            link.commit_pending.eq(axis.commit_pending),
+            link.commit_pending.eq(axis.commit_pending | old.any()),
         ]
 
         self._drive(m, armed, running)

@@ -1,6 +1,6 @@
 """The clocks of a board: the one of its axes with its reset, and the oscillator's, which watches it."""
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from amaranth.hdl import ClockDomain, DomainRenamer, Module, Signal
 from amaranth.lib.cdc import FFSynchronizer
@@ -20,10 +20,24 @@ class Clocked(Protocol):
     oscillator: Signal
 
 
-def board_clocks(m: Module, board: Clocked) -> tuple[Signal, Signal]:
-    """Make the clock domains of a board; return whether its clock runs, as the oscillator has found, and its reset.
+class Clocks(NamedTuple):
+    """The clocks of a board.
 
-    The reset follows the pin 2 to 3 clocks later, and lasts as long after power-up.
+    Attributes:
+        running: whether the clock runs, as the oscillator has found; asynchronous.
+        stood: whether it did not, at the clock: it still says so when the clock comes back.
+        reset: the reset, which follows the pin 2 to 3 clocks later, and lasts as long after power-up.
+    """
+
+    running: Signal
+    stood: Signal
+    reset: Signal
+
+
+def board_clocks(m: Module, board: Clocked) -> Clocks:
+    """Make the clock domains of a board; return what is known of its clocks.
+
+    `running` rises behind the second change of a beat that the clock makes, so `stood` is high for many clocks then.
     """
     m.domains.sync = domain = ClockDomain()
     m.d.comb += domain.clk.eq(board.clk)
@@ -40,4 +54,6 @@ def board_clocks(m: Module, board: Clocked) -> tuple[Signal, Signal]:
     beat = Signal(design.beat_clocks.bit_length(), reset_less=True)
     m.d.sync += beat.eq(beat + 1)
     m.d.comb += monitor.beat.eq(beat[-1])
-    return monitor.running, reset
+    stood = Signal(init=1)
+    m.submodules.running_synchroniser = FFSynchronizer(~monitor.running, stood, init=1)
+    return Clocks(monitor.running, stood, reset)

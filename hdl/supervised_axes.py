@@ -194,7 +194,7 @@ class SupervisedAxes(wiring.Component):
             **monitors.runaway(moved, pipe.later(first, look), supervisors.let_out, look - 1),
             **lost,
         }
-        slips = Cat(made[bit] & words("supervisor_causes", end)[bit] for bit in SLIPS).any()
+        slips = Cat(causes[bit] & words("supervisor_causes", end)[bit] for bit in SLIPS).any()
         found = Cat(pipe.turns(end + 1)) & pipe.taken(slips, "slips").replicate(axes.spec.axes)
         m.d.comb += axes.slip.eq(self.slip | turned | found)
         judged = supervisors.judged(

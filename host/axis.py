@@ -12,7 +12,7 @@ from .device import Device, read_identity
 from .errors import ChangedError, HostError, NotReadyError, RefusedError, TrippedError
 from .groups import Named, Supervisor, Wall
 from .heartbeat import LEASE_S, Beat, Heartbeat
-from .homing import REST_S, Homed, homing
+from .homing import Homed, homing
 from .port import Port
 from .seconds import check_seconds
 from .shared import Shared
@@ -311,36 +311,52 @@ class Axis(Named):
             raise TrippedError(f"the axis is still tripped: {now}")
 
     def preload(self, position_m: float) -> None:
-        """Say where the handle is. The axis must not be ARMED, and the handle should rest.
+        """Say where the handle is, which must rest: the axis loses its reference.
 
         Raises:
             FieldError: if the position is out of range.
             NotReadyError: if the axis is ARMED.
             HostError: if the board is not reached.
         """
-        self.set(preload_count=position_m)
+        self._move("preload", position_m)
+
+    def shift_origin(self, by_m: float) -> None:
+        """Add to all positions, that of the handle and that of a latched index, at one clock. The handle may move.
+
+        With a latched index the axis has its reference from then on.
+
+        Raises:
+            FieldError: if the way is out of range.
+            NotReadyError: if the axis is ARMED.
+            HostError: if the board is not reached.
+        """
+        self._move("origin_shift", by_m)
+
+    def _move(self, pulse: str, count_m: float) -> None:
+        """Let a pulse go out that moves the count, with its word."""
+        self.set(preload_count=count_m)
         try:
-            self.pulse("preload")
+            self.pulse(pulse)
         except RefusedError as error:
             raise NotReadyError("the axis is ARMED: disarm it before its position is set") from error
 
     def homing(self, index_m: float = 0.0) -> Generator[str, None, Homed]:
         """Home as `home` does, a look at a step: see `hardwall.host.homing.homing`."""
-        return homing(self, index_m, REST_S / self._port.pace)
+        return homing(self, index_m)
 
     def home(self, index_m: float = 0.0, seconds: float = 60.0) -> float:
         """Wait until a hand has moved the handle over the index; then make the index the position `index_m`.
 
-        Returns the position of the handle, which must rest at the end: how far the old origin was off is the
-        difference.
+        Returns the position of the handle, which may move all the time.
 
         A homing that does not end leaves the board waiting for its index, for which it has no way back, and without a
         reference, until another one ends.
 
         Raises:
-            FieldError: if `index_m` is beyond the range of positions, or the time is not finite, or negative.
-            TimeoutError: if the index, or a handle that rests, does not come in time.
-            NotReadyError: if the axis is ARMED.
+            FieldError: if `index_m` is beyond the range of positions, or would take the handle beyond it, or the time
+                is not finite, or negative.
+            TimeoutError: if the index does not come in time.
+            NotReadyError: if the axis is ARMED, or its scale has slipped since the index was found.
             HostError: if the board is not reached.
         """
         check_seconds("seconds", seconds)

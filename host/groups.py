@@ -94,7 +94,7 @@ class Supervisor(Group):
     ramp = Value("The rise of the limit after arming, N/s.")
     watchdog = Value("The longest time between two beats of the host, s.")
     causes = Value("The causes that trip, a bit each.")
-    reference = Value("1 if arming needs a reference, which is a count preloaded since the index was found, else 0.")
+    reference = Value("1 if arming needs a reference, which is an origin shifted since the index was found, else 0.")
     position_low = Value("The least position, m.")
     position_high = Value("The largest position, m.")
     velocity_limit = Value("The largest estimated speed, m/s.")

@@ -1,18 +1,17 @@
-"""Homing: a hand moves the handle over its index, and lets it rest; the index becomes a position."""
+"""Homing: a hand moves the handle over its index, and the index becomes a position."""
 
-import time
 from collections.abc import Generator
 from typing import NamedTuple, Protocol
 
-from ..model.checks import check_range
+from ..model.arithmetic.fixed import wrap
+from ..model.checks import FieldError, check_range
 from .device import Device
 from .errors import NotReadyError
 from .status import State, Status
 
-REST_S, REST_COUNTS = 0.3, 2
-"""The time in which a handle that rests moves by so many counts at most."""
-INDEX, REST = "the index: move the handle over it", "a handle that rests: let it"
-"""What homing waits for, in this order."""
+INDEX = "the index: move the handle over it"
+"""What homing waits for."""
+LOST = "the index was found, but the scale has slipped since: see to the encoder, clear what it says, and home again"
 
 
 class Homed(NamedTuple):
@@ -36,22 +35,23 @@ class Board(Protocol):
 
     def pulse(self, name: str) -> None: ...
 
-    def preload(self, position_m: float) -> None: ...
+    def shift_origin(self, by_m: float) -> None: ...
 
 
-def homing(axis: Board, index_m: float, rest_s: float) -> Generator[str, None, Homed]:
+def homing(axis: Board, index_m: float) -> Generator[str, None, Homed]:
     """Home an axis, a look at it at a step, for who has more to do between two.
 
-    Yields what is waited for, `INDEX` or `REST`.
+    The handle may move all the time: the board latches the place of the index, and moves its origin at one clock.
+
+    Yields what is waited for, `INDEX`.
 
     Args:
         axis: the axis.
         index_m: the position that the index becomes.
-        rest_s: the time in which a handle that rests moves by `REST_COUNTS` at most.
 
     Raises:
-        FieldError: if `index_m` is beyond the range of positions.
-        NotReadyError: if the axis is ARMED.
+        FieldError: if `index_m` is beyond the range of positions, or would take the handle beyond it.
+        NotReadyError: if the axis is ARMED, or its scale has slipped since the index was found.
         HostError: if the board is not reached.
     """
     count = axis.device.registers["count"]
@@ -62,12 +62,18 @@ def homing(axis: Board, index_m: float, rest_s: float) -> Generator[str, None, H
     axis.pulse("index_arm")
     while axis.read("index_armed"):
         yield INDEX
-    rest_m = (REST_COUNTS + 0.5) * count.lsb
-    at_m, since_s = axis.status.position_m, time.monotonic()
-    while time.monotonic() - since_s < rest_s:
-        yield REST
-        if abs((now_m := axis.status.position_m) - at_m) > rest_m:
-            at_m, since_s = now_m, time.monotonic()
-    moved_m = index_m - axis.read("index_count") * count.lsb
-    axis.preload(axis.status.position_m + moved_m)
-    return Homed(axis.status.position_m, moved_m)
+    index = axis.read("index_count")
+    if not axis.read("index_latched"):
+        raise NotReadyError(LOST)
+    place = round(index_m / count.lsb)
+    # The handle is as far from its index as before, wherever its count is: a count that wraps would be another place.
+    handle = place + wrap(axis.read("count") - index, count.format.width)
+    if not count.low <= handle <= count.high:
+        within = f"{count.low * count.lsb:g} to {count.high * count.lsb:g}"
+        raise FieldError("index_m", f"must leave the handle within {within}, not at {handle * count.lsb:g}")
+    by = wrap(place - index, count.format.width)
+    axis.shift_origin(by * count.lsb)
+    status = axis.status
+    if not status.referenced:
+        raise NotReadyError(LOST)
+    return Homed(status.position_m, by * count.lsb)

@@ -49,7 +49,7 @@ class Status:
         force_n: the force that is let out.
         stamp_s: the time of the clock, which wraps behind the largest value of the register `stamp`.
         live: whether the heartbeat is not overdue; ready: whether the axis can be armed.
-        referenced: whether the position was set since the index was found.
+        referenced: whether the origin was shifted since the index was found, and the scale has not slipped.
         flags: names of the sticky flags; the estimator's own are `estimator_0` and so on.
         a_channel_idle: the warning that the last edges were all of one channel.
         trip: the causes that are latched; None if none is.

@@ -107,14 +107,22 @@ AXIS_PULSES = (
     ("commit", "Every word that was written becomes active at the axis's next sample, all together."),
     ("clear_flags", "The sticky flags and the count of illegal transitions are cleared."),
     ("preload", "The count is set to the active word preload_count, and the estimator starts afresh."),
-    ("index_arm", "The count is latched at the next rise of the index."),
+    ("index_arm", "The place of the next index is latched."),
 )
 """The axis's pulses, in the order of their addresses downwards."""
+LAST_PULSES = (
+    (
+        "origin_shift",
+        "The active word preload_count is added to the count and to index_count at one clock, and the estimator starts "
+        "afresh.",
+    ),
+)
+"""The axis's pulses whose addresses are below all others."""
 
 
 def _words(spec: DesignedAxis, committed: Iterable[Word]) -> tuple[Register, ...]:
     """Return the committed words of an axis as written: the preload's count first, for every axis has it."""
-    meaning = "The pulse preload sets the count to this word once it is active."
+    meaning = "The pulse preload sets the count to this word once it is active, and the pulse origin_shift adds it."
     preload = Register("preload_count", Kind.WORD, SQ(spec.count_width, 0), meaning, spec.count_m, "m")
     return preload, *map(word_register, committed)
 
@@ -196,8 +204,11 @@ class RegisterMap:
 
         telemetry = _placed(TELEMETRY, SUPERVISOR - TELEMETRY, _telemetry(spec))
         self.status = telemetry + _placed(SUPERVISOR, COUNTERS - SUPERVISOR, own(Kind.STATUS))
-        pulses = tuple(Register(name, Kind.PULSE, UQ(1, 0), meaning) for name, meaning in AXIS_PULSES)
-        pulses += own(Kind.PULSE)
+        first, last = (
+            tuple(Register(name, Kind.PULSE, UQ(1, 0), meaning) for name, meaning in pulses)
+            for pulses in (AXIS_PULSES, LAST_PULSES)
+        )
+        pulses = (*first, *own(Kind.PULSE), *last)
         lowest = WRITTEN - len(pulses)
         self.pulses = _placed(lowest, WRITTEN - max(lowest, PULSES), pulses[::-1])[::-1]
         self.words = _placed(WRITTEN, ACTIVE - WRITTEN, _words(spec, committed))

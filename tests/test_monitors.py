@@ -44,7 +44,7 @@ def campaign(d: monitors.Design, clocks: int) -> dict[str, np.ndarray]:
         "reset": (random.random(clocks) < 1e-3).astype(np.int64),
         "count": word(-half, half - 1, 30),
         "stepped": bit(0.5, 2), "edge_kind": held(random.integers(0, 4, clocks) & ~1, 60) ^ bit(0.05, 60),
-        "indexed": bit(0.2, 2), "valid": bit(0.5, 3), "saturated": bit(0.7, 200),
+        "edge_down": bit(0.5, 9), "indexed": bit(0.2, 2), "valid": bit(0.5, 3), "saturated": bit(0.7, 200),
         "velocity": word(d.velocity.min, d.velocity.max, 3), "at_limit": bit(0.7, 60), "negative": bit(0.5, 200),
         "a": a, "a_n": a ^ bit(0.7, 30), "b": b, "b_n": b ^ bit(0.7, 30),
         **{word_.name: word(word_.format.min, word_.format.max, 300) for word_ in d.words},
@@ -107,7 +107,7 @@ class Bench:
         """Move the handle, an edge a clock."""
         way = 1 if count > self.inputs.count else -1
         while self.inputs.count != count:
-            self.inputs = self.inputs._replace(count=self.inputs.count + way)
+            self.inputs = self.inputs._replace(count=self.inputs.count + way, edge_down=int(way < 0))
             self.clock(stepped=1)
 
 
@@ -264,13 +264,30 @@ def test_index_edges_are_turns_apart():
 
 
 def test_index_edges_may_come_at_successive_clocks_and_with_edges_of_the_count():
-    bench = Bench(supervisor_turn=4, supervisor_index_tolerance=0)
-    found = []
-    for count in range(1, 30):
-        bench.inputs = bench.inputs._replace(count=count)
-        found += bench.clock(stepped=1, indexed=int(count % 4 == 0 or count in {21, 22}))
-    # At 21 and 22, and at 24, which is no turn from 22.
-    assert found == ["index_spacing"] * 3
+    for down in (0, 1):
+        bench = Bench(supervisor_turn=4, supervisor_index_tolerance=0)
+        found = []
+        for count in range(1, 30):
+            # Downwards an edge has the number of the count before it.
+            place = count - down
+            bench.inputs = bench.inputs._replace(count=-count if down else count, edge_down=down)
+            found += bench.clock(stepped=1, indexed=int(place % 4 == 0 or place in {21, 22}))
+        # At 21 and 22, and at 24, which is no turn from 22.
+        assert found == ["index_spacing"] * 3
+
+
+def test_an_index_on_an_edge_is_at_one_place_from_both_sides():
+    """Edges and indexes come together at every third clock, or at every clock, and the handle turns round at them."""
+    for pause in (0, 3):
+        bench, found, place = Bench(supervisor_turn=9999, supervisor_index_tolerance=0), [], 0
+        for way in (1, 1, -1, 1, -1, -1, 1, 1, 1, -1, -1, -1, -1, 1):
+            edge, place = max(place, place + way), place + way
+            bench.inputs = bench.inputs._replace(count=place, edge_down=int(way < 0))
+            found += bench.clock(stepped=1, indexed=int(edge == 1))
+            for _ in range(pause):
+                found += bench.clock()
+        found += [cause for _ in range(4) for cause in bench.clock()]
+        assert found == []
 
 
 def test_edges_of_one_channel_alone_are_a_warning():

@@ -38,7 +38,7 @@ def test_the_addresses_that_every_host_knows():
     assert [each.address for each in registers.registers if each.kind is Kind.CONSTANT] == [0, 2, 4, 6, 8, 10, 12]
     known = {"drive": 0x20, "stamp": 0x32, "state": 0x40, "link_errors": 0x64, "commit": 0x7F, "clear_flags": 0x7E}
     known |= {"acknowledge": 0x79, "preload_count": 0x80, "encoder_glitch_clocks": 0x82, "active_encoder_invert": 0xA4}
-    known |= {"capture_start": 0x78, "capture_trigger": 0x77, "capture_state": 0x56}
+    known |= {"capture_start": 0x78, "capture_trigger": 0x77, "origin_shift": 0x76, "capture_state": 0x56}
     known |= {"heartbeat": 0xC0, "acknowledged": 0xC2, "supervisor_force_limit": 0xC4}
     assert {name: registers[name].address for name in known} == known
 

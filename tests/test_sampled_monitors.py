@@ -68,6 +68,9 @@ def test_a_handle_that_runs_against_the_largest_drive_is_a_runaway(way):
     # A preload is no motion, and hides that of one sample.
     assert bench.sample(count=7777 * way, fresh=1) == []
     assert bench.sample(count=7778 * way) == ["runaway"]
+    # Nor is a shift of the origin.
+    assert bench.sample(count=6778 * way, shifted=1, shift=-1000 * way) == ["runaway"]
+    bench.sample(count=7778 * way, shifted=1, shift=1000 * way)
     # On the other side, and where the drive comes to its limit again, the way begins anew.
     bench.presses(int(way < 0))
     bench.presses(int(way > 0))
@@ -112,6 +115,12 @@ def test_index_edges_are_turns_apart():
     ):  # fmt: skip
         assert bench.sample(count=count + 5, indexed=1, index_count=count) == ["index_spacing"] * wrong, count
         assert bench.sample(count=count) == []
+    # The last one moves with the origin.
+    assert bench.sample(shifted=1, shift=-2000) == []
+    assert bench.sample(indexed=1, index_count=30) == []
+    assert bench.sample(shifted=1, shift=7, indexed=1, index_count=1040) == ["index_spacing"]
+    assert bench.sample(indexed=1, index_count=1041) == []
+    # A preload forgets it.
     assert bench.sample(fresh=1) == []
     assert bench.sample(indexed=1, index_count=300) == []
     assert bench.sample(indexed=1, index_count=303) == ["index_spacing"]

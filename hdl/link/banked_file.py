@@ -7,7 +7,7 @@ from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.axes_registers import BANK, is_shared
 from hardwall.model.link.banked_file import Design
-from hardwall.model.link.register_file import CELL_BITS, Area, Operation
+from hardwall.model.link.register_file import CELL_BITS, EXCLUSIVE, Area, Operation
 from hardwall.model.register import Kind, Register
 from hardwall.model.registers import (
     ACTIVE,
@@ -51,8 +51,8 @@ class BankedFile(wiring.Component):
 
     - CHECK_READ, CHECK_WRITE: raise `absent`, `outside` or `refused` if the register cannot be read, or written with
       `host.value`, or not now. The halves of a value are checked in the order of their addresses, one after the other.
-      `arm` is refused unless the last turn of its axis was `ready`, and `preload` if it was ARMED; the capture memory,
-      unless it is done. A CHECK_READ of a status lets the next SNAPSHOT take that axis's.
+      `arm` is refused unless the last turn of its axis was `ready`, `preload` and `origin_shift` if it was ARMED, and
+      a second one of these three since `clear`; the capture memory, unless it is done. A CHECK_READ of a status lets the next SNAPSHOT take that axis's.
     - READ: give the register; of a status, in whichever bank, that of the last snapshot.
     - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. A live word goes to its axis
       with its lower half, which is written after the upper one. Only what was checked is written.
@@ -140,7 +140,8 @@ class BankedFile(wiring.Component):
         for axis in range(banks):
             with m.If(self.turn_valid & (self.turn_axis == axis)):
                 m.d.sync += [ready[axis].eq(self.turn_ready), armed[axis].eq(self.turn_state == ARMED)]
-        refusing = {"arm": ~word_of(ready, asking, banks), "preload": word_of(armed, asking, banks)}
+        moving = word_of(armed, asking, banks)
+        refusing = {"arm": ~word_of(ready, asking, banks), "preload": moving, "origin_shift": moving}
         names = [pulse.name for pulse in self._design.registers.pulses]
         return Cat(wanted[bit] & refusing[name] for bit, name in enumerate(names) if name in refusing).any()
 
@@ -180,9 +181,11 @@ class BankedFile(wiring.Component):
         here, to, asked = (Signal(range(max(banks, 2)), name=name) for name in ("here", "to", "asked"))
         asks = Signal()
         m.d.comb += here.eq(bank)
-        refused = self._refused(m, wanted, here)
+        names = [pulse.name for pulse in registers.pulses]
+        exclusive, one_of = Signal(), Cat(wanted[names.index(name)] for name in EXCLUSIVE).any()
+        refused = self._refused(m, wanted, here) | (one_of & exclusive)
         with m.If(host.clear):
-            m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0), asks.eq(0)]
+            m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0), asks.eq(0), exclusive.eq(0)]
 
         # What `shift` takes: a cell, a text, a status, or the host's value. What it had goes to `upper`.
         shift, upper = Signal(CELL_BITS), Signal(CELL_BITS)
@@ -211,7 +214,7 @@ class BankedFile(wiring.Component):
 
         # A walk through cells: all of them after a reset; and at a FINISH the words of a bank, and behind them the
         # count of a preload and the causes that the host has read.
-        words, commit = len(registers.words), marks[[pulse.name for pulse in registers.pulses].index("commit")]
+        words, commit = len(registers.words), marks[names.index("commit")]
         step, low, settling = Signal(range(BANK * banks)), Signal(), Signal(range(design.settle_clocks + 1))
         count, causes = registers["active_preload_count"].address, registers["acknowledged"].address
         copies, halfway = Signal(), Signal(range(END - WRITTEN))
@@ -278,6 +281,8 @@ class BankedFile(wiring.Component):
                             m.d.sync += host.absent.eq(1)
                         with m.If(refused):
                             m.d.sync += host.refused.eq(1)
+                        with m.If(one_of):
+                            m.d.sync += exclusive.eq(1)
                         m.next = "LEAST"
                     with m.Case(Operation.READ):
                         m.next = "READ"

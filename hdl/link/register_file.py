@@ -5,7 +5,17 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Member, Out
 
-from hardwall.model.link.register_file import CELL_BITS, NEXT, SOURCE, Area, Design, Operation, Source
+from hardwall.model.link.register_file import (
+    CELL_BITS,
+    EXCLUSIVE,
+    NEXT,
+    SOURCE,
+    WITH_WORDS,
+    Area,
+    Design,
+    Operation,
+    Source,
+)
 from hardwall.model.registers import ACTIVE, CAPTURE, COUNTERS, EDGE_STAMPS, END, LIVE, MAP, PULSES, WRITTEN
 
 from ..arithmetic.fixed import less, shape
@@ -23,19 +33,20 @@ class RegisterFile(wiring.Component):
 
     - CHECK_READ, CHECK_WRITE: raise `absent`, `outside` or `refused` if the register cannot be read, or written with
       `host.value`, or not now. The halves of a value are checked in the order of their addresses, one after the other.
+      Of the pulses `EXCLUSIVE` a second one since `clear` is refused.
     - READ: give the register.
     - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. A live word is at its port with
       `done` of its lower half, which is written after the upper one. Only what was checked is written.
     - COUNT: add 1 to a counter, which wraps.
-    - FINISH: if `commit` is marked, copy every written word to its active one; if it or `preload` is, shift the active
-      words to their ports. Then all marked pulses are high for one clock, the same one; the words have been at their
+    - FINISH: if `commit` is marked, copy every written word to its active one; if a pulse of `WITH_WORDS` is, shift the
+      active words to their ports. Then all marked pulses are high for one clock, the same one; the words have been at their
       ports for a clock or more, and stay until `done`, which comes when `commit_pending` has fallen: so what is read
       back as active is in use.
     - SNAPSHOT: take the status for what is read from then on, in the turns of `design.turns`: what is taken in one turn
       is of one clock, and every value is whole. `taken_clocks` has the clock of each.
 
     Latency, in clocks from the first of `start` to `done`: 1 for CHECK_READ; 2 for READ, 3 of the capture memory; 3 for
-    WRITE and COUNT; 4 for CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if `commit` or `preload` is
+    WRITE and COUNT; 4 for CHECK_WRITE; `snapshot_clocks` for SNAPSHOT; for FINISH 3 and, if a pulse of `WITH_WORDS` is
     marked, `shift_clocks` and the wait for the sample. After a reset the first `start` may come at once; it waits up to
     `boot_clocks`.
 
@@ -57,8 +68,8 @@ class RegisterFile(wiring.Component):
     stepped, edge_kind : In
         High for one clock with the stamp behind an edge's; with it, the kind of the edge.
     one output for each word of the map : Out
-        The active word while a FINISH needs it: from a clock before `commit` or `preload` until `done`. At other times
-        it is anything.
+        The active word while a FINISH needs it: from a clock before a pulse of `WITH_WORDS` until `done`. At other
+        times it is anything.
     one output for each live word of the map : Out
         The word as written.
     one output for each pulse of the map : Out(1)
@@ -66,7 +77,7 @@ class RegisterFile(wiring.Component):
     refuse : In
         Bit k: the device now refuses pulse k of `design.registers.pulses`.
     commit_pending : In(1)
-        A commit waits for its sample.
+        A pulse of `WITH_WORDS` waits for its sample.
     capture_address : Out(15)
         The register of the capture memory that is read; there is none if the map has no capture memory.
     capture_data : In(16)
@@ -187,7 +198,8 @@ class RegisterFile(wiring.Component):
         for bit, pulse in enumerate(registers.pulses):
             m.d.comb += wanted[bit].eq(is_pulse & (below[:4] == pulse.address % 16) & host.value[0])
         names = [pulse.name for pulse in registers.pulses]
-        commit, preload = marks[names.index("commit")], marks[names.index("preload")]
+        commit, with_words = marks[names.index("commit")], Cat(marks[names.index(name)] for name in WITH_WORDS).any()
+        exclusive, asked = Signal(), Cat(wanted[names.index(name)] for name in EXCLUSIVE).any()
 
         # The lowest bits of the address, an area, and whether it is in the window.
         step, shift = Signal(range(END)), Signal(CELL_BITS)
@@ -210,7 +222,7 @@ class RegisterFile(wiring.Component):
             with m.If(captured):
                 m.d.comb += found.eq(arrived)
         with m.If(host.clear):
-            m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0)]
+            m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0), exclusive.eq(0)]
 
         # One subtraction compares a bound with a value: signed at the top of a value, and only as long as all above
         # it was equal.
@@ -287,8 +299,10 @@ class RegisterFile(wiring.Component):
                         live = ~less(below, LIVE) & less(below, design.last_live)
                         with m.If(~in_book | ~(word | live) | half):
                             m.d.sync += host.absent.eq(1)
-                        with m.If((wanted & self.refuse).any()):
+                        with m.If((wanted & self.refuse).any() | (asked & exclusive)):
                             m.d.sync += host.refused.eq(1)
+                        with m.If(asked):
+                            m.d.sync += exclusive.eq(1)
                         m.next = "LEAST"
                     with m.Case(Operation.READ):
                         m.next = "READ"
@@ -300,7 +314,7 @@ class RegisterFile(wiring.Component):
                     with m.Case(Operation.FINISH):
                         m.d.sync += step.eq(registers.active[0].address + 1)
                         m.next = "PULSE"
-                        with m.If(commit | preload):
+                        with m.If(with_words):
                             m.d.sync += committing.eq(1)
                             m.next = "COPY"
                     with m.Case(Operation.SNAPSHOT):

@@ -117,12 +117,12 @@ class BankedFile(register_file.RegisterFile):
         if self.design.shows(address):
             self.asked = address // BANK
 
-    def _refuses(self, address: int) -> bool:
+    def _pulse(self, address: int) -> str:
         bank, place = divmod(address, BANK)
         if not self.design.in_banks(address):
-            return False
+            return ""
         self.refusing = self.refused_of[bank]
-        return super()._refuses(place)
+        return super()._pulse(place)
 
     def read(self, address: int) -> int:
         """Return the register at an address that can be read; a status as the last snapshot has it, in any bank."""

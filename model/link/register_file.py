@@ -35,6 +35,10 @@ from ..registers import (
     RegisterMap,
 )
 
+EXCLUSIVE = "arm", "preload", "origin_shift"
+"""Pulses of which a frame may have one: an axis that is armed as its count moves drives for the old place."""
+WITH_WORDS = "commit", "preload", "origin_shift"
+"""Pulses that need the active words at their ports."""
 CELL_BITS = 16
 CELL = (1 << CELL_BITS) - 1
 EXTENDED = 1 << CELL_BITS - 1
@@ -173,7 +177,7 @@ class RegisterFile:
     Attributes:
         live: the cells that the host reads.
         active: the word that the axis uses, by name: of a live word the one at its port; of the others the one that is
-            at its port while the pulse `commit` or `preload` is high, and after a commit until the axis has it.
+            at its port while a pulse of `WITH_WORDS` is high, and after a commit until the axis has it.
         pulses: names of the pulses that went out at the last FINISH, and `marked`, those that go out at the next.
         status: the word of every status now.
         refusing: names of the pulses that the device refuses now.
@@ -196,22 +200,22 @@ class RegisterFile:
     @property
     def ports(self) -> dict[str, int]:
         """The words that are at their ports with `pulses`, by name: the live ones, and those that a pulse needs."""
-        shifted = {"commit", "preload"} & set(self.pulses)
+        shifted = set(WITH_WORDS) & set(self.pulses)
         kept = (*self.design.registers.words, *self.design.registers.live) if shifted else self.design.registers.live
         return {word.name: self.active[word.name] for word in kept}
 
     def clear(self) -> None:
         """Forget what the checks have found."""
-        self.absent = self.outside = self.refused = False
+        self.absent = self.outside = self.refused = self._exclusive = False
 
     def _half(self, address: int, first: bool, last: bool) -> bool:
         """Return whether the other half of a value is missing: it begins at an even address and ends at an odd one."""
         return self.design.wide(address) and ((first and address % 2 == 1) or (last and address % 2 == 0))
 
-    def _refuses(self, address: int) -> bool:
-        """Return whether there is a pulse at an address that the device refuses now."""
+    def _pulse(self, address: int) -> str:
+        """Return the name of the pulse at an address, or nothing."""
         is_pulse = self.design.first_pulse <= address < WRITTEN
-        return is_pulse and self.design.registers.pulses[WRITTEN - 1 - address].name in self.refusing
+        return self.design.registers.pulses[WRITTEN - 1 - address].name if is_pulse else ""
 
     def check_read(self, address: int, first: bool, last: bool) -> None:
         """Find out whether a register can be read, as the first or the last of a frame or neither.
@@ -229,7 +233,11 @@ class RegisterFile:
         the halves above it are equal to the bound's.
         """
         self.absent |= not self.design.writable(address) or self._half(address, first, last)
-        self.refused |= bool(value & 1) and self._refuses(address)
+        pulse = self._pulse(address) if value & 1 else ""
+        self.refused |= pulse in self.refusing
+        if pulse in EXCLUSIVE:
+            self.refused |= self._exclusive
+            self._exclusive = True
         top = not self.design.wide(address) or address % 2 == 0
         flip = EXTENDED if top else 0
         for k, area in enumerate((Area.LEAST, Area.MOST)):

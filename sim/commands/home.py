@@ -26,6 +26,6 @@ def command(
     with axis_at(port, baud, identity, pace) as axis:
         count = axis.device.registers["count"]
         within(at, "--at", count.low * count.lsb, count.high * count.lsb, "m")
-        log.print("move the handle over its index, and let it rest")
+        log.print("move the handle over its index")
         position_m = axis.home(at, seconds)
     options.finish(Values({"position_m": position_m}))

@@ -102,7 +102,8 @@ void* axes_open(const int64_t* levels, const int64_t* words) {
     axes.encoder_a = axes.encoder_b = axes.encoder_z = 0;
     for (int axis = 0; axis < AXES; ++axis) context->set_pins(axis, static_cast<int>(levels[axis]));
     axes.drive_enable = ALL;
-    axes.clear_flags = axes.preload = axes.preload_count = axes.index_arm = axes.commit = 0;
+    axes.clear_flags = axes.preload = axes.origin_shift = axes.preload_count = axes.slip = 0;
+    axes.index_arm = axes.commit = 0;
     axes.word_write = axes.word_axis = axes.word_number = axes.word_value = 0;
     axes.rst = 1;
     context->tick();

@@ -163,7 +163,8 @@ void* axis_open(int64_t level, const int64_t* words, int64_t decoder_clocks) {
 #if VM_TRACE
     axis.encoder_z = 0;
     axis.drive_enable = 1;
-    axis.clear_flags = axis.preload = axis.preload_count = axis.index_arm = axis.commit = 0;
+    axis.clear_flags = axis.preload = axis.origin_shift = axis.preload_count = axis.slip = 0;
+    axis.index_arm = axis.commit = 0;
     axis.rst = 1;
     context->run(2);
     axis.rst = 0;

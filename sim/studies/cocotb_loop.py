@@ -91,7 +91,8 @@ def _advanced(world, kept, edges, moment, force_n, interval):
 async def _open(dut, scene, start_level: int) -> None:
     """Reset the axis with the pins at `start_level`, commit the scene's words, and run clock 0."""
     dut.rst.value = 1
-    for name in ("encoder_z", "clear_flags", "preload", "preload_count", "index_arm", "commit"):
+    strobes = "clear_flags", "preload", "origin_shift", "preload_count", "slip", "index_arm", "commit"
+    for name in ("encoder_z", *strobes):
         getattr(dut, name).value = 0
     dut.encoder_a.value, dut.encoder_b.value = start_level & 1, start_level >> 1
     dut.drive_enable.value = 1

@@ -138,7 +138,7 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual, called):
         "hardwall: error: in 0.2 s there was not the index: move the handle over it"
     )
     with started(HARDWALL, "home", virtual.path, "--at", "0.1", "--json", *AT) as process:
-        assert process.stderr.readline() == "move the handle over its index, and let it rest\n"
+        assert process.stderr.readline() == "move the handle over its index\n"
         virtual.order("hold 7")
         code, out, err = ended(process)
     assert code == 0, err

@@ -52,7 +52,7 @@ class Board(TwinBoard):
         """Let an axis show words of its status, and refuse what it then does."""
         status = self.server.file.statuses[axis]
         status |= words
-        refused = {"arm": not status["ready"], "preload": status["state"] == ARMED}
+        refused = {"arm": not status["ready"], **dict.fromkeys(("preload", "origin_shift"), status["state"] == ARMED)}
         self.server.file.refused_of[axis] = frozenset(name for name, is_so in refused.items() if is_so)
 
     def react(self, pulses: tuple[str, ...]) -> None:

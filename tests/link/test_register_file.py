@@ -7,7 +7,7 @@ from cocotb.triggers import ClockCycles, RisingEdge
 
 from hardwall.hdl.link.register_file import RegisterFile
 from hardwall.model.link import register_file as model
-from hardwall.model.link.register_file import Operation
+from hardwall.model.link.register_file import WITH_WORDS, Operation
 from hardwall.model.registers import CAPTURE, COUNTERS, EDGE_STAMPS, MAP, SPACE
 from hardwall.testing import Bench, parameters, rng, simulate
 from stimuli.lengths import some_of
@@ -149,7 +149,7 @@ async def random_operations(dut):
         elif case < 0.9:
             clocks = await host.do(Operation.FINISH)
             host.twin.finish()
-            shifted = "commit" in host.twin.pulses or "preload" in host.twin.pulses
+            shifted = bool({*WITH_WORDS} & {*host.twin.pulses})
             assert clocks == 3 + host.component.shift_clocks * shifted
             ported = {name: host.bench.reader(name)() for name in host.twin.ports}
             await RisingEdge(dut.clk)

@@ -224,7 +224,7 @@ class Host(OnALine):
         read = [r for r in self.registers.status if begin <= r.address < end]
         status = {r.name: r.from_registers(tuple(cells[r.address - begin : r.address - begin + 2])) for r in read}
         if {"ready", "state"} <= set(status):
-            refused = {"arm": not status["ready"], "preload": status["state"] == ARMED}
+            refused = {"arm": not status["ready"], **dict.fromkeys(("preload", "origin_shift"), status["state"] == ARMED)}
             self.server.file.refused_of[axis] = frozenset(name for name, is_so in refused.items() if is_so)
         return status
 

@@ -116,7 +116,7 @@ class Host(OnALine):
             self.pulses.append(pins)
             self.history.append((twin.decoder.stamp, twin.shown()))
             self.pulsed += [name for name in pulses if asked[name]]
-            if asked["commit"] or asked["preload"]:
+            if any(asked[name] for name in register_file.WITH_WORDS):
                 self.shifted.append(asked)
             twin.edge(self.pins, asked, found)
             self._turn()
@@ -141,7 +141,7 @@ class Host(OnALine):
         expected = []
         # What is refused depends on the state while the frame is checked, which may change on the way.
         for ready, armed in sorted({(state["ready"], state["state"] == 1) for state in states}):
-            expected.append(frozenset(("arm",) * (not ready) + ("preload",) * armed))
+            expected.append(frozenset(("arm",) * (not ready) + ("preload", "origin_shift") * armed))
         self.server.file.refusing = self._refusing(answer, expected)
         # A capture may be done on the way, and is then until a host starts the next.
         done = {state[3].capture_state == DONE for state in shown}
@@ -155,7 +155,7 @@ class Host(OnALine):
         assert {word.name: found[word.name] for word in self.registers.live}.items() <= file.active.items()
         assert sorted(self.pulsed) == sorted(file.pulses)
         self.pulsed.clear()
-        shifted = {"commit", "preload"} & set(file.pulses)
+        shifted = {*register_file.WITH_WORDS} & set(file.pulses)
         assert [{name: each[name] for name in file.active} for each in self.shifted] == [file.active] * bool(shifted)
         self.shifted.clear()
         return answer[1:-2]

@@ -4,7 +4,7 @@ from amaranth.hdl import Cat, Mux, Signal, Value
 from amaranth.lib.wiring import PureInterface
 
 from hardwall.hdl.link.register_file import RegisterFile
-from hardwall.model.link.register_file import CELL_BITS, Area, Design, Operation
+from hardwall.model.link.register_file import CELL_BITS, WITH_WORDS, Area, Design, Operation
 from hardwall.model.registers import END, RegisterMap
 from stimuli.specs import spec
 
@@ -160,7 +160,7 @@ def every_operation_ends(bench: Bench) -> None:
     )
     # At the clock behind the beginning of an operation exactly its latency is left, and it is over only with `done`.
     names = [pulse.name for pulse in design.registers.pulses]
-    shifts = Cat(inner["marks"][names.index(name)] for name in ("commit", "preload")).any()
+    shifts = Cat(inner["marks"][names.index(name)] for name in WITH_WORDS).any()
     latencies = {
         Operation.CHECK_READ: 1,
         Operation.READ: 2 + captured,
@@ -216,7 +216,7 @@ PROPERTIES = [
         bugs=(
             Bug(RegisterFile.elaborate, "step.eq(step + 1)", "step.eq(step)"),
             Bug(RegisterFile.elaborate, 'm.next = "COUNT"', 'm.next = "LEAST"', NO_BOOT),
-            Bug(RegisterFile.elaborate, "m.If(commit | preload)", "m.If(~commit)", NO_BOOT),
+            Bug(RegisterFile.elaborate, "m.If(with_words)", "m.If(~commit)", NO_BOOT),
         ),
     ),
 ]
