@@ -29,7 +29,7 @@ class Board(wiring.Component):
 
     A host reads and writes the registers of `registers`; what it asks for in one frame happens at one clock. It is
     refused an `arm` unless the axis is `ready`, and a `preload` or an `origin_shift` while ARMED. Neither is answered
-    before a sample of the new count has changed the drive.
+    before the drive follows the new count.
 
     Drive: the drive stage of `spec.stage`, a block of `hdl/drive/`, makes pins of `driven`. The word `drive_invert`
     reverses the sign; it is taken in every state but ARMED.
@@ -171,11 +171,11 @@ class Board(wiring.Component):
             m.d.comb += getattr(link, shown.name).eq(value >> max(len(value) - shown.format.width, 0))
         armed = axis.state == ARMED
         refused = {"arm": ~axis.ready, "preload": armed, "origin_shift": armed}
-        # At most two samples of the old count are under way.
+        # At most two samples of the old count are under way, so the drive of the third actuation follows the new one.
         old = Signal(2)
         with m.If(axis.preload | axis.origin_shift):
             m.d.sync += old.eq(3)
-        with m.Elif(axis.sampled):
+        with m.Elif(axis.actuated):
             m.d.sync += old.eq(old - old.any())
         m.d.comb += [
             link.stepped.eq(axis.stepped),

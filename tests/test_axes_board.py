@@ -1,5 +1,7 @@
 """The board of several axes, spoken to over its line: words, states and pulses of each, at every clock of its pins."""
 
+import itertools
+
 import cocotb
 import pytest
 from cocotb.triggers import ClockCycles, RisingEdge
@@ -9,6 +11,7 @@ from hardwall.model import clock_monitor
 from hardwall.model.axes_capture import SAMPLED
 from hardwall.model.axes_registers import BANK
 from hardwall.model.capture import DONE, RECORD_REGISTERS, SOURCES, WAITING
+from hardwall.model.link.register_file import EXCLUSIVE
 from hardwall.model.link.server import ABSENT, FAILURE, VALUE
 from hardwall.model.monitors import IDLE_EDGES
 from hardwall.model.quadrature import latency
@@ -22,7 +25,7 @@ from stimuli import frames
 
 BITS = {cause.name: 1 << bit for bit, cause in enumerate(CAUSES)}
 PLACES = -3, 11
-"""The counts that a host gives the axes of a board of two by a preload."""
+"""The counts that a host gives the axes of a board of two by a preload or a shift."""
 TRIP, FALL = (1 << SOURCES.index(name) for name in ("trip", "fall"))
 LOOKS = 10
 GLITCH_CLOCKS = 1
@@ -99,7 +102,8 @@ async def one_axis_trips_while_the_other_drives_on(dut):
     await host.write(1, supervisor_force_limit=most // 2)
     assert (await host.look(1, "state"))["driven"] == -(most // 2)
     # A host that speaks of one axis does not move the other.
-    assert (await host.request(frames.write(host.registers["preload"].address, [1])))[1] == FAILURE
+    for name in ("preload", "origin_shift"):
+        assert (await host.request(frames.write(host.registers[name].address, [1])))[1] == FAILURE
     await host.write(1, supervisor_causes=REQUIRED | BITS["position_range"])
     await host.write(1, supervisor_position_low=1)
     status = await host.look(1)
@@ -170,10 +174,11 @@ async def every_status_is_of_its_axis(dut):
     await host.write(0, index_arm=1)
     await check_status(host, 0, count=9, wall_force=-9, drive=-9, index_armed=1, **ready)
     await host.turn(6, -7, index=0b01)
-    await host.write(0, preload=1)
+    await host.write(0, commit=1, preload_count=PLACES[0] - 6)
+    await host.write(0, origin_shift=1)
     await check_status(host, 1, count=-7, wall_force=7, drive=7, driven=7, state=ARMED, **found)
-    found = {"index_latched": 1, "index_count": 6, "referenced": 1}
-    await check_status(host, 0, count=PLACES[0], **found, **ready)
+    found = {"index_count": PLACES[0]}
+    await check_status(host, 0, count=PLACES[0], index_latched=1, referenced=1, **found, **ready)
     # Edges of both channels at once are counted until the counter is full, and forgotten when the host says so.
     await host.jump(130, 101)
     illegal = {"state": TRIPPED, "latched": BITS["encoder_illegal"], "first": BITS["encoder_illegal"]}
@@ -198,10 +203,11 @@ async def find_another_index(host: Host) -> None:
         assert status.items() >= {"count": count, "index_armed": 1, "index_latched": 0, "referenced": 0}.items(), axis
     # That is 4 counts below the place of the one, and at the count 6 of the other.
     await host.turn(2, 6, index=0b11)
-    await host.write(1, preload=1)
-    for axis, counts in enumerate(((PLACES[0] - 4, PLACES[0] - 4), (PLACES[1], 6))):
-        wanted = dict(zip(("count", "index_count"), counts, strict=True))
-        wanted |= {"index_armed": 0, "index_latched": 1, "referenced": axis, "illegal_count": 0}
+    await host.write(1, commit=1, preload_count=PLACES[1] - 6)
+    await host.write(1, origin_shift=1)
+    for axis, count in enumerate((PLACES[0] - 4, PLACES[1])):
+        wanted = {"count": count, "index_count": count, "illegal_count": 0}
+        wanted |= {"index_armed": 0, "index_latched": 1, "referenced": axis}
         assert (await host.look(axis, "count", "referenced")).items() >= wanted.items(), axis
 
 
@@ -360,10 +366,39 @@ async def a_loop_stops_every_axis(dut):
 
 
 @cocotb.test()
+async def one_frame_arms_preloads_or_shifts_the_origin(dut):
+    """Two of these in a frame are refused, and neither is done; the other axis is asked for nothing."""
+    host = Host(dut, **parameters())
+    await host.reset()
+    await host.write(0, heartbeat=1)
+    await host.turn(5, 3)
+    place = {name: host.registers[name].address for name in EXCLUSIVE}
+    for axis in (0, 1):
+        await host.write(axis, commit=1, preload_count=9)
+        for these in itertools.combinations(EXCLUSIVE, 2):
+            assert (await host.look(axis))["ready"] == 1
+            places = [place[name] for name in these]
+            values = [int(at in places) for at in range(min(places), max(places) + 1)]
+            assert (await host.request(frames.write(BANK * axis + min(places), values)))[1] == FAILURE
+            status = await host.look(axis)
+            assert (status["state"], status["count"]) == (DISARMED, (5, 3)[axis])
+    for axis, count in ((0, 14), (1, 12)):
+        await host.write(axis, origin_shift=1)
+        assert (await host.look(axis))["count"] == count
+
+
+@cocotb.test()
 async def a_clock_that_stops_makes_every_output_low_and_all_come_back_disarmed(dut):
     host = Host(dut, **parameters())
     await host.reset()
     await host.write(0, heartbeat=1)
+    for axis in (0, 1):
+        await host.write(axis, index_arm=1)
+    await host.turn(3, 3, index=0b11)
+    for axis in (0, 1):
+        await host.write(axis, origin_shift=1)
+        assert (await host.look(axis))["referenced"] == 1
+    await host.turn(0, 0)
     for axis in (0, 1):
         await drive(host, axis)
     outputs, both = [dut.drive_pdm, dut.alive, dut.outputs_enable], 0b11
@@ -381,7 +416,8 @@ async def a_clock_that_stops_makes_every_output_low_and_all_come_back_disarmed(d
     await ClockCycles(dut.clk, 2 * host.board.spec.clocks_per_sample)
     assert not any(int(output.value) for output in outputs[:2])
     for axis in (0, 1):
-        assert (await host.look(axis))["state"] == DISARMED
+        status = await host.look(axis)
+        assert [status[name] for name in ("state", "index_latched", "referenced")] == [DISARMED, 0, 0]
     host.bench.drive(rst=1)
     await ClockCycles(dut.clk, 2 * SYNCHRONISER)
     assert not int(dut.outputs_enable.value)

@@ -1,14 +1,17 @@
 """The board top: pins, registers and pulses against the models of link and supervised axis, clock for clock."""
 
+import itertools
+
 import cocotb
 import pytest
-from cocotb.triggers import ClockCycles, RisingEdge, Timer
+from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge, Timer
 
 from hardwall.hdl.board import Board
 from hardwall.hdl.link.axi_link import AxiLink
 from hardwall.hdl.supervised import LOOPS
 from hardwall.model import clock_monitor
 from hardwall.model.capture import DONE, RECORD_REGISTERS, SOURCES, TRIGGERED, WAITING
+from hardwall.model.link.register_file import EXCLUSIVE
 from hardwall.model.link.server import FAILURE
 from hardwall.model.registers import CAPTURE, RegisterMap
 from hardwall.model.supervisor import ALL, ARMED, CAUSES, DISARMED, REQUIRED, TRIPPED, names
@@ -26,7 +29,7 @@ CLOCKS, LONGEST = 3 * SAMPLES // 10, 3 * max(SAMPLES, REACHING)
 """Clocks of the campaign; and the most of them, for the cases that are still not reached."""
 SHOWN = "stamp", "capture_stamp"
 """The first and the last status that a host of a capture looks at."""
-LOOKS = ("drive", "capture_stamp"), ("index_latched", "first")
+LOOKS = ("drive", "capture_stamp"), ("index_armed", "first")
 """The first and the last status that a random host looks at: all of them, or those that it needs."""
 
 
@@ -115,8 +118,11 @@ async def a_random_host_at_a_random_handle(dut):
         act = random.random() * (0.55 if status["state"] == DISARMED else 1)
         if act < 0.5:
             words = random_words(host) | ({"wall_stiffness": stiffness.high} if random.random() < 0.7 else {})
-            index_arm, preload = (int(random.random() < chance) for chance in (0.8, 0.2))
-            await host.write(commit=1, index_arm=index_arm, preload=preload, **words)
+            moves = str(random.choice(("", "preload", "origin_shift"), p=(0.8, 0.1, 0.1)))
+            # An origin that is shifted comes to the handle.
+            words["preload_count"] *= 1 - 2 * (moves == "origin_shift")
+            pulses = {"index_arm": int(random.random() < 0.8), **({moves: 1} if moves else {})}
+            await host.write(commit=1, **pulses, **words)
         elif act < 0.8:
             await random_live_word(host)
         elif act < 0.9:
@@ -125,15 +131,19 @@ async def a_random_host_at_a_random_handle(dut):
         else:
             await host.write(disarm=1)
     assert lacks(host, seen) == []
-    # The index that is found becomes a reference only by a preload, and not after the next index_arm.
-    host.rate = 0.02
+    # The index that is found becomes a reference only by a shift of the origin, and not after the next index_arm.
+    host.rate, host.illegal_rate = 0.02, 0.0
     await host.write(disarm=1)
     for _ in range(2):
         await host.write(index_arm=1)
-        while not seen[-1].get("index_latched"):
-            seen.append(await host.look(*LOOKS[1]))
-        await host.write(preload=1)
         seen.append(await host.look(*LOOKS[1]))
+        while not seen[-1]["referenced"]:
+            # Edges that the filter does not pass may take the index away.
+            if seen[-1]["index_latched"]:
+                await host.write(origin_shift=1)
+            elif not seen[-1]["index_armed"]:
+                await host.write(index_arm=1)
+            seen.append(await host.look(*LOOKS[1]))
     # An axis without a heartbeat, or one that is armed, is not armed.
     for _ in range(2):
         await host.write(arm=1)
@@ -247,7 +257,8 @@ async def the_limits_of_the_position_are_those_of_the_host(dut):
         assert names(host.shown()["first"]) == causes, place
         if not causes:
             # A host of an axis that is ARMED may not move its count.
-            assert (await host.write(preload=1))[1] == FAILURE
+            for name in ("preload", "origin_shift"):
+                assert (await host.write(**{name: 1}))[1] == FAILURE
             await host.write(disarm=1)
     await host.look("stamp", "counts_0")
 
@@ -261,22 +272,103 @@ async def an_index_that_is_not_where_it_was_trips(dut):
     await host.write(supervisor_causes=REQUIRED | cause)
     for counts, trips in ((0, False), (tolerance, False), (tolerance + 1, True)):
         await host.turn(counts)
-        for level in (1, 0):
-            host.change(encoder_z=level)
-            await host.edges(host.settling)
+        await over_the_index(host)
         assert bool(host.shown()["latched"] & cause) == trips
+
+
+async def over_the_index(host: Host) -> None:
+    """Turn the handle up by a count, where Z rises, and back; Z falls as it comes to that place from below again."""
+    for level in (1, 0):
+        await host.turn(1)
+        host.change(encoder_z=level)
+        await host.edges(host.settling)
+        await host.turn(-1)
+
+
+@cocotb.test()
+async def one_frame_arms_preloads_or_shifts_the_origin(dut):
+    """Two of these in a frame are refused, and neither is done; the next frame finds a drive of the new place."""
+    host = Host(dut, **parameters())
+    await host.reset()
+    await host.write(commit=1, preload_count=9)
+    await host.write(heartbeat=1)
+    for these in itertools.combinations(EXCLUSIVE, 2):
+        assert host.shown()["ready"] == 1
+        assert (await host.write(**dict.fromkeys(these, 1)))[1] == FAILURE
+        assert (host.shown()["state"], host.shown()["count"]) == (DISARMED, 0)
+    await host.write(origin_shift=1)
+    assert host.shown()["count"] == 9
+
+
+@cocotb.test()
+async def a_host_is_not_answered_before_the_drive_is_of_the_new_place(dut):
+    host = Host(dut, **parameters())
+    await host.reset()
+    half = 1 << host.twin.spec.count_width - 1
+    words = {"wall_stiffness": host.registers["wall_stiffness"].high, "wall_position": 0, "wall_left": 0}
+    await host.write(commit=1, **words, preload_count=half // 2)
+    for name in ("preload", "origin_shift"):
+        await host.write(preload=1, commit=1, preload_count=half // 2)
+        assert host.shown()["drive"] < 0
+        await host.write(commit=1, preload_count=-half // 2 if name == "preload" else -half)
+        asking = cocotb.start_soon(host.write(**{name: 1}))
+        await FallingEdge(dut.uart_tx)
+        assert host.shown()["drive"] == 0, name
+        await asking
+
+
+@cocotb.test()
+async def a_scale_that_has_slipped_is_no_reference(dut):
+    """What is asked for by a host that wants a reference is refused, until the axis is homed again."""
+    host = Host(dut, **parameters())
+    await host.reset()
+    glitch = host.registers["encoder_glitch_clocks"].high
+    await host.write(supervisor_reference=1)
+
+    async def twice() -> None:
+        host.phase += 2
+        host.change(**host._channels())
+
+    async def too_fast() -> None:
+        # A level that the filter rejects, with an edge of the other channel in it.
+        for change in ({"encoder_a": 1}, {"encoder_b": 1}, {"encoder_a": 0}, {"encoder_b": 0}):
+            host.change(**{name: host.pins[name] ^ 1 for name in change})
+            await host.edges(2)
+
+    async def inverted() -> None:
+        await host.write(commit=1, encoder_glitch_clocks=glitch, encoder_invert=1)
+
+    for slips, cause in ((twice, "encoder_illegal"), (too_fast, "encoder_overspeed"), (inverted, "")):
+        await host.write(commit=1, encoder_glitch_clocks=glitch, encoder_invert=0)
+        await host.write(index_arm=1)
+        await over_the_index(host)
+        await host.write(origin_shift=1)
+        await host.write(heartbeat=host.shown()["live"] + int(host.random.integers(1, 1000)))
+        assert (host.shown()["referenced"], host.shown()["ready"]) == (1, 1)
+        await slips()
+        await host.edges(40 + host.settling)
+        assert (host.shown()["referenced"], host.shown()["index_latched"]) == (0, 0)
+        shown = host.shown()
+        assert [name for name in names(shown["latched"]) if name.startswith("encoder")] == [cause] * bool(cause)
+        await host.arm()
+        assert host.shown()["state"] == DISARMED
+        # Nor does a preload, or a shift by the index that was, make it one.
+        for name in ("preload", "origin_shift"):
+            await host.write(**{name: 1})
+            await host.arm()
+            assert (host.shown()["state"], host.shown()["referenced"]) == (DISARMED, 0)
 
 
 @cocotb.test()
 async def every_word_reaches_the_axis(dut):
     host = Host(dut, **parameters())
     await host.reset()
-    registers, pulses = host.registers, [pulse.name for pulse in host.registers.pulses if pulse.name != "arm"]
+    registers, pulses = host.registers, [pulse.name for pulse in host.registers.pulses if pulse.name not in EXCLUSIVE]
     restless = {word.name: Restless(word, host.random) for word in (*registers.words, *registers.live)}
-    for _ in range(4):
+    for moves in ("preload", "origin_shift") * 2:
         drawn = {name: values.next() for name, values in restless.items()}
         await host.write(**{word.name: drawn[word.name] for word in registers.live})
-        await host.write(**dict.fromkeys(pulses, 1), **{word.name: drawn[word.name] for word in registers.words})
+        await host.write(**dict.fromkeys((*pulses, moves), 1), **{word.name: drawn[word.name] for word in registers.words})
     assert not host.refused
 
 
@@ -287,7 +379,11 @@ async def a_clock_that_stops_makes_the_outputs_low_and_comes_back_disarmed(dut):
     stiffness, position = host.registers["wall_stiffness"], host.registers["wall_position"]
     await host.write(supervisor_ramp=host.registers["supervisor_ramp"].high)
     await host.write(commit=1, wall_position=1 + position.low, wall_stiffness=stiffness.high)
+    await host.write(index_arm=1)
+    await over_the_index(host)
+    await host.write(origin_shift=1)
     await host.arm()
+    assert (host.shown()["referenced"], host.shown()["index_latched"]) == (1, 1)
     outputs = [dut.drive_pdm, dut.alive, dut.outputs_enable]
     while not all(int(output.value) for output in outputs):
         await host.edges(1)
@@ -300,6 +396,8 @@ async def a_clock_that_stops_makes_the_outputs_low_and_comes_back_disarmed(dut):
     host.bench.clock.start()
     await RisingEdge(dut.outputs_enable)
     assert (host.shown()["state"], host.shown()["driven"]) == (DISARMED, 0)
+    # Edges may have been missed.
+    assert (host.shown()["referenced"], host.shown()["index_latched"]) == (0, 0)
     assert not any(int(output.value) for output in outputs[:2])
 
 

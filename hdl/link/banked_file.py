@@ -59,9 +59,9 @@ class BankedFile(wiring.Component):
     - COUNT: add 1 to a counter, which wraps.
     - FINISH: if `commit` is marked, copy every written word of the bank of the last WRITE to its active one, and write
       it to that axis. Then all marked pulses are high for one clock, the same one, with `preload_count` and
-      `acknowledged`, which stay. `done` comes when every axis has had a turn since: so what is read back as active is
-      in use, what is read of a status is of a sample behind the pulses, what is refused is known, and no
-      acknowledgement takes another one's place.
+      `acknowledged`, which stay. `done` comes when every axis has had an actuation and a turn since: so what is read
+      back as active is in use, what is read of a status is of a sample behind the pulses, what is refused is known, the
+      drive of a moved count is that of its new place, and no acknowledgement takes another one's place.
     - SNAPSHOT: take the status of the axis that CHECK_READ was asked for, if any: all of one sample, the next one, with
       the stamp of the clock of its record. The stamps of edges are those of the last edges in that sample's count, each
       0 until there was one: they are remembered here, for every axis.

@@ -34,7 +34,7 @@ class Design(register_file.Design):
         axes: the design of the axes.
         numbers: the number by which an axis knows a word, by the address of its lower half in a bank.
         own_places: addresses of live words and pulses that only the bank of axis 0 has.
-        settle_clocks: clocks from pulses until a sample of every axis, and a turn of its supervisor, has seen them.
+        settle_clocks: clocks from pulses until an actuation of every axis, and a turn of its supervisor, has seen them.
 
     Raises:
         TypeError: if `registers` is not an AxesMap.
@@ -51,7 +51,8 @@ class Design(register_file.Design):
         words = (*registers.words, *registers.live)
         self.numbers = {word.address + 1: known[word.name] for word in words if word.name in known}
         self.own_places = frozenset(each.address + half for each in registers.shared for half in range(each.size))
-        self.settle_clocks = registers.spec.clocks_per_sample + self.axes.latency
+        spec = registers.spec
+        self.settle_clocks = spec.samples_per_actuation * spec.clocks_per_sample + self.axes.latency
 
     @property
     def banks(self) -> int:

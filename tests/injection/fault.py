@@ -77,6 +77,7 @@ class Fault:
         offset: the count at the mark.
         oscillator_ns: the period of the oscillator, in the time of the simulation.
         rearms: whether the axis can then be armed again.
+        homed: whether the axis is homed before, and needs its reference to be armed: the fault takes it away.
         common: of several axes, all of them see the fault, and must come to the same.
     """
 
@@ -92,12 +93,14 @@ class Fault:
     offset: int = 0
     oscillator_ns: int = OSCILLATOR_NS
     rearms: bool = True
+    homed: bool = False
     common: bool = False
 
     @property
     def words(self) -> dict[str, int]:
         """The live words, with the causes that are enabled."""
-        return {"supervisor_causes": (ENABLED | self.causes) & ~self.masked, **self.live}
+        causes = (ENABLED | self.causes) & ~self.masked
+        return {"supervisor_causes": causes, "supervisor_reference": int(self.homed), **self.live}
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ async def judged(rig: Rig, fault: Fault) -> Outcome:
     try:
         for each in (rig, *others):
             alike = fault if each is rig or fault.common else UNDISTURBED
-            await each.contact(alike.words, alike.committed, alike.offset)
+            await each.contact(alike.words, alike.committed, alike.offset, alike.homed)
     except NotSteadyError as error:
         return Outcome(fault.name, fault.expected.text, "", None, 0.0, 0.0, 0.0, (str(error),))
     # The fault comes at any clock of a sample, the same one for the same seed.
@@ -84,7 +84,12 @@ async def _way_back(rig: Rig, fault: Fault) -> None:
         rig.claim(rig.sees(DISARMED), f"{' + '.join(names(rig.see('latched')))} is not acknowledged")
     await rig.run(REST_MS)
     rig.claim(turns == len(rig.turns) and last == rig.last_asked, "the drive came back before the arm")
-    if fault.rearms:
+    if fault.homed:
+        rig.claim(not await host.arm(), "an arm is taken without a reference")
+        for moves in ("preload", "origin_shift"):
+            await host.write(**{moves: 1})
+            rig.claim(not await host.arm(), f"an arm is taken after the pulse {moves}, with an index that is void")
+    elif fault.rearms:
         rig.claim(await host.arm(), "an arm is refused")
         await rig.run(REST_MS)
         rig.claim(rig.sees(ARMED), "the axis cannot be armed again")

@@ -62,6 +62,20 @@ OF_ONE = (
         trips("encoder_overspeed", within=FAST + LOOKED),
     ),
     Fault(
+        "homed: the scale slips by two counts",
+        slips,
+        trips("encoder_illegal", within=COUNTED + LOOKED),
+        homed=True,
+    ),
+    Fault(
+        "homed, complements wired: all four wires low for a while",
+        wired(stuck(**NONE)),
+        trips("encoder_loss", within=LOST),
+        mended,
+        **PAIRS,
+        homed=True,
+    ),
+    Fault(
         "brown-out, complements wired: all four wires low",
         wired(stuck(**NONE)),
         trips("encoder_loss", within=LOST),

@@ -111,6 +111,16 @@ FAULTS = (
         "both channels change at once: the scale slips by two counts", slips, trips("encoder_illegal", within=ILLEGAL)
     ),
     Fault("the encoder turns at 8 m/s, twice what its filter passes", rushes, trips("encoder_overspeed", within=FAST)),
+    Fault("homed: the scale slips by two counts", slips, trips("encoder_illegal", within=ILLEGAL), homed=True),
+    Fault("homed: the encoder turns at 8 m/s", rushes, trips("encoder_overspeed", within=FAST), homed=True),
+    Fault(
+        "homed, complements wired: all four wires low for a while",
+        wired(stuck(**NONE)),
+        trips("encoder_loss", within=LOST),
+        mended,
+        **PAIRS,
+        homed=True,
+    ),
     Fault("a glitch on A, as long as the filter", wired(stuck(a=0), clocks=GLITCH), UNCHANGED),
     Fault(
         "brown-out, complements wired: all four wires low",

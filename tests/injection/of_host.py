@@ -128,6 +128,15 @@ async def moves_the_wall(rig: Rig) -> None:
         await rig.run(1 - 0.15)
 
 
+async def arms_and_moves(rig: Rig) -> None:
+    """Disarm, and ask for an arm and a move of the count in one frame."""
+    await writes(disarm=1)(rig)
+    for moves in ("preload", "origin_shift"):
+        answer = await rig.host.write(**{"arm": 1, moves: 1})
+        found = answer[1] if answer[0] & REFUSED else None
+        rig.claim(found == FAILURE, f"the answer to arm and {moves} is exception {found}")
+
+
 FAULTS = (
     Fault(
         "the host is killed (supervisor_watchdog 50 ms)",
@@ -176,6 +185,19 @@ FAULTS = (
         Expected(largest_n=SPEC.force_max_n),
     ),
     Fault("the host asks for a preload", writes(FAILURE, preload=1), UNCHANGED),
+    Fault("the host asks for a shift of the origin", writes(FAILURE, origin_shift=1), UNCHANGED),
+    Fault(
+        "the host disarms, and arms beside a preload, and beside a shift of the origin",
+        arms_and_moves,
+        Expected(state=DISARMED, within=TAKEN),
+    ),
+    Fault(
+        "homed: the host commits encoder_invert",
+        writes(commit=1, encoder_invert=1),
+        Expected(state=DISARMED, within=TAKEN + RegisterFile(Design(REGISTERS)).shift_clocks),
+        writes(commit=1, encoder_invert=0),
+        homed=True,
+    ),
     Fault("the host reverses drive_invert", writes(drive_invert=1), UNCHANGED),
     Fault(
         "the host commits encoder_invert",

@@ -266,8 +266,12 @@ class Rig:
                 raise NotSteadyError(f"after {milliseconds} ms it is not so that {what}")
             await Timer(clocks * CLOCK_NS, "ns")
 
-    async def contact(self, live: dict[str, int], committed: dict[str, int], offset: int = 0) -> None:
+    async def contact(
+        self, live: dict[str, int], committed: dict[str, int], offset: int = 0, homed: bool = False
+    ) -> None:
         """Arm the axis and let go of the handle, in the wall and at rest; with `offset` the count at the mark.
+
+        If it is to be homed, the handle passes its index, and the origin stays where it is.
 
         Raises:
             NotSteadyError: if force or speed is not that of a steady contact.
@@ -283,8 +287,12 @@ class Rig:
         await self.run(0.02)
         if offset:
             await host.write(preload=1)
+        if homed:
+            await host.write(index_arm=1)
         handle.held = REST
         await self.until(lambda: handle.number == REST, 2, "the handle is in the wall")
+        if homed:
+            await host.write(origin_shift=1)
         # No estimate of that motion is left.
         await self.run(SETTLING_MS)
         await host.heartbeat()

@@ -176,11 +176,15 @@ class Host(OnALine):
         self.bench.drive(**loops)
 
     async def turn(self, *places: int, index: int = 0) -> None:
-        """Turn the handles to counts; there, the axes with a bit in `index` see a pulse of their index."""
+        """Turn the handles to counts; there, the axes with a bit in `index` see their index.
+
+        Upwards Z rises there; downwards it falls, and a handle has two counts to go at least.
+        """
+        downwards = sum((to < at) << axis for axis, (at, to) in enumerate(zip(self.places, places, strict=True))) & index
         while self.places != [*places]:
             self.places = [at + (to > at) - (to < at) for at, to in zip(self.places, places, strict=True)]
-            await self._show(0)
-        await self._show(index)
+            await self._show(downwards)
+        await self._show(index & ~downwards)
         await self._show(0)
 
     async def _show(self, index: int, jumping: int = 0) -> None:

@@ -7,12 +7,12 @@ from hardwall.hdl.link.banked_file import BankedFile
 from hardwall.model.axes import AxesSpec
 from hardwall.model.axes_registers import BANK, AxesMap, is_shared
 from hardwall.model.link.banked_file import Design
-from hardwall.model.link.register_file import Operation
+from hardwall.model.link.register_file import EXCLUSIVE, Operation
 from stimuli.specs import NARROW
 
 from .bench import Bench
 from .bugs import Bug
-from .of_register_file import each_takes, only_checks_find
+from .of_register_file import a_frame_does_one, each_takes, only_checks_find
 from .property import Property
 
 WHERE = "banked file narrow, 3 axes"
@@ -73,6 +73,14 @@ def pulses_are_asked_for(bench: Bench) -> None:
         # One of all axes has a single bit, and is written to in the bank of axis 0.
         for axis in range(len(sent)):
             bench.promise(~sent[axis] | finishing & bench.past(asked[axis]) & ~bench.past(sent[axis]))
+
+
+def one_frame_arms_or_moves(bench: Bench) -> None:
+    block = banked_file(bench)
+    host, registers = block.host, block.design.registers
+    place, _ = _at(host)
+    within = (host.address < BANK * block.design.banks) & host.value[0]
+    a_frame_does_one(bench, block, [within & (place == registers[name].address) for name in EXCLUSIVE])
 
 
 def words_go_where_they_were_written(bench: Bench) -> None:
@@ -180,6 +188,16 @@ def every_operation_ends(bench: Bench) -> None:
 NO_BOOT = ('m.next = "BOOT_TAKE"', 'm.next = "IDLE"')
 """A reset writes no cell, so that a bug behind it shows in the first clocks."""
 PROPERTIES = [
+    Property(
+        "of an arm, a preload and a shift of the origin one frame does one at most",
+        WHERE,
+        one_frame_arms_or_moves,
+        depth=2,
+        bugs=(
+            Bug(BankedFile.elaborate, "| (one_of & exclusive)", "", NO_BOOT),
+            Bug(BankedFile.elaborate, "exclusive.eq(1)", "exclusive.eq(0)", NO_BOOT),
+        ),
+    ),
     Property(
         "a pulse goes out for one clock, at the end of a frame, to the axis whose bank it was written to",
         WHERE,

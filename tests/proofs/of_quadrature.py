@@ -49,7 +49,8 @@ def a_glitch_never_counts(bench: Bench) -> None:
         bench.promise(bench.inner[f"held_{'abz'[bit]}"] <= bench.past(lasted))
         bench.promise(~moved[bit] | bench.past(lasted > limit))
     still = decoder.seen.count == bench.past(decoder.seen.count)
-    bench.promise(still | bench.past(moved[0] ^ moved[1]) | bench.past(decoder.preload) | bench.past(bench.reset))
+    asked = bench.past(decoder.preload | decoder.origin_shift)
+    bench.promise(still | bench.past(moved[0] ^ moved[1]) | asked | bench.past(bench.reset))
 
 
 def counts_as_an_ideal_decoder(bench: Bench) -> None:
@@ -66,10 +67,10 @@ def counts_as_an_ideal_decoder(bench: Bench) -> None:
     # The level of the last clock, from which a step of more than one cell has no direction.
     before, count, illegal, wrapped = Signal(2), Signal.like(decoder.seen.count), Signal(), Signal()
     step, onward = Signal(2), Signal(signed(len(count) + 2))
-    change = Mux(step[0], Mux(step[1] ^ decoder.invert, -1, 1), 0)
+    change, moves = Mux(step[0], Mux(step[1] ^ decoder.invert, -1, 1), 0), decoder.preload | decoder.origin_shift
     bench.m.d.comb += [
         step.eq(cell(ideal.level) - cell(before)),
-        onward.eq(Mux(decoder.preload, decoder.preload_count, count) + change),
+        onward.eq(Mux(decoder.preload, 0, count) + Mux(moves, decoder.preload_count, 0) + change),
     ]
     most = (1 << len(count) - 1) - 1
     bench.m.d.sync += [
@@ -91,7 +92,7 @@ def no_wrong_count_before_a_flag(bench: Bench) -> None:
     limit, phase, moves, forth = bench.constant(2), bench.constant(2), bench.free(2), bench.free()
     place, level, pins, rested = Signal(signed(4), init=0), Signal(2), Signal(2), Signal(4)
     decoder = bench.block(
-        Quadrature(4, 2, 2, 1), a=pins[0], b=pins[1], glitch_clocks=limit, invert=0, preload=0, clear=0
+        Quadrature(4, 2, 2, 1), a=pins[0], b=pins[1], glitch_clocks=limit, invert=0, preload=0, origin_shift=0, clear=0
     )
     bench.assume(~bench.reset)
     bench.assume((bench.inner["starting"] != STARTING) | (moves == 0))
@@ -154,7 +155,38 @@ def no_fault_is_lost(bench: Bench) -> None:
     bench.promise(decoder.fault == (decoder.illegal | decoder.overspeed | decoder.wrapped))
 
 
+def no_reference_outlasts_a_slip(bench: Bench) -> None:
+    decoder = bench.block(Quadrature(4, 2, 2, 1))
+    moved, latched, referenced = bench.inner["moved"], decoder.index_latched, decoder.referenced
+    fresh = bench.past(bench.reset) | bench.past(bench.reset, 2)
+    turned = (bench.past(decoder.invert) ^ bench.past(decoder.invert, 2)) & ~fresh
+    rises = (flag & ~bench.past(flag) for flag in (decoder.overspeed, decoder.wrapped))
+    flagged = Cat(*rises, bench.past(moved[:2].all())).any()
+    slipped = turned | flagged | bench.past(decoder.slip)
+    bench.promise(fresh | (bench.inner["inverted"] == bench.past(decoder.invert)))
+    bench.promise(~slipped | ~latched & ~referenced)
+    bench.promise(~bench.past(decoder.preload | decoder.arm) | ~referenced)
+    bench.promise(~referenced | latched)
+    shifted = bench.past(decoder.origin_shift & latched) & ~bench.past(bench.reset)
+    bench.promise(~referenced | bench.past(referenced) | shifted)
+    bench.promise(~latched | bench.past(latched) | bench.past(decoder.index_armed & moved[2]))
+
+
 PROPERTIES = [
+    Property(
+        "a reference is by a latched index, and falls at the clock of a slip",
+        "quadrature",
+        no_reference_outlasts_a_slip,
+        depth=3,
+        bugs=(
+            Bug(Quadrature._index, "both | outrun | self.slip |", "outrun | self.slip |"),
+            Bug(Quadrature._index, "both | outrun | self.slip |", "both | self.slip |"),
+            Bug(Quadrature._index, "| (self.invert ^ inverted)", ""),
+            Bug(Quadrature.elaborate, "self.index_latched.eq(~beyond)", "self.index_latched.eq(1)"),
+            Bug(Quadrature.elaborate, "m.If(self.arm | self.preload | lost | beyond)", "m.If(self.arm | lost | beyond)"),
+            Bug(Quadrature.elaborate, "m.Elif(lost | beyond | self.preload)", "m.Elif(beyond | self.preload)"),
+        ),
+    ),
     Property(
         "a pulse that the filter must reject never counts",
         "quadrature",

@@ -3,8 +3,9 @@
 from amaranth.hdl import Cat, Mux, Signal, Value
 from amaranth.lib.wiring import PureInterface
 
+from hardwall.hdl.link.banked_file import BankedFile
 from hardwall.hdl.link.register_file import RegisterFile
-from hardwall.model.link.register_file import CELL_BITS, WITH_WORDS, Area, Design, Operation
+from hardwall.model.link.register_file import CELL_BITS, EXCLUSIVE, WITH_WORDS, Area, Design, Operation
 from hardwall.model.registers import END, RegisterMap
 from stimuli.specs import spec
 
@@ -44,6 +45,39 @@ def pulses_are_asked_for(bench: Bench) -> None:
         bench.promise(~bench.inner["marks"][number] | asked)
         bench.promise(~sent | asked & finishes)
         bench.promise(~sent | ~bench.past(sent))
+
+
+def a_frame_does_one(bench: Bench, block: RegisterFile | BankedFile, asks: list[Value]) -> None:
+    """Promise that of some pulses one frame does one at most.
+
+    What is written was checked since the last clear, and no check has found anything. A clear is before the writes.
+
+    Args:
+        bench: the bench.
+        block: the register file, or that of several axes.
+        asks: for every one of `EXCLUSIVE`, whether the host's address and value ask for it.
+    """
+    host, checked, names = block.host, Signal(len(EXCLUSIVE)), [each.name for each in block.design.registers.pulses]
+    marks = Cat(bench.inner["marks"][names.index(name)] for name in EXCLUSIVE)
+    checks = bench.state("IDLE") & host.start & (host.operation == Operation.CHECK_WRITE)
+    bench.m.d.sync += checked.eq(Mux(host.clear, 0, checked) | Mux(checks, Cat(asks), 0))
+    for bit, asked in enumerate(asks):
+        writes = host.start & (host.operation == Operation.WRITE) & asked
+        bench.assume(~writes | checked[bit] & ~host.refused)
+    bench.assume(~host.clear | ~marks.any())
+    bench.promise(bench.inner["exclusive"] == checked.any())
+    bench.promise((marks & ~checked) == 0)
+    sent = Cat(getattr(block, name).any() for name in EXCLUSIVE)
+    for several in (Mux(host.refused, 0, checked), marks, sent):
+        bench.promise((several & (several - 1)[: len(several)]) == 0)
+
+
+def one_frame_arms_or_moves(bench: Bench) -> None:
+    block = register_file(bench)
+    host, registers = block.host, block.design.registers
+    a_frame_does_one(
+        bench, block, [(host.address == registers[name].address) & host.value[0] for name in EXCLUSIVE]
+    )
 
 
 def only_checks_find(bench: Bench, host: PureInterface) -> Value:
@@ -180,6 +214,16 @@ SHORT_BOOT = ("step.all()", "1")
 NO_BOOT = ('m.next = "BOOT_TAKE"', 'm.next = "IDLE"')
 """A reset writes no cell at all."""
 PROPERTIES = [
+    Property(
+        "of an arm, a preload and a shift of the origin one frame does one at most",
+        WHERE,
+        one_frame_arms_or_moves,
+        depth=2,
+        bugs=(
+            Bug(RegisterFile.elaborate, "| (asked & exclusive)", "", NO_BOOT),
+            Bug(RegisterFile.elaborate, "exclusive.eq(1)", "exclusive.eq(0)", NO_BOOT),
+        ),
+    ),
     Property(
         "a pulse goes out for one clock, at the end of a frame that has written 1 to its register",
         WHERE,

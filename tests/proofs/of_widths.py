@@ -101,7 +101,7 @@ FORWARD = Bug(CycleTimes.elaborate, "forward = Signal(signed(len(count) + 1))", 
 CASES = {
     "quadrature": Case(
         lambda axis: Quadrature(20, 16),
-        ("count", "seen__stamp"),
+        ("base", "count", "index_count", "seen__stamp"),
         Bug(Quadrature.elaborate, "held >= self.glitch_clocks", "held > self.glitch_clocks"),
         ranges.start,
         ALONE,
