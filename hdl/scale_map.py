@@ -13,15 +13,16 @@ from .block import Block
 class ScaleMap(Block):
     """The error of the place of an edge, by the edge's number.
 
-    Equation: with bins of 2**bin_bits edges from edge `first` on, places[floor((number - first) / 2**bin_bits)]; beyond
-    the bins that of the nearest one; 0 without `enabled`.
+    Equation: with bins of 2**bin_bits edges from edge `first` on, places[floor((n - first) / 2**bin_bits)]; beyond the
+    bins that of the nearest one; 0 without `enabled`. n is `number` less all that the origin was shifted by while
+    `enabled`, so that an edge keeps its bin.
 
     Latency: `error` and `outside` are those of the number `latency` clocks before; a new number may come every clock.
     A word that is written is read from the next clock on.
 
-    Rounding and overflow: none; the number less `first` has a bit more than a number.
+    Rounding and overflow: n is taken modulo the count's width; n less `first` has a bit more than a number.
 
-    Reset: the memory keeps what it holds. It is 0 at power-on.
+    Reset: the memory keeps what it holds, and n is `number`. The memory is 0 at power-on.
 
     Parameters
     ----------
@@ -33,7 +34,9 @@ class ScaleMap(Block):
     number : In(SQ)
         The number of an edge, of the count's width.
     enabled : In(1)
-        The count is referenced, and the map holds; acts on `error` at once.
+        The count is referenced, and the map holds; acts on `error` at once. While it is low, n is `number`.
+    shift : In(1), shift_count : In(SQ)
+        Pulse: the origin was shifted, and `shift_count` added to the count.
     write : In(1)
         Pulse: put `written` into the bin `bin`.
     bin : In
@@ -58,6 +61,8 @@ class ScaleMap(Block):
         return {
             "number": In(signed(design.count_width)),
             "enabled": In(1),
+            "shift": In(1),
+            "shift_count": In(signed(design.count_width)),
             "write": In(1),
             "bin": In(range(design.bins)),
             "written": In(shape(design.place)),
@@ -71,7 +76,13 @@ class ScaleMap(Block):
         read, write = places.read_port(), places.write_port()
         m.d.comb += [write.addr.eq(self.bin), write.data.eq(self.written), write.en.eq(self.write)]
 
-        wanted = (self.number - d.first) >> d.bin_bits
+        origin, unshifted = Signal.like(self.number), Signal.like(self.number)
+        with m.If(~self.enabled):
+            m.d.sync += origin.eq(0)
+        with m.Elif(self.shift):
+            m.d.sync += origin.eq((origin + self.shift_count)[: d.count_width])
+        m.d.comb += unshifted.eq((self.number - origin)[: d.count_width])
+        wanted = (unshifted - d.first) >> d.bin_bits
         below, above = wanted < 0, wanted > d.bins - 1
         held, beyond = Signal(range(d.bins)), Signal()
         m.d.sync += [

@@ -7,7 +7,8 @@ Edge n of an encoder stands at n + e(n) counts. The map has e for the bins of 2*
 
 An edge `outside` the bins has the error of the nearest bin, so that there is no step at their ends. A count that wraps
 does so outside. The number of an edge is that of the count, so a map holds only while the count is referenced: what
-reads the map has an `enabled` for that, and without it every error is 0.
+reads the map has an `enabled` for that, and without it every error is 0. An origin that is shifted while the map holds
+moves the numbers of all edges: n is then the number less that shift (`unshifted`), so that an edge keeps its bin.
 
 Formats. `place` SQ(i, FRACTION_BITS) in counts: i holds `limit_counts`, to which errors saturate. An error that is
 rounded to a 64th is off by 0.0045 counts RMS, a tenth of what edges that are each off by 0.05 are. The width of a bin
@@ -19,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arithmetic.fixed import SQ, bits_for
+from .arithmetic.fixed import SQ, bits_for, wrap
 from .checks import FieldError, check_int, check_number, check_range
 from .compiled import compiled
 
@@ -49,6 +50,12 @@ class Place(NamedTuple):
 def nothing(floating: bool = False) -> Params:
     """Return a map of no error anywhere."""
     return Params(0, 0, np.zeros(1, np.float64 if floating else np.int64))
+
+
+@compiled
+def unshifted(number, origin, count_width):
+    """Return the number of an edge on the map, whose origin was shifted by `origin` counts since the map held."""
+    return wrap(number - origin, count_width)
 
 
 @compiled

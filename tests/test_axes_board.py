@@ -379,7 +379,9 @@ async def one_frame_arms_preloads_or_shifts_the_origin(dut):
             assert (await host.look(axis))["ready"] == 1
             places = [place[name] for name in these]
             values = [int(at in places) for at in range(min(places), max(places) + 1)]
-            assert (await host.request(frames.write(BANK * axis + min(places), values)))[1] == FAILURE
+            # Behind the shift lie pulses of the capture memory, which only the bank of axis 0 has.
+            refusal = ABSENT if axis and "origin_shift" in these else FAILURE
+            assert (await host.request(frames.write(BANK * axis + min(places), values)))[1] == refusal
             status = await host.look(axis)
             assert (status["state"], status["count"]) == (DISARMED, (5, 3)[axis])
     for axis, count in ((0, 14), (1, 12)):

@@ -6,6 +6,7 @@ import pytest
 
 from hardwall.hdl.scale_map import ScaleMap
 from hardwall.model import scale_map
+from hardwall.model.arithmetic.fixed import wrap
 from hardwall.model.scale_map import Design, place_of
 from hardwall.testing import Recorded, check, parameters, play, simulate
 from stimuli.lengths import some_of
@@ -33,7 +34,9 @@ def stimulus(d: Design) -> dict[str, np.ndarray]:
             {
                 "reset": int(random.random() < 0.001),
                 "number": min(max(number, -half), half - 1),
-                "enabled": int(random.random() < 0.9),
+                "enabled": int(random.random() < 0.99),
+                "shift": int(random.random() < 0.02),
+                "shift_count": random.choice([-half, half - 1, random.randint(-99, 99), random.randint(-half, half - 1)]),
                 "write": int(k < d.bins or random.random() < 0.1),
                 "bin": k if k < d.bins else random.choice([0, d.bins - 1, random.randrange(d.bins)]),
                 "written": random.choice([d.place.min, d.place.max, random.randint(d.place.min, d.place.max)]),
@@ -50,16 +53,19 @@ async def follows_model(dut):
     places = np.zeros(d.bins, np.int64)
     params = scale_map.Params(d.first, d.bin_bits, places)
     expected, met, beyond = {"error": [], "outside": []}, 0, 0
-    ahead = None
+    ahead, origin = None, 0
     for row in inputs.rows:
         given = dict(zip(inputs.names, row, strict=True))
         # The memory is read with the number of a clock before, as it is before this clock's word.
         error = 0 if ahead is None else places[ahead]
         expected["error"].append(int(error))
         expected["outside"].append(0 if given["reset"] else beyond)
-        held = min(max(scale_map.bin_of(params, given["number"]), 0), d.bins - 1)
+        number = scale_map.unshifted(given["number"], origin, d.count_width)
+        held = min(max(scale_map.bin_of(params, number), 0), d.bins - 1)
         ahead = 0 if given["reset"] else held
-        beyond = 0 if given["reset"] else place_of(params, given["number"]).outside
+        beyond = 0 if given["reset"] else place_of(params, number).outside
+        shift = given["shift"] * given["shift_count"]
+        origin = wrap(origin + shift, d.count_width) if given["enabled"] and not given["reset"] else 0
         if given["write"]:
             places[given["bin"]] = given["written"]
         met += error != 0
@@ -83,6 +89,15 @@ def test_an_edge_has_the_error_of_its_bin_and_beyond_the_bins_that_of_the_neares
         counted = (number + 20) // 4
         place = place_of(params, number)
         assert place == (64 * (min(max(counted, 0), 9) - 3), int(not 0 <= counted <= 9))
+
+
+@pytest.mark.parametrize("origin", [-512, -300, 7, 511])
+def test_an_edge_keeps_its_bin_when_the_origin_is_shifted(origin):
+    d = Design(10, -20, 2, 10)
+    params = d.params(np.arange(10) - 3.0)
+    for number in range(-512, 512):
+        shifted = wrap(number + origin, 10)
+        assert place_of(params, scale_map.unshifted(shifted, origin, 10)) == place_of(params, number)
 
 
 def test_words_are_rounded_half_up_and_saturate():

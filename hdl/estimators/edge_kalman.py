@@ -58,7 +58,7 @@ class Estimator(EstimatorBlock):
 
     Members, with a map of the scale, beside those of every estimator
     -----------------------------------------------------------------
-    map_enabled, map_write, map_bin, map_written : In
+    map_enabled, map_shift, map_shift_count, map_write, map_bin, map_written : In
         Those of `hardwall.hdl.scale_map.ScaleMap`. They change only before a sample with `restart`.
     map_outside : Out(1)
         From `valid` until the next `strobe`: the last edge is beyond the map's bins.
@@ -122,6 +122,8 @@ class Estimator(EstimatorBlock):
         m.d.comb += [
             scale.number.eq(s.to),
             scale.enabled.eq(self.map_enabled),
+            scale.shift.eq(self.map_shift),
+            scale.shift_count.eq(self.map_shift_count),
             scale.write.eq(self.map_write),
             scale.bin.eq(self.map_bin),
             scale.written.eq(self.map_written),

@@ -226,7 +226,7 @@ CASES = {
     ),
     "scale_map": Case(
         lambda axis: ScaleMap(Bins(12, -300, 3, 64, 16.0)),
-        (),
+        ("origin", "unshifted"),
         Bug(ScaleMap.elaborate, "wanted > d.bins - 1", "wanted > d.bins"),
         axes=ALONE,
     ),
