@@ -119,7 +119,7 @@ class Rig:
         await Timer(RESET_CLOCKS * CLOCK_NS, "ns")
         dut.rst.value = 0
         await Timer(RESET_CLOCKS * CLOCK_NS, "ns")
-        self.host = SerialHost(dut)
+        self.host = SerialHost(dut, self.stage.registers)
         for rig in self._all:
             rig._go(self)
         return self.clock, self.oscillator
@@ -128,7 +128,7 @@ class Rig:
         """Close the loop; the device is that of the rig of its first axis."""
         if self is not first:
             self.clock, self.oscillator, self._stopped = first.clock, first.oscillator, first._stopped
-            self.host = SerialHost(self.dut, self.axis, first.host)
+            self.host = SerialHost(self.dut, self.stage.registers, self.axis, first.host)
         self._given = self.see("given")
         self._tasks = [cocotb.start_soon(each) for each in (self._turn(), self._watch_drive())]
 

@@ -9,9 +9,10 @@ from cocotb.triggers import FallingEdge, First, Lock, Timer
 from hardwall.model.axes_registers import BANK, is_shared
 from hardwall.model.link.line import framed
 from hardwall.model.register import Kind
+from hardwall.model.registers import RegisterMap
 from stimuli import frames
 
-from .scene import BAUD, CLOCK_HZ, CLOCK_NS, CLOCKS_PER_MS, REGISTERS
+from .scene import BAUD, CLOCK_HZ, CLOCK_NS, CLOCKS_PER_MS
 
 BIT_NS = CLOCK_NS * CLOCK_HZ // BAUD
 SILENCE_NS = 30 * BIT_NS
@@ -31,7 +32,8 @@ def bits(data: bytes) -> list[int]:
 class SerialHost:
     """A host that knows the words it wrote.
 
-    It speaks of axis `axis`: of another one than the first, `first` is the host that has the line and the heartbeat.
+    It speaks of axis `axis`: of another one than the first, `first` is the host that has the line and the heartbeat. The
+    device has `registers`.
 
     Attributes:
         beats: whether the heartbeat goes on; `repeats`: whether it always says the same.
@@ -39,11 +41,12 @@ class SerialHost:
         sent: called when the last bit of a frame is on the line.
     """
 
-    def __init__(self, dut, axis: int = 0, first: "SerialHost | None" = None):
+    def __init__(self, dut, registers: RegisterMap, axis: int = 0, first: "SerialHost | None" = None):
+        self._registers = registers
         self._dut, self._lock = dut, first._lock if first else Lock()
         self._first, self._bank = first, axis * BANK
         self.beats, self.repeats, self.beat = True, False, 0
-        self.words = {each.name: each.reset for each in (*REGISTERS.words, *REGISTERS.live)}
+        self.words = {each.name: each.reset for each in (*registers.words, *registers.live)}
         self.sent: Callable[[], None] = lambda: None
         self._got = first._got if first else bytearray()
         self._tasks = [] if first else [cocotb.start_soon(self._listen()), cocotb.start_soon(self._beat())]
@@ -115,9 +118,9 @@ class SerialHost:
     def writing(self, **values: int) -> bytes:
         """Return the request that writes registers, and with them what lies between, as it was written last."""
         self.words |= {name: value for name, value in values.items() if name in self.words}
-        places = [REGISTERS[name].address for name in values]
+        places = [self._registers[name].address for name in values]
         cells = []
-        for register in REGISTERS.registers:
+        for register in self._registers.registers:
             if min(places) <= register.address <= max(places):
                 old = 0 if register.kind is Kind.PULSE else self.words[register.name]
                 cells += register.to_registers(values.get(register.name, old))
@@ -129,8 +132,9 @@ class SerialHost:
         Of an axis but the first, it is a frame for each where something that the axes share lies between, and the last
         answer: that cannot be written there.
         """
-        places = [REGISTERS[name].address for name in values]
-        between = (register for register in REGISTERS.registers if min(places) <= register.address <= max(places))
+        places = [self._registers[name].address for name in values]
+        known = self._registers.registers
+        between = (register for register in known if min(places) <= register.address <= max(places))
         if self._first and any(map(is_shared, between)):
             for name, value in values.items():
                 answer = await self.request(self.writing(**{name: value}))
@@ -144,7 +148,7 @@ class SerialHost:
 
     async def read(self, name: str) -> int:
         """Return the value of a register, as the board answers it."""
-        register = REGISTERS[name]
+        register = self._registers[name]
         data = (await self.request(frames.read(self._bank + register.address, register.size)))[2:]
         return register.from_registers(tuple(int.from_bytes(data[k : k + 2], "big") for k in range(0, len(data), 2)))
 

@@ -8,6 +8,7 @@ from hardwall.hdl.axes_board import AxesBoard
 from hardwall.hdl.board import Board
 from hardwall.hdl.link.link import Link
 from hardwall.model.axes import AxesSpec
+from hardwall.model.axes_registers import AxesMap
 from hardwall.model.drive import dac
 from hardwall.model.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
@@ -62,9 +63,14 @@ class Staged:
     def spec(self) -> AxisSpec:
         return dataclasses.replace(SPEC, stage=STAGES[self.name])
 
+    @cached_property
+    def registers(self) -> RegisterMap:
+        """The registers of the board; of several axes, those of each in its bank."""
+        return RegisterMap(self.spec)
+
     def board(self) -> Board:
         """Return a board with the stage."""
-        return Board(self.spec, Link(RegisterMap(self.spec), BAUD))
+        return Board(self.spec, Link(self.registers, BAUD))
 
     @property
     def has_codes(self) -> bool:
@@ -107,8 +113,12 @@ class StagedAxes(Staged):
         shared = {each.name for each in dataclasses.fields(AxesSpec)} - {"axes"}
         return AxesSpec(axes=AXES, **{name: getattr(SPEC, name) for name in shared})
 
+    @cached_property
+    def registers(self) -> AxesMap:
+        return AxesMap(self.spec, 0)
+
     def board(self) -> AxesBoard:
-        return AxesBoard(self.spec, BAUD, 0)
+        return AxesBoard(self.spec, BAUD, self.registers.capture_registers)
 
 
 PULSES = (("drive_pdm", 1), {"while the drive's pin is high": 0}, "while the drive's pin is low", True)
