@@ -109,3 +109,46 @@ def test_a_start_on_the_pulse_is_no_index():
         there = np.full(60, place)
         z = np.full(60, 1)
         assert not run(there, z, 0, 0, np.ones(60, int), Strobes()).indexed.any()
+
+
+SLIPS = ("illegal", "overspeed", "invert", "slip", "edge beyond the range", "shift beyond the range")
+
+
+@pytest.mark.parametrize("what", [*SLIPS, "preload", "arm"])
+def test_a_reference_falls_with_what_destroys_it(what):
+    """At the very clock, and a shift by the index that was does not set it again."""
+    clocks, homes, when = 60, 20, 30
+    beyond = what == "edge beyond the range"
+    params = Params(5, 8, 8)
+    # Up by a count at clock 4, over the index at the next, and there until another edge at the last clock but some.
+    place = np.minimum(np.arange(clocks), 6) + (np.arange(clocks) >= when - 3) * (beyond or 0)
+    places = np.where(np.arange(clocks) < 4, 0, place - 3)
+    a, b = ((places + 3) % 4 < 2).astype(int), ((places + 2) % 4 < 2).astype(int)
+    z, invert, glitch = (places >= 2).astype(int), np.zeros(clocks, int), 0
+    at = {name: np.zeros(clocks, int) for name in Strobes._fields}
+    at["arm"][1], at["origin_shift"][homes] = 1, 1
+    # The count is at the end of its range behind the shift, or in its middle.
+    at["preload_count"][:] = 12 if beyond else 0
+    if what == "illegal":
+        a[when - 3 :] ^= 1
+        b[when - 3 :] ^= 1
+    elif what == "overspeed":
+        glitch = np.where(np.arange(clocks) > homes, 3, 0)
+        a[when - 4 : when - 2] ^= 1
+        b[when - 3 :] ^= 1
+    elif what == "invert":
+        invert[when:] = 1
+    elif what == "shift beyond the range":
+        at["origin_shift"][when], at["preload_count"][when] = 1, 15
+    elif not beyond:
+        at[what][when] = 1
+    again = when + 15
+    at["origin_shift"][again], at["preload_count"][again] = 1, 0
+    states = quadrature.run(params, Inputs(a, b, z, glitch, invert), Strobes(**at))
+    assert states.referenced[homes : when + 1].tolist() == [1] * (when - homes) + [0]
+    assert states.index_latched[homes : when + 1].tolist() == [1] * (when - homes) + [0]
+    flags = {"illegal": states.illegal, "overspeed": states.overspeed}
+    flags |= dict.fromkeys(SLIPS[-2:], states.wrapped)
+    for name, flag in flags.items():
+        assert flag[when] == (what == name or flag is flags.get(what)), name
+    assert not states.referenced[when:].any()

@@ -34,11 +34,12 @@ def at(clocks: int, *when: int) -> np.ndarray:
 def pulses(channel: str, glitch_clocks: int) -> dict[str, np.ndarray]:
     """Return pulses of every width from 1 to glitch_clocks + 2 on one channel, the others low.
 
-    Between two pulses on Z the handle moves on by a count.
+    Between two pulses on Z the handle moves down and up again by a count.
     """
     apart = 2 * glitch_clocks + 9
     clock = np.arange(apart * (glitch_clocks + 3))
-    levels = pins((clock - glitch_clocks - 4) // apart + 1) if channel == "z" else {}
+    back = (glitch_clocks + 3 <= clock % apart) & (clock % apart < 2 * glitch_clocks + 4)
+    levels = pins(-back.astype(int)) if channel == "z" else {}
     levels[channel] = clock % apart < clock // apart
     return stimulus(len(clock), glitch_clocks=glitch_clocks, arm=clock % apart == apart - 1, **levels)
 
@@ -72,7 +73,7 @@ def meeting(strobe: str, when: int) -> dict[str, np.ndarray]:
     columns = {
         **pins(np.clip(clock - 11, 0, 6) + 2 * (clock >= 30)),
         "glitch_clocks": 2 * (clock >= 40),
-        "preload_count": 5,
+        "preload_count": -5 if strobe == "origin_shift" else 5,
         "arm": at(60, 4),
     }
     columns["a"] = columns["a"] ^ at(60, 50, 51)
