@@ -37,8 +37,8 @@ class Board(wiring.Component):
     Safe are the pins of the drive as the stage says, and `alive` low; they are so from power-up on. A clock that stops
     would keep them as they were: the oscillator, a second clock, finds that out, at most
     `clock_monitor.Design.stop_latency_s` later, makes them safe, and acts as the loop of `drive_enable` does, so that
-    the axis is DISARMED when the clock comes back, and without a reference: edges may have been missed. Until both clocks run and the reset has ended, `outputs_enable` is
-    low: the outputs may be left to their pulls.
+    the axis is DISARMED when the clock comes back, and without a reference: edges may have been missed. Until both
+    clocks run and the reset has ended, `outputs_enable` is low: the outputs may be left to their pulls.
 
     Latency: at most `latency` clocks from the sample strobe to pins that follow the changed drive. `drive_enable` or
     `emergency_stop` low makes the pins of the drive safe at once, through a gate that needs no clock; any cause makes

@@ -28,8 +28,8 @@ class Monitors(Block):
     Latency: `latency` of a cause, from the inputs to `causes`; a new limit of the position acts a clock later.
     `velocity` and `saturated` are looked at with `valid`, `edge_kind` with `stepped`, and the distance to the last
     index edge with `indexed`: velocity_limit and index_spacing are pulses. The others last for as long as what is wrong
-    does, which for the position must be two clocks. Ways are counted edge by edge: a preload or a shift of the origin is
-    no motion.
+    does, which for the position must be two clocks. Ways are counted edge by edge: a preload or a shift of the origin
+    is no motion.
 
     Rounding and overflow: distances are taken modulo the count's width; counters stop at their limits.
 
@@ -185,7 +185,8 @@ class Monitors(Block):
         # The distance from the last index, negative, and its side. At an index it begins anew, with the edge behind it
         # and that of this clock.
         distance, upwards, grows = Signal.like(self.count), Signal(), Signal()
-        begun = Mux(behind, Cat(~counts, (~counts | down).replicate(len(distance) - 1)), counts.replicate(len(distance)))
+        bits = len(distance)
+        begun = Mux(behind, Cat(~counts, (~counts | down).replicate(bits - 1)), counts.replicate(bits))
         m.d.comb += grows.eq((distance == 0) | (down ^ upwards))
         with m.If(indexed):
             m.d.sync += [upwards.eq(~(down | behind)), distance.eq(begun)]

@@ -87,8 +87,9 @@ class Quadrature(wiring.Component):
     clock (the count, or one more if it counted -1), else at the count. A pulse narrower than a count is found upwards
     only. An edge of Z that lies on an edge of A or B may come a clock before or after it, and is then a count off.
 
-    Slip: after `illegal`, `overspeed`, `wrapped`, another `invert` or `slip` the count belongs no more to the scale. In that
-    clock `index_latched` and `referenced` fall. `preload` makes them fall too, for it moves the count by nobody knows what.
+    Slip: after `illegal`, `overspeed`, `wrapped`, another `invert` or `slip` the count belongs no more to the scale. In
+    that clock `index_latched` and `referenced` fall. `preload` makes them fall too, for nobody knows by how much it
+    moves the count.
 
     Rounding and overflow: nothing is rounded. `count`, `index_count` and the stamps wrap, `illegal_count` saturates. An
     edge or a shift of the origin that takes the count beyond an end of its range raises `wrapped` with the wrong count.
@@ -306,22 +307,7 @@ class Quadrature(wiring.Component):
         with m.Elif(both):
             m.d.sync += seen.run.eq(0)
 
-        latches = self.index_armed & index & ~self.arm
-        with m.If(self.arm):
-            m.d.sync += [self.index_armed.eq(1), self.index_latched.eq(0)]
-        with m.Elif(latches):
-            m.d.sync += [self.index_armed.eq(0), self.index_latched.eq(~beyond)]
-        with m.Elif(lost | beyond | self.preload):
-            m.d.sync += self.index_latched.eq(0)
-        with m.If(latches):
-            m.d.sync += self.index_count.eq(Mux(one & down, base, count))
-        with m.Elif(self.origin_shift):
-            m.d.sync += self.index_count.eq((self.index_count + self.preload_count)[: self._count_width])
-        with m.If(self.arm | self.preload | lost | beyond):
-            m.d.sync += self.referenced.eq(0)
-        with m.Elif(self.origin_shift & self.index_latched):
-            m.d.sync += self.referenced.eq(1)
-
+        self._latch(m, index, Mux(one & down, base, count), lost, beyond)
         kept = Signal(self._fault_width)
         m.d.comb += [
             kept.eq(Mux(self.clear, 0, self.illegal_count)),
@@ -347,3 +333,28 @@ class Quadrature(wiring.Component):
         # Whether an edge came since Z's last change; one in the very clock of a change came before it.
         m.d.sync += [inverted.eq(self.invert), passed.eq((one | passed) & ~moved[2] & ~lost)]
         return index, lost
+
+    def _latch(self, m: Module, index: Value, place: Value, lost: Value, beyond: Value) -> None:
+        """Latch the place of an index, move it with the origin, and forget it when the count loses its scale.
+
+        Args:
+            m: the module.
+            index, place: whether there is an index, and its place.
+            lost, beyond: whether the count loses its scale otherwise than beyond its range, and there. The latter comes
+                late in a clock.
+        """
+        latches = self.index_armed & index & ~self.arm
+        with m.If(self.arm):
+            m.d.sync += [self.index_armed.eq(1), self.index_latched.eq(0)]
+        with m.Elif(latches):
+            m.d.sync += [self.index_armed.eq(0), self.index_latched.eq(~beyond)]
+        with m.Elif(lost | beyond | self.preload):
+            m.d.sync += self.index_latched.eq(0)
+        with m.If(latches):
+            m.d.sync += self.index_count.eq(place)
+        with m.Elif(self.origin_shift):
+            m.d.sync += self.index_count.eq((self.index_count + self.preload_count)[: self._count_width])
+        with m.If(self.arm | self.preload | lost | beyond):
+            m.d.sync += self.referenced.eq(0)
+        with m.Elif(self.origin_shift & self.index_latched):
+            m.d.sync += self.referenced.eq(1)

@@ -50,10 +50,10 @@ class SupervisedAxes(wiring.Component):
 
     Parameters at run time are written as in `Axes`, by the numbers of `design.words`. Those of `spec.design.words`
     wait for a `commit`; the others act in the axis's next turn, so a lower force limit holds with its drive.
-    `output_force_limit` cannot be written. A commit of another `encoder_invert` is a `disarm` and a `slip`; so is a
-    slip what a turn finds of the causes `SLIPS`, if the axis watches them. The heartbeat and its
-    watchdog are those of the one host, for all axes; a word of the watchdog beyond its range is the cause word_range of
-    each. Both, and the ranges of the words, are looked at in the turn alone: what lasts for less than a rota is missed.
+    `output_force_limit` cannot be written. A commit of another `encoder_invert` is a `disarm` and a `slip`. A turn that
+    finds a cause of `SLIPS`, which the axis watches, is a `slip` too. The heartbeat and its watchdog are those of the
+    one host, for all axes; a word of the watchdog beyond its range is the cause word_range of each. Both, and the
+    ranges of the words, are looked at in the turn alone: what lasts for less than a rota is missed.
 
     Causes: those of `hardwall.model.supervisor`, as `hardwall.model.sampled_monitors` sees them. strobe_busy is never
     present: the rota has a clock for every axis, and nothing can begin in it sooner.
@@ -194,7 +194,7 @@ class SupervisedAxes(wiring.Component):
             **monitors.runaway(moved, pipe.later(first, look), supervisors.let_out, look - 1),
             **lost,
         }
-        slips = Cat(causes[bit] & words("supervisor_causes", end)[bit] for bit in SLIPS).any()
+        slips = Cat(made[bit] & words("supervisor_causes", end)[bit] for bit in SLIPS).any()
         found = Cat(pipe.turns(end + 1)) & pipe.taken(slips, "slips").replicate(axes.spec.axes)
         m.d.comb += axes.slip.eq(self.slip | turned | found)
         judged = supervisors.judged(

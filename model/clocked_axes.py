@@ -50,8 +50,8 @@ class Outputs(NamedTuple):
 class State(NamedTuple):
     """The state of an axis.
 
-    `restart` is 1 from a preload or a shift of the origin until the next sample. `allowed` is 1 while the force in the output stage may become
-    the drive.
+    `restart` is 1 from a preload or a shift of the origin until the next sample. `allowed` is 1 while the force in the
+    output stage may become the drive.
     """
 
     decoder: quadrature.State

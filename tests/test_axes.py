@@ -19,9 +19,11 @@ from stimuli.lengths import LONG, REACHING, WHOLE, long_form
 from stimuli.places import place
 from stimuli.specs import MHZ
 
-LEVELS, PULSES = ("encoder_a", "encoder_b", "encoder_z", "drive_enable"), ("preload", "origin_shift", "index_arm", "clear_flags", "slip")
+LEVELS = "encoder_a", "encoder_b", "encoder_z", "drive_enable"
+PULSES = "preload", "origin_shift", "index_arm", "clear_flags", "slip"
 """The inputs of one bit for each axis besides `commit`."""
-CHANCES = {"commit": 0.004, "preload": 0.004, "origin_shift": 0.004, "index_arm": 0.02, "clear_flags": 0.01, "slip": 1e-3}
+CHANCES = {"commit": 0.004, "preload": 0.004, "origin_shift": 0.004, "index_arm": 0.02, "clear_flags": 0.01}
+CHANCES |= {"slip": 0.001}
 """The chances of a pulse in a clock."""
 STIFFEST = "wall_stiffness", "output_force_limit", "output_slew_limit"
 """The words whose largest make the largest drive."""

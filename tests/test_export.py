@@ -23,11 +23,13 @@ TOPS = {"axis": Axis, "board": Board, "axi": lambda axis: Board(axis, AxiLink(Re
 WRITTEN = ("axis.v", "axi.v", "board.v", "ports.md", "registers.md", "registers.h", "registers.json")
 # Designs that instantiate the axis depend on these names; the words depend on its estimator.
 AXIS_PORTS = """
-clk rst encoder_a encoder_b encoder_z drive_enable clear_flags preload origin_shift preload_count slip index_arm commit
+clk rst encoder_a encoder_b encoder_z drive_enable clear_flags preload origin_shift preload_count slip index_arm
+commit
 encoder_glitch_clocks encoder_invert levant_lambda levant_alpha levant_output wall_stiffness wall_damping wall_position
 wall_left wall_forbid_pull output_force_limit output_slew_limit drive sampled actuated count sampled_count velocity
-wall_force flags stepped edge_kind edge_down indexed estimated saturated strobe_busy illegal overspeed illegal_count
-index_count index_armed index_latched referenced stamp stamp_a_rise stamp_b_rise stamp_a_fall stamp_b_fall commit_pending
+wall_force flags stepped edge_kind edge_down indexed estimated saturated strobe_busy illegal overspeed wrapped
+illegal_count index_count index_armed index_latched referenced stamp stamp_a_rise stamp_b_rise stamp_a_fall stamp_b_fall
+commit_pending
 """
 BOARD_PORTS = """
 clk rst oscillator encoder_a encoder_b encoder_z encoder_a_n encoder_b_n drive_enable external_fault emergency_stop

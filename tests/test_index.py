@@ -23,7 +23,9 @@ ORIGIN = 64
 """The count at which a turn of the walks begins."""
 
 
-def run(places: np.ndarray, z: np.ndarray, invert: int, glitch_clocks: int, holds: np.ndarray, strobes: Strobes) -> State:
+def run(
+    places: np.ndarray, z: np.ndarray, invert: int, glitch_clocks: int, holds: np.ndarray, strobes: Strobes
+) -> State:
     """Return the states at every clock of handles that are at places (lane, move), each held for some clocks."""
     cell = places // PARTS
     levels = ((cell + 3) % 4 < 2, (cell + 2) % 4 < 2, z)

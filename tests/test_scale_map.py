@@ -36,7 +36,9 @@ def stimulus(d: Design) -> dict[str, np.ndarray]:
                 "number": min(max(number, -half), half - 1),
                 "enabled": int(random.random() < 0.99),
                 "shift": int(random.random() < 0.02),
-                "shift_count": random.choice([-half, half - 1, random.randint(-99, 99), random.randint(-half, half - 1)]),
+                "shift_count": random.choice(
+                    [-half, half - 1, random.randint(-99, 99), random.randint(-half, half - 1)]
+                ),
                 "write": int(k < d.bins or random.random() < 0.1),
                 "bin": k if k < d.bins else random.choice([0, d.bins - 1, random.randrange(d.bins)]),
                 "written": random.choice([d.place.min, d.place.max, random.randint(d.place.min, d.place.max)]),

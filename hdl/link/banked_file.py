@@ -52,7 +52,8 @@ class BankedFile(wiring.Component):
     - CHECK_READ, CHECK_WRITE: raise `absent`, `outside` or `refused` if the register cannot be read, or written with
       `host.value`, or not now. The halves of a value are checked in the order of their addresses, one after the other.
       `arm` is refused unless the last turn of its axis was `ready`, `preload` and `origin_shift` if it was ARMED, and
-      a second one of these three since `clear`; the capture memory, unless it is done. A CHECK_READ of a status lets the next SNAPSHOT take that axis's.
+      a second one of these three since `clear`; the capture memory, unless it is done. A CHECK_READ of a status lets
+      the next SNAPSHOT take that axis's.
     - READ: give the register; of a status, in whichever bank, that of the last snapshot.
     - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. A live word goes to its axis
       with its lower half, which is written after the upper one. Only what was checked is written.

@@ -39,9 +39,9 @@ class RegisterFile(wiring.Component):
       `done` of its lower half, which is written after the upper one. Only what was checked is written.
     - COUNT: add 1 to a counter, which wraps.
     - FINISH: if `commit` is marked, copy every written word to its active one; if a pulse of `WITH_WORDS` is, shift the
-      active words to their ports. Then all marked pulses are high for one clock, the same one; the words have been at their
-      ports for a clock or more, and stay until `done`, which comes when `commit_pending` has fallen: so what is read
-      back as active is in use.
+      active words to their ports. Then all marked pulses are high for one clock, the same one; the words have been at
+      their ports for a clock or more, and stay until `done`, which comes when `commit_pending` has fallen: so what is
+      read back as active is in use.
     - SNAPSHOT: take the status for what is read from then on, in the turns of `design.turns`: what is taken in one turn
       is of one clock, and every value is whole. `taken_clocks` has the clock of each.
 

@@ -102,7 +102,7 @@ def test_the_index_is_exactly_where_it_is_said_to_be(goes):
 
 
 def test_a_scale_that_has_slipped_is_homed_again():
-    with pytest.raises(NotReadyError, match="the scale has slipped since: .* home again"):
+    with pytest.raises(NotReadyError, match=r"the scale has slipped since: .* home again"):
         home(Trembling(rng(), 60, slips=True), 0.0)
 
 

@@ -32,8 +32,8 @@ def bits(data: bytes) -> list[int]:
 class SerialHost:
     """A host that knows the words it wrote.
 
-    It speaks of axis `axis`: of another one than the first, `first` is the host that has the line and the heartbeat. The
-    device has `registers`.
+    It speaks of axis `axis`: of another one than the first, `first` is the host that has the line and the heartbeat.
+    The device has `registers`.
 
     Attributes:
         beats: whether the heartbeat goes on; `repeats`: whether it always says the same.

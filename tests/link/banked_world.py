@@ -129,7 +129,8 @@ class World:
         self.clock, self.compared = self.clock + 1, self.compared + 1
         self._step(bits)
         if given["turn_valid"]:
-            refused = {"arm": not given["turn_ready"], **dict.fromkeys(("preload", "origin_shift"), given["turn_state"] == ARMED)}
+            refused = dict.fromkeys(("preload", "origin_shift"), given["turn_state"] == ARMED)
+            refused |= {"arm": not given["turn_ready"]}
             self.twin.refused_of[given["turn_axis"]] = frozenset(name for name, is_so in refused.items() if is_so)
         return seen
 

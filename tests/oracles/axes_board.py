@@ -180,7 +180,8 @@ class Host(OnALine):
 
         Upwards Z rises there; downwards it falls, and a handle has two counts to go at least.
         """
-        downwards = sum((to < at) << axis for axis, (at, to) in enumerate(zip(self.places, places, strict=True))) & index
+        ways = zip(self.places, places, strict=True)
+        downwards = sum((to < at) << axis for axis, (at, to) in enumerate(ways)) & index
         while self.places != [*places]:
             self.places = [at + (to > at) - (to < at) for at, to in zip(self.places, places, strict=True)]
             await self._show(downwards)
@@ -228,7 +229,8 @@ class Host(OnALine):
         read = [r for r in self.registers.status if begin <= r.address < end]
         status = {r.name: r.from_registers(tuple(cells[r.address - begin : r.address - begin + 2])) for r in read}
         if {"ready", "state"} <= set(status):
-            refused = {"arm": not status["ready"], **dict.fromkeys(("preload", "origin_shift"), status["state"] == ARMED)}
+            refused = dict.fromkeys(("preload", "origin_shift"), status["state"] == ARMED)
+            refused |= {"arm": not status["ready"]}
             self.server.file.refused_of[axis] = frozenset(name for name, is_so in refused.items() if is_so)
         return status
 

@@ -182,9 +182,9 @@ PROPERTIES = [
             Bug(Quadrature._index, "both | outrun | self.slip |", "outrun | self.slip |"),
             Bug(Quadrature._index, "both | outrun | self.slip |", "both | self.slip |"),
             Bug(Quadrature._index, "| (self.invert ^ inverted)", ""),
-            Bug(Quadrature.elaborate, "self.index_latched.eq(~beyond)", "self.index_latched.eq(1)"),
-            Bug(Quadrature.elaborate, "m.If(self.arm | self.preload | lost | beyond)", "m.If(self.arm | lost | beyond)"),
-            Bug(Quadrature.elaborate, "m.Elif(lost | beyond | self.preload)", "m.Elif(beyond | self.preload)"),
+            Bug(Quadrature._latch, "self.index_latched.eq(~beyond)", "self.index_latched.eq(1)"),
+            Bug(Quadrature._latch, "m.If(self.arm | self.preload | lost | beyond)", "m.If(self.arm | lost | beyond)"),
+            Bug(Quadrature._latch, "m.Elif(lost | beyond | self.preload)", "m.Elif(beyond | self.preload)"),
         ),
     ),
     Property(

@@ -75,9 +75,7 @@ def a_frame_does_one(bench: Bench, block: RegisterFile | BankedFile, asks: list[
 def one_frame_arms_or_moves(bench: Bench) -> None:
     block = register_file(bench)
     host, registers = block.host, block.design.registers
-    a_frame_does_one(
-        bench, block, [(host.address == registers[name].address) & host.value[0] for name in EXCLUSIVE]
-    )
+    a_frame_does_one(bench, block, [(host.address == registers[name].address) & host.value[0] for name in EXCLUSIVE])
 
 
 def only_checks_find(bench: Bench, host: PureInterface) -> Value:

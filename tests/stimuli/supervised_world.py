@@ -14,7 +14,8 @@ STROBES = (
 )  # fmt: skip
 QUARTERS = ((0, 0), (1, 0), (1, 1), (0, 1))
 ACTS = (
-    "", "disarm", "commit", "committed", "live", "settle", "index_arm", "preload", "acknowledge", "origin_shift", "slip",
+    "", "disarm", "commit", "committed", "live", "settle", "index_arm", "preload", "acknowledge", "origin_shift",
+    "slip",
 )  # fmt: skip
 CHANCES = (0.9814, 0.0005, 0.002, 0.003, 0.0045, 0.0035, 0.002, 0.0013, 0.0002, 0.0015, 0.0002)
 """What a host does beside bringing the axis to ARMED, and the chance of each in a clock."""
