@@ -197,6 +197,7 @@ PROPERTIES = [
             Bug(BankedFile.elaborate, "| (one_of & exclusive)", "", NO_BOOT),
             Bug(BankedFile.elaborate, "exclusive.eq(1)", "exclusive.eq(0)", NO_BOOT),
         ),
+        within=12,
     ),
     Property(
         "a pulse goes out for one clock, at the end of a frame, to the axis whose bank it was written to",

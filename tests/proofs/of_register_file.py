@@ -221,6 +221,7 @@ PROPERTIES = [
             Bug(RegisterFile.elaborate, "| (asked & exclusive)", "", NO_BOOT),
             Bug(RegisterFile.elaborate, "exclusive.eq(1)", "exclusive.eq(0)", NO_BOOT),
         ),
+        within=12,
     ),
     Property(
         "a pulse goes out for one clock, at the end of a frame that has written 1 to its register",
