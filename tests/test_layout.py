@@ -83,6 +83,7 @@ BROAD = {
     "test_fuzz": "every command, called as no one would",
     "test_gates": "netlists beside their RTL, and the means",
     "test_killed": "every command that stores results",
+    "test_index": "where the decoder finds the index, and what takes the reference",
     "test_kept": "what the tasks that sign the hardware off keep",
     "test_layout": "the tree",
     "test_makefile": "the tasks",

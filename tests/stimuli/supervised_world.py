@@ -114,7 +114,9 @@ class World:
             return {}
         if state == TRIPPED:
             clear = int(not self.flips and random.random() < 0.8)
-            home = {"preload": 1, "preload_count": int(self.position // 1)} if random.random() < 0.5 else {}
+            half = 1 << self.design.spec.count_width - 1
+            count = (int(self.position // 1) + half) % (2 * half) - half
+            home = {"preload": 1, "preload_count": count} if random.random() < 0.5 else {}
             return {"acknowledge": 1, "acknowledged": latched, "clear_flags": clear, **home}
         return {"arm": int(state == DISARMED)}
 
