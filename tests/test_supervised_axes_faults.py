@@ -238,6 +238,8 @@ async def every_cause_trips_its_axis_alone(dut):
         assert [turn["state"] for turn in device.turns] == [ARMED] * AXES, name
         assert min(device.magnitude(axis) for axis in range(AXES)) > 0
         if name == "index_spacing":
+            await device.moves(1)
+            await device.clocks(PIN_CLOCKS)
             device.level("encoder_z", 1)
             await device.clocks(ENOUGH)
         await inject(device)

@@ -19,6 +19,7 @@ from hardwall.hdl.lead_out import lead_out
 from hardwall.hdl.link.link import Link
 from hardwall.model.link import server
 from hardwall.model.link.line import framed
+from hardwall.model.link.register_file import EXCLUSIVE
 from hardwall.model.register import Kind
 from hardwall.model.registers import CAPTURE, COUNTERS, MAP, SUPERVISOR, TELEMETRY
 from hardwall.testing import Bench, parameters, rng, simulate
@@ -287,11 +288,14 @@ async def every_port_has_what_a_client_writes_and_reads(dut):
         @bridge
         def run() -> None:
             assert not client.write_registers(live[0].address, halves(live, drawn), **unit).isError()
-            together = [1] * len(pulses) + halves(words, drawn)
+            # A frame has one of the pulses that exclude each other.
+            alone = [pulse for pulse in pulses if pulse.name in EXCLUSIVE[1:]]
+            together = [int(pulse not in alone) for pulse in pulses[::-1]] + halves(words, drawn)
             bench.drive(refuse=(1 << len(pulses)) - 1)
             assert client.write_registers(pulses[-1].address, together, **unit).exception_code == 4
             bench.drive(refuse=0)
             assert not client.write_registers(pulses[-1].address, together, **unit).isError()
+            assert not any(client.write_register(pulse.address, 1, **unit).isError() for pulse in alone)
             for block in (TELEMETRY, SUPERVISOR):
                 shown = halves([each for each in registers.status if block <= each.address < block + 0x20], drawn)
                 assert values(client.read_holding_registers(block, count=len(shown), **unit)) == shown
