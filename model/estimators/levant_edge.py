@@ -96,7 +96,6 @@ from ..quadrature import RUN_MAX
 from .estimate import estimate
 from .levant import sign_of
 from .levant_edge_anchor import (
-    CARRIED,
     FIRST,
     LOOSE,
     TIMED,
@@ -108,8 +107,6 @@ from .levant_edge_anchor import (
 from .levant_edge_design import LEARN_SHIFT, Design, FloatParams, Gains, Params, State
 
 __all__ = ["Design", "Gains"]
-REST_BITS = 3
-"""An axis is at rest after 2**REST_BITS times the last interval, rounded up to a power of two, without an edge."""
 LEFT_MAX = 46
 """Largest left shift of a gain word, beyond which every result saturates anyway: 16 + 46 bits fit int64."""
 
@@ -131,6 +128,17 @@ def within(line, velocity, bound):
     if velocity < 0:
         return saturate(line, -max(bound + velocity, 0), -velocity)
     return saturate(line, -velocity, max(bound - velocity, 0))
+
+
+@compiled
+def refuted(bound, before, after):
+    """Return whether a velocity at an edge shows that the bound before this edge was no bound: edges come in bursts.
+
+    Without bursts an axis that slows down within its cell is no faster at the next edge than `bound` less its speed
+    `before`. One that stops in it and starts again is slower than half of that speed.
+    """
+    onward = max(after if before >= 0 else 0, -after if before <= 0 else 0)
+    return onward > bound - abs(before) and 2 * onward > abs(before)
 
 
 @compiled
@@ -189,30 +197,31 @@ def step(params, state, seen, restart):
     if restart or not state.running:
         state = started(params, seen, 0)
     met, interval, passed = meet(params, state, seen)
-    known, length = state.known, state.length
+    known, doubt = state.known, max(state.doubt - 1, 0)
     velocity, acceleration, places = state.velocity, state.acceleration, state.places
     most, flags = params.velocity_max, 0
     if met == FIRST:
-        known, velocity, acceleration = 1, 0, 0
+        known, doubt, velocity, acceleration = 1, 0, 0, 0
     elif met == TIMED:
-        length = length_of(interval)
         velocity, acceleration, places, flags = _correct(params, state, seen, interval, passed)
-    elif met == CARRIED:
-        moved = velocity + _turn(params, acceleration, interval)
-        velocity = _fitted(moved, most)
-        flags = int(moved != velocity) << 1
+        if refuted(state.bound, state.velocity, velocity):
+            doubt = params.doubt
     number, stamp, kind, age = anchored(params, state, seen, met)
 
-    gone = age >> (params.stamp_width - 1)
-    if met != LOOSE and (gone or age >> (length + REST_BITS)):
-        velocity, acceleration = 0, 0
-        known = int(known and not gone)
     straight = velocity + _turn(params, acceleration, age)
     line = _fitted(straight, most)
     flags |= int(line != straight) << 1
-    if met != LOOSE:
-        line = within(line, velocity, min(params.bound >> max(length_of(age) - 1, 0), most))
-    return State(1, known, number, stamp, kind, length, velocity, acceleration, places), line, flags
+    bound = state.bound
+    if met != LOOSE or age >> (params.shortest + 1):
+        gone = age >> (params.stamp_width - 1)
+        bound = min(params.bound >> max(length_of(age) - 1 - int(met == LOOSE), 0), params.bound_max)
+        rests = gone or not doubt and abs(line) >= 2 * bound
+        if not doubt:
+            line = within(line, velocity, bound)
+        if rests:
+            velocity, acceleration, line = 0, 0, 0
+            known = int(known and not gone)
+    return State(1, known, number, stamp, kind, bound, doubt, velocity, acceleration, places), line, flags
 
 
 @compiled
@@ -245,22 +254,24 @@ def float_step(params, state, seen, restart):
     if restart or not state.running:
         state = started(params, seen, 0.0)
     met, interval, passed = meet(params, state, seen)
-    known, length = state.known, state.length
+    known, doubt = state.known, max(state.doubt - 1, 0)
     velocity, acceleration, places = state.velocity, state.acceleration, state.places
     if met == FIRST:
-        known, velocity, acceleration = 1, 0.0, 0.0
+        known, doubt, velocity, acceleration = 1, 0, 0.0, 0.0
     elif met == TIMED:
-        length = length_of(interval)
         velocity, acceleration, places = _float_correct(params, state, seen, interval, passed)
-    elif met == CARRIED:
-        velocity = velocity + acceleration * interval
+        if refuted(state.bound, state.velocity, velocity):
+            doubt = params.doubt
     number, stamp, kind, age = anchored(params, state, seen, met)
 
-    gone = age >> (params.stamp_width - 1)
-    if met != LOOSE and (gone or age >> (length + REST_BITS)):
-        velocity, acceleration = 0.0, 0.0
-        known = int(known and not gone)
-    line = velocity + acceleration * age
-    if met != LOOSE:
-        line = within(line, velocity, 2.5 * params.clocks * 2.0 ** -max(length_of(age) - 1, 0))
-    return State(1, known, number, stamp, kind, length, velocity, acceleration, places), line, 0
+    line, bound = velocity + acceleration * age, state.bound
+    if met != LOOSE or age >> (params.shortest + 1):
+        gone = age >> (params.stamp_width - 1)
+        bound = 2.5 * params.clocks * 2.0 ** -max(length_of(age) - 1 - int(met == LOOSE), 0)
+        rests = gone or not doubt and abs(line) >= 2 * bound
+        if not doubt:
+            line = within(line, velocity, bound)
+        if rests:
+            velocity, acceleration, line = 0.0, 0.0, 0.0
+            known = int(known and not gone)
+    return State(1, known, number, stamp, kind, bound, doubt, velocity, acceleration, places), line, 0
