@@ -21,8 +21,8 @@ class Signals:
         self.v, self.a = Signal(velocity), Signal(shape(d.acceleration))
         self.places = Array(Signal(shape(d.place), name=f"place_{n}") for n in range(4))
 
-        # The sample. `anchor`: its edge is the new anchor; `loose`: its edge is too close to the anchor; `young`: and so
-        # is the sample.
+        # The sample. `anchor`: its edge is the new anchor; `loose`: its edge is too close to the anchor, and the
+        # sample, too, if it is `young`.
         self.fresh, self.full_run, self.gone, self.rest, self.beyond = (Signal() for _ in range(5))
         self.correct, self.anchor, self.loose, self.young = Signal(), Signal(), Signal(), Signal()
         self.now, self.at, self.waited = Signal(clocks), Signal(clocks), Signal()

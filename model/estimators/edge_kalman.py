@@ -184,7 +184,7 @@ def step(params, state, seen, restart):
     straight = velocity + _turn(params, acceleration, age)
     line = saturate(straight, -params.velocity_max, params.velocity_max)
     flags |= int(line != straight) << 1
-    rests = gone or not doubt and abs(line) >= 2 * bound
+    rests = gone or (not doubt and abs(line) >= 2 * bound)
     if not doubt:
         line = within(line, velocity, bound)
     if rests:
@@ -237,7 +237,7 @@ def float_step(params, state, seen, restart):
     gone = age >> (params.time_bits - 1)
     bound = params.bound * 2.0 ** -max(length_of(age) - 1, 0)
     line = velocity + acceleration * age
-    rests = gone or not doubt and abs(line) >= 2 * bound
+    rests = gone or (not doubt and abs(line) >= 2 * bound)
     if not doubt:
         line = within(line, velocity, bound)
     if rests:

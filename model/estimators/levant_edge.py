@@ -215,7 +215,7 @@ def step(params, state, seen, restart):
     if met != LOOSE or age >> (params.shortest + 1):
         gone = age >> (params.stamp_width - 1)
         bound = min(params.bound >> max(length_of(age) - 1 - int(met == LOOSE), 0), params.bound_max)
-        rests = gone or not doubt and abs(line) >= 2 * bound
+        rests = gone or (not doubt and abs(line) >= 2 * bound)
         if not doubt:
             line = within(line, velocity, bound)
         if rests:
@@ -268,7 +268,7 @@ def float_step(params, state, seen, restart):
     if met != LOOSE or age >> (params.shortest + 1):
         gone = age >> (params.stamp_width - 1)
         bound = 2.5 * params.clocks * 2.0 ** -max(length_of(age) - 1 - int(met == LOOSE), 0)
-        rests = gone or not doubt and abs(line) >= 2 * bound
+        rests = gone or (not doubt and abs(line) >= 2 * bound)
         if not doubt:
             line = within(line, velocity, bound)
         if rests:
