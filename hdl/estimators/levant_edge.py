@@ -22,7 +22,7 @@ class Estimator(EstimatorBlock):
 
         E = (v + a T/2) T - (n + the difference of the two edges' places) D
         v <- v + a T - min(|E| / T, lambda sqrt(|E| 2**L)) sign(E)
-        a <- a - min(|E| / T / 2**L, alpha 2**L) sign(E)
+        a <- a - min(change of v / 2**L, alpha 2**L) sign(E)
 
     (where |E| >= D, without the limit by lambda), and at every sample, s clocks after that edge, velocity = v + a s,
     held within the bound for no further edge; 0 at rest. The places of the four edges of a cycle are learnt from E.
@@ -108,7 +108,7 @@ class Estimator(EstimatorBlock):
             halves.eq((s.length >> 1) - (first >> 1)),
             s.slope.eq(quotient.quotient),
             s.far_slope.eq(quotient.saturated),
-            s.bent.eq(at_most(shift_floor(s.slope, p.slope_shift + first) >> more, steepest)),
+            s.bent.eq(at_most(shift_floor(s.change[: len(s.slope)], p.slope_shift + first) >> more, steepest)),
             s.limit.eq(at_most(_shifted(s.root_product, p.limit_shift - (first >> 1), halves), most)),
             s.relay.eq(at_most(_shifted(self.levant_edge_alpha, p.alpha_shift - first, few), steepest)),
         ]
@@ -235,16 +235,18 @@ class Estimator(EstimatorBlock):
         with m.State("CHANGE"):
             limited = s.e_cut == 0
             change = Mux(limited & ~s.lost & (s.limit < s.slope), s.limit, s.slope)
-            bend = Mux(limited & (s.relay < s.bent), s.relay, s.bent)
             m.d.sync += [
                 s.change.eq(Mux(s.correct, change, 0)),
-                s.bend.eq(Mux(s.correct, bend, 0)),
                 s.flags[0].eq(s.correct & (s.beyond | s.far_slope)),
             ]
             m.next = "SIGN"
         with m.State("SIGN"):
             with m.If(s.e < 0):
-                m.d.sync += [s.change.eq(-s.change), s.bend.eq(-s.bend)]
+                m.d.sync += s.change.eq(-s.change)
+            m.next = "BEND"
+        with m.State("BEND"):
+            bend = Mux((s.e_cut == 0) & (s.relay < s.bent), s.relay, s.bent)
+            m.d.sync += s.bend.eq(_signed(bend, s.e < 0))
             m.next = "UPDATE"
         with m.State("UPDATE"):
             far_v = s.ahead - s.change

@@ -54,8 +54,8 @@ from ..arithmetic.fixed import SQ, UQ, bits_for
 from ..checks import FieldError
 from ..quadrature import Seen
 from ..requirements import AxisRequirements
+from .bursts import doubt_samples
 from .estimate import EstimatorDesign, EstimatorGains
-from .levant_edge_design import doubt_samples
 from .riccati import steady_state
 
 QUIET = 1.6

@@ -34,8 +34,8 @@ from ..checks import FieldError
 from ..compiled import compiled
 from ..quadrature import Seen, stamp_of
 from ..requirements import AxisRequirements
+from .bursts import doubt_samples
 from .estimate import EstimatorDesign, EstimatorGains, estimate
-from .levant_edge_design import doubt_samples
 from .period import check_stamps, velocity_format
 
 WINDOW_LIMIT = 1 / 4

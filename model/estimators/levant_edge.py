@@ -7,15 +7,17 @@ a sample, v in counts a sample, a in counts a sample per clock, T and s in clock
 
     E = (v + a T/2) T - (n D + place[this edge] - place[last edge])
     v <- v + a T - min(|E| / T, lambda sqrt(|E| 2**L)) sign(E)            |E| >= D: without the limit by lambda
-    a <- a - min(|E| / T / 2**L, alpha 2**L) sign(E)                      |a| <= 2**ACCELERATION_BITS C, or next above
+    a <- a - min(change of v / 2**L, alpha 2**L) sign(E)                  |a| <= 2**ACCELERATION_BITS C, or next above
 
 and at every sample, s clocks after that edge (the anchor), u = v + a s; this line is the output, `u`. Which edges are
 in use is said in `levant_edge_anchor`.
 
 The two minima are the sliding mode: the square root and the sign of the error, or, where those would pass the surface
-E = 0, the step that ends on it (the implicit discretisation: no chatter at any rate). |E| / T alone gives
-v = n D / T + a T/2: the mean velocity of the interval, extrapolated by half of it. In a, division by 2**L instead of T
-needs no second division, and it stabilises the loop: for constant T and g = T / 2**L in (1/2, 1],
+E = 0, the step that ends on it (the implicit discretisation: no chatter at any rate). The change of a is no more than
+2**-L of that of v: with lambda^2 below alpha, down to a lambda of 0, a would swing from edge to edge.
+
+|E| / T alone gives v = n D / T + a T/2: the mean velocity of the interval, extrapolated by half of it. In a, division
+by 2**L instead of T needs no second division, and it stabilises the loop: for constant T and g = T / 2**L in (1/2, 1],
 z^2 - (1 - g/2) z + g/2 = 0, |z| <= 0.71.
 
 Lost. lambda limits the correction of errors of less than a count, |E| < D: no more comes from edges that are half a
@@ -173,12 +175,13 @@ def _correct(params, state, seen, interval, passed):
     sign, size = sign_of(error), abs(error)
 
     slope = divide(size << params.error_shift, time, params.quotient_width)
-    change, bend = slope, min(shift_floor(slope, params.slope_shift + length), steepest)
+    change = slope
+    if shift == 0 and size < params.lost:
+        radicand = shift_floor(size, params.radicand_shift) << (length & 1)
+        change = min(change, shift_floor(params.lambda_ * isqrt(radicand), params.limit_shift - (length >> 1)))
+    bend = min(shift_floor(change, params.slope_shift + length), steepest)
     if shift == 0:
         bend = min(bend, shift_floor(params.alpha, max(params.alpha_shift - length, -LEFT_MAX)))
-        if size < params.lost:
-            radicand = shift_floor(size, params.radicand_shift) << (length & 1)
-            change = min(change, shift_floor(params.lambda_ * isqrt(radicand), params.limit_shift - (length >> 1)))
 
     far_velocity = velocity + turn - sign * change
     velocity = _fitted(far_velocity, most)
@@ -233,11 +236,12 @@ def _float_correct(params, state, seen, interval, passed):
     place = passed * params.clocks + places[kind] - places[state.kind]
     error = (velocity + turn / 2) * interval - place
     sign, slope = sign_of(error), abs(error) / interval
-    change, bend = slope, slope / scale
+    change = slope
+    if interval >> params.mantissa == 0 and abs(error) < params.clocks:
+        change = min(change, params.lambda_ * math.sqrt(abs(error) * scale))
+    bend = change / scale
     if interval >> params.mantissa == 0:
         bend = min(bend, params.alpha * scale)
-        if abs(error) < params.clocks:
-            change = min(change, params.lambda_ * math.sqrt(abs(error) * scale))
     velocity = velocity + turn - sign * change
     acceleration = saturate(acceleration - sign * bend, -params.steepest, params.steepest)
     coarse = error * 2.0 ** -max(length_of(interval) - params.mantissa, 0)

@@ -30,6 +30,7 @@ from ..checks import FieldError
 from ..quadrature import Seen
 from ..requirements import AxisRequirements
 from ..words import GAIN_BITS, Word
+from .bursts import doubt_samples
 from .estimate import EstimatorDesign, EstimatorGains
 
 HEADROOM_BITS = 2
@@ -46,11 +47,9 @@ LEARN_SHIFT = 5
 """An edge's error moves the two places on which it depends by 2**-LEARN_SHIFT of that error."""
 PLACE_BITS = 21
 """Places of edges resolve 2**-PLACE_BITS counts."""
-DOUBT_S, DOUBT_SAMPLES = 1e-3, 16
-"""How long silence is no evidence after a burst: so long, and at least so many samples."""
 QUOTIENT_BITS = 2
 """Quotient bits a clock."""
-STEPS = 19
+STEPS = 20
 """Clocks of the sequence besides the root's or the quotient's: see `hardwall.hdl.estimators.levant_edge`."""
 
 
@@ -67,11 +66,6 @@ class Gains(EstimatorGains):
         bound = axis.acceleration_max_m_per_s2
         alpha = 2 * bound * math.sqrt(bound / axis.count_m)
         return cls(1.5 * math.sqrt(alpha), alpha)
-
-
-def doubt_samples(axis: AxisRequirements) -> int:
-    """Return for how many samples an estimator takes silence as no evidence, once edges have come in bursts."""
-    return max(round(DOUBT_S * axis.sample_hz), DOUBT_SAMPLES)
 
 
 class Params(NamedTuple):

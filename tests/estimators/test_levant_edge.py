@@ -216,12 +216,12 @@ class Oracle:
         quotient = self.down_to(size * unit / time, v)
         slope = change = min(quotient, power(v.i - 1) - power(-v.f))
         steepest = d.acceleration.max * power(-d.acceleration.f)
-        bend = min(self.down_to(slope / 2**self.length, d.acceleration), steepest)
         if self.length <= d.mantissa and size < d.clocks:
             odd = self.length % 2
             radicand = self.down_to(size, d.radicand) * 2**odd
             root = Fraction(math.isqrt(math.floor(radicand * 4**d.root.f)), 2**d.root.f)
             change = min(change, self.down_to(Fraction(lam) * root * 2 ** (self.length // 2), v))
+        bend = min(self.down_to(change / 2**self.length, d.acceleration), steepest)
         if self.length <= d.mantissa:
             bend = min(bend, self.down_to(Fraction(alpha) * 2**self.length, d.acceleration))
         far = self.v + turn - sign * change
