@@ -226,14 +226,14 @@ class Estimator(EstimatorBlock):
             "LINE SUM": [s.summed],
             "LINE TURN": [s.turned],
             "STRAIGHT": [s.straight.eq(s.v + s.turn)],
-            "LIMIT": [s.line.eq(limited), s.flags[1].eq(s.flags[1] | (limited != s.straight))],
+            "LIMIT": [s.line.eq(limited), s.far_line.eq(limited != s.straight)],
             "HOLD": [
                 s.held.eq(Mux(s.doubt != 0, s.line, held)),
                 s.rest.eq(s.gone | (s.doubt == 0) & (_size(s.line) >= s.bound << 1)),
             ],
             "OUTPUT": [
                 self.velocity.eq(Mux(s.rest, 0, shift_round_half_up(s.held, GUARD_BITS))),
-                self.saturated.eq(s.flags),
+                self.saturated.eq(s.flags | (s.far_line & ~s.rest) << 1),
                 self.valid.eq(1),
             ],
         }

@@ -73,7 +73,7 @@ class Signals:
         self.was_down, self.was_still, self.refuted = Signal(), Signal(), Signal()
         self.straight, self.line = Signal(signed(d.motion.width + 2)), Signal(motion)
         self.least, self.most = Signal(signed(d.motion.width + 1)), Signal(signed(d.motion.width + 1))
-        self.held = Signal(motion)
+        self.held, self.far_line = Signal(motion), Signal()
 
     def _place(self, d: Design) -> None:
         """Add what passed, with the errors of both edges' places where a map has them: `before` is the anchor's."""

@@ -69,7 +69,7 @@ class Estimator(EstimatorBlock):
         m.d.comb += [
             s.cut.eq(Mux(s.size > d.mantissa, s.size - d.mantissa, 0)),
             s.time.eq(s.measure >> s.cut),
-            # A time with its top bit set is cut by one more bit, but then the acceleration is 0.
+            # A time with its top bit set is cut by one more bit, but then no acceleration is used.
             s.kept.eq(d.turn_span - s.cut),
             s.turned.eq(fitted(shift_floor(s.product, p.turn_shift) >> s.drop, len(s.turned))),
             s.room.eq(Mux(s.v < 0, s.bound + s.v, s.bound - s.v)),
@@ -198,7 +198,7 @@ class Estimator(EstimatorBlock):
         with m.State("TURN"):
             gone = ~s.young & s.measure[-1]
             # Half of the time since the anchor, at most, has passed since an edge that is too close to it.
-            since = Mux(s.size == 0, 0, s.size - 1 - s.loose)[: len(s.size)]
+            since = Mux(s.size <= s.loose, 0, s.size - 1 - s.loose)[: len(s.size)]
             bound = Const(p.bound) >> since
             m.d.sync += [
                 s.turn.eq(s.turned),
@@ -278,14 +278,14 @@ class Estimator(EstimatorBlock):
             ]
             m.next = "LINE TURN"
         with m.State("LINE TURN"):
-            m.d.sync += s.turn.eq(s.turned)
+            m.d.sync += s.turn.eq(Mux(s.gone, 0, s.turned))
             with m.If(s.refuted):
                 m.d.sync += s.doubt.eq(d.doubt)
             m.next = "LINE"
         with m.State("LINE"):
             straight = s.v + s.turn
             line = fitted(straight, d.velocity.width)
-            m.d.sync += [s.line.eq(line), s.flags[1].eq(s.flags[1] | (line != straight))]
+            m.d.sync += [s.line.eq(line), s.far_line.eq(line != straight)]
             m.next = "END"
         with m.State("END"):
             # Only the bound on the line's own side of 0 can limit it.
@@ -301,7 +301,7 @@ class Estimator(EstimatorBlock):
                 m.d.sync += [s.v.eq(0), s.a.eq(0)]
             m.d.sync += [
                 self.velocity.eq(Mux(s.rest, 0, held)),
-                self.saturated.eq(s.flags),
+                self.saturated.eq(s.flags | (s.far_line & ~s.rest) << 1),
                 self.valid.eq(1),
             ]
             m.next = "SAMPLE"

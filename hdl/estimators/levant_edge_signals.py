@@ -58,4 +58,5 @@ class Signals:
         self.room = Signal(signed(d.velocity.width + 1))
         self.onward, self.fastest = Signal(d.velocity.width), Signal(d.velocity.width)
         self.was_down, self.was_still, self.refuted = Signal(), Signal(), Signal()
+        self.far_line = Signal()
         self.line, self.end = Signal(velocity), Signal(signed(d.velocity.width + 1))

@@ -183,8 +183,8 @@ def step(params, state, seen, restart):
     bound = min(params.bound >> max(length_of(age) - 1, 0), params.bound_max)
     straight = velocity + _turn(params, acceleration, age)
     line = saturate(straight, -params.velocity_max, params.velocity_max)
-    flags |= int(line != straight) << 1
     rests = gone or (not doubt and abs(line) >= 2 * bound)
+    flags |= int(line != straight and not rests) << 1
     if not doubt:
         line = within(line, velocity, bound)
     if rests:

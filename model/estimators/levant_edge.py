@@ -211,19 +211,20 @@ def step(params, state, seen, restart):
             doubt = params.doubt
     number, stamp, kind, age = anchored(params, state, seen, met)
 
-    straight = velocity + _turn(params, acceleration, age)
+    young = met == LOOSE and not age >> (params.shortest + 1)
+    gone = not young and age >> (params.stamp_width - 1)
+    straight = velocity if gone else velocity + _turn(params, acceleration, age)
     line = _fitted(straight, most)
-    flags |= int(line != straight) << 1
-    bound = state.bound
-    if met != LOOSE or age >> (params.shortest + 1):
-        gone = age >> (params.stamp_width - 1)
+    bound, rests = state.bound, False
+    if not young:
         bound = min(params.bound >> max(length_of(age) - 1 - int(met == LOOSE), 0), params.bound_max)
-        rests = gone or (not doubt and abs(line) >= 2 * bound)
-        if not doubt:
-            line = within(line, velocity, bound)
-        if rests:
-            velocity, acceleration, line = 0, 0, 0
-            known = int(known and not gone)
+        rests = bool(gone) or (not doubt and abs(line) >= 2 * bound)
+    flags |= int(line != straight and not rests) << 1
+    if not young and not doubt:
+        line = within(line, velocity, bound)
+    if rests:
+        velocity, acceleration, line = 0, 0, 0
+        known = int(known and not gone)
     return State(1, known, number, stamp, kind, bound, doubt, velocity, acceleration, places), line, flags
 
 

@@ -249,7 +249,7 @@ class Oracle:
         age = (now - self.anchor[1]) % wide
         straight = self.v + self.turn(age)
         line = self.limited(straight)
-        flags |= 2 * (line != straight)
+        far = line != straight
         # The usual error of an edge is 0.1 counts, so two are at most 1.5 counts apart.
         bound = Fraction(3 * d.clocks, 1 << d.unit) / 2 ** max(age.bit_length() - 1, 0)
         self.bound = min(self.to(bound, d.motion.f), 2 * self.fastest)
@@ -257,6 +257,7 @@ class Oracle:
         if not self.doubt:
             sign = -1 if self.v < 0 else 1
             line = sign * max(-abs(self.v), min(sign * line, max(self.bound - abs(self.v), 0)))
+        flags |= 2 * (far and not rests)
         if rests:
             x, self.known = self.x, self.known and age < wide // 2
             self.forget()

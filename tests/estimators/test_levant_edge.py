@@ -187,10 +187,11 @@ class Oracle:
                 loose = True
             if not loose:
                 self.anchor, age = (number, at, kind), (now - at) % wide
-        straight = self.v + self.turn(age)
+        young = loose and age < 2 << d.shortest
+        straight = self.v + (self.turn(age) if young or age < wide // 2 else 0)
         line = self.fit(straight, v.i, v.f)
-        flags |= 2 * (line != straight)
-        if not loose or age >= 2 << d.shortest:
+        far, rests = line != straight, False
+        if not young:
             # An edge too close to the anchor has halved the silence at most.
             since = Fraction(2 ** max(age.bit_length() - 1, 0), 1 + loose)
             self.bound = min(self.down_to(Fraction(5 * d.clocks, 2) / since, v), power(v.i) - power(-v.f))
@@ -198,9 +199,10 @@ class Oracle:
             if not self.doubt:
                 sign = -1 if self.v < 0 else 1
                 line = sign * max(-abs(self.v), min(sign * line, max(self.bound - abs(self.v), 0)))
-            if rests:
-                self.v = self.a = line = Fraction(0)
-                self.known = self.known and age < wide // 2
+        flags |= 2 * (far and not rests)
+        if rests:
+            self.v = self.a = line = Fraction(0)
+            self.known = self.known and age < wide // 2
         return line * 2**v.f, flags
 
     def correct(self, passed, interval, kind, full, lam, alpha):

@@ -119,8 +119,8 @@ def levant_edge(bench: Bench, block: wiring.Component) -> None:
     lately = (inner["now"] - inner["stamp"])[: len(measure)] >> first == 0
     came = (measure != 0) | (inner["passed"] != 0)
     bench.promise(~bench.state("DECISION") | ~came | inner["waited"] | lately)
-    bench.promise(~bench.state("TIME", "TURN PRODUCT") | ~inner["loose"] | ~inner["anchor"] & lately)
-    bench.promise(~bench.state("TURN") | ~inner["loose"] | ~measure[-1])
+    bench.promise(~bench.state("TIME", "TURN PRODUCT") | ~inner["young"] | ~inner["anchor"] & lately)
+    bench.promise(~bench.state("TURN") | ~inner["young"] | ~measure[-1])
     bench.promise(~bench.state("TIME") | ~correct | (inner["size"] >= first))
     shifting = bench.state("TURN", "MEAN", "PLACE PRODUCT", "ERROR", "START", "SOLVE", "LIMIT", "CHANGE") & correct
     timed = shifting | bench.state("TURN PRODUCT") & correct
@@ -134,5 +134,5 @@ def levant_edge(bench: Bench, block: wiring.Component) -> None:
 
 def edge_kalman(bench: Bench, block: wiring.Component) -> None:
     v_max, level = block.design.params({}).velocity_max, (0, TOP)
-    bench.within(v=v_max, line=v_max, least=v_max, most=v_max, held=v_max, bound=(0, v_max), level=level, lower=level)
-    bench.promise(~bench.state("LINE LOW") | (bench.inner["room"] <= v_max))
+    bench.within(v=v_max, line=v_max, held=v_max, bound=(0, 2 * v_max), level=level, lower=level)
+    bench.within(room=2 * v_max, least=2 * v_max, most=2 * v_max, fastest=(0, 2 * v_max))
