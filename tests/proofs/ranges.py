@@ -72,11 +72,6 @@ def edges(bench: Bench, block: wiring.Component) -> None:
     bench.within(**{"edges.phase": (0, design.half - 1), "edges.moved": (0, design.edges_max)})
 
 
-def scaled_edges(bench: Bench, block: wiring.Component) -> None:
-    edges(bench, block)
-    bench.within(scaled=(0, block.design.edges_max * block.design.clocks))
-
-
 def digits_left(bench: Bench, block: wiring.Component) -> None:
     """Promise that digits are left of every quotient under way, and no more than it has."""
     edges(bench, block)
@@ -135,4 +130,4 @@ def levant_edge(bench: Bench, block: wiring.Component) -> None:
 def edge_kalman(bench: Bench, block: wiring.Component) -> None:
     v_max, level = block.design.params({}).velocity_max, (0, TOP)
     bench.within(v=v_max, line=v_max, held=v_max, bound=(0, 2 * v_max), level=level, lower=level)
-    bench.within(room=2 * v_max, least=2 * v_max, most=2 * v_max, fastest=(0, 2 * v_max))
+    bench.within(room=2 * v_max, least=(-2 * v_max, 0), most=(0, 2 * v_max), fastest=(0, 2 * v_max))
