@@ -25,10 +25,15 @@ is the agile one at once, and grows again at GROWTH, a quarter, of the time that
 tenths of a count, and what came before it is forgotten in an agile memory; edges that err alone are no alarm.
 
 Silence. Without an edge the axis is within its cell, which is as long as two edges may be apart, 1 + m counts. The line
-is held as that of `levant_edge` is: within -v and (2 + 2 m) D 2**-l - v, where 2**l <= s < 2**(l+1). An axis is at
-rest, v = a = 0, once s has more than REST_BITS bits more than the last T, or is half the range of the stamp, since
-slower edges cannot be distinguished from rest; the memory is then agile, and the next edge begins a motion. At
-standstill the velocity is exactly 0.
+is held as that of `levant_edge` is: within -v and bound - v, where bound = (2 + 2 m) D 2**-l and 2**l <= s < 2**(l+1).
+A motion with even acceleration that stays in the cell never has a line of twice the bound. So at twice the bound the
+axis is at rest, v = a = 0. It is at rest too once s is half the range of the stamp, since slower edges cannot be
+distinguished from rest. The memory is then agile, and the next edge begins a motion. At standstill the velocity is
+exactly 0.
+
+Bursts. Some encoders emit their edges several at once, after a silence that is no sign of a slower axis. An edge that
+finds the axis faster than the last bound allows, and faster than half of its speed before, shows such an encoder: see
+`levant_edge.refuted`. For `bursts.doubt_samples` from then on the line is not held, and there is no rest by silence.
 
 A turn needs no care: an edge has one place, whichever way it is crossed.
 

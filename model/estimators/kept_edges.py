@@ -10,6 +10,10 @@ Every half window, of `half` samples, the newer of two kept edges becomes the ol
 the last one is forgotten, |N - N'| is 0. The kernels are those of every estimator whose hardware rounds this velocity
 exactly, by whatever arithmetic: `mt` says what it is good for and guarantees, `mt_divisionless` is the other.
 
+Bursts. Some encoders emit their edges several at once, after a silence that is no sign of a slower axis. An edge shows
+such an encoder if the last age before it was more than 3/2 counts at the new speed: 2 |N - N'| A > 3 (S - S'). For
+`bursts.doubt_samples` from then on the speed is not bounded.
+
 Formats, derived.
 
 - `velocity` and the quotient are those of `period`.

@@ -38,12 +38,16 @@ slowly.
 
 The bound without a further edge. With v at the anchor and no edge for s clocks, a constant deceleration that stops
 within the cell leaves at most 2 D/s - |v|, and a motion that turns within the cell returns no faster than v. The line
-is held within -v and (5/2) D 2**-l - v, where 2**l <= s < 2**(l+1): never tighter than for a cell a quarter too wide.
-An axis is at rest, v = a = 0, once s has more than REST_BITS bits more than the last T, which never happens in a
-parabola through the cell (its longest interval is 4.8 times the one before); and also after half the range of the
-stamp, since slower edges cannot be distinguished from rest. A stop from constant speed reads exactly 0 after 2.5 to 5
-times the time of a count (plus two of the shortest intervals, if a count takes less), and at the latest after 16
-intervals; until then it reads the old speed.
+is held within -v and bound - v, where bound = (5/2) D 2**-l and 2**l <= s < 2**(l+1): never tighter than for a cell a
+quarter too wide. While an edge is too close to the anchor, the bound is twice that, and there is none at first. An axis
+is at rest, v = a = 0, once the line is at twice the bound, where no parabola through the cell comes; and also after
+half the range of the stamp, since slower edges cannot be distinguished from rest. A stop from constant speed reads
+exactly 0 after 2.5 to 5 times the time of a count (plus two of the shortest intervals, if a count takes less); until
+then it reads the old speed.
+
+Bursts. Some encoders emit their edges several at once, after a silence that is no sign of a slower axis. `refuted`
+finds them by an edge at which the axis is faster than the last bound allows. For `bursts.doubt_samples` from then on
+the line is not held, and there is no rest by silence. A stop within that time reads the old speed until its end.
 
 Guarantee. For any gains, any |f''| <= A and errors of the learnt places up to p counts, s clocks after a correction
 over T: |u - f'| <= (1 + 2 p) D / T + (A + |a|) (T/2 + s), with the larger of |a| before and after it; or, in a silence

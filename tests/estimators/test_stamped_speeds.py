@@ -142,3 +142,50 @@ def test_edges_in_their_place_are_no_bursts(name):
         late = np.array([0, 0.45])[np.arange(len(passed[0])) % 2] * axis.count_m * axis.clock_hz / float(speed)
         record = read(axis, (passed[0] + late.astype(np.int64), passed[1]), Fraction(1, 20))
         assert record.flags[-1] == 0
+
+
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("name", ["edge-kalman", "levant-edge"])
+def test_a_single_pair_of_close_edges_is_no_sign_of_rest(name, floating):
+    """One edge in a thousand is 0.9 counts late, 0.1 before the next edge, ten times as close as the others."""
+    axis, speed = axis_of(name), Fraction(15, 100)
+    clocks, levels = edges(speed, Fraction(1, 20), False)
+    late = np.zeros(len(clocks), np.int64)
+    late[2000::1000] = int(0.9 * axis.count_m * axis.clock_hz / speed)
+    seen = read(axis, (clocks + late, levels), Fraction(1, 20), floating).velocity_m_per_s[len(late) * 3 :]
+    # The bound after 1.9 counts of silence, for a cell of 1.25 counts, less the speed.
+    assert seen.min() > (2.5 / 1.9 - 1) * speed
+    assert seen.max() < 1.1 * speed
+
+
+@pytest.mark.parametrize("floating", [False, True])
+def test_edges_in_pairs_about_the_shortest_interval_do_not_bias_levant_edge(floating):
+    """Intervals of 0.8 counts are too short to be used, and those of 1.2 are not: the mean takes in both."""
+    axis, speed = axis_of("levant-edge"), Fraction(2, 100)
+    clocks, levels = edges(speed, Fraction(1, 5), False)
+    count = axis.count_m * axis.clock_hz / speed
+    assert 0.8 * count < 1 << axis.design.estimator.shortest < 1.2 * count
+    late = np.array([0, round(0.2 * count)])[np.arange(len(clocks)) % 2]
+    record = read(axis, (clocks + late, levels), Fraction(1, 5), floating)
+    assert np.mean(record.velocity_m_per_s[100_000:]) == pytest.approx(float(speed), rel=1e-3)
+
+
+def test_no_switch_of_period_count_leaves_a_speed_unread():
+    """At 10 kHz a fast axis makes many cycles a sample, which are counted whatever the word is."""
+    axis = axis_of("period-count", 10_000)
+    (word,) = axis.design.estimator.words
+    for switch in (word.si_min, word.si_max):
+        for speed in (Fraction(2, 100), Fraction(1, 10), Fraction(1)):
+            of = Axis(axis, period_count_switch=switch, encoder_glitch_clocks=0)
+            record = stamped.run(of, *edges(speed, Fraction(1, 10), False), samples=1000)
+            assert np.mean(record.velocity_m_per_s[500:]) == pytest.approx(float(speed), rel=0.01)
+
+
+def test_no_gains_make_levant_edge_swing():
+    """With the largest alpha and no lambda the acceleration has nothing to damp it: it does not change."""
+    axis = axis_of("levant-edge")
+    _, alpha = axis.design.estimator.words
+    of = Axis(axis, levant_edge_lambda=0.0, levant_edge_alpha=alpha.si_max, encoder_glitch_clocks=0)
+    for speed in (Fraction(2, 100), Fraction(1, 10), Fraction(1)):
+        record = stamped.run(of, *edges(speed, Fraction(1, 20), False), samples=50_000)
+        assert np.ptp(record.velocity_m_per_s[25_000:]) < 1e-3
