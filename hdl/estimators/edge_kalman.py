@@ -14,7 +14,6 @@ from hardwall.model.estimators.edge_kalman_design import (
     KV,
     KX,
     LEVEL_BITS,
-    REST_BITS,
     Design,
 )
 
@@ -146,14 +145,23 @@ class Estimator(EstimatorBlock):
 
     def _sample(self, s):
         """Return the states that take the interval, and what passed in it."""
-        d = self._design
+        d, half = self._design, _size(s.v) >> 1
         return {
             "DIFFERENCE": [
                 s.interval.eq(Mux(s.fresh, 0, s.at - s.stamp)),
                 # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
                 s.passed.eq(Mux(s.fresh, 0, (s.to - s.number)[: len(s.passed)].as_signed())),
+                s.room.eq(Mux(s.v < 0, s.bound + s.v, s.bound - s.v)),
+                s.was_down.eq(s.v < 0),
+                s.was_still.eq(s.v == 0),
+                s.doubt.eq(s.doubt - (s.doubt != 0)),
             ],
-            "DECISION": [s.left.eq(s.a), s.right.eq(s.interval)],
+            "DECISION": [
+                s.left.eq(s.a),
+                s.right.eq(s.interval),
+                # The fastest that the axis is at the next edge, if the bound of the last sample was one.
+                s.fastest.eq(Mux(s.room < half, half, s.room)),
+            ],
             "TURN LOW": [s.size.eq(length_of(s.interval)), s.age.eq(s.now - Mux(s.anchor, s.at, s.stamp))],
             "TURN HIGH": [
                 s.waits(0),
@@ -204,7 +212,7 @@ class Estimator(EstimatorBlock):
             "BEND HIGH": [s.waits(p.bend_shift), s.far_v.eq(s.ahead + faster)],
             "BEND SUM": [s.summed],
             "BEND": [s.bent.eq(s.a + shift_floor(s.total, p.bend_shift))],
-            "UPDATE": [],
+            "UPDATE": [s.refuted.eq((s.was_still | ((s.v < 0) == s.was_down)) & (_size(s.v) > s.fastest))],
         }
 
     def _line(self, s):
@@ -220,11 +228,14 @@ class Estimator(EstimatorBlock):
             "LINE SUM": [s.summed],
             "LINE TURN": [s.turned],
             "STRAIGHT": [s.straight.eq(s.v + s.turn)],
-            "LIMIT": [s.line.eq(limited), s.flags[1].eq(s.flags[1] | (limited != s.straight))],
-            "HOLD": [s.held.eq(held)],
+            "LIMIT": [s.line.eq(limited), s.far_line.eq(limited != s.straight)],
+            "HOLD": [
+                s.held.eq(Mux(s.doubt != 0, s.line, held)),
+                s.rest.eq(s.gone | (s.doubt == 0) & (_size(s.line) >= s.bound << 1)),
+            ],
             "OUTPUT": [
-                self.velocity.eq(shift_round_half_up(s.held, GUARD_BITS)),
-                self.saturated.eq(s.flags),
+                self.velocity.eq(Mux(s.rest, 0, shift_round_half_up(s.held, GUARD_BITS))),
+                self.saturated.eq(s.flags | (s.far_line & ~s.rest) << 1),
                 self.valid.eq(1),
             ],
         }
@@ -248,15 +259,11 @@ class Estimator(EstimatorBlock):
                 ]
                 with m.If(came & unknown):
                     m.d.sync += [s.known.eq(1), *s.forgotten]
-            case "TURN HIGH":
-                with m.If(s.correct):
-                    m.d.sync += s.length.eq(s.size)
             case "TURN SUM":
                 bound = Const(p.bound) >> Mux(s.age_size == 0, 0, s.age_size - 1)[: len(s.age_size)]
                 m.d.sync += [
                     s.gone.eq(s.age[-1]),
-                    s.rest.eq(s.age[-1] | (s.age_size > s.length + REST_BITS)),
-                    s.bound.eq(Mux(bound > p.velocity_max, p.velocity_max, bound)),
+                    s.bound.eq(Mux(bound > p.bound_max, p.bound_max, bound)),
                 ]
             case "BLEND":
                 with m.If(s.correct):
@@ -281,5 +288,14 @@ class Estimator(EstimatorBlock):
                 if d.scale is not None:
                     with m.If(s.anchor | s.fresh):
                         m.d.sync += s.before.eq(s.error)
+            case "LINE":
+                with m.If(s.correct & s.refuted):
+                    m.d.sync += s.doubt.eq(p.doubt)
+            case "OUTPUT":
                 with m.If(s.rest):
                     m.d.sync += [s.level.eq(TOP), s.mean.eq(0), s.v.eq(0), s.a.eq(0), s.known.eq(s.known & ~s.gone)]
+
+
+def _size(value):
+    """Return the magnitude of a signed value."""
+    return Mux(value < 0, -value, value)

@@ -21,11 +21,12 @@ class Signals:
 
         # The state from sample to sample: the anchor, the motion there, and how long it is remembered.
         self.running, self.known = Signal(), Signal()
-        self.number, self.stamp, self.length = Signal(count), Signal(time), Signal(range(d.time_bits + 1))
+        self.number, self.stamp = Signal(count), Signal(time)
+        self.bound, self.doubt = Signal(d.motion.width), Signal(range(d.doubt + 1))
         self.level = Signal(range(TOP + 1))
         self.place, self.mean = Signal(error), Signal(error)
         self.v, self.a = Signal(motion), Signal(shape(d.acceleration))
-        states = self.place, self.mean, self.v, self.a, self.length
+        states = self.place, self.mean, self.v, self.a, self.doubt
         self.forgotten = [self.level.eq(TOP), *(state.eq(0) for state in states)]
 
         # The sample. `correct`: its edge corrects; `anchor`: its edge is the new anchor.
@@ -68,9 +69,11 @@ class Signals:
         self.bent = Signal(signed(max(d.acceleration.width, self._shifted(p.bend_shift)) + 1))
 
         # The line, and the bound on it without a further edge.
-        self.bound, self.room = Signal(d.motion.width - 1), Signal(signed(d.motion.width + 1))
+        self.room, self.fastest = Signal(signed(d.motion.width + 1)), Signal(d.motion.width)
+        self.was_down, self.was_still, self.refuted = Signal(), Signal(), Signal()
         self.straight, self.line = Signal(signed(d.motion.width + 2)), Signal(motion)
-        self.least, self.most, self.held = Signal(motion), Signal(motion), Signal(motion)
+        self.least, self.most = Signal(signed(d.motion.width + 1)), Signal(signed(d.motion.width + 1))
+        self.held, self.far_line = Signal(motion), Signal()
 
     def _place(self, d: Design) -> None:
         """Add what passed, with the errors of both edges' places where a map has them: `before` is the anchor's."""

@@ -47,6 +47,14 @@ class KeptEdges(Block):
         Clocks between the two edges, 1 or more.
     age : Out(stamp_width)
         Clocks since the last edge, 1 or more if `moved` is not 0.
+    news : Out(1)
+        Whether there is a new edge, and not the first one.
+    quiet : Out(stamp_width)
+        The age at the last sample; 0 if there was no edge.
+    refuted : In(1)
+        Pulse, after `valid` and before the next `strobe`: silence is no evidence for the next `doubt` samples.
+    doubted : Out(1)
+        Whether it is none now.
     valid : Out(1)
         High for one clock; the others are valid from then until the next `strobe`.
 
@@ -70,6 +78,10 @@ class KeptEdges(Block):
             "down": Out(1),
             "time": Out(design.stamp_width, init=model.NOTHING.time),
             "age": Out(design.stamp_width),
+            "news": Out(1),
+            "quiet": Out(design.stamp_width),
+            "refuted": In(1),
+            "doubted": Out(1),
             "valid": Out(1),
         }
 
@@ -95,7 +107,12 @@ class KeptEdges(Block):
         news = (stamp != last_stamp) | (number != last_number)
         young = (self.age != 0) & ~self.age[-2:].all()
         knows = Signal()
-        m.d.comb += knows.eq(~fresh & young & (was_known | news))
+        doubt = Signal(range(design.doubt + 1))
+        m.d.comb += [
+            knows.eq(~fresh & young & (was_known | news)),
+            self.news.eq(known & news),
+            self.doubted.eq(doubt != 0),
+        ]
         begins, due = ~(knows & was_known), phase == design.half - 1
         m.d.sync += self.valid.eq(0)
         with m.FSM():
@@ -110,6 +127,7 @@ class KeptEdges(Block):
                     fresh.eq(self.restart | ~running),
                     running.eq(1),
                     was_known.eq(known),
+                    self.quiet.eq(Mux(known, self.age, 0)),
                 ]
                 m.next = "AGE"
             with m.State("AGE"):
@@ -132,8 +150,9 @@ class KeptEdges(Block):
                 m.d.sync += size.eq(Mux(moved < 0, -moved, moved))
                 m.next = "HOLD"
             with m.State("HOLD"):
+                m.d.sync += doubt.eq(doubt - (doubt != 0))
                 with m.If(~known):
-                    m.d.sync += self.moved.eq(0)
+                    m.d.sync += [self.moved.eq(0), doubt.eq(0)]
                 with m.Elif(passed != 0):
                     m.d.sync += [
                         self.moved.eq(Mux(size > most, most, size)),
@@ -142,4 +161,6 @@ class KeptEdges(Block):
                     ]
                 m.d.sync += self.valid.eq(1)
                 m.next = "SAMPLE"
+        with m.If(self.refuted):
+            m.d.sync += doubt.eq(design.doubt)
         return m

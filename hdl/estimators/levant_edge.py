@@ -3,7 +3,7 @@
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, signed
 
 from hardwall.model.arithmetic.sqrt import latency as sqrt_latency
-from hardwall.model.estimators.levant_edge import REST_BITS, Design
+from hardwall.model.estimators.levant_edge import Design
 from hardwall.model.estimators.levant_edge_design import QUOTIENT_BITS
 from hardwall.model.quadrature import RUN_MAX
 
@@ -22,7 +22,7 @@ class Estimator(EstimatorBlock):
 
         E = (v + a T/2) T - (n + the difference of the two edges' places) D
         v <- v + a T - min(|E| / T, lambda sqrt(|E| 2**L)) sign(E)
-        a <- a - min(|E| / T / 2**L, alpha 2**L) sign(E)
+        a <- a - min(change of v / 2**L, alpha 2**L) sign(E)
 
     (where |E| >= D, without the limit by lambda), and at every sample, s clocks after that edge, velocity = v + a s,
     held within the bound for no further edge; 0 at rest. The places of the four edges of a cycle are learnt from E.
@@ -69,9 +69,10 @@ class Estimator(EstimatorBlock):
         m.d.comb += [
             s.cut.eq(Mux(s.size > d.mantissa, s.size - d.mantissa, 0)),
             s.time.eq(s.measure >> s.cut),
-            # A time with its top bit set is cut by one more bit, but then the acceleration is 0.
+            # A time with its top bit set is cut by one more bit, but then no acceleration is used.
             s.kept.eq(d.turn_span - s.cut),
             s.turned.eq(fitted(shift_floor(s.product, p.turn_shift) >> s.drop, len(s.turned))),
+            s.room.eq(Mux(s.v < 0, s.bound + s.v, s.bound - s.v)),
         ]
 
     def _solve(self, m, s):
@@ -107,7 +108,7 @@ class Estimator(EstimatorBlock):
             halves.eq((s.length >> 1) - (first >> 1)),
             s.slope.eq(quotient.quotient),
             s.far_slope.eq(quotient.saturated),
-            s.bent.eq(at_most(shift_floor(s.slope, p.slope_shift + first) >> more, steepest)),
+            s.bent.eq(at_most(shift_floor(s.change[: len(s.slope)], p.slope_shift + first) >> more, steepest)),
             s.limit.eq(at_most(_shifted(s.root_product, p.limit_shift - (first >> 1), halves), most)),
             s.relay.eq(at_most(_shifted(self.levant_edge_alpha, p.alpha_shift - first, few), steepest)),
         ]
@@ -141,14 +142,20 @@ class Estimator(EstimatorBlock):
             ]
             m.next = "DIFFERENCE"
         with m.State("DIFFERENCE"):
+            half = _size(s.v) >> 1
             m.d.sync += [
                 s.measure.eq(Mux(s.fresh, 0, s.at - s.stamp)),
                 s.waited.eq(((s.now - s.stamp)[: d.stamp_width] >> (d.shortest + 1)) != 0),
                 # The difference of two counts is taken modulo their width: a wrapped counter is no jump.
                 s.passed.eq(Mux(s.fresh, 0, (s.to - s.number)[: len(s.passed)].as_signed())),
+                s.was_down.eq(s.v < 0),
+                s.was_still.eq(s.v == 0),
+                # The fastest that the axis is at the next edge, if the bound of the last sample was one.
+                s.fastest.eq(Mux(s.room < half, half, s.room)),
+                s.doubt.eq(s.doubt - (s.doubt != 0)),
             ]
             with m.If(s.fresh):
-                m.d.sync += [s.known.eq(0), s.v.eq(0), s.a.eq(0), s.length.eq(0)]
+                m.d.sync += [s.known.eq(0), s.doubt.eq(0), s.v.eq(0), s.a.eq(0)]
                 m.d.sync += [s.number.eq(s.to), s.stamp.eq(s.at), s.kind.eq(s.to_kind)]
                 m.d.sync += [s.places[n].eq(0) for n in range(4)]
             m.next = "DECISION"
@@ -159,15 +166,15 @@ class Estimator(EstimatorBlock):
             held = fitted(s.passed, d.distance.width)
             m.d.sync += [
                 s.correct.eq(came & ~unknown & timed),
-                s.carry.eq(came & ~unknown & ~timed & s.waited),
-                s.anchor.eq(came & (unknown | timed | s.waited)),
-                s.loose.eq(came & ~(unknown | timed | s.waited)),
+                s.anchor.eq(came & (unknown | timed)),
+                s.loose.eq(came & ~(unknown | timed)),
+                s.young.eq(came & ~(unknown | timed | s.waited)),
                 s.distance.eq(held),
                 s.beyond.eq(held != s.passed),
                 s.apart.eq(s.here - s.there),
             ]
             with m.If(came & unknown):
-                m.d.sync += [s.known.eq(1), s.v.eq(0), s.a.eq(0)]
+                m.d.sync += [s.known.eq(1), s.doubt.eq(0), s.v.eq(0), s.a.eq(0)]
             m.next = "TIME"
 
     def _states_of_the_error(self, m, s):
@@ -189,21 +196,23 @@ class Estimator(EstimatorBlock):
             m.d.sync += s.moved.eq(shift_floor(s.way, -p.place_shift) >> s.e_cut)
             m.next = "TURN"
         with m.State("TURN"):
-            gone = ~s.loose & s.measure[-1]
-            since = Mux(s.size == 0, 0, s.size - 1)[: len(s.size)]
+            gone = ~s.young & s.measure[-1]
+            # Half of the time since the anchor, at most, has passed since an edge that is too close to it.
+            since = Mux(s.size <= s.loose, 0, s.size - 1 - s.loose)[: len(s.size)]
+            bound = Const(p.bound) >> since
             m.d.sync += [
                 s.turn.eq(s.turned),
                 s.age_time.eq(s.time),
                 s.age_drop.eq(s.kept),
-                s.bound.eq(at_most(Const(p.bound) >> since, len(s.bound))),
-                s.rest.eq(gone | ~s.loose & (s.size > s.length + REST_BITS)),
+                s.bound.eq(Mux(s.young, s.bound, at_most(bound, len(s.bound)))),
+                s.gone.eq(gone),
                 s.known.eq(s.known & ~gone),
             ]
             m.next = "MEAN"
         with m.State("MEAN"):
             m.d.sync += [
                 s.left.eq(fitted(s.v + (s.turn >> 1), len(s.left))),
-                s.ahead.eq(Mux(s.correct | s.carry, s.v + s.turn, s.v)),
+                s.ahead.eq(Mux(s.correct, s.v + s.turn, s.v)),
             ]
             m.next = "PLACE PRODUCT"
         with m.State("PLACE PRODUCT"):
@@ -226,23 +235,25 @@ class Estimator(EstimatorBlock):
         with m.State("CHANGE"):
             limited = s.e_cut == 0
             change = Mux(limited & ~s.lost & (s.limit < s.slope), s.limit, s.slope)
-            bend = Mux(limited & (s.relay < s.bent), s.relay, s.bent)
             m.d.sync += [
                 s.change.eq(Mux(s.correct, change, 0)),
-                s.bend.eq(Mux(s.correct, bend, 0)),
                 s.flags[0].eq(s.correct & (s.beyond | s.far_slope)),
             ]
             m.next = "SIGN"
         with m.State("SIGN"):
             with m.If(s.e < 0):
-                m.d.sync += [s.change.eq(-s.change), s.bend.eq(-s.bend)]
+                m.d.sync += s.change.eq(-s.change)
+            m.next = "BEND"
+        with m.State("BEND"):
+            bend = Mux((s.e_cut == 0) & (s.relay < s.bent), s.relay, s.bent)
+            m.d.sync += s.bend.eq(_signed(bend, s.e < 0))
             m.next = "UPDATE"
         with m.State("UPDATE"):
             far_v = s.ahead - s.change
             v = fitted(far_v, d.velocity.width)
-            a = Mux(s.rest, 0, fitted(s.a - s.bend, d.acceleration.width))
+            a = fitted(s.a - s.bend, d.acceleration.width)
             m.d.sync += [
-                s.v.eq(Mux(s.rest, 0, v)),
+                s.v.eq(v),
                 s.a.eq(a),
                 s.left.eq(a),
                 s.right.eq(s.age_time),
@@ -259,26 +270,38 @@ class Estimator(EstimatorBlock):
         """Add the states that extrapolate the velocity from the anchor and hold it within the bound for no edge."""
         d = self._design
         with m.State("LINE PRODUCT"):
-            room = Mux(s.v < 0, s.bound + s.v, s.bound - s.v)
-            m.d.sync += s.onward.eq(Mux(room < 0, 0, room))
+            # A motion that goes on, faster than the bound allows, shows that the bound was none.
+            goes_on = s.was_still | ((s.v < 0) == s.was_down)
+            m.d.sync += [
+                s.onward.eq(Mux(s.room < 0, 0, s.room)),
+                s.refuted.eq(s.correct & goes_on & (_size(s.v) > s.fastest)),
+            ]
             m.next = "LINE TURN"
         with m.State("LINE TURN"):
-            m.d.sync += s.turn.eq(s.turned)
+            m.d.sync += s.turn.eq(Mux(s.gone, 0, s.turned))
+            with m.If(s.refuted):
+                m.d.sync += s.doubt.eq(d.doubt)
             m.next = "LINE"
         with m.State("LINE"):
             straight = s.v + s.turn
             line = fitted(straight, d.velocity.width)
-            m.d.sync += [s.line.eq(line), s.flags[1].eq(s.flags[1] | (line != straight))]
+            m.d.sync += [s.line.eq(line), s.far_line.eq(line != straight)]
             m.next = "END"
         with m.State("END"):
             # Only the bound on the line's own side of 0 can limit it.
-            m.d.sync += s.end.eq(Mux((s.line < 0) == (s.v < 0), _signed(s.onward, s.v < 0), -s.v))
+            m.d.sync += [
+                s.end.eq(Mux((s.line < 0) == (s.v < 0), _signed(s.onward, s.v < 0), -s.v)),
+                s.rest.eq(s.gone | ~s.young & (s.doubt == 0) & (_size(s.line) >= s.bound << 1)),
+            ]
             m.next = "OUTPUT"
         with m.State("OUTPUT"):
             past_end = ((s.line - s.end) < 0) == (s.line < 0)
+            held = Mux(~s.young & (s.doubt == 0) & past_end, s.end, s.line)
+            with m.If(s.rest):
+                m.d.sync += [s.v.eq(0), s.a.eq(0)]
             m.d.sync += [
-                self.velocity.eq(Mux(~s.loose & past_end, s.end, s.line)),
-                self.saturated.eq(s.flags),
+                self.velocity.eq(Mux(s.rest, 0, held)),
+                self.saturated.eq(s.flags | (s.far_line & ~s.rest) << 1),
                 self.valid.eq(1),
             ]
             m.next = "SAMPLE"
@@ -291,3 +314,8 @@ def _shifted(value, right: int, left):
 
 def _signed(value, negative):
     return Mux(negative, -value, value)
+
+
+def _size(value):
+    """Return the magnitude of a signed value."""
+    return Mux(value < 0, -value, value)

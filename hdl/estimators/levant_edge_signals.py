@@ -21,9 +21,10 @@ class Signals:
         self.v, self.a = Signal(velocity), Signal(shape(d.acceleration))
         self.places = Array(Signal(shape(d.place), name=f"place_{n}") for n in range(4))
 
-        # The sample. `anchor`: its edge is the new anchor; `loose`: its edge is not an anchor yet.
-        self.fresh, self.full_run, self.rest, self.beyond = Signal(), Signal(), Signal(), Signal()
-        self.correct, self.carry, self.anchor, self.loose = Signal(), Signal(), Signal(), Signal()
+        # The sample. `anchor`: its edge is the new anchor; `loose`: its edge is too close to the anchor, and the
+        # sample, too, if it is `young`.
+        self.fresh, self.full_run, self.gone, self.rest, self.beyond = (Signal() for _ in range(5))
+        self.correct, self.anchor, self.loose, self.young = Signal(), Signal(), Signal(), Signal()
         self.now, self.at, self.waited = Signal(clocks), Signal(clocks), Signal()
         self.to, self.to_kind, self.passed = Signal(count), Signal(2), Signal(count)
         self.flags = Signal(2)
@@ -53,5 +54,9 @@ class Signals:
         self.next_here, self.next_there = Signal(shape(d.place)), Signal(shape(d.place))
 
         # The bound of the line without a further edge.
-        self.bound, self.onward = Signal(d.velocity.width - 1), Signal(d.velocity.width - 1)
+        self.bound, self.doubt = Signal(d.velocity.width), Signal(range(d.doubt + 1))
+        self.room = Signal(signed(d.velocity.width + 1))
+        self.onward, self.fastest = Signal(d.velocity.width), Signal(d.velocity.width)
+        self.was_down, self.was_still, self.refuted = Signal(), Signal(), Signal()
+        self.far_line = Signal()
         self.line, self.end = Signal(velocity), Signal(signed(d.velocity.width + 1))

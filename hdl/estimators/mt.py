@@ -16,7 +16,7 @@ class Estimator(EstimatorBlock):
     Equation, per sample, in counts and clocks, with c clocks a sample:
 
         speed    = c |number of the last edge - number of the older| / (stamp of the last edge - stamp of the older)
-        velocity = sign * min(speed, 3 c / (2 age))
+        velocity = sign * min(speed, 3 c / (2 age)), or sign * speed for some samples after a burst
 
     `KeptEdges` has the two edges and their start.
 
@@ -43,7 +43,8 @@ class Estimator(EstimatorBlock):
         m.submodules.edges = edges = KeptEdges(design)
         m.d.comb += [edges.strobe.eq(self.strobe), edges.restart.eq(self.restart)]
         connect(m, flipped(self.seen), edges.seen)
-        scaled = Signal(range(design.clocks * design.edges_max + 1))
+        product = Signal(len(edges.moved) + max(len(edges.quiet), design.clocks.bit_length()))
+        scaled = product[: (design.clocks * design.edges_max).bit_length()]
         m.submodules.speed = speed = Divide(len(scaled) + fraction, len(edges.time), width)
         m.submodules.limit = limit = Divide(bound.bit_length(), len(edges.age), width)
         m.d.comb += [
@@ -52,20 +53,27 @@ class Estimator(EstimatorBlock):
             limit.dividend.eq(bound),
             limit.divisor.eq(edges.age),
         ]
-        least = Signal(width)
+        factor, least = Signal(len(product) - len(edges.moved)), Signal(width)
         far = (least + 1) >> 1
         saturated = far > design.velocity.max
         magnitude = Mux(saturated, design.velocity.max, far)
-        m.d.sync += self.valid.eq(0)
+        m.d.comb += factor.eq(edges.quiet)
+        m.d.sync += [product.eq(edges.moved * factor), self.valid.eq(0)]
         with m.FSM():
-            with m.State("SCALE"), m.If(edges.valid):
-                m.d.sync += scaled.eq(edges.moved * design.clocks)
+            with m.State("WEIGH"), m.If(edges.valid):
+                m.next = "SCALE"
+            with m.State("SCALE"):
+                m.d.comb += [
+                    factor.eq(design.clocks),
+                    edges.refuted.eq(edges.news & (product << 1 > (edges.time << 1) + edges.time)),
+                ]
                 m.next = "DIVIDE"
             with m.State("DIVIDE"):
                 m.d.comb += [speed.start.eq(1), limit.start.eq(1)]
                 m.next = "LEAST"
             with m.State("LEAST"), m.If(speed.done):
-                m.d.sync += least.eq(Mux(speed.quotient < limit.quotient, speed.quotient, limit.quotient))
+                bounded = ~edges.doubted & (limit.quotient < speed.quotient)
+                m.d.sync += least.eq(Mux(bounded, limit.quotient, speed.quotient))
                 m.next = "OUTPUT"
             with m.State("OUTPUT"):
                 m.d.sync += [
@@ -73,5 +81,5 @@ class Estimator(EstimatorBlock):
                     self.saturated.eq(saturated),
                     self.valid.eq(1),
                 ]
-                m.next = "SCALE"
+                m.next = "WEIGH"
         return m

@@ -15,7 +15,8 @@ class Estimator(EstimatorBlock):
 
     Equation, per sample, in counts and clocks, with c clocks a sample:
 
-        velocity = sign * c moved / time, or sign * 3 c / (2 age) if 2 moved age > 3 time
+        velocity = sign * c moved / time, or sign * 3 c / (2 age) if 2 moved age > 3 time, but for some samples
+                   after a burst
 
     `KeptEdges` has the two edges and their start, `Divisionless` makes the quotient, and its multiplier moved * age and
     c moved before.
@@ -46,7 +47,7 @@ class Estimator(EstimatorBlock):
         m.submodules.speed = speed = Divisionless(
             scaled.bit_length(), stamp + 1, velocity.f, velocity.width - 1, len(edges.moved), stamp
         )
-        bounded = Signal()
+        bounded, faster = Signal(), speed.product << 1 > (edges.time << 1) + edges.time
         m.d.comb += [
             speed.factor.eq(edges.moved),
             speed.dividend.eq(Mux(bounded, 3 * clocks, speed.product)),
@@ -54,13 +55,16 @@ class Estimator(EstimatorBlock):
         ]
         m.d.sync += self.valid.eq(0)
         with m.FSM():
-            with m.State("WEIGH"):
-                m.d.comb += speed.term.eq(edges.age)
+            with m.State("LISTEN"):
+                m.d.comb += speed.term.eq(edges.quiet)
                 with m.If(edges.valid):
-                    m.next = "CHOOSE"
+                    m.next = "WEIGH"
+            with m.State("WEIGH"):
+                m.d.comb += [speed.term.eq(edges.age), edges.refuted.eq(edges.news & faster)]
+                m.next = "CHOOSE"
             with m.State("CHOOSE"):
                 m.d.comb += speed.term.eq(clocks)
-                m.d.sync += bounded.eq(speed.product << 1 > (edges.time << 1) + edges.time)
+                m.d.sync += bounded.eq(~edges.doubted & faster)
                 m.next = "START"
             with m.State("START"):
                 m.d.comb += speed.start.eq(1)
@@ -71,5 +75,5 @@ class Estimator(EstimatorBlock):
                     self.saturated.eq(speed.saturated),
                     self.valid.eq(1),
                 ]
-                m.next = "WEIGH"
+                m.next = "LISTEN"
         return m

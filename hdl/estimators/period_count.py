@@ -1,12 +1,13 @@
 """Velocity by the time of one encoder cycle at low speed, and by the counts of a window at high speed."""
 
-from amaranth.hdl import Module, Mux, Signal, signed
+from amaranth.hdl import Cat, Module, Mux, Signal, signed
 from amaranth.lib.wiring import connect, flipped
 
 from hardwall.model.estimators.period_count import Design
 
 from ..arithmetic.divide import Divide
 from ..arithmetic.fixed import saturate
+from .bursts import Bursts
 from .cycle_times import CycleTimes
 from .estimate import EstimatorBlock
 
@@ -46,6 +47,9 @@ class Estimator(EstimatorBlock):
         m.submodules.times = times = CycleTimes(design.count_width, design.stamp_width, design.cycles_max)
         m.d.comb += [times.strobe.eq(self.strobe), times.restart.eq(self.restart)]
         connect(m, flipped(self.seen), times.seen)
+        m.submodules.watch = watch = Bursts(design.stamp_width, design.cycles_max, design.doubt)
+        m.d.comb += watch.strobe.eq(times.valid)
+        m.d.comb += [getattr(watch, name).eq(getattr(times, name)) for name in ("news", "cycles", "cycle", "age")]
 
         running, down = Signal(), Signal()
         samples = Signal(range(1 << window_bits)) if window_bits else Signal(1)
@@ -91,6 +95,7 @@ class Estimator(EstimatorBlock):
             with m.State("OUTPUT"), m.If(divide.done):
                 far = Mux(counting, far_counted, Mux(down, -far_timed, far_timed))
                 held = saturate(far, -velocity.max, velocity.max)
-                m.d.sync += [self.velocity.eq(held), self.saturated.eq(held != far), self.valid.eq(1)]
+                flags = Cat(held != far, watch.found & ~counting)
+                m.d.sync += [self.velocity.eq(held), self.saturated.eq(flags), self.valid.eq(1)]
                 m.next = "OBSERVE"
         return m

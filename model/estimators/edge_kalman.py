@@ -25,10 +25,15 @@ is the agile one at once, and grows again at GROWTH, a quarter, of the time that
 tenths of a count, and what came before it is forgotten in an agile memory; edges that err alone are no alarm.
 
 Silence. Without an edge the axis is within its cell, which is as long as two edges may be apart, 1 + m counts. The line
-is held as that of `levant_edge` is: within -v and (2 + 2 m) D 2**-l - v, where 2**l <= s < 2**(l+1). An axis is at
-rest, v = a = 0, once s has more than REST_BITS bits more than the last T, or is half the range of the stamp, since
-slower edges cannot be distinguished from rest; the memory is then agile, and the next edge begins a motion. At
-standstill the velocity is exactly 0.
+is held as that of `levant_edge` is: within -v and bound - v, where bound = (2 + 2 m) D 2**-l and 2**l <= s < 2**(l+1).
+A motion with even acceleration that stays in the cell never has a line of twice the bound. So at twice the bound the
+axis is at rest, v = a = 0. It is at rest too once s is half the range of the stamp, since slower edges cannot be
+distinguished from rest. The memory is then agile, and the next edge begins a motion. At standstill the velocity is
+exactly 0.
+
+Bursts. Some encoders emit their edges several at once, after a silence that is no sign of a slower axis. An edge that
+finds the axis faster than the last bound allows, and faster than half of its speed before, shows such an encoder: see
+`levant_edge.refuted`. For `bursts.doubt_samples` from then on the line is not held, and there is no rest by silence.
 
 A turn needs no care: an edge has one place, whichever way it is crossed.
 
@@ -66,7 +71,6 @@ from .edge_kalman_design import (
     KX,
     LEVEL_BITS,
     LEVELS,
-    REST_BITS,
     WIDTHS,
     Design,
     FloatParams,
@@ -75,7 +79,7 @@ from .edge_kalman_design import (
     State,
 )
 from .estimate import estimate
-from .levant_edge import within
+from .levant_edge import refuted, within
 from .levant_edge_anchor import number_of
 
 __all__ = ["Design", "Gains"]
@@ -97,7 +101,7 @@ def _time_of(params, stamp):
 def _started(params, seen, top, zero):
     """Return the state at a first sample: its last edge is the anchor, whose arrival was not seen."""
     at = _time_of(params, stamp_of(seen, seen.edge))
-    return State(1, 0, number_of(params, seen), at, 0, top, zero, zero, zero, zero)
+    return State(1, 0, number_of(params, seen), at, zero, 0, top, zero, zero, zero, zero)
 
 
 @compiled
@@ -166,27 +170,32 @@ def step(params, state, seen, restart):
         state = _started(params, seen, TOP, 0)
     met, interval, passed = _met(params, state, seen)
     here = number_of(params, seen)
-    known, length, level, place, mean = state.known, state.length, state.level, state.place, state.mean
+    known, level, place, mean = state.known, state.level, state.place, state.mean
     velocity, acceleration, flags = state.velocity, state.acceleration, 0
+    doubt = max(state.doubt - 1, 0)
     if met == FIRST:
-        known, length, level, place, mean, velocity, acceleration = 1, 0, TOP, 0, 0, 0, 0
+        known, doubt, level, place, mean, velocity, acceleration = 1, 0, TOP, 0, 0, 0, 0
     elif met == TIMED:
-        length = length_of(interval)
         level, place, mean, velocity, acceleration, flags = _correct(params, state, interval, passed, here)
+        if refuted(state.bound, state.velocity, velocity):
+            doubt = params.doubt
     number, stamp = state.number, state.stamp
     if met != ANCHOR:
         number, stamp = here, _time_of(params, stamp_of(seen, seen.edge))
 
     age = (_time_of(params, seen.stamp) - stamp) & ((1 << params.time_bits) - 1)
     gone = age >> (params.time_bits - 1)
-    if gone or age >> (length + REST_BITS):
-        level, mean, velocity, acceleration = TOP, 0, 0, 0
-        known = int(known and not gone)
+    bound = min(params.bound >> max(length_of(age) - 1, 0), params.bound_max)
     straight = velocity + _turn(params, acceleration, age)
     line = saturate(straight, -params.velocity_max, params.velocity_max)
-    flags |= int(line != straight) << 1
-    line = within(line, velocity, min(params.bound >> max(length_of(age) - 1, 0), params.velocity_max))
-    after = State(1, known, number, stamp, length, level, place, mean, velocity, acceleration)
+    rests = gone or (not doubt and abs(line) >= 2 * bound)
+    flags |= int(line != straight and not rests) << 1
+    if not doubt:
+        line = within(line, velocity, bound)
+    if rests:
+        level, mean, velocity, acceleration, line = TOP, 0, 0, 0, 0
+        known = int(known and not gone)
+    after = State(1, known, number, stamp, bound, doubt, level, place, mean, velocity, acceleration)
     return after, shift_round_half_up(line, params.output_shift), flags
 
 
@@ -217,22 +226,26 @@ def float_step(params, state, seen, restart):
         state = _started(params, seen, float(AGILE_LEVEL), 0.0)
     met, interval, passed = _met(params, state, seen)
     here = number_of(params, seen)
-    known, length, level, place, mean = state.known, state.length, state.level, state.place, state.mean
-    velocity, acceleration = state.velocity, state.acceleration
+    known, level, place, mean = state.known, state.level, state.place, state.mean
+    velocity, acceleration, doubt = state.velocity, state.acceleration, max(state.doubt - 1, 0)
     if met == FIRST:
-        known, length, level, place, mean, velocity, acceleration = 1, 0, float(AGILE_LEVEL), 0.0, 0.0, 0.0, 0.0
+        known, doubt, level, place, mean, velocity, acceleration = 1, 0, float(AGILE_LEVEL), 0.0, 0.0, 0.0, 0.0
     elif met == TIMED:
-        length = length_of(interval)
         level, place, mean, velocity, acceleration = _float_correct(params, state, interval, passed, here)
+        if refuted(state.bound, state.velocity, velocity):
+            doubt = params.doubt
     number, stamp = state.number, state.stamp
     if met != ANCHOR:
         number, stamp = here, _time_of(params, stamp_of(seen, seen.edge))
 
     age = (_time_of(params, seen.stamp) - stamp) & ((1 << params.time_bits) - 1)
     gone = age >> (params.time_bits - 1)
-    if gone or age >> (length + REST_BITS):
-        level, mean, velocity, acceleration = float(AGILE_LEVEL), 0.0, 0.0, 0.0
-        known = int(known and not gone)
+    bound = params.bound * 2.0 ** -max(length_of(age) - 1, 0)
     line = velocity + acceleration * age
-    line = within(line, velocity, params.bound * 2.0 ** -max(length_of(age) - 1, 0))
-    return State(1, known, number, stamp, length, level, place, mean, velocity, acceleration), line, 0
+    rests = gone or (not doubt and abs(line) >= 2 * bound)
+    if not doubt:
+        line = within(line, velocity, bound)
+    if rests:
+        level, mean, velocity, acceleration, line = float(AGILE_LEVEL), 0.0, 0.0, 0.0, 0.0
+        known = int(known and not gone)
+    return State(1, known, number, stamp, bound, doubt, level, place, mean, velocity, acceleration), line, 0

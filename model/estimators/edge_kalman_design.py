@@ -54,6 +54,7 @@ from ..arithmetic.fixed import SQ, UQ, bits_for
 from ..checks import FieldError
 from ..quadrature import Seen
 from ..requirements import AxisRequirements
+from .bursts import doubt_samples
 from .estimate import EstimatorDesign, EstimatorGains
 from .riccati import steady_state
 
@@ -85,8 +86,6 @@ TIME_BITS = 27
 """The most bits of a stamp that are used; a time in use has one less."""
 MOTION_MAX, ERROR_MAX = 35, 38
 """Largest widths of velocity and acceleration, and of the error, bits."""
-REST_BITS = 3
-"""An axis is at rest after 2**REST_BITS times the last interval, rounded up to a power of two, without an edge."""
 BLEND, ALARM_AT, FALL, KX, KV, KA = range(6)
 """The columns of the table."""
 WIDTHS = 16, 18, 18, 18, 20, 24
@@ -132,6 +131,8 @@ class Params(NamedTuple):
     acceleration_max: int
     output_shift: int
     bound: int
+    bound_max: int
+    doubt: int
     row_bits: int
     table: np.ndarray
     scale: scale_map.Params
@@ -143,6 +144,7 @@ class FloatParams(NamedTuple):
     time_bits: int
     per_sample: float
     bound: float
+    doubt: int
     steepest: float
     row_bits: int
     table: np.ndarray
@@ -162,7 +164,8 @@ class State(NamedTuple):
     known: int
     number: int
     stamp: int
-    length: int
+    bound: float
+    doubt: int
     level: float
     place: float
     mean: float
@@ -170,8 +173,8 @@ class State(NamedTuple):
     acceleration: float
 
 
-START = State(0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-FLOAT_START = State(0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+START = State(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+FLOAT_START = State(0, 0, 0, 0, 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Design(EstimatorDesign):
@@ -213,6 +216,7 @@ class Design(EstimatorDesign):
         self._unit_s = 2.0**self.unit / axis.clock_hz
         self._per_sample = self.clocks * 2.0**-self.unit
         self._apart = 1 + max(ROOM * gains.edge_error_counts, LEAST_ROOM)
+        self.doubt = doubt_samples(axis)
         self._derive_table(axis, gains)
         self._derive_motion(axis)
         self._derive_words()
@@ -314,6 +318,8 @@ class Design(EstimatorDesign):
             acceleration_max=a.max,
             output_shift=GUARD_BITS,
             bound=math.floor(2 * self._apart * self._per_sample * 2.0**v.f),
+            bound_max=2 * self.velocity.max << GUARD_BITS,
+            doubt=self.doubt,
             row_bits=self.row_bits,
             table=self.table,
             scale=scale_map.nothing(),
@@ -323,7 +329,7 @@ class Design(EstimatorDesign):
         """Return the float64 kernel's parameters: unrounded gains."""
         steepest = 2.0 ** (self.acceleration.i - 1)
         sizes = self.count_width, self.unit, self.time_bits
-        held = self._per_sample, 2 * self._apart * self._per_sample, steepest
+        held = self._per_sample, 2 * self._apart * self._per_sample, self.doubt, steepest
         return FloatParams(*sizes, *held, self.row_bits, self.rates, scale_map.nothing(True))
 
     def start(self, floating: bool = False) -> State:

@@ -10,6 +10,10 @@ Every half window, of `half` samples, the newer of two kept edges becomes the ol
 the last one is forgotten, |N - N'| is 0. The kernels are those of every estimator whose hardware rounds this velocity
 exactly, by whatever arithmetic: `mt` says what it is good for and guarantees, `mt_divisionless` is the other.
 
+Bursts. Some encoders emit their edges several at once, after a silence that is no sign of a slower axis. An edge shows
+such an encoder if the last age before it was more than 3/2 counts at the new speed: 2 |N - N'| A > 3 (S - S'). For
+`bursts.doubt_samples` from then on the speed is not bounded.
+
 Formats, derived.
 
 - `velocity` and the quotient are those of `period`.
@@ -34,6 +38,7 @@ from ..checks import FieldError
 from ..compiled import compiled
 from ..quadrature import Seen, stamp_of
 from ..requirements import AxisRequirements
+from .bursts import doubt_samples
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 from .period import check_stamps, velocity_format
 
@@ -75,6 +80,7 @@ class Params(NamedTuple):
     clocks: int
     half: int
     edges_max: int
+    doubt: int
     fraction: int
     quotient_width: int
     velocity_max: int
@@ -86,6 +92,7 @@ class FloatParams(NamedTuple):
     clocks: int
     half: int
     edges_max: int
+    doubt: int
 
 
 class Edges(NamedTuple):
@@ -107,6 +114,8 @@ class Edges(NamedTuple):
     moved: int
     down: int
     time: int
+    quiet: int
+    doubt: int
 
 
 NOTHING = Edges(*(int(name == "time") for name in Edges._fields))
@@ -130,7 +139,7 @@ class KeptDesign(EstimatorDesign):
     def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         check_stamps(axis, spare=1)
-        self.clocks = axis.clocks_per_sample
+        self.clocks, self.doubt = axis.clocks_per_sample, doubt_samples(axis)
         self.velocity = velocity_format(axis)
         most = half_max(axis)
         self.half = max(1, round(min(gains.window_s * axis.sample_hz, 4.0 * most) / 2))
@@ -148,6 +157,7 @@ class KeptDesign(EstimatorDesign):
             clocks=self.clocks,
             half=self.half,
             edges_max=self.edges_max,
+            doubt=self.doubt,
             fraction=self.velocity.f + 1,
             quotient_width=self.velocity.width,
             velocity_max=self.velocity.max,
@@ -155,7 +165,7 @@ class KeptDesign(EstimatorDesign):
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 kernel's parameters: the same whole samples."""
-        return FloatParams(self.count_width, self.stamp_width, self.clocks, self.half, self.edges_max)
+        return FloatParams(self.count_width, self.stamp_width, self.clocks, self.half, self.edges_max, self.doubt)
 
     def start(self, floating: bool = False) -> Edges:
         return NOTHING
@@ -187,6 +197,12 @@ def observe(params, edges, seen, restart):
         moved = 0
     elif passed:
         moved, down, time = min(abs(between), params.edges_max), int(between < 0), passed
+    # An edge that comes after so long a silence, in a motion so fast, shows that edges come in bursts.
+    doubt = max(edges.doubt - 1, 0)
+    if not known:
+        doubt = 0
+    elif news and 2 * moved * edges.quiet > 3 * time:
+        doubt = params.doubt
     edges = Edges(
         running=1,
         known=known,
@@ -200,6 +216,8 @@ def observe(params, edges, seen, restart):
         moved=moved,
         down=down,
         time=time,
+        quiet=age if known else 0,
+        doubt=doubt,
     )
     return edges, age if known else 0
 
@@ -210,7 +228,7 @@ def step(params, edges, seen, restart):
     edges, age = observe(params, edges, seen, restart)
     speed = divide(params.clocks * edges.moved << params.fraction, edges.time, params.quotient_width)
     limit = divide(3 * params.clocks << (params.fraction - 1), age, params.quotient_width)
-    far = (min(speed, limit) + 1) >> 1
+    far = ((speed if edges.doubt else min(speed, limit)) + 1) >> 1
     magnitude = min(far, params.velocity_max)
     return edges, -magnitude if edges.down else magnitude, int(far != magnitude)
 
@@ -221,5 +239,6 @@ def float_step(params, edges, seen, restart):
     """Take one sample in float64, unsaturated: the same algorithm."""
     edges, age = observe(params, edges, seen, restart)
     speed = 1.0 * params.clocks * edges.moved / edges.time
-    magnitude = min(speed, 1.5 * params.clocks / age) if age else 0.0
+    limit = 1.5 * params.clocks / age if age else 0.0
+    magnitude = speed if edges.doubt else min(speed, limit)
     return edges, -magnitude if edges.down else magnitude, 0

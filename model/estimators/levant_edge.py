@@ -7,15 +7,17 @@ a sample, v in counts a sample, a in counts a sample per clock, T and s in clock
 
     E = (v + a T/2) T - (n D + place[this edge] - place[last edge])
     v <- v + a T - min(|E| / T, lambda sqrt(|E| 2**L)) sign(E)            |E| >= D: without the limit by lambda
-    a <- a - min(|E| / T / 2**L, alpha 2**L) sign(E)                      |a| <= 2**ACCELERATION_BITS C, or next above
+    a <- a - min(change of v / 2**L, alpha 2**L) sign(E)                  |a| <= 2**ACCELERATION_BITS C, or next above
 
 and at every sample, s clocks after that edge (the anchor), u = v + a s; this line is the output, `u`. Which edges are
 in use is said in `levant_edge_anchor`.
 
 The two minima are the sliding mode: the square root and the sign of the error, or, where those would pass the surface
-E = 0, the step that ends on it (the implicit discretisation: no chatter at any rate). |E| / T alone gives
-v = n D / T + a T/2: the mean velocity of the interval, extrapolated by half of it. In a, division by 2**L instead of T
-needs no second division, and it stabilises the loop: for constant T and g = T / 2**L in (1/2, 1],
+E = 0, the step that ends on it (the implicit discretisation: no chatter at any rate). The change of a is no more than
+2**-L of that of v: with lambda^2 below alpha, down to a lambda of 0, a would swing from edge to edge.
+
+|E| / T alone gives v = n D / T + a T/2: the mean velocity of the interval, extrapolated by half of it. In a, division
+by 2**L instead of T needs no second division, and it stabilises the loop: for constant T and g = T / 2**L in (1/2, 1],
 z^2 - (1 - g/2) z + g/2 = 0, |z| <= 0.71.
 
 Lost. lambda limits the correction of errors of less than a count, |E| < D: no more comes from edges that are half a
@@ -36,12 +38,16 @@ slowly.
 
 The bound without a further edge. With v at the anchor and no edge for s clocks, a constant deceleration that stops
 within the cell leaves at most 2 D/s - |v|, and a motion that turns within the cell returns no faster than v. The line
-is held within -v and (5/2) D 2**-l - v, where 2**l <= s < 2**(l+1): never tighter than for a cell a quarter too wide.
-An axis is at rest, v = a = 0, once s has more than REST_BITS bits more than the last T, which never happens in a
-parabola through the cell (its longest interval is 4.8 times the one before); and also after half the range of the
-stamp, since slower edges cannot be distinguished from rest. A stop from constant speed reads exactly 0 after 2.5 to 5
-times the time of a count (plus two of the shortest intervals, if a count takes less), and at the latest after 16
-intervals; until then it reads the old speed.
+is held within -v and bound - v, where bound = (5/2) D 2**-l and 2**l <= s < 2**(l+1): never tighter than for a cell a
+quarter too wide. While an edge is too close to the anchor, the bound is twice that, and there is none at first. An axis
+is at rest, v = a = 0, once the line is at twice the bound, where no parabola through the cell comes; and also after
+half the range of the stamp, since slower edges cannot be distinguished from rest. A stop from constant speed reads
+exactly 0 after 2.5 to 5 times the time of a count (plus two of the shortest intervals, if a count takes less); until
+then it reads the old speed.
+
+Bursts. Some encoders emit their edges several at once, after a silence that is no sign of a slower axis. `refuted`
+finds them by an edge at which the axis is faster than the last bound allows. For `bursts.doubt_samples` from then on
+the line is not held, and there is no rest by silence. A stop within that time reads the old speed until its end.
 
 Guarantee. For any gains, any |f''| <= A and errors of the learnt places up to p counts, s clocks after a correction
 over T: |u - f'| <= (1 + 2 p) D / T + (A + |a|) (T/2 + s), with the larger of |a| before and after it; or, in a silence
@@ -96,7 +102,6 @@ from ..quadrature import RUN_MAX
 from .estimate import estimate
 from .levant import sign_of
 from .levant_edge_anchor import (
-    CARRIED,
     FIRST,
     LOOSE,
     TIMED,
@@ -108,8 +113,6 @@ from .levant_edge_anchor import (
 from .levant_edge_design import LEARN_SHIFT, Design, FloatParams, Gains, Params, State
 
 __all__ = ["Design", "Gains"]
-REST_BITS = 3
-"""An axis is at rest after 2**REST_BITS times the last interval, rounded up to a power of two, without an edge."""
 LEFT_MAX = 46
 """Largest left shift of a gain word, beyond which every result saturates anyway: 16 + 46 bits fit int64."""
 
@@ -131,6 +134,17 @@ def within(line, velocity, bound):
     if velocity < 0:
         return saturate(line, -max(bound + velocity, 0), -velocity)
     return saturate(line, -velocity, max(bound - velocity, 0))
+
+
+@compiled
+def refuted(bound, before, after):
+    """Return whether a velocity at an edge shows that the bound before this edge was no bound: edges come in bursts.
+
+    Without bursts an axis that slows down within its cell is no faster at the next edge than `bound` less its speed
+    `before`. One that stops in it and starts again is slower than half of that speed.
+    """
+    onward = max(after if before >= 0 else 0, -after if before <= 0 else 0)
+    return onward > bound - abs(before) and 2 * onward > abs(before)
 
 
 @compiled
@@ -165,12 +179,13 @@ def _correct(params, state, seen, interval, passed):
     sign, size = sign_of(error), abs(error)
 
     slope = divide(size << params.error_shift, time, params.quotient_width)
-    change, bend = slope, min(shift_floor(slope, params.slope_shift + length), steepest)
+    change = slope
+    if shift == 0 and size < params.lost:
+        radicand = shift_floor(size, params.radicand_shift) << (length & 1)
+        change = min(change, shift_floor(params.lambda_ * isqrt(radicand), params.limit_shift - (length >> 1)))
+    bend = min(shift_floor(change, params.slope_shift + length), steepest)
     if shift == 0:
         bend = min(bend, shift_floor(params.alpha, max(params.alpha_shift - length, -LEFT_MAX)))
-        if size < params.lost:
-            radicand = shift_floor(size, params.radicand_shift) << (length & 1)
-            change = min(change, shift_floor(params.lambda_ * isqrt(radicand), params.limit_shift - (length >> 1)))
 
     far_velocity = velocity + turn - sign * change
     velocity = _fitted(far_velocity, most)
@@ -189,30 +204,32 @@ def step(params, state, seen, restart):
     if restart or not state.running:
         state = started(params, seen, 0)
     met, interval, passed = meet(params, state, seen)
-    known, length = state.known, state.length
+    known, doubt = state.known, max(state.doubt - 1, 0)
     velocity, acceleration, places = state.velocity, state.acceleration, state.places
     most, flags = params.velocity_max, 0
     if met == FIRST:
-        known, velocity, acceleration = 1, 0, 0
+        known, doubt, velocity, acceleration = 1, 0, 0, 0
     elif met == TIMED:
-        length = length_of(interval)
         velocity, acceleration, places, flags = _correct(params, state, seen, interval, passed)
-    elif met == CARRIED:
-        moved = velocity + _turn(params, acceleration, interval)
-        velocity = _fitted(moved, most)
-        flags = int(moved != velocity) << 1
+        if refuted(state.bound, state.velocity, velocity):
+            doubt = params.doubt
     number, stamp, kind, age = anchored(params, state, seen, met)
 
-    gone = age >> (params.stamp_width - 1)
-    if met != LOOSE and (gone or age >> (length + REST_BITS)):
-        velocity, acceleration = 0, 0
-        known = int(known and not gone)
-    straight = velocity + _turn(params, acceleration, age)
+    young = met == LOOSE and not age >> (params.shortest + 1)
+    gone = not young and age >> (params.stamp_width - 1)
+    straight = velocity if gone else velocity + _turn(params, acceleration, age)
     line = _fitted(straight, most)
-    flags |= int(line != straight) << 1
-    if met != LOOSE:
-        line = within(line, velocity, min(params.bound >> max(length_of(age) - 1, 0), most))
-    return State(1, known, number, stamp, kind, length, velocity, acceleration, places), line, flags
+    bound, rests = state.bound, False
+    if not young:
+        bound = min(params.bound >> max(length_of(age) - 1 - int(met == LOOSE), 0), params.bound_max)
+        rests = bool(gone) or (not doubt and abs(line) >= 2 * bound)
+    flags |= int(line != straight and not rests) << 1
+    if not young and not doubt:
+        line = within(line, velocity, bound)
+    if rests:
+        velocity, acceleration, line = 0, 0, 0
+        known = int(known and not gone)
+    return State(1, known, number, stamp, kind, bound, doubt, velocity, acceleration, places), line, flags
 
 
 @compiled
@@ -224,11 +241,12 @@ def _float_correct(params, state, seen, interval, passed):
     place = passed * params.clocks + places[kind] - places[state.kind]
     error = (velocity + turn / 2) * interval - place
     sign, slope = sign_of(error), abs(error) / interval
-    change, bend = slope, slope / scale
+    change = slope
+    if interval >> params.mantissa == 0 and abs(error) < params.clocks:
+        change = min(change, params.lambda_ * math.sqrt(abs(error) * scale))
+    bend = change / scale
     if interval >> params.mantissa == 0:
         bend = min(bend, params.alpha * scale)
-        if abs(error) < params.clocks:
-            change = min(change, params.lambda_ * math.sqrt(abs(error) * scale))
     velocity = velocity + turn - sign * change
     acceleration = saturate(acceleration - sign * bend, -params.steepest, params.steepest)
     coarse = error * 2.0 ** -max(length_of(interval) - params.mantissa, 0)
@@ -245,22 +263,24 @@ def float_step(params, state, seen, restart):
     if restart or not state.running:
         state = started(params, seen, 0.0)
     met, interval, passed = meet(params, state, seen)
-    known, length = state.known, state.length
+    known, doubt = state.known, max(state.doubt - 1, 0)
     velocity, acceleration, places = state.velocity, state.acceleration, state.places
     if met == FIRST:
-        known, velocity, acceleration = 1, 0.0, 0.0
+        known, doubt, velocity, acceleration = 1, 0, 0.0, 0.0
     elif met == TIMED:
-        length = length_of(interval)
         velocity, acceleration, places = _float_correct(params, state, seen, interval, passed)
-    elif met == CARRIED:
-        velocity = velocity + acceleration * interval
+        if refuted(state.bound, state.velocity, velocity):
+            doubt = params.doubt
     number, stamp, kind, age = anchored(params, state, seen, met)
 
-    gone = age >> (params.stamp_width - 1)
-    if met != LOOSE and (gone or age >> (length + REST_BITS)):
-        velocity, acceleration = 0.0, 0.0
-        known = int(known and not gone)
-    line = velocity + acceleration * age
-    if met != LOOSE:
-        line = within(line, velocity, 2.5 * params.clocks * 2.0 ** -max(length_of(age) - 1, 0))
-    return State(1, known, number, stamp, kind, length, velocity, acceleration, places), line, 0
+    line, bound = velocity + acceleration * age, state.bound
+    if met != LOOSE or age >> (params.shortest + 1):
+        gone = age >> (params.stamp_width - 1)
+        bound = 2.5 * params.clocks * 2.0 ** -max(length_of(age) - 1 - int(met == LOOSE), 0)
+        rests = gone or (not doubt and abs(line) >= 2 * bound)
+        if not doubt:
+            line = within(line, velocity, bound)
+        if rests:
+            velocity, acceleration, line = 0.0, 0.0, 0.0
+            known = int(known and not gone)
+    return State(1, known, number, stamp, kind, bound, doubt, velocity, acceleration, places), line, 0

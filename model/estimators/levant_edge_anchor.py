@@ -3,7 +3,7 @@
 A stamp is off by up to a clock, so the velocity over T is off by speed / T: intervals of less than 2**shortest clocks
 are not used. 2**shortest is the T at which, at the largest speed, that error equals the change of
 velocity by C over T: sqrt(speed / (clock C)); but at most a quarter of the time in which C moves a count, sqrt(q / C).
-An edge too close to the anchor that stays the last edge for twice as long becomes the anchor, without a correction.
+An edge too close to the anchor stays unused: the next edge is taken with the interval from the anchor.
 """
 
 from ..arithmetic.fixed import wrap
@@ -11,9 +11,8 @@ from ..compiled import compiled
 from ..quadrature import stamp_of
 from .levant_edge_design import State
 
-ANCHOR, FIRST, TIMED, CARRIED, LOOSE = range(5)
-"""The last edge is: the anchor itself; the first known edge; an edge to correct by; an edge too close to the anchor,
-which has long stayed the last and becomes the anchor; an edge that is still too close."""
+ANCHOR, FIRST, TIMED, LOOSE = range(4)
+"""The last edge is: the anchor itself; the first known edge; an edge to correct by; an edge too close to the anchor."""
 
 
 @compiled
@@ -32,7 +31,7 @@ def kind_of(seen):
 def started(params, seen, zero):
     """Return the state at a first sample: time and position count from its last edge, whose arrival was not seen."""
     number, stamp, kind = number_of(params, seen), stamp_of(seen, seen.edge), kind_of(seen)
-    return State(1, 0, number, stamp, kind, 0, zero, zero, (zero, zero, zero, zero))
+    return State(1, 0, number, stamp, kind, zero, 0, zero, zero, (zero, zero, zero, zero))
 
 
 @compiled
@@ -47,8 +46,7 @@ def meet(params, state, seen):
         return FIRST, interval, passed
     if interval >> params.shortest:
         return TIMED, interval, passed
-    waited = ((seen.stamp - state.stamp) & mask) >> (params.shortest + 1)
-    return (CARRIED if waited else LOOSE), interval, passed
+    return LOOSE, interval, passed
 
 
 @compiled

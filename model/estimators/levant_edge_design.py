@@ -30,6 +30,7 @@ from ..checks import FieldError
 from ..quadrature import Seen
 from ..requirements import AxisRequirements
 from ..words import GAIN_BITS, Word
+from .bursts import doubt_samples
 from .estimate import EstimatorDesign, EstimatorGains
 
 HEADROOM_BITS = 2
@@ -48,7 +49,7 @@ PLACE_BITS = 21
 """Places of edges resolve 2**-PLACE_BITS counts."""
 QUOTIENT_BITS = 2
 """Quotient bits a clock."""
-STEPS = 19
+STEPS = 20
 """Clocks of the sequence besides the root's or the quotient's: see `hardwall.hdl.estimators.levant_edge`."""
 
 
@@ -93,6 +94,8 @@ class Params(NamedTuple):
     place_max: int
     lost: int
     bound: int
+    bound_max: int
+    doubt: int
     velocity_max: int
     acceleration_max: int
 
@@ -105,6 +108,7 @@ class FloatParams(NamedTuple):
     clocks: int
     shortest: int
     mantissa: int
+    doubt: int
     steepest: float
     learn_max: float
     place_max: float
@@ -122,14 +126,15 @@ class State(NamedTuple):
     number: int
     stamp: int
     kind: int
-    length: int
+    bound: float
+    doubt: int
     velocity: float
     acceleration: float
     places: tuple
 
 
-START = State(0, 0, 0, 0, 0, 0, 0, 0, (0, 0, 0, 0))
-FLOAT_START = State(0, 0, 0, 0, 0, 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
+START = State(0, 0, 0, 0, 0, 0, 0, 0, 0, (0, 0, 0, 0))
+FLOAT_START = State(0, 0, 0, 0, 0, 0.0, 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
 
 
 class Design(EstimatorDesign):
@@ -155,7 +160,7 @@ class Design(EstimatorDesign):
 
     def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
-        self.clocks = axis.clocks_per_sample
+        self.clocks, self.doubt = axis.clocks_per_sample, doubt_samples(axis)
         if 4 * self.clocks > 1 << axis.stamp_width:
             raise FieldError("sample_hz", f"must be 4 or more for stamps that last a second, not {axis.sample_hz!r}")
         self._derive_times(axis)
@@ -259,6 +264,8 @@ class Design(EstimatorDesign):
             place_max=self.place.max,
             lost=shift_floor(self.clocks, -e_f),
             bound=shift_floor(5 * self.clocks, 1 - f),
+            bound_max=2 * self.velocity.max + 1,
+            doubt=self.doubt,
             velocity_max=self.velocity.max,
             acceleration_max=self.acceleration.max,
         )
@@ -274,6 +281,7 @@ class Design(EstimatorDesign):
             self.clocks,
             self.shortest,
             self.mantissa,
+            self.doubt,
             2.0 ** (self.acceleration.i - 1),
             2.0 ** bits_for(self.clocks / 4),
             2.0 ** (self.place.i - 1),

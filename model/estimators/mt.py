@@ -35,7 +35,7 @@ from ..arithmetic.divide import latency as divide_latency
 from . import kept_edges
 from .kept_edges import KeptDesign
 
-STEPS = kept_edges.LATENCY + 3
+STEPS = kept_edges.LATENCY + 4
 """Clocks of the sequence besides the division."""
 
 

@@ -22,7 +22,7 @@ from ..arithmetic.divisionless import latency as quotient_latency
 from . import kept_edges
 from .kept_edges import KeptDesign
 
-STEPS = kept_edges.LATENCY + 3
+STEPS = kept_edges.LATENCY + 4
 """Clocks of the sequence besides the quotient."""
 
 

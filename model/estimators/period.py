@@ -37,6 +37,9 @@ At standstill v = 0, exactly, once the last edge is AGE_LIMIT of the stamp's ran
 than half an LSB. If a cycle lasts longer than that, v is read from gaps; if a gap lasts longer, v = 0. Twice the
 largest speed fits the format; the largest step of position is a cycle's mean like any other.
 
+Bursts. An encoder that emits its edges several at once has no cycles to be timed: the flag `edges_in_bursts` says so,
+see `bursts`.
+
 The velocity saturates at its format's largest word, with either sign, and the flag `velocity_saturated`. Count and
 stamps may wrap. The first sample, and a sample with a restart, forget the past: v = 0 until there are two new edges.
 """
@@ -52,7 +55,8 @@ from ..checks import FieldError
 from ..compiled import compiled
 from ..quadrature import Seen
 from ..requirements import AxisRequirements
-from . import cycle_times
+from . import bursts, cycle_times
+from .bursts import Watch, doubt_samples, watch
 from .cycle_times import AGE_LIMIT, NOTHING, Memory, observe
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 
@@ -81,6 +85,7 @@ class Params(NamedTuple):
     stamp_width: int
     clocks: int
     cycles_max: int
+    doubt: int
     fraction: int
     quotient_width: int
     velocity_max: int
@@ -90,17 +95,20 @@ class FloatParams(NamedTuple):
     count_width: int
     stamp_width: int
     clocks: int
+    cycles_max: int
+    doubt: int
 
 
 class State(NamedTuple):
     """The state; `speed` is the speed of the last cycle or gap, without bound and sign (float: counts a sample)."""
 
     memory: Memory
+    watch: Watch
     speed: float
 
 
-START = State(NOTHING, 0)
-FLOAT_START = State(NOTHING, 0.0)
+START = State(NOTHING, bursts.NOTHING, 0)
+FLOAT_START = State(NOTHING, bursts.NOTHING, 0.0)
 
 
 def check_stamps(axis, spare: int = 0) -> None:
@@ -141,26 +149,26 @@ class Design(EstimatorDesign):
     name = "period"
     gains_class = Gains
     inputs = Seen._fields
+    flags = ("velocity_saturated", "edges_in_bursts")
 
     def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
         check_stamps(axis)
         self.clocks = axis.clocks_per_sample
         self.velocity = velocity_format(axis)
-        self.cycles_max = (self.clocks + 3) // 4
+        self.cycles_max, self.doubt = (self.clocks + 3) // 4, doubt_samples(axis)
 
     @property
     def latency(self) -> int:
         return STEPS + divide_latency(self.velocity.width)
 
     def params(self, words: Mapping[str, int]) -> Params:
-        fraction, width = self.velocity.f + 1, self.velocity.width
-        return Params(
-            self.count_width, self.stamp_width, self.clocks, self.cycles_max, fraction, width, self.velocity.max
-        )
+        limits = self.cycles_max, self.doubt
+        quotient = self.velocity.f + 1, self.velocity.width
+        return Params(self.count_width, self.stamp_width, self.clocks, *limits, *quotient, self.velocity.max)
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
-        return FloatParams(self.count_width, self.stamp_width, self.clocks)
+        return FloatParams(self.count_width, self.stamp_width, self.clocks, self.cycles_max, self.doubt)
 
     def start(self, floating: bool = False) -> State:
         return FLOAT_START if floating else START
@@ -177,6 +185,7 @@ def bound(times):
 @compiled
 def step(params, state, seen, restart):
     memory, times = observe(params, state.memory, seen, restart)
+    watched, clumped = watch(params, state.watch, times)
     speed = state.speed
     if times.age == 0:
         speed = 0
@@ -191,7 +200,7 @@ def step(params, state, seen, restart):
     limit = divide(params.clocks * counts << (params.fraction - 1), clocks, params.quotient_width)
     far = (min(speed, limit) + 1) >> 1
     magnitude = min(far, params.velocity_max)
-    return State(memory, speed), -magnitude if seen.down else magnitude, int(far != magnitude)
+    return State(memory, watched, speed), -magnitude if seen.down else magnitude, int(far != magnitude) | clumped << 1
 
 
 @estimate.register(FloatParams)
@@ -199,9 +208,10 @@ def step(params, state, seen, restart):
 def float_step(params, state, seen, restart):
     """Take one sample in float64, unsaturated: the same algorithm."""
     memory, times = observe(params, state.memory, seen, restart)
+    watched, clumped = watch(params, state.watch, times)
     speed = state.speed
     if times.age == 0:
-        return State(memory, 0.0), 0.0, 0
+        return State(memory, watched, 0.0), 0.0, 0
     if times.news:
         speed = 0.0
         if times.cycles:
@@ -210,4 +220,4 @@ def float_step(params, state, seen, restart):
             speed = 1.0 * params.clocks / times.gap
     counts, clocks = bound(times)
     magnitude = min(speed, 0.5 * params.clocks * counts / clocks)
-    return State(memory, speed), -magnitude if seen.down else magnitude, 0
+    return State(memory, watched, speed), -magnitude if seen.down else magnitude, clumped << 1

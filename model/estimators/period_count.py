@@ -16,7 +16,7 @@ and its speed is that of D / 2 and up to a gap ago, an error of 3 C / v. A windo
 error of 1 / w, and its speed is that of w / 2 to 3 w / 2 ago, an error of 3 C w / 2. So w = sqrt(2 / 3 C) is the best
 window, and counting is the better of the two above the speed at which v^2 / 4 c equals the window's error,
 1 / w + 3 C w / 2: the switching speed. It is also at most CYCLE_SPEED, since an axis that makes more than a cycle in a
-sample leaves no single cycle to be timed.
+sample leaves no single cycle to be timed. The run-time word goes no higher than a cycle a sample.
 
 Counting begins with a window of more than `switch` counts, and timing again with a window of fewer than `switch` - 1: a
 hysteresis of two counts, by which windows at constant speed do not differ (the floor of a length takes two values;
@@ -31,7 +31,8 @@ Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992: fix
 Formats. `velocity` is derived as in `period`, with at least k fraction bits, so that n / w is exact. A window may be no
 longer than half the counter's range at twice the largest speed, so that n does not alias. D, B and ages are as in
 `period`: v = 0, exactly, when B is AGE_LIMIT of the stamp's range. Count and stamps may wrap; the largest step makes a
-fast window, and no cycle. Both speeds saturate at the format, with the flag `velocity_saturated`. After the first
+fast window, and no cycle. While edges come in bursts (`bursts`) a cycle's speed has the flag `edges_in_bursts`; a
+window's is right. Both speeds saturate at the format, with the flag `velocity_saturated`. After the first
 sample or a restart, v = 0 until there are five edges in one direction, or a fast window.
 """
 
@@ -48,7 +49,8 @@ from ..compiled import compiled
 from ..quadrature import Seen
 from ..requirements import AxisRequirements
 from ..words import Word
-from . import cycle_times
+from . import bursts, cycle_times
+from .bursts import Watch, doubt_samples, watch
 from .cycle_times import NOTHING, Memory, observe
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 from .period import check_stamps, velocity_format
@@ -84,6 +86,8 @@ class Params(NamedTuple):
     stamp_width: int
     window: int
     switch: int
+    cycles_max: int
+    doubt: int
     dividend: int
     quotient_width: int
     shift: int  # left shift from a window's counts to the velocity's format
@@ -95,6 +99,8 @@ class FloatParams(NamedTuple):
     stamp_width: int
     window: int
     switch: int
+    cycles_max: int
+    doubt: int
     clocks: int
 
 
@@ -102,6 +108,7 @@ class State(NamedTuple):
     """The state: `cycle` is D (0: none), `first` the window's first count, `moved` the counts of the last window."""
 
     memory: Memory
+    watch: Watch
     cycle: int
     samples: int
     first: int
@@ -109,7 +116,7 @@ class State(NamedTuple):
     counting: int
 
 
-START = State(NOTHING, 0, 0, 0, 0, 0)
+START = State(NOTHING, bursts.NOTHING, 0, 0, 0, 0, 0)
 
 
 def _window_bits_max(axis) -> int:
@@ -131,6 +138,7 @@ class Design(EstimatorDesign):
     name = "period-count"
     gains_class = Gains
     inputs = Seen._fields
+    flags = ("velocity_saturated", "edges_in_bursts")
     cycles_max = 2
     """More than one cycle in a sample is not timed, so only 0, 1 and more must be distinguished."""
 
@@ -141,9 +149,10 @@ class Design(EstimatorDesign):
         self.window_bits = round(math.log2(gains.window_s / tau))
         if not 0 <= self.window_bits <= most:
             raise FieldError("window_s", f"must be {tau:g} to {tau * 2**most:g} at these rates, not {gains.window_s!r}")
-        self.clocks = axis.clocks_per_sample
+        self.clocks, self.doubt = axis.clocks_per_sample, doubt_samples(axis)
         self.velocity = velocity_format(axis, self.window_bits)
-        fmt = UQ(axis.count_width - 1, 0)
+        # Above a cycle a sample no cycle is timed: the largest word switches at just that speed.
+        fmt = UQ(min(self.window_bits + 2, axis.count_width - 1), 0)
         unit = axis.velocity_unit_m_per_s / 2**self.window_bits
         if not SWITCH_MIN <= round(gains.switch_m_per_s / unit) <= fmt.max:
             raise FieldError(
@@ -175,6 +184,8 @@ class Design(EstimatorDesign):
             stamp_width=self.stamp_width,
             window=1 << self.window_bits,
             switch=words["period_count_switch"],
+            cycles_max=self.cycles_max,
+            doubt=self.doubt,
             dividend=self.dividend,
             quotient_width=self.velocity.width,
             shift=self.velocity.f - self.window_bits,
@@ -185,7 +196,9 @@ class Design(EstimatorDesign):
         """Return the float64 kernel's parameters; like the integer kernel it switches at whole counts."""
         word = self.switch
         switch = word.from_si(si["period_count_switch"]) if "period_count_switch" in si else word.reset
-        return FloatParams(self.count_width, self.stamp_width, 1 << self.window_bits, switch, self.clocks)
+        window = 1 << self.window_bits
+        watched = self.cycles_max, self.doubt
+        return FloatParams(self.count_width, self.stamp_width, window, switch, *watched, self.clocks)
 
     def start(self, floating: bool = False) -> State:
         return START
@@ -205,36 +218,37 @@ def _count(params, state, seen, restart):
 
 @compiled
 def _sample(params, state, seen, restart):
-    """Take one sample: return (state, the clocks of a cycle that give the slow speed; 0: none)."""
+    """Take one sample: return (state, the clocks of a cycle that give the slow speed, 0: none; whether in bursts)."""
     samples, first, moved, counting = _count(params, state, seen, restart)
     memory, times = observe(params, state.memory, seen, restart)
     # With more than one cycle in a sample the last timed cycle stays, until counting begins.
     cycle = state.cycle if times.age and (not times.news or times.cycles > 1) else 0
     if times.age and times.news and times.cycles == 1:
         cycle = times.cycle
-    state = State(memory, cycle, samples, first, moved, counting)
-    return state, max(cycle, times.cycle_age) if cycle and times.cycle_age else 0
+    watched, clumped = watch(params, state.watch, times)
+    state = State(memory, watched, cycle, samples, first, moved, counting)
+    return state, max(cycle, times.cycle_age) if cycle and times.cycle_age else 0, int(clumped and not counting)
 
 
 @estimate.register(Params)
 @compiled
 def step(params, state, seen, restart):
-    state, clocks = _sample(params, state, seen, restart)
+    state, clocks, clumped = _sample(params, state, seen, restart)
     if state.counting:
         far = state.moved << params.shift
     else:
         far = (divide(params.dividend, clocks, params.quotient_width) + 1) >> 1 if clocks else 0
         far = -far if seen.down else far
     velocity = saturate(far, -params.velocity_max, params.velocity_max)
-    return state, velocity, int(velocity != far)
+    return state, velocity, int(velocity != far) | clumped << 1
 
 
 @estimate.register(FloatParams)
 @compiled
 def float_step(params, state, seen, restart):
     """Take one sample in float64, unsaturated: the same algorithm."""
-    state, clocks = _sample(params, state, seen, restart)
+    state, clocks, clumped = _sample(params, state, seen, restart)
     if state.counting:
         return state, state.moved / params.window, 0
     speed = 4.0 * params.clocks / clocks if clocks else 0.0
-    return state, -speed if seen.down else speed, 0
+    return state, -speed if seen.down else speed, clumped << 1

@@ -9,7 +9,7 @@ from ..world import device
 from ..world.euler import longest_s
 from ..world.presliding import fastest_per_s
 from .build import bristled_of, device_of
-from .quantities import MARGIN, rounded_down
+from .quantities import MARGIN, rounded_down, rounded_up
 from .schema import Scene
 from .sentences import plain
 from .several import GAIN_WORDS
@@ -90,6 +90,12 @@ def _check_axis(scene: Scene) -> None:
         raise ValueError(
             f"controller.speed_max_m_per_s must be at most {rounded_down(fastest)}, the decoder's limit at this clock, "
             f"count size, glitch_clocks and edge error, not {spec.speed_max_m_per_s!r}"
+        )
+    apart_s, least_s = scene.encoder.edge_separation_s, 1 / max_edge_rate(spec.clock_hz, scene.glitch_clocks)
+    if apart_s is not None and apart_s * MARGIN < least_s:
+        raise ValueError(
+            f"encoder.edge_separation_s must be at least {rounded_up(least_s)}, the decoder's limit at this clock and "
+            f"glitch_clocks, not {apart_s!r}"
         )
 
 

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from ...model.quadrature_speed import GLITCH_CLOCKS_MAX
 from ..world.encoder import Errors, offsets
 from ..world.lines import Lines
 from ..world.scale import CUT_SIGMAS, MOST_COUNTS, WAVES, Scale, Wave, cut_of, spread
@@ -32,11 +33,17 @@ Period = whole(2, PERIOD_MAX)
 Phase = number(0.0, 1.0)
 Jitter = number(1e-12, 1e-4)
 Pulse = number(1e-9, 1e-3)
+Emission = number(1e-9, 1e-2)
 GlitchRate = number(1e-3, 1e8)
 DeadTime = number(0.0, 1e6)
 Seed = whole(0, 2**32 - 1)
 
-TOGETHER = {"eccentricity_counts": "counts_per_turn", "glitches_hz": "glitch_s", "dead": "dead_s"}
+TOGETHER = {
+    "eccentricity_counts": "counts_per_turn",
+    "emission_period_s": "edge_separation_s",
+    "glitches_hz": "glitch_s",
+    "dead": "dead_s",
+}
 """Keys that are given together."""
 
 
@@ -61,6 +68,9 @@ class EncoderSection(Section):
     eccentricity_phase: Phase = 0.0
     hysteresis_counts: number(0.0, 100.0) = 0.0
     jitter_s: or_none(Jitter) = 0.0
+    emission_period_s: Emission | None = None
+    emission_phase: Phase = 0.0
+    edge_separation_s: Emission | None = None
     glitches_hz: GlitchRate | None = None
     glitch_s: Pulse | None = None
     dead: Literal["a", "b", "both"] | None = None
@@ -99,6 +109,12 @@ class EncoderSection(Section):
         """Return the same with the jitter, which moves an edge by up to 4 sigma, at a rate of edges."""
         return self.error_counts + CUT_SIGMAS * self.jitter_s * edges_hz
 
+    def glitch_clocks_max(self, clock_hz: float) -> int:
+        """Return the longest glitch filter that the levels of a burst leave, two separations long."""
+        if not self.edge_separation_s:
+            return GLITCH_CLOCKS_MAX
+        return max(math.floor(2 * self.edge_separation_s * clock_hz * MARGIN) - 1, 0)
+
     @property
     def closest_counts(self) -> float:
         """The least distance of two edges, counts."""
@@ -117,11 +133,13 @@ class EncoderSection(Section):
         if self.edge_error_counts or self.waves or self.hysteresis_counts:
             waves = (*self.waves, *[Wave()] * WAVES)[:WAVES]
             scale = Scale(self.edge_error_counts, self.cut_counts, waves, self.hysteresis_counts, self.seed)
-        if self.jitter_s or self.glitches_hz or self.dead:
+        if self.jitter_s or self.emission_period_s or self.glitches_hz or self.dead:
             dead_a_s, dead_b_s = (self.dead_s if self.dead in (line, "both") else math.inf for line in "ab")
             gap_s = 1 / self.glitches_hz if self.glitches_hz else math.inf
             late_s = CUT_SIGMAS * self.jitter_s
-            lines = Lines(self.jitter_s, late_s, gap_s, self.glitch_s or 0.0, dead_a_s, dead_b_s, self.seed)
+            emission = self.emission_period_s or 0.0, self.emission_phase, self.edge_separation_s or 0.0
+            glitches = gap_s, self.glitch_s or 0.0
+            lines = Lines(self.jitter_s, late_s, *emission, *glitches, dead_a_s, dead_b_s, self.seed)
         return Errors(self.offsets, scale, lines)
 
     def check(self) -> None:
@@ -130,6 +148,11 @@ class EncoderSection(Section):
             for given, lacking in ((one, other), (other, one)):
                 if getattr(self, given) is not None and getattr(self, lacking) is None:
                     raise ValueError(f"encoder.{lacking} is missing, which encoder.{given} needs")
+        if self.emission_period_s and self.edge_separation_s > self.emission_period_s:
+            raise ValueError(
+                f"encoder.edge_separation_s must be at most emission_period_s, {self.emission_period_s:g}, "
+                f"not {self.edge_separation_s!r}"
+            )
         try:
             known = self._known_counts
         except ValueError as error:
@@ -154,6 +177,11 @@ class EncoderSection(Section):
             raise ValueError(
                 f"encoder.jitter_s must be less than {most_s:.4g}: at controller.speed_max_m_per_s, "
                 f"{edges_hz * self.count_m:g}, 4 sigma would move an edge over its neighbour, not {self.jitter_s!r}"
+            )
+        if self.emission_period_s and self.edge_separation_s * edges_hz > MARGIN:
+            raise ValueError(
+                f"encoder.edge_separation_s must be at most {rounded_down(1 / edges_hz)}: edges come so often at "
+                f"controller.speed_max_m_per_s, {edges_hz * self.count_m:g}, not {self.edge_separation_s!r}"
             )
         if self.glitches_hz:
             most_hz = TOGETHER_MAX / max(1 / sample_hz, self.glitch_s)

@@ -4,7 +4,7 @@
 that a hand touches, and narrow enough that no sum or product of such numbers leaves the range of float64.
 """
 
-from decimal import ROUND_FLOOR, Context
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
@@ -34,6 +34,11 @@ MARGIN = 1 + 1e-12
 def rounded_down(limit: float) -> str:
     """Return an upper limit in six digits, not above it: what a message says is accepted."""
     return f"{float(Context(6, ROUND_FLOOR).create_decimal(repr(float(limit * MARGIN)))):g}"
+
+
+def rounded_up(limit: float) -> str:
+    """Return a lower limit in six digits, not below it."""
+    return f"{float(Context(6, ROUND_CEILING).create_decimal(repr(float(limit / MARGIN)))):g}"
 
 
 def or_none(quantity: Any) -> Any:

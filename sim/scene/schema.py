@@ -248,7 +248,8 @@ class Scene(Section):
         if given is not None:
             return given
         error_counts = self.encoder.error_counts_at(SPEED_MARGIN * self.edges_hz)
-        return glitch_clocks_for(self.edges_hz / self.controller.clock_hz, error_counts)
+        clock_hz = self.controller.clock_hz
+        return min(glitch_clocks_for(self.edges_hz / clock_hz, error_counts), self.encoder.glitch_clocks_max(clock_hz))
 
     @property
     def estimator_output(self) -> str:

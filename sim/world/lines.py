@@ -5,6 +5,9 @@ An edge that the handle passes at time t is shown at t + late + jitter: the jitt
 glitch is a pulse that turns one line over for its length; glitches come at random times, independently of each other. A
 line that dies keeps its level from then on.
 
+An interpolator that samples its scale emits edges on a clock of its own: an edge waits for the next emission, and two
+edges are shown at least a separation apart. So several edges that are passed between two emissions come as a burst.
+
 Every change is a *toggle*: a clock and the line, 1 for A and 2 for B, whose level it turns over. So edges and glitches
 that overtake each other need no more than an order in time. `carry` gives a loop the toggles of one interval after the
 other, and `carried` those of a whole record.
@@ -23,6 +26,8 @@ from .scale import CUT_SIGMAS
 JITTER, GAPS, CHANNELS = 2, 3, 4
 """The streams of random numbers: of the jitter, of the times between glitches, and of the lines that they are on."""
 A, B = 1, 2
+ROUNDING = 1e-6
+"""Clocks by which a product of a time and a clock may be above a whole number that it is meant to be."""
 
 
 class Lines(NamedTuple):
@@ -30,6 +35,9 @@ class Lines(NamedTuple):
 
     jitter_s: float  # sigma
     late_s: float
+    emission_s: float  # the period of the emissions; 0 for none, and an edge is shown at once
+    emission_phase: float  # the first emission, in periods
+    separation_s: float  # the least time between two edges that are emitted
     glitch_gap_s: float  # the mean time from a glitch to the next one, on both lines together
     glitch_s: float  # the length of a glitch
     dead_a_s: float  # when the line dies
@@ -43,11 +51,13 @@ class Waiting(NamedTuple):
     edges: Edges  # those of the loop: in go the edges that the handle passes, out come those of the pins
     toggles: Edges  # the clocks and lines of the toggles to come, in order
     marks: np.ndarray  # int64: how many these are, the level of the handle's cell, that of the pins, glitches so far
-    next_s: np.ndarray  # float64: the beginning of the next glitch
+    next_s: np.ndarray  # float64: the beginning of the next glitch, and the earliest time of the next emitted edge
 
 
 PENDING, TRUE, SHOWN, GLITCHES = range(4)
 """The elements of `Waiting.marks`."""
+GLITCH, FREE = range(2)
+"""The elements of `Waiting.next_s`."""
 
 
 @inlined
@@ -71,6 +81,15 @@ def _jittered_s(lines, clock, number, upwards, at_s):
         return at_s
     drawn = normal(lines.seed, JITTER, clock, 2 * number + int(upwards))
     return at_s + lines.late_s + lines.jitter_s * min(max(drawn, -CUT_SIGMAS), CUT_SIGMAS)
+
+
+@compiled
+def emitted_s(lines, passed_s, free_s):
+    """Return when an edge is emitted (s) that would be shown at `passed_s`, and no earlier than `free_s`."""
+    if lines.emission_s == 0.0:
+        return passed_s
+    number = math.ceil(passed_s / lines.emission_s - lines.emission_phase)
+    return max((number + lines.emission_phase) * lines.emission_s, free_s)
 
 
 @compiled
@@ -102,7 +121,7 @@ def waiting(lines: Lines | None, level: int, edges: Edges) -> Waiting | None:
     """
     if lines is None:
         return None
-    return Waiting(edges, room_for(len(edges.clocks)), np.array([0, level, level, 0]), np.array([gap_s(lines, 0)]))
+    return Waiting(edges, room_for(len(edges.clocks)), np.array([0, level, level, 0]), np.array([gap_s(lines, 0), 0.0]))
 
 
 @compiled
@@ -123,15 +142,15 @@ def _insert(kept, clock, line):
 @compiled
 def _take_glitches(lines, kept, until, clock_hz):
     """Take the glitches that begin up to clock `until`; return whether there was room for them."""
-    while kept.next_s[0] * clock_hz <= until:
-        number, begin_s = kept.marks[GLITCHES], kept.next_s[0]
+    while kept.next_s[GLITCH] * clock_hz <= until:
+        number, begin_s = kept.marks[GLITCHES], kept.next_s[GLITCH]
         first, behind = math.ceil(begin_s * clock_hz), math.ceil((begin_s + lines.glitch_s) * clock_hz)
         line = line_of(lines, number)
         # A pulse that begins and ends between two clocks is seen by none.
         if first < behind and not (_insert(kept, first, line) and _insert(kept, behind, line)):
             return False
         kept.marks[GLITCHES] = number + 1
-        kept.next_s[0] = begin_s + gap_s(lines, number + 1)
+        kept.next_s[GLITCH] = begin_s + gap_s(lines, number + 1)
     return True
 
 
@@ -177,7 +196,9 @@ def carry(lines, kept, before, n_edges, interval, clock_hz):
     for i in range(before, n_edges):
         line = kept.edges.levels[i] ^ kept.marks[TRUE]
         kept.marks[TRUE] = kept.edges.levels[i]
-        if not _insert(kept, kept.edges.clocks[i], line):
+        at_s = emitted_s(lines, kept.edges.clocks[i] / clock_hz, kept.next_s[FREE])
+        kept.next_s[FREE] = at_s + lines.separation_s
+        if not _insert(kept, math.ceil(at_s * clock_hz - ROUNDING), line):
             return -1
     until = interval.clock + interval.clocks
     if not _take_glitches(lines, kept, until, clock_hz):
@@ -195,6 +216,17 @@ def jittered_s(lines, numbers, upwards, times, clock_hz):
     return shown
 
 
+@compiled
+def _emitted(lines, clocks, clock_hz):
+    """Return the clocks at which edges are emitted, in the order of a record."""
+    emitted, free_s = np.empty_like(clocks), 0.0
+    for i in range(len(clocks)):
+        at_s = emitted_s(lines, clocks[i] / clock_hz, free_s)
+        free_s = at_s + lines.separation_s
+        emitted[i] = math.ceil(at_s * clock_hz - ROUNDING)
+    return emitted
+
+
 def carried(lines: Lines, edges: Edges, level: int, seconds: float, clock_hz: float) -> Edges:
     """Return what the pins show of a whole record.
 
@@ -206,7 +238,7 @@ def carried(lines: Lines, edges: Edges, level: int, seconds: float, clock_hz: fl
         clock_hz: frequency of the clock.
     """
     before = np.concatenate([[level], edges.levels])[:-1]
-    clocks, toggled = [edges.clocks], [edges.levels ^ before]
+    clocks, toggled = [_emitted(lines, edges.clocks, clock_hz)], [edges.levels ^ before]
     begin_s, number = gap_s(lines, 0), 0
     while begin_s < seconds:
         pulse = [math.ceil(begin_s * clock_hz), math.ceil((begin_s + lines.glitch_s) * clock_hz)]

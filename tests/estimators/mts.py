@@ -69,7 +69,7 @@ async def stays_until_the_next(dut, component: EstimatorBlock) -> None:
     every = list(stimulus(d, 6_000))
     first = int(model(d, every, NOTHING)["saturated"].argmax())
     seen = set()
-    for row in every[max(first - 2 * d.half - 8, 0) : first + 20]:
+    for row in every[max(first - 2 * d.half - d.doubt - 8, 0) : first + 20]:
         before = velocity(), saturated()
         bench.drive(strobe=1, **dict(zip(names, row, strict=True)))
         await clock

@@ -184,7 +184,7 @@ class Oracle:
     """The module's equations in exact rationals, rounded as documented, on unwrapped positions."""
 
     def __init__(self, d: edge_kalman.Design):
-        self.d, self.known = d, None
+        self.d, self.known, self.bound = d, None, Fraction(0)
 
     @staticmethod
     def to(value: Fraction, f: int, add: Fraction = Fraction(0)) -> Fraction:
@@ -202,7 +202,7 @@ class Oracle:
 
     def forget(self) -> None:
         self.x = self.z = self.v = self.a = Fraction(0)
-        self.level, self.length = Fraction(LEVELS - 1), 0
+        self.level = Fraction(LEVELS - 1)
 
     def turn(self, units: int) -> Fraction:
         d = self.d
@@ -229,36 +229,43 @@ class Oracle:
         wide = 1 << d.time_bits
         at, now, number = (stamps[edge] >> d.unit) % wide, (now >> d.unit) % wide, count + down
         if self.known is None or restart:
-            self.known, self.anchor = False, (number, at)
+            self.known, self.anchor, self.doubt = False, (number, at), 0
             self.forget()
         half, flags = 1 << (d.count_width - 1), 0
         passed = (number - self.anchor[0] + half) % (2 * half) - half
         interval = (at - self.anchor[1]) % wide
+        self.doubt = max(self.doubt - 1, 0)
         if interval or passed:
             if not self.known or interval >= wide // 2:
-                self.known = True
+                self.known, self.doubt = True, 0
                 self.forget()
             else:
+                before = self.v
                 flags = self.correct(passed, interval)
+                fastest = max(self.bound - abs(before), abs(before) / 2)
+                if self.v * before >= 0 and abs(self.v) > fastest:
+                    self.doubt = d.doubt
             self.anchor = number, at
         age = (now - self.anchor[1]) % wide
-        if age >= wide // 2 or age >= 8 << self.length:
-            x, length, self.known = self.x, self.length, self.known and age < wide // 2
-            self.forget()
-            self.x, self.length = x, length
         straight = self.v + self.turn(age)
         line = self.limited(straight)
-        flags |= 2 * (line != straight)
+        far = line != straight
         # The usual error of an edge is 0.1 counts, so two are at most 1.5 counts apart.
         bound = Fraction(3 * d.clocks, 1 << d.unit) / 2 ** max(age.bit_length() - 1, 0)
-        bound = min(self.to(bound, d.motion.f), self.fastest)
-        sign = -1 if self.v < 0 else 1
-        line = sign * max(-abs(self.v), min(sign * line, max(bound - abs(self.v), 0)))
+        self.bound = min(self.to(bound, d.motion.f), 2 * self.fastest)
+        rests = age >= wide // 2 or (not self.doubt and abs(line) >= 2 * self.bound)
+        if not self.doubt:
+            sign = -1 if self.v < 0 else 1
+            line = sign * max(-abs(self.v), min(sign * line, max(self.bound - abs(self.v), 0)))
+        flags |= 2 * (far and not rests)
+        if rests:
+            x, self.known = self.x, self.known and age < wide // 2
+            self.forget()
+            self.x, line = x, Fraction(0)
         return self.half_up(line, d.velocity.f) * 2**d.velocity.f, flags
 
     def correct(self, passed: int, interval: int) -> int:
         d, e = self.d, self.d.error
-        self.length = interval.bit_length()
         blend, alarm, fall, kx, *_ = self.entries(interval, math.floor(self.level + Fraction(1, 2)))
         turn = self.turn(interval)
         mean = self.to(self.v + turn / 2, d.motion.f)

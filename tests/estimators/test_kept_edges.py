@@ -23,7 +23,7 @@ from stimuli.specs import PAPER, spec
 
 NAME = "mt"
 FIELDS = [name for name in Seen._fields if name != "run"]
-OUTPUTS = ("moved", "down", "time", "age")
+OUTPUTS = ("moved", "down", "time", "quiet", "news", "age")
 
 
 def make(name: str, half: int) -> KeptEdges:
@@ -34,8 +34,10 @@ def observed(d: KeptDesign, inputs) -> dict[str, np.ndarray]:
     """Return what the model observes; of the age of an edge that is not known, nothing is said."""
     edges, out = NOTHING, []
     for row in inputs:
+        before = edges
         edges, age = observe(d.params({}), edges, Seen(*row[:RUN], 0), row[-1])
-        out.append((edges.moved, edges.down, edges.time, age))
+        news = edges.known and (edges.stamp, edges.number) != (before.stamp, before.number)
+        out.append((edges.moved, edges.down, edges.time, before.quiet, news, age))
     return dict(zip(OUTPUTS, np.array(out, np.int64).T, strict=True))
 
 
@@ -63,8 +65,11 @@ def test_rtl(name, half):
 
 
 def speeds(d: KeptDesign, strobes, edges: list[Edge]):
-    """Yield velocity and bound in counts a clock, as the module's equations give them, from lists of edges alone."""
-    since, lasts, velocity = None, [], Fraction(0)
+    """Yield velocity and bound in counts a clock, as the module's equations give them, from lists of edges alone.
+
+    The bound is infinite while silence is no evidence.
+    """
+    since, lasts, velocity, quiet, doubt = None, [], Fraction(0), 0, 0
     half_count = 1 << (d.count_width - 1)
     for strobe in strobes:
         if since is None or strobe.restart:
@@ -73,9 +78,10 @@ def speeds(d: KeptDesign, strobes, edges: list[Edge]):
         if last and strobe.at - last.at >= 3 << (d.stamp_width - 2):
             since, last = strobe.edges, None
         if last is None:
-            lasts, velocity = [], Fraction(0)
+            lasts, velocity, quiet, doubt = [], Fraction(0), 0, 0
             yield velocity, Fraction(0)
             continue
+        news = not lasts or last is not lasts[-1]
         lasts.append(last)
         older = lasts[max((len(lasts) - 1) // d.half - 1, 0) * d.half]
         # Some samples last longer than the axis's, so that times alias, too.
@@ -83,7 +89,11 @@ def speeds(d: KeptDesign, strobes, edges: list[Edge]):
         if time:
             moved = (last.number - older.number + half_count) % (2 * half_count) - half_count
             velocity = Fraction(moved, time)
-        yield velocity, Fraction(3, 2 * (strobe.at - last.at))
+        doubt = max(doubt - 1, 0)
+        if news and abs(velocity) * quiet > Fraction(3, 2):
+            doubt = d.doubt
+        quiet = strobe.at - last.at
+        yield velocity, math.inf if doubt else Fraction(3, 2 * quiet)
 
 
 @pytest.mark.parametrize(("name", "half"), [("mhz", None), ("paper", 1), ("narrow", 3), ("wide", None)])

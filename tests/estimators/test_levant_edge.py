@@ -144,7 +144,7 @@ class Oracle:
     """The module's equations in exact rationals, rounded down to an LSB as documented, on unwrapped positions."""
 
     def __init__(self, d: levant_edge.Design):
-        self.d, self.known = d, None
+        self.d, self.known, self.bound = d, None, Fraction(0)
 
     def down_to(self, value, fmt, fraction=None):
         scale = power(fmt.f if fraction is None else fraction)
@@ -169,35 +169,40 @@ class Oracle:
         at, kind, wide = stamps[edge], edge ^ 2 * down, 1 << d.stamp_width
         number, flags, loose = count + down, 0, False
         if self.known is None or restart:
-            self.known, self.v, self.a, self.length = False, Fraction(0), Fraction(0), 0
+            self.known, self.v, self.a, self.doubt = False, Fraction(0), Fraction(0), 0
             self.places, self.anchor = [Fraction(0)] * 4, (number, at, kind)
         half = 1 << (d.count_width - 1)
         passed = (number - self.anchor[0] + half) % (2 * half) - half
         interval, age = (at - self.anchor[1]) % wide, (now - self.anchor[1]) % wide
+        self.doubt = max(self.doubt - 1, 0)
         if interval or passed:
             if not self.known or interval >= wide // 2:
-                self.known, self.v, self.a = True, Fraction(0), Fraction(0)
+                self.known, self.v, self.a, self.doubt = True, Fraction(0), Fraction(0), 0
             elif interval >= 1 << d.shortest:
+                before = self.v
                 flags = self.correct(passed, interval, kind, run == 4, lam * d.lambda_.lsb, alpha * d.alpha.lsb)
-            elif age >= 2 << d.shortest:
-                moved = self.v + self.turn(interval)
-                self.v = self.fit(moved, v.i, v.f)
-                flags = 2 * (self.v != moved)
+                if self.v * before >= 0 and abs(self.v) > max(self.bound - abs(before), abs(before) / 2):
+                    self.doubt = d.doubt
             else:
                 loose = True
             if not loose:
                 self.anchor, age = (number, at, kind), (now - at) % wide
-        if not loose and (age >= wide // 2 or age >= 8 << self.length):
-            self.v = self.a = Fraction(0)
-            self.known = self.known and age < wide // 2
-        straight = self.v + self.turn(age)
+        young = loose and age < 2 << d.shortest
+        straight = self.v + (self.turn(age) if young or age < wide // 2 else 0)
         line = self.fit(straight, v.i, v.f)
-        flags |= 2 * (line != straight)
-        if not loose:
-            most = power(v.i - 1) - power(-v.f)
-            bound = min(self.down_to(Fraction(5 * d.clocks, 2) / 2 ** max(age.bit_length() - 1, 0), v), most)
-            sign = -1 if self.v < 0 else 1
-            line = sign * max(-abs(self.v), min(sign * line, max(bound - abs(self.v), 0)))
+        far, rests = line != straight, False
+        if not young:
+            # An edge too close to the anchor has halved the silence at most.
+            since = Fraction(2 ** max(age.bit_length() - 1, 0), 1 + loose)
+            self.bound = min(self.down_to(Fraction(5 * d.clocks, 2) / since, v), power(v.i) - power(-v.f))
+            rests = age >= wide // 2 or (not self.doubt and abs(line) >= 2 * self.bound)
+            if not self.doubt:
+                sign = -1 if self.v < 0 else 1
+                line = sign * max(-abs(self.v), min(sign * line, max(self.bound - abs(self.v), 0)))
+        flags |= 2 * (far and not rests)
+        if rests:
+            self.v = self.a = line = Fraction(0)
+            self.known = self.known and age < wide // 2
         return line * 2**v.f, flags
 
     def correct(self, passed, interval, kind, full, lam, alpha):
@@ -213,12 +218,12 @@ class Oracle:
         quotient = self.down_to(size * unit / time, v)
         slope = change = min(quotient, power(v.i - 1) - power(-v.f))
         steepest = d.acceleration.max * power(-d.acceleration.f)
-        bend = min(self.down_to(slope / 2**self.length, d.acceleration), steepest)
         if self.length <= d.mantissa and size < d.clocks:
             odd = self.length % 2
             radicand = self.down_to(size, d.radicand) * 2**odd
             root = Fraction(math.isqrt(math.floor(radicand * 4**d.root.f)), 2**d.root.f)
             change = min(change, self.down_to(Fraction(lam) * root * 2 ** (self.length // 2), v))
+        bend = min(self.down_to(change / 2**self.length, d.acceleration), steepest)
         if self.length <= d.mantissa:
             bend = min(bend, self.down_to(Fraction(alpha) * 2**self.length, d.acceleration))
         far = self.v + turn - sign * change

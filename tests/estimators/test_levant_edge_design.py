@@ -141,11 +141,14 @@ def test_one_sample_of_words_is_within_the_derived_bound_of_the_algorithm(sample
             now, edges = sight(shown, edges, k)
             places = tuple(place * d.place.lsb for place in state.places)
             same = state._replace(
-                velocity=state.velocity * lsb, acceleration=state.acceleration * d.acceleration.lsb, places=places
+                bound=state.bound * lsb,
+                velocity=state.velocity * lsb,
+                acceleration=state.acceleration * d.acceleration.lsb,
+                places=places,
             )
             after, velocity, flags = estimate(params, state, now, 0)
             real_after, real, _ = estimate(exact, same, now, 0)
-            length = after.length
+            length = ((after.stamp - state.stamp) & ((1 << d.stamp_width) - 1)).bit_length()
             age = (now.stamp - after.stamp) & ((1 << d.stamp_width) - 1)
             limit = 2 * words["levant_edge_lambda"] * d.lambda_.lsb * d.root.lsb * 2.0 ** (length / 2)
             cut = 2.0 ** (1 - d.mantissa) * (length > d.mantissa) * 2 * (abs(real) + abs(same.velocity) + lsb)

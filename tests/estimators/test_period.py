@@ -73,7 +73,7 @@ async def follows_model(dut):
     bounds = rows(d, *at_the_bound(d, random, samples // 30))
     stimulus = [row for part in (*turns, bounds, anything(d, random, samples // 3)) for row in part]
     expected = await follow(dut, make(name), stimulus, START)
-    assert set(expected["saturated"]) == {0, 1}
+    assert {0, 1} <= set(expected["saturated"]) <= {0, 1, 2, 3}
     for end in (-d.velocity.max, 0, d.velocity.max):
         assert end in expected["velocity"]
 
@@ -139,7 +139,7 @@ def test_model_is_the_exact_speed_rounded(name, invert):
     for k, (speed, down) in enumerate(exact_speeds):
         word = math.floor(speed * d.clocks * 2**d.velocity.f + Fraction(1, 2))
         expected = min(word, d.velocity.max) * (-1 if down else 1), int(word > d.velocity.max)
-        assert (seen["velocity"][k], seen["saturated"][k]) == expected, f"sample {k}: {strobes[k]}"
+        assert (seen["velocity"][k], seen["saturated"][k] & 1) == expected, f"sample {k}: {strobes[k]}"
         moving += word > 0
     assert moving > 2_000
 

@@ -60,7 +60,7 @@ async def follows_model(dut):
     turns = [rows(d, *turn(d, random, samples // 3), invert) for invert in (False, True)]
     plain = (row for part in (*turns, anything(d, random, samples // 3)) for row in part)
     expected = await follow(dut, make(name), [*with_words(d, plain, random), *decided], START)
-    assert set(expected["saturated"]) == {0, 1}
+    assert {0, 1} <= set(expected["saturated"]) <= {0, 1, 2, 3}
     for end in (-d.velocity.max, 0, d.velocity.max):
         assert end in expected["velocity"]
 
@@ -103,7 +103,7 @@ def test_model_is_the_exact_speed_rounded(name, switch):
     for k, (speed, counting) in enumerate(speeds(d, strobes, edges, switch)):
         word = math.floor(abs(speed) * 2**d.velocity.f + Fraction(1, 2))
         expected = min(word, d.velocity.max) * (-1 if speed < 0 else 1), int(word > d.velocity.max)
-        assert (seen["velocity"][k], seen["saturated"][k]) == expected, f"sample {k}: {strobes[k]}"
+        assert (seen["velocity"][k], seen["saturated"][k] & 1) == expected, f"sample {k}: {strobes[k]}"
         modes[counting] += word > 0
     assert modes[False] > 100
     assert modes[True] > 100

@@ -202,7 +202,7 @@ CASES = {
         partial(estimator, "mt"),
         (*DIGITS, *EDGES),
         Bug(mt.Estimator.elaborate, "Divide(bound.bit_length(), ", "Divide(bound.bit_length() - 1, "),
-        ranges.scaled_edges,
+        ranges.edges,
     ),
     "mt-divisionless": Case(
         partial(estimator, "mt-divisionless"),

@@ -72,11 +72,6 @@ def edges(bench: Bench, block: wiring.Component) -> None:
     bench.within(**{"edges.phase": (0, design.half - 1), "edges.moved": (0, design.edges_max)})
 
 
-def scaled_edges(bench: Bench, block: wiring.Component) -> None:
-    edges(bench, block)
-    bench.within(scaled=(0, block.design.edges_max * block.design.clocks))
-
-
 def digits_left(bench: Bench, block: wiring.Component) -> None:
     """Promise that digits are left of every quotient under way, and no more than it has."""
     edges(bench, block)
@@ -119,8 +114,8 @@ def levant_edge(bench: Bench, block: wiring.Component) -> None:
     lately = (inner["now"] - inner["stamp"])[: len(measure)] >> first == 0
     came = (measure != 0) | (inner["passed"] != 0)
     bench.promise(~bench.state("DECISION") | ~came | inner["waited"] | lately)
-    bench.promise(~bench.state("TIME", "TURN PRODUCT") | ~inner["loose"] | ~inner["anchor"] & lately)
-    bench.promise(~bench.state("TURN") | ~inner["loose"] | ~measure[-1])
+    bench.promise(~bench.state("TIME", "TURN PRODUCT") | ~inner["young"] | ~inner["anchor"] & lately)
+    bench.promise(~bench.state("TURN") | ~inner["young"] | ~measure[-1])
     bench.promise(~bench.state("TIME") | ~correct | (inner["size"] >= first))
     shifting = bench.state("TURN", "MEAN", "PLACE PRODUCT", "ERROR", "START", "SOLVE", "LIMIT", "CHANGE") & correct
     timed = shifting | bench.state("TURN PRODUCT") & correct
@@ -134,5 +129,5 @@ def levant_edge(bench: Bench, block: wiring.Component) -> None:
 
 def edge_kalman(bench: Bench, block: wiring.Component) -> None:
     v_max, level = block.design.params({}).velocity_max, (0, TOP)
-    bench.within(v=v_max, line=v_max, least=v_max, most=v_max, held=v_max, bound=(0, v_max), level=level, lower=level)
-    bench.promise(~bench.state("LINE LOW") | (bench.inner["room"] <= v_max))
+    bench.within(v=v_max, line=v_max, held=v_max, bound=(0, 2 * v_max), level=level, lower=level)
+    bench.within(room=2 * v_max, least=(-2 * v_max, 0), most=(0, 2 * v_max), fastest=(0, 2 * v_max))

@@ -15,6 +15,7 @@ from stimuli.lengths import LONG
 from stimuli.scenes import ONE_SECOND
 
 CYCLE = {"edges": 16, "error_counts": 0.1}
+EMISSION = {"emission_period_s": 2e-5, "edge_separation_s": 5e-7}
 GLITCHES = {"encoder.glitches_hz": 50.0, "encoder.glitch_s": 1e-7}
 REFUSED = [
     ({"edge_error_counts": 0.24}, "edge_error_counts must be a number of 0 to 0.2375, not 0.24"),
@@ -38,6 +39,12 @@ REFUSED = [
     ({"counts_per_turn": 4000, "eccentricity_counts": 400.0}, "phase_error_counts, duty_error_counts, cycles and"),
     ({"hysteresis_counts": 101.0}, "hysteresis_counts must be a number of 0 to 100, not 101.0"),
     ({"jitter_s": 1e-5}, "jitter_s must be less than 6.25e-08: at controller.speed_max_m_per_s, 2, 4 sigma would"),
+    ({"emission_period_s": 2e-5}, "edge_separation_s is missing, which encoder.emission_period_s needs"),
+    ({"edge_separation_s": 2e-7}, "emission_period_s is missing, which encoder.edge_separation_s needs"),
+    ({"emission_period_s": 1e-7, "edge_separation_s": 2e-7}, "edge_separation_s must be at most emission_period_s, "),
+    (EMISSION | {"edge_separation_s": 6e-7}, "edge_separation_s must be at most 5e-07: edges come so often at"),
+    (EMISSION | {"edge_separation_s": 1e-8}, "edge_separation_s must be at least 3e-08, the decoder's limit at this"),
+    (EMISSION | {"emission_phase": 1.5}, "emission_phase must be a number of 0 to 1, not 1.5"),
     ({"glitches_hz": 10.0}, "glitch_s is missing, which encoder.glitches_hz needs"),
     ({"glitches_hz": 1e7, "glitch_s": 1e-3}, "glitches_hz must be at most 1e+06, 1000 in a sample or at the same time"),
     ({"dead": "c", "dead_s": 0.0}, "dead must be one of a, b, both, not 'c'"),
@@ -108,6 +115,16 @@ def test_a_given_filter_that_is_too_long_for_the_errors_is_refused():
     with pytest.raises(SceneError, match=r"speed_max_m_per_s must be at most .* edge error, not 2"):
         load("mhz", keys | {"controller.speed_max_m_per_s": 2.0, "encoder.edge_error_counts": 0.1})
     assert max_edge_rate(2e7, 15, 0.4) == pytest.approx(1.5e6)
+
+
+@pytest.mark.parametrize(("separation_s", "glitch"), [(5e-7, 15), (1e-7, 9), (2e-8, 1)])
+def test_the_glitch_filter_leaves_the_levels_of_a_burst(separation_s, glitch):
+    """A level is two separations long, whatever the speed."""
+    keys = {"encoder.emission_period_s": 2e-5, "encoder.edge_separation_s": separation_s}
+    scene = load("mhz", {"controller.glitch_clocks": None} | keys)
+    assert scene.glitch_clocks == glitch <= 2 * separation_s * scene.controller.clock_hz - 1 + 1e-9
+    with pytest.raises(SceneError, match="edge_separation_s must be at least"):
+        load("mhz", keys | {"controller.glitch_clocks": 15, "encoder.edge_separation_s": 1e-7})
 
 
 def test_the_axes_of_a_scene_have_encoders_of_their_own():

@@ -1,6 +1,7 @@
 """What the lines of an encoder do in time: jitter, glitches and dead channels, counted at the pins."""
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from hardwall.sim.world.encoder import Encoder
 from hardwall.sim.world.lines import A, B, Lines, carried, carry, waiting
 
 NEVER = math.inf
-QUIET = Lines(0.0, 0.0, NEVER, 0.0, NEVER, NEVER, 1)
+QUIET = Lines(0.0, 0.0, 0.0, 0.0, 0.0, NEVER, 0.0, NEVER, NEVER, 1)
 NS = 1e9
 """A clock that resolves times of a nanosecond."""
 NO_EDGES = Edges(np.zeros(0, np.int64), np.zeros(0, np.int64))
@@ -77,6 +78,31 @@ def test_edges_that_overtake_each_other_are_shown_in_order_and_none_is_lost():
     assert shown.edges.levels[-1] == moving(None, 1.0, 0.02).edges.levels[-1]
 
 
+def emitting(period_s: float, separation_s: float, phase: float = 0.0) -> Lines:
+    return QUIET._replace(emission_s=period_s, emission_phase=phase, separation_s=separation_s)
+
+
+@pytest.mark.parametrize("speed", [0.02, 0.15, -0.15, 1.0, 1.9])
+@pytest.mark.parametrize("phase", [0.0, 0.25])
+def test_edges_wait_for_the_next_emission_and_keep_their_separation(speed, phase):
+    """Every 20 us the edges that were passed come 500 ns apart, in order: exactly, by rationals."""
+    clock_hz, period, apart = 50_000_000, Fraction(20, 10**6), Fraction(1, 2 * 10**6)
+    plain = moving(None, speed, 0.02, clock_hz)
+    shown = moving(emitting(20e-6, 500e-9, phase), speed, 0.02, clock_hz)
+    free, expected = Fraction(0), []
+    for clock in plain.edges.clocks.tolist():
+        at = (math.ceil(Fraction(clock, clock_hz) / period - Fraction(phase)) + Fraction(phase)) * period
+        expected.append(math.ceil(max(at, free) * clock_hz))
+        free = max(at, free) + apart
+    assert shown.edges.clocks.tolist() == expected
+    assert (shown.edges.levels == plain.edges.levels).all()
+
+
+def test_three_edges_come_in_a_burst_every_20_us_at_150_mm_per_s():
+    shown = moving(emitting(20e-6, 500e-9), 0.15, 0.01, 50e6)
+    assert sorted(set(np.diff(shown.edges.clocks[1:]).tolist())) == [25, 950]
+
+
 def glitching(hz: float, length_s: float, seed: int = 1) -> Lines:
     return QUIET._replace(glitch_gap_s=1 / hz, glitch_s=length_s, seed=seed)
 
@@ -132,8 +158,13 @@ def test_a_dead_line_keeps_its_level_from_its_time_on(dead, lives):
     assert np.abs(counts[shared:] - counts[shared - 1]).max(initial=0) <= 1
 
 
-ALL = Lines(3e-6, 12e-6, 2e-4, 5e-6, 0.02, NEVER, 3)
-KINDS = {"jitter": ALL._replace(glitch_gap_s=NEVER, dead_a_s=NEVER), "glitches": glitching(5e3, 5e-6), "all": ALL}
+ALL = Lines(3e-6, 12e-6, 20e-6, 0.3, 3e-6, 2e-4, 5e-6, 0.02, NEVER, 3)
+KINDS = {
+    "jitter": ALL._replace(emission_s=0.0, separation_s=0.0, glitch_gap_s=NEVER, dead_a_s=NEVER),
+    "emission": QUIET._replace(emission_s=20e-6, emission_phase=0.3, separation_s=3e-6),
+    "glitches": glitching(5e3, 5e-6),
+    "all": ALL,
+}
 
 
 @pytest.mark.parametrize("name", KINDS)

@@ -1,0 +1,191 @@
+"""Estimators by clock stamps at steady speeds, against rational arithmetic: any speed, both ways, and in bursts."""
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hardwall.model import stamped
+from hardwall.model.axis import Axis
+from hardwall.model.estimators import registry
+from hardwall.model.estimators.bursts import doubt_samples
+from hardwall.model.monitors import Design as Monitors
+from stimuli.specs import spec
+
+STAMPED = [name for name in registry.ESTIMATORS if registry.design_of(name).uses_stamps()]
+TIMED = "period", "period-count"
+"""Estimators that time cycles, of which a burst has none."""
+CLOCK_HZ, COUNTS_A_METRE = 50_000_000, 10**6
+LEVELS = np.array([1, 3, 2, 0]), np.array([2, 3, 1, 0])
+"""Levels of the pins from edge to edge, upwards and downwards, from 0."""
+SLOWEST_M_PER_S = Fraction(1, 50_000)
+SPEEDS = sorted({SLOWEST_M_PER_S * 7**k for k in range(6)} | {Fraction(k, 10) for k in (5, 10, 15, 20, 22, 30, 39)})
+BEYOND = [Fraction(41, 10), Fraction(5), Fraction(10), Fraction(20), Fraction(40), Fraction(50)]
+"""Speeds beyond the format of 4 m/s, up to an edge a clock: the decoder's limit."""
+
+
+def axis_of(name: str, sample_hz: int = 1_000_000):
+    return replace(spec("mhz", name), sample_hz=sample_hz, actuation_hz=sample_hz)
+
+
+@cache
+def edges(speed: Fraction, seconds: Fraction, downwards: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return the edges of a steady speed: the clocks from which a register has them, exactly, and the levels."""
+    a_clock = speed * COUNTS_A_METRE / CLOCK_HZ
+    numbers = np.arange(1, math.floor(a_clock * CLOCK_HZ * seconds) + 1)
+    return -(-numbers * a_clock.denominator // a_clock.numerator), LEVELS[downwards][(numbers - 1) % 4]
+
+
+@cache
+def bursts(speed: Fraction, seconds: Fraction, downwards: bool, phase: Fraction) -> tuple[np.ndarray, np.ndarray]:
+    """Return the same of an encoder that emits every 20 us what it has passed, 500 ns apart."""
+    a_second, period, apart = speed * COUNTS_A_METRE, Fraction(20, 10**6), Fraction(1, 2 * 10**6)
+    free, clocks = Fraction(0), []
+    for n in range(1, math.floor(a_second * seconds) + 1):
+        at = max((math.ceil(n / a_second / period - phase) + phase) * period, free)
+        free = at + apart
+        clocks.append(math.ceil(at * CLOCK_HZ))
+    return np.array(clocks, np.int64), LEVELS[downwards][np.arange(len(clocks)) % 4]
+
+
+def read(axis, passed, seconds: Fraction, floating: bool = False) -> stamped.Record:
+    samples = int(axis.sample_hz * seconds)
+    return stamped.run(Axis(axis, floating, encoder_glitch_clocks=0), *passed, samples=samples)
+
+
+@pytest.mark.parametrize("downwards", [False, True])
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("name", STAMPED)
+def test_a_steady_speed_is_read_however_fast_it_is(name, floating, downwards):
+    """The mean is the speed, but for a clock in a cycle; so it grows with the speed. It ends with the format.
+
+    Two words are for rounding, and four for a time that `levant-edge` cuts to its mantissa. Fixed point says by a flag
+    where it leaves the speed.
+    """
+    axis, sign, before = axis_of(name), -1 if downwards else 1, 0.0
+    velocity, unit = axis.design.estimator.velocity, axis.velocity_unit_m_per_s
+    for speed in SPEEDS + BEYOND:
+        rate = float(speed) / axis.count_m / axis.clock_hz
+        # Twenty edges to begin with, and as many to be read.
+        seconds = max(40 / (speed * COUNTS_A_METRE), Fraction(1, 125))
+        record = read(axis, edges(speed, seconds, downwards), seconds, floating)
+        half = len(record.velocity) // 2
+        mean = sign * float(np.mean(record.velocity_m_per_s[half:]))
+        if floating or speed < velocity.max * velocity.lsb * unit:
+            assert abs(mean - speed) <= float(speed) * rate / 4 + 6 * velocity.lsb * unit, speed
+        else:
+            assert (np.abs(record.velocity[half:]) >= velocity.max).all(), speed
+            assert "velocity_saturated" in axis.design.flag_names(int(record.flags[-1])), speed
+        assert mean >= before * (1 - rate / 4), speed
+        before = mean
+    # The monitor's limit after reset is below what the estimate reaches.
+    (limit,) = [word for word in Monitors(axis, velocity).words if word.name == "supervisor_velocity_limit"]
+    assert before > limit.to_si(limit.reset)
+
+
+BURSTS = [
+    (sample_hz, speed, phase)
+    for sample_hz in (1_000_000, 100_000, 10_000)
+    for speed in (Fraction(15, 100), Fraction(4, 10), Fraction(1))
+    for phase in (Fraction(0), Fraction(3, 10))
+]
+
+
+@pytest.mark.parametrize("downwards", [False, True])
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("name", [name for name in STAMPED if name not in TIMED])
+def test_edges_in_bursts_are_read_as_the_speed_that_made_them(name, floating, downwards):
+    """A burst is a twentieth of the shortest memory or window, so is the error of the mean; no sample reads rest."""
+    for sample_hz, speed, phase in BURSTS:
+        axis, seconds = axis_of(name, sample_hz), Fraction(1, 25)
+        record = read(axis, bursts(speed, seconds, downwards, phase), seconds, floating)
+        seen = (-1 if downwards else 1) * record.velocity_m_per_s[len(record.velocity) // 2 :]
+        assert np.mean(seen) == pytest.approx(float(speed), rel=0.05), (sample_hz, speed)
+        assert seen.min() > 0.4 * speed, (sample_hz, speed)
+        assert seen.max() < 1.6 * speed, (sample_hz, speed)
+
+
+@pytest.mark.parametrize("downwards", [False, True])
+@pytest.mark.parametrize("name", TIMED)
+def test_estimators_of_cycles_say_that_edges_come_in_bursts(name, downwards):
+    for sample_hz in (1_000_000, 100_000):
+        for speed in (Fraction(15, 100), Fraction(4, 10), Fraction(1)):
+            axis, seconds = axis_of(name, sample_hz), Fraction(1, 20)
+            record = read(axis, bursts(speed, seconds, downwards, Fraction(0)), seconds)
+            off = np.abs(record.velocity_m_per_s[len(record.velocity) // 2 :]) - float(speed)
+            raised = axis.design.flag_names(int(record.flags[-1]))
+            assert "edges_in_bursts" in raised or np.abs(off).max() < 0.01 * speed, (sample_hz, speed)
+
+
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("name", [name for name in STAMPED if name not in TIMED])
+def test_a_stop_after_bursts_reads_0_when_their_evidence_is_old(name, floating):
+    axis, speed, moving = axis_of(name), Fraction(1), Fraction(1, 50)
+    record = read(axis, bursts(speed, moving, False, Fraction(0)), 2 * moving, floating)
+    stopped = int(axis.sample_hz * (moving + Fraction(20, 10**6)))
+    # Then the bound holds: a word is less than half an LSB after so many samples without an edge.
+    rest = record.velocity_m_per_s[stopped + doubt_samples(axis) + 10 :]
+    assert np.abs(rest[20:]).max() <= 2.5 * axis.count_m * axis.sample_hz / doubt_samples(axis)
+    if name in ("edge-kalman", "levant-edge"):
+        assert (rest[20:] == 0).all()
+
+
+@pytest.mark.parametrize("name", STAMPED)
+def test_edges_in_their_place_are_no_bursts(name):
+    """Channel B late by 0.45 counts: edges in turns 0.55 and 1.45 counts apart, at any speed."""
+    axis = axis_of(name)
+    for speed in (Fraction(1, 100), Fraction(15, 100), Fraction(1)):
+        passed = edges(speed, Fraction(1, 20), False)
+        late = np.array([0, 0.45])[np.arange(len(passed[0])) % 2] * axis.count_m * axis.clock_hz / float(speed)
+        record = read(axis, (passed[0] + late.astype(np.int64), passed[1]), Fraction(1, 20))
+        assert record.flags[-1] == 0
+
+
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("name", ["edge-kalman", "levant-edge"])
+def test_a_single_pair_of_close_edges_is_no_sign_of_rest(name, floating):
+    """One edge in a thousand is 0.9 counts late, 0.1 before the next edge, ten times as close as the others."""
+    axis, speed = axis_of(name), Fraction(15, 100)
+    clocks, levels = edges(speed, Fraction(1, 20), False)
+    late = np.zeros(len(clocks), np.int64)
+    late[2000::1000] = int(0.9 * axis.count_m * axis.clock_hz / speed)
+    seen = read(axis, (clocks + late, levels), Fraction(1, 20), floating).velocity_m_per_s[len(late) * 3 :]
+    # The bound after 1.9 counts of silence, for a cell of 1.25 counts, less the speed.
+    assert seen.min() > (2.5 / 1.9 - 1) * speed
+    assert seen.max() < 1.1 * speed
+
+
+@pytest.mark.parametrize("floating", [False, True])
+def test_edges_in_pairs_about_the_shortest_interval_do_not_bias_levant_edge(floating):
+    """Intervals of 0.8 counts are too short to be used, and those of 1.2 are not: the mean takes in both."""
+    axis, speed = axis_of("levant-edge"), Fraction(2, 100)
+    clocks, levels = edges(speed, Fraction(1, 5), False)
+    count = axis.count_m * axis.clock_hz / speed
+    assert 0.8 * count < 1 << axis.design.estimator.shortest < 1.2 * count
+    late = np.array([0, round(0.2 * count)])[np.arange(len(clocks)) % 2]
+    record = read(axis, (clocks + late, levels), Fraction(1, 5), floating)
+    assert np.mean(record.velocity_m_per_s[100_000:]) == pytest.approx(float(speed), rel=1e-3)
+
+
+def test_no_switch_of_period_count_leaves_a_speed_unread():
+    """At 10 kHz a fast axis makes many cycles a sample, which are counted whatever the word is."""
+    axis = axis_of("period-count", 10_000)
+    (word,) = axis.design.estimator.words
+    for switch in (word.si_min, word.si_max):
+        for speed in (Fraction(2, 100), Fraction(1, 10), Fraction(1)):
+            of = Axis(axis, period_count_switch=switch, encoder_glitch_clocks=0)
+            record = stamped.run(of, *edges(speed, Fraction(1, 10), False), samples=1000)
+            assert np.mean(record.velocity_m_per_s[500:]) == pytest.approx(float(speed), rel=0.01)
+
+
+def test_no_gains_make_levant_edge_swing():
+    """With the largest alpha and no lambda the acceleration has nothing to damp it: it does not change."""
+    axis = axis_of("levant-edge")
+    _, alpha = axis.design.estimator.words
+    of = Axis(axis, levant_edge_lambda=0.0, levant_edge_alpha=alpha.si_max, encoder_glitch_clocks=0)
+    for speed in (Fraction(2, 100), Fraction(1, 10), Fraction(1)):
+        record = stamped.run(of, *edges(speed, Fraction(1, 20), False), samples=50_000)
+        assert np.ptp(record.velocity_m_per_s[25_000:]) < 1e-3
