@@ -191,32 +191,21 @@ class Design(EstimatorDesign):
             lam,
         )
 
+        self.words = self._words(lam, alpha, tau, q)
+
+    def _words(self, lam: float, alpha: float, tau: float, q: float) -> tuple[Word, ...]:
+        """Return the run-time words for the designed gains per sample, with the ranges that the module derives."""
         prefix = self.name.replace("-", "_")
         of_root, of_sign = self.lambda_.from_real(lam), self.alpha.from_real(alpha)
         damped = math.sqrt(self.alpha.to_real(self.alpha.max) / UNDAMPED)
         least_root = max(min(math.ceil(damped * 2**self.lambda_.f), of_root), 1)
-        most_sign = math.floor(UNDAMPED * self.lambda_.to_real(least_root) ** 2 * 2**f)
-        self.words = (
-            Word(
-                f"{prefix}_lambda",
-                self.lambda_,
-                math.sqrt(q) / tau,
-                "m^(1/2)/s",
-                of_root,
-                "gain of the square-root term",
-                least_root,
-                self._most(of_root),
-            ),
-            Word(
-                f"{prefix}_alpha",
-                self.alpha,
-                q / tau**2,
-                "m/s^2",
-                of_sign,
-                "gain of the sign term",
-                max(of_sign >> LOWER_BITS, 1),
-                min(max(most_sign, of_sign), self.alpha.max),
-            ),
+        most_sign = math.floor(UNDAMPED * self.lambda_.to_real(least_root) ** 2 * 2**self.alpha.f)
+        roots = least_root, self._most(of_root)
+        signs = max(of_sign >> LOWER_BITS, 1), min(max(most_sign, of_sign), self.alpha.max)
+        doc, unit = "gain of the square-root term", "m^(1/2)/s"
+        return (
+            Word(f"{prefix}_lambda", self.lambda_, math.sqrt(q) / tau, unit, of_root, doc, *roots),
+            Word(f"{prefix}_alpha", self.alpha, q / tau**2, "m/s^2", of_sign, "gain of the sign term", *signs),
             Word(self.output_word(), UQ(1, 0), 1.0, "", 0, "velocity output: 0 for u, 1 for u1"),
         )
 

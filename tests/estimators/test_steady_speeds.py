@@ -129,7 +129,7 @@ def lengths(name: str, estimator: str, steady: Steady, words: dict[str, int], sl
         alpha = words[d.words[1].name] / 2**d.velocity.f
         start += slews * min(abs(steady.speed), Fraction(d.velocity.max, 2**d.velocity.f)) / alpha
     if estimator in (*LEVANTS, "levant-edge"):
-        behind = period * math.ceil(40_000 / period)
+        behind = period * math.ceil((40_000 if estimator in LEVANTS else 8_000) / period)
     return math.ceil(start / period) * period, behind
 
 
