@@ -97,8 +97,8 @@ class Design(capture.Design):
     def __init__(self, spec: AxesSpec, records: int):
         super().__init__(spec, records)
         doc = "the axis that a capture takes with its start"
-        self.words = (*self.words, Word("capture_axis", UQ(max(spec.axes - 1, 1).bit_length(), 0), 1.0, "", 0, doc))
-        self.ranges = {**self.ranges, "capture_axis": (0, spec.axes - 1)}
+        fmt = UQ(max(spec.axes - 1, 1).bit_length(), 0)
+        self.words = (*self.words, Word("capture_axis", fmt, 1.0, "", 0, doc, 0, spec.axes - 1))
 
     @property
     def sampled_clocks(self) -> int:

@@ -74,7 +74,7 @@ class AxesMap(RegisterMap):
         design = Design(spec)
         # The same words in the same order as those of a single axis: the watchdog is among them.
         live = (*design.supervisor.words, *design.monitors.words, design.live[-1])
-        known = registers_of(spec, live, design.ranges)
+        known = registers_of(spec, live)
         self._describe((*known, *(self.capture.registers() if self.capture else ())), design.committed)
 
     @property

@@ -166,9 +166,8 @@ class Design:
             Word("capture_sources", UQ(len(SOURCES), 0), 1.0, "", 0, f"what triggers a capture: {sources}"),
             Word("capture_level", self.count, spec.count_m, "m", 0, "level of the count whose passing triggers"),
             Word("capture_before", self.place, 1.0, "", 0, "records that are wanted before the trigger"),
-            Word("capture_decimation", UQ(DECIMATION_BITS, 0), 1.0, "", 1, "samples from a record to the next"),
+            Word("capture_decimation", UQ(DECIMATION_BITS, 0), 1.0, "", 1, "samples from a record to the next", 1),
         )
-        self.ranges: dict[str, tuple[int | None, int | None]] = {"capture_decimation": (1, None)}
 
     @property
     def sampled_clocks(self) -> int:
@@ -204,7 +203,7 @@ class Design:
                 "s",
             ),
             *(Register(name, Kind.PULSE, UQ(1, 0), meaning) for name, meaning in pulses),
-            *(word_register(word, Kind.LIVE, *self.ranges.get(word.name, ())) for word in self.words),
+            *(word_register(word, Kind.LIVE) for word in self.words),
         )
 
     def memory(self) -> np.ndarray:

@@ -7,8 +7,8 @@ words whose values after reset follow from the axis:
                           twice the travel on either side: a handle anywhere in its travel, whatever its origin, is
                           within
     position_wrap         the count is in the last quarter of its range on either side, three times the travel away
-    velocity_limit        |velocity| > supervisor_velocity_limit, after reset one and a half times the largest speed,
-                          or the format's largest word if that is less
+    velocity_limit        |velocity| > supervisor_velocity_limit, after reset one and a half times the largest speed.
+                          The largest word is less than the estimate of the fastest handle, so that each can trip
     runaway               the handle has moved against a drive at its limit by more than supervisor_runaway since the
                           drive came to the limit, after reset by a tenth of the travel: a wall that works turns the
                           handle back, and with a reversed polarity it drives the handle in. A hand that pushes
@@ -28,6 +28,7 @@ from typing import NamedTuple
 
 from .arithmetic.fixed import SQ, UQ, wrap
 from .compiled import compiled
+from .estimators.estimate import EstimatorDesign
 from .requirements import AxisRequirements
 from .supervisor import CAUSES
 from .words import Word
@@ -130,11 +131,11 @@ class Design:
 
     Args:
         axis: the axis.
-        velocity: the format of its estimator's velocity.
+        estimator: its estimator.
     """
 
-    def __init__(self, axis: AxisRequirements, velocity: SQ):
-        self.count_width, self.velocity = axis.count_width, velocity
+    def __init__(self, axis: AxisRequirements, estimator: EstimatorDesign):
+        self.count_width, self.velocity = axis.count_width, (velocity := estimator.velocity)
         # The word has as many bits as a host's register holds without its sign.
         self.params = Params(axis.count_width, max(velocity.width - 1 - REGISTER_BITS, 0))
         count, distance = SQ(axis.count_width, 0), UQ(axis.count_width - 1, 0)
@@ -142,13 +143,15 @@ class Design:
         reach = min(int(2 * axis.travel_m / axis.count_m), count.max)
         # A finite difference knows nothing below one count a sample.
         fastest = int(max(1.5 * axis.speed_max_counts_per_sample, 2.0) * 2**speed.f)
+        # A limit that no estimate exceeds is none.
+        most = (estimator.fastest - 1) >> self.params.velocity_shift
         samples = max(int(SATURATED_S * axis.sample_hz), 1)
         self.words = (
             Word("supervisor_position_low", count, axis.count_m, "m", -reach, "least position while ARMED"),
             Word("supervisor_position_high", count, axis.count_m, "m", reach, "largest position while ARMED"),
             Word(
-                "supervisor_velocity_limit", speed, axis.velocity_unit_m_per_s, "m/s", min(fastest, speed.max),
-                "largest estimated speed while ARMED",
+                "supervisor_velocity_limit", speed, axis.velocity_unit_m_per_s, "m/s", min(fastest, most),
+                "largest estimated speed while ARMED", 0, most,
             ),
             Word(
                 "supervisor_runaway", distance, axis.count_m, "m", max(min(reach // 20, distance.max), 1),

@@ -127,7 +127,8 @@ class Register:
         return word - (1 << 16 * self.size) if self.format.signed and word >> (16 * self.size - 1) else word
 
 
-def word_register(word: Word, kind: Kind = Kind.WORD, least: int | None = None, most: int | None = None) -> Register:
-    """Return the register of a run-time word, which accepts words from `least` to `most`; None for the format's."""
+def word_register(word: Word, kind: Kind = Kind.WORD) -> Register:
+    """Return the register of a run-time word."""
     meaning = f"{word.doc[0].upper()}{word.doc[1:]}."
-    return Register(word.name, kind, word.format, meaning, word.si_per_unit, word.unit, least, most, word.reset)
+    bounds = word.least, word.most
+    return Register(word.name, kind, word.format, meaning, word.si_per_unit, word.unit, *bounds, word.reset)

@@ -1,14 +1,14 @@
 """An axis with its supervisor: every run-time word, and what the words of the axis alone are then fixed to."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from . import monitors, supervisor
 from .arithmetic.fixed import UQ
 from .designed import DesignedAxis
 from .register import VALUE_BITS, Kind, Register, word_register
 from .spec import AxisSpec
-from .supervisor import BEAT_BITS, CAUSES, COUNT, COUNT_BITS, WATCHDOG_MS
-from .words import Word
+from .supervisor import BEAT_BITS, CAUSES, COUNT, COUNT_BITS
+from .words import Word, ranges_of
 
 FIXED = ("output_force_limit",)
 """Words of the axis that no host writes: the supervisor's force limit holds at once, and after everything."""
@@ -35,17 +35,13 @@ class Design:
 
     def __init__(self, spec: AxisSpec):
         self.spec = spec
-        self.monitors = monitors.Design(spec, spec.design.estimator.velocity)
+        self.monitors = monitors.Design(spec, spec.design.estimator)
         self.supervisor = supervisor.Design(spec)
         self.committed = tuple(word for word in spec.design.words if word.name not in FIXED)
         doc = "1: the sign of the drive's pins is reversed; taken in every state but ARMED"
         invert = Word("drive_invert", UQ(1, 0), 1.0, "", int(spec.stage.inverted), doc)
         self.live = (*self.supervisor.words, *self.monitors.words, invert)
-        self.ranges = {
-            "supervisor_force_limit": (0, spec.force_limit_word),
-            "supervisor_ramp": (1, self.supervisor.ramp.max),
-            "supervisor_watchdog": WATCHDOG_MS,
-        }
+        self.ranges = ranges_of(self.live)
 
     @property
     def words(self) -> tuple[Word, ...]:
@@ -54,18 +50,15 @@ class Design:
 
     def registers(self) -> tuple[Register, ...]:
         """Return what a host sees of the supervisor and the monitors, and what it asks of them, as registers."""
-        return registers_of(self.spec, self.live, self.ranges)
+        return registers_of(self.spec, self.live)
 
 
-def registers_of(
-    spec: DesignedAxis, live: Sequence[Word], ranges: Mapping[str, tuple[int, int]]
-) -> tuple[Register, ...]:
+def registers_of(spec: DesignedAxis, live: Sequence[Word]) -> tuple[Register, ...]:
     """Return what a host sees of the supervisor and the monitors of an axis, and what it asks of them, as registers.
 
     Args:
         spec: the axis, alone or one of several.
         live: its words that need no commit.
-        ranges: the least and the largest of those that may not have every value of their formats.
     """
     causes = ", ".join(f"bit {bit} {cause.name}" for bit, cause in enumerate(CAUSES))
     per_value = VALUE_BITS // COUNT_BITS
@@ -99,5 +92,5 @@ def registers_of(
         *(Register(name, Kind.PULSE, UQ(1, 0), meaning) for name, meaning in pulses),
         Register("heartbeat", Kind.LIVE, UQ(BEAT_BITS, 0), "A word that the host changes again and again."),
         Register("acknowledged", Kind.LIVE, UQ(COUNT, 0), "The causes that the host has read."),
-        *(word_register(word, Kind.LIVE, *ranges.get(word.name, ())) for word in live),
+        *(word_register(word, Kind.LIVE) for word in live),
     )

@@ -15,8 +15,8 @@ from .arithmetic.fixed import UQ
 from .axes import AxesSpec
 from .compiled import compiled
 from .supervised import FIXED
-from .supervisor import ARMED, WATCHDOG_MS
-from .words import Word
+from .supervisor import ARMED
+from .words import Word, ranges_of
 
 SAMPLE_WORDS = (
     "supervisor_position_low", "supervisor_position_high", "supervisor_velocity_limit", "supervisor_saturated",
@@ -82,17 +82,13 @@ class Design:
 
     def __init__(self, spec: AxesSpec):
         self.spec = spec
-        self.monitors = monitors.Design(spec, spec.design.estimator.velocity)
+        self.monitors = monitors.Design(spec, spec.design.estimator)
         self.supervisor, self.watchdog = supervisor.Design(spec), watchdog.Design(spec)
         doc = "1: the sign of the drive's pins is reversed; taken in every state but ARMED"
         own = [word for word in self.supervisor.words if word.name != self.watchdog.word.name]
         self.live = (*own, *self.monitors.words, Word("drive_invert", UQ(1, 0), 1.0, "", 0, doc))
         self.words = (*spec.design.words, *self.live)
-        self.ranges = {
-            "supervisor_force_limit": (0, spec.force_limit_word),
-            "supervisor_ramp": (1, self.supervisor.ramp.max),
-            "supervisor_watchdog": WATCHDOG_MS,
-        }
+        self.ranges = ranges_of((*self.supervisor.words, *self.monitors.words))
         width, shift = self.monitors.params
         self.params = Params(sampled_monitors.Params(width, shift, spec.clocks_per_sample), self.supervisor.params)
 

@@ -161,16 +161,19 @@ class Design:
             Word(
                 "supervisor_force_limit", self.limit, r, "N", most,
                 "largest drive, either way; holds at the next clock without a commit",
+                0, most,
             ),
             Word(
                 "supervisor_ramp", self.ramp, r * axis.sample_hz, "N/s",
                 max(min(int(ramp), self.ramp.max), 1),
                 "rise of the limit after arming",
+                1, self.ramp.max,
             ),
             Word(
                 "supervisor_watchdog", UQ(11, 0), 1e-3, "s", WATCHDOG_RESET_MS,
                 f"longest time between beats of the host; {WATCHDOG_MS[0]} to {WATCHDOG_MS[1]} ms, "
                 "any other word is the cause word_range",
+                *WATCHDOG_MS,
             ),
             Word(
                 "supervisor_causes", UQ(COUNT, 0), 1.0, "", ENABLED,

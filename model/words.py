@@ -1,5 +1,6 @@
 """Run-time parameters of the hardware: a word on a port, and what it means in SI units."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from .arithmetic.fixed import UQ, Format, bits_for
@@ -30,6 +31,7 @@ class Word:
         unit: SI unit, as text; empty for choices and plain numbers.
         reset: the word after reset.
         doc: one line for the port table.
+        least, most: the range of the words that are accepted; None for the format's.
     """
 
     name: str
@@ -38,20 +40,35 @@ class Word:
     unit: str
     reset: int
     doc: str
+    least: int | None = None
+    most: int | None = None
 
     def __post_init__(self):
-        if not self.format.min <= self.reset <= self.format.max:
-            raise FieldError(self.name, f"must fit {self.format}, not {self.reset!r}")
+        for bound in (self.low, self.high, self.reset):
+            if not self.format.min <= bound <= self.format.max:
+                raise FieldError(self.name, f"must fit {self.format}, not {bound!r}")
+        if not self.low <= self.reset <= self.high:
+            raise FieldError(self.name, f"must be {self.low} to {self.high} after reset, not {self.reset!r}")
+
+    @property
+    def low(self) -> int:
+        """The least word that is accepted."""
+        return self.format.min if self.least is None else self.least
+
+    @property
+    def high(self) -> int:
+        """The largest word that is accepted."""
+        return self.format.max if self.most is None else self.most
 
     @property
     def si_min(self) -> float:
         """The smallest value, in SI units."""
-        return self.to_si(self.format.min)
+        return self.to_si(self.low)
 
     @property
     def si_max(self) -> float:
         """The largest value, in SI units."""
-        return self.to_si(self.format.max)
+        return self.to_si(self.high)
 
     def to_si(self, word: int) -> float:
         """Return the value of `word` in SI units."""
@@ -74,8 +91,14 @@ class Word:
         accepted = f"{least:g} to {most:g}"
         if whole and value % 1:
             raise FieldError(self.name, f"must be a whole number of {accepted}, not {shown(value)}")
-        lowest, highest = (max(bound * (1 + ROUNDING), float(f"{bound:g}"), key=abs) for bound in (least, most))
+        lowest = min(least - abs(least) * ROUNDING, float(f"{least:g}"))
+        highest = max(most + abs(most) * ROUNDING, float(f"{most:g}"))
         if not lowest <= value <= highest:
             unit = f" {self.unit}" if self.unit else ""
             raise FieldError(self.name, f"must be {accepted}{unit}, not {shown(value)}")
         return self.format.from_real(min(max(value, least), most) / self.si_per_unit)
+
+
+def ranges_of(words: Iterable[Word]) -> dict[str, tuple[int, int]]:
+    """Return the least and the largest of those words that may not have every value of their formats, by name."""
+    return {word.name: (word.low, word.high) for word in words if (word.least, word.most) != (None, None)}

@@ -129,8 +129,8 @@ EVERY_DESIGN = [(name, estimator) for name in SPECS for estimator in registry.ES
 @pytest.mark.parametrize(("name", "estimator"), EVERY_DESIGN)
 def test_the_si_value_of_every_word_is_accepted(name, estimator):
     for word in spec(name, estimator).design.words:
-        fmt = word.format
-        for number in {fmt.min, fmt.min // 2, fmt.min + 1, fmt.max // 3, fmt.max - 1, fmt.max}:
+        fmt, low, high = word.format, word.low, word.high
+        for number in {low, max(low // 2, low), low + 1, max(high // 3, low), high - 1, high}:
             assert word.from_si(word.to_si(number)) == word.from_si(number * word.to_si(1)) == number
             # In this order the last digits may differ.
             assert word.from_si(number / (1 / fmt.lsb / word.si_per_unit)) == number
@@ -139,11 +139,11 @@ def test_the_si_value_of_every_word_is_accepted(name, estimator):
 @pytest.mark.parametrize(("name", "estimator"), EVERY_DESIGN)
 def test_the_bounds_in_the_message_are_accepted_and_nothing_beyond(name, estimator):
     for word in spec(name, estimator).design.words:
-        for bound, last, way in ((word.si_min, word.format.min, -1), (word.si_max, word.format.max, 1)):
+        for bound, last, way, farther in ((word.si_min, word.low, -1, min), (word.si_max, word.high, 1, max)):
             shown = float(f"{bound:g}")
             assert word.from_si(shown) == pytest.approx(last, rel=5e-6)
             with pytest.raises(ValueError, match=f"^{word.name} must be "):
-                word.from_si(max(bound, shown, key=abs) + way * 1e-9 * max(word.to_si(1), abs(bound)))
+                word.from_si(farther(bound, shown) + way * 1e-9 * max(word.to_si(1), abs(bound)))
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ OUTPUTS = monitors.State._fields[:2]
 
 def design(name: str, estimator: str = "levant") -> monitors.Design:
     axis = spec(name, estimator)
-    return monitors.Design(axis, axis.design.estimator.velocity)
+    return monitors.Design(axis, axis.design.estimator)
 
 
 def make(name: str, estimator: str) -> Recorded:

@@ -13,6 +13,6 @@ def test_no_hit_of_a_scene_is_a_runaway(name):
     axis, protocol = scene.spec, scene.protocol
     # What the push has given the handle on its way, and gives it on, the drive at its limit takes: friction helps.
     way_m = protocol.push_n * abs(protocol.start_m) / (axis.force_max_n - protocol.push_n)
-    words = monitors.Design(axis, axis.design.estimator.velocity).words
+    words = monitors.Design(axis, axis.design.estimator).words
     runaway = next(word for word in words if word.name == "supervisor_runaway")
     assert way_m < runaway.to_si(runaway.reset)

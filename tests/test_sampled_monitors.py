@@ -20,7 +20,7 @@ class Bench:
 
     def __init__(self, **words: int):
         axis = spec("mhz")
-        design = monitors.Design(axis, axis.design.estimator.velocity)
+        design = monitors.Design(axis, axis.design.estimator)
         self.params, self.state, self.let_out = Params(*design.params, ROTA), START, supervisor.START
         self.inputs = Inputs(**{word.name: word.reset for word in design.words} | words)
 

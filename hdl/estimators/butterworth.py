@@ -23,8 +23,8 @@ class Estimator(EstimatorBlock):
     the three products.
 
     Rounding and overflow: operands and products round down, the velocity half up; d, w and y saturate, with flags; w
-    and y saturate only while the coefficients belong to no single cutoff, or just after a change of cutoff. The count
-    may wrap.
+    and y saturate only while the coefficients belong to no single cutoff, or just after a change of cutoff. A third
+    flag is up while the coefficients are unstable. The count may wrap.
 
     Parameters
     ----------
@@ -62,6 +62,10 @@ class Estimator(EstimatorBlock):
                     m.d.comb += scaled.eq(shift_floor(product, shift))
             with m.Default():
                 m.d.comb += scaled.eq(shift_floor(product, shifts[-1]))
+        one, frequency, twice = 1 << design.coefficient.f, self.butterworth_frequency, self.butterworth_damping << 1
+        unstable = (twice + frequency >= 4 * one) | (twice + (frequency << 1) + frequency >= 6 * one)
+        if design.exponent_max:
+            unstable &= self.butterworth_exponent == 0
         held = saturate(total, -state_max, state_max)
         limited = saturate(moved, -design.step_max, design.step_max)
 
@@ -84,7 +88,11 @@ class Estimator(EstimatorBlock):
             "SHIFT": [],
             "ADD MOVE": [total.eq(y + term)],
             "LIMIT Y": [y.eq(held), self.saturated[1].eq(self.saturated[1] | (held != total))],
-            "OUTPUT": [self.velocity.eq(shift_round_half_up(y, state.f - velocity.f)), self.valid.eq(1)],
+            "OUTPUT": [
+                self.velocity.eq(shift_round_half_up(y, state.f - velocity.f)),
+                self.saturated[2].eq(unstable),
+                self.valid.eq(1),
+            ],
         }
 
         def forget(fresh):

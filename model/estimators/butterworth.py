@@ -42,6 +42,16 @@ Formats, derived. C' = C tau^2 / q is the bound on the acceleration in counts a 
 - They hold any cutoff from the default one / 2**RANGE_BITS, or the designed one if that is lower, to CUTOFF_MAX.
 - int64 holds 62 bits: if the formats do not fit, first the range of cutoffs is reduced, then f.
 
+Range of the words. The poles are those of z^2 - (2 - beta - gamma^2) z + 1 - beta. By Jury's criterion they are stable
+if and only if 0 < beta, 0 < gamma and gamma^2 + 2 beta < 4.
+
+- Both mantissas begin at LEAST, below which no cutoff has any. 0 is refused: it would hold the velocity, or leave an
+  oscillation without damping.
+- With an exponent of 1 or more both coefficients are below 1/8, and stable.
+- With exponent 0 no ranges of single words hold every cutoff and no unstable pair. So a pair with
+  2 beta + gamma >= 4 or 2 beta + 3 gamma >= 6 raises the flag `gains_unstable` at every sample. Every unstable pair
+  does, since gamma^2 is at most gamma below 1, and at most 3 gamma - 2 from 1 to 2. A cutoff has 5.98 and less.
+
 Restart and the first sample: d = 0 and all states 0; the count may wrap. A start from rest has no transient; a start in
 motion has the filter's step response, as for any step of velocity: 4.3 % overshoot, settled in about 1 / cutoff.
 """
@@ -68,6 +78,8 @@ GUARD_BITS = 6
 """Bits of an operand below the output LSB."""
 EXPONENT_STEP = 4
 """Bits by which one step of the common exponent shifts the coefficients: few exponents, at little loss of precision."""
+LEAST = 1 << GAIN_BITS - 1 - EXPONENT_STEP
+"""The least word of a coefficient: a smaller one would have a larger exponent, or be below the least cutoff."""
 STATE_NORM = 1.75
 OPERAND_NORM = 24.0
 PRODUCT_NORM = 6.3
@@ -111,6 +123,7 @@ class Params(NamedTuple):
     operand_shift: int
     output_shift: int
     state_max: int
+    unstable: int
 
 
 class State(NamedTuple):
@@ -151,7 +164,7 @@ class Design(EstimatorDesign):
 
     name = "butterworth"
     gains_class = Gains
-    flags = ("velocity_saturated", "state_saturated")
+    flags = ("velocity_saturated", "state_saturated", "gains_unstable")
     latency = STEPS
 
     def __init__(self, axis: AxisRequirements, gains: Gains):
@@ -183,14 +196,15 @@ class Design(EstimatorDesign):
         reset = self.words_for(gains.cutoff_hz)
         mantissa = "coefficient {} times 16**butterworth_exponent"
         self.words = tuple(
-            Word(name, fmt, 1.0, "", fmt.from_real(reset[name]), doc)
-            for name, fmt, doc in (
-                ("butterworth_frequency", self.coefficient, mantissa.format("gamma")),
-                ("butterworth_damping", self.coefficient, mantissa.format("beta")),
+            Word(name, fmt, 1.0, "", fmt.from_real(reset[name]), doc, least)
+            for name, fmt, doc, least in (
+                ("butterworth_frequency", self.coefficient, mantissa.format("gamma"), LEAST),
+                ("butterworth_damping", self.coefficient, mantissa.format("beta"), LEAST),
                 (
                     "butterworth_exponent",
                     UQ(max(self.exponent_max.bit_length(), 1), 0),
                     "common exponent of the coefficients",
+                    None,
                 ),
             )
         )
@@ -229,6 +243,17 @@ class Design(EstimatorDesign):
         shift = self.operand.f + self.coefficient.f - self.state.f
         return shift + EXPONENT_STEP * min(exponent, self.exponent_max)
 
+    def unstable(self, frequency: int, damping: int, exponent: int) -> bool:
+        """Return whether the flag `gains_unstable` is up with these words."""
+        one = 1 << self.coefficient.f
+        far = 2 * damping + frequency >= 4 * one or 2 * damping + 3 * frequency >= 6 * one
+        return far and min(exponent, self.exponent_max) == 0
+
+    @property
+    def fastest(self) -> int:
+        """The velocity's word at a difference of counts that is limited at every sample."""
+        return self.step_max << self.velocity.f
+
     def params(self, words: Mapping[str, int]) -> Params:
         return Params(
             words["butterworth_frequency"],
@@ -240,6 +265,7 @@ class Design(EstimatorDesign):
             self.state.f - self.operand.f,
             self.state.f - self.velocity.f,
             self.velocity.max << (self.state.f - self.velocity.f),
+            int(self.unstable(*(words[word.name] for word in self.words))),
         )
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
@@ -273,7 +299,7 @@ def step(params, state, seen, restart):
     far_y = y + shift_floor(params.frequency * (w >> params.operand_shift), params.product_shift)
     y = saturate(far_y, -params.state_max, params.state_max)
 
-    flags = int(d != moved) | int(w != far_w or y != far_y) << 1
+    flags = int(d != moved) | int(w != far_w or y != far_y) << 1 | params.unstable << 2
     return State(1, seen.count, d, d1, w, y), shift_round_half_up(y, params.output_shift), flags
 
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
-from ..arithmetic.fixed import SQ
+from ..arithmetic.fixed import SQ, bits_for
 from ..checks import NUMBERS, check_number, check_range
 from ..compiled import by_type
 from ..requirements import AxisRequirements
@@ -76,6 +76,11 @@ class EstimatorDesign(ABC):
         """Clocks from the strobe to `valid`."""
 
     @property
+    def fastest(self) -> int:
+        """The velocity's word at the largest steady speed, which no faster one makes smaller: the format's largest."""
+        return self.velocity.max
+
+    @property
     def interval(self) -> int:
         """The fewest clocks from a strobe to the next, which may come with `valid`."""
         return self.latency
@@ -121,6 +126,14 @@ def largest_step(axis: AxisRequirements) -> int:
     place; at most half of the count's range, for two counts differ by no more.
     """
     return min(math.floor(2 * axis.speed_max_counts_per_sample) + 2, 1 << (axis.count_width - 1))
+
+
+def whole_counts(axis: AxisRequirements) -> SQ:
+    """Return the format of a whole number of counts a sample that holds twice the largest speed.
+
+    It holds at least three counts: two come in a sample at any speed, with an edge out of place.
+    """
+    return SQ(1 + max(2, bits_for(math.floor(2 * axis.speed_max_counts_per_sample) + 1)), 0)
 
 
 def fraction_bits(axis: AxisRequirements, resolution_bits: int) -> int:

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
+from ..arithmetic.fixed import SQ, saturate, wrap
 from ..compiled import compiled
 from ..requirements import AxisRequirements
-from .estimate import EstimatorDesign, EstimatorGains, estimate
+from .estimate import EstimatorDesign, EstimatorGains, estimate, whole_counts
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Design(EstimatorDesign):
 
     def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
-        self.velocity = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), axis.shrunk(0))
+        self.velocity = SQ(whole_counts(axis).i, axis.shrunk(0))
 
     def params(self, words: Mapping[str, int]) -> Params:
         return Params(self.count_width, self.velocity.max)

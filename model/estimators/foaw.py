@@ -158,6 +158,11 @@ class Design(EstimatorDesign):
         )
 
     @property
+    def fastest(self) -> int:
+        """The velocity's word at a change of the count that is limited at every sample."""
+        return self.history.change.max << self.velocity.f
+
+    @property
     def latency(self) -> int:
         return STEPS + self.history.latency + TAPS + divide_latency(self.velocity.width - 1)
 

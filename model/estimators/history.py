@@ -12,7 +12,7 @@ rest has no transient.
 Formats, derived:
 
 - `change` SQ(i, 0), the change of the count in a sample: i holds twice the largest speed (a loop that overshoots is
-  still read correctly), and at least one count, since the count of the slowest axis still steps by one. A larger change
+  still read correctly), and at least three counts: see `estimate.whole_counts`. A larger change
   is limited (flag `velocity_saturated`) and the rest of that step is forgotten. So the change over a window always
   fits, and a motion that is too fast reads as the largest velocity, not as an alias.
 - `age_bits`: the fewest bits that hold the window's length in stored positions. The memory has 2**age_bits words.
@@ -28,10 +28,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arithmetic.fixed import SQ, bits_for, saturate, wrap
+from ..arithmetic.fixed import saturate, wrap
 from ..checks import FieldError
 from ..compiled import compiled
 from ..requirements import AxisRequirements
+from .estimate import whole_counts
 
 MEMORY_BITS = 1 << 16
 """Largest memory: 16 of the 30 blocks of 4 kbit in an iCE40UP5K, 4 of the 56 of 18 kbit in an ECP5-25F."""
@@ -92,7 +93,7 @@ class Design:
 
     def __init__(self, axis: AxisRequirements, window_s: float, steps: int = 1):
         self.count_width = axis.count_width
-        self.change = SQ(1 + max(1, bits_for(2 * axis.speed_max_counts_per_sample)), 0)
+        self.change = whole_counts(axis)
         # Rounding to whole steps may lengthen a window by half, or to the least length of one step.
         most = 2.0 ** (WIDTH_MAX - 1 - self.change.i) / axis.sample_hz
         if not 0 < window_s <= most:

@@ -45,9 +45,22 @@ Formats, derived. C' = C tau^2 / q; 2**reach is at least 1/h and at least 1.
   ERROR_NORM 2**-GUARD_BITS of an LSB of the velocity, which is less than a half: *at constant n counts a sample the
   velocity, rounded half up, settles to n exactly*, to 0 at standstill. A limit cycle of the states may remain that no
   output shows.
-- The gain words are GAIN_BITS wide, with HEADROOM_BITS above the designed gain; K_x stays below 2. The exact settling
-  holds for gains of the designed h, or of any larger h that the words hold; with a smaller h the last bits may move.
+- The gain words are GAIN_BITS wide, in formats with HEADROOM_BITS above the designed gain. The exact settling holds for
+  gains of the designed h, or of any larger h that the words hold; with others the last bits may move.
 - int64 holds 62 bits: if the formats do not fit, f is reduced.
+
+Range of the gains. The poles are those of z^3 + (K_x + K_v + K_a/2 - 3) z^2 + (3 - 2 K_x - K_v + K_a/2) z + K_x - 1. By
+Jury's criterion they are stable if and only if
+
+    0 < K_x < 2,    0 < K_v,    0 < K_a,    2 K_x + K_v < 4,    K_a (2 - K_x) < 2 K_x K_v
+
+and with K_a = 0, where the filter has two integrators, without the conditions on K_a. Each word has a range of its own,
+so the ranges are a box within that region. K_a may be 0 to r times the designed one, K_x and K_v no less than 1/r
+times. With r = sqrt(2), or less for an h near 1 and above, the last condition holds in all of the box, by STABLE. (The
+designed gains have 0.25 there for small h.) K_x and K_v may be raised together by sqrt(4 / (2 K_x + K_v)) of the
+designed ones, 4 at most. So a host may set the gains of a bandwidth of 0.85 to 1.12 times the designed one, and either
+number of integrators. `kalman_position = 0`, which leaves an oscillation without damping, and `kalman_velocity = 0` are
+refused.
 
 Restart and the first sample: all states 0; the count may wrap. A start from rest has no transient; a start in motion
 has the step response, as for any step of velocity: about 41 % overshoot, settled in a few times sqrt(q / C).
@@ -73,7 +86,11 @@ GUARD_BITS = 6
 ERROR_NORM = 18.0
 """Largest sum of all rounding errors at v, in units of a guard bit: see the module's docstring."""
 HEADROOM_BITS = 2
-"""A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
+"""Gains of position and velocity may be raised to at most 2**HEADROOM_BITS times the designed ones at run time."""
+RATIOS = tuple(2 ** (step / 64) for step in range(32, -1, -1))
+"""What they may be lowered by, and the gain of the acceleration raised by, is the first of these that is stable."""
+STABLE = 0.75
+"""Largest part of 2 K_x K_v that K_a (2 - K_x) may be, where 1 is the limit of stability."""
 STEPS = 12
 """Clocks of the sequence: see `hardwall.hdl.estimators.kalman`."""
 
@@ -210,12 +227,18 @@ class Design(EstimatorDesign):
 
         reset = self.words_for(gains)
         units = (1.0, ""), (axis.sample_hz, "1/s"), (axis.sample_hz**2, "1/s^2")
+        per_sample = [value / scale for value, (scale, _) in zip(reset.values(), units, strict=True)]
+        k_x, k_v, k_a = per_sample
+        raised = min(math.sqrt(4 / (2 * k_x + k_v)), 2.0**HEADROOM_BITS)
+        ratio = next(r for r in RATIOS if r * k_a * (2 - k_x / r) <= STABLE * 2 * k_x * k_v / r**2)
+        bounds = (1 / ratio, raised), (1 / ratio, raised), (0.0, ratio)
         words = []
-        for (name, value), (scale, unit) in zip(reset.items(), units, strict=True):
-            largest = 2**HEADROOM_BITS * value / scale
+        for name, value, (scale, unit), (lowered, most) in zip(reset, per_sample, units, bounds, strict=True):
+            largest = 2**HEADROOM_BITS * value
             fmt = gain_format(min(largest, 2 - 2.0 ** (1 - GAIN_BITS)) if scale == 1 else largest)
+            ends = math.ceil(lowered * value * 2**fmt.f), min(math.floor(most * value * 2**fmt.f), fmt.max)
             what = name.removeprefix("kalman_")
-            words.append(Word(name, fmt, scale, unit, fmt.from_real(value / scale), f"gain of the {what}"))
+            words.append(Word(name, fmt, scale, unit, fmt.from_real(value), f"gain of the {what}", *ends))
         self.words = tuple(words)
         self.shifts = tuple(
             self.operand.f + word.format.f - state.f
@@ -227,6 +250,11 @@ class Design(EstimatorDesign):
         k_x, k_v, k_a = steady_state(gains.index(self._axis, integrators), integrators)
         rate = self._axis.sample_hz
         return {"kalman_position": k_x, "kalman_velocity": k_v * rate, "kalman_acceleration": k_a * rate**2}
+
+    @property
+    def fastest(self) -> int:
+        """The velocity's word at a difference of counts that is limited at every sample."""
+        return self.step_max << self.velocity.f
 
     def params(self, words: Mapping[str, int]) -> Params:
         k_x, k_v, k_a = (words[word.name] for word in self.words)

@@ -227,6 +227,11 @@ class Design(EstimatorDesign):
         self._exact = self._whole / (self.divisor * self.history.every)
 
     @property
+    def fastest(self) -> int:
+        """The velocity's word at a change of the count that is limited at every sample."""
+        return self.history.change.max << self.velocity.f
+
+    @property
     def latency(self) -> int:
         return STEPS + self.history.latency + self.taps + divide_latency(self.velocity.width - 1)
 

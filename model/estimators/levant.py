@@ -27,7 +27,18 @@ Formats, derived. Let lam = lambda tau / sqrt(q) and alp = alpha tau^2 / q be th
   still followed; but e_max is never more than the range of the count. A larger e saturates (flag `error_saturated`),
   which drags x along.
 - `lambda` UQ, GAIN_BITS wide, with two bits of headroom above the designed gain for changes at run time; `alpha` has
-  the same headroom.
+  the same headroom, and may be lowered by LOWER_BITS.
+
+Range of the gains. Three kinds of words make an estimate that is wrong without a flag, and are refused:
+
+- alpha = 0: u1 never moves.
+- a lambda near 0: nothing damps the swing of u1 about a constant speed. The swing falls by a factor of lambda and
+  sqrt(alpha) alone, and its last size is some 2 alpha^1.5 / lambda counts a sample: hence UNDAMPED.
+- a lambda above 2, for the explicit sign alone: an error below lambda^2 / 4 changes its sign at every sample, so that
+  u1 stands still while it is less than about lambda^2 / 4 counts a sample away from the speed. `LAMBDA_MAX` keeps that
+  to a count a sample.
+
+A design whose own gains are beyond one of these limits has that limit at its own gains.
 
 Both states saturate at the velocity format (flag `velocity_saturated`).
 
@@ -60,6 +71,12 @@ POSITION_BUDGET = 2.0**-5
 """Largest displacement of the position, in counts, by all rounding at |e| = 1 count."""
 HEADROOM_BITS = 2
 """A gain may be raised to 2**HEADROOM_BITS times the designed one at run time."""
+LOWER_BITS = 4
+"""Alpha may be lowered to the designed one 2**-LOWER_BITS."""
+UNDAMPED = 64
+"""Every lambda that is accepted has a square of at least every alpha / UNDAMPED: the paper's gains have alpha / 1.1."""
+LAMBDA_MAX = 2.0
+"""The largest lambda of the explicit sign, unless the designed one is larger: see the module's docstring."""
 STEPS = 1
 """Clocks of the sequence besides the root: see `hardwall.hdl.estimators.levant`."""
 
@@ -174,21 +191,27 @@ class Design(EstimatorDesign):
             lam,
         )
 
+        self.words = self._words(lam, alpha, tau, q)
+
+    def _words(self, lam: float, alpha: float, tau: float, q: float) -> tuple[Word, ...]:
+        """Return the run-time words for the designed gains per sample, with the ranges that the module derives."""
         prefix = self.name.replace("-", "_")
-        self.words = (
-            Word(
-                f"{prefix}_lambda",
-                self.lambda_,
-                math.sqrt(q) / tau,
-                "m^(1/2)/s",
-                self.lambda_.from_real(lam),
-                "gain of the square-root term",
-            ),
-            Word(
-                f"{prefix}_alpha", self.alpha, q / tau**2, "m/s^2", self.alpha.from_real(alpha), "gain of the sign term"
-            ),
+        of_root, of_sign = self.lambda_.from_real(lam), self.alpha.from_real(alpha)
+        damped = math.sqrt(self.alpha.to_real(self.alpha.max) / UNDAMPED)
+        least_root = max(min(math.ceil(damped * 2**self.lambda_.f), of_root), 1)
+        most_sign = math.floor(UNDAMPED * self.lambda_.to_real(least_root) ** 2 * 2**self.alpha.f)
+        roots = least_root, self._most(of_root)
+        signs = max(of_sign >> LOWER_BITS, 1), min(max(most_sign, of_sign), self.alpha.max)
+        doc, unit = "gain of the square-root term", "m^(1/2)/s"
+        return (
+            Word(f"{prefix}_lambda", self.lambda_, math.sqrt(q) / tau, unit, of_root, doc, *roots),
+            Word(f"{prefix}_alpha", self.alpha, q / tau**2, "m/s^2", of_sign, "gain of the sign term", *signs),
             Word(self.output_word(), UQ(1, 0), 1.0, "", 0, "velocity output: 0 for u, 1 for u1"),
         )
+
+    def _most(self, designed: int) -> int:
+        """Return the largest word of lambda, for that of the designed one."""
+        return max(designed, min(math.floor(LAMBDA_MAX * 2**self.lambda_.f), self.lambda_.max))
 
     def _least(self, f_max: int) -> tuple[float, float]:
         """Return the least lambda and alpha, per sample, that `f_max` fraction bits can hold."""

@@ -84,6 +84,10 @@ class Design(levant.Design):
     name = "levant-semi-implicit"
     steps = STEPS
 
+    def _most(self, designed: int) -> int:
+        # The projection keeps the root term from crossing, however large lambda is.
+        return self.lambda_.max
+
     def _catch(self, step: float, lam: float) -> float:
         return (step / lam) ** 2 + step
 

@@ -24,9 +24,10 @@ This loop has no acceleration: at constant acceleration a its velocity is late b
 
 Stability. The poles are those of z^2 - (2 - 2 h - h^2) z + 1 - 2 h. Its discriminant is h^3 (h + 4), its value at 1 is
 h^2: for every 0 < h <= 1/2 both poles are real, none is negative, both are below 1, and neither state oscillates. The
-words end below 1/2, ODrive's limit, so *every word but 0 is a stable loop*; 0 holds the velocity. (From 1/2 on a pole
-is negative, and at 2 sqrt(2) - 2 = 0.83 it is -1.) As the poles are real, the response of v to the difference of counts
-is nowhere negative, and its sum is 1: v is never beyond the largest difference, and does not overshoot.
+words end below 1/2, ODrive's limit, and begin at `least`, so *every word is a stable loop*; 0 would hold the velocity.
+(From 1/2 on a pole is negative, and at 2 sqrt(2) - 2 = 0.83 it is -1.) As the poles are real, the response of v to the
+difference of counts is nowhere negative, and its sum is 1: v is never beyond the largest difference, and does not
+overshoot.
 
 Norms, the sums of absolute impulse responses, follow in the same way, for any h up to 1/2:
 
@@ -40,8 +41,9 @@ Formats, derived. C' = C tau^2 / q is the bound on the acceleration in counts a 
   is a displacement of the scale, without later effect.
 - The host may lower the bandwidth to the designed one / 2**RANGE_BITS, and raise it to at least 2**HEADROOM_BITS times
   that, or to the end of the words: `least` and `most` are these h. The ranges of v and lead are the norms at `least`
-  times `step_max`, plus one: within that range of bandwidths nothing else saturates. Below it lead may (flag
-  `innovation_saturated`; it drags x along); after a change of the bandwidth in motion v may (flag `state_saturated`).
+  times `step_max`, plus one: within that range of bandwidths nothing else saturates, and no word beyond it is accepted.
+  After a change of the bandwidth in motion lead may (flag `innovation_saturated`; it drags x along), and v (flag
+  `state_saturated`).
 - f, fraction bits of the velocity: an LSB is at most sqrt(C') 2**-RESOLUTION_BITS. lead has GUARD_BITS more, and v
   another `reach`, 1 / `least` as a power of two, at least 2.
 - The multiplier takes lead without its last `less` bits, with most 2**less < 1, and then h e, which has the fraction
@@ -177,8 +179,8 @@ class Design(EstimatorDesign):
         self.lead, self.v = SQ(i_lead, f + GUARD_BITS), SQ(i, f + GUARD_BITS + reach)
         self.operand = SQ(i_lead, f + GUARD_BITS - less)
         fmt = _format(index)
-        doc = "bandwidth of the loop, both poles; 0 holds the velocity"
-        self.words = (Word("tracking_loop_bandwidth", fmt, self._hz, "Hz", fmt.from_real(index), doc),)
+        doc, least = "bandwidth of the loop, both poles", math.ceil(self.least * 2**fmt.f)
+        self.words = (Word("tracking_loop_bandwidth", fmt, self._hz, "Hz", fmt.from_real(index), doc, least),)
         self.shifts = fmt.f - less, fmt.f - reach
 
     def _bits(self, index: float) -> tuple[int, int, int, int]:
@@ -200,6 +202,11 @@ class Design(EstimatorDesign):
         low, high = self.bandwidth_min_hz, self.bandwidth_max_hz
         if not low * (1 - 1e-9) <= bandwidth_hz <= high * (1 + 1e-9):
             raise FieldError("bandwidth_hz", f"must be {low:g} to {high:g} at these rates, not {bandwidth_hz!r}")
+
+    @property
+    def fastest(self) -> int:
+        """The velocity's word at a difference of counts that is limited at every sample."""
+        return self.step_max << self.velocity.f
 
     def params(self, words: Mapping[str, int]) -> Params:
         return Params(

@@ -119,6 +119,8 @@ def _fits(word: Word, value: float) -> bool:
 
 def _range_of(word: Word, scene: Scene) -> str:
     """Return what the scene key of a word accepts; so are the numbers that it shows."""
+    if word.low > 0:
+        return f"{word.si_min:g} to {word.si_max:g}"
     half = word.to_si(1) / 2
     least = f"{half:g}" if word.from_si(float(f"{half:g}")) else repr(half)
     above_0 = f"{least} (half of its word's LSB) to "

@@ -29,7 +29,7 @@ def reset_words(design: EstimatorDesign) -> list[int]:
 
 
 @compiled
-def _run(params: tuple, state: tuple, seen: Any, restart: np.ndarray, velocity: np.ndarray, flags: np.ndarray) -> tuple:
+def run(params: tuple, state: tuple, seen: Any, restart: np.ndarray, velocity: np.ndarray, flags: np.ndarray) -> tuple:
     """Fill `velocity` and `flags` with the outputs for records of what the decoder shows; return the last state."""
     for k in range(len(velocity)):
         sight = Seen(
@@ -58,7 +58,7 @@ def model(design: EstimatorDesign, rows: Iterable[tuple[int, ...]], start: tuple
     for part in map(slice, [0, *changes], [*changes, len(restart)]):
         held = {word.name: int(values[part.start]) for word, values in zip(design.words, words, strict=True)}
         sight = Seen(*(column[part] for column in seen))
-        start = _run(design.params(held), start, sight, restart[part], velocity[part], flags[part])
+        start = run(design.params(held), start, sight, restart[part], velocity[part], flags[part])
     return {"velocity": velocity, "saturated": flags}
 
 

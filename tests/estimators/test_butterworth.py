@@ -72,7 +72,7 @@ async def follows_model(dut):
     samples = SAMPLES if name == "mhz" else SAMPLES // 10
     expected = await follow(dut, make(name), stimulus(name, samples), START)
     # The campaign must reach every saturation, and the quiet track too.
-    assert {0b00, 0b01, 0b10, 0b11} == set(expected["saturated"].tolist())
+    assert {0b000, 0b001, 0b010, 0b011, 0b100, 0b111} <= set(expected["saturated"].tolist())
 
 
 @cocotb.test()
@@ -104,7 +104,8 @@ def oracle(d: Design, rows):
         far_y = y + gamma * (w // coarse * coarse) // fine * fine
         y = max(-most, min(most, far_y))
         last, d1, d2 = count, step, d1
-        yield math.floor(y / out + Fraction(1, 2)), (step != moved) | (w != far_w or y != far_y) << 1
+        unstable = 2 * beta + gamma >= 4 or 2 * beta + 3 * gamma >= 6
+        yield math.floor(y / out + Fraction(1, 2)), (step != moved) | (w != far_w or y != far_y) << 1 | unstable << 2
 
 
 @pytest.mark.parametrize("name", ["paper", "mhz", "narrow"])

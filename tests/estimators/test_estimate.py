@@ -130,7 +130,7 @@ def test_the_float_kernel_takes_the_selected_output_and_the_gains_in_si(name):
         assert exact.params.estimator == axis.design.estimator.float_params(axis.design.gains, output, {})
     for word in axis.design.estimator.words:
         if word.unit:
-            changed = Axis(axis, True, **{word.name: word.to_si(max(word.reset // 2, 1))}).params.estimator
+            changed = Axis(axis, True, **{word.name: word.to_si(max(word.reset // 2, word.low))}).params.estimator
             assert flat(changed) != flat(Axis(axis, True).params.estimator)
 
 

@@ -19,11 +19,11 @@ def active(board, registers, name: str) -> int:
 
 def test_words_of_one_call_are_committed_by_one_request(board, axis, registers):
     before = len(board.requests)
-    axis.set(wall_stiffness=10e3, wall_damping=20.0, levant_lambda=0.5)
+    axis.set(wall_stiffness=10e3, wall_damping=20.0, levant_lambda=5.0)
     # One request, and the two of the first beat.
     assert len(board.requests) - before == 3
     assert board.requests[before][7:9] == b"\0\1"
-    for name, value in (("wall_stiffness", 10e3), ("wall_damping", 20.0), ("levant_lambda", 0.5)):
+    for name, value in (("wall_stiffness", 10e3), ("wall_damping", 20.0), ("levant_lambda", 5.0)):
         assert active(board, registers, name) == round(value / registers[name].lsb)
         assert axis.get(name) == pytest.approx(value, abs=registers[name].lsb / 2)
     untouched = [

@@ -81,7 +81,7 @@ class World:
     def _pins(self) -> dict[str, int]:
         random = self.random
         if random.random() < 0.002:
-            self.speed = random.choice((0.0, 0.005, 0.01, 0.02, 0.02, 0.05, 0.2, 0.5)) * random.choice((-1, 1))
+            self.speed = random.choice((0.0, 0.005, 0.01, 0.02, 0.02, 0.05, 0.2, 0.5, 1.0)) * random.choice((-1, 1))
             self.reach = 13 if random.random() < 0.2 else 5
         if abs(self.position) >= self.reach:
             self.speed = -abs(self.speed) if self.position > 0 else abs(self.speed)
