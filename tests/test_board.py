@@ -41,7 +41,7 @@ def random_words(host: Host) -> dict[str, int]:
     words = {}
     for register in host.registers.words:
         size = 2.0 ** -random.integers(0, register.format.width)
-        words[register.name] = int((register.format.max + 1) * random.random() * size)
+        words[register.name] = max(int((register.high + 1) * random.random() * size), register.low)
     left, near = int(random.integers(0, 2)), 2.0 ** -random.integers(1, axis.count_width)
     depth = int(random.integers(0, half) * near)
     place = min(max(count + (depth if left else -depth), -half), half - 1)

@@ -328,9 +328,18 @@ class Design(EstimatorDesign):
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 kernel's parameters: unrounded gains."""
         steepest = 2.0 ** (self.acceleration.i - 1)
-        sizes = self.count_width, self.unit, self.time_bits
-        held = self._per_sample, 2 * self._apart * self._per_sample, self.doubt, steepest
-        return FloatParams(*sizes, *held, self.row_bits, self.rates, scale_map.nothing(True))
+        return FloatParams(
+            count_width=self.count_width,
+            unit=self.unit,
+            time_bits=self.time_bits,
+            per_sample=self._per_sample,
+            bound=2 * self._apart * self._per_sample,
+            doubt=self.doubt,
+            steepest=steepest,
+            row_bits=self.row_bits,
+            table=self.rates,
+            scale=scale_map.nothing(True),
+        )
 
     def start(self, floating: bool = False) -> State:
         return FLOAT_START if floating else START

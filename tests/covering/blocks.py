@@ -33,7 +33,7 @@ RECORDED = ("component.component",)
 """The module of a block that a recorder feeds."""
 BLOCKS = (
     *(Block(f"arithmetic/{name}") for name in ("divide", "divisionless", "signed_divide", "sqrt")),
-    *(Block(f"estimators/{name}") for name in ("cycle_times", "history", "kept_edges")),
+    *(Block(f"estimators/{name}") for name in ("bursts", "cycle_times", "history", "kept_edges")),
     *(Block("estimators/finite_difference" if n == "fdm" else f"estimators/{n.replace('-', '_')}") for n in ESTIMATORS),
     Block("quadrature", RECORDED),
     Block("scale_map", RECORDED),

@@ -257,7 +257,7 @@ def check_no_drift(axis_spec: AxisSpec) -> None:
     for speed in (ramp, -ramp, np.full(rate, 3.0), np.full(rate, -3.0)):
         counts = np.floor(np.cumsum(speed) * tau + 0.25).astype(np.int64)
         record = axis(axis_spec).run(counts)
-        assert record.flags[-1] == 0
+        assert record.design.flag_names(int(record.flags[-1])) in ([], ["count_wrapped"])
         total = int(record.velocity.sum()) * record.design.estimator.velocity.lsb
         assert abs(total - (counts[-1] - counts[0])) <= 2
 
