@@ -82,7 +82,9 @@ def test_a_steady_speed_is_read_however_fast_it_is(name, floating, downwards):
         assert mean >= before * (1 - rate / 4), speed
         before = mean
     # The monitor's limit after reset is below what the estimate reaches.
-    (limit,) = [word for word in Monitors(axis, axis.design.estimator).words if word.name == "supervisor_velocity_limit"]
+    (limit,) = [
+        word for word in Monitors(axis, axis.design.estimator).words if word.name == "supervisor_velocity_limit"
+    ]
     assert before > limit.to_si(limit.reset)
 
 
