@@ -233,10 +233,10 @@ class Design(EstimatorDesign):
         ratio = next(r for r in RATIOS if r * k_a * (2 - k_x / r) <= STABLE * 2 * k_x * k_v / r**2)
         bounds = (1 / ratio, raised), (1 / ratio, raised), (0.0, ratio)
         words = []
-        for name, value, (scale, unit), (lowered, most) in zip(reset, per_sample, units, bounds, strict=True):
+        for name, value, (scale, unit), (down, up) in zip(reset, per_sample, units, bounds, strict=True):
             largest = 2**HEADROOM_BITS * value
             fmt = gain_format(min(largest, 2 - 2.0 ** (1 - GAIN_BITS)) if scale == 1 else largest)
-            ends = math.ceil(lowered * value * 2**fmt.f), min(math.floor(most * value * 2**fmt.f), fmt.max)
+            ends = math.ceil(down * value * 2**fmt.f), min(math.floor(up * value * 2**fmt.f), fmt.max)
             what = name.removeprefix("kalman_")
             words.append(Word(name, fmt, scale, unit, fmt.from_real(value), f"gain of the {what}", *ends))
         self.words = tuple(words)
