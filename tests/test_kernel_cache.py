@@ -199,7 +199,7 @@ def test_two_processes_that_keep_at_once_never_mix_their_variants(tmp_path, monk
 
 WALL = """
 from hardwall.model.wall import FloatParams, render
-print(render(FloatParams(2.0, 0.0, 0, 0, 0, 0.0, 0, 16, 1.0), 21, 0.0))
+print(render(FloatParams(2.0, 0.0, 0, 0, 0, 0.0, 0, 1.0), 21, 0.0))
 """
 
 

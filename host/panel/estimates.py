@@ -36,7 +36,9 @@ class _Lane:
     def run(self, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the velocities (m/s) and the wall's forces (N) of successive counts."""
         words = [np.zeros(len(counts), np.int64) for _ in range(4)]
-        self._state = model.run(self._params, self._state, counts, *words)
+        # A fault of the encoder changes neither velocity nor force; the board's drive is not looked at here.
+        faults = np.zeros(len(counts), np.int64)
+        self._state = model.run(self._params, self._state, counts, faults, *words)
         record = model.Record(self.spec.design, *words)
         return record.velocity_m_per_s, record.force_n
 
