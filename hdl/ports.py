@@ -135,6 +135,8 @@ class Quantity(NamedTuple):
     si_per_unit: float
     unit: str
     reset: int | None = None
+    range: tuple[int, int] | None = None
+    """The words that are accepted; None for the format's."""
 
 
 def _quantities(spec: AxisSpec | AxesSpec) -> dict[str, Quantity]:
@@ -151,7 +153,10 @@ def _quantities(spec: AxisSpec | AxesSpec) -> dict[str, Quantity]:
         "edge_kind": Quantity(UQ(2, 0), 1.0, ""),
         "illegal_count": Quantity(UQ(ILLEGAL_WIDTH, 0), 1.0, ""),
         **dict.fromkeys(("velocity", "record_velocity"), velocity),
-        **{word.name: Quantity(word.format, word.si_per_unit, word.unit, word.reset) for word in spec.design.words},
+        **{
+            word.name: Quantity(word.format, word.si_per_unit, word.unit, word.reset, (word.low, word.high))
+            for word in spec.design.words
+        },
     }
 
 
@@ -178,7 +183,8 @@ def _number(quantity: Quantity) -> tuple[str, str, str, str]:
     scale = fmt.lsb * quantity.si_per_unit
     lsb = f"{scale:.6g}{unit}" if unit else ""
     reset = "" if quantity.reset is None else str(quantity.reset)
-    return str(fmt), lsb, f"{fmt.min * scale:.6g} to {fmt.max * scale:.6g}{unit}", reset
+    low, high = quantity.range or (fmt.min, fmt.max)
+    return str(fmt), lsb, f"{low * scale:.6g} to {high * scale:.6g}{unit}", reset
 
 
 def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:

@@ -198,8 +198,8 @@ def test_two_processes_that_keep_at_once_never_mix_their_variants(tmp_path, monk
 
 
 WALL = """
-from hardwall.model.wall import FloatParams, render
-print(render(FloatParams(2.0, 0.0, 0, 0, 0, 0.0, 0, 1.0), 21, 0.0))
+from hardwall.model.wall import Params, render
+print(render(Params(2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 99), 21, 0))
 """
 
 
@@ -217,9 +217,9 @@ def test_an_edit_of_the_arithmetic_is_computed_wherever_the_build_folder_is(tmp_
         return done.stdout.strip(), len(done.stderr.splitlines())
 
     lines = int("file" in place)
-    assert run() == ("-42.0", lines)
-    # The wall's kernel takes its depth from another file, which Numba's own cache does not look at.
+    assert run() == ("-42", lines)
+    # The wall's kernel rounds by another file, which Numba's own cache does not look at.
     fixed = tmp_path / "hardwall" / "model" / "arithmetic" / "fixed.py"
-    fixed.write_text(fixed.read_text() + "\n\n@compiled\ndef wrap(number, width):\n    return number + 1\n")
-    assert run() == ("-40.0", lines)
+    fixed.write_text(fixed.read_text() + "\n\n@compiled\ndef shift_round_half_up(word, shift):\n    return word - 2\n")
+    assert run() == ("-40", lines)
     assert list((tmp_path / "hardwall").rglob("*.nb[ic]")) == []

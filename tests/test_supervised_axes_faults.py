@@ -170,11 +170,14 @@ async def the_handle_runs_away(device: Device) -> None:
 
 
 async def the_estimate_saturates(device: Device) -> None:
-    await device.write(WRONG, encoder_glitch_clocks=0)
+    # From within the wall on the other side of 0, so that the count stays far from its ends.
+    clocks = device.design.spec.clocks_per_sample
+    await device.write(WRONG, encoder_glitch_clocks=0, wall_position=-2 * clocks)
     await device.clock(commit=1 << WRONG)
+    await device.moves(-clocks)
     await device.clocks(ENOUGH)
-    # For two samples, and not as far as where the count wraps.
-    await device.moves(3 * device.design.spec.clocks_per_sample // 2, every=1)
+    # Half a sample and more is beyond the format: so many edges are that in two samples, wherever a sample begins.
+    await device.moves(2 * clocks + 1, every=1)
 
 
 async def a_word_is_out_of_range(device: Device) -> None:
