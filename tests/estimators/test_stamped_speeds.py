@@ -157,8 +157,9 @@ def test_a_single_pair_of_close_edges_is_no_sign_of_rest(name, floating):
     seen = read(axis, (clocks + late, levels), Fraction(1, 20), floating).velocity_m_per_s[len(late) * 3 :]
     # The bound after 1.9 counts of silence, for a cell of 1.25 counts, less the speed.
     assert seen.min() > (2.5 / 1.9 - 1) * speed
-    # The mean velocity of the shortest interval in use that begins at a late edge; edge-kalman leaves no edge out.
-    counts = math.ceil((1 << axis.design.estimator.shortest) * speed / axis.count_m / axis.clock_hz + 0.9) if name == "levant-edge" else 9
+    # The mean velocity of the shortest interval that levant-edge takes from a late edge; edge-kalman stays below it.
+    shortest = Fraction(1 << axis_of("levant-edge").design.estimator.shortest, axis.clock_hz)
+    counts = math.ceil(shortest * speed * COUNTS_A_METRE + Fraction(9, 10))
     assert seen.max() < counts / (counts - 0.9) * speed
 
 
