@@ -69,8 +69,9 @@ def test_a_steady_speed_is_read_however_fast_it_is(name, floating, downwards):
     velocity, unit = axis.design.estimator.velocity, axis.velocity_unit_m_per_s
     for speed in SPEEDS + BEYOND:
         rate = float(speed) / axis.count_m / axis.clock_hz
-        # As many edges to begin with as to be read: a start in motion is forgotten in some memories.
-        seconds = max(400 / (speed * COUNTS_A_METRE), Fraction(1, 125))
+        # Half is to begin with: a start in motion is forgotten in some memories, which are edges or a time.
+        a_count = 1 / (speed * COUNTS_A_METRE)
+        seconds = max(40 * a_count, min(200 * a_count, Fraction(1, 4)), Fraction(1, 125))
         record = read(axis, edges(speed, seconds, downwards), seconds, floating)
         half = len(record.velocity) // 2
         mean = sign * float(np.mean(record.velocity_m_per_s[half:]))

@@ -15,13 +15,13 @@ class Bug:
         function: the function, mostly the `elaborate` of a block.
         right: a part of its source, which occurs once.
         wrong: what stands in its place.
-        sooner: another part that occurs once, and what stands in its place: no bug, but it shows sooner with it.
+        sooner: other parts that occur once, and what stands in their places: no bugs, but it shows sooner with them.
     """
 
     function: Callable
     right: str
     wrong: str
-    sooner: tuple[str, str] | None = None
+    sooner: tuple[tuple[str, str], ...] = ()
 
     def __str__(self) -> str:
         return f"{self.wrong or 'nothing'} for {self.right}"
@@ -34,7 +34,7 @@ class Bug:
             ValueError: if the source does not have a part exactly once.
         """
         source = textwrap.dedent(inspect.getsource(self.function))
-        for right, wrong in ((self.right, self.wrong), *([self.sooner] if self.sooner else [])):
+        for right, wrong in ((self.right, self.wrong), *self.sooner):
             if source.count(right) != 1:
                 raise ValueError(f"{self.function.__qualname__} must have {right!r} once, not {source.count(right)}")
             source = source.replace(right, wrong)

@@ -185,7 +185,7 @@ def every_operation_ends(bench: Bench) -> None:
     bench.promise(~bench.past(bench.reset, init=1) | bench.state("BOOT") & (left == block.boot_clocks))
 
 
-NO_BOOT = ('m.next = "BOOT_TAKE"', 'm.next = "IDLE"')
+NO_BOOT = (('m.next = "BOOT_TAKE"', 'm.next = "IDLE"'),)
 """A reset writes no cell, so that a bug behind it shows in the first clocks."""
 PROPERTIES = [
     Property(
