@@ -1,7 +1,6 @@
 """The command `accuracy`."""
 
-import hashlib
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import typer
@@ -81,9 +80,9 @@ def command(
         # Invalid input is reported before anything long begins.
         for job in jobs:
             spec_of(job)
-        files = _recording_jobs(curves, recorded, backend)
+        recordings = _recordings(curves, recorded, backend)
         rows = options.results(f"accuracy, {backend}", measure, jobs, Store("accuracy"))
-        rows += options.results(f"recordings, {backend}", measure_recording, files, Store("recordings"))
+        rows += options.results(f"recordings, {backend}", recordings.measure, recordings.jobs, Store("recordings"))
     except (ValueError, recording.RecordingError, ReplayError) as error:
         raise BadInput(str(error)) from None
     options.finish(accuracy.Accuracy(figure, curves, rows, labels))
@@ -113,20 +112,37 @@ def _signals(names: list[str]) -> tuple[list[str], list[tuple[str, str]]]:
     return known, recorded
 
 
-def _recording_jobs(curves: list[Curve], recorded: list[tuple[str, str]], backend: str) -> list[dict]:
-    """Return the arguments of `measure_recording` for every estimator and recording.
+@dataclass(frozen=True)
+class _Recordings:
+    """Recordings, each read once: a job has the digest of the bytes that its counts come from.
+
+    Attributes:
+        read: the recordings, by digest and column.
+        jobs: the arguments of `measure`, which JSON can hold.
+    """
+
+    read: dict[tuple[str, str], recording.Recording]
+    jobs: list[dict]
+
+    def measure(self, file: str, column: str, content: str, **how: str) -> dict:
+        """Return the row of a job: see `measure_recording`."""
+        return measure_recording(replace(self.read[content, column], file=file), **how)
+
+
+def _recordings(curves: list[Curve], recorded: list[tuple[str, str]], backend: str) -> _Recordings:
+    """Return the recordings of (file, column) pairs, to be put through every estimator.
 
     Raises:
         RecordingError, ReplayError: if a recording is not valid, or too short to be judged, or an estimator cannot take
             it.
     """
-    jobs = []
+    read, jobs = {}, []
     for file, column in recorded:
         counts = recording.load(file, column)
         check_length(counts)
         for estimator in dict.fromkeys(curve.estimator for curve in curves):
             plan(counts, estimator, backend, COARSEN)
-        content = hashlib.sha256(Path(file).read_bytes()).hexdigest()
-        keys = {"file": file, "column": column, "content": content, "backend": backend}
+        read[counts.content, column] = counts
+        keys = {"file": file, "column": column, "content": counts.content, "backend": backend}
         jobs += [{"estimator": curve.estimator, "output": curve.output} | keys for curve in curves]
-    return jobs
+    return _Recordings(read, jobs)

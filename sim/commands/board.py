@@ -54,7 +54,7 @@ def command(
     log.print(one_line(f"bitstream: {path / report['bitstream']}, {said}"), soft_wrap=True)
     if program:
         with log.status(f"loading {on.name}"):
-            load_into(on, path / report["bitstream"], program)
+            load_into(on, path / report["bitstream"], program, report["sha256"])
 
 
 def scene_on(board: Description, options: StudyOptions, scene: str | None, estimator: str | None) -> Scene:

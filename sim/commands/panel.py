@@ -2,10 +2,12 @@
 
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -19,7 +21,7 @@ from ...host.panel.serving import LOCAL, PanelServer
 from ...host.port import BAUD
 from ...model import supervisor
 from ..jobs import ending
-from ..scene.load import load
+from ..scene.load import parse, read
 from ..scene.schema import Scene
 from .errors import BadInput
 from .options import EstimatorOption, SetOption, changes_of, within
@@ -67,7 +69,9 @@ def command(
         if scene is None and CLOCK not in changes:
             changes[CLOCK] = CLOCK_HZ
             words += ["--set", f"{CLOCK}={CLOCK_HZ}"]
-        with VirtualBench([name, *words], load(name, changes), identity) as board:
+        text = read(name)
+        of = parse(name, text, changes)
+        with _scene_file(of, text) as file, VirtualBench([str(file), *words], of, identity) as board:
             try:
                 _serve(board.connect, board, f"{name}, virtual", (host, http), seconds)
             except PortError:
@@ -77,6 +81,16 @@ def command(
         raise BadInput("SCENE, --estimator and --set are for `hardwall panel virtual`, not for a board at a port")
     else:
         _serve(lambda: connect(port, baud, identity=identity, pace=pace), None, port, (host, http), seconds)
+
+
+@contextmanager
+def _scene_file(scene: Scene, text: str) -> Iterator[Path]:
+    """Provide a file with the text of a scene, so that a board that starts later, or anew, runs what was read here."""
+    folder = tempfile.TemporaryDirectory(prefix="hardwall-")
+    with ending.undone(folder.cleanup):
+        file = Path(folder.name) / f"{scene.name}.toml"
+        file.write_text(text, encoding="utf-8")
+        yield file
 
 
 class VirtualBench:

@@ -18,10 +18,11 @@ from ...model.estimators import registry
 from ...model.spec import AxisSpec
 from ..scene.load import load
 from ..world.encoder import Errors, offsets
-from . import learning, recording, signals
+from . import learning, signals
 from .judge import Judge
 from .motions import velocity
 from .playback import velocities
+from .recording import Recording
 from .replay import check_length, replay
 from .through_pins import GLITCH_CLOCKS
 
@@ -234,9 +235,7 @@ def judged(
     return judge, raised
 
 
-def measure_recording(
-    estimator: str, output: str, file: str, column: str, backend: str = "float", content: str = ""
-) -> dict:
+def measure_recording(recorded: Recording, estimator: str, output: str, backend: str = "float") -> dict:
     """Return one row of a recording at its own rate, its counts `COARSEN` times coarser, in recorded counts.
 
     The file does not give the size of a count in mm, so the keys of the figures end in `_counts_s`. The reference is
@@ -244,15 +243,13 @@ def measure_recording(
     sample.
 
     Args:
+        recorded: the recording.
         estimator, output, backend: as for `measure`.
-        file, column: the recording's file and its column of counts.
-        content: a digest of the file, which ties a stored result to the file's content.
 
     Raises:
-        RecordingError, ReplayError: in one line, what is refused and what is accepted.
+        ReplayError: in one line, what is refused and what is accepted.
         RuntimeError: if the RTL could not be built.
     """
-    recorded = recording.load(file, column)
     check_length(recorded)
     result = replay(recorded, estimator, output, backend, coarsen=COARSEN)
     rate, begin = result.recording.rate_hz, result.judged_from
@@ -265,7 +262,7 @@ def measure_recording(
         "output": output,
         "backend": backend,
         "sample_hz": rate,
-        "signal": f"{file}:{column}",
+        "signal": f"{recorded.file}:{recorded.column}",
         "rms_counts_s": judge.rms,
         "max_counts_s": judge.largest,
         "delay_s": judge.delay_s(lambda at_s: np.interp(at_s, times, exact), DELAY_MAX_S),

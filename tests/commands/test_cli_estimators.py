@@ -1,12 +1,14 @@
 """The commands that compare estimators: their output, the input that they refuse, and interrupted runs."""
 
 import json
+import math
 import re
 import signal
 
 import pytest
 
 from hardwall.model.build_folder import build_dir
+from hardwall.sim.commands import accuracy as commands
 from stimuli.command_line import call
 from stimuli.lengths import LONG
 from stimuli.processes import HARDWALL, ended_by, session, started, stored, wait_until
@@ -146,6 +148,36 @@ def test_a_recording_that_cannot_be_taken_is_refused_before_any_work(
     assert (code, out) == (2, "")
     assert err.startswith(f"hardwall: error: made.csv, column c: {said}")
     assert err.count("\n") == 1
+
+
+def test_a_recording_that_changes_meanwhile_counts_as_it_was_read(monkeypatch, capsys, tmp_path, fresh):
+    """What is stored under the digest of a file is of the bytes with that digest."""
+    file, plan = tmp_path / "made.csv", commands.plan
+
+    def recorded(height: int) -> str:
+        rows = (f"{number / 1000:.3f},{round(height * math.sin(number / 100))}\n" for number in range(3000))
+        return "time_s,c\n" + "".join(rows)
+
+    def row() -> dict:
+        words = ("accuracy", "--signal", f"{file}:c", "--estimators", "fdm", "--workers", 1, "--json")
+        code, out, err = call(monkeypatch, capsys, *words)
+        assert code == 0, err
+        return json.loads(out)["rows"][0]
+
+    def planned(*arguments: object) -> object:
+        file.write_text(recorded(9000))
+        return plan(*arguments)
+
+    file.write_text(recorded(3000))
+    with monkeypatch.context() as patch:
+        patch.setattr(commands, "plan", planned)
+        low = row()
+    assert row()["acceleration_max_counts_s2"] > 2 * low["acceleration_max_counts_s2"]
+    file.write_text(recorded(3000))
+    (stored,) = (tmp_path / "build" / "results").iterdir()
+    assert row() == low, "from the store"
+    stored.unlink()
+    assert row() == low, "computed again"
 
 
 def test_an_interrupted_run_loses_nothing_and_ends_its_workers(tmp_path):

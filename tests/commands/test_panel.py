@@ -1,10 +1,15 @@
 """The command `panel`: its end, and what it refuses; the page itself is tested in a browser."""
 
 import subprocess
+from pathlib import Path
 
 import psutil
 import pytest
 
+from hardwall.sim.commands.errors import BadInput
+from hardwall.sim.scene.load import read
+from hardwall.sim.scene.schema import Scene
+from stimuli.command_line import call
 from stimuli.processes import HARDWALL, ended, line, started, wait_until
 from stimuli.virtual_boards import SCENE
 
@@ -24,6 +29,21 @@ def test_its_end_leaves_no_process_and_a_board_is_not_asked_for_twice():
     assert code == 0, err
     assert children
     wait_until(lambda: not any(child.is_running() and child.status() != "zombie" for child in children))
+
+
+def test_a_board_that_starts_later_runs_the_scene_that_was_read(monkeypatch, capsys, tmp_path):
+    file, text, seen = tmp_path / "mine.toml", read("mhz"), []
+    file.write_text(text)
+
+    def bench(words: list[str], scene: Scene, identity: str | None) -> None:
+        file.write_text("another")
+        seen.append((scene.name, Path(words[0]).stem, Path(words[0]).read_text()))
+        raise BadInput("seen")
+
+    monkeypatch.setattr("hardwall.sim.commands.panel.VirtualBench", bench)
+    code, out, err = call(monkeypatch, capsys, "panel", "virtual", file)
+    assert (code, out, err) == (2, "", "hardwall: error: seen\n")
+    assert seen == [("mine", "mine", text)]
 
 
 @pytest.mark.parametrize(

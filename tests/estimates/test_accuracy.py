@@ -132,9 +132,10 @@ def test_the_lower_bound():
 
 @pytest.mark.parametrize("name", RECORDINGS)
 def test_recordings_of_a_real_drive(recordings, name):
-    row = measure_recording("levant", "u1", str(recordings / name), "motor_counts", "fixed")
-    result = replay(load(recordings / name, "motor_counts"), "levant", "u1", "fixed", coarsen=COARSEN)
+    recorded = load(recordings / name, "motor_counts")
+    row = measure_recording(recorded, "levant", "u1", "fixed")
+    result = replay(recorded, "levant", "u1", "fixed", coarsen=COARSEN)
     assert row["rms_counts_s"] == pytest.approx(result.rms_counts_per_s, rel=1e-12)
-    plain = measure_recording("fdm", "u", str(recordings / name), "motor_counts")
+    plain = measure_recording(recorded, "fdm", "u")
     assert row["rms_counts_s"] < plain["rms_counts_s"] == pytest.approx(result.rms_fdm_counts_per_s, rel=1e-12)
     assert row["delay_s"] > plain["delay_s"] > 0

@@ -5,6 +5,7 @@ import os
 
 import pytest
 
+from hardwall import sim
 from hardwall.model import build_folder
 from hardwall.sim.jobs import ending, parallel, store
 from hardwall.sim.jobs.store import Store
@@ -166,6 +167,29 @@ def test_other_sources_begin_anew(monkeypatch):
     Store("some").put({"a": 1}, 1)
     monkeypatch.setattr(store, "sources", lambda: "others")
     assert Store("some").get({"a": 1}) is None
+
+
+def test_sources_that_changed_since_the_program_began_are_none_of_a_store(monkeypatch, caplog, unsaid):
+    """The digest is of the sources as they are, and the program runs what they were: its results have no place."""
+    Store("some").put({"a": 1}, 1)
+    monkeypatch.setattr(sim, "BEGAN_NS", 0)
+    kept = Store("some")
+    assert {"a": 1} not in kept
+    kept.put({"a": 2}, 2)
+    assert kept.get({"a": 2}) == 2
+    (said,) = caplog.messages
+    assert said.endswith(" changed while this process ran: its results are not kept")
+    monkeypatch.undo()
+    monkeypatch.setenv("HARDWALL_BUILD", str(kept.path.parents[1]))
+    assert ({"a": 1} in Store("some"), {"a": 2} in Store("some")) == (True, False)
+
+
+def test_a_time_in_the_future_is_that_of_another_clock(monkeypatch, caplog, unsaid):
+    monkeypatch.setattr(store.time, "time_ns", lambda: 1)
+    monkeypatch.setattr(sim, "BEGAN_NS", 0)
+    Store("some").put({"a": 1}, 1)
+    assert Store("some").get({"a": 1}) == 1
+    assert caplog.messages == []
 
 
 @pytest.mark.parametrize("workers", [1, 2])

