@@ -11,35 +11,6 @@ from hardwall.sim.estimates.recording import RecordingError, load
 GOOD = ["0.000,5", "0.001,6", "0.002,4", "0.003,4"]
 
 
-@pytest.fixture
-def read(tmp_path):
-    """Return a function that loads a column of a file of the given text, bytes or lines after a header."""
-
-    def load_text(content, column="counts", rate_hz=None, header="time_s,counts"):
-        path = tmp_path / "spindle.csv"
-        if isinstance(content, list):
-            content = "\n".join([header, *content]) + "\n"
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return load(path, column, rate_hz)
-
-    return load_text
-
-
-@pytest.fixture
-def refused(read):
-    """Return a function that gives the message for a refused file, which is always one line that names the file."""
-
-    def message(*args, **kwargs):
-        with pytest.raises(RecordingError) as caught:
-            read(*args, **kwargs)
-        text = str(caught.value)
-        assert "\n" not in text
-        assert "spindle.csv" in text
-        return text
-
-    return message
-
-
 def test_counts_rate_and_times_are_read(read):
     found = read(GOOD)
     assert found.counts.dtype == np.int64
@@ -160,83 +131,18 @@ def test_without_times_a_rate_must_be_given(refused, read):
     assert read("counts\n1\n2\n", rate_hz=2500).rate_hz == 2500.0
 
 
-@pytest.mark.parametrize("rate", [0, -1, np.nan, np.inf, 2e9, "10"])
+@pytest.mark.parametrize("rate", [0, -1, 0.09, np.nan, np.inf, 2e9, "10"])
 def test_a_rate_that_is_none_is_refused(refused, rate):
-    assert "the rate must be 1e-06 to 1e+09 Hz, not " in refused("counts\n1\n2\n", rate_hz=rate)
-
-
-def stamped(times, form="{:.3f}"):
-    return [f"{form.format(t)},{k}" for k, t in enumerate(times)]
-
-
-@pytest.mark.parametrize(
-    ("times", "form", "rate"),
-    [
-        (np.arange(5000) / 1000, "{:.3f}", 1000),
-        (np.arange(5000) / 3000, "{:.6f}", 3000),
-        (np.arange(5000) / 3000, "{:.4f}", 3000),
-        (np.arange(5000) * 0.001, "{!r}", 1000),
-        (np.cumsum(np.full(5000, 0.001)), "{!r}", 1000),
-        (1.7e9 + np.arange(5000) / 1000, "{!r}", 1000),
-        (1.7e9 + np.arange(5000) / 1000, "{:.6f}", 1000),
-        (np.arange(500), "{:.0f}", 1),
-        (np.arange(500) / 1000 - 0.25, "{:.3e}", 1000),
-    ],
-)
-def test_the_rate_is_found_from_uniform_times(read, times, form, rate):
-    """The rate is as exact as the stamps: the first and the last are off by at most half a unit."""
-    lines = stamped(map(float, times), form)
-    decimals = 6 if "e" in form else max(len(line.split(",")[0].partition(".")[2]) for line in lines)
-    whole = times[-1] - times[0]
-    unit = max(10.0**-decimals, np.spacing(np.abs(times).max()), 1e-12 * whole)
-    found = read(lines).rate_hz
-    assert abs(found / rate - 1) <= unit / whole * (1 + 1e-9)
-    assert read(lines, rate_hz=rate).rate_hz == rate
-
-
-@pytest.mark.parametrize("form", ["{:.3f}", "{:.4f}", "{:.6f}", "{!r}"])
-@pytest.mark.parametrize("samples", [10, 20_000])
-def test_a_lost_sample_is_seen(refused, form, samples):
-    times = np.arange(samples) / 1000
-    times[samples // 2 :] += 0.001
-    message = refused(stamped(map(float, times), form))
-    assert f"line {samples // 2 + 2}, column time_s: times must be uniform within" in message
-    assert "not go by 0.002 s where 0.001 s is usual" in message
-    assert "times must agree with the rate 1000 Hz within" in refused(stamped(map(float, times), form), rate_hz=1000)
-
-
-@pytest.mark.parametrize(
-    ("cells", "line", "said"),
-    [
-        (["0.000", "0.001", "0.003", "0.003"], 5, "times must increase, not go by 0 s"),
-        (["0.000", "0.001", "0.000", "0.001"], 4, "times must increase, not go by -0.001 s"),
-        (["0.0000", "0.0010", "0.0025", "0.0030"], 4, "times must be uniform within 0.0001 s, not go by 0.0015 s"),
-        (["0.000", "", "0.002", "0.003"], 3, "a time must be a number of seconds of -1e+12 to 1e+12, not ''"),
-        (["0.000", "0.001", "nan", "0.003"], 4, "a time must be a number of seconds of -1e+12 to 1e+12, not 'nan'"),
-        (["0.000", "0.001", "1e400", "0.003"], 4, "a time must be a number of seconds of -1e+12 to 1e+12, not '1e400'"),
-        (["0.000", "0.001", "noon", "0.003"], 4, "a time must be a number of seconds of -1e+12 to 1e+12, not 'noon'"),
-    ],
-)
-def test_times_that_are_not_uniform_are_refused(refused, cells, line, said):
-    message = refused([f"{cell},1" for cell in cells])
-    assert f"line {line}, column time_s: {said}" in message
-
-
-def test_a_rate_that_contradicts_the_times_is_refused(refused, read):
-    lines = stamped(np.arange(2000) / 1000)
-    assert "line 3, column time_s: times must agree with the rate 500 Hz within 0.001 s" in refused(lines, rate_hz=500)
-    assert "(over all: 1000 Hz)" in refused(lines, rate_hz=1001)
-    # The rate is as exact as stamps of a millisecond allow over two seconds.
-    assert read(lines, rate_hz=1000.4).rate_hz == 1000.4
+    assert "the rate must be 0.1 to 1e+09 Hz, not " in refused("counts\n1\n2\n", rate_hz=rate)
 
 
 @pytest.mark.parametrize("step", ["1e-12", "1e-300", "1e-999999999", "1e7", "1e300"])
 def test_a_rate_of_times_has_the_range_of_a_given_rate(refused, step):
     message = refused(["0,1", f"{step},1"])
     if step in ("1e-12", "1e-300", "1e7"):
-        assert "column time_s: times must be those of a rate of 1e-06 to 1e+09 Hz, not of " in message
+        assert "column time_s: times must be those of a rate of 0.1 to 1e+09 Hz, not of " in message
     assert len(message) < 300
-    assert "the rate must be 1e-06 to 1e+09 Hz, not 1e-07" in refused(GOOD, rate_hz=1e-7)
+    assert "the rate must be 0.1 to 1e+09 Hz, not 1e-07" in refused(GOOD, rate_hz=1e-7)
 
 
 def test_numbers_of_any_length_are_refused_in_a_short_line(refused):

@@ -1,0 +1,15 @@
+"""The error of a recording that is refused, and how its message names files and columns."""
+
+from ...model.checks import shown
+
+NAME_MAX = 200
+"""The most characters of the name of a column or of a file in a message."""
+
+
+class RecordingError(ValueError):
+    """A recording that is refused: one line that names the file, the place in it, and what is accepted."""
+
+
+def plain(text: str) -> str:
+    """Return the name of a file or of a column for a message, without quotes where none are needed."""
+    return text if text.isprintable() and 0 < len(text) <= NAME_MAX else shown(text)

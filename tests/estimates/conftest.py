@@ -1,0 +1,34 @@
+"""Recordings from lines of text, and the messages of those that are refused."""
+
+import pytest
+
+from hardwall.sim.estimates.recording import RecordingError, load
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Return a function that loads a column of a file of the given text, bytes or lines after a header."""
+
+    def load_text(content, column="counts", rate_hz=None, header="time_s,counts"):
+        path = tmp_path / "spindle.csv"
+        if isinstance(content, list):
+            content = "\n".join([header, *content]) + "\n"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return load(path, column, rate_hz)
+
+    return load_text
+
+
+@pytest.fixture
+def refused(read):
+    """Return a function that gives the message for a refused file, which is always one line that names the file."""
+
+    def message(*args, **kwargs):
+        with pytest.raises(RecordingError) as caught:
+            read(*args, **kwargs)
+        text = str(caught.value)
+        assert "\n" not in text
+        assert "spindle.csv" in text
+        return text
+
+    return message
