@@ -2,6 +2,8 @@
 
 import errno
 import logging
+import os
+import re
 import select
 import socket
 import time
@@ -105,7 +107,7 @@ def client_of(name: str, baud: int, wait_s: float) -> SerialClient | NetworkClie
     if not name.startswith(NETWORK):
         return SerialClient(name, baudrate=baud, timeout=wait_s, retries=0)
     host, _, number = name.removeprefix(NETWORK).rpartition(":")
-    if not host or not number.isdecimal() or not 0 < int(number) < 1 << 16:
+    if not host or not re.fullmatch("[0-9]{1,5}", number) or not 0 < int(number) < 1 << 16:
         raise PortError(f"a port of the network must be {NETWORK}HOST:PORT, with a PORT of 1 to 65535, not {name}")
     return NetworkClient(host, port=int(number), framer=FramerType.RTU, timeout=wait_s, retries=0)
 
@@ -121,6 +123,7 @@ def reason(error: Exception) -> str:
         return "another program has it, and a board has one host at a time"
     if number in (errno.ECONNREFUSED, errno.ETIMEDOUT):
         return "nothing listens there"
-    if "configure" in str(error):
+    if number == errno.EISDIR or "configure" in str(error):
         return "it is no serial port"
-    return str(error).rpartition(": ")[2] or str(error)
+    # The number of a name that is not found is not the system's.
+    return os.strerror(number) if number and number > 0 else str(error).rpartition(": ")[2] or str(error)

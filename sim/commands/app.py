@@ -54,8 +54,9 @@ def _run() -> tuple[int, str]:
         return 1, f"{error.name} is not installed: it comes with pip install 'hardwall[{extra}]'"
     except streams.StdoutError as error:
         return error.code, str(error)
-    except (RuntimeError, OSError) as error:
-        return 1, f"{error}{ending.remark()}"
+    except (RuntimeError, OSError, MemoryError) as error:
+        what = "this run needs more memory than there is" if isinstance(error, MemoryError) else error
+        return 1, f"{what}{ending.remark()}"
     except SystemExit as exit_:
         return exit_.code or 0, ""
     return 0, ""

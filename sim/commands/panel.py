@@ -1,5 +1,8 @@
 """The command `panel`."""
 
+import errno
+import os
+import socket
 import subprocess
 import sys
 import tempfile
@@ -18,14 +21,15 @@ from ...host.panel.estimates import Estimates
 from ...host.panel.hand import Hand
 from ...host.panel.live import Bench
 from ...host.panel.serving import LOCAL, PanelServer
-from ...host.port import BAUD
+from ...host.port import BAUD, BAUD_MAX
 from ...model import supervisor
+from ...model.checks import shown
 from ..jobs import ending
 from ..scene.load import parse, read
 from ..scene.schema import Scene
 from .errors import BadInput
 from .options import EstimatorOption, SetOption, changes_of, within
-from .port import BaudOption, IdentityOption, PaceOption, SecondsOption, check_pace
+from .port import IdentityOption, PaceOption, SecondsOption, check_pace
 from .terminal import log
 from .virtual import COUNTS
 
@@ -52,7 +56,9 @@ def command(
     ] = None,
     estimator: EstimatorOption = None,
     set_: SetOption = None,
-    baud: BaudOption = BAUD,
+    baud: Annotated[
+        int | None, typer.Option(min=1, max=BAUD_MAX, help="the board's rate", show_default=f"{BAUD}")
+    ] = None,
     identity: IdentityOption = None,
     pace: PaceOption = None,
     host: Annotated[str, typer.Option(metavar="ADDRESS", help="the address at which the page is served")] = LOCAL,
@@ -62,7 +68,10 @@ def command(
     if seconds is not None:
         within(seconds, "--seconds", 0.0, 1e6, "s")
     check_pace(pace)
+    _check_address(host, http)
     if port == VIRTUAL:
+        if baud is not None or pace is not None:
+            raise BadInput("--baud and --pace are for a board at a port, not for `hardwall panel virtual`")
         name = scene or SCENE
         changes = changes_of(set_, controller__estimator=estimator)
         words = [*_options("--set", set_ or []), *_options("--estimator", [estimator] if estimator else [])]
@@ -80,7 +89,19 @@ def command(
     elif scene or estimator or set_:
         raise BadInput("SCENE, --estimator and --set are for `hardwall panel virtual`, not for a board at a port")
     else:
-        _serve(lambda: connect(port, baud, identity=identity, pace=pace), None, port, (host, http), seconds)
+        _serve(lambda: connect(port, baud or BAUD, identity=identity, pace=pace), None, port, (host, http), seconds)
+
+
+def _check_address(host: str, http: int) -> None:
+    """Raise BadInput, before a board is started, if this machine has no such address; RuntimeError if it is taken."""
+    try:
+        socket.create_server((host, http), family=socket.AF_INET6 if ":" in host else socket.AF_INET).close()
+    except (OSError, UnicodeError) as error:
+        number = getattr(error, "errno", None)
+        # The number of a name that is not found is not the system's.
+        if number is None or number < 0 or number == errno.EADDRNOTAVAIL:
+            raise BadInput(f"--host must be an address of this machine, not {shown(host)}") from None
+        raise RuntimeError(f"port {http} of {host} cannot be had: {os.strerror(number)}") from None
 
 
 @contextmanager

@@ -73,7 +73,13 @@ def command(
             print(f"tcp port: 127.0.0.1:{line.tcp_port}")
         print(f"orders: {', '.join(f'{name} {order.operand}' for name, order in ORDERS.items())}", flush=True)
         pace = _Pace(speed, math.inf if seconds is None else seconds)
-        _run(board, line, teller, pace, _Counts() if counts else None)
+        counted = _Counts() if counts else None
+        try:
+            simulated_s, real_s = _run(board, line, teller, pace, counted)
+        finally:
+            if counted:
+                counted.end()
+        print(f"{simulated_s:g} s in {real_s:.3g} s: {simulated_s / real_s:.2f} of real time")
 
 
 @dataclass(frozen=True)
@@ -96,8 +102,13 @@ class _Counts:
         self._counts += map(str, board.counts.tolist())
         self._runs += 1
         if self._runs == COUNTED_RUNS:
+            self.end()
+
+    def end(self) -> None:
+        """Print the counts that are left."""
+        if self._counts:
             print(COUNTS, *self._counts, flush=True)
-            self._counts, self._runs = [], 0
+        self._counts, self._runs = [], 0
 
 
 class _Orders:
@@ -124,8 +135,15 @@ class _Orders:
                 self._rest += data or b"\n" * bool(self._rest)
 
 
-def _run(board: VirtualBoard, line: Line, teller: Teller, pace: _Pace, counts: _Counts | None) -> None:
-    """Let the board run, carry bytes and orders to it, and tell its hosts how much of real time it keeps."""
+def _run(board: VirtualBoard, line: Line, teller: Teller, pace: _Pace, counts: _Counts | None) -> tuple[float, float]:
+    """Let the board run, carry bytes and orders to it, and tell its hosts how much of real time it keeps.
+
+    Returns:
+        The simulated time and the real time that it took, s.
+
+    Raises:
+        RuntimeError: if the handle is too fast for its encoder.
+    """
     orders, keeping, told = _Orders(), Keeping(), False
     began, begun_s = time.monotonic(), board.handle.time_s
 
@@ -155,8 +173,7 @@ def _run(board: VirtualBoard, line: Line, teller: Teller, pace: _Pace, counts: _
         if not told and real_s > JUDGED_S:
             told = True
             log.print(f"it runs at {simulated_s / real_s:.2g} of real time")
-    simulated_s, real_s = passed()
-    print(f"{simulated_s:g} s in {real_s:.3g} s: {simulated_s / real_s:.2f} of real time")
+    return passed()
 
 
 def _carry(board: VirtualBoard, line: Line, wait_s: float) -> None:

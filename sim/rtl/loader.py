@@ -5,6 +5,7 @@ import tempfile
 from pathlib import Path
 
 from ..boards.description import Description, Memory
+from ..jobs.ending import undone
 from . import tools
 from .tools import SynthesisError
 
@@ -21,8 +22,9 @@ def load(board: Description, bitstream: Path, memory: Memory, sha256: str) -> No
         SynthesisError: if the bitstream has another digest than `sha256`, there is no loader, or it fails, as it does
             without a board.
     """
-    with tempfile.TemporaryDirectory() as folder:
-        work = Path(folder)
+    folder = tempfile.TemporaryDirectory(prefix="hardwall-")
+    with undone(folder.cleanup):
+        work = Path(folder.name)
         copy = work / bitstream.name
         copy.write_bytes(_content(board, bitstream, sha256))
         command = (LOADER, "--board", board.loader, OPTION[memory], str(copy))

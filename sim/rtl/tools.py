@@ -40,8 +40,13 @@ def run(work: Path, log: Path, command: Sequence[str], doing: str) -> None:
     tool = shutil.which(command[0], path=os.pathsep.join([str(TOOLS), os.environ.get("PATH", "")]))
     if tool is None:
         raise SynthesisError(f"{command[0]} is not installed: {HOW_TO_INSTALL}")
+    # What a tool leaves when it is ended goes with the folder that it works in.
+    temporary = work / "tmp"
+    temporary.mkdir(exist_ok=True)
+    environ = os.environ | {"TMPDIR": str(temporary.absolute())}
     with log.open("w", encoding="utf-8") as file:
-        done = children.run([tool, *command[1:]], cwd=work, stdout=file, stderr=subprocess.STDOUT)
+        done = children.run([tool, *command[1:]], cwd=work, env=environ, stdout=file, stderr=subprocess.STDOUT)
+    shutil.rmtree(temporary, ignore_errors=True)
     if done.returncode:
         lines = [line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines()]
         why = next(filter(None, map(_error, lines)), f"exit code {done.returncode}")

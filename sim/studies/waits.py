@@ -76,7 +76,8 @@ def program_of(folder: Path) -> Path:
         ValueError: if there is none.
     """
     for place in PLACES:
-        if (folder / place).exists():
+        # What cannot be looked at, as a name that is too long, is none.
+        if os.path.exists(folder / place):
             return folder.absolute() / place
     raise ValueError(f"must be a checkout in which make tools has run, or an environment with hardwall, not {folder}")
 

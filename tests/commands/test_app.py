@@ -197,3 +197,11 @@ def test_a_summary_reads_well(capsys):
 def test_a_name_with_markup_is_only_a_name(capsys):
     show(Table({"[red]heading": "left"}, [["[bold]cell"]]))
     assert "[bold]cell" in capsys.readouterr()[0]
+
+
+def test_a_run_that_needs_more_memory_than_there_is_ends_in_a_line(monkeypatch, capsys):
+    def run() -> None:
+        raise MemoryError
+
+    monkeypatch.setattr("hardwall.sim.commands.group.run", run)
+    assert call(monkeypatch, capsys, "hit") == (1, "", "hardwall: error: this run needs more memory than there is\n")

@@ -52,6 +52,11 @@ def test_a_board_that_starts_later_runs_the_scene_that_was_read(monkeypatch, cap
         (["/dev/hardwall-absent"], 1, "cannot be opened: there is none of that name"),
         (["/dev/hardwall-absent", "mhz"], 2, "SCENE, --estimator and --set are for `hardwall panel virtual`"),
         (["virtual", "nowhere"], 2, "nowhere"),
+        (["virtual", "--baud", "9600"], 2, "--baud and --pace are for a board at a port, not for `hardwall panel virt"),
+        (["virtual", "--pace", "0.5"], 2, "--baud and --pace are for a board at a port, not for `hardwall panel virtu"),
+        (["virtual", "--host", "nosuch.invalid"], 2, "--host must be an address of this machine, not 'nosuch.invalid'"),
+        (["virtual", "--host", "192.0.2.1"], 2, "--host must be an address of this machine, not '192.0.2.1'"),
+        (["virtual", "--host", "a" * 300], 2, "--host must be an address of this machine, not 'aaa"),
         # The virtual board itself finds this.
         (["virtual", *changes("controller.clock_hz=400000", "encoder.count_m=20e-6")], 2, "must be 460800 or more"),
     ],

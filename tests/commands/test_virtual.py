@@ -76,6 +76,14 @@ def test_it_prints_the_count_of_every_sample_and_ends_after_the_time_that_was_as
     assert re.search(r"\n0\.04 s in [\d.]+ s: [\d.]+ of real time\n$", done.stdout)
 
 
+def test_the_last_counts_are_printed_too():
+    words = command(CLOCK, "--seconds", "0.003", "--counts", "--speed", "0")
+    done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (line,) = [line.split() for line in done.stdout.splitlines() if line.startswith("counts:")]
+    assert len(line) - 1 == 30
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -2,6 +2,7 @@
 
 import os
 import socket
+import tracemalloc
 
 import pytest
 
@@ -16,6 +17,19 @@ def test_a_file_is_read_whole_up_to_its_bound(tmp_path):
         content_of(path, 4)
     with pytest.raises(FileNotFoundError):
         content_of(tmp_path / "none", 5)
+
+
+def test_a_small_file_takes_little_memory_whatever_its_bound(tmp_path):
+    path = tmp_path / "file"
+    path.write_bytes(b"12345")
+    tracemalloc.start()
+    try:
+        assert content_of(path, 1 << 32) == b"12345"
+        assert tracemalloc.get_traced_memory()[1] < 1 << 22
+    finally:
+        tracemalloc.stop()
+    path.write_bytes(bytes(range(256)) * 20_000)
+    assert content_of(path, 1 << 32) == path.read_bytes()
 
 
 def test_what_has_no_end_or_no_writer_is_not_read(tmp_path, monkeypatch):

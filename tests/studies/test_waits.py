@@ -68,3 +68,6 @@ def test_what_has_no_hardwall_is_refused(tmp_path, monkeypatch, capsys):
         "hardwall: error: --against must be a checkout in which make tools has run, or an environment with hardwall, "
         f"not {tmp_path}\n"
     )
+    code, out, err = call(monkeypatch, capsys, "bench", "--against", "a" * 300)
+    assert (code, out) == (2, "")
+    assert err.startswith("hardwall: error: --against must be a checkout in which make tools has run, ")
