@@ -5,6 +5,7 @@ Whatever becomes of a cluster is a RuntimeError of one line: the logs of Dask ar
 
 import asyncio
 import logging
+import os
 import threading
 import time
 from collections.abc import Callable, Hashable, Iterator
@@ -29,6 +30,7 @@ POLL_S = 1.0
 SCHEMES = ("tcp", "tls")
 HOST_MAX = 253
 """The most characters of a host's name."""
+LOST = "the connection to the Dask scheduler is lost"
 SILENT = ("asyncio", "distributed", "tornado")
 """The loggers of Dask and of what it is made of."""
 
@@ -59,11 +61,13 @@ def result_of(future: Future) -> dict:
     """
     try:
         return future.result()
-    except (KilledWorker, CancelledError, ModuleNotFoundError) as error:
-        if getattr(error, "reason", None) == "scheduler-connection-lost":
-            raise RuntimeError("the connection to the Dask scheduler is lost") from None
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise RuntimeError(f"the Dask cluster could not run a hit: {reason}") from None
+    except CancelledError:
+        # Nobody else cancels a job: the reason that Dask gives depends on how far the job had come.
+        raise RuntimeError(LOST) from None
+    except KilledWorker:
+        raise RuntimeError("the Dask cluster could not run a hit: its workers end while they run it") from None
+    except ModuleNotFoundError as error:
+        raise RuntimeError(f"the Dask cluster could not run a hit: a worker has no module {error.name}") from None
 
 
 class Cluster:
@@ -76,7 +80,12 @@ class Cluster:
     def give(self, tag: Hashable, function: Callable[..., Any], job: dict) -> None:
         """Have `function(**job)` called: see `crew.Crew`."""
         # Every job is a call of its own, even if another one is equal.
-        future = self._client.submit(function, **job, pure=False)
+        try:
+            future = self._client.submit(function, **job, pure=False)
+        except Exception:
+            if self._client.status == "running":
+                raise
+            raise RuntimeError(LOST) from None
         self._tags[future.key] = tag
         self._queue.add(future)
 
@@ -105,7 +114,7 @@ def connected(scheduler: str) -> Iterator[Cluster]:
     try:
         client = Client(scheduler, timeout=TIMEOUT_S)
     except (OSError, ValueError) as error:
-        raise RuntimeError(f"no Dask scheduler answers at {scheduler}: {error or 'timed out'}") from None
+        raise RuntimeError(f"no Dask scheduler answers at {scheduler}: {_why(error)}") from None
     with client:
         try:
             client.wait_for_workers(1, TIMEOUT_S)
@@ -128,7 +137,7 @@ def _watched(client: Client, scheduler: str) -> Iterator[None]:
         peopled = time.monotonic()
         while not over.wait(POLL_S):
             now = time.monotonic()
-            if client.scheduler_info()["workers"]:
+            if client.scheduler_info().get("workers"):
                 peopled = now
             elif now - peopled > PATIENCE_S:
                 deserted.set()
@@ -167,10 +176,21 @@ def _check_scheduler(address: str) -> None:
     try:
         kind = answer.result(TIMEOUT_S)
     except Exception as error:
-        reason = "timed out" if isinstance(error, TimeoutError) else " ".join(str(error).split())
-        raise RuntimeError(f"no Dask scheduler answers at {address}: {reason or type(error).__name__}") from None
+        raise RuntimeError(f"no Dask scheduler answers at {address}: {_why(error)}") from None
     if kind != "Scheduler":
         raise RuntimeError(f"no Dask scheduler answers at {address}: what answers is no scheduler")
+
+
+def _why(error: BaseException) -> str:
+    """Return why nobody answers: the system's own reason where there is one, for Dask wraps it into sentences."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError) and cause.errno and cause.errno > 0:
+            return os.strerror(cause.errno)
+        cause = cause.__cause__
+    if isinstance(error, OSError):
+        return "timed out"
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 async def _kind_of(address: str) -> str | None:

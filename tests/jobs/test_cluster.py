@@ -5,11 +5,13 @@ import socket
 import sys
 import threading
 from collections.abc import Callable
+from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager
 from functools import partialmethod
 
 import pytest
 from distributed import Client, LocalCluster
+from distributed.scheduler import KilledWorker
 
 from hardwall.sim.jobs import cluster
 from stimuli.command_line import call
@@ -155,3 +157,44 @@ def test_a_scheduler_that_is_killed_is_a_failure_in_a_line(monkeypatch, capfd):
         with pytest.raises(RuntimeError, match=r"^the connection to the Dask scheduler is lost$"):
             wait_for_nobody(address, monkeypatch, scheduler.kill)
     assert capfd.readouterr() == ("", "")
+
+
+def test_a_job_for_a_scheduler_that_was_killed_fails_in_a_line_too(monkeypatch, capfd):
+    """The client does not know yet, or connects again and again; what Dask says of the job is not for the user."""
+    monkeypatch.setattr(cluster, "TIMEOUT_S", 30.0)
+    monkeypatch.setattr(cluster, "PATIENCE_S", 1.0)
+    monkeypatch.setattr(cluster, "POLL_S", 0.1)
+
+    def give_late() -> None:
+        with cluster.connected(address) as crew:
+            crew.give("taken", json.dumps, {"obj": 7})
+            assert crew.take() == ("taken", "7")
+            scheduler.kill()
+            scheduler.wait()
+            crew.give("late", json.dumps, {"obj": 8})
+            crew.take()
+
+    with started(sys.executable, "-c", SCHEDULER) as scheduler:
+        address = line(scheduler)
+        message = rf"^{cluster.LOST}$|^the Dask cluster at {address} has had no worker for 1 s$"
+        with pytest.raises(RuntimeError, match=message):
+            give_late()
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (CancelledError("dumps-02ae cancelled for reason: unknown."), cluster.LOST),
+        (
+            KilledWorker("dumps-02ae", None, 3),
+            "the Dask cluster could not run a hit: its workers end while they run it",
+        ),
+        (ModuleNotFoundError("No module named 'a'", name="a"), "the Dask cluster could not run a hit: a worker has no"),
+    ],
+)
+def test_what_dask_says_of_a_job_is_put_in_words(error, said):
+    future = Future()
+    future.set_exception(error)
+    with pytest.raises(RuntimeError, match=f"^{said}"):
+        cluster.result_of(future)
