@@ -9,7 +9,7 @@ import typer
 from ...host import Axis
 from ...host.capture import Captured
 from ...host.port import BAUD
-from ...model.capture import SOURCES
+from ...model.capture import DECIMATION_BITS, RECORDS_MAX, SOURCES
 from ...model.checks import shown
 from ..jobs.result import Summary
 from .errors import BadInput
@@ -19,6 +19,7 @@ from .set import values_of
 from .study import StudyOptions, study
 from .terminal import log, progress
 
+DECIMATION_MAX = (1 << DECIMATION_BITS) - 1
 HAND = "hand"
 """The trigger that a person gives: as soon as enough records are there before it."""
 
@@ -60,9 +61,10 @@ def command(
         str, typer.Option(metavar="NAME,...", help=f"what triggers: {', '.join((*SOURCES, HAND))}")
     ] = "contact",
     before: Annotated[
-        int | None, typer.Option(help="records wanted before the trigger", show_default="a quarter of all")
+        int | None,
+        typer.Option(min=0, max=RECORDS_MAX, help="records wanted before the trigger", show_default="a quarter of all"),
     ] = None,
-    decimation: Annotated[int, typer.Option(help="samples from a record to the next")] = 1,
+    decimation: Annotated[int, typer.Option(min=1, max=DECIMATION_MAX, help="samples from a record to the next")] = 1,
     level: Annotated[float, typer.Option(metavar="M", help="the position of the triggers rise and fall, m")] = 0.0,
     arm: Annotated[bool, typer.Option("--arm", help="arm the axis first, and disarm it at the end")] = False,
     seconds: Annotated[float, typer.Option(metavar="S", help="the longest wait")] = 60.0,

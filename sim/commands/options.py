@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import stat
 import tempfile
 from contextlib import suppress
@@ -10,6 +11,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from ...model.axes import AXES_MAX
 from ...model.checks import shown
 from ...model.estimators import registry
 from ..boards.parts import PARTS
@@ -69,7 +71,9 @@ ModelOption = Annotated[Literal["float", "fixed"], typer.Option(help="float64 al
 DeviceOption = Annotated[PartName, typer.Option(help="the part to place and route for")]
 AxesOption = Annotated[
     int | None,
-    typer.Option(metavar="N", help="several axes, each at the scene's rates", show_default="one alone"),
+    typer.Option(
+        min=1, max=AXES_MAX, metavar="N", help="several axes, each at the scene's rates", show_default="one alone"
+    ),
 ]
 SeedsOption = Annotated[int, typer.Option(min=1, max=99, help="number of placements; fmax is their median")]
 RateOption = Annotated[float, typer.Option(metavar="HZ", help="sample rate")]
@@ -141,11 +145,14 @@ def value_of(key: str, text: str) -> Any:
         # Nothing can follow a value in an inline table but another key.
         found = toml_of(f"table = {{ value = {text} }}")
     except ValueError:
-        return text
+        return float(text) if DECIMAL.fullmatch(text) else text
     if found.keys() != {"table"} or found["table"].keys() != {"value"}:
         raise BadInput(f"--set {shown(key)} must be one value, not {shown(text)}")
     return found["table"]["value"]
 
+
+DECIMAL = re.compile(r"[+-]?([0-9]+\.[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+"""A number as people write it and TOML does not, `.35` or `2.`."""
 
 GAINS = ("controller.estimator", "controller.output", "controller.gains")
 WALL = ("wall.stiffness_n_per_m", "wall.damping_n_s_per_m")

@@ -11,6 +11,9 @@ from .options import BackendOption, Estimator, OutputOption, output_file
 from .study import StudyOptions, study
 from .terminal import progress
 
+OPTIONS = {"output": "--output", "coarsen": "--coarsen", "acceleration_max_counts_per_s2": "--acceleration-max"}
+"""The options that give the arguments of a replay, by the names of these."""
+
 
 @study("plot")
 def command(
@@ -20,7 +23,9 @@ def command(
     rate: Annotated[
         float | None, typer.Option(metavar="HZ", help="sample rate", show_default="from column time_s")
     ] = None,
-    coarsen: Annotated[int, typer.Option(help="divide the counts, and judge against the full ones")] = 1,
+    coarsen: Annotated[
+        int, typer.Option(min=1, max=replay.COARSEN_MAX, help="divide the counts, and judge against the full ones")
+    ] = 1,
     estimator: Annotated[Estimator, typer.Option(help="velocity estimator")] = "levant",
     output: OutputOption = None,
     backend: BackendOption = "fixed",
@@ -35,6 +40,8 @@ def command(
         recorded = recording.load(file, column, rate)
         with progress(f"{file.name} {estimator} {backend}", len(recorded.counts)) as advance:
             result = replay.replay(recorded, estimator, output, backend, coarsen, acceleration_max, progress=advance)
+    except replay.ArgumentError as error:
+        raise BadInput(f"{OPTIONS[error.argument]} {error.said}") from None
     except (recording.RecordingError, replay.ReplayError) as error:
         raise BadInput(str(error)) from None
     options.finish(result, {"velocities": (out, result.save)} if out else {})

@@ -37,6 +37,7 @@ class Report(BaseModel):
     max_force_n: Number
     estimate_rms_mm_per_s: Number | None
     force_sha256: Name | None
+    touched: bool = True
     axis: Name | None = None
 
     def row(self) -> list[str]:

@@ -12,6 +12,7 @@ import typer
 
 from ...model.checks import shown
 from ...model.link.told_pace import Teller
+from ...model.link.uart import BAUD_MAX, BAUD_MIN
 from ..rtl.families import FAMILIES
 from ..scene.load import load
 from ..virtual.keeping import Keeping
@@ -44,7 +45,9 @@ def command(
     tcp: Annotated[
         int | None, typer.Option(min=0, max=65535, metavar="PORT", help="listen at this port of 127.0.0.1, too")
     ] = None,
-    baud: Annotated[int | None, typer.Option(help="rate of the serial line", show_default="the board's")] = None,
+    baud: Annotated[
+        int | None, typer.Option(min=BAUD_MIN, max=BAUD_MAX, help="rate of the serial line", show_default="the board's")
+    ] = None,
     seconds: Annotated[
         float | None, typer.Option(metavar="S", help="simulated time to run", show_default="until it is interrupted")
     ] = None,

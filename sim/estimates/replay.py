@@ -33,12 +33,26 @@ from .through_pins import GLITCH_CLOCKS
 
 CLOCK_MAX_HZ = 100e6
 """The fastest clock of a replay; counts that change too fast for it are a fault of the recording, not a motion."""
+COARSEN_MAX = (1 << 31) - 1
 EDGES_MAX = 1 << 24
 """The most edges in a sample that go through the pins: all of them are in memory."""
 
 
 class ReplayError(ValueError):
     """A replay that is refused: one line with what is wrong and what is accepted."""
+
+
+class ArgumentError(ReplayError):
+    """An argument of `replay` that is refused: the message begins with its name.
+
+    Attributes:
+        argument: the name of the argument.
+        said: the message behind it.
+    """
+
+    def __init__(self, argument: str, said: str):
+        super().__init__(f"{argument} {said}")
+        self.argument, self.said = argument, said
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,9 +159,9 @@ class Replay(Summary):
             )
 
 
-def _one_of(name: str, value: object, accepted: tuple[str, ...]) -> None:
+def _one_of(name: str, value: object, accepted: tuple[str, ...], of: str = "") -> None:
     if value not in accepted:
-        raise ReplayError(f"{name} must be one of {', '.join(accepted)}, not {shown(value)}")
+        raise ArgumentError(name, f"{of}must be one of {', '.join(accepted)}, not {shown(value)}")
 
 
 def _check_speed(recording: Recording, counts: np.ndarray, count: int, taker: str) -> None:
@@ -169,7 +183,7 @@ def _check_names(estimator: str, output: str | None, backend: str) -> str:
     _one_of("estimator", estimator, tuple(registry.ESTIMATORS))
     outputs = registry.design_of(estimator).outputs
     output = outputs[0] if output is None else output
-    _one_of(f"output of {estimator}", output, outputs)
+    _one_of("output", output, outputs, f"of {estimator} ")
     _one_of("backend", backend, BACKENDS)
     return output
 
@@ -186,13 +200,15 @@ def check_length(recording: Recording) -> None:
 def _check_numbers(recording: Recording, coarsen: object, bound: float | None, cutoff: float) -> None:
     """Raise ReplayError if a recording cannot be replayed with these numbers."""
     rate = recording.rate_hz
-    if isinstance(coarsen, bool) or not (isinstance(coarsen, int) and 1 <= coarsen < 2**31):
-        raise ReplayError(f"coarsen must be a whole number of 1 to 2**31 - 1, not {coarsen!r}")
+    if isinstance(coarsen, bool) or not (isinstance(coarsen, int) and 1 <= coarsen <= COARSEN_MAX):
+        raise ArgumentError("coarsen", f"must be a whole number of 1 to {COARSEN_MAX}, not {shown(coarsen)}")
     if not 0 < cutoff < rate / 2:
-        raise ReplayError(f"reference_hz must be more than 0 and less than {rate / 2:g}, half the rate, not {cutoff!r}")
+        said = f"must be more than 0 and less than {rate / 2:g}, half the rate, not {cutoff!r}"
+        raise ArgumentError("reference_hz", said)
     least, most = (number * (rate / SECOND) ** 2 for number in NUMBERS)
     if bound is not None and not least <= bound <= most:
-        raise ReplayError(f"acceleration_max_counts_per_s2 must be {least:g} to {most:g} at {rate:g} Hz, not {bound!r}")
+        said = f"must be {least:g} to {most:g} counts/s^2 at {rate:g} Hz, not {bound!r}"
+        raise ArgumentError("acceleration_max_counts_per_s2", said)
 
 
 def _counts_for(recording: Recording, count: int, estimator: str, backend: str) -> np.ndarray:
@@ -250,9 +266,8 @@ def plan(
                 f"{recording.file}, column {recording.column}: {estimator} cannot take this recording, for no gains "
                 f"fit its acceleration of {bound:g} counts/s^2 ({why})"
             ) from None
-        raise ReplayError(
-            f"acceleration_max_counts_per_s2 must give gains that fit this recording ({why}), not {bound!r}"
-        ) from None
+        said = f"must give gains that fit this recording ({why}), not {bound!r}"
+        raise ArgumentError("acceleration_max_counts_per_s2", said) from None
     return Plan(counts, cutoff, reference, bound, spec)
 
 

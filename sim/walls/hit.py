@@ -13,7 +13,7 @@ import numpy as np
 
 from ...model import stamped
 from ...model.whole_file import whole_file
-from ..jobs.result import Summary
+from ..jobs.result import Summary, Table, Values
 from ..jobs.stages import stage
 from ..loop import loop, record
 from ..loop.backends import Opened, is_exact, number_of, opened
@@ -24,6 +24,7 @@ from ..scene.schema import Scene
 from ..world.encoder import level
 from ..world.lines import waiting
 from . import repetition
+from .hit_rows import NEVER
 from .tally import STABLE, UNDECIDED, UNSTABLE, Tally
 
 VERDICTS = STABLE, UNSTABLE, UNDECIDED
@@ -156,6 +157,11 @@ class Hit(Summary):
         """Return the arrays of the traces, by `overview_` or `detail_` and their name."""
         kept = {"overview": self.overview, "detail": self.detail}
         return {f"{name}_{key}": array for name, trace in kept.items() for key, array in vars(trace).items()}
+
+    def tables(self) -> list[Table]:
+        """Return the report as a table; a wall that was never touched has no verdict there, and no RMS."""
+        said = self.report() | ({} if self.touched else {"verdict": NEVER, "rms_mm": None})
+        return Values(said).tables()
 
     def notes(self) -> list[str]:
         """Return what keeps the velocity's error from being known."""

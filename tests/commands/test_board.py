@@ -47,10 +47,10 @@ def test_several_axes_have_the_rates_of_the_scene(calls, monkeypatch, capsys):
     ("command", "message"),
     [
         (("synth", "mhz", "--axes", "9"), "the scene's axes must be at most 8 on ulx3s-25f, not 9"),
-        (("synth", "mhz", "--axes", "0"), "the scene's axes must be 1 to 32, not 0"),
+        (("synth", "mhz", "--axes", "0"), "--axes must be a whole number of 1 to 32, not '0'"),
         (("board", "icebreaker", "--axes", "2", "-o", "out"),
          "the scene's axes must be absent: icebreaker has pins for one axis, not 2"),
-        (("verilog", "mhz", "--axes", "33", "-o", "out"), "the scene's axes must be 1 to 32, not 33"),
+        (("verilog", "mhz", "--axes", "33", "-o", "out"), "--axes must be a whole number of 1 to 32, not '33'"),
         (("synth", "mhz", "--axes", "2", "--estimator", "kalman"),
          "the scene's estimator must be one of fdm, levant, window, not 'kalman'"),
         (("synth", "mhz", "--axes", "2", "--set", "drive={stage='pdm', newtons_per_volt=2.0, full_scale_v=24.0}"),

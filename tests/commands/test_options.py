@@ -60,6 +60,11 @@ DIGITS = "9" * 5000
             ["hit", "drive-2011", "--set", "motor.torque_constant_n_m_per_a=1e300"],
             "drive-2011: motor.torque_constant_n_m_per_a must be",
         ),
+        (["synth", "--axes", DIGITS], "--axes must be a whole number of 1 to 32, not '9999"),
+        (["virtual", "--baud", DIGITS], "--baud must be a whole number of 115200 to 3e+06, not '9999"),
+        (["capture", "p", "--before", DIGITS], "--before must be a whole number of 0 to 4096, not '9999"),
+        (["capture", "p", "--decimation", "0"], "--decimation must be a whole number of 1 to 4095, not '0'"),
+        (["replay", "r.csv", "--column", "c", "--coarsen", DIGITS], "--coarsen must be a whole number of 1 to 21474"),
         (["rates", "--rates", ""], "--rates must be whole numbers of 1000 to 1e+07 Hz, not ''"),
         (["rates", "--estimators", ""], "--estimators: estimator must be one of fdm, "),
         (["rates", "--estimators", "abc"], "--estimators: estimator must be one of fdm, "),
@@ -127,6 +132,30 @@ def test_a_value_is_one_toml_value_or_a_text(text, value):
     else:
         with pytest.raises(BadInput, match=r"^--set 'key' must be one value, not '1, a = 2'$"):
             options.value_of("key", text)
+
+
+@pytest.mark.parametrize(("text", "value"), [(".35", 0.35), ("-.5e-1", -0.05), ("+2.", 2.0), ("1.e3", 1000.0)])
+def test_a_number_may_be_written_as_people_do(text, value):
+    assert options.value_of("key", text) == value
+    for other in (".", "e5", ".5.", "1.2.3", "5 .", ".5,"):
+        assert options.value_of("key", other) == other
+
+
+def test_a_replay_names_its_options(monkeypatch, capsys, tmp_path):
+    (tmp_path / "r.csv").write_text("c\n" + "".join(f"{k * k // 50}\n" for k in range(1200)))
+    for words, said in (
+        (
+            ("--acceleration-max", "0"),
+            "--acceleration-max must be 9.53674e-31 to 9.53674e+29 counts/s^2 at 1000 Hz, not",
+        ),
+        (("--acceleration-max", "1e12"), "--acceleration-max must give gains that fit this recording ("),
+        (("--output", "v"), "--output of levant must be one of u, u1, not 'v'"),
+        (("--coarsen", "0"), "--coarsen must be a whole number of 1 to 2147483647, not '0'"),
+    ):
+        file = (tmp_path / "r.csv", "--column", "c", "--rate", "1000")
+        code, out, err = call(monkeypatch, capsys, "replay", *file, *words)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert err.startswith(f"hardwall: error: {said}")
 
 
 def test_what_does_not_print_is_escaped():

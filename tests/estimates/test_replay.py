@@ -160,8 +160,8 @@ def test_the_widest(estimator, output):
         ({"output": "u2"}, "output of levant must be one of u, u1, not 'u2'"),
         ({"estimator": "fdm", "output": "u1"}, "output of fdm must be one of u, not 'u1'"),
         ({"backend": "gpu"}, "backend must be one of float, fixed, rtl, not 'gpu'"),
-        ({"coarsen": 0}, "coarsen must be a whole number of 1 to 2**31 - 1, not 0"),
-        ({"coarsen": 1.5}, "coarsen must be a whole number of 1 to 2**31 - 1, not 1.5"),
+        ({"coarsen": 0}, "coarsen must be a whole number of 1 to 2147483647, not 0"),
+        ({"coarsen": 1.5}, "coarsen must be a whole number of 1 to 2147483647, not 1.5"),
         ({"reference_hz": 500.0}, "reference_hz must be more than 0 and less than 500, half the rate, not 500.0"),
         ({"reference_hz": math.nan}, "reference_hz must be more than 0 and less than 500, half the rate, not nan"),
         ({"acceleration_max_counts_per_s2": 0.0}, "acceleration_max_counts_per_s2 must be "),
@@ -211,7 +211,7 @@ def test_more_edges_in_a_sample_than_memory_holds_are_refused():
 @pytest.mark.parametrize("estimator", ["kalman", "butterworth", "fdm"])
 def test_a_bound_beyond_every_use_is_refused_with_its_range(estimator, bound):
     with pytest.raises(
-        ReplayError, match=r"^acceleration_max_counts_per_s2 must be 9.53674e-31 to 9.53674e\+29 at 1000"
+        ReplayError, match=r"^acceleration_max_counts_per_s2 must be 9.53674e-31 to 9.53674e\+29 counts/s\^2 at 1000"
     ):
         replay(swing(), estimator, acceleration_max_counts_per_s2=bound)
 

@@ -8,6 +8,7 @@ from hardwall.sim.scene.build import device_of, start_of, work_of, world_of
 from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load, read
 from hardwall.sim.walls import hit
+from hardwall.sim.walls.hit_rows import row_of
 from hardwall.sim.walls.zwidth import verdict
 from hardwall.sim.world.converter import AS_IT_IS, Converter, Pulse
 from hardwall.sim.world.device import Device, Hand, Motor, Shunt, Transmission, train
@@ -107,6 +108,9 @@ def test_a_handle_that_never_comes_to_the_wall_proves_no_wall_stable():
     assert result.rms_m < 1e-15
     assert not result.touched
     assert not result.stable
+    assert ["verdict", "never touched"] in result.tables()[0].rows
+    assert ["rms_mm", "-"] in result.tables()[0].rows
+    assert row_of("a", result.report())[3:5] == ["never touched", "-"]
     job = {
         "scene": "seed-2011",
         "text": read("seed-2011"),
