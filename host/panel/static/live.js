@@ -1,4 +1,5 @@
-// The socket to the board. What is sent here is never kept for later: without a connection it is not sent at all.
+// The socket to the board. What is sent has the time of the wish, so that nothing is done late that was kept on its way;
+// without a connection it is not sent at all.
 
 export const ALIVE_MS = 100; // the time between two signs of life; the board's lease lasts five of them
 export const LIVE = ["DISARMED", "ARMED", "TRIPPED"]; // the states of a board that is reached
@@ -9,13 +10,21 @@ export const board = { told: null };
 let heard = 0, truth = null, old = false; // `truth` is what was told last
 const hearers = { told: [], samples: [], records: [] };
 let socket = null;
+let lead = null; // the server's time less ours, s: never too large, for what tells it takes some time
 
 export function hear(what, hearer) {
   hearers[what].push(hearer);
 }
 
+// Returns the server's time, s; null while it is not known.
+export function now() {
+  return lead === null ? null : lead + performance.now() / 1e3;
+}
+window.hardwallNow = now; // for the events of controls
+
 export function send(message) {
-  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message));
+  const at_s = now();
+  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ ...message, at_s }));
 }
 
 function tell(what, value) {
@@ -36,6 +45,7 @@ export function open() {
   socket.onmessage = (event) => {
     if (event.data instanceof ArrayBuffer) return tell("records", new Float32Array(event.data));
     const message = JSON.parse(event.data);
+    lead = message.at_s - performance.now() / 1e3;
     if (message.told) truth = message.told;
     if (message.samples || !old) heard = performance.now();
     if (message.told || (message.samples && old)) {
@@ -47,6 +57,7 @@ export function open() {
     }
   };
   socket.onclose = () => {
+    lead = null;
     lose();
     setTimeout(open, AGAIN_MS);
   };

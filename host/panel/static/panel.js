@@ -2,7 +2,7 @@
 
 import { ALIVE_MS, LIVE, board, hear, look, open, send } from "./live.js";
 import { drawTraces, takeFresh } from "./traces.js";
-import { drawHand, listen } from "./hand.js";
+import { drawHand, listen, release } from "./hand.js";
 import { begin, drawEstimates, keepPace, listenTo } from "./estimates.js";
 
 const find = (id) => document.getElementById(id);
@@ -20,8 +20,14 @@ hear("told", (told) => {
   for (const name of ["state", "why", "do", "said"]) find(name).textContent = told[name];
   for (const name of ACTS) find(name).disabled = !told.may.includes(name);
   find("connect").hidden = !told.may.includes("connect");
-  document.body.classList.toggle("locked", Boolean(told.locked));
-  document.body.classList.toggle("old", !LIVE.includes(told.state));
+  const old = !LIVE.includes(told.state), locked = Boolean(told.locked);
+  document.body.classList.toggle("locked", locked);
+  document.body.classList.toggle("old", old);
+  // What cannot be done now cannot be asked for, with keys neither.
+  for (const part of document.querySelectorAll("aside, .asks, #hand")) part.inert = old || locked;
+  // A clock that stands makes a board silent, and must be started again.
+  for (const button of document.querySelectorAll(".fault")) button.disabled = locked || (old && told.state !== "SILENT");
+  if (old || locked) release();
   document.title = `${told.state} – hardwall`;
   keepPace(told.pace);
   if (told.identity) {
