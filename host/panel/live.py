@@ -19,7 +19,7 @@ from typing import Any
 from fastapi import WebSocket, WebSocketDisconnect
 
 from ...model.checks import check_int
-from .driver import LOOK_S, Driver
+from .driver import LATE, LOOK_S, Driver
 from .estimates import Estimates
 from .hand import Hand
 from .numbers import number_of, time_from
@@ -106,9 +106,10 @@ class Live:
             hand.hold(wanted_m - view.moved_m, view.status.position_m - view.moved_m)
 
     def _turn(self, tab: str, hand: Hand, message: dict[str, Any]) -> None:
-        fault = message["fault"]
-        if self._may(tab) and is_fresh(message["at_s"]):
-            hand.turn(fault)
+        if not is_fresh(message["at_s"]):
+            self._driver.refuse(LATE)
+        elif self._may(tab):
+            hand.turn(message["fault"])
 
     def _free(self, tab: str, hand: Hand) -> None:
         if self._dragging == tab:
