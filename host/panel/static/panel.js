@@ -7,6 +7,7 @@ import { begin, drawEstimates, keepPace, listenTo } from "./estimates.js";
 
 const find = (id) => document.getElementById(id);
 const ACTS = ["arm", "disarm", "acknowledge", "connect"];
+const DRAWINGS = { traces: drawTraces, hand: drawHand, estimates: drawEstimates };
 const drawn = []; // the times of the frames that had something new
 let identity = "", pinged = 0;
 
@@ -50,19 +51,34 @@ function pace(now) {
   find("pace").textContent = `${told.pace.toFixed(2)} of real time · ${looks}${flags}`;
 }
 
+const failed = new Set(); // the parts that could not be drawn last time
+
+// Draws a part of the page. One that fails is told once, and ends no other one.
+function isolated(name, draw) {
+  try {
+    draw();
+    failed.delete(name);
+  } catch (error) {
+    if (!failed.has(name)) window.reportError(error);
+    failed.add(name);
+  }
+}
+
 function frame(now) {
+  // Whatever fails below, there is a next frame.
+  window.requestAnimationFrame(frame);
   // The tab lives as long as it draws: one that hangs, or is hidden, does not renew the lease.
   if (now - pinged >= ALIVE_MS) {
     pinged = now;
     send({ do: "ping" });
-    pace(now);
-    look();
+    isolated("pace", () => pace(now));
+    isolated("look", look);
   }
   if (takeFresh()) drawn.push(now);
-  if (find("traces")) drawTraces(find("traces"));
-  if (find("hand")) drawHand(find("hand"));
-  if (find("estimates")) drawEstimates(find("estimates"));
-  window.requestAnimationFrame(frame);
+  for (const [name, draw] of Object.entries(DRAWINGS)) {
+    const canvas = find(name);
+    if (canvas) isolated(name, () => draw(canvas));
+  }
 }
 
 // The page's elements are there a moment after its scripts.
