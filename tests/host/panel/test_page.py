@@ -280,12 +280,20 @@ def test_a_contact_is_captured_zoomed_and_saved(tab, tmp_path):
 
 def test_the_index_becomes_the_origin_and_the_first_one_again(tab):
     card = tab.page.locator(".home")
-    card.get_by_text("Home", exact=True).click()
-    wait_until(lambda: "move the handle over it" in card.inner_text())
+
+    def begins() -> bool:
+        """Press again where this machine was too slow for it, so that nothing was done."""
+        if "move the handle over it" in card.inner_text():
+            return True
+        if card.get_by_text("Home", exact=True).count():
+            card.get_by_text("Home", exact=True).click()
+        tab.page.wait_for_timeout(1000)
+        return False
+
+    wait_until(begins)
     card.get_by_text("Leave it").click()
     wait_until(lambda: card.get_by_text("Home", exact=True).count())
-    card.get_by_text("Home", exact=True).click()
-    wait_until(lambda: "move the handle over it" in card.inner_text())
+    wait_until(begins)
     with tab.dragged(4):
         wait_until(lambda: "it is homed: the handle is at" in tab.text("said"))
     wait_until(lambda: "It is homed." in card.inner_text())
