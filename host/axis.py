@@ -1,15 +1,16 @@
 """An axis on a board: its wall, what it does, and the acts that let it drive."""
 
+import math
 import time
 from collections.abc import Generator, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import partial
 
 from ..model.register import Kind
 from ..model.registers import TELEMETRY
 from .capture import Capture
 from .device import Device, read_identity
-from .errors import ChangedError, HostError, NotReadyError, RefusedError, TrippedError
+from .errors import ChangedError, HostError, LateError, NotReadyError, RefusedError, TrippedError
 from .groups import Named, Supervisor, Wall
 from .heartbeat import LEASE_S, Beat, Heartbeat
 from .homing import Homed, homing
@@ -61,7 +62,9 @@ class Axis(Named):
 
     def __init__(self, port: Port, device: Device, shared: Shared | None = None, number: int = 0):
         self.device, self._port = device, port
-        self._words = Words(port, device, None if shared is None else shared.words)
+        # The time, of time.monotonic, after which nothing that is written goes out, except a disarm and beats.
+        self._until_s = math.inf
+        self._words = Words(port, device, None if shared is None else shared.words, self._check_time)
         self.wall, self.supervisor = Wall(self), Supervisor(self)
         self.capture = Capture(self, number)
         self._status = device.of_kind(Kind.STATUS)
@@ -131,10 +134,31 @@ class Axis(Named):
             RefusedError: if the board refuses it in its present state.
             HostError: if the board is not reached.
         """
-        check = self._check_wanted if name == "arm" else None
+        checks = {"arm": self._check_wanted, "disarm": None}
+        check = checks.get(name, self._check_time)
         self._port.write(self.device.registers[name].address, (1,), once=name not in TWICE, check=check)
 
+    @contextmanager
+    def by(self, until_s: float) -> Iterator[None]:
+        """Let acts write only until a time; from then on they raise LateError. A disarm and beats have no such time.
+
+        A board that does not answer is asked again and again: this way nothing is done long after it was wanted.
+
+        Args:
+            until_s: the last time at which a request to write goes out, s, of time.monotonic.
+        """
+        before, self._until_s = self._until_s, until_s
+        try:
+            yield
+        finally:
+            self._until_s = before
+
+    def _check_time(self) -> None:
+        if time.monotonic() > self._until_s:
+            raise LateError("the board did not answer in time: what was not done by then is not done any more")
+
     def _check_wanted(self) -> None:
+        self._check_time()
         if self._called_off:
             raise NotReadyError("the axis is not armed: it was disarmed or closed meanwhile")
 
@@ -303,7 +327,7 @@ class Axis(Named):
             trip = self.trip
         if trip:
             word = self.device.registers["acknowledged"]
-            self._port.write(word.address, word.to_registers(trip.latched))
+            self._port.write(word.address, word.to_registers(trip.latched), check=self._check_time)
             # What the encoder says is a cause until the flags are cleared, so that comes first.
             self.pulse("clear_flags")
             self.pulse("acknowledge")

@@ -33,6 +33,10 @@ class RefusedError(HostError):
         self.code = code
 
 
+class LateError(HostError):
+    """What was asked for is too old to be done."""
+
+
 class NotReadyError(HostError):
     """The axis cannot be armed, and why."""
 

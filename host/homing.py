@@ -4,7 +4,8 @@ from collections.abc import Generator
 from typing import NamedTuple, Protocol
 
 from ..model.arithmetic.fixed import wrap
-from ..model.checks import FieldError, check_range
+from ..model.checks import FieldError
+from .bounds import check_within
 from .device import Device
 from .errors import NotReadyError
 from .status import State, Status
@@ -55,7 +56,7 @@ def homing(axis: Board, index_m: float) -> Generator[str, None, Homed]:
         HostError: if the board is not reached.
     """
     count = axis.device.registers["count"]
-    check_range("index_m", index_m, count.low * count.lsb, count.high * count.lsb)
+    check_within("index_m", count, index_m)
     axis.renew()
     if axis.status.state is State.ARMED:
         raise NotReadyError("the axis is ARMED: disarm it before it is homed")
@@ -65,7 +66,7 @@ def homing(axis: Board, index_m: float) -> Generator[str, None, Homed]:
     index = axis.read("index_count")
     if not axis.read("index_latched"):
         raise NotReadyError(LOST)
-    place = round(index_m / count.lsb)
+    place = min(max(round(index_m / count.lsb), count.low), count.high)
     # The handle is as far from its index as before, wherever its count is: a count that wraps would be another place.
     handle = place + wrap(axis.read("count") - index, count.format.width)
     if not count.low <= handle <= count.high:

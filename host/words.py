@@ -1,13 +1,14 @@
 """The words of a board in SI units: what was written, and one request for all that takes effect together."""
 
-import math
-from collections.abc import Mapping
+import difflib
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from ..model.axes_registers import is_shared
-from ..model.checks import FieldError, check_number
+from ..model.checks import FieldError, shown
 from ..model.register import Kind, Register
 from ..model.registers import ACTIVE, PULSES, WRITTEN
+from .bounds import check_within
 from .device import Device
 from .errors import ChangedError, RefusedError
 from .port import Port
@@ -23,13 +24,20 @@ class Words:
         port: the line.
         device: the device there.
         once: of several axes what was written last of the words that there are once, by name; they all share it.
+        check: called when a request to write goes out; what it raises is raised, and nothing is written.
 
     Raises:
         HostError: if the board does not answer.
     """
 
-    def __init__(self, port: Port, device: Device, once: dict[str, int] | None = None):
-        self._port, self._device = port, device
+    def __init__(
+        self,
+        port: Port,
+        device: Device,
+        once: dict[str, int] | None = None,
+        check: Callable[[], None] | None = None,
+    ):
+        self._port, self._device, self._check = port, device, check
         kinds = Kind.WORD, Kind.LIVE
         words = [word for kind in kinds for word in device.of_kind(kind) if word.name not in OF_THE_HEARTBEAT]
         self._words = {word.name: word for word in words}
@@ -118,7 +126,7 @@ class Words:
         """Write registers by which some words are given."""
         self._tried = given
         try:
-            self._port.write(address, registers)
+            self._port.write(address, registers, check=self._check)
         except RefusedError:
             self._tried = {}
             raise
@@ -139,7 +147,9 @@ class Words:
 
     def _word(self, name: str) -> Register:
         if name not in self._words:
-            raise FieldError("word", f"must be one of {', '.join(self._words)}, not {name!r}")
+            near = difflib.get_close_matches(name, self._words, 1)
+            known = f"; did you mean {near[0]}?" if near else f"; they are {', '.join(self._words)}"
+            raise FieldError("word", f"must be one of the board's, not {shown(name)}{known}")
         return self._words[name]
 
     def _si(self, name: str, word: int) -> float:
@@ -147,13 +157,6 @@ class Words:
 
     @staticmethod
     def _rounded(word: Register, value: float | bool) -> int:
-        """Return the word nearest to an SI value that is within its range."""
-        if not isinstance(value, bool):
-            check_number(word.name, value)
-        least, most = word.low * word.lsb, word.high * word.lsb
-        # Half of a unit beyond an end is the end: `least` and `most` are rounded themselves.
-        near = word.lsb / 2
-        if not math.isfinite(value) or not least - near < value < most + near:
-            unit = f" {word.unit}" if word.unit else ""
-            raise FieldError(word.name, f"must be {least:g} to {most:g}{unit}, not {value!r}")
+        """Return the word nearest to an SI value, which is checked before it is rounded."""
+        check_within(word.name, word, value)
         return min(max(round(value / word.lsb), word.low), word.high)

@@ -1,12 +1,14 @@
 """The texts that are made from a register map: a Markdown page, a C header and JSON."""
 
 import json
+from collections.abc import Iterator
 
 from .axes_capture import Design as OfAxes
 from .axes_registers import BANK, AxesMap
-from .capture import DONE, RECORD_REGISTERS, Design
+from .capture import DONE, RECORD_REGISTERS, SOURCES, STATES, Design
 from .register import Register
 from .registers import ACTIVE, CAPTURE, EVENTS, LAYOUT, MAP, WRITTEN, RegisterMap
+from .supervisor import ARMED, CAUSES, DISARMED, TRIPPED
 
 COLUMNS = ("address", "register", "kind", "access", "format", "one LSB", "range", "reset", "meaning")
 
@@ -65,7 +67,8 @@ def markdown(registers: RegisterMap) -> str:
     ]
     return (
         f"# Registers\n\nIdentity {registers.identity}, layout {LAYOUT}. Modbus RTU, unit 1. A value of two registers "
-        "has the high one first; half of one can be neither read nor written. Words that are written become active "
+        "has the high one first; half of one can be neither read nor written. A value whose format is signed (SQ) is "
+        "two's complement, its sign extended to all bits of its registers. Words that are written become active "
         f"together, by `commit`; the active word of each is at 0x{ACTIVE - WRITTEN:02X} above it. "
         f"{_of_status(registers)}\n\n"
         + head
@@ -75,8 +78,31 @@ def markdown(registers: RegisterMap) -> str:
     )
 
 
+SIGNS = (
+    "A value of two registers has the high one first. One whose NAME_SIGNED is 1 is two's complement, its sign "
+    "extended to all bits of its registers: take the 32 bits for an int32_t."
+)
+"""How a negative value looks."""
+
+
+def _choices(registers: RegisterMap) -> Iterator[tuple[str, str]]:
+    """Yield the names and values of states and masks, for C."""
+    for state, number in (("DISARMED", DISARMED), ("ARMED", ARMED), ("TRIPPED", TRIPPED)):
+        yield f"STATE_{state}", f"{number}"
+    # Of `latched`, `first`, `acknowledged` and `supervisor_causes`.
+    for bit, cause in enumerate(CAUSES):
+        yield f"CAUSE_{cause.name.upper()}", f"0x{1 << bit:X}"
+    for bit, flag in enumerate(registers.spec.design.flags):
+        yield f"FLAG_{flag.upper()}", f"0x{1 << bit:X}"
+    if registers.capture:
+        for number, state in enumerate(STATES):
+            yield f"CAPTURE_STATE_{state}", f"{number}"
+        for bit, source in enumerate(SOURCES):
+            yield f"CAPTURE_SOURCE_{source.upper()}", f"0x{1 << bit:X}"
+
+
 def c_header(registers: RegisterMap) -> str:
-    """Return the header `registers.h`: the address of every register, the SI value of its LSB, and its range."""
+    """Return the header `registers.h`: states and masks; of every register its address, sign, LSB's SI value, range."""
     lines = [
         f"/* Registers of a hardwall axis; identity {registers.identity}, layout {LAYOUT}. */",
         "#ifndef HARDWALL_REGISTERS_H",
@@ -88,11 +114,18 @@ def c_header(registers: RegisterMap) -> str:
     ]
     if isinstance(registers, AxesMap):
         lines += [f"#define HARDWALL_AXES {registers.banks}", f"#define HARDWALL_BANK 0x{BANK:04X}"]
+    lines += [
+        "",
+        "/* States of `state` and of the capture; masks of causes, of flags and of what triggers a capture. */",
+    ]
+    lines += [f"#define HARDWALL_{name} {value}" for name, value in _choices(registers)]
+    lines += ["", f"/* {SIGNS} */"]
     for register in registers.registers:
         name = f"HARDWALL_{register.name.upper()}"
         unit = f" in {register.unit}" if register.unit else ""
         lines += ["", f"/* {register.meaning} ({register.kind.value}, {register.format}) */"]
         lines.append(f"#define {name} 0x{register.address:04X}")
+        lines.append(f"#define {name}_SIGNED {int(register.format.signed)}")
         lines.append(f"#define {name}_LSB {register.lsb!r} /* one LSB{unit} */")
         if register.kind.access != "read":
             lines += [f"#define {name}_MIN ({register.low})", f"#define {name}_MAX ({register.high})"]

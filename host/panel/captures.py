@@ -1,9 +1,10 @@
 """The card of a capture: what triggers it, how far it has come, and its records at the full rate, to be zoomed."""
 
-from nicegui import ui
+from nicegui import events, ui
 
 from .chart import chart_of, empty
 from .driver import Driver
+from .numbers import TIMED, number_of, time_from
 from .recorder import IDLE, READING, TRIGGERS, Recording, Wish
 
 ABOUT = "Every sample around an event, from the board's own memory. Turn the wheel over the picture, and drag it."
@@ -46,7 +47,8 @@ class CaptureCard:
                 self._level.bind_visibility_from(self._trigger, "value", backward=rises_or_falls)
                 for field in (self._trigger, self._span, self._before, self._level):
                     field.props("dense outlined hide-bottom-space")
-                ui.button("Capture", on_click=self._begin).props("dense no-caps").mark("capture")
+                begin = ui.button("Capture").props("dense no-caps").mark("capture")
+                begin.on("click", self._begin, js_handler=TIMED)
                 self._save = ui.button("Save .npz", on_click=self._download).props("dense flat no-caps")
                 self._state = ui.label().classes("state")
             self._chart = ui.echart(empty())
@@ -65,18 +67,19 @@ class CaptureCard:
             self._chart.options.update(chart_of(recording.captured))
             self._chart.update()
 
-    def _begin(self) -> None:
-        numbers = (self._span.value, self._before.value, self._level.value)
-        if None in numbers:
+    def _begin(self, event: events.GenericEventArguments) -> None:
+        fields = {"time": self._span, "before": self._before, "level": self._level}
+        if None in (field.value for field in fields.values()):
             ui.notify("a capture needs its numbers", type="warning")
             return
-        span_ms, before_percent, level_mm = numbers
         try:
+            span_ms, before_percent, level_mm = (number_of(name, field.value) for name, field in fields.items())
             wish = Wish(self._trigger.value, 1e-3 * span_ms, 1e-2 * before_percent, 1e-3 * level_mm)
-        except ValueError as error:
+            asked_s = time_from(event.args)
+        except (TypeError, ValueError) as error:
             ui.notify(f"{error}", type="warning")
             return
-        self._driver.record(self._tab, wish)
+        self._driver.record(self._tab, wish, asked_s)
 
     def _download(self) -> None:
         captured = self._driver.view.recording.captured

@@ -1,9 +1,11 @@
 """What polls a board for all tabs: one thread has its axis, does what they ask for, and keeps what they see."""
 
+import math
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Generator
+from contextlib import nullcontext
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -17,13 +19,14 @@ from .knobs import knobs_of
 from .pace import Pace
 from .recorder import Recorder, Wish
 from .view import View
+from .wishes import DONE_S, Wishes, is_fresh, time_of
 
 LOOK_S = 1 / 60
 """The time between two looks at the board."""
 KEPT = 4096
 """Samples that are kept for tabs."""
-STALE_S = 0.5
-"""The age at which what a tab asked for is not done any more: the board was silent meanwhile, and the person waited."""
+LATE = "the board did not answer in time: nothing was done"
+NO_ANSWER = "no board answers: nothing was done"
 SAID_S = 8.0
 """How long it is said why an act had no effect."""
 
@@ -41,6 +44,9 @@ class Sample(NamedTuple):
 class Driver:
     """The one user of an axis. Tabs ask, and see; nothing that they call waits for the board.
 
+    A wish has a time, that at which its person had it, in s of time.monotonic. One that is `STALE_S` old, or that comes
+    while no board answers, is dropped, and that is said. A disarm is done however old it is.
+
     The tab that armed renews the lease, by `ping`. When it is silent for `LEASE_S`, the board is disarmed; and if this
     thread cannot do that, it cannot renew either, so that the board trips.
 
@@ -56,8 +62,7 @@ class Driver:
 
     def __init__(self, connect: Callable[[], Axis]):
         self._connect, self.view = connect, View()
-        self._asked: deque[tuple[float, Callable[[], None]]] = deque()
-        self._wanted: dict[str, tuple[str, float]] = {}
+        self._wishes = Wishes()
         self._lock, self._ended = threading.Lock(), threading.Event()
         self._samples: deque[Sample] = deque(maxlen=KEPT)
         self._pings: dict[str, float] = {}
@@ -85,61 +90,65 @@ class Driver:
             new = min(self._taken - number, len(self._samples))
             return self._taken, [self._samples[-place] for place in range(new, 0, -1)]
 
-    def ping(self, tab: str) -> None:
-        """Hear that a tab lives."""
-        self._pings[tab] = time.monotonic()
+    def ping(self, tab: str, at_s: float | None = None) -> None:
+        """Hear that a tab lives, or lived at a time."""
+        self._pings[tab] = max(time_of(at_s), self._pings.get(tab, -math.inf))
 
     def leave(self, tab: str) -> None:
         """Hear that a tab has gone; if it armed, the board is disarmed."""
         self._pings.pop(tab, None)
         if self.view.holder == tab:
-            self._ask(self._disarm)
+            self.disarm()
 
-    def arm(self, tab: str) -> None:
+    def arm(self, tab: str, at_s: float | None = None) -> None:
         """Arm, for a tab that lives."""
-        self._ask(lambda: self._arm(tab))
+        self._wishes.ask(lambda: self._arm(tab), at_s)
 
     def disarm(self) -> None:
         """Disarm; any tab may."""
-        self._ask(self._disarm)
+        self._wishes.ask_always(self._disarm)
 
-    def acknowledge(self, latched: int) -> None:
+    def acknowledge(self, latched: int, at_s: float | None = None) -> None:
         """Acknowledge the causes that a tab shows, and no others."""
-        self._ask(lambda: self._acknowledge(latched))
+        self._wishes.ask(lambda: self._acknowledge(latched), at_s)
 
-    def connect(self) -> None:
+    def connect(self, at_s: float | None = None) -> None:
         """Open the port again, if the board was lost."""
-        self._ask(self._open_again)
+        self._wishes.ask(self._open_again, at_s, anyway=True)
 
-    def home(self, tab: str, index_m: float) -> None:
-        """Begin to home, until it is done, left, or something else is wanted."""
-        self._ask(lambda: self._home(tab, index_m))
+    def home(self, tab: str, index_m: float, at_s: float | None = None) -> None:
+        """Begin to home, until it is done, left, or something else is wanted, or the board is silent."""
+        self._wishes.ask(lambda: self._home(tab, index_m), at_s)
 
     def leave_home(self) -> None:
         """Do not home any more."""
-        self._ask(self._leave_home)
+        self._wishes.ask(self._leave_home, anyway=True)
 
-    def record(self, tab: str, wish: Wish) -> None:
+    def record(self, tab: str, wish: Wish, at_s: float | None = None) -> None:
         """Begin a capture, whatever was before."""
-        self._ask(lambda: self._record(tab, wish))
+        self._wishes.ask(lambda: self._record(tab, wish), at_s)
 
-    def set(self, tab: str, name: str, value: float) -> None:
+    def set(self, tab: str, name: str, value: float, at_s: float | None = None) -> None:
         """Write a word, in SI units; of several values that come before they are written the last counts."""
-        with self._lock:
-            self._wanted[name] = tab, value
+        self._wishes.set(name, tab, value, at_s)
+
+    def refuse(self, why: str) -> None:
+        """Say for a while why something is not done."""
+
+        def fails() -> None:
+            raise HostError(why)
+
+        self._wishes.ask(fails, anyway=True)
 
     # ---- the thread -------------------------------------------------------------------------------------------------
-
-    def _ask(self, do: Callable[[], None]) -> None:
-        self._asked.append((time.monotonic(), do))
 
     def _run(self) -> None:
         while not self._ended.is_set():
             began = time.monotonic()
             try:
                 self._obey()
+                self._write()
                 if self._axis:
-                    self._write(self._axis)
                     self._live(self._axis)
                     self._look(self._axis)
                     self._record_on(self._axis)
@@ -148,6 +157,7 @@ class Driver:
                 self._lose(error)
             except HostError as error:
                 self._see(status=None, lost=f"{error}")
+                self._leave_late()
             except Exception as error:
                 # Whatever it is: a page never shows an old state as if it were of now.
                 self._lose(HostError(f"the panel failed: {error!r}"))
@@ -164,17 +174,20 @@ class Driver:
         """Do what was asked for; what is refused is said for a while."""
         if self.view.said and time.monotonic() - self._said_s > SAID_S:
             self._say("")
-        while self._asked:
-            asked_s, do = self._asked.popleft()
-            if do != self._disarm and time.monotonic() - asked_s > STALE_S:
-                self._say("the board did not answer in time: nothing was done")
-                continue
-            self._try(do)
+        while act := self._wishes.act():
+            if self.view.status is None and not act.anyway:
+                self._say(NO_ANSWER)
+            elif not is_fresh(act.at_s):
+                self._say(LATE)
+            else:
+                self._try(act.do, act.at_s + DONE_S)
 
-    def _try(self, do: Callable[[], None]) -> None:
+    def _try(self, do: Callable[[], None], until_s: float) -> None:
+        """Do something, of which nothing goes out to the board after a time."""
         self._say("")
         try:
-            do()
+            with self._axis.by(until_s) if self._axis else nullcontext():
+                do()
         except PortError:
             raise
         except (HostError, ValueError, TypeError) as error:
@@ -208,9 +221,17 @@ class Driver:
             self._axis.close()
             self._axis = None
             self._recorder.leave()
-            self._leave_home()
+            self._leave_late()
         gone = {"status": None, "connected": False, "holder": None, "pace": None, "looks_hz": 0.0}
         self._see(**gone, lost=f"{error}", recording=self._recorder.recording)
+
+    def _leave_late(self) -> None:
+        """Leave what was begun for a person whose board is silent now: it would end at a time that nobody expects."""
+        self._recorder.leave_trigger()
+        self._see(recording=self._recorder.recording)
+        if self._homing:
+            self._leave_home()
+            self._say("the board did not answer: it is not homed any more")
 
     def _arm(self, tab: str) -> None:
         if self._axis is None:
@@ -276,15 +297,22 @@ class Driver:
             self._say(f"{error}")
         self._see(recording=self._recorder.recording)
 
-    def _write(self, axis: Axis) -> None:
+    def _write(self) -> None:
         """Write what tabs want, all at one sample; while a tab holds the board, only what that one wants."""
-        with self._lock:
-            wanted, self._wanted = self._wanted, {}
-        values = {name: value for name, (tab, value) in wanted.items() if self.view.holder in (None, tab)}
-        if len(values) < len(wanted):
+        words, late = self._wishes.words()
+        axis = self._axis if self.view.status else None
+        if late or (words and axis is None):
+            # What was dropped is not left as it is shown.
+            self._keep({})
+            self._say(LATE if axis else NO_ANSWER)
+        if axis is None:
+            return
+        values = {name: word.value for name, word in words.items() if self.view.holder in (None, word.tab)}
+        if len(values) < len(words):
             self._say("another tab armed the board, and alone may set its words")
         if values:
-            self._try(lambda: self._set(axis, values))
+            until_s = min(words[name].at_s for name in values) + DONE_S
+            self._try(lambda: self._set(axis, values), until_s)
 
     def _set(self, axis: Axis, values: dict[str, float]) -> None:
         try:

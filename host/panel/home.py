@@ -1,8 +1,9 @@
 """The card of homing: the position that the index becomes, and what is waited for."""
 
-from nicegui import ui
+from nicegui import events, ui
 
 from .driver import Driver
+from .numbers import TIMED, number_of, time_from
 
 BEGIN, LEAVE = "Home", "Leave it"
 
@@ -22,7 +23,8 @@ class HomeCard:
             with ui.element("div").classes("asks"):
                 self._at = ui.number("Index is at", value=0, suffix="mm", format="%.7g")
                 self._at.props("dense outlined hide-bottom-space")
-                self._button = ui.button(BEGIN, on_click=self._press).props("dense no-caps")
+                self._button = ui.button(BEGIN).props("dense no-caps")
+                self._button.on("click", self._press, js_handler=TIMED)
             self._said = ui.label().classes("said")
 
     def refresh(self) -> None:
@@ -35,8 +37,13 @@ class HomeCard:
             homed = view.status and view.status.referenced
             self._said.set_text("It is homed." if homed else "It is not homed yet.")
 
-    def _press(self) -> None:
+    def _press(self, event: events.GenericEventArguments) -> None:
         if self._driver.view.homing:
             self._driver.leave_home()
         elif self._at.value is not None:
-            self._driver.home(self._tab, 1e-3 * self._at.value)
+            try:
+                at_mm, asked_s = number_of("index", self._at.value), time_from(event.args)
+            except (TypeError, ValueError) as error:
+                self._driver.refuse(f"{error}")
+            else:
+                self._driver.home(self._tab, 1e-3 * at_mm, asked_s)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from ...model.register import Kind, Register
+from ..bounds import is_whole
 from ..device import Device
 from ..words import OF_THE_HEARTBEAT
 
@@ -83,6 +84,7 @@ class Knob:
         least, most, step: the word's range and its 1, in SI units.
         way: how a value goes along the slider: `DECADES` for what a hand feels by ratios, `CUBE` for what has a sign,
             which is fine near 0.
+        whole: whether there is nothing between two values.
     """
 
     name: str
@@ -94,6 +96,7 @@ class Knob:
     most: float
     step: float
     way: Way
+    whole: bool
 
     def to_slider(self, value: float) -> float:
         """Return the slider's position, 0 to 1, of an SI value."""
@@ -111,6 +114,7 @@ class Knob:
             value = max(self.most, -self.least) * (2 * place - 1) ** 3
         else:
             value = self.least + place * (self.most - self.least)
+            value = float(round(value)) if self.whole and self.way is Way.LINEAR else value
         return min(max(value, self.least), self.most)
 
     def shown(self, value: float) -> float:
@@ -128,7 +132,7 @@ def knob_of(word: Register) -> Knob:
     unit, scale = UNITS.get(word.unit, (word.unit, 1.0))
     least, most = word.low * word.lsb, word.high * word.lsb
     label = LABELS.get(word.name, word.name.replace("_", " ").capitalize())
-    return Knob(word.name, label, _group(word.name), unit, scale, least, most, word.lsb, _way(word))
+    return Knob(word.name, label, _group(word.name), unit, scale, least, most, word.lsb, _way(word), is_whole(word))
 
 
 def knobs_of(device: Device) -> tuple[Knob, ...]:

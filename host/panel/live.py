@@ -3,9 +3,14 @@
 A tab sends objects of JSON with a key `do`: ping, arm, disarm, acknowledge (`latched`), connect, and at a virtual board
 hold (`m`), free and turn (`fault`). It gets objects with `told`, see `view.told`, when that changed, and `samples`,
 each a list of what a `Sample` has; and, as bytes, the records of `Estimates`.
+
+Every object has a time `at_s`, s of the server's time.monotonic: of those from the server when it was sent, and of
+those from a tab when its person wished it, by the tab's clock and the last time that it got. So what a slow network or
+a server that hung has kept is known to be old, and is not done.
 """
 
 import asyncio
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,10 +18,17 @@ from typing import Any
 
 from fastapi import WebSocket, WebSocketDisconnect
 
-from .driver import LOOK_S, Driver
+from ...model.checks import check_int
+from .driver import LATE, LOOK_S, Driver
 from .estimates import Estimates
 from .hand import Hand
+from .numbers import number_of, time_from
 from .view import told
+from .wishes import is_fresh
+
+TIMED_S = 0.1
+"""The longest time between two objects to a tab, from which it takes its time."""
+WORD_MAX = (1 << 32) - 1
 
 
 @dataclass(frozen=True)
@@ -43,18 +55,18 @@ class Live:
     def __init__(self, driver: Driver, bench: Bench | None):
         self._driver, self._bench, self._dragging = driver, bench, ""
         self._acts: dict[str, Callable[[str, dict[str, Any]], object]] = {
-            "ping": lambda tab, _: driver.ping(tab),
-            "arm": lambda tab, _: driver.arm(tab),
+            "ping": lambda tab, message: driver.ping(tab, message["at_s"]),
+            "arm": lambda tab, message: driver.arm(tab, message["at_s"]),
             "disarm": lambda tab, _: driver.disarm(),
-            "acknowledge": lambda tab, message: driver.acknowledge(int(message["latched"])),
-            "connect": lambda tab, _: driver.connect(),
+            "acknowledge": self._acknowledge,
+            "connect": lambda _, message: driver.connect(message["at_s"]),
         }
         if bench:
             hand = bench.hand
             self._acts |= {
-                "hold": lambda tab, message: self._hold(tab, hand, float(message["m"])),
+                "hold": lambda tab, message: self._hold(tab, hand, message),
                 "free": lambda tab, _: self._free(tab, hand),
-                "turn": lambda tab, message: self._turn(tab, hand, str(message["fault"])),
+                "turn": lambda tab, message: self._turn(tab, hand, message),
             }
 
     async def serve(self, socket: WebSocket, tab: str) -> None:
@@ -64,6 +76,7 @@ class Live:
         try:
             while True:
                 message = await socket.receive_json()
+                message["at_s"] = time_from(message["at_s"])
                 self._acts[message["do"]](tab, message)
         except (KeyError, TypeError, ValueError):
             # What is no message of a page of ours is not answered.
@@ -81,15 +94,22 @@ class Live:
         """Return whether a tab may do more than to disarm: no other one holds the board."""
         return self._driver.view.holder in (None, tab)
 
-    def _hold(self, tab: str, hand: Hand, wanted_m: float) -> None:
-        view = self._driver.view
-        if view.status and self._may(tab) and self._dragging in ("", tab):
+    def _acknowledge(self, tab: str, message: dict[str, Any]) -> None:
+        latched = message["latched"]
+        check_int("latched", latched, 0, WORD_MAX)
+        self._driver.acknowledge(latched, message["at_s"])
+
+    def _hold(self, tab: str, hand: Hand, message: dict[str, Any]) -> None:
+        view, wanted_m = self._driver.view, number_of("m", message["m"])
+        if view.status and self._may(tab) and is_fresh(message["at_s"]) and self._dragging in ("", tab):
             self._dragging = tab
             hand.hold(wanted_m - view.moved_m, view.status.position_m - view.moved_m)
 
-    def _turn(self, tab: str, hand: Hand, fault: str) -> None:
-        if self._may(tab):
-            hand.turn(fault)
+    def _turn(self, tab: str, hand: Hand, message: dict[str, Any]) -> None:
+        if not is_fresh(message["at_s"]):
+            self._driver.refuse(LATE)
+        elif self._may(tab):
+            hand.turn(message["fault"])
 
     def _free(self, tab: str, hand: Hand) -> None:
         if self._dragging == tab:
@@ -102,7 +122,7 @@ class Live:
         number, _ = self._driver.samples_since(0)
         record, _ = estimates.since(0) if estimates else (0, [])
         before: dict[str, Any] = {}
-        used = None
+        used, timed_s = None, 0.0
         with suppress(WebSocketDisconnect, RuntimeError):
             while True:
                 message: dict[str, Any] = {}
@@ -112,7 +132,8 @@ class Live:
                 number, samples = self._driver.samples_since(number)
                 if samples:
                     message["samples"] = samples
-                if message:
+                if message or time.monotonic() - timed_s > TIMED_S:
+                    message["at_s"] = timed_s = time.monotonic()
                     await socket.send_json(message)
                 if estimates:
                     view = self._driver.view

@@ -13,6 +13,7 @@ from .hand import FAULTS
 from .home import HomeCard
 from .knobs import Group, Knob, Way, knobs_of
 from .live import Bench
+from .numbers import TIMED, VALUED, number_of, time_from
 
 STEPS = 1000
 """Places of a slider."""
@@ -89,23 +90,26 @@ class _Row:
 
     Args:
         knob: the word.
-        give: takes its new SI value.
+        give: takes its new SI value, and when it was wished for.
+        refuse: takes what is wrong with what a browser sent.
     """
 
-    def __init__(self, knob: Knob, give: Callable[[float], None]):
-        self.knob, self._give_value, self._touched_s = knob, give, 0.0
+    def __init__(self, knob: Knob, give: Callable[[float, float], None], refuse: Callable[[str], None]):
+        self.knob, self._give, self._refuse, self._touched_s = knob, give, refuse, 0.0
         self._slider = self._number = self._switch = None
         with ui.element("div").classes("knob").props(f'data-word="{knob.name}"'):
             ui.label(knob.label).classes("name")
             if knob.way is Way.SWITCH:
-                self._switch = ui.switch().props("dense").on("update:model-value", self._switched)
+                self._switch = ui.switch().props("dense")
+                self._switch.on("update:model-value", self._switched, js_handler=VALUED)
             else:
                 self._slider = ui.slider(min=0, max=STEPS, step=1).props("dense")
-                self._slider.on("update:model-value", self._slid, throttle=0.05)
+                self._slider.on("update:model-value", self._slid, throttle=0.05, js_handler=VALUED)
                 least, most = knob.shown(knob.least), knob.shown(knob.most)
                 self._number = ui.number(min=least, max=most, suffix=knob.unit, format="%.7g")
-                self._number.props("dense outlined hide-bottom-space").on("blur", self._typed)
-                self._number.on("keydown.enter", self._typed)
+                self._number.props("dense outlined hide-bottom-space")
+                for event in ("blur", "keydown.enter"):
+                    self._number.on(event, self._typed, js_handler=TIMED)
             self._used = ui.label().classes("used")
 
     @property
@@ -124,20 +128,25 @@ class _Row:
             self._number.set_value(knob.shown(value))
             self._used.set_text(f"{knob.shown(value):.7g} {knob.unit}")
 
-    def _give(self, value: float) -> None:
+    def _take(self, value_of: Callable[[], float], at: object) -> None:
+        """Give a value of a browser, and refuse what is none."""
         self._touched_s = time.monotonic()
-        self._give_value(value)
+        try:
+            self._give(value_of(), time_from(at))
+        except (TypeError, ValueError) as error:
+            self._refuse(f"{error}")
 
     def _switched(self, event: events.GenericEventArguments) -> None:
-        self._give(float(bool(event.args if not isinstance(event.args, list) else event.args[0])))
+        on, at = event.args
+        self._take(lambda: float(bool(on)), at)
 
     def _slid(self, event: events.GenericEventArguments) -> None:
-        place = event.args[0] if isinstance(event.args, list) else event.args
-        self._give(self.knob.from_slider(float(place) / STEPS))
+        place, at = event.args
+        self._take(lambda: self.knob.from_slider(number_of(self.knob.name, place, 0, STEPS) / STEPS), at)
 
-    def _typed(self) -> None:
-        if self._number and self._number.value is not None:
-            self._give(self.knob.in_si(self._number.value))
+    def _typed(self, event: events.GenericEventArguments) -> None:
+        if self._number and (shown := self._number.value) is not None:
+            self._take(lambda: self.knob.in_si(number_of(self.knob.name, shown)), event.args)
 
 
 def _knobs(driver: Driver, tab: str) -> list[_Row]:
@@ -149,7 +158,7 @@ def _knobs(driver: Driver, tab: str) -> list[_Row]:
         with ui.expansion(group.value, value=group is not Group.WIRING).classes("card group").props("dense"):
             for knob in knobs:
                 if knob.group is group:
-                    rows.append(_Row(knob, partial(driver.set, tab, knob.name)))
+                    rows.append(_Row(knob, partial(driver.set, tab, knob.name), driver.refuse))
     return rows
 
 

@@ -100,6 +100,11 @@ class Recorder:
         self._reading = None
         self._say(state=IDLE, read=0.0)
 
+    def leave_trigger(self) -> None:
+        """Leave a capture whose trigger is a person's, unless it was given: now it would be late."""
+        if self._by_hand and self.recording.state in ("FILLING", "WAITING"):
+            self.leave()
+
     def step(self, axis: Axis) -> None:
         """Do what a look at the board has time for: ask for the state of the memory, or for a part of it.
 

@@ -1,11 +1,13 @@
 """The server of the page: in a thread, on one address, and only for who knows its token."""
 
 import hmac
+import ipaddress
 import os
 import secrets
 import socket
 import threading
 import time
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +23,30 @@ from .page import add_page
 
 STATIC = Path(__file__).with_name("static")
 LOCAL, EVERYWHERE = "127.0.0.1", ("0.0.0.0", "::")
-REFUSED = "This page needs the whole address that `hardwall panel` printed, with its token.\n"
+LOCALS, HTTP = ("localhost", LOCAL), 80
+"""Names of this machine for itself; and the port that an address need not name."""
+REFUSED = "This page needs the whole address that `hardwall panel` printed, as it is, with its token.\n"
+HEADERS = {
+    "Content-Security-Policy": "; ".join(
+        (
+            "default-src 'self'",
+            # The page's framework has scripts within the page, and makes handlers of events from texts.
+            "script-src 'self' 'unsafe-inline' 'unsafe-eval'",
+            "style-src 'self' 'unsafe-inline'",
+            "img-src 'self' data: blob:",
+            "font-src 'self' data:",
+            "connect-src 'self'",
+            "object-src 'none'",
+            "base-uri 'none'",
+            "form-action 'none'",
+            "frame-ancestors 'none'",
+        )
+    ),
+    # The address of the page has its token.
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+"""Headers of every answer: all comes from this server, no other page frames this one, and none learns its address."""
 START_S = 60.0
 """The longest time in which the server begins: it imports and compiles much on a loaded machine."""
 
@@ -31,26 +56,78 @@ class ServerError(RuntimeError):
 
 
 class Guard:
-    """Lets only requests through whose path begins with a token; refuses pages and sockets alike.
+    """Lets only requests through whose path begins with a token, whose Host is that of the page's address, and whose
+    Origin, if they have one, is the page itself; refuses pages and sockets alike. So a page of another site, or a name
+    that another site points here, gets nothing even if the token leaked. What is let through gets `HEADERS`.
 
     Args:
         inner: the application of ASGI behind it.
         token: the first part of the path.
+        hosts: the names and addresses that are the page's; with one of `EVERYWHERE`, every address of numbers is.
+        port: the port of the page.
     """
 
-    def __init__(self, inner: Any, token: str):
-        self._inner, self._token = inner, token.encode()
+    def __init__(self, inner: Any, token: str, hosts: Collection[str], port: int):
+        self._inner, self._token, self._port = inner, token.encode(), port
+        self._hosts = {host.lower() for host in hosts}
 
     async def __call__(self, scope: Any, receive: Any, send: Any) -> None:
-        if scope["type"] != "lifespan":
-            first = scope["path"].lstrip("/").partition("/")[0]
-            if not hmac.compare_digest(first.encode(), self._token):
-                if scope["type"] == "websocket":
-                    await send({"type": "websocket.close", "code": 1008})
-                else:
-                    await PlainTextResponse(REFUSED, 403)(scope, receive, send)
-                return
-        await self._inner(scope, receive, send)
+        if scope["type"] == "lifespan":
+            await self._inner(scope, receive, send)
+        elif self._is_ours(scope):
+            await self._inner(scope, receive, _with_headers(send))
+        elif scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008})
+        else:
+            await PlainTextResponse(REFUSED, 403, HEADERS)(scope, receive, send)
+
+    def _is_ours(self, scope: Any) -> bool:
+        first = scope["path"].lstrip("/").partition("/")[0]
+        if not hmac.compare_digest(first.encode(), self._token):
+            return False
+        hosts, origins = (_values(scope, name) for name in (b"host", b"origin"))
+        if len(hosts) != 1 or not self._is_host(hosts[0]):
+            return False
+        # A browser sends an Origin with every socket, and none with a page that is typed.
+        needed = scope["type"] == "websocket"
+        return origins == [f"http://{hosts[0]}"] or not (origins or needed)
+
+    def _is_host(self, value: str) -> bool:
+        """Return whether a value of the header Host is the page's: a name, and its port unless that is `HTTP`."""
+        host, colon, port = value.rpartition(":")
+        if not colon or value.endswith("]"):
+            host, port = value, f"{HTTP}"
+        if port != f"{self._port}":
+            return False
+        return host in self._hosts or (not self._hosts.isdisjoint(EVERYWHERE) and _is_address(host))
+
+
+def _is_address(host: str) -> bool:
+    """Return whether a host is an address of numbers, which no other site can point here."""
+    try:
+        ipaddress.ip_address(host.removeprefix("[").removesuffix("]"))
+    except ValueError:
+        return False
+    return True
+
+
+def _values(scope: Any, name: bytes) -> list[str]:
+    """Return all values of a header of a request, in lower case."""
+    return [value.decode("latin-1").lower() for key, value in scope["headers"] if key.lower() == name]
+
+
+def _with_headers(send: Any) -> Any:
+    """Return what sends with `HEADERS`, in place of the application's own of these names."""
+    ours = [(name.lower().encode(), value.encode()) for name, value in HEADERS.items()]
+    names = {name for name, _ in ours}
+
+    async def sends(message: Any) -> None:
+        if message["type"] == "http.response.start":
+            others = [each for each in message.get("headers", []) if each[0].lower() not in names]
+            message = {**message, "headers": [*others, *ours]}
+        await send(message)
+
+    return sends
 
 
 class PanelServer:
@@ -79,9 +156,10 @@ class PanelServer:
             said = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror
             raise ServerError(f"port {port} of {host} cannot be had: {said or error}") from None
         shown = socket.gethostname() if host in EVERYWHERE else f"[{host}]" if ":" in host else host
-        self.url = f"http://{shown}:{self._socket.getsockname()[1]}/{token}/"
+        listening = self._socket.getsockname()[1]
+        self.url = f"http://{shown}:{listening}/{token}/"
         config = uvicorn.Config(
-            Guard(_application(driver, bench, title, token), token),
+            Guard(_application(driver, bench, title, token), token, {host, shown, *LOCALS}, listening),
             log_level="error",
             access_log=False,
             ws="websockets-sansio",

@@ -34,7 +34,7 @@ COUNTS = "counts:"
 COUNTED_RUNS = 20
 """The runs of the board whose counts are in a line."""
 WAITING_MAX = 4096
-"""The host's bytes that may wait for the board's line until no more are taken: a few frames."""
+"""The host's bytes that may wait for the board's line: many frames. What comes beyond is lost."""
 
 
 def command(
@@ -180,11 +180,11 @@ def _run(board: VirtualBoard, line: Line, teller: Teller, pace: _Pace, counts: _
 
 
 def _carry(board: VirtualBoard, line: Line, wait_s: float) -> None:
-    """Wait for a host for some time, and carry its bytes to the board, unless many wait there already."""
-    if board.hardware.waiting < WAITING_MAX:
-        board.hardware.send(line.take(wait_s))
-    else:
-        time.sleep(wait_s)
+    """Wait for a host for some time, and carry its bytes to the board; more than its line has room for are lost."""
+    before = line.sent_away
+    board.hardware.send(line.take(wait_s, max(WAITING_MAX - board.hardware.waiting, 0)))
+    if line.sent_away > before:
+        log.print(f"a host of the network port was sent away: more than {WAITING_MAX} of its bytes waited for the line")
 
 
 def _obey(board: VirtualBoard, line: Line, text: str) -> None:

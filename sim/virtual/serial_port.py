@@ -27,13 +27,14 @@ class Line:
     Attributes:
         path: the pseudo-terminal's name, which a host opens as a serial port.
         drops: how many of the next bytes to the board are lost.
+        sent_away: how many guests were sent away because they sent more than the board's line has room for.
 
     Raises:
         PortError: if there is no pseudo-terminal, or the port cannot be had.
     """
 
     def __init__(self, tcp_port: int | None = None):
-        self.drops = 0
+        self.drops, self.sent_away, self._room = 0, 0, 0
         try:
             self._listener = None if tcp_port is None else socket.create_server((LOOPBACK, tcp_port), backlog=1)
         except OSError as error:
@@ -77,9 +78,18 @@ class Line:
         """The port of 127.0.0.1; None without one."""
         return self._listener.getsockname()[1] if self._listener else None
 
-    def take(self, wait_s: float = 0.0) -> bytes:
-        """Return the bytes that have come from hosts, and wait for them for some time; what is lost is left out."""
+    def take(self, wait_s: float, room: int) -> bytes:
+        """Return the bytes that have come from hosts, and wait for them for some time; what is lost is left out.
+
+        A host waits for an answer, so what sends more than there is room for is none. What it sends is lost, so that
+        others are soon heard again: a guest is sent away, with all that it has sent.
+
+        Args:
+            wait_s: the longest wait, s.
+            room: how many bytes are taken.
+        """
         self._came.clear()
+        self._room = room
         for key, _ in self._selector.select(wait_s):
             key.data()
         lost = min(self.drops, len(self._came))
@@ -108,7 +118,8 @@ class Line:
 
     def _from_terminal(self) -> None:
         with suppress(BlockingIOError):
-            data = os.read(self._master, CHUNK)
+            data = os.read(self._master, CHUNK)[: self._room]
+            self._room -= len(data)
             self._came += data
             self._hearer = self._to_terminal
 
@@ -133,6 +144,11 @@ class Line:
         if not data:
             self._leave()
             return
+        if len(data) > self._room:
+            self.sent_away += 1
+            self._leave()
+            return
+        self._room -= len(data)
         self._came += data
         self._hearer = self._to_guest
 

@@ -1,6 +1,7 @@
 """The command `virtual`: a process with a serial port and a port of the loopback, orders on stdin, and its ends."""
 
 import os
+import random
 import re
 import signal
 import socket
@@ -12,6 +13,7 @@ import pytest
 from pymodbus import FramerType
 from pymodbus.client import ModbusTcpClient
 
+from hardwall.host.connect import connect
 from hardwall.model.link.line import framed
 from hardwall.model.registers import RegisterMap
 from hardwall.model.supervisor import TRIPPED, names
@@ -62,6 +64,29 @@ def test_the_serial_port_is_one_for_any_program():
         while len(answer) < 9:
             answer += os.read(port, 100)
         assert answer == framed(b"\1\3\4" + frames.words(0, REGISTERS["layout"].reset))
+        os.close(port)
+
+
+@pytest.mark.parametrize("by", ["tcp", "terminal"])
+def test_a_flood_of_random_bytes_silences_no_port(by):
+    """2.9 MB, which the line would take half a minute of the board's time for, and none of which is a request."""
+    with running(CLOCK, "--tcp", "0", "--speed", "0") as board:
+        junk, port = random.Random(1).randbytes(2_900_000), os.open(board.path, os.O_RDWR | os.O_NOCTTY)
+        if by == "tcp":
+            with socket.create_connection(("127.0.0.1", int(board.tcp.rpartition(":")[2])), timeout=60) as guest:
+                with suppress(ConnectionError):
+                    guest.sendall(junk)
+                with suppress(ConnectionError):
+                    assert guest.recv(1) == b""
+        else:
+            view = memoryview(junk)
+            while view:
+                view = view[os.write(port, view) :]
+        began = time.monotonic()
+        with connect(board.path, answer_s=5.0) as axis:
+            assert axis.device.identity == REGISTERS.identity
+        connect(board.tcp, answer_s=5.0).close()
+        assert time.monotonic() - began < 20
         os.close(port)
 
 

@@ -1,5 +1,7 @@
 """Words in SI units: rounded, in range, committed together in one request, and compared with the board's."""
 
+import re
+
 import pytest
 
 from hardwall.host.connect import connect
@@ -62,8 +64,21 @@ def test_what_a_host_before_has_written_is_kept(board, registers):
         ),
         ({"wall_left": 2}, "wall_left must be 0 to 1, not 2"),
         ({"supervisor_watchdog": 0.02}, "supervisor_watchdog must be 0.05 to 2 s, not 0.02"),
-        ({"heartbeat": 3}, "word must be one of preload_count, .*, drive_invert, .*, not 'heartbeat'"),
-        ({"wall_stiffness": 5e3, "wall": 1}, "word must be one of preload_count, .*, not 'wall'"),
+        # Less than half of a unit beyond a bound, which rounds to it.
+        ({"wall_stiffness": -1.0}, r"wall_stiffness must be 0 to 255996 N/m, not -1\.0"),
+        ({"wall_stiffness": -1e-9}, "wall_stiffness must be 0 to 255996 N/m, not -1e-09"),
+        ({"wall_stiffness": 255997.0}, "wall_stiffness must be 0 to 255996 N/m, not 255997.0"),
+        ({"wall_position": -1.048581}, "wall_position must be -1.04858 to 1.04858 m, not -1.048581"),
+        ({"supervisor_watchdog": 0.0499}, "supervisor_watchdog must be 0.05 to 2 s, not 0.0499"),
+        ({"wall_left": 1.4}, "wall_left must be 0 to 1, not 1.4"),
+        ({"wall_left": 0.4}, "wall_left must be a whole number of 0 to 1, not 0.4"),
+        ({"supervisor_turn": 4000.5}, "supervisor_turn must be a whole number of .*, not 4000.5"),
+        (
+            {"heartbeat": 3},
+            "word must be one of the board's, not 'heartbeat'; they are preload_count, .*, drive_invert",
+        ),
+        ({"wall_stifness": 5e3}, r"not 'wall_stifness'; did you mean wall_stiffness\?"),
+        ({"wall_stiffness": 5e3, "wal_damping": 1}, r"not 'wal_damping'; did you mean wall_damping\?"),
     ],
 )
 def test_what_is_out_of_range_writes_nothing(board, axis, values, message):
@@ -73,7 +88,7 @@ def test_what_is_out_of_range_writes_nothing(board, axis, values, message):
     assert len(board.requests) == before
 
 
-@pytest.mark.parametrize("value", ["5", None, [1]])
+@pytest.mark.parametrize("value", ["5", None, [1], True])
 def test_what_is_no_number_writes_nothing(board, axis, value):
     before = len(board.requests)
     with pytest.raises(TypeError, match="wall_stiffness must be a number"):
@@ -90,6 +105,29 @@ def test_the_ends_of_every_range_can_be_written(board, axis, registers):
             axis.set(**{word.name: word.reset * word.lsb})
     assert {"heartbeat", "acknowledged"} & set(axis.names) == set()
     assert len(axis.names) == len(registers.words) + len(registers.live) - 2
+
+
+def test_every_bound_that_is_printed_can_be_written_and_no_value_beyond_it(board, axis, registers):
+    for word in (*registers.words, *registers.live):
+        if word.name in axis.names:
+            with pytest.raises(FieldError) as error:
+                axis.set(**{word.name: 1e29})
+            said = re.search(r"must be (\S+) to ([^\s,]+)", str(error.value))
+            for text, end, way in ((said[1], word.low, -1), (said[2], word.high, 1)):
+                bound = float(text)
+                assert bound == pytest.approx(end * word.lsb, rel=1e-5)
+                axis.set(**{word.name: bound})
+                assert board.server.file.active[word.name] == end
+                # A step beyond both, far less than the word's unit.
+                beyond = way * max(way * bound, way * end * word.lsb)
+                with pytest.raises(FieldError):
+                    axis.set(**{word.name: beyond + way * max(abs(beyond) * 1e-9, 1e-12)})
+            axis.set(**{word.name: word.reset * word.lsb})
+
+
+def test_a_switch_takes_truth(board, axis):
+    axis.set(wall_left=True)
+    assert board.server.file.active["wall_left"] == 1
 
 
 @pytest.mark.parametrize("name", ["wall_stiffness", "supervisor_force_limit"])

@@ -3,10 +3,14 @@
 import os
 import pty
 import socket
+from contextlib import suppress
 
 import pytest
 
 from hardwall.sim.virtual.serial_port import Line, PortError
+
+ROOM = 4096
+"""Bytes that a board has room for."""
 
 
 @pytest.fixture
@@ -24,21 +28,21 @@ def say(line: Line, who: socket.socket, word: bytes) -> None:
     who.sendall(word)
     heard = b""
     while heard != word:
-        heard += line.take(1.0)
+        heard += line.take(1.0, ROOM)
 
 
 def test_every_byte_passes_a_terminal_as_it_is(line):
     port = os.open(line.path, os.O_RDWR | os.O_NOCTTY)
     data = bytes(range(256))
     os.write(port, data)
-    assert line.take(1.0) == data
+    assert line.take(1.0, ROOM) == data
     line.give(data)
     assert os.read(port, 300) == data
     os.close(port)
     # A host may come back.
     port = os.open(line.path, os.O_RDWR | os.O_NOCTTY)
     os.write(port, b"again")
-    assert line.take(1.0) == b"again"
+    assert line.take(1.0, ROOM) == b"again"
     os.close(port)
 
 
@@ -48,7 +52,7 @@ def test_one_guest_at_a_time_and_answers_go_to_who_spoke_last(line):
         line.give(b"answer")
         assert first.recv(10) == b"answer"
         assert second.recv(10) == b"", "the second guest is sent away"
-    while line.take(0.1) or line._guest:
+    while line.take(0.1, ROOM) or line._guest:
         pass
     with guest(line) as third:
         say(line, third, b"x")
@@ -61,9 +65,9 @@ def test_a_guest_that_has_gone_is_no_end(line):
         say(line, first, b"x")
     for _ in range(3):
         line.give(b"nobody hears this")
-        assert line.take(0.05) == b""
+        assert line.take(0.05, ROOM) == b""
     with guest(line) as second:
-        assert line.take(1.0) == b""
+        assert line.take(1.0, ROOM) == b""
         line.give(b"nor this")
         say(line, second, b"x")
         line.give(b"y")
@@ -74,7 +78,7 @@ def test_bytes_are_lost_as_ordered(line):
     port = os.open(line.path, os.O_RDWR | os.O_NOCTTY)
     line.drops = 3
     os.write(port, b"abcdef")
-    assert line.take(1.0) == b"def"
+    assert line.take(1.0, ROOM) == b"def"
     assert line.drops == 0
     os.close(port)
 
@@ -82,6 +86,34 @@ def test_bytes_are_lost_as_ordered(line):
 def test_without_a_reader_bytes_are_lost_and_nothing_waits(line):
     for _ in range(100):
         line.give(b"z" * 4096)
+
+
+def test_a_guest_that_floods_is_sent_away_and_the_next_is_heard(line):
+    with guest(line) as flooding:
+        flooding.settimeout(10)
+        heard = 0
+        with suppress(OSError):
+            for _ in range(1000):
+                flooding.send(b"z" * ROOM)
+                heard += len(line.take(0.1, max(ROOM - heard, 0)))
+        assert line.sent_away == 1
+    assert 0 < heard <= ROOM
+    assert line.take(0.05, ROOM) == b""
+    with guest(line) as good:
+        say(line, good, b"x")
+        line.give(b"y")
+        assert good.recv(10) == b"y"
+
+
+def test_what_floods_the_terminal_is_lost(line):
+    port = os.open(line.path, os.O_RDWR | os.O_NOCTTY)
+    os.write(port, b"abcdef")
+    assert line.take(1.0, 4) == b"abcd"
+    os.write(port, b"gh")
+    assert line.take(1.0, 0) == b""
+    os.write(port, b"ij")
+    assert line.take(1.0, 4) == b"ij"
+    os.close(port)
 
 
 def test_a_port_that_is_taken_is_an_error(line):

@@ -22,6 +22,7 @@ export function cleared(canvas) {
 
 // Returns about `count` round numbers from `low` to `high`, and how many decimals they need.
 export function ticks(low, high, count) {
+  if (count <= 0) return { values: [], decimals: 0 };
   const raw = (high - low) / count;
   const power = 10 ** Math.floor(Math.log10(raw));
   const step = [1, 2, 5, 10].map((each) => each * power).find((each) => each >= raw * 0.999);

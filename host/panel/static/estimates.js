@@ -55,6 +55,7 @@ export function drawEstimates(canvas) {
   const { context, width, height } = cleared(canvas);
   const names = [canvas.dataset.own, "plain difference"];
   const across = Math.floor((width - LEFT - MIDDLE) / 2), tall = (height - HEAD - 6) / 2 - NAME;
+  if (across < 1) return;
   ROWS.forEach((kind, line) => {
     const both = [0, 1].map((lane) => columns(2 * line + lane, across));
     let low = Infinity, high = -Infinity;

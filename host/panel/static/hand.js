@@ -18,6 +18,11 @@ function beginning(wall, left, at) {
   return dragged === null ? view.from : (view.from = view.before);
 }
 
+export function release() {
+  if (dragged !== null) send({ do: "free" });
+  dragged = null;
+}
+
 export function listen(canvas) {
   const place = (event) => view.from + (event.offsetX / canvas.clientWidth) * SHOWN_MM;
   canvas.addEventListener("pointerdown", (event) => {
@@ -29,10 +34,7 @@ export function listen(canvas) {
     if (dragged !== null) dragged = place(event);
   });
   for (const end of ["pointerup", "pointercancel"]) {
-    canvas.addEventListener(end, () => {
-      dragged = null;
-      send({ do: "free" });
-    });
+    canvas.addEventListener(end, release);
   }
 }
 

@@ -2,11 +2,12 @@
 
 import { ALIVE_MS, LIVE, board, hear, look, open, send } from "./live.js";
 import { drawTraces, takeFresh } from "./traces.js";
-import { drawHand, listen } from "./hand.js";
+import { drawHand, listen, release } from "./hand.js";
 import { begin, drawEstimates, keepPace, listenTo } from "./estimates.js";
 
 const find = (id) => document.getElementById(id);
 const ACTS = ["arm", "disarm", "acknowledge", "connect"];
+const DRAWINGS = { traces: drawTraces, hand: drawHand, estimates: drawEstimates };
 const drawn = []; // the times of the frames that had something new
 let identity = "", pinged = 0;
 
@@ -20,8 +21,14 @@ hear("told", (told) => {
   for (const name of ["state", "why", "do", "said"]) find(name).textContent = told[name];
   for (const name of ACTS) find(name).disabled = !told.may.includes(name);
   find("connect").hidden = !told.may.includes("connect");
-  document.body.classList.toggle("locked", Boolean(told.locked));
-  document.body.classList.toggle("old", !LIVE.includes(told.state));
+  const old = !LIVE.includes(told.state), locked = Boolean(told.locked);
+  document.body.classList.toggle("locked", locked);
+  document.body.classList.toggle("old", old);
+  // What cannot be done now cannot be asked for, with keys neither.
+  for (const part of document.querySelectorAll("aside, .asks, #hand")) part.inert = old || locked;
+  // A clock that stands makes a board silent, and must be started again.
+  for (const button of document.querySelectorAll(".fault")) button.disabled = locked || (old && told.state !== "SILENT");
+  if (old || locked) release();
   document.title = `${told.state} – hardwall`;
   keepPace(told.pace);
   if (told.identity) {
@@ -44,19 +51,34 @@ function pace(now) {
   find("pace").textContent = `${told.pace.toFixed(2)} of real time · ${looks}${flags}`;
 }
 
+const failed = new Set(); // the parts that could not be drawn last time
+
+// Draws a part of the page. One that fails is told once, and ends no other one.
+function isolated(name, draw) {
+  try {
+    draw();
+    failed.delete(name);
+  } catch (error) {
+    if (!failed.has(name)) window.reportError(error);
+    failed.add(name);
+  }
+}
+
 function frame(now) {
+  // Whatever fails below, there is a next frame.
+  window.requestAnimationFrame(frame);
   // The tab lives as long as it draws: one that hangs, or is hidden, does not renew the lease.
   if (now - pinged >= ALIVE_MS) {
     pinged = now;
     send({ do: "ping" });
-    pace(now);
-    look();
+    isolated("pace", () => pace(now));
+    isolated("look", look);
   }
   if (takeFresh()) drawn.push(now);
-  if (find("traces")) drawTraces(find("traces"));
-  if (find("hand")) drawHand(find("hand"));
-  if (find("estimates")) drawEstimates(find("estimates"));
-  window.requestAnimationFrame(frame);
+  for (const [name, draw] of Object.entries(DRAWINGS)) {
+    const canvas = find(name);
+    if (canvas) isolated(name, () => draw(canvas));
+  }
 }
 
 // The page's elements are there a moment after its scripts.

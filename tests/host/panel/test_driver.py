@@ -7,8 +7,10 @@ import pytest
 
 from hardwall.host.errors import HostError
 from hardwall.host.heartbeat import LEASE_S
-from hardwall.host.panel.driver import STALE_S, Driver
+from hardwall.host.panel.driver import Driver
+from hardwall.host.panel.recorder import Wish
 from hardwall.host.panel.view import View
+from hardwall.host.panel.wishes import STALE_S
 from hardwall.host.status import State
 from hardwall.model.supervisor import TRIPPED
 from stimuli.processes import wait_until
@@ -16,6 +18,8 @@ from stimuli.processes import wait_until
 TAB, OTHER = "tab", "other"
 STOP = 1 << 13
 """The cause emergency_stop."""
+DISARM, COMMIT, HEARTBEAT = b"\0\x7a", b"\0\x7f", b"\0\xc0"
+"""Addresses, as requests have them."""
 
 
 def seen(driver: Driver, so: Callable[[View], object], tab: str = TAB) -> View:
@@ -73,7 +77,7 @@ def test_the_tab_that_armed_keeps_it_armed_and_its_silence_disarms(driver, board
 
 
 def beats(board) -> int:
-    return sum(each[1] == 16 and each[2:4] == b"\0\xc0" for each in list(board.requests))
+    return sum(each[1] == 16 and each[2:4] == HEARTBEAT for each in list(board.requests))
 
 
 def test_a_tab_that_goes_disarms_what_it_armed_and_nothing_else(driver):
@@ -160,6 +164,80 @@ def test_what_was_asked_of_a_silent_board_is_not_done_late_but_a_disarm_is(drive
     time.sleep(0.1)
     driver.disarm()
     seen(driver, lambda view: view.status.state is State.DISARMED)
+
+
+def test_a_word_of_a_board_that_is_gone_is_not_written_to_the_next_one(driver, board):
+    before = driver.view.values["wall_stiffness"]
+    board.hang_up()
+    wait_until(lambda: not driver.view.connected)
+    revision = driver.view.revision
+    driver.set(TAB, "wall_stiffness", 150e3)
+    wait_until(lambda: driver.view.said)
+    assert driver.view.said == "no board answers: nothing was done"
+    # The page shows anew what the board uses.
+    assert driver.view.revision > revision
+    driver.connect()
+    wait_until(lambda: driver.view.connected)
+    looks = driver.samples_since(0)[0]
+    wait_until(lambda: driver.samples_since(0)[0] > looks + 3)
+    assert driver.view.values["wall_stiffness"] == before
+    assert commits(board) == 0
+
+
+def commits(board) -> int:
+    """Return how many requests have written words and their commit."""
+    return sum(each[1] == 16 and each[2:4] == COMMIT for each in list(board.requests))
+
+
+@pytest.mark.parametrize("ask", ["set", "arm", "home", "record"])
+def test_what_was_asked_of_a_board_that_was_silent_while_armed_is_not_done_late(driver, board, ask):
+    armed(driver)
+    board.lost = 1 << 30
+    wait_until(lambda: driver.view.status is None)
+    before = len(board.requests)
+    said = "no board answers: nothing was done"
+    {
+        "set": lambda: driver.set(TAB, "wall_stiffness", 150e3),
+        "arm": lambda: (driver.ping(TAB), driver.arm(TAB)),
+        "home": lambda: driver.home(TAB, 0.0),
+        "record": lambda: driver.record(TAB, Wish()),
+    }[ask]()
+    wait_until(lambda: driver.view.said == said)
+    board.lost = 0
+    seen(driver, lambda view: view.status)
+    seen(driver, lambda view: view.status.state is State.DISARMED, OTHER)
+    # Nothing was written but beats and a disarm.
+    written = {each[2:4] for each in board.requests[before:] if each[1] == 16}
+    assert written <= {HEARTBEAT, DISARM}
+
+
+def test_a_wish_that_came_late_is_dropped(driver, board):
+    driver.set(TAB, "wall_stiffness", 900.0, time.monotonic() - 1.05 * STALE_S)
+    wait_until(lambda: driver.view.said == "the board did not answer in time: nothing was done")
+    assert driver.view.values["wall_stiffness"] == 0
+    driver.set(TAB, "wall_stiffness", 900.0, time.monotonic() + 1e9)
+    wait_until(lambda: driver.view.values["wall_stiffness"] == pytest.approx(900, abs=4))
+
+
+def test_a_request_that_waits_for_its_board_does_not_go_out_late(driver, board, monkeypatch):
+    """A board that falls silent just before a word is asked again, but not for as long as for a look."""
+    monkeypatch.setattr("hardwall.host.panel.driver.DONE_S", 0.0)
+    driver.set(TAB, "wall_stiffness", 900.0, time.monotonic())
+    wait_until(lambda: "what was not done by then is not done any more" in driver.view.said)
+    assert commits(board) == 0
+
+
+def test_a_homing_is_left_when_the_board_falls_silent(driver, board):
+    driver.home(TAB, 0.0)
+    board.show(index_armed=1)
+    wait_until(lambda: driver.view.homing)
+    board.lost = 1 << 30
+    wait_until(lambda: driver.view.status is None)
+    assert not driver.view.homing
+    assert driver.view.said == "the board did not answer: it is not homed any more"
+    board.lost = 0
+    wait_until(lambda: driver.view.status)
+    assert not driver.view.homing
 
 
 def test_a_board_that_is_gone_is_said_and_had_again(driver, board):

@@ -1,6 +1,8 @@
 """The socket of a tab: what it may ask for, what it is told, and what its end does."""
 
 import asyncio
+import json
+import time
 from itertools import pairwise
 
 import numpy as np
@@ -11,14 +13,20 @@ from hardwall.host.panel.driver import Driver
 from hardwall.host.panel.estimates import Estimates
 from hardwall.host.panel.hand import Hand
 from hardwall.host.panel.live import Bench, Live
+from hardwall.host.panel.wishes import STALE_S
 from hardwall.sim.scene.load import load
 from stimuli.processes import wait_until
 
 TAB, OTHER = "tab", "other"
+NUMBERLESS = [json.loads(text) for text in ("NaN", "-Infinity", "1e999", f"1{'0' * 400}")]
+"""What JSON of a browser may have in place of a number, as Python reads it."""
 
 
 class Socket:
-    """A socket whose browser says some messages, the next when something was so; then it goes."""
+    """A socket whose browser says some messages, the next when something was so; then it goes.
+
+    A message without a time is of now.
+    """
 
     def __init__(self, *messages: object):
         self._messages, self.sent, self.bytes, self.code = list(messages), [], [], None
@@ -34,7 +42,8 @@ class Socket:
             self._messages.pop(0)
         if not self._messages:
             raise WebSocketDisconnect
-        return self._messages.pop(0)
+        message = self._messages.pop(0)
+        return {"at_s": time.monotonic(), **message} if isinstance(message, dict) else message
 
     async def send_json(self, message: dict) -> None:
         self.sent.append(message)
@@ -91,7 +100,14 @@ def test_what_is_told_is_told_when_it_changes_and_samples_always(driver, live, b
 
 
 @pytest.mark.parametrize(
-    "message", [{}, {"do": "leap"}, {"do": "acknowledge"}, {"do": "hold", "m": "x"}, [], "arm", {"do": "turn"}, 3]
+    "message",
+    [
+        *({}, {"do": "leap"}, {"do": "acknowledge"}, {"do": "hold", "m": "x"}, [], "arm", {"do": "turn"}, 3),
+        *({"do": "hold", "m": m} for m in (*NUMBERLESS, None, True, [1.0])),
+        *({"do": "acknowledge", "latched": word} for word in (*NUMBERLESS, 1.0, -1, 1 << 32, True)),
+        *({"do": "ping", "at_s": at_s} for at_s in (*NUMBERLESS, "0", True)),
+        *({"do": "turn", "fault": fault} for fault in (["wire"], None, 0)),
+    ],
 )
 def test_what_is_no_message_ends_the_socket(live, orders, message):
     assert serve(live, Socket(message)).code == 1003
@@ -124,6 +140,31 @@ def test_while_another_tab_holds_the_board_a_tab_may_only_disarm(driver, live, o
     assert driver.view.holder == OTHER
     serve(live, Socket({"do": "disarm"}))
     wait_until(lambda: state(driver) == "DISARMED")
+
+
+def test_what_was_wished_long_ago_is_not_done(driver, live, orders):
+    """A network that stood still delivers at once what it has kept."""
+    old = {"at_s": time.monotonic() - 1.05 * STALE_S}
+    asked = [{"do": "ping"}, {"do": "arm"}, {"do": "hold", "m": 1e-3}, {"do": "turn", "fault": "wire"}]
+    said = lambda: driver.view.said == "the board did not answer in time: nothing was done"  # noqa: E731
+    # Life of long ago is none, and a page that does not know the time says nothing that counts.
+    for late in (old, {"at_s": None}):
+        serve(live, Socket(*(each | late for each in asked), said))
+        assert state(driver) == "DISARMED"
+        assert orders == []
+    serve(live, Socket({"do": "ping"}, {"do": "arm"}, lambda: driver.view.holder, {"do": "disarm", "at_s": None}))
+    wait_until(lambda: state(driver) == "DISARMED")
+
+
+def test_every_message_has_the_time_of_the_server(driver, live, board):
+    board.lost = 1 << 30
+    wait_until(lambda: driver.view.status is None)
+    began_s = time.monotonic()
+    socket = Socket(lambda: len(socket.sent) > 5)
+    serve(live, socket)
+    times = [message["at_s"] for message in socket.sent]
+    assert times == sorted(times)
+    assert all(began_s < at_s < time.monotonic() for at_s in times)
 
 
 def test_records_of_the_estimators_are_sent_with_the_words_of_the_board(driver, live, estimates):

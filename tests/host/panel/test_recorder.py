@@ -8,7 +8,7 @@ from host.twin_board import TwinBoard
 
 from hardwall.host.connect import connect
 from hardwall.host.panel.driver import Driver
-from hardwall.host.panel.recorder import IDLE, READING, Wish
+from hardwall.host.panel.recorder import IDLE, NOW, READING, Wish
 from hardwall.model.capture import DONE, RECORD_REGISTERS, STATES, WAITING
 from hardwall.model.checks import FieldError
 from hardwall.model.registers import RegisterMap
@@ -42,6 +42,30 @@ def done(board, registers, clocks: int) -> np.ndarray:
     board.server.file.capture = cells.ravel().tolist()
     board.show(capture_state=DONE, capture_place=7)
     return cells[:, 1]
+
+
+def test_a_trigger_of_a_person_is_not_given_late(driver, board, started):
+    driver.record(TAB, Wish(NOW))
+    wait_until(lambda: driver.view.recording.state == "FILLING")
+    board.lost = 1 << 30
+    wait_until(lambda: driver.view.status is None)
+    assert driver.view.recording.state == IDLE
+    board.show(capture_state=WAITING)
+    board.lost = 0
+    wait_until(lambda: driver.view.status)
+    looks = driver.samples_since(0)[0]
+    wait_until(lambda: driver.samples_since(0)[0] > looks + 5)
+    assert {"by_hand": 1} not in started
+
+
+def test_a_capture_of_an_event_outlasts_a_silence(driver, board, started):
+    driver.record(TAB, Wish("contact"))
+    wait_until(lambda: driver.view.recording.state == "FILLING")
+    board.lost = 1 << 30
+    wait_until(lambda: driver.view.status is None)
+    board.show(capture_state=WAITING)
+    board.lost = 0
+    wait_until(lambda: driver.view.recording.state == "WAITING")
 
 
 def test_a_capture_is_begun_and_read_in_parts_between_looks(driver, board, registers, started):

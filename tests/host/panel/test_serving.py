@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+from collections.abc import Sequence
 
 import pytest
 
@@ -12,14 +13,97 @@ async def inner(scope, receive, send) -> None:
     await send({"type": "inner", "path": scope.get("path")})
 
 
-def answered(kind: str, path: str) -> list[dict]:
+HOST = "127.0.0.1:8080"
+
+
+def answered(
+    kind: str, path: str, hosts: Sequence[str] = (HOST,), origins: Sequence[str] = (f"http://{HOST}",), at: str = HOST
+) -> list[dict]:
+    """Return what is sent for a request with some headers Host and Origin to a page that is served at an address."""
     sent = []
 
     async def send(message: dict) -> None:
         sent.append(message)
 
-    asyncio.run(Guard(inner, "token")({"type": kind, "path": path}, None, send))
+    pairs = [(b"host", host.encode()) for host in hosts] + [(b"origin", origin.encode()) for origin in origins]
+    address, _, port = at.rpartition(":")
+    guard = Guard(inner, "token", {address, "localhost"}, int(port))
+    asyncio.run(guard({"type": kind, "path": path, "headers": pairs}, None, send))
     return sent
+
+
+def passes(kind: str, *args: object, **named: object) -> bool:
+    return answered(kind, "/token/", *args, **named)[0]["type"] == "inner"
+
+
+@pytest.mark.parametrize("kind", ["http", "websocket"])
+@pytest.mark.parametrize(
+    ("hosts", "origins"),
+    [
+        # A page of another site that has learned the token.
+        ([HOST], ["http://evil.example"]),
+        ([HOST], ["http://127.0.0.1:8081"]),
+        ([HOST], ["https://127.0.0.1:8080"]),
+        ([HOST], ["null"]),
+        ([HOST], [f"http://{HOST}", "http://evil.example"]),
+        # A name that another site points here.
+        (["evil.example:8080"], ["http://evil.example:8080"]),
+        (["evil.example:8080"], []),
+        (["10.0.0.1:8080"], []),
+        (["127.0.0.1"], []),
+        (["127.0.0.1:80"], []),
+        ([""], []),
+        ([], []),
+        ([HOST, "evil.example"], []),
+    ],
+)
+def test_who_knows_the_token_and_is_another_page_is_refused(kind, hosts, origins):
+    assert not passes(kind, hosts, origins)
+
+
+def test_a_page_may_be_typed_and_a_socket_is_of_the_page():
+    assert passes("http", [HOST], [])
+    assert not passes("websocket", [HOST], [])
+    assert passes("websocket", ["LOCALHOST:8080"], ["http://localhost:8080"])
+
+
+@pytest.mark.parametrize(
+    ("at", "host", "comes_through"),
+    [
+        ("0.0.0.0:8080", "10.0.0.1:8080", True),
+        ("0.0.0.0:8080", "[fe80::1]:8080", True),
+        ("0.0.0.0:8080", "evil.example:8080", False),
+        (":::8080", "10.0.0.1:8080", True),
+        ("10.0.0.1:80", "10.0.0.1", True),
+        ("10.0.0.1:80", "10.0.0.2", False),
+        ("[::1]:8080", "[::1]:8080", True),
+        ("[::1]:80", "[::1]", True),
+    ],
+)
+def test_a_host_is_that_of_the_address(at, host, comes_through):
+    assert passes("http", [host], [], at=at) == comes_through
+
+
+def test_every_answer_forbids_frames_and_other_servers_and_tells_no_address():
+    async def page(scope, receive, send) -> None:
+        await send({"type": "http.response.start", "status": 200, "headers": [(b"referrer-policy", b"unsafe-url")]})
+
+    sent = []
+
+    async def send(message: dict) -> None:
+        sent.append(message)
+
+    scope = {"type": "http", "path": "/token/", "headers": [(b"host", HOST.encode())]}
+    asyncio.run(Guard(page, "token", {"127.0.0.1"}, 8080)(scope, None, send))
+    (refusal, _) = answered("http", "/")
+    for message in (sent[0], refusal):
+        names = [name for name, _ in message["headers"]]
+        assert names.count(b"referrer-policy") == 1
+        headers = dict(message["headers"])
+        assert headers[b"referrer-policy"] == b"no-referrer"
+        policy = dict(each.split(" ", 1) for each in headers[b"content-security-policy"].decode().split("; "))
+        assert policy["frame-ancestors"] == "'none'"
+        assert policy["default-src"] == policy["connect-src"] == "'self'"
 
 
 @pytest.mark.parametrize("path", ["/token", "/token/", "/token/live", "/token/_nicegui/x"])
