@@ -66,6 +66,13 @@ def test_every_bug_changes_the_hardware(known):
     assert [bug for bug in known.bugs if known.rtlil(bug) == right] == []
 
 
+@pytest.mark.parametrize("known", properties.PROPERTIES, ids=[known.name for known in properties.PROPERTIES])
+def test_every_bug_has_its_place_in_the_source(known):
+    for bug in known.bugs:
+        with bug.seeded():
+            assert str(bug)
+
+
 def test_a_bug_must_be_of_a_part_that_the_source_has_once():
     code = Output.elaborate.__code__
     with pytest.raises(ValueError, match=r"^Output\.elaborate must have 'self\.drive' once, not \d+$"):

@@ -209,7 +209,7 @@ PROPERTIES = [
         depth=4,
         bugs=(
             Bug(Quadrature.elaborate, "Mux(down, -1, 1)", "Mux(down, 1, 1)"),
-            Bug(Quadrature.elaborate, "(base[-1] ^ count[-1]) & (count[-1] ^ count[-2])", "base[-1] ^ count[-1]"),
+            Bug(Quadrature.elaborate, "total[self._count_width - 1 :].any()", "total[self._count_width :].any()"),
             Bug(Quadrature.elaborate, "level ^ accepted, pins", "level ^ accepted, 0"),
         ),
     ),
