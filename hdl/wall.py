@@ -71,7 +71,7 @@ class Wall(Block):
     wall_forbid_pull : In(1)
         1: the wall only pushes.
     wall_velocity : In(SQ)
-        Of a coupling: the surface's velocity, counts a sample, with the bits of `design.coarse`.
+        Of a coupling: the surface's velocity, counts a sample, with the bits of `design.surface`.
     wall_two_sided : In(1)
         Of a coupling. 1: the wall holds on both sides, if it may pull.
         All these words are constant from the clock after a sample's `lead` to its `strobe`.
@@ -142,13 +142,14 @@ class Wall(Block):
         half = (1 << (design.push - 1)) - 1 if design.push > 0 else 0
         lean = half + left if design.push > 0 else 0
         if design.coupling:
+            surface_shift = design.push - design.damping.f - design.surface.f
             # What the surface's velocity adds is known before the strobe: the sum has no more terms than without.
             carried, surface = products("surface", self.wall_damping, self.wall_velocity)
             lean = Signal(signed(design.lean_bits))
             with m.If(known):
                 m.d.sync += carried
             with m.If(placed):
-                m.d.sync += lean.eq((surface << damper_shift) + half + (self.wall_left if design.push > 0 else 0))
+                m.d.sync += lean.eq((surface << surface_shift) + half + (self.wall_left if design.push > 0 else 0))
         with m.If(damped):
             m.d.sync += total.eq((spring << spring_shift) - (damper << damper_shift) + lean)
 

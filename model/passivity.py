@@ -126,7 +126,7 @@ class Design:
         self.decimation = axis.samples_per_actuation
         self.force = axis.force
         self.velocity = velocity
-        self.damping, self.coarse = damper_formats(axis, velocity)
+        self.damping, self.coarse, _ = damper_formats(axis, velocity)
         self.shift = self.damping.f + self.coarse.f
         # A clock counts one edge at most. A sample's largest change begins and ends anywhere in a count.
         self.displacement = SQ(1 + bits_for(2 * min(axis.clocks_per_sample, 1 << axis.count_width - 1) + 3), 0)

@@ -17,7 +17,8 @@ Formats, derived, with the force LSB r, the count q and the sample period tau:
   of two counts of a handle are taken modulo the count's width; this one is none.
 - `stiffness` and `damping` are gain words in force LSB a count and a count/sample.
 - The velocity keeps only as many fraction bits as can move the push by half a force LSB at the largest damping; the
-  other bits are dropped (floor). The surface's velocity is a word with these bits.
+  other bits are dropped (floor). The surface's velocity is a word with as many, also where the estimator's has fewer: a
+  finite difference has none, and a surface of less than a count a sample would stand still for the damper.
 - The products are added exactly and rounded once, half up, to a force LSB; then push saturates at the largest
   magnitude of the force format.
 
@@ -54,6 +55,7 @@ class Params(NamedTuple):
     velocity_shift: int
     spring_shift: int
     damper_shift: int
+    surface_shift: int
     push_shift: int
     force_max: int
 
@@ -72,11 +74,13 @@ class FloatParams(NamedTuple):
     velocity_lsb: float
 
 
-def damper_formats(axis: AxisRequirements, velocity: SQ) -> tuple[UQ, SQ]:
-    """Return the formats of a damping word, in force LSB a count/sample, and of the velocity as the damper takes it."""
+def damper_formats(axis: AxisRequirements, velocity: SQ) -> tuple[UQ, SQ, SQ]:
+    """Return the formats of a damping word, in force LSB a count/sample, of the velocity as the damper takes it, and of
+    a velocity with every bit that a damper can use."""
     tau = 1 / axis.sample_hz
     damping = gain_format(axis.damping_max_n_s_per_m * axis.count_m / tau / axis.force_resolution_n)
-    return damping, SQ(velocity.i, max(min(velocity.f, 1 + damping.i), 1 - velocity.i))
+    whole = SQ(velocity.i, max(1 + damping.i, 1 - velocity.i))
+    return damping, SQ(velocity.i, max(min(velocity.f, whole.f), 1 - velocity.i)), whole
 
 
 class Design:
@@ -92,6 +96,7 @@ class Design:
         stiffness, damping: gain formats.
         depth: format of the depth.
         coarse: format of the velocity as the damper takes it.
+        surface: format of the surface's velocity; of a wall, whose surface stands, that of `coarse`.
         push: fraction bits in which the products are added.
         lean_bits: bits of what the surface's velocity adds, with half a force LSB.
         total_bits: bits of the whole sum.
@@ -112,11 +117,12 @@ class Design:
         self.velocity = velocity
         self.coupling = coupling
         self.stiffness = gain_format(axis.stiffness_max_n_per_m * q / r)
-        self.damping, self.coarse = damper_formats(axis, velocity)
-        self.push = max(self.stiffness.f, self.damping.f + self.coarse.f, 0)
+        self.damping, self.coarse, whole = damper_formats(axis, velocity)
+        self.surface = whole if coupling else self.coarse
+        self.push = max(self.stiffness.f, self.damping.f + self.surface.f, 0)
         self.depth = SQ(axis.count_width + 1, 0)
         spring_bits = 16 + self.depth.width + self.push - self.stiffness.f
-        damper_bits = 16 + self.coarse.width + self.push - self.damping.f - self.coarse.f
+        damper_bits = 16 + self.surface.width + self.push - self.damping.f - self.surface.f
         for name, bits in (("stiffness_max_n_per_m", damper_bits), ("damping_max_n_s_per_m", spring_bits)):
             if bits > 61:
                 value = getattr(axis, name)
@@ -127,7 +133,7 @@ class Design:
                 )
         for name, fraction in (
             ("stiffness_max_n_per_m", self.stiffness.f),
-            ("damping_max_n_s_per_m", self.damping.f + self.coarse.f),
+            ("damping_max_n_s_per_m", self.damping.f + self.surface.f),
         ):
             if fraction + self.force.width > 61:
                 value = getattr(axis, name)
@@ -136,7 +142,7 @@ class Design:
         self.lean_bits = max(damper_bits, self.push + self.force.width) + 1
         self.total_bits = max(spring_bits + 1, self.lean_bits) + 1
         moving = (
-            Word("wall_velocity", self.coarse, q / tau, "m/s", 0, "velocity of the surface"),
+            Word("wall_velocity", self.surface, q / tau, "m/s", 0, "velocity of the surface"),
             Word("wall_two_sided", UQ(1, 0), 1.0, "", 0, "1: the wall holds on both sides, if it may pull"),
         )
         self.words = (
@@ -161,6 +167,7 @@ class Design:
             velocity_shift=self.velocity.f - self.coarse.f,
             spring_shift=self.push - self.stiffness.f,
             damper_shift=self.push - self.damping.f - self.coarse.f,
+            surface_shift=self.push - self.damping.f - self.surface.f,
             push_shift=self.push,
             force_max=self.force.max,
         )
@@ -174,9 +181,9 @@ class Design:
             words["wall_position"],
             words["wall_left"],
             words["wall_forbid_pull"],
-            words.get("wall_velocity", 0) * self.coarse.lsb,
+            words.get("wall_velocity", 0) * self.surface.lsb,
             words.get("wall_two_sided", 0),
-            self.coarse.lsb,
+            self.surface.lsb,
         )
 
 
@@ -203,11 +210,10 @@ def step(params, count, velocity):
     depth = _depth(params, count)
     if not (params.two_sided or depth > 0):
         return 0
-    coarse = shift_floor(velocity, params.velocity_shift) - params.velocity
-    inward = -coarse if params.left else coarse
+    damper = (params.damping * shift_floor(velocity, params.velocity_shift)) << params.damper_shift
+    damper -= (params.damping * params.velocity) << params.surface_shift
     spring = (params.stiffness * depth) << params.spring_shift
-    damper = (params.damping * inward) << params.damper_shift
-    push = shift_round_half_up(spring + damper, params.push_shift)
+    push = shift_round_half_up(spring - damper if params.left else spring + damper, params.push_shift)
     push = saturate(push, 0 if params.forbid_pull else -params.force_max, params.force_max)
     return push if params.left else -push
 
@@ -250,6 +256,7 @@ def word_moved(params, position, velocity):
         params.velocity_shift,
         params.spring_shift,
         params.damper_shift,
+        params.surface_shift,
         params.push_shift,
         params.force_max,
     )

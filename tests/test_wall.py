@@ -14,6 +14,7 @@ from hardwall.hdl.wall import Wall
 from hardwall.model import wall
 from hardwall.model.axes import Axes, AxesSpec
 from hardwall.model.axis import Axis
+from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from stimuli.lengths import some_of
 from stimuli.magnitudes import magnitudes
@@ -38,7 +39,7 @@ def stimulus(d: wall.Design, samples: int):
     if not d.coupling:
         yield from of_a_wall(d, samples)
         return
-    least, most = d.coarse.min, d.coarse.max
+    least, most = d.surface.min, d.surface.max
     for row in of_a_wall(d, samples // 2):
         yield *row, 0, 0
     half = 1 << (d.count_width - 1)
@@ -48,7 +49,7 @@ def stimulus(d: wall.Design, samples: int):
     )  # fmt: skip
     yield from itertools.product(*extremes)
     random = rng()
-    surface = magnitudes(random, least, most, samples // 2, d.coarse.width).tolist()
+    surface = magnitudes(random, least, most, samples // 2, d.surface.width).tolist()
     sides = random.integers(0, 2, samples // 2).tolist()
     for row, *moving in zip(of_a_wall(d, samples // 2), surface, sides, strict=False):
         yield *row, *moving
@@ -171,9 +172,9 @@ def oracle(d: wall.Design, row) -> int:
     depth = side * (count - position)
     if not two_sided and depth <= 0:
         return 0
-    coarse = math.floor(Fraction(velocity) / 2 ** (d.velocity.f - d.coarse.f)) - surface
-    coarse *= Fraction(2) ** -d.coarse.f
-    push = k * Fraction(2) ** -d.stiffness.f * depth + b * Fraction(2) ** -d.damping.f * side * coarse
+    coarse = math.floor(Fraction(velocity) / 2 ** (d.velocity.f - d.coarse.f)) * Fraction(2) ** -d.coarse.f
+    beyond = coarse - surface * Fraction(2) ** -d.surface.f
+    push = k * Fraction(2) ** -d.stiffness.f * depth + b * Fraction(2) ** -d.damping.f * side * beyond
     push = math.floor(push + Fraction(1, 2))
     if forbid_pull:
         push = max(push, 0)
@@ -196,7 +197,7 @@ def test_the_force_is_exact_for_every_position_and_count(coupling):
     d = design("narrow", coupling=coupling)
     every = range(-(1 << d.count_width - 1), 1 << d.count_width - 1)
     gains = (0, d.stiffness.max // 3), (0, d.damping.max)
-    moving = (d.coarse.min, d.coarse.max), (0, 1)
+    moving = (d.surface.min, d.surface.max), (0, 1)
     rows = itertools.product(
         every, (d.velocity.min, 0, d.velocity.max), *gains, every, (0, 1), (0, 1), *(moving if coupling else ())
     )
@@ -283,6 +284,19 @@ def test_a_surface_that_is_moved_is_that_of_its_words(floating):
 
     changes = {"wall_position": 1234, "wall_velocity": -77}
     assert wall.moved(params({}), *changes.values()) == params(changes)
+
+
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize("estimator", [name for name, design in ESTIMATORS.items() if not design.uses_stamps()])
+@pytest.mark.parametrize("name", ["paper", "mhz"])
+def test_a_coupling_damps_to_its_surface_however_slow_it_is(name, estimator, floating):
+    """A handle that goes with its surface is not braked: in the mean over the counts, at less than a count a sample."""
+    made = dataclasses.replace(spec(name, estimator), coupling=True)
+    held = {"wall_stiffness": 0.0, "wall_two_sided": 1, "wall_forbid_pull": 0}
+    for speed in (5e-3, -23e-3):
+        counts = np.floor(np.arange(20_000) * (speed / made.sample_hz / made.count_m)).astype(np.int64)
+        record = Axis(made, floating, wall_damping=100.0, wall_velocity=speed, **held).run(counts)
+        assert abs(record.force_n[10_000:].mean()) < 2 * made.force_resolution_n
 
 
 def test_gains_of_an_axis_that_are_too_small_are_refused_by_name():

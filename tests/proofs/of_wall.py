@@ -83,8 +83,9 @@ def force_is_exact(axis: str, coupling: bool, bench: Bench) -> None:
     # positions, and of the damping with the velocity, less what the surface's adds.
     acts, side, pushes = (bench.past(each) for each in (inside, left, forbidden))
     spring_shift, damper_shift = design.push - design.stiffness.f, design.push - design.damping.f - design.coarse.f
-    surface = whole(bench, "surface") if coupling else 0
-    outwards = (whole(bench, "spring") << spring_shift) - ((whole(bench, "damper") - surface) << damper_shift)
+    surface_shift = design.push - design.damping.f - design.surface.f
+    surface = whole(bench, "surface") << surface_shift if coupling else 0
+    outwards = (whole(bench, "spring") << spring_shift) - (whole(bench, "damper") << damper_shift) + surface
     most = design.force.max
     push = (Mux(side, outwards, -outwards) + (1 << design.push - 1)) >> design.push
     least = Mux(pushes, 0, -most)
@@ -99,7 +100,7 @@ def force_is_exact(axis: str, coupling: bool, bench: Bench) -> None:
     bench.promise(~waits | (inner["positive"] == inside & (left | ~forbidden)))
     bench.promise(~waits | (inner["negative"] == inside & ~(left & forbidden)))
     if coupling:
-        carried = (surface << damper_shift) + (1 << design.push - 1) - 1 + left
+        carried = surface + (1 << design.push - 1) - 1 + left
         bench.promise(~waits | (inner["lean"] == carried))
 
 

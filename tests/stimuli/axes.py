@@ -65,7 +65,7 @@ def random_words(design: Design, random: np.random.Generator) -> dict[str, int]:
     words["wall_position"] = int(random.integers(-30, 30))
     words["wall_left"], words["wall_forbid_pull"] = random.integers(0, 2, 2).tolist()
     if design.wall.coupling:
-        least, most, width = design.wall.coarse.min, design.wall.coarse.max, design.wall.coarse.width
+        least, most, width = design.wall.surface.min, design.wall.surface.max, design.wall.surface.width
         words["wall_velocity"] = int(random.integers(least, most + 1)) >> int(random.integers(0, width))
         words["wall_two_sided"] = int(random.random() < 0.5)
     words["encoder_glitch_clocks"] = int(random.choice([0, 1, 2, 5, 15]))
