@@ -28,7 +28,7 @@ from .designed import DesignedAxis
 from .drive import registry
 from .drive.pdm import USUAL
 from .drive.stage import Stage, StageDesign
-from .quadrature import WRAPPED
+from .quadrature import ILLEGAL, WRAPPED
 
 AXES_MAX = 32
 """The most axes of one pipeline."""
@@ -167,18 +167,19 @@ class Axes:
 
         Args:
             counts: integers, shape (axes, samples). A count may exceed the count's width: it wraps, as in the hardware,
-                and from there on the flag count_wrapped is up and the drive is zero. It may not jump by half of its
-                range.
+                and from there on the flag count_wrapped is up and the drive is zero. A count that goes by more in a
+                sample than the sample has clocks raises the encoder's flag of an illegal step in the same way. It may
+                not jump by half of its range.
 
         Raises:
             TypeError: if the counts are not integers.
             ValueError: if the counts have no row for every axis, or jump.
         """
         spec = self.spec
-        lanes, wrapped = checks.lanes_of_counts(counts, spec.count_width, spec.clocks_per_sample)
+        lanes, wrapped, outrun = checks.lanes_of_counts(counts, spec.count_width, spec.clocks_per_sample)
         if lanes.ndim != 2 or len(lanes) != spec.axes:
             raise ValueError(f"counts must have a row for each of the {spec.axes} axes, not the shape {lanes.shape}")
-        faults = wrapped * WRAPPED
+        faults = wrapped * WRAPPED | outrun * ILLEGAL
         velocity, force, drive, flags = (np.zeros(lanes.shape, np.int64) for _ in range(4))
         for lane, params in enumerate(self.params):
             made = velocity[lane], force[lane], drive[lane], flags[lane]

@@ -124,7 +124,8 @@ class Axis:
         Args:
             counts: integers, shape (samples,), or (lanes, samples) for independent axes side by side. A count may
                 exceed the count's width: it wraps, as in the hardware, and from there on the flag count_wrapped is up
-                and the drive is zero. It may not jump by half of its range.
+                and the drive is zero. A count that goes by more in a sample than the sample has clocks raises the
+                encoder's flag of an illegal step in the same way. It may not jump by half of its range.
 
         Raises:
             TypeError: if the counts are not integers.
@@ -137,8 +138,9 @@ class Axis:
                 f"hardwall.model.stamped.run takes the edges that it needs"
             )
         spec = self.spec
-        checked, wrapped = checks.lanes_of_counts(counts, spec.count_width, spec.clocks_per_sample)
-        lanes, faults = np.atleast_2d(checked), np.atleast_2d(wrapped) * quadrature.WRAPPED
+        checked, wrapped, outrun = checks.lanes_of_counts(counts, spec.count_width, spec.clocks_per_sample)
+        lanes = np.atleast_2d(checked)
+        faults = np.atleast_2d(wrapped * quadrature.WRAPPED | outrun * quadrature.ILLEGAL)
         number = np.float64 if self.floating else np.int64
         velocity, force, drive = (np.zeros(lanes.shape, number) for _ in range(3))
         flags = np.zeros(lanes.shape, np.int64)

@@ -79,13 +79,13 @@ def integers(name: str, values: ArrayLike, least: int = -LARGEST - 1, most: int 
     return array.astype(np.int64)
 
 
-def lanes_of_counts(counts: ArrayLike, width: int, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return records of counts as int64 words of `width` bits, and at which samples a count has wrapped.
+def lanes_of_counts(counts: ArrayLike, width: int, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return records of counts as int64 words of `width` bits, where a count has wrapped, and where one was outrun.
 
-    Both have the shape of the records, (samples,) or (lanes, samples). A count beyond the width wraps, and has then
-    wrapped for the rest of its record. From one sample to the next a count may change by less than half of its range,
-    or wrap around the end of the range; a wrapped change is at most `most`, the counts that the decoder can make in a
-    sample.
+    All have the shape of the records, (samples,) or (lanes, samples). A count beyond the width wraps, and has then
+    wrapped for the rest of its record. It is outrun for the rest if it changes by more than `most` in a sample, the
+    counts that the decoder can make. From one sample to the next a count may change by less than half of its range, or
+    wrap around the end of the range; a wrapped change is at most `most`.
 
     Raises:
         TypeError: if the counts are not integers.
@@ -95,19 +95,20 @@ def lanes_of_counts(counts: ArrayLike, width: int, most: int) -> tuple[np.ndarra
     if array.ndim not in (1, 2):
         raise ValueError(f"counts must have 1 or 2 dimensions, not {array.ndim}")
     half = 1 << (width - 1)
-    changes = np.diff(array, axis=-1)
+    changes = np.diff(array, axis=-1, prepend=array[..., :1])
     far = np.abs(changes) >= half
+    outrun = np.abs(((changes + half) & (2 * half - 1)) - half) > most
     if far.any():
-        round_it = ((changes + half) & (2 * half - 1)) - half
-        wrong = np.argwhere(far & (np.abs(round_it) > most))
+        wrong = np.argwhere(far & outrun)
         if len(wrong):
-            *lane, before = wrong[0].tolist()
+            *lane, sample = wrong[0].tolist()
             raise ValueError(
                 f"counts must change by less than {half}, half of their range, from sample to sample, "
-                f"not by {changes[*lane, before]} at sample {before + 1}{f' of lane {lane[0]}' if lane else ''}"
+                f"not by {changes[*lane, sample]} at sample {sample}{f' of lane {lane[0]}' if lane else ''}"
             )
-    beyond = (array < -half) | (array >= half) | np.pad(far, [(0, 0)] * (array.ndim - 1) + [(1, 0)])
-    return ((array + half) & (2 * half - 1)) - half, np.logical_or.accumulate(beyond, axis=-1)
+    beyond = (array < -half) | (array >= half) | far
+    wrapped, behind = (np.logical_or.accumulate(each, axis=-1) for each in (beyond, outrun))
+    return ((array + half) & (2 * half - 1)) - half, wrapped, behind
 
 
 def edges(edge_clocks: ArrayLike, edge_levels: ArrayLike) -> tuple[np.ndarray, np.ndarray]:

@@ -83,8 +83,8 @@ class State(NamedTuple):
     starting: int  # clocks until the synchronisers are filled
 
 
-WRAPPED = 1 << 2
-"""The sticky flag `wrapped` in the word of `fault`."""
+ILLEGAL, WRAPPED = 1, 1 << 2
+"""The sticky flags `illegal` and `wrapped` in the word of `fault`."""
 A_RISE, B_RISE, A_FALL, B_FALL = range(4)
 RUN_MAX = 4
 """Edges in a full cycle of the encoder: after this many in one direction, all four stamps are of the last cycle."""

@@ -249,6 +249,21 @@ def test_a_count_that_wraps_is_flagged_and_drives_nothing(side, floating):
     assert beyond.sum() > 90
 
 
+@pytest.mark.parametrize("kind", ["fixed", "float", "axes"])
+@pytest.mark.parametrize("way", [1, -1])
+def test_a_count_that_no_decoder_can_follow_is_flagged_and_drives_nothing(kind, way):
+    """A decoder counts an edge a clock at most; a handle that jumps by more than the travel is none that it saw."""
+    words, clocks = {"wall_stiffness": 1e3, "wall_left": int(way < 0)}, MHZ["clock_hz"] // 500_000
+    made = AxesSpec(**MHZ | {"sample_hz": 500_000, "actuation_hz": 500_000}, axes=1, estimator="fdm")
+    axis = Axes(made, [words]) if kind == "axes" else Axis(made, kind == "float", **words)
+    for jump, flagged in ((clocks, False), (clocks + 1, True), (200_000, True)):
+        counts = way * np.array([[0, 1, 1 + jump, jump, jump]])
+        record = axis.run(counts)
+        illegal = record.flags & 1 << axis.design.flags.index("encoder_illegal") != 0
+        assert illegal.tolist() == [[False, False, *[flagged] * 3]]
+        assert (record.drive != 0).tolist() == [[False, True, *[not flagged] * 3]]
+
+
 @pytest.mark.parametrize("coupling", [False, True])
 @pytest.mark.parametrize("name", ["paper", "mhz", "wide"])
 def test_fixed_point_is_within_a_force_lsb_of_float(name, coupling):
