@@ -4,9 +4,12 @@ All of it can be made again. What is found there is checked before it is used, a
 written there.
 """
 
+import atexit
 import logging
 import multiprocessing
 import os
+import shutil
+import tempfile
 from pathlib import Path
 
 LOGGER = logging.getLogger("hardwall")
@@ -18,14 +21,35 @@ _said: set[str] = set()
 def build_dir() -> Path:
     """Return where generated files go: `$HARDWALL_BUILD`, else `build/` of the source tree, else a folder of the user.
 
-    The user's folder serves an installed copy, whose own folder may not be writable.
+    The user's folder serves an installed copy, whose own folder may not be writable. A user without a home has a
+    temporary folder for as long as the process runs.
+
+    Raises:
+        ValueError: if `$HARDWALL_BUILD` begins with the home of a user who has none.
     """
     if chosen := os.environ.get("HARDWALL_BUILD"):
-        return Path(chosen).absolute()
+        try:
+            return Path(chosen).expanduser().absolute()
+        except RuntimeError:
+            raise ValueError(f"HARDWALL_BUILD must not begin with a home that nobody has: {chosen!r}") from None
     root = Path(__file__).absolute().parent.parent
     if (root / "pyproject.toml").exists():
         return root / "build"
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "hardwall"
+    if cache := os.environ.get("XDG_CACHE_HOME"):
+        return Path(cache) / "hardwall"
+    try:
+        return Path.home() / ".cache" / "hardwall"
+    except RuntimeError:
+        return _for_this_process()
+
+
+def _for_this_process() -> Path:
+    """Return a new folder that is removed at the end; workers find it in the variable."""
+    folder = tempfile.mkdtemp(prefix="hardwall-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    os.environ["HARDWALL_BUILD"] = folder
+    warn_once("no home", "there is no home folder: what this run makes is not kept; HARDWALL_BUILD names a folder")
+    return Path(folder)
 
 
 def warn_once(kind: str, message: str) -> None:

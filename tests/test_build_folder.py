@@ -1,6 +1,9 @@
 """The build folder: where it is, and one line when nothing can be kept there."""
 
 import multiprocessing
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -31,6 +34,36 @@ def test_an_installed_copy_has_a_folder_of_the_user(tmp_path, monkeypatch):
     monkeypatch.setattr(build_folder, "__file__", str(tmp_path / "hardwall" / "model" / "build_folder.py"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     assert build_dir() == tmp_path / "cache" / "hardwall"
+
+
+def test_the_variable_may_begin_with_a_home(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("HARDWALL_BUILD", "~/x")
+    assert build_dir() == tmp_path / "x"
+    monkeypatch.setenv("HARDWALL_BUILD", "~nobody-of-this-name/x")
+    with pytest.raises(ValueError, match=r"^HARDWALL_BUILD must not begin with a home that nobody has: '~nobody"):
+        build_dir()
+
+
+NO_HOME = """
+import pathlib
+def home():
+    raise RuntimeError("Could not determine home directory.")
+pathlib.Path.home = home
+from hardwall.model import build_folder
+build_folder.__file__ = "/nowhere/hardwall/model/build_folder.py"
+first = build_folder.build_dir()
+assert first.is_dir() and build_folder.build_dir() == first
+print(first)
+"""
+
+
+def test_a_user_without_a_home_has_a_folder_until_the_end():
+    environ = {name: value for name, value in os.environ.items() if name not in ("HARDWALL_BUILD", "XDG_CACHE_HOME")}
+    done = subprocess.run([sys.executable, "-c", NO_HOME], env=environ, capture_output=True, text=True, check=True)
+    assert not Path(done.stdout.strip()).exists()
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("there is no home folder: what this run makes is not kept")
 
 
 def test_what_is_not_kept_is_said_once(caplog):

@@ -281,16 +281,14 @@ def _check_solver(scene: Scene, parts: device.Device) -> None:
 
 
 def _check_map(scene: Scene) -> None:
-    steps, spec = scene.zwidth, scene.spec
-    for key, least_key, most_key in (
-        ("stiffness_to_n_per_m", "stiffness_step_n_per_m", "stiffness_max_n_per_m"),
-        ("damping_to_n_s_per_m", "damping_from_n_s_per_m", "damping_max_n_s_per_m"),
+    steps = scene.zwidth
+    for key, least_key in (
+        ("stiffness_to_n_per_m", "stiffness_step_n_per_m"),
+        ("damping_to_n_s_per_m", "damping_from_n_s_per_m"),
     ):
-        value, least, most = getattr(steps, key), getattr(steps, least_key), getattr(spec, most_key)
+        value, least = getattr(steps, key), getattr(steps, least_key)
         if value < least:
             raise ValueError(f"zwidth.{key} must be at least zwidth.{least_key}, {least:g}, not {value!r}")
-        if value > most and scene.coupling is None:
-            raise ValueError(f"zwidth.{key} must be at most controller.{most_key}, {most:g}, not {value!r}")
     for key, span in (
         ("stiffness_step_n_per_m", steps.stiffness_to_n_per_m),
         ("damping_step_n_s_per_m", steps.damping_to_n_s_per_m - steps.damping_from_n_s_per_m),

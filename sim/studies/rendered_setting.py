@@ -160,6 +160,7 @@ class Setting:
             "own_rates": self.rate_hz is None,
             "sample_hz": controller.sample_hz,
             "actuation_hz": controller.actuation_hz,
+            "mean_delay_s": self.delay_s,
             "delay_s": self.delay_s,
             "slow_hz": slow_hz(self.waves) if self.waves else None,
             **report_of(self.lost_n_s_per_m, "spring_takes_n_s_per_m"),

@@ -84,10 +84,6 @@ def test_a_file_that_is_no_regular_one_or_too_large_is_refused(tmp_path, monkeyp
             "zwidth.damping_to_n_s_per_m must be at least zwidth.damping_from_n_s_per_m, 1e+06, not 300.0",
         ),
         (
-            {"zwidth.damping_to_n_s_per_m": 500.0},
-            "zwidth.damping_to_n_s_per_m must be at most controller.damping_max_n_s_per_m, 400, not 500.0",
-        ),
-        (
             {"encoder.phase_error_counts": 0.7},
             "encoder.phase_error_counts and duty_error_counts must move each edge by less than 0.5 counts, not 0.7",
         ),

@@ -2,6 +2,7 @@
 
 import pytest
 
+from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls.grid import grid_of, wider_grid
 from stimuli.scenes import COUPLING
@@ -32,3 +33,12 @@ def test_the_words_of_a_coupling_stay_as_they_are():
 def test_a_scene_without_steps_has_no_study():
     with pytest.raises(ValueError, match="mhz: zwidth is missing"):
         wider_grid(load("mhz"), 1.0)
+
+
+def test_a_grid_is_limited_where_a_map_is_made_and_one_hit_does_not_ask():
+    lower = load("seed-2011", {"controller.stiffness_max_n_per_m": 50e3})
+    assert lower.spec.stiffness_max_n_per_m == 50e3
+    refusal = r"^seed-2011: zwidth\.stiffness_to_n_per_m must be at most controller\.stiffness_max_n_per_m, 50000, not 1"
+    with pytest.raises(SceneError, match=refusal):
+        grid_of(lower)
+    assert grid_of(load("seed-2011", wider_grid(lower, 4.0))).stiffness_to_n_per_m == 300e3

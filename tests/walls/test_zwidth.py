@@ -220,7 +220,7 @@ def test_report_and_picture(monkeypatch, capsys, tmp_path, map_of_one_thread):
         ),
         (["--set", "zwidth.stiffness_step_n_per_m=0"], "zwidth.stiffness_step_n_per_m must be a number of 1e-06"),
         (
-            ["--set", "zwidth.stiffness_to_n_per_m=1e9"],
+            ["--set", "zwidth.stiffness_to_n_per_m=1e6"],
             "zwidth.stiffness_to_n_per_m must be at most controller.",
         ),
         (
