@@ -38,7 +38,7 @@ def test_a_scene_without_steps_has_no_study():
 def test_a_grid_is_limited_where_a_map_is_made_and_one_hit_does_not_ask():
     lower = load("seed-2011", {"controller.stiffness_max_n_per_m": 50e3})
     assert lower.spec.stiffness_max_n_per_m == 50e3
-    refusal = r"^seed-2011: zwidth\.stiffness_to_n_per_m must be at most controller\.stiffness_max_n_per_m, 50000, not 1"
+    refusal = r"^seed-2011: zwidth\.stiffness_to_n_per_m must be at most controller\.stiffness_max_n_per_m, 50000,"
     with pytest.raises(SceneError, match=refusal):
         grid_of(lower)
     assert grid_of(load("seed-2011", wider_grid(lower, 4.0))).stiffness_to_n_per_m == 300e3
