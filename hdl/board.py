@@ -171,9 +171,10 @@ class Board(wiring.Component):
             m.d.comb += getattr(link, shown.name).eq(value >> max(len(value) - shown.format.width, 0))
         armed = axis.state == ARMED
         refused = {"arm": ~axis.ready, "preload": armed, "origin_shift": armed}
-        # At most two samples of the old count are under way, so the drive of the third actuation follows the new one.
+        # At most two samples of the old count, or of the old words, are under way, so the drive of the third actuation
+        # follows the new ones. The words of an axis that drives may be another's of the same wall: they do not wait.
         old = Signal(2)
-        with m.If(axis.preload | axis.origin_shift):
+        with m.If(axis.preload | axis.origin_shift | (axis.commit_pending & ~armed)):
             m.d.sync += old.eq(3)
         with m.Elif(axis.actuated):
             m.d.sync += old.eq(old - old.any())

@@ -3,7 +3,6 @@
 from collections.abc import Generator
 from typing import NamedTuple, Protocol
 
-from ..model.arithmetic.fixed import wrap
 from ..model.checks import FieldError
 from .bounds import check_within
 from .device import Device
@@ -67,13 +66,14 @@ def homing(axis: Board, index_m: float) -> Generator[str, None, Homed]:
     if not axis.read("index_latched"):
         raise NotReadyError(LOST)
     place = min(max(round(index_m / count.lsb), count.low), count.high)
-    # The handle is as far from its index as before, wherever its count is: a count that wraps would be another place.
-    handle = place + wrap(axis.read("count") - index, count.format.width)
+    by = place - index
+    handle = axis.read("count") + by
     if not count.low <= handle <= count.high:
         within = f"{count.low * count.lsb:g} to {count.high * count.lsb:g}"
         raise FieldError("index_m", f"must leave the handle within {within}, not at {handle * count.lsb:g}")
-    by = wrap(place - index, count.format.width)
-    axis.shift_origin(by * count.lsb)
+    # The word of a shift has the range of a position: a longer way is two shifts, between two places in the range.
+    for part in (by,) if count.low <= by <= count.high else (by // 2, by - by // 2):
+        axis.shift_origin(part * count.lsb)
     status = axis.status
     if not status.referenced:
         raise NotReadyError(LOST)

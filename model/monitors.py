@@ -132,9 +132,10 @@ class Design:
     Args:
         axis: the axis.
         estimator: its estimator.
+        edges: the most counts between two looks at the way: a rota's, for one of several axes.
     """
 
-    def __init__(self, axis: AxisRequirements, estimator: EstimatorDesign):
+    def __init__(self, axis: AxisRequirements, estimator: EstimatorDesign, edges: int = 1):
         self.count_width, self.velocity = axis.count_width, (velocity := estimator.velocity)
         # The word has as many bits as a host's register holds without its sign.
         self.params = Params(axis.count_width, max(velocity.width - 1 - REGISTER_BITS, 0))
@@ -146,6 +147,9 @@ class Design:
         # A limit that no estimate exceeds is none.
         most = (estimator.fastest - 1) >> self.params.velocity_shift
         samples = max(int(SATURATED_S * axis.sample_hz), 1)
+        # A way is as wide as the count: beyond the longest one it has room for what one look adds.
+        runaway = max(min(reach // 20, distance.max), 1)
+        longest = None if edges == 1 else max(distance.max + 1 - edges, runaway)
         self.words = (
             Word("supervisor_position_low", count, axis.count_m, "m", -reach, "least position while ARMED"),
             Word("supervisor_position_high", count, axis.count_m, "m", reach, "largest position while ARMED"),
@@ -154,8 +158,8 @@ class Design:
                 "largest estimated speed while ARMED", 0, most,
             ),
             Word(
-                "supervisor_runaway", distance, axis.count_m, "m", max(min(reach // 20, distance.max), 1),
-                "longest way against a drive at its limit",
+                "supervisor_runaway", distance, axis.count_m, "m", runaway,
+                "longest way against a drive at its limit", most=longest,
             ),
             Word(
                 "supervisor_saturated", UQ(samples.bit_length() + 3, 0), 1 / axis.sample_hz, "s", samples,

@@ -82,7 +82,7 @@ class Design:
 
     def __init__(self, spec: AxesSpec):
         self.spec = spec
-        self.monitors = monitors.Design(spec, spec.design.estimator)
+        self.monitors = monitors.Design(spec, spec.design.estimator, spec.clocks_per_sample)
         self.supervisor, self.watchdog = supervisor.Design(spec), watchdog.Design(spec)
         doc = "1: the sign of the drive's pins is reversed; taken in every state but ARMED"
         own = [word for word in self.supervisor.words if word.name != self.watchdog.word.name]

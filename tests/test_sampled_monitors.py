@@ -58,6 +58,23 @@ def test_the_speed_of_every_sample_is_looked_at():
 
 
 @pytest.mark.parametrize("way", [1, -1])
+def test_the_longest_way_that_is_accepted_is_not_jumped_over(way):
+    """As fast as a decoder counts, the way is within its width when it is too long, whatever is left to the limit."""
+    axis = spec("mhz")
+    words = monitors.Design(axis, axis.design.estimator, ROTA).words
+    (longest,) = [word.high for word in words if word.name == "supervisor_runaway"]
+    assert longest == (1 << 20) - ROTA
+    for short in range(3 * ROTA):
+        bench = Bench(supervisor_runaway=longest)
+        start = -way * 3 << 18
+        bench.sample(count=start)
+        bench.presses(int(way > 0))
+        bench.state = bench.state._replace(way=short - longest)
+        (before, found) = [bench.sample(count=start + way * ROTA * n) for n in (short // ROTA, short // ROTA + 1)]
+        assert ("runaway" in before, "runaway" in found) == (False, True)
+
+
+@pytest.mark.parametrize("way", [1, -1])
 def test_a_handle_that_runs_against_the_largest_drive_is_a_runaway(way):
     bench = Bench(supervisor_runaway=50)
     bench.sample(count=-200 * way)

@@ -7,7 +7,7 @@ from amaranth.lib.wiring import In, Member, Out
 
 from hardwall.model.axes_registers import BANK, is_shared
 from hardwall.model.link.banked_file import Design
-from hardwall.model.link.register_file import CELL_BITS, EXCLUSIVE, Area, Operation
+from hardwall.model.link.register_file import CELL_BITS, Area, Operation
 from hardwall.model.register import Kind, Register
 from hardwall.model.registers import (
     ACTIVE,
@@ -26,6 +26,7 @@ from hardwall.model.supervisor import ARMED
 from ..arithmetic.fixed import less, shape
 from .axis_status import Moments, held_status, shown, word_of
 from .line import UNMIXED
+from .register_file import exclusive_of
 from .requests import Requests
 
 
@@ -52,8 +53,8 @@ class BankedFile(wiring.Component):
     - CHECK_READ, CHECK_WRITE: raise `absent`, `outside` or `refused` if the register cannot be read, or written with
       `host.value`, or not now. The halves of a value are checked in the order of their addresses, one after the other.
       `arm` is refused unless the last turn of its axis was `ready`, `preload` and `origin_shift` if it was ARMED, and
-      a second one of these three since `clear`; the capture memory, unless it is done. A CHECK_READ of a status lets
-      the next SNAPSHOT take that axis's.
+      a pulse beside one of `EXCLUSIVE` since `clear`; the capture memory, unless it is done. A CHECK_READ of a status
+      lets the next SNAPSHOT take that axis's.
     - READ: give the register; of a status, in whichever bank, that of the last snapshot.
     - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. A live word goes to its axis
       with its lower half, which is written after the upper one. Only what was checked is written.
@@ -183,8 +184,8 @@ class BankedFile(wiring.Component):
         asks = Signal()
         m.d.comb += here.eq(bank)
         names = [pulse.name for pulse in registers.pulses]
-        exclusive, one_of = Signal(), Cat(wanted[names.index(name)] for name in EXCLUSIVE).any()
-        refused = self._refused(m, wanted, here) | (one_of & exclusive)
+        exclusive, one_of, several = exclusive_of(wanted, names)
+        refused = self._refused(m, wanted, here) | several
         with m.If(host.clear):
             m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0), asks.eq(0), exclusive.eq(0)]
 
@@ -282,8 +283,7 @@ class BankedFile(wiring.Component):
                             m.d.sync += host.absent.eq(1)
                         with m.If(refused):
                             m.d.sync += host.refused.eq(1)
-                        with m.If(one_of):
-                            m.d.sync += exclusive.eq(1)
+                        m.d.sync += exclusive.eq(exclusive | one_of)
                         m.next = "LEAST"
                     with m.Case(Operation.READ):
                         m.next = "READ"

@@ -1,6 +1,6 @@
 """The registers of an axis: shadowed words, pulses, counters, a snapshot of every status, and windows to memories."""
 
-from amaranth.hdl import Cat, Const, Module, Mux, Signal
+from amaranth.hdl import Cat, Const, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Member, Out
@@ -26,6 +26,19 @@ SWEPT = CELL_BITS + 4
 """Clocks that a snapshot takes for a cell."""
 
 
+def exclusive_of(wanted: Value, names: list[str]) -> tuple[Signal, Value, Value]:
+    """Return what a register file remembers of a frame's exclusive pulses, which it asks for, and if it may not.
+
+    Args:
+        wanted: the pulses that are asked for, a bit for each name.
+        names: the names of all pulses.
+    """
+    exclusive, asked = Signal(len(EXCLUSIVE)), Cat(wanted[names.index(name)] for name in EXCLUSIVE)
+    beside = {name: exclusive[bit] for bit, name in enumerate(EXCLUSIVE)}
+    refused = (asked[bit] & Cat(beside[other] for other in EXCLUSIVE[name]).any() for bit, name in enumerate(EXCLUSIVE))
+    return exclusive, asked, Cat(refused).any()
+
+
 class RegisterFile(wiring.Component):
     """A memory of cells of 16 bits, and what joins it to the axis.
 
@@ -33,7 +46,7 @@ class RegisterFile(wiring.Component):
 
     - CHECK_READ, CHECK_WRITE: raise `absent`, `outside` or `refused` if the register cannot be read, or written with
       `host.value`, or not now. The halves of a value are checked in the order of their addresses, one after the other.
-      Of the pulses `EXCLUSIVE` a second one since `clear` is refused.
+      A pulse is refused beside one of `EXCLUSIVE` that was checked since `clear`.
     - READ: give the register.
     - WRITE: keep the value of a word, or of a counter; mark a pulse if the value is 1. A live word is at its port with
       `done` of its lower half, which is written after the upper one. Only what was checked is written.
@@ -199,7 +212,7 @@ class RegisterFile(wiring.Component):
             m.d.comb += wanted[bit].eq(is_pulse & (below[:4] == pulse.address % 16) & host.value[0])
         names = [pulse.name for pulse in registers.pulses]
         commit, with_words = marks[names.index("commit")], Cat(marks[names.index(name)] for name in WITH_WORDS).any()
-        exclusive, asked = Signal(), Cat(wanted[names.index(name)] for name in EXCLUSIVE).any()
+        exclusive, asked, several = exclusive_of(wanted, names)
 
         # The lowest bits of the address, an area, and whether it is in the window.
         step, shift = Signal(range(END)), Signal(CELL_BITS)
@@ -299,10 +312,9 @@ class RegisterFile(wiring.Component):
                         live = ~less(below, LIVE) & less(below, design.last_live)
                         with m.If(~in_book | ~(word | live) | half):
                             m.d.sync += host.absent.eq(1)
-                        with m.If((wanted & self.refuse).any() | (asked & exclusive)):
+                        with m.If((wanted & self.refuse).any() | several):
                             m.d.sync += host.refused.eq(1)
-                        with m.If(asked):
-                            m.d.sync += exclusive.eq(1)
+                        m.d.sync += exclusive.eq(exclusive | asked)
                         m.next = "LEAST"
                     with m.Case(Operation.READ):
                         m.next = "READ"

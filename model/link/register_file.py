@@ -35,8 +35,14 @@ from ..registers import (
     RegisterMap,
 )
 
-EXCLUSIVE = "arm", "preload", "origin_shift"
-"""Pulses of which a frame may have one: an axis that is armed as its count moves drives for the old place."""
+EXCLUSIVE = {
+    "arm": ("commit", "preload", "origin_shift"),
+    "commit": ("arm",),
+    "preload": ("arm", "origin_shift"),
+    "origin_shift": ("arm", "preload"),
+}
+"""The pulses that a frame may not have beside a pulse: an axis that is armed as its words or its count change would
+drive for the old wall or the old place."""
 WITH_WORDS = "commit", "preload", "origin_shift"
 """Pulses that need the active words at their ports."""
 CELL_BITS = 16
@@ -206,7 +212,8 @@ class RegisterFile:
 
     def clear(self) -> None:
         """Forget what the checks have found."""
-        self.absent = self.outside = self.refused = self._exclusive = False
+        self.absent = self.outside = self.refused = False
+        self._exclusive = set()
 
     def _half(self, address: int, first: bool, last: bool) -> bool:
         """Return whether the other half of a value is missing: it begins at an even address and ends at an odd one."""
@@ -236,8 +243,8 @@ class RegisterFile:
         pulse = self._pulse(address) if value & 1 else ""
         self.refused |= pulse in self.refusing
         if pulse in EXCLUSIVE:
-            self.refused |= self._exclusive
-            self._exclusive = True
+            self.refused |= not self._exclusive.isdisjoint(EXCLUSIVE[pulse])
+            self._exclusive.add(pulse)
         top = not self.design.wide(address) or address % 2 == 0
         flip = EXTENDED if top else 0
         for k, area in enumerate((Area.LEAST, Area.MOST)):

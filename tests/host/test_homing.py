@@ -26,12 +26,14 @@ class Trembling:
         random: of the clocks that pass between two requests.
         goes: the counts that the handle goes before it trembles.
         slips: whether the scale slips once the index is found.
+        origin: the count at first.
     """
 
-    def __init__(self, random: np.random.Generator, goes: int, slips: bool = False):
+    def __init__(self, random: np.random.Generator, goes: int, slips: bool = False, origin: int = 0):
         self.device = SimpleNamespace(registers=REGISTERS)
         self._random, self._goes, self._slips = random, goes, slips
         self._params, self._state, self._place, self._asked = Params(COUNT.format.width, 32, 8), START, 0, NO_STROBES
+        self._state = self._state._replace(count=origin)
         self._passes(100)
 
     def _passes(self, clocks: int) -> None:
@@ -99,6 +101,22 @@ def test_the_index_is_exactly_where_it_is_said_to_be(goes):
         assert axis.read("index_count") == wanted
         off.append(axis.off())
     assert set(off) == {wanted - INDEX_AT}
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_an_origin_may_go_from_one_end_of_the_range_to_the_other(side):
+    origin, wanted = side * COUNT.high * 9 // 10, -side * COUNT.high * 9 // 10
+    axis = Trembling(rng(), 60, origin=origin)
+    homed = home(axis, wanted * COUNT.lsb)
+    assert round(homed.moved_m / COUNT.lsb) == wanted - INDEX_AT - origin
+    assert (axis.read("index_count"), axis.read("wrapped"), axis.read("referenced")) == (wanted, 0, 1)
+
+
+def test_a_way_that_leaves_the_range_is_refused_before_anything_has_moved():
+    axis = Trembling(rng(), 60, origin=COUNT.high - 100)
+    with pytest.raises(ValueError, match=r"index_m must leave the handle within .* to .*, not at "):
+        home(axis, COUNT.high * COUNT.lsb)
+    assert (axis.read("wrapped"), axis.read("index_count")) == (0, COUNT.high - 100 + INDEX_AT)
 
 
 def test_a_scale_that_has_slipped_is_homed_again():

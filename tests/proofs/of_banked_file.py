@@ -189,13 +189,13 @@ NO_BOOT = (('m.next = "BOOT_TAKE"', 'm.next = "IDLE"'),)
 """A reset writes no cell, so that a bug behind it shows in the first clocks."""
 PROPERTIES = [
     Property(
-        "of an arm, a preload and a shift of the origin one frame does one at most",
+        "no frame arms an axis beside a commit, a preload or a shift of the origin, nor has both of these",
         WHERE,
         one_frame_arms_or_moves,
         depth=2,
         bugs=(
-            Bug(BankedFile.elaborate, "| (one_of & exclusive)", "", NO_BOOT),
-            Bug(BankedFile.elaborate, "exclusive.eq(1)", "exclusive.eq(0)", NO_BOOT),
+            Bug(BankedFile.elaborate, "| several", "", NO_BOOT),
+            Bug(BankedFile.elaborate, "exclusive.eq(exclusive | one_of)", "exclusive.eq(one_of)", NO_BOOT),
         ),
         within=12,
     ),
