@@ -2,7 +2,7 @@
 
 import math
 
-from ...model.checks import NUMBERS, check_number, check_range
+from ...model.checks import NUMBERS, check_range, shown
 
 MOST = NUMBERS[1]
 """The largest number, either way, that is taken where there is no other range."""
@@ -22,7 +22,8 @@ def number_of(name: str, value: object, least: float = -MOST, most: float = MOST
         TypeError: if it is no number.
         FieldError: if it is out of its range, infinite or NaN.
     """
-    check_number(name, value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError(f"{name} must be a number, not {shown(value)}")
     check_range(name, value, least, most)
     return float(value)
 

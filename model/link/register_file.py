@@ -213,7 +213,7 @@ class RegisterFile:
     def clear(self) -> None:
         """Forget what the checks have found."""
         self.absent = self.outside = self.refused = False
-        self._exclusive = set()
+        self._exclusive: set[str] = set()
 
     def _half(self, address: int, first: bool, last: bool) -> bool:
         """Return whether the other half of a value is missing: it begins at an even address and ends at an odd one."""
