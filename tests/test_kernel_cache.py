@@ -199,7 +199,7 @@ def test_two_processes_that_keep_at_once_never_mix_their_variants(tmp_path, monk
 
 WALL = """
 from hardwall.model.wall import Params, render
-print(render(Params(2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 99), 21, 0))
+print(render(Params(**dict.fromkeys(Params._fields, 0) | {"stiffness": 2, "force_max": 99}), 21, 0))
 """
 
 

@@ -155,7 +155,7 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual, called):
     [
         (["set", "PORT", "wall_stiffness=1e9"], 2, "wall_stiffness must be 0 to 204797 N/m, not "),
         (["set", "PORT", "wall_stiffness=nan"], 2, "wall_stiffness must be 0 to 204797 N/m, not "),
-        (["set", "PORT", "speed=1"], 2, "word must be one of preload_count, "),
+        (["set", "PORT", "speed=1"], 2, "word must be one of the board's, not 'speed'; they are preload_count, "),
         (["set", "PORT", "wall_left"], 2, "a word must be NAME=NUMBER, each once, not 'wall_left'"),
         (["set", "PORT", "wall_left=1", "wall_left=0"], 2, "a word must be NAME=NUMBER, each once, not 'wall_left=0'"),
         (["set", "PORT", "wall_left=one"], 2, "a word must be NAME=NUMBER, each once, not 'wall_left=one'"),
@@ -165,7 +165,7 @@ def test_watch_shows_a_line_and_home_finds_the_index(virtual, called):
         (["connect", "PORT", "--pace", "0"], 2, "--pace must be 0.001 to 1 s/s, not 0.0"),
         (["watch", "PORT", "--seconds", "inf"], 2, "--seconds must be 0 to 1e+06 s, not inf"),
         (["capture", "PORT", "--trigger", "contact,noise"], 2, "--trigger must be of contact, trip, rise, fall, hand,"),
-        (["capture", "PORT", "--before", "9999"], 2, "before must be 0 to 2047, not 9999"),
+        (["capture", "PORT", "--before", "3000"], 2, "before must be 0 to 2047, not 3000"),
         (["capture", "PORT", "-o", "hit.csv"], 2, "--out must end in .npz, not 'hit.csv'"),
         (["connect", "PORT", "--identity", "no"], 1, "it has another bitstream"),
         (["connect", "/dev/hardwall-absent"], 1, "cannot be opened: there is none of that name"),
