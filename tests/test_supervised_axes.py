@@ -178,6 +178,7 @@ async def handles_that_run_away_by_a_count_too_many(dut):
     handles, half = Still(run), 1 << run.design.spec.count_width - 1
     words = {word.name: word.format for word in run.design.words}
     most = 3 * half // 4 - 1
+    (high,) = [word.high for word in run.design.words if word.name == "supervisor_runaway"]
     await run.until_ready()
     stiffest = {"encoder_glitch_clocks": 0, "wall_stiffness": words["wall_stiffness"].max}
     await handles.write(supervisor_causes=BITS["runaway"], supervisor_ramp=words["supervisor_ramp"].max, **stiffest)
@@ -185,8 +186,7 @@ async def handles_that_run_away_by_a_count_too_many(dut):
     for left, way in ((0, 1), (1, -1)):
         await handles.write(wall_left=left, wall_position=-way * (most + 1))
         await handles.go_on(run.turn, commit=run.everyone)
-        # Deeper than half of the range of a count there is no wall.
-        for longest in range(half - 1):
+        for longest in range(high + 1):
             await handles.write(supervisor_runaway=longest)
             await handles.arm_at(-way * most)
             await handles.go_on(2 * run.turn)
