@@ -172,7 +172,7 @@ class Board(wiring.Component):
         armed = axis.state == ARMED
         refused = {"arm": ~axis.ready, "preload": armed, "origin_shift": armed}
         # At most two samples of the old count, or of the old words, are under way, so the drive of the third actuation
-        # follows the new ones. The words of an axis that drives may be another's of the same wall: they do not wait.
+        # follows the new ones. An axis that is ARMED drives meanwhile anyway, so its commit does not wait for that.
         old = Signal(2)
         with m.If(axis.preload | axis.origin_shift | (axis.commit_pending & ~armed)):
             m.d.sync += old.eq(3)

@@ -8,7 +8,7 @@ def check_within(field: str, word: Register, value: float) -> None:
     """Raise FieldError unless an SI value is within the range of a word, before it is rounded to the word's unit.
 
     A bound is printed with six digits. A value may be as far as what is printed, and no farther. A plain number must be
-    whole. `hardwall.model.words.Word.from_si` has the same rule.
+    whole. `hardwall.model.words.Word.from_si` does it for the words of a model, and takes its own rounding besides.
 
     Args:
         field: what the value is called.

@@ -18,6 +18,10 @@ SHOWN_MAX = 200
 _said: set[str] = set()
 
 
+class BuildFolderError(ValueError):
+    """The build folder that is chosen cannot be one."""
+
+
 def build_dir() -> Path:
     """Return where generated files go: `$HARDWALL_BUILD`, else `build/` of the source tree, else a folder of the user.
 
@@ -25,13 +29,13 @@ def build_dir() -> Path:
     temporary folder for as long as the process runs.
 
     Raises:
-        ValueError: if `$HARDWALL_BUILD` begins with the home of a user who has none.
+        BuildFolderError: if `$HARDWALL_BUILD` begins with the home of a user who has none.
     """
     if chosen := os.environ.get("HARDWALL_BUILD"):
         try:
             return Path(chosen).expanduser().absolute()
         except RuntimeError:
-            raise ValueError(f"HARDWALL_BUILD must not begin with a home that nobody has: {chosen!r}") from None
+            raise BuildFolderError(f"HARDWALL_BUILD must not begin with a home that nobody has: {chosen!r}") from None
     root = Path(__file__).absolute().parent.parent
     if (root / "pyproject.toml").exists():
         return root / "build"

@@ -1,7 +1,5 @@
 """The board of several axes, spoken to over its line: words, states and pulses of each, at every clock of its pins."""
 
-import itertools
-
 import cocotb
 import pytest
 from cocotb.triggers import ClockCycles, RisingEdge
@@ -375,7 +373,7 @@ async def one_frame_arms_commits_preloads_or_shifts_the_origin(dut):
     place = {name: host.registers[name].address for name in EXCLUSIVE}
     for axis in (0, 1):
         await host.write(axis, commit=1, preload_count=9)
-        for these in [pair for pair in itertools.combinations(EXCLUSIVE, 2) if pair[1] in EXCLUSIVE[pair[0]]]:
+        for these in frames.NOT_TOGETHER:
             assert (await host.look(axis))["ready"] == 1
             places = [place[name] for name in these]
             values = [int(at in places) for at in range(min(places), max(places) + 1)]

@@ -1,7 +1,5 @@
 """The board top: pins, registers and pulses against the models of link and supervised axis, clock for clock."""
 
-import itertools
-
 import cocotb
 import pytest
 from cocotb.triggers import ClockCycles, FallingEdge, RisingEdge, Timer
@@ -292,11 +290,6 @@ async def over_the_index(host: Host) -> None:
         await host.turn(-1)
 
 
-def excluded() -> list[tuple[str, str]]:
-    """Return the pairs of pulses that no frame may have."""
-    return [pair for pair in itertools.combinations(EXCLUSIVE, 2) if pair[1] in EXCLUSIVE[pair[0]]]
-
-
 @cocotb.test()
 async def one_frame_arms_commits_preloads_or_shifts_the_origin(dut):
     """Two of these in a frame are refused, and neither is done; the next frame finds a drive of the new place."""
@@ -304,7 +297,7 @@ async def one_frame_arms_commits_preloads_or_shifts_the_origin(dut):
     await host.reset()
     await host.write(commit=1, preload_count=9)
     await host.write(heartbeat=1)
-    for these in excluded():
+    for these in frames.NOT_TOGETHER:
         assert host.shown()["ready"] == 1
         assert (await host.write(**dict.fromkeys(these, 1)))[1] == FAILURE
         assert (host.shown()["state"], host.shown()["count"]) == (DISARMED, 0)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from hardwall.model import build_folder
-from hardwall.model.build_folder import SHOWN_MAX, build_dir, not_kept, shown_path
+from hardwall.model.build_folder import SHOWN_MAX, BuildFolderError, build_dir, not_kept, shown_path
 
 PLAIN = Path("/some/where")
 
@@ -41,7 +41,7 @@ def test_the_variable_may_begin_with_a_home(tmp_path, monkeypatch):
     monkeypatch.setenv("HARDWALL_BUILD", "~/x")
     assert build_dir() == tmp_path / "x"
     monkeypatch.setenv("HARDWALL_BUILD", "~nobody-of-this-name/x")
-    with pytest.raises(ValueError, match=r"^HARDWALL_BUILD must not begin with a home that nobody has: '~nobody"):
+    with pytest.raises(BuildFolderError, match=r"^HARDWALL_BUILD must not begin with a home that nobody has: '~nobody"):
         build_dir()
 
 

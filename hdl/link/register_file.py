@@ -27,11 +27,15 @@ SWEPT = CELL_BITS + 4
 
 
 def exclusive_of(wanted: Value, names: list[str]) -> tuple[Signal, Value, Value]:
-    """Return what a register file remembers of a frame's exclusive pulses, which it asks for, and if it may not.
+    """Return the means to refuse a pulse beside another one of its frame, in the order of `EXCLUSIVE`.
 
     Args:
         wanted: the pulses that are asked for, a bit for each name.
         names: the names of all pulses.
+
+    Returns:
+        A register for the exclusive pulses of the frame until now, those that are asked for, and whether one of these
+        is refused.
     """
     exclusive, asked = Signal(len(EXCLUSIVE)), Cat(wanted[names.index(name)] for name in EXCLUSIVE)
     beside = {name: exclusive[bit] for bit, name in enumerate(EXCLUSIVE)}

@@ -1,8 +1,9 @@
 """Numbers that a browser sends with its events: finite and in a range, for what comes from a socket may be anything."""
 
 import math
+from typing import Any
 
-from ...model.checks import NUMBERS, check_range, shown
+from ...model.checks import NUMBERS, check_number, check_range
 
 MOST = NUMBERS[1]
 """The largest number, either way, that is taken where there is no other range."""
@@ -10,7 +11,7 @@ TIMED, VALUED = "() => emit(window.hardwallNow())", "(value) => emit(value, wind
 """What the page sends of an event: when it was; and of one with a value that, too."""
 
 
-def number_of(name: str, value: object, least: float = -MOST, most: float = MOST) -> float:
+def number_of(name: str, value: Any, least: float = -MOST, most: float = MOST) -> float:
     """Return a number as a float.
 
     Args:
@@ -22,8 +23,7 @@ def number_of(name: str, value: object, least: float = -MOST, most: float = MOST
         TypeError: if it is no number.
         FieldError: if it is out of its range, infinite or NaN.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TypeError(f"{name} must be a number, not {shown(value)}")
+    check_number(name, value)
     check_range(name, value, least, most)
     return float(value)
 

@@ -1,5 +1,6 @@
 """The server of the page: in a thread, on one address, and only for who knows its token."""
 
+import errno
 import hmac
 import ipaddress
 import os
@@ -9,7 +10,7 @@ import threading
 import time
 from collections.abc import Collection
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import uvicorn
 from fastapi import FastAPI, WebSocket
@@ -53,6 +54,10 @@ START_S = 60.0
 
 class ServerError(RuntimeError):
     """The page cannot be served; one line that says why."""
+
+
+class AddressError(ServerError):
+    """The address at which the page is to be served is none of this machine."""
 
 
 class Guard:
@@ -130,6 +135,40 @@ def _with_headers(send: Any) -> Any:
     return sends
 
 
+class Listener(NamedTuple):
+    """An address that is listened at.
+
+    Attributes:
+        host: the address, as it was given.
+        socket: the socket there.
+    """
+
+    host: str
+    socket: socket.socket
+
+
+def listen(host: str = LOCAL, port: int = 0) -> Listener:
+    """Listen at an address; a browser that comes before there is a server waits for it.
+
+    Args:
+        host: the address.
+        port: its port, 0 for any that is free.
+
+    Raises:
+        AddressError: if the address is none of this machine.
+        ServerError: if it cannot be had.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        return Listener(host, socket.create_server((host, port), family=family))
+    except (OSError, UnicodeError) as error:
+        number, refused = getattr(error, "errno", None), f"port {port} of {host} cannot be had"
+        # Of a name that is none, the number is not the system's.
+        if not number or number < 0 or number == errno.EADDRNOTAVAIL:
+            raise AddressError(f"{refused}: that is no address of this machine") from None
+        raise ServerError(f"{refused}: {os.strerror(number)}") from None
+
+
 class PanelServer:
     """Serves the page of a board; a context manager that ends it. There is one in a process.
 
@@ -137,29 +176,19 @@ class PanelServer:
         driver: the board.
         bench: what is beside a virtual board; None at a real one.
         title: the title of the page.
-        host: the address to listen at; port: its port, 0 for any that is free.
+        at: where it is served; the socket is closed at the end.
 
     Attributes:
         url: the address of the page, with its token.
-
-    Raises:
-        ServerError: if the address cannot be had.
     """
 
-    def __init__(self, driver: Driver, bench: Bench | None, title: str, host: str = LOCAL, port: int = 0):
-        token = secrets.token_urlsafe(16)
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        try:
-            self._socket = socket.create_server((host, port), family=family)
-        except OSError as error:
-            # Of a name that is none, the number is not the system's.
-            said = os.strerror(error.errno) if error.errno and error.errno > 0 else error.strerror
-            raise ServerError(f"port {port} of {host} cannot be had: {said or error}") from None
-        shown = socket.gethostname() if host in EVERYWHERE else f"[{host}]" if ":" in host else host
-        listening = self._socket.getsockname()[1]
-        self.url = f"http://{shown}:{listening}/{token}/"
+    def __init__(self, driver: Driver, bench: Bench | None, title: str, at: Listener):
+        token, host, self._socket = secrets.token_urlsafe(16), at.host, at.socket
+        name = socket.gethostname() if host in EVERYWHERE else f"[{host}]" if ":" in host else host
+        port = self._socket.getsockname()[1]
+        self.url = f"http://{name}:{port}/{token}/"
         config = uvicorn.Config(
-            Guard(_application(driver, bench, title, token), token, {host, shown, *LOCALS}, listening),
+            Guard(_application(driver, bench, title, token), token, {host, name, *LOCALS}, port),
             log_level="error",
             access_log=False,
             ws="websockets-sansio",

@@ -9,6 +9,7 @@ import gc
 import sys
 from importlib import import_module
 
+from ...model.build_folder import BuildFolderError
 from ..jobs import ending
 from ..scene.errors import SceneError
 from . import streams
@@ -44,7 +45,7 @@ def _run() -> tuple[int, str]:
     except (BadInput, ValueError) as error:
         # A scene may be valid and its axis have no board, which is an error of the model; its import is slow.
         of_board = hasattr(error, "field")
-        if not of_board and not isinstance(error, BadInput | SceneError):
+        if not of_board and not isinstance(error, BadInput | SceneError | BuildFolderError):
             raise
         return 2, f"the scene's {error}" if of_board else str(error)
     except ModuleNotFoundError as error:

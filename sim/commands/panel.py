@@ -1,15 +1,12 @@
 """The command `panel`."""
 
-import errno
-import os
-import socket
 import subprocess
 import sys
 import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -20,7 +17,7 @@ from ...host.panel.driver import Driver
 from ...host.panel.estimates import Estimates
 from ...host.panel.hand import Hand
 from ...host.panel.live import Bench
-from ...host.panel.serving import LOCAL, PanelServer
+from ...host.panel.serving import LOCAL, AddressError, PanelServer, listen
 from ...host.port import BAUD, BAUD_MAX
 from ...model import supervisor
 from ...model.checks import shown
@@ -68,7 +65,6 @@ def command(
     if seconds is not None:
         within(seconds, "--seconds", 0.0, 1e6, "s")
     check_pace(pace)
-    _check_address(host, http)
     if port == VIRTUAL:
         if baud is not None or pace is not None:
             raise BadInput("--baud and --pace are for a board at a port, not for `hardwall panel virtual`")
@@ -90,18 +86,6 @@ def command(
         raise BadInput("SCENE, --estimator and --set are for `hardwall panel virtual`, not for a board at a port")
     else:
         _serve(lambda: connect(port, baud or BAUD, identity=identity, pace=pace), None, port, (host, http), seconds)
-
-
-def _check_address(host: str, http: int) -> None:
-    """Raise BadInput, before a board is started, if this machine has no such address; RuntimeError if it is taken."""
-    try:
-        socket.create_server((host, http), family=socket.AF_INET6 if ":" in host else socket.AF_INET).close()
-    except (OSError, UnicodeError) as error:
-        number = getattr(error, "errno", None)
-        # The number of a name that is not found is not the system's.
-        if number is None or number < 0 or number == errno.EADDRNOTAVAIL:
-            raise BadInput(f"--host must be an address of this machine, not {shown(host)}") from None
-        raise RuntimeError(f"port {http} of {host} cannot be had: {os.strerror(number)}") from None
 
 
 @contextmanager
@@ -197,9 +181,14 @@ def _serve(
     seconds: float | None,
 ) -> None:
     """Serve the page of a board, until it is interrupted or the time has passed."""
-    with _driver(open_axis, board) as driver:
+    try:
+        at = listen(*address)
+    except AddressError:
+        raise BadInput(f"--host must be an address of this machine, not {shown(address[0])}") from None
+    # The address is had before a board is started.
+    with closing(at.socket), _driver(open_axis, board) as driver:
         bench = board.bench if board else None
-        with PanelServer(driver, bench, title, *address) as server:
+        with PanelServer(driver, bench, title, at) as server:
             print(f"page: {server.url}", flush=True)
             log.print("Open that page in a browser. Whoever has its address may arm the board.")
             until = None if seconds is None else time.monotonic() + seconds

@@ -205,3 +205,12 @@ def test_a_run_that_needs_more_memory_than_there_is_ends_in_a_line(monkeypatch, 
 
     monkeypatch.setattr("hardwall.sim.commands.group.run", run)
     assert call(monkeypatch, capsys, "hit") == (1, "", "hardwall: error: this run needs more memory than there is\n")
+
+
+def test_a_build_folder_that_cannot_be_is_refused_in_a_line():
+    environ = os.environ | {"HARDWALL_BUILD": "~nobody-of-this-name/x"}
+    done = subprocess.run([str(HARDWALL), "hit", "mhz"], env=environ, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        "hardwall: error: HARDWALL_BUILD must not begin with a home that nobody has: '~nobody-of-this-name/x'\n"
+    )

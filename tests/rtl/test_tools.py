@@ -1,6 +1,7 @@
 """The tools that make a bitstream: what one leaves when it is ended."""
 
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -24,5 +25,5 @@ def test_a_tool_that_is_ended_leaves_no_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path / "build"))
     with pytest.raises(tools.SynthesisError, match=r"^it failed: exit code -9; see "):
         tools.run(work, work / "log", ["tool"], "it")
-    assert f"{work}/tmp/yowasp_" in (work / "log").read_text()
+    assert Path((work / "log").read_text().strip()).parent == work / "tmp"
     assert [path.name for folder in (work, others) for path in folder.iterdir()] == ["log"]

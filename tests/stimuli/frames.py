@@ -6,6 +6,9 @@ import numpy as np
 
 from hardwall.model.link.line import framed
 
+NOT_TOGETHER = (("arm", "commit"), ("arm", "preload"), ("arm", "origin_shift"), ("preload", "origin_shift"))
+"""Pairs of pulses that no frame may have."""
+
 
 def words(*values: int) -> bytes:
     """Return 16-bit values, big-endian."""

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from hardwall.host.panel.serving import REFUSED, Guard, PanelServer, ServerError
+from hardwall.host.panel.serving import REFUSED, AddressError, Guard, ServerError, listen
 
 
 async def inner(scope, receive, send) -> None:
@@ -126,13 +126,14 @@ def test_the_server_s_own_life_needs_no_token():
     assert answered("lifespan", "") == [{"type": "inner", "path": ""}]
 
 
-def test_a_port_that_is_taken_is_one_line(driver):
+def test_a_port_that_is_taken_is_one_line():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(ServerError, match=rf"^port {port} of 127\.0\.0\.1 cannot be had: Address already in use$"):
-            PanelServer(driver, None, "title", port=port)
+            listen(port=port)
 
 
-def test_an_address_that_is_none_is_one_line(driver):
-    with pytest.raises(ServerError, match=r"^port 0 of nowhere\.invalid cannot be had: "):
-        PanelServer(driver, None, "title", host="nowhere.invalid")
+@pytest.mark.parametrize("host", ["nowhere.invalid", "192.0.2.1", "a" * 300])
+def test_an_address_that_is_none_is_one_line(host):
+    with pytest.raises(AddressError, match=rf"^port 0 of {host} cannot be had: that is no address of this machine$"):
+        listen(host)
