@@ -184,7 +184,7 @@ class BankedFile(wiring.Component):
         asks = Signal()
         m.d.comb += here.eq(bank)
         names = [pulse.name for pulse in registers.pulses]
-        exclusive, one_of, several = exclusive_of(wanted, names)
+        exclusive, after, several = exclusive_of(wanted, names, host.clear)
         refused = self._refused(m, wanted, here) | several
         with m.If(host.clear):
             m.d.sync += [host.absent.eq(0), host.outside.eq(0), host.refused.eq(0), asks.eq(0), exclusive.eq(0)]
@@ -283,7 +283,7 @@ class BankedFile(wiring.Component):
                             m.d.sync += host.absent.eq(1)
                         with m.If(refused):
                             m.d.sync += host.refused.eq(1)
-                        m.d.sync += exclusive.eq(exclusive | one_of)
+                        m.d.sync += exclusive.eq(after)
                         m.next = "LEAST"
                     with m.Case(Operation.READ):
                         m.next = "READ"

@@ -26,21 +26,23 @@ SWEPT = CELL_BITS + 4
 """Clocks that a snapshot takes for a cell."""
 
 
-def exclusive_of(wanted: Value, names: list[str]) -> tuple[Signal, Value, Value]:
+def exclusive_of(wanted: Value, names: list[str], clear: Value) -> tuple[Signal, Value, Value]:
     """Return the means to refuse a pulse beside another one of its frame, in the order of `EXCLUSIVE`.
 
     Args:
         wanted: the pulses that are asked for, a bit for each name.
         names: the names of all pulses.
+        clear: whether a frame begins, perhaps in the clock of its first check.
 
     Returns:
-        A register for the exclusive pulses of the frame until now, those that are asked for, and whether one of these
-        is refused.
+        A register for the exclusive pulses of the frame until now, what it has after those that are asked for, and
+        whether one of these is refused.
     """
     exclusive, asked = Signal(len(EXCLUSIVE)), Cat(wanted[names.index(name)] for name in EXCLUSIVE)
-    beside = {name: exclusive[bit] for bit, name in enumerate(EXCLUSIVE)}
+    before = Mux(clear, 0, exclusive)
+    beside = {name: before[bit] for bit, name in enumerate(EXCLUSIVE)}
     refused = (asked[bit] & Cat(beside[other] for other in EXCLUSIVE[name]).any() for bit, name in enumerate(EXCLUSIVE))
-    return exclusive, asked, Cat(refused).any()
+    return exclusive, before | asked, Cat(refused).any()
 
 
 class RegisterFile(wiring.Component):
@@ -216,7 +218,7 @@ class RegisterFile(wiring.Component):
             m.d.comb += wanted[bit].eq(is_pulse & (below[:4] == pulse.address % 16) & host.value[0])
         names = [pulse.name for pulse in registers.pulses]
         commit, with_words = marks[names.index("commit")], Cat(marks[names.index(name)] for name in WITH_WORDS).any()
-        exclusive, asked, several = exclusive_of(wanted, names)
+        exclusive, after, several = exclusive_of(wanted, names, host.clear)
 
         # The lowest bits of the address, an area, and whether it is in the window.
         step, shift = Signal(range(END)), Signal(CELL_BITS)
@@ -318,7 +320,7 @@ class RegisterFile(wiring.Component):
                             m.d.sync += host.absent.eq(1)
                         with m.If((wanted & self.refuse).any() | several):
                             m.d.sync += host.refused.eq(1)
-                        m.d.sync += exclusive.eq(exclusive | asked)
+                        m.d.sync += exclusive.eq(after)
                         m.next = "LEAST"
                     with m.Case(Operation.READ):
                         m.next = "READ"

@@ -195,7 +195,7 @@ PROPERTIES = [
         depth=2,
         bugs=(
             Bug(BankedFile.elaborate, "| several", "", NO_BOOT),
-            Bug(BankedFile.elaborate, "exclusive.eq(exclusive | one_of)", "exclusive.eq(one_of)", NO_BOOT),
+            Bug(BankedFile.elaborate, "exclusive.eq(after)", "exclusive.eq(0)", NO_BOOT),
         ),
         within=12,
     ),

@@ -223,7 +223,7 @@ PROPERTIES = [
         depth=2,
         bugs=(
             Bug(RegisterFile.elaborate, "| several", "", SHORT_CHECKS),
-            Bug(RegisterFile.elaborate, "exclusive.eq(exclusive | asked)", "exclusive.eq(asked)", SHORT_CHECKS),
+            Bug(RegisterFile.elaborate, "exclusive.eq(after)", "exclusive.eq(0)", SHORT_CHECKS),
         ),
         within=12,
     ),
