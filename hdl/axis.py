@@ -69,7 +69,7 @@ class Axis(wiring.Component):
     stepped, edge_kind, edge_down : Out
         High for one clock with the count of a new edge; the kind of the last edge, and whether it counted -1.
     indexed : Out(1)
-        High for one clock with the count at an index.
+        High for one clock with `stepped`, if the edge found an index, at the count before it.
     estimated, saturated : Out(1)
         High for one clock with a sample's velocity; with it, the estimator is saturated.
     strobe_busy : Out(1)

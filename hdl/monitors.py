@@ -45,7 +45,7 @@ class Monitors(Block):
     stepped, edge_kind, edge_down : In
         An edge has changed the count, its kind, and whether it counted -1.
     indexed : In(1)
-        Pulse: there was an index, at the number of an edge that has just changed the count, or else at the count.
+        Pulse, with `stepped`: that edge has found an index, at the count before it.
     valid, velocity, saturated : In
         The estimator's result, and whether it is saturated.
     at_limit, negative : In(1)
@@ -174,31 +174,20 @@ class Monitors(Block):
     def _index_is_wrong(self, m: Module) -> Value:
         """Return whether an index is neither at the last one nor a turn away."""
         tolerance, down = self.supervisor_index_tolerance, self.edge_down
-        has_index, indexed, measured = Signal(), Signal(), Signal()
-        m.d.sync += [has_index.eq(has_index | self.indexed), indexed.eq(self.indexed)]
-        m.d.sync += measured.eq(self.indexed & has_index)
-        # An edge that counts down has the number of the count before it: with an index it is behind that place, and is
-        # counted a clock later.
-        behind, above, counts = Signal(), Signal(), Signal()
-        m.d.comb += [above.eq(self.indexed & down), counts.eq(self.stepped & ~above)]
-        m.d.sync += behind.eq(self.stepped & above)
-        # The distance from the last index, negative, and its side. At an index it begins anew, with the edge behind it
-        # and that of this clock.
+        has_index, away = Signal(), Signal()
+        m.d.sync += has_index.eq(has_index | self.indexed)
+        # The distance from the last index, negative, and its side. An edge that finds an index is one count beyond it.
         distance, upwards, grows = Signal.like(self.count), Signal(), Signal()
-        bits = len(distance)
-        begun = Mux(behind, Cat(~counts, (~counts | down).replicate(bits - 1)), counts.replicate(bits))
-        m.d.comb += grows.eq((distance == 0) | (down ^ upwards))
-        with m.If(indexed):
-            m.d.sync += [upwards.eq(~(down | behind)), distance.eq(begun)]
-        with m.Elif(counts):
-            m.d.sync += distance.eq(distance + _one(distance, grows))
+        m.d.comb += grows.eq((distance == 0) | (down ^ upwards) | self.indexed)
+        with m.If(self.stepped):
+            m.d.sync += distance.eq(Mux(self.indexed, 0, distance) + _one(distance, grows))
             with m.If(grows):
                 m.d.sync += upwards.eq(~down)
 
         low, high = _halves(distance, len(tolerance))
         near = (distance == 0) | (high.all() & (low + tolerance)[-1])
-        away, beyond = Signal(), Signal(signed(len(self.count) + 1))
-        m.d.sync += [away.eq(measured & ~near), beyond.eq(distance + self.supervisor_turn)]
+        beyond = Signal(signed(len(self.count) + 1))
+        m.d.sync += [away.eq(self.indexed & has_index & ~near), beyond.eq(distance + self.supervisor_turn)]
         low, high = _halves(beyond, len(tolerance))
         return away & ~((high == beyond[-1].replicate(len(high))) & _within(Cat(low, beyond[-1]), tolerance))
 

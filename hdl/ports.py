@@ -48,7 +48,7 @@ MEANINGS = {
     "stepped": "high for one clock with the count of a new edge",
     "edge_kind": "kind of the last edge: 0 A rises, 1 B rises, 2 A falls, 3 B falls",
     "edge_down": "the last edge counted -1",
-    "indexed": "high for one clock with the count at an index",
+    "indexed": "high for one clock with stepped, if the edge found an index, at the count before it",
     "estimated": "high for one clock with the estimate of a sample",
     "saturated": "with estimated: the estimator is saturated",
     "strobe_busy": "high for one clock behind a sample that began before the last one's velocity was there",

@@ -80,12 +80,14 @@ class Quadrature(wiring.Component):
 
     Start: counting starts from the pins as sampled by the first clock after a reset, whatever their levels.
 
-    Index: one edge of Z's pulse, the same from both sides. Z rises there as the count goes up, and falls as it goes
-    down; the pulse's other edge is passed over. The direction is that of an edge of A or B in the same clock, else of
-    the last one. A handle may turn round between two of these: after a change of Z the next one counts only if an edge
-    of A or B came since, and none is an index in the clock of a slip. The index is at the number of an edge in the same
-    clock (the count, or one more if it counted -1), else at the count. A pulse narrower than a count is found upwards
-    only. An edge of Z that lies on an edge of A or B may come a clock before or after it, and is then a count off.
+    Index: one edge of Z's pulse, the same from both sides: there Z rises as the count goes up, and falls as it goes
+    down. Every edge of A and B looks at Z on its lower side: upwards just before its clock, downwards at it. Of two
+    successive edges in one direction, with no slip since the first one, the second finds an index if Z was 0 at the
+    lower and 1 at the upper of them. Its place is the count between the two. So a handle that turns round is no matter,
+    nor are scales on which A, B and Z have a hysteresis below a count: the pulse's other edge is never taken. The count
+    is beside the place by one (below it if the edge counted -1) when the index is found. A pulse between two edges is
+    no index: Z has to last a count. An edge of Z that lies on an edge of A or B may come a clock before or after it, or
+    elsewhere upwards than downwards, and is then a count off.
 
     Slip: after `illegal`, `overspeed`, `wrapped`, another `invert` or `slip` the count belongs no more to the scale. In
     that clock `index_latched` and `referenced` fall. `preload` makes them fall too, for nobody knows by how much it
@@ -141,7 +143,7 @@ class Quadrature(wiring.Component):
     stepped : Out(1)
         High for one clock with the count of a new edge.
     indexed : Out(1)
-        High for one clock with the count at an index.
+        High for one clock with `stepped`, if the edge found an index.
     illegal, overspeed, wrapped : Out(1)
         Sticky flags, see above.
     fault : Out(1)
@@ -307,7 +309,7 @@ class Quadrature(wiring.Component):
         with m.Elif(both):
             m.d.sync += seen.run.eq(0)
 
-        self._latch(m, index, Mux(one & down, base, count), lost, beyond)
+        self._latch(m, index, base, lost, beyond)
         kept = Signal(self._fault_width)
         m.d.comb += [
             kept.eq(Mux(self.clear, 0, self.illegal_count)),
@@ -323,15 +325,16 @@ class Quadrature(wiring.Component):
     def _index(self, m: Module, moved: Value, level: Value, down: Value, outrun: Value) -> tuple[Value, Value]:
         """Return whether there is an index in this clock, and whether the count loses its scale."""
         one, both = moved[0] ^ moved[1], moved[0] & moved[1]
-        inverted, passed = Signal(), Signal()
-        lost, index = Signal(), Signal()
-        way = Mux(one, down, self.seen.down)
+        inverted, known, below = Signal(), Signal(), Signal()
+        lost, index, z = Signal(), Signal(), Signal()
+        onward = known & (self.seen.down == down)
         m.d.comb += [
             lost.eq(both | outrun | self.slip | (self.invert ^ inverted)),
-            index.eq(moved[2] & (level[2] ^ way) & (one | passed) & ~lost),
+            # Z on the lower side of this edge; `below` is that of the last one, if it is known.
+            z.eq(level[2] ^ (moved[2] & ~down)),
+            index.eq(one & onward & (below == down) & (z != down) & ~lost),
         ]
-        # Whether an edge came since Z's last change; one in the very clock of a change came before it.
-        m.d.sync += [inverted.eq(self.invert), passed.eq((one | passed) & ~moved[2] & ~lost)]
+        m.d.sync += [inverted.eq(self.invert), known.eq((one | known) & ~lost), below.eq(Mux(one, z, below))]
         return index, lost
 
     def _latch(self, m: Module, index: Value, place: Value, lost: Value, beyond: Value) -> None:

@@ -43,7 +43,7 @@ MADE = (
     "estimator_saturated",
 )  # fmt: skip
 """The causes that are made here; the others come from the decoder, the axis, the pins and the host."""
-CLOCKS = {"position_range": 2, "runaway": 2, "estimator_saturated": 2, "index_spacing": 3}
+CLOCKS = {"position_range": 2, "runaway": 2, "estimator_saturated": 2, "index_spacing": 2}
 """Clocks of the causes that are not found in one: limits are compared in turn, or what has been counted before."""
 SATURATED_S = 0.01
 IDLE_EDGES = 100
@@ -109,9 +109,6 @@ class State(NamedTuple):
     channel: int  # channel of the last edge, 1: B
     edges: int  # edges in a row of that channel
     has_index: int
-    indexed: int  # there was an index
-    behind: int  # with an edge that counted down, which is behind its place and not yet counted
-    measured: int  # it has a distance from the last one, `distance`
     distance: int  # counts from the last index, to either side: negative
     upwards: int  # the side, 1: the count has grown
     away: int  # an index was not at the last one
@@ -204,10 +201,9 @@ def _ways(params, state, inputs):
         way = 0
     elif inputs.stepped:
         way = wrap(way - 1 if up == inputs.negative else way + 1, params.count_width)
-    if state.indexed:
-        distance, upwards = -state.behind, 0
-    # An edge that counts down has the number of the count before it: with an index it is behind that place.
-    if inputs.stepped and not (inputs.indexed and inputs.edge_down):
+    # An edge that finds an index is one count beyond it.
+    if inputs.stepped:
+        distance = 0 if inputs.indexed else distance
         if distance == 0 or up == upwards:
             distance, upwards = wrap(distance - 1, params.count_width), up
         else:
@@ -239,8 +235,8 @@ def step(params, state, inputs):
         channel = inputs.edge_kind & 1
         edges = min(edges + 1, IDLE_EDGES) if channel == state.channel else 1
 
-    measured = int(inputs.indexed and state.has_index)
-    away = int(state.measured and not -inputs.supervisor_index_tolerance <= state.distance <= 0)
+    near = -inputs.supervisor_index_tolerance <= state.distance <= 0
+    away = int(inputs.indexed and state.has_index and not near)
     too_fast = inputs.valid and abs(inputs.velocity) > inputs.supervisor_velocity_limit << params.velocity_shift
     causes = (
         int(wrong or state.wrong) << POSITION_RANGE
@@ -266,9 +262,6 @@ def step(params, state, inputs):
         channel=channel,
         edges=edges,
         has_index=state.has_index | inputs.indexed,
-        indexed=inputs.indexed,
-        behind=inputs.stepped & inputs.indexed & inputs.edge_down,
-        measured=measured,
         distance=distance,
         upwards=upwards,
         away=away,

@@ -78,7 +78,8 @@ class State(NamedTuple):
     held_b: int
     held_z: int
     inverted: int  # `invert` of the last clock
-    passed: int  # there was an edge since Z's last change, and no slip
+    known: int  # there was an edge, and no slip since
+    below: int  # Z on the lower side of the last edge
     crossed: int  # pending channels, of A and B, with an edge of the other channel since they became pending
     starting: int  # clocks until the synchronisers are filled
 
@@ -192,12 +193,13 @@ def _either(condition, new, old):
 
 @compiled
 def _index(state, inputs, strobes, one, down, fault):
-    """Return whether the count loses its scale in a clock, and whether there is an index; of an edge its direction."""
+    """Return (whether the count loses its scale in a clock, Z on the lower side of an edge, whether that finds an
+    index)."""
     slipped = fault | strobes.slip | (state.inverted ^ inputs.invert)
-    way = down if one else state.down
-    # Z rises there upwards, and falls downwards. Without an edge since its last change the direction is not known.
-    found = state.moved >> 2 & (state.level >> 2 ^ way) & (one | state.passed) & ~slipped
-    return slipped, found & 1
+    # Z on the lower side of this edge: before this clock if the count goes up, else at it.
+    below = state.level >> 2 ^ (state.moved >> 2 & ~down)
+    onward = state.known and state.down == down and state.below == down
+    return slipped, below, int(one and onward and below != down and not slipped)
 
 
 @compiled
@@ -217,10 +219,9 @@ def step(params, state, inputs, strobes):
     risen = level & state.moved & 3
     kind = one_b + 2 * int(risen == 0)
     run = min(state.run + 1, RUN_MAX) if state.down == down else 1
-    slipped, indexed = _index(state, inputs, strobes, one, down, both | outrun)
+    slipped, below, indexed = _index(state, inputs, strobes, one, down, both | outrun)
     latches = state.index_armed & ~strobes.arm & indexed
-    # The number of an edge that counts down is that of the count before it.
-    place = wrap(_either(one & down, base, count), params.count_width)
+    place = wrap(base, params.count_width)
     moved_place = wrap(state.index_count + strobes.origin_shift * strobes.preload_count, params.count_width)
     beyond = int(count != onward)
     void = strobes.arm | strobes.preload | slipped | beyond
@@ -256,7 +257,8 @@ def step(params, state, inputs, strobes):
         held_b=(state.held_b + 1) * (pending >> 1 & 1),
         held_z=(state.held_z + 1) * (pending >> 2 & 1),
         inverted=inputs.invert,
-        passed=(one | state.passed) & ~(state.moved >> 2 | slipped) & 1,
+        known=(one | state.known) & ~slipped & 1,
+        below=_either(one, below, state.below),
         crossed=pending & crossing & 3,
         starting=state.starting - int(state.starting > 0),
     )
@@ -305,7 +307,8 @@ def resting(params, state, count, pins, clocks):
         held_b=0,
         held_z=0,
         inverted=state.inverted,
-        passed=state.passed,
+        known=state.known,
+        below=state.below,
         crossed=0,
         starting=0,
     )
@@ -313,9 +316,10 @@ def resting(params, state, count, pins, clocks):
 
 @compiled
 def _lone(state, pins, inputs, clocks):
-    """Return whether a settled state meets the edge of one channel, A or B, that is decoded and settled in `clocks`."""
+    """Return whether a settled state meets the edge of one channel, A or B, that is decoded and settled in `clocks`,
+    and that finds no index."""
     changed, still = state.level ^ pins, state.inverted == inputs.invert and settled(state, state.level)
-    return 0 < changed < 3 and clocks > LATENCY + inputs.glitch_clocks and still
+    return 0 < changed < 3 and clocks > LATENCY + inputs.glitch_clocks and still and state.below == state.level >> 2
 
 
 @compiled
@@ -360,7 +364,8 @@ def _edge(params, state, inputs, pins, clocks):
         held_b=0,
         held_z=0,
         inverted=state.inverted,
-        passed=1,
+        known=1,
+        below=state.below,
         crossed=0,
         starting=0,
     )

@@ -282,12 +282,13 @@ async def an_index_that_is_not_where_it_was_trips(dut):
 
 
 async def over_the_index(host: Host) -> None:
-    """Turn the handle up by a count, where Z rises, and back; Z falls as it comes to that place from below again."""
+    """Turn the handle up by a count, where Z rises, and by another, which finds the index, and back below Z."""
+    await host.turn(1)
     for level in (1, 0):
-        await host.turn(1)
         host.change(encoder_z=level)
         await host.edges(host.settling)
-        await host.turn(-1)
+        await host.turn(level)
+    await host.turn(-2)
 
 
 @cocotb.test()

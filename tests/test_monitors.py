@@ -110,6 +110,12 @@ class Bench:
             self.inputs = self.inputs._replace(count=self.inputs.count + way, edge_down=int(way < 0))
             self.clock(stepped=1)
 
+    def index(self, count: int, way: int = 1) -> list[str]:
+        """Find an index at a count with the edge that leaves it, and return the causes at every clock."""
+        self.moves(count)
+        self.inputs = self.inputs._replace(count=count + way, edge_down=int(way < 0))
+        return self.clock(stepped=1, indexed=1) + [cause for _ in range(3) for cause in self.clock()]
+
 
 def test_an_axis_within_its_specification_is_never_wrong():
     bench, axis = Bench(), spec("mhz")
@@ -217,7 +223,7 @@ def test_a_drive_below_its_limit_is_no_runaway():
 def test_a_preload_is_no_motion():
     bench = Bench(supervisor_runaway=50, supervisor_turn=1000)
     bench.inputs = bench.inputs._replace(at_limit=1, negative=1)
-    bench.clock(indexed=1)
+    assert bench.index(0) == []
     bench.moves(50)
     bench.inputs = bench.inputs._replace(count=7777)
     assert bench.last("runaway") == []
@@ -225,8 +231,8 @@ def test_a_preload_is_no_motion():
     bench.moves(8727)
     assert bench.clock() == ["runaway"]
     bench.inputs = bench.inputs._replace(at_limit=0)
-    bench.clock(indexed=1)
-    assert [bench.clock() for _ in range(bench.latency("index_spacing"))][-1] == []
+    bench.last("runaway")
+    assert bench.index(8727) == []
 
 
 def test_an_estimate_may_be_saturated_for_a_while():
@@ -258,32 +264,40 @@ def test_index_edges_are_turns_apart():
         (17, 0), (19, 0), (1018, 0), (2020, 0), (1019, 0), (17, 0), (17, 0), (1020, 1), (1023, 1), (1025, 0),
         (22, 1), (-979, 0), (-977, 0), (-974, 1), (1027, 1), (3028, 1), (3026, 0), (2028, 0),
     ):  # fmt: skip
-        bench.moves(count)
-        found = [bench.clock(indexed=1), *(bench.clock() for _ in range(bench.latency("index_spacing")))]
-        assert found == [*([[]] * (len(found) - 2)), ["index_spacing"] * wrong, []], count
+        for way in (1, -1):
+            assert bench.index(count, way) == ["index_spacing"] * wrong, count
+            # The same place again is no distance.
+            wrong = 0
 
 
-def test_index_edges_may_come_at_successive_clocks_and_with_edges_of_the_count():
+def test_an_index_is_found_within_its_clocks():
+    bench = Bench(supervisor_turn=1000, supervisor_index_tolerance=2)
+    bench.index(0)
+    bench.moves(500)
+    found = [bench.clock(stepped=1, indexed=1), *(bench.clock() for _ in range(bench.latency("index_spacing")))]
+    assert found == [*([[]] * (len(found) - 2)), ["index_spacing"], []]
+
+
+def test_indexes_may_come_at_successive_clocks():
     for down in (0, 1):
         bench = Bench(supervisor_turn=4, supervisor_index_tolerance=0)
         found = []
         for count in range(1, 30):
-            # Downwards an edge has the number of the count before it.
-            place = count - down
             bench.inputs = bench.inputs._replace(count=-count if down else count, edge_down=down)
-            found += bench.clock(stepped=1, indexed=int(place % 4 == 0 or place in {21, 22}))
+            found += bench.clock(stepped=1, indexed=int((count - 1) % 4 == 0 or count - 1 in {21, 22}))
         # At 21 and 22, and at 24, which is no turn from 22.
         assert found == ["index_spacing"] * 3
 
 
-def test_an_index_on_an_edge_is_at_one_place_from_both_sides():
-    """Edges and indexes come together at every third clock, or at every clock, and the handle turns round at them."""
+def test_an_index_is_at_one_place_from_both_sides():
+    """A handle turns round at the index, at which it is again and again, with an edge a clock or every fourth one."""
     for pause in (0, 3):
-        bench, found, place = Bench(supervisor_turn=9999, supervisor_index_tolerance=0), [], 0
-        for way in (1, 1, -1, 1, -1, -1, 1, 1, 1, -1, -1, -1, -1, 1):
-            edge, place = max(place, place + way), place + way
+        bench, found, place, last = Bench(supervisor_turn=9999, supervisor_index_tolerance=0), [], 0, 0
+        for way in (1, 1, -1, 1, -1, -1, 1, 1, 1, -1, -1, -1, -1, 1, 1, 1, 1, -1, -1, -1):
+            passes = place == 1 and way == last
+            place, last = place + way, way
             bench.inputs = bench.inputs._replace(count=place, edge_down=int(way < 0))
-            found += bench.clock(stepped=1, indexed=int(edge == 1))
+            found += bench.clock(stepped=1, indexed=int(passes))
             for _ in range(pause):
                 found += bench.clock()
         found += [cause for _ in range(4) for cause in bench.clock()]

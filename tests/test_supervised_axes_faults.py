@@ -148,6 +148,8 @@ async def an_index_is_out_of_place(device: Device) -> None:
     await device.moves(2)
     await device.clocks(PIN_CLOCKS)
     device.level("encoder_z", 1)
+    await device.clocks(PIN_CLOCKS)
+    await device.moves(1, 0)
 
 
 async def a_count_is_out_of_range(device: Device) -> None:
@@ -244,6 +246,8 @@ async def every_cause_trips_its_axis_alone(dut):
             await device.moves(1)
             await device.clocks(PIN_CLOCKS)
             device.level("encoder_z", 1)
+            await device.clocks(PIN_CLOCKS)
+            await device.moves(1)
             await device.clocks(ENOUGH)
         await inject(device)
         edges = await is_at_zero(device, most(design) + 1)

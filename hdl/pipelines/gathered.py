@@ -89,10 +89,10 @@ def sample(pipe: Pipe, axes: Axes, first: Value, index_bits: int, stage: int) ->
     rows = []
     for number, mine in enumerate(zip(*marks, strict=True)):
         low = Signal(index_bits, name=f"index_low_{number}")
-        # An edge that counted down has the number of the count before it.
-        above = axes.stepped[number] & axes.edge_down[number]
+        # The edge that found it has counted away from it.
+        back = Cat(1, (~axes.edge_down[number]).replicate(index_bits - 1))
         with m.If(axes.indexed[number]):
-            m.d.sync += low.eq((axes.count[number] + above)[:index_bits])
+            m.d.sync += low.eq((axes.count[number] + back)[:index_bits])
         rows.append(Cat(*mine, low))
     row, first = pipe.later(pipe.of(rows, 0), stage), pipe.later(first, stage)
     return Sample(

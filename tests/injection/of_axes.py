@@ -6,7 +6,7 @@ from hardwall.model.supervisor import DISARMED
 from oracles.supervised import BITS, SYNCHRONISER
 
 from .fault import Expected, Fault, trips
-from .of_encoder import FAST, HARDER_N, INDEX, NONE, PAIRS, mended, rushes, slips, stuck, wired
+from .of_encoder import FAST, HARDER_N, INDEX, NONE, PAIRS, marks, mended, rushes, slips, stuck, wired
 from .of_host import QUICK, SILENT, TAKEN, heard, killed, recovered
 from .of_motion import (
     FASTEST_M_PER_S,
@@ -90,8 +90,8 @@ OF_ONE = (
         **PAIRS,
     ),
     Fault(
-        "Z is stuck high, 100 counts from the index",
-        wired(stuck(z=1)),
+        "Z is stuck high from 110 counts off the index on",
+        marks(for_good=True),
         trips("index_spacing", within=SAMPLED),
         mended,
         **INDEX,

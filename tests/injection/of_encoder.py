@@ -20,7 +20,11 @@ FAST = math.ceil(clocks_to_fault(BURST / STEP_CLOCKS, GLITCH)) + 1
 LOST = 2 + WORDS["supervisor_loss"].reset + latency("encoder_loss") + 1
 """Clock edges from wires that are equal to the drive at zero: synchroniser, `supervisor_loss`, monitor, supervisor."""
 INDEXED = COUNTED + latency("index_spacing") + 1
-"""Clock edges from an index edge to the drive at zero: count, monitor, supervisor."""
+"""Clock edges from the edge that finds an index to the drive at zero: count, monitor, supervisor."""
+NUDGED_N = PUSH_N + 0.3
+"""A push by which the handle goes on by some 60 counts; the force stays the same within that of a tremor."""
+ONWARD = 10
+"""Counts from where the hand pushes on to the false index."""
 PAIRS = {"causes": BITS["encoder_loss"]}
 INDEX = {"causes": BITS["index_spacing"], "live": {"supervisor_turn": TURN}}
 
@@ -65,6 +69,31 @@ def dies(*names: str, push_n: float = PUSH_N, lives: str | None = None):
         if lives:
             rig.on_count = begins
         await wired(stuck(**{name: now[f"encoder_{name}"] for name in names}), push_n)(rig)
+
+    return inject
+
+
+def marks(for_good: bool):
+    """Return the fault that Z rises with an edge, for good or for a count, as the hand pushes the handle on a little.
+
+    It begins with the edge after, which finds the index.
+    """
+
+    async def inject(rig: Rig) -> None:
+        rises = rig.handle.number + ONWARD
+
+        def meets(number: int) -> None:
+            if number == rises - 1:
+                rig.handle.fault = stuck(z=1)
+            elif number > rises:
+                rig.begin()
+                rig.on_count = lambda number: None
+                if not for_good:
+                    rig.handle.fault = sound
+                    rig.wire()
+
+        rig.on_count, rig.handle.push_n = meets, NUDGED_N
+        await rig.until(lambda: rig.handle.number > rises, 9, "the handle has met the false index")
 
     return inject
 
@@ -180,18 +209,19 @@ FAULTS = (
         BLIND,
     ),
     Fault("Z is dead", wired(stuck(z=0)), UNCHANGED, **INDEX),
+    Fault("noise on Z between two edges", wired(stuck(z=1), clocks=20), UNCHANGED, **INDEX),
     Fault(
-        "noise on Z, 100 counts from the index",
-        wired(stuck(z=1), clocks=20),
+        "a false pulse on Z, a count wide, 110 counts from the index",
+        marks(for_good=False),
         trips("index_spacing", within=INDEXED),
         **INDEX,
     ),
     Fault(
-        "Z is stuck high, 100 counts from the index",
-        wired(stuck(z=1)),
+        "Z is stuck high from 110 counts off the index on",
+        marks(for_good=True),
         trips("index_spacing", within=INDEXED),
         mended,
         **INDEX,
     ),
-    Fault("index_spacing is off: noise on Z", wired(stuck(z=1), clocks=20), UNCHANGED),
+    Fault("index_spacing is off: a false pulse on Z, a count wide", marks(for_good=False), UNCHANGED),
 )

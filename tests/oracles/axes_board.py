@@ -178,14 +178,19 @@ class Host(OnALine):
     async def turn(self, *places: int, index: int = 0) -> None:
         """Turn the handles to counts; there, the axes with a bit in `index` see their index.
 
-        Upwards Z rises there; downwards it falls, and a handle has two counts to go at least.
+        Upwards Z rises there; downwards it falls. Such an axis goes a count further, which finds the index, and back.
         """
-        ways = zip(self.places, places, strict=True)
-        downwards = sum((to < at) << axis for axis, (at, to) in enumerate(ways)) & index
+        ways = [(to > at) - (to < at) for at, to in zip(self.places, places, strict=True)]
+        downwards = sum((way < 0) << axis for axis, way in enumerate(ways)) & index
         while self.places != [*places]:
             self.places = [at + (to > at) - (to < at) for at, to in zip(self.places, places, strict=True)]
             await self._show(downwards)
-        await self._show(index & ~downwards)
+        if index:
+            await self._show(index)
+            self.places = [at + way * (index >> axis & 1) for axis, (at, way) in enumerate(zip(places, ways, strict=True))]
+            await self._show(index & ~downwards)
+            await self._show(0)
+            self.places = [*places]
         await self._show(0)
 
     async def _show(self, index: int, jumping: int = 0) -> None:

@@ -103,9 +103,9 @@ class Follower:
         width = self._design.spec.count_width
         for axis in range(self._axes):
             if shown["indexed"] >> axis & 1:
-                # An edge that counted down has the number of the count before it.
-                above = shown["stepped"] & shown["edge_down"]
-                self._index[axis] = wrap((shown["count"] >> width * axis) + (above >> axis & 1), width)
+                # The edge that found it has counted away from it.
+                back = 1 if shown["edge_down"] >> axis & 1 else -1
+                self._index[axis] = wrap((shown["count"] >> width * axis) + back, width)
         if at := self._at(self._sampled - 1):
             at[1].update({name: self._words[at[0]][name] for name in SAMPLE_WORDS})
         if at := self._at(self._sampled):

@@ -169,10 +169,70 @@ def no_reference_outlasts_a_slip(bench: Bench) -> None:
     bench.promise(~referenced | latched)
     shifted = bench.past(decoder.origin_shift & latched) & ~bench.past(bench.reset)
     bench.promise(~referenced | bench.past(referenced) | shifted)
-    bench.promise(~latched | bench.past(latched) | bench.past(decoder.index_armed & moved[2]))
+    bench.promise(~latched | bench.past(latched) | bench.past(decoder.index_armed & (moved[0] ^ moved[1])))
+
+
+def an_index_is_one_edge_of_z(bench: Bench) -> None:
+    """Each index is at the cell in which Z rises upwards, and two edges in one direction around it find it.
+
+    Places are quarters of a count. The handle moves by one a clock at most, and Z is high from one place to another.
+    """
+    rises, falls = bench.constant(signed(6)), bench.constant(signed(6))
+    offset, phase, moves = bench.constant(2), bench.constant(2), bench.free(2)
+    place, now, level = Signal(signed(6)), Signal(signed(6)), Signal(2)
+    there = Signal(signed(7))
+    decoder = bench.block(
+        Quadrature(4, 2, 1, 1),
+        a=level[0] ^ level[1],
+        b=level[1],
+        z=(rises <= there) & (there < falls),
+        **dict.fromkeys(("glitch_clocks", "invert", "preload", "origin_shift", "clear", "slip"), 0),
+    )
+    inner = bench.inner
+    bench.assume(~bench.reset)
+    bench.assume((inner["starting"] != STARTING) | (moves == 0))
+    bench.m.d.comb += [
+        now.eq(place + Mux(moves == 1, 1, Mux(moves == 2, -1, 0))),
+        there.eq(now + offset),
+        level.eq((there >> 2) + phase),
+    ]
+    bench.assume((now < 24) & (now >= -24))
+    bench.m.d.sync += place.eq(now)
+
+    def high(at: Value) -> Value:
+        return (rises <= at) & (at < falls)
+
+    # Behind the synchroniser the levels come, and a clock later the count.
+    at_level, at_count = (bench.past(now, SYNCHRONISER + clocks) + offset for clocks in (1, 2))
+    running = inner["starting"] == 0
+    count, down, level = decoder.seen.count, decoder.seen.down, inner["level"]
+    bench.promise(~running | (cell(level) == ((at_level >> 2) + phase)[:2]))
+    bench.promise(~running | (level[2] == high(at_level)))
+    bench.promise(~bench.past(running) | (inner["moved"] == level ^ bench.past(level)))
+    bench.promise(~decoder.fault & (count == at_count >> 2))
+    below = Mux(down, count + 1, count) * 4 - 1
+    bench.promise(~inner["known"] | (inner["below"] == high(below)))
+    mark = Signal(signed(8))
+    bench.m.d.comb += mark.eq(Mux(down, count + 1, count - 1))
+    onward = decoder.stepped & bench.past(inner["known"]) & (down == bench.past(down))
+    bench.promise(decoder.indexed == onward & (mark == rises >> 2) & high(mark * 4 + 3))
+    bench.promise(~decoder.index_latched | (decoder.index_count == rises >> 2))
 
 
 PROPERTIES = [
+    Property(
+        "an index is at one edge of Z, however the handle moves",
+        "quadrature",
+        an_index_is_one_edge_of_z,
+        depth=6,
+        quick=True,
+        bugs=(
+            Bug(Quadrature._index, "below.eq(Mux(one, z, below))", "below.eq(z)"),
+            Bug(Quadrature._index, "(z != down) & ~lost", "(z != down) & ~lost & ~down"),
+            Bug(Quadrature._index, "level[2] ^ (moved[2] & ~down)", "level[2]"),
+            Bug(Quadrature._index, "(below == down) & ", ""),
+        ),
+    ),
     Property(
         "a reference is by a latched index, and falls at the clock of a slip",
         "quadrature",

@@ -34,13 +34,14 @@ def at(clocks: int, *when: int) -> np.ndarray:
 def pulses(channel: str, glitch_clocks: int) -> dict[str, np.ndarray]:
     """Return pulses of every width from 1 to glitch_clocks + 2 on one channel, the others low.
 
-    Between two pulses on Z the handle moves down and up again by a count.
+    The handle moves up by a count before a pulse on Z, by another one a clock after it begins, and back behind it.
     """
-    apart = 2 * glitch_clocks + 9
+    hold = glitch_clocks + 4
+    apart, begins = (4 * hold + 3, hold + 1) if channel == "z" else (2 * hold + 1, 0)
     clock = np.arange(apart * (glitch_clocks + 3))
-    back = (glitch_clocks + 3 <= clock % apart) & (clock % apart < 2 * glitch_clocks + 4)
-    levels = pins(-back.astype(int)) if channel == "z" else {}
-    levels[channel] = clock % apart < clock // apart
+    up, down = (((clock % apart)[:, None] >= edges).sum(axis=1) for edges in ((1, hold + 2), (2 * hold + 2, 3 * hold + 2)))
+    levels = pins(up - down) if channel == "z" else {}
+    levels[channel] = (begins <= clock % apart) & (clock % apart < begins + clock // apart)
     return stimulus(len(clock), glitch_clocks=glitch_clocks, arm=clock % apart == apart - 1, **levels)
 
 
