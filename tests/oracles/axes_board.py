@@ -187,7 +187,9 @@ class Host(OnALine):
             await self._show(downwards)
         if index:
             await self._show(index)
-            self.places = [at + way * (index >> axis & 1) for axis, (at, way) in enumerate(zip(places, ways, strict=True))]
+            self.places = [
+                at + way * (index >> axis & 1) for axis, (at, way) in enumerate(zip(places, ways, strict=True))
+            ]
             await self._show(index & ~downwards)
             await self._show(0)
             self.places = [*places]

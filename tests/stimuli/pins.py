@@ -39,7 +39,9 @@ def pulses(channel: str, glitch_clocks: int) -> dict[str, np.ndarray]:
     hold = glitch_clocks + 4
     apart, begins = (4 * hold + 3, hold + 1) if channel == "z" else (2 * hold + 1, 0)
     clock = np.arange(apart * (glitch_clocks + 3))
-    up, down = (((clock % apart)[:, None] >= edges).sum(axis=1) for edges in ((1, hold + 2), (2 * hold + 2, 3 * hold + 2)))
+    up, down = (
+        ((clock % apart)[:, None] >= edges).sum(axis=1) for edges in ((1, hold + 2), (2 * hold + 2, 3 * hold + 2))
+    )
     levels = pins(up - down) if channel == "z" else {}
     levels[channel] = (begins <= clock % apart) & (clock % apart < begins + clock // apart)
     return stimulus(len(clock), glitch_clocks=glitch_clocks, arm=clock % apart == apart - 1, **levels)
