@@ -4,7 +4,7 @@ import dataclasses
 import random as plain
 from collections import Counter
 from contextlib import suppress
-from itertools import count, pairwise
+from itertools import count, pairwise, product
 
 import cocotb
 import numpy as np
@@ -270,6 +270,33 @@ def test_every_source_triggers_by_a_change_alone(source, shown):
         axis.take(3)
         changed = sources == source and not there
         assert axis.state.capture_state == (TRIGGERED if changed else WAITING)
+
+
+@pytest.mark.parametrize("source", [CONTACT, RISE, FALL])
+def test_a_way_past_the_level_is_judged_exactly_at_the_ends_of_every_word(source):
+    """Counts, levels and forces are those at the ends of their formats, and about 0, each before each."""
+    design, state = design_of("narrow", "fdm"), START
+
+    def ends(fmt) -> tuple[int, ...]:
+        return fmt.min, fmt.min + 1, -1, 0, 1, fmt.max - 1, fmt.max
+
+    counts, forces = ends(design.count), ends(design.force)
+    cases = [(level, *way, force, force) for level in counts for way in product(counts, counts) for force in (0, 1)]
+    cases += [(0, 5, 5, *two) for two in product(forces, forces)]
+    for level, before, after, pushed, pushes in cases:
+        memory = design.memory()
+        words = {"capture_sources": source, "capture_level": level, "capture_before": 7, "capture_decimation": 1}
+        state = capture.step(design.params, memory, state, Inputs(**words, capture_start=1))
+        for count, force in ((before, pushed), (before, pushed), (after, pushes)):
+            for clock in range(11):
+                given = {"count": count, "wall_force": force, "sampled": int(clock == 10)}
+                state = capture.step(design.params, memory, state, Inputs(**words, **given))
+        passes = {
+            RISE: before < level <= after,
+            FALL: after < level <= before,
+            CONTACT: pushed == 0 != pushes,
+        }
+        assert (state.capture_state == TRIGGERED) == passes[source], (level, before, after, pushed, pushes)
 
 
 def test_a_level_that_moves_with_the_start_is_not_passed():

@@ -78,6 +78,46 @@ def a_debt_stays(axis: str, bench: Bench) -> None:
     bench.promise(~owed | (energy == bench.past(energy)))
 
 
+def the_energy_is_the_balance(axis: str, bench: Bench) -> None:
+    """Promise the equations of what the energy becomes, in as many bits as they need, for every product of a drive."""
+    block = bench.block(passivity(axis), FreeProducts())
+    keeps(bench, block)
+    inner, design = bench.inner, block.design
+    energy, most = inner["energy"], design.energy.max
+    before, summed = bench.past(energy), bench.past(inner["summed"] & ~bench.reset)
+    balance = before - bench.past(inner["work"])
+    bounded = Mux(balance > most, most, Mux(balance < -most, -most, balance))
+    bench.promise(~summed | (energy == Mux(bench.past(inner["begins"]), 0, bounded)))
+    # Of a credit all but 2**-memory is left, rounded down; without a force nothing.
+    forgot, force = bench.past(inner["forgets"] & ~bench.reset), bench.past(block.force.any(), 2)
+    share = (before << design.memory) - before
+    left = (energy << design.memory <= share) & (share < (energy + 1) << design.memory)
+    bench.promise(~forgot | Mux(before < 0, energy == before, Mux(force, left, energy == 0)))
+    bench.promise(~bench.past(~bench.reset) | summed | forgot | (energy == before))
+
+
+def a_way_is_between_two_places(axis: str, bench: Bench) -> None:
+    """Promise that a sample's half counts are those from the last place of the handle to the next, as edges show it."""
+    block = bench.block(passivity(axis), FreeProducts())
+    samples(bench, block)
+    inner = bench.inner
+    count, restarted, known = inner["last"], inner["restarted"], inner["known"]
+    place, before, now = Signal(len(count) + 1, init=1), Signal.like(count), Signal(len(count) + 1)
+    goes, fastest = (block.count - count)[: len(count)].as_signed(), block.design.displacement.max // 2 - 1
+    bench.assume(~block.lead | block.restart | (goes <= fastest) & (goes >= -fastest))
+    up, down = ((before + way)[: len(count)] == count[:] for way in (1, -1))
+    within = Mux(up & ~restarted, 0, Mux(down & ~restarted, 2, 1))
+    bench.m.d.comb += now.eq(Mux((count == before) & ~restarted, place, 2 * count + within))
+    with bench.m.If(known):
+        bench.m.d.sync += [place.eq(now), before.eq(count)]
+    way = bench.past((now - place)[: len(now)].as_signed())
+    bench.promise(~bench.past(known & ~restarted & ~bench.reset) | (inner["half_counts"] == way))
+    # For the induction: where the handle is in its count, and what has gone by since the last sample.
+    bench.promise(place == (2 * before + inner["within"])[: len(place)])
+    bench.promise(~known | (inner["moved"] == (count - before)[: len(count)].as_signed()) | restarted)
+    bench.promise(known | (count == before))
+
+
 PROPERTIES = [
     Property(
         "what is given is of the force's sign, or zero, and in range",
@@ -106,5 +146,26 @@ PROPERTIES = [
         partial(a_debt_stays, "mhz"),
         depth=8,
         bugs=(Bug(Passivity._observe, "Mux(energy[-1], 0, ", "Mux(0, 0, "),),
+    ),
+    Property(
+        "the energy is the exact balance of work and credit",
+        "passivity mhz",
+        partial(the_energy_is_the_balance, "mhz"),
+        depth=8,
+        bugs=(
+            Bug(Passivity._observe, "total.eq(energy - work)", "total.eq(energy + work)"),
+            Bug(Passivity._observe, " + energy[: design.memory].any()", ""),
+            Bug(Passivity._observe, "Mux(begins, 0, held", "Mux(0, 0, held"),
+        ),
+    ),
+    Property(
+        "the way in a sample is that between two places, as edges show them",
+        "passivity mhz",
+        partial(a_way_is_between_two_places, "mhz"),
+        depth=8,
+        bugs=(
+            Bug(Passivity._observe, "2 * moved + now - within", "2 * moved + now - MIDDLE"),
+            Bug(Passivity._observe, "Mux(moved == -1, UPPER, MIDDLE)", "MIDDLE"),
+        ),
     ),
 ]
