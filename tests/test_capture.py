@@ -287,9 +287,9 @@ def test_a_way_past_the_level_is_judged_exactly_at_the_ends_of_every_word(source
         memory = design.memory()
         words = {"capture_sources": source, "capture_level": level, "capture_before": 7, "capture_decimation": 1}
         state = capture.step(design.params, memory, state, Inputs(**words, capture_start=1))
-        for count, force in ((before, pushed), (before, pushed), (after, pushes)):
+        for place, force in ((before, pushed), (before, pushed), (after, pushes)):
             for clock in range(11):
-                given = {"count": count, "wall_force": force, "sampled": int(clock == 10)}
+                given = {"count": place, "wall_force": force, "sampled": int(clock == 10)}
                 state = capture.step(design.params, memory, state, Inputs(**words, **given))
         passes = {
             RISE: before < level <= after,
