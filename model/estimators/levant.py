@@ -44,8 +44,9 @@ Both states saturate at the velocity format (flag `velocity_saturated`).
 
 Limits. The count may wrap. The first sample, and a sample with `restart`, begin with x = count and u1 = 0: a start from
 rest has no transient; a start in motion at u0 has the transient of a step of u0, which u overshoots by about 40 % and
-follows in about 2 u0 / alpha, as it does the largest step (0.3 m/s with C = 12 m/s^2: 0.42 m/s at most, 43 ms). Up to
-the largest speed nothing saturates after that transient. At standstill u and u1 never come to rest but chatter by
+follows within u0 (1 + p) / (alpha (1 - p)), p = exp(-pi / sqrt(8 alpha / lambda^2 - 1)), which is 1.96 u0 / alpha with
+the default gains, as it does the largest step (0.3 m/s with C = 12 m/s^2: 0.42 m/s at most, 43 ms). Up to the largest
+speed nothing saturates after that transient. At standstill u and u1 never come to rest but chatter by
 lambda sqrt(alpha tau^2) and alpha tau; `levant_semi_implicit` comes to rest.
 
 `levant_semi_implicit`, `levant_implicit` and `levant_adaptive` share this module's gains, design and helper functions.
