@@ -68,6 +68,7 @@ BROAD = {
     "estimators/test_edge_kalman_map": "edge_kalman with a scale_map",
     "estimators/test_levant_edge_bound": "levant_edge in motions beyond its gains",
     "estimators/test_stamped_speeds": "estimators by clock stamps at steady speeds, and on edges in bursts",
+    "estimators/test_start_in_motion": "how long a start in motion lasts, by a formula",
     "estimators/test_steady_speeds": "every estimator, at every steady speed and with every word",
     "estimators/test_levants": "what several of Levant's differentiators promise alike",
     "host/test_unwanted": "what axis, heartbeat and words together must not let happen",
