@@ -100,6 +100,7 @@ BROAD = {
     "test_wheel": "the package that a user installs",
     "testing/test_examples": "the bench as others use it",
     "world/test_shunt": "a device whose motor has a damping circuit",
+    "walls/test_rounding": "which rounding decides a wall at the edge of Levant's region",
     "walls/test_contact_energy": "the energy that passivity sees in a hit",
 }
 # Modules of studies/ without a test of their own name, and the test that covers them.

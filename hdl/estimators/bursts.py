@@ -1,109 +1,120 @@
-"""A watch over the times of cycles: whether an encoder emits its edges in bursts."""
+"""A watch over the stamps of edges: whether an encoder emits its edges in bursts."""
 
-from amaranth.hdl import Module, Mux, Signal
-from amaranth.lib import wiring
-from amaranth.lib.wiring import In, Out
+from amaranth.hdl import Array, Module, Mux, Signal
+from amaranth.lib.wiring import In, Member, Out
 
-from hardwall.model.checks import check_int
 from hardwall.model.estimators import bursts as model
 
+from ..block import Block
+from ..quadrature import Seen
 
-class Bursts(wiring.Component):
-    """Whether silences between edges are too long for the speed of their cycles, again and again.
 
-    Equation: `hardwall.model.estimators.bursts` defines silences and events.
+class Bursts(Block):
+    """Whether edges come faster after silences than any axis can, again and again.
 
-    Latency: `latency` clocks from `strobe` to `found`; the next `strobe` may come no earlier.
+    Equation, with the age and the count of the sample before the first edges in `window` samples:
 
-    Rounding and overflow: exact.
+        jolt = three edges in one direction within `span` clocks, and 4 (their clocks + 1) < that age
+
+    `found` is 1 from the third jolt on with an age of more than `tolerated`, each within `memory` samples of the one
+    before, until none comes. The model's module derives the limits.
+
+    Latency: `latency` clocks from `strobe` to both outputs; the next `strobe` may come no earlier.
+
+    Rounding and overflow: exact; ages are cut off at what every jolt has. Count and stamps may wrap.
 
     Parameters
     ----------
-    stamp_width : int
-        Bits of the clock stamps, 3 to 62.
-    cycles_max : int
-        Largest number of cycles, 1 or more.
-    doubt : int
-        Samples for which an event is remembered, 2 or more.
+    design : hardwall.model.estimators.bursts.Limits
+        Widths and limits.
 
     Members
     -------
     strobe : In(1)
-        Pulse: take a sample, the outputs of `CycleTimes`.
-    news, cycles, cycle, age : In
-        Those outputs, constant for `latency` clocks.
+        Pulse: take a sample.
+    restart : In(1)
+        With `strobe`: forget everything.
+    seen : In(Seen)
+        The decoder's outputs.
+    jolt : Out(1)
+        Whether this sample has a jolt.
     found : Out(1)
         Whether edges come in bursts.
 
     Raises
     ------
     TypeError
-        If a parameter is not an int.
-    ValueError
-        If a parameter is out of range.
+        If `design` is of another class.
 
     Source: this project's.
     """
 
-    def __init__(self, stamp_width: int, cycles_max: int, doubt: int):
-        check_int("stamp_width", stamp_width, 3, 62)
-        check_int("cycles_max", cycles_max, 1)
-        check_int("doubt", doubt, 2)
-        self._stamp_width, self._cycles_max, self._doubt = stamp_width, cycles_max, doubt
-        super().__init__(
-            {
-                "strobe": In(1),
-                "news": In(1),
-                "cycles": In(range(cycles_max + 1)),
-                "cycle": In(stamp_width),
-                "age": In(stamp_width),
-                "found": Out(1),
-            }
-        )
+    design_class = model.Limits
 
-    @property
-    def stamp_width(self) -> int:
-        return self._stamp_width
-
-    @property
-    def cycles_max(self) -> int:
-        return self._cycles_max
-
-    @property
-    def doubt(self) -> int:
-        return self._doubt
+    @staticmethod
+    def members(design: model.Limits) -> dict[str, Member]:
+        return {
+            "strobe": In(1),
+            "restart": In(1),
+            "seen": In(Seen(design.count_width, design.stamp_width)),
+            "jolt": Out(1),
+            "found": Out(1),
+        }
 
     @property
     def latency(self) -> int:
-        """Clocks from `strobe` to `found`."""
+        """Clocks from `strobe` to both outputs."""
         return model.LATENCY
 
     def elaborate(self, platform):
         m = Module()
-        quiet, silence = Signal(self._stamp_width), Signal(self._stamp_width)
-        product = Signal(len(self.cycles) + self._stamp_width)
-        events, left = Signal(range(model.EVENTS + 1)), Signal(range(self._doubt + 1))
-        m.d.comb += self.found.eq(events == model.EVENTS)
+        limits, seen, longest = self._design, self.seen, model.longest(self._design)
+        stamps = Array([seen.stamp_a_rise, seen.stamp_b_rise, seen.stamp_a_fall, seen.stamp_b_fall])
+        stamp, age, span = (Signal(limits.stamp_width, name=name) for name in ("stamp", "age", "span"))
+        count, last, base, moved = (
+            Signal(min(model.MOVED_BITS, limits.count_width), name=name) for name in ("count", "last", "base", "moved")
+        )
+        quiet, silence = Signal(range(longest + 1)), Signal(range(longest + 1))
+        edge, running, fresh, news, together = Signal(2), Signal(), Signal(), Signal(), Signal()
+        window, left = Signal(range(limits.window + 1)), Signal(range(limits.memory + 1))
+        events = Signal(range(model.EVENTS + 1))
+        near = (moved + model.EDGES - 1)[: len(moved)] <= 2 * (model.EDGES - 1)
+        m.d.comb += [self.found.eq(events == model.EVENTS), moved.eq(count - base)]
         with m.FSM():
             with m.State("SAMPLE"), m.If(self.strobe):
-                m.d.sync += [quiet.eq(self.age), left.eq(left - (left != 0))]
-                with m.If(self.news & (quiet > silence)):
-                    m.d.sync += silence.eq(quiet)
-                m.next = "WEIGH"
-            with m.State("WEIGH"):
-                m.d.sync += [product.eq(self.cycles * silence), events.eq(Mux(left != 0, events, 0))]
+                newest = stamps[seen.edge]
+                m.d.sync += [
+                    news.eq((newest != stamp) | (seen.edge != edge)),
+                    together.eq(seen.run >= model.EDGES),
+                    fresh.eq(self.restart | ~running),
+                    running.eq(1),
+                    edge.eq(seen.edge),
+                    stamp.eq(newest),
+                    # The edge two before the last one of a run is of the opposite kind.
+                    span.eq(stamps[seen.edge ^ 2]),
+                    age.eq(seen.stamp),
+                    count.eq(seen.count),
+                    last.eq(count),
+                    window.eq(window - (window != 0)),
+                    left.eq(left - (left != 0)),
+                ]
+                m.next = "SILENCE"
+            with m.State("SILENCE"):
+                m.d.sync += [span.eq(stamp - span), age.eq(age - stamp)]
+                with m.If(left == 0):
+                    m.d.sync += events.eq(0)
+                with m.If(news & ((window == 0) | (quiet > silence))):
+                    m.d.sync += [silence.eq(quiet), base.eq(last), window.eq(limits.window)]
                 m.next = "JUDGE"
             with m.State("JUDGE"):
-                with m.If(self.age == 0):
-                    m.d.sync += [silence.eq(0), events.eq(0), left.eq(0)]
-                with m.Elif(self.news & (self.cycles != 0)):
-                    with m.If(silence > self.cycle):
-                        m.d.sync += silence.eq(0)
-                    with m.Elif(product << 4 > (self.cycle << 3) + self.cycle):
-                        m.d.sync += [
-                            silence.eq(0),
-                            events.eq(Mux(events == model.EVENTS, events, events + 1)),
-                            left.eq(self._doubt),
-                        ]
+                close = (span <= limits.span) & (((span + 1) << 2) < silence)
+                jolt = ~fresh & news & (window != 0) & together & ~near & close
+                m.d.sync += [quiet.eq(Mux(age > longest, longest, age)), self.jolt.eq(jolt)]
+                with m.If(fresh | jolt):
+                    m.d.sync += [silence.eq(0), window.eq(0)]
+                with m.If(fresh):
+                    m.d.sync += [events.eq(0), left.eq(0)]
+                with m.Elif(jolt & (silence > limits.tolerated)):
+                    m.d.sync += [events.eq(events + (events != model.EVENTS)), left.eq(limits.memory)]
                 m.next = "SAMPLE"
         return m

@@ -79,6 +79,8 @@ class Estimator(EstimatorBlock):
     def elaborate(self, platform):
         m = Module()
         s = Signals(self._design)
+        bursts = self._bursts(m)
+        m.d.comb += [s.bursts.eq(bursts.found), s.jolt.eq(bursts.jolt)]
         self._multiply(m, s)
         self._look_up(m, s)
         if self._design.scale is not None:
@@ -235,7 +237,7 @@ class Estimator(EstimatorBlock):
             ],
             "OUTPUT": [
                 self.velocity.eq(Mux(s.rest, 0, shift_round_half_up(s.held, GUARD_BITS))),
-                self.saturated.eq(s.flags | (s.far_line & ~s.rest) << 1),
+                self.saturated.eq(Cat(s.flags[0], s.flags[1] | s.far_line & ~s.rest, s.bursts)),
                 self.valid.eq(1),
             ],
         }
@@ -289,7 +291,7 @@ class Estimator(EstimatorBlock):
                     with m.If(s.anchor | s.fresh):
                         m.d.sync += s.before.eq(s.error)
             case "LINE":
-                with m.If(s.correct & s.refuted):
+                with m.If(s.correct & s.refuted | s.jolt):
                     m.d.sync += s.doubt.eq(p.doubt)
             case "OUTPUT":
                 with m.If(s.rest):

@@ -37,6 +37,7 @@ class Signals:
         self.age, self.rest, self.gone = Signal(time), Signal(), Signal()
         self.size, self.age_size = Signal(range(d.time_bits + 1)), Signal(range(d.time_bits))
         self.flags = Signal(2)
+        self.bursts, self.jolt = Signal(), Signal()
 
         self._place(d)
 

@@ -3,13 +3,14 @@
 from collections.abc import Callable
 
 from amaranth.hdl import Module, Mux, Signal, Value
-from amaranth.lib.wiring import In, Member, Out
+from amaranth.lib.wiring import In, Member, Out, connect, flipped
 
 from hardwall.model.estimators.estimate import EstimatorDesign
 
 from ..arithmetic.fixed import shape
 from ..block import Block
 from ..quadrature import Seen
+from .bursts import Bursts
 
 
 class EstimatorBlock(Block):
@@ -54,6 +55,13 @@ class EstimatorBlock(Block):
             "saturated": Out(len(design.flags)),
             "valid": Out(1),
         }
+
+    def _bursts(self, m: Module) -> Bursts:
+        """Add the watch over bursts, and return it: its outputs hold from its latency on until the next strobe."""
+        m.submodules.watch = watch = Bursts(self._design.bursts)
+        m.d.comb += [watch.strobe.eq(self.strobe), watch.restart.eq(self.restart)]
+        connect(m, flipped(self.seen), watch.seen)
+        return watch
 
     def _step_by_step(
         self, m: Module, moved: Signal, forget: Callable[[Value], None], sequence: dict[str, list]

@@ -51,6 +51,8 @@ class Estimator(EstimatorBlock):
     def elaborate(self, platform):
         m = Module()
         s = Signals(self._design)
+        bursts = self._bursts(m)
+        m.d.comb += [s.bursts.eq(bursts.found), s.jolt.eq(bursts.jolt)]
         self._measure(m, s)
         self._solve(m, s)
         self._learn(m, s)
@@ -279,7 +281,7 @@ class Estimator(EstimatorBlock):
             m.next = "LINE TURN"
         with m.State("LINE TURN"):
             m.d.sync += s.turn.eq(Mux(s.gone, 0, s.turned))
-            with m.If(s.refuted):
+            with m.If(s.refuted | s.jolt):
                 m.d.sync += s.doubt.eq(d.doubt)
             m.next = "LINE"
         with m.State("LINE"):
@@ -301,7 +303,7 @@ class Estimator(EstimatorBlock):
                 m.d.sync += [s.v.eq(0), s.a.eq(0)]
             m.d.sync += [
                 self.velocity.eq(Mux(s.rest, 0, held)),
-                self.saturated.eq(s.flags | (s.far_line & ~s.rest) << 1),
+                self.saturated.eq(Cat(s.flags[0], s.flags[1] | s.far_line & ~s.rest, s.bursts)),
                 self.valid.eq(1),
             ]
             m.next = "SAMPLE"

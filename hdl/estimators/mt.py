@@ -1,6 +1,6 @@
 """The M/T method: counts between two edges that are a window apart, over the time between them."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib.wiring import connect, flipped
 
 from hardwall.model.estimators.mt import Design
@@ -43,6 +43,7 @@ class Estimator(EstimatorBlock):
         m.submodules.edges = edges = KeptEdges(design)
         m.d.comb += [edges.strobe.eq(self.strobe), edges.restart.eq(self.restart)]
         connect(m, flipped(self.seen), edges.seen)
+        bursts = self._bursts(m)
         product = Signal(len(edges.moved) + max(len(edges.quiet), design.clocks.bit_length()))
         scaled = product[: (design.clocks * design.edges_max).bit_length()]
         m.submodules.speed = speed = Divide(len(scaled) + fraction, len(edges.time), width)
@@ -78,7 +79,7 @@ class Estimator(EstimatorBlock):
             with m.State("OUTPUT"):
                 m.d.sync += [
                     self.velocity.eq(Mux(edges.down, -magnitude, magnitude)),
-                    self.saturated.eq(saturated),
+                    self.saturated.eq(Cat(saturated, bursts.found)),
                     self.valid.eq(1),
                 ]
                 m.next = "WEIGH"

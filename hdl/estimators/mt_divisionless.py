@@ -1,6 +1,6 @@
 """The M/T method without a divider: the counts between two edges times the reciprocal of the time between them."""
 
-from amaranth.hdl import Module, Mux, Signal
+from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib.wiring import connect, flipped
 
 from hardwall.model.estimators.mt_divisionless import Design
@@ -43,6 +43,7 @@ class Estimator(EstimatorBlock):
         m.submodules.edges = edges = KeptEdges(design)
         m.d.comb += [edges.strobe.eq(self.strobe), edges.restart.eq(self.restart)]
         connect(m, flipped(self.seen), edges.seen)
+        bursts = self._bursts(m)
         scaled = max(clocks * design.edges_max, 3 * clocks)
         m.submodules.speed = speed = Divisionless(
             scaled.bit_length(), stamp + 1, velocity.f, velocity.width - 1, len(edges.moved), stamp
@@ -72,7 +73,7 @@ class Estimator(EstimatorBlock):
             with m.State("OUTPUT"), m.If(speed.done):
                 m.d.sync += [
                     self.velocity.eq(Mux(edges.down, -speed.quotient, speed.quotient)),
-                    self.saturated.eq(speed.saturated),
+                    self.saturated.eq(Cat(speed.saturated, bursts.found)),
                     self.valid.eq(1),
                 ]
                 m.next = "LISTEN"

@@ -6,7 +6,6 @@ from amaranth.lib.wiring import connect, flipped
 from hardwall.model.estimators.period import Design
 
 from ..arithmetic.divide import Divide
-from .bursts import Bursts
 from .cycle_times import CycleTimes
 from .estimate import EstimatorBlock
 
@@ -46,9 +45,7 @@ class Estimator(EstimatorBlock):
         m.submodules.times = times = CycleTimes(design.count_width, design.stamp_width, design.cycles_max)
         m.d.comb += [times.strobe.eq(self.strobe), times.restart.eq(self.restart)]
         connect(m, flipped(self.seen), times.seen)
-        m.submodules.watch = watch = Bursts(width, design.cycles_max, design.doubt)
-        m.d.comb += watch.strobe.eq(times.valid)
-        m.d.comb += [getattr(watch, name).eq(getattr(times, name)) for name in ("news", "cycles", "cycle", "age")]
+        bursts = self._bursts(m)
 
         # The quotient of the speed is held until there is a new edge.
         scaled = Signal(range(4 * clocks * design.cycles_max + 1))
@@ -92,7 +89,7 @@ class Estimator(EstimatorBlock):
             with m.State("OUTPUT"):
                 m.d.sync += [
                     self.velocity.eq(Mux(down, -magnitude, magnitude)),
-                    self.saturated.eq(Cat(saturated, watch.found)),
+                    self.saturated.eq(Cat(saturated, bursts.found)),
                     self.valid.eq(1),
                 ]
                 m.next = "OBSERVE"

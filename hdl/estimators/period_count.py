@@ -7,7 +7,6 @@ from hardwall.model.estimators.period_count import Design
 
 from ..arithmetic.divide import Divide
 from ..arithmetic.fixed import saturate
-from .bursts import Bursts
 from .cycle_times import CycleTimes
 from .estimate import EstimatorBlock
 
@@ -47,9 +46,7 @@ class Estimator(EstimatorBlock):
         m.submodules.times = times = CycleTimes(design.count_width, design.stamp_width, design.cycles_max)
         m.d.comb += [times.strobe.eq(self.strobe), times.restart.eq(self.restart)]
         connect(m, flipped(self.seen), times.seen)
-        m.submodules.watch = watch = Bursts(design.stamp_width, design.cycles_max, design.doubt)
-        m.d.comb += watch.strobe.eq(times.valid)
-        m.d.comb += [getattr(watch, name).eq(getattr(times, name)) for name in ("news", "cycles", "cycle", "age")]
+        bursts = self._bursts(m)
 
         running, down = Signal(), Signal()
         samples = Signal(range(1 << window_bits)) if window_bits else Signal(1)
@@ -95,7 +92,7 @@ class Estimator(EstimatorBlock):
             with m.State("OUTPUT"), m.If(divide.done):
                 far = Mux(counting, far_counted, Mux(down, -far_timed, far_timed))
                 held = saturate(far, -velocity.max, velocity.max)
-                flags = Cat(held != far, watch.found & ~counting)
+                flags = Cat(held != far, bursts.found)
                 m.d.sync += [self.velocity.eq(held), self.saturated.eq(flags), self.valid.eq(1)]
                 m.next = "OBSERVE"
         return m

@@ -62,6 +62,7 @@ from ..arithmetic.fixed import length_of, saturate, shift_floor, shift_round_hal
 from ..compiled import compiled
 from ..quadrature import stamp_of
 from ..scale_map import FRACTION_BITS, place_of
+from .bursts import NOTHING, watch
 from .edge_kalman_design import (
     ALARM_AT,
     BLEND,
@@ -101,7 +102,7 @@ def _time_of(params, stamp):
 def _started(params, seen, top, zero):
     """Return the state at a first sample: its last edge is the anchor, whose arrival was not seen."""
     at = _time_of(params, stamp_of(seen, seen.edge))
-    return State(1, 0, number_of(params, seen), at, zero, 0, top, zero, zero, zero, zero)
+    return State(1, 0, number_of(params, seen), at, zero, 0, top, zero, zero, zero, zero, NOTHING)
 
 
 @compiled
@@ -166,6 +167,7 @@ def _correct(params, state, interval, passed, number):
 @estimate.register(Params)
 @compiled
 def step(params, state, seen, restart):
+    watched, clumped = watch(params.bursts, state.watch, seen, restart)
     if restart or not state.running:
         state = _started(params, seen, TOP, 0)
     met, interval, passed = _met(params, state, seen)
@@ -177,8 +179,8 @@ def step(params, state, seen, restart):
         known, doubt, level, place, mean, velocity, acceleration = 1, 0, TOP, 0, 0, 0, 0
     elif met == TIMED:
         level, place, mean, velocity, acceleration, flags = _correct(params, state, interval, passed, here)
-        if refuted(state.bound, state.velocity, velocity):
-            doubt = params.doubt
+        doubt = params.doubt if refuted(state.bound, state.velocity, velocity) else doubt
+    doubt = params.doubt if watched.jolt else doubt
     number, stamp = state.number, state.stamp
     if met != ANCHOR:
         number, stamp = here, _time_of(params, stamp_of(seen, seen.edge))
@@ -195,8 +197,8 @@ def step(params, state, seen, restart):
     if rests:
         level, mean, velocity, acceleration, line = TOP, 0, 0, 0, 0
         known = int(known and not gone)
-    after = State(1, known, number, stamp, bound, doubt, level, place, mean, velocity, acceleration)
-    return after, shift_round_half_up(line, params.output_shift), flags
+    after = State(1, known, number, stamp, bound, doubt, level, place, mean, velocity, acceleration, watched)
+    return after, shift_round_half_up(line, params.output_shift), flags | clumped << 2
 
 
 @compiled
@@ -222,6 +224,7 @@ def _float_correct(params, state, interval, passed, number):
 @compiled
 def float_step(params, state, seen, restart):
     """Take one sample in float64, unsaturated: the same algorithm, as a reference for the cost of fixed point."""
+    watched, clumped = watch(params.bursts, state.watch, seen, restart)
     if restart or not state.running:
         state = _started(params, seen, float(AGILE_LEVEL), 0.0)
     met, interval, passed = _met(params, state, seen)
@@ -232,8 +235,8 @@ def float_step(params, state, seen, restart):
         known, doubt, level, place, mean, velocity, acceleration = 1, 0, float(AGILE_LEVEL), 0.0, 0.0, 0.0, 0.0
     elif met == TIMED:
         level, place, mean, velocity, acceleration = _float_correct(params, state, interval, passed, here)
-        if refuted(state.bound, state.velocity, velocity):
-            doubt = params.doubt
+        doubt = params.doubt if refuted(state.bound, state.velocity, velocity) else doubt
+    doubt = params.doubt if watched.jolt else doubt
     number, stamp = state.number, state.stamp
     if met != ANCHOR:
         number, stamp = here, _time_of(params, stamp_of(seen, seen.edge))
@@ -248,4 +251,5 @@ def float_step(params, state, seen, restart):
     if rests:
         level, mean, velocity, acceleration, line = float(AGILE_LEVEL), 0.0, 0.0, 0.0, 0.0
         known = int(known and not gone)
-    return State(1, known, number, stamp, bound, doubt, level, place, mean, velocity, acceleration), line, 0
+    after = State(1, known, number, stamp, bound, doubt, level, place, mean, velocity, acceleration, watched)
+    return after, line, clumped << 2

@@ -54,7 +54,8 @@ from ..arithmetic.fixed import SQ, UQ, bits_for
 from ..checks import FieldError
 from ..quadrature import Seen
 from ..requirements import AxisRequirements
-from .bursts import doubt_samples
+from . import bursts
+from .bursts import Limits, Watch, doubt_samples
 from .estimate import EstimatorDesign, EstimatorGains
 from .riccati import steady_state
 
@@ -72,6 +73,8 @@ ROOM = 5.0
 """By how much farther apart than a count two edges may be, in errors of an edge."""
 LEAST_ROOM = 0.25
 """The least such distance, counts: the line has errors of its own."""
+TOLERATED = 0.5
+"""The silence between bursts that is tolerated, in memories of the shortest."""
 LEVELS = 4
 """Memories: level 0 is the quiet one, the last is the agile one."""
 LEVEL_BITS = 16
@@ -133,6 +136,7 @@ class Params(NamedTuple):
     bound: int
     bound_max: int
     doubt: int
+    bursts: Limits
     row_bits: int
     table: np.ndarray
     scale: scale_map.Params
@@ -145,6 +149,7 @@ class FloatParams(NamedTuple):
     per_sample: float
     bound: float
     doubt: int
+    bursts: Limits
     steepest: float
     row_bits: int
     table: np.ndarray
@@ -171,10 +176,11 @@ class State(NamedTuple):
     mean: float
     velocity: float
     acceleration: float
+    watch: Watch
 
 
-START = State(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0)
-FLOAT_START = State(0, 0, 0, 0, 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0)
+START = State(0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, bursts.NOTHING)
+FLOAT_START = State(0, 0, 0, 0, 0.0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, bursts.NOTHING)
 
 
 class Design(EstimatorDesign):
@@ -200,8 +206,8 @@ class Design(EstimatorDesign):
 
     name = "edge-kalman"
     gains_class = Gains
-    inputs = tuple(name for name in Seen._fields if name != "run")
-    flags = ("error_saturated", "velocity_saturated")
+    inputs = Seen._fields
+    flags = ("error_saturated", "velocity_saturated", "edges_in_bursts")
     latency = STEPS
 
     def __init__(self, axis: AxisRequirements, gains: Gains, scale: scale_map.Design | None = None):
@@ -218,6 +224,7 @@ class Design(EstimatorDesign):
         self._apart = 1 + max(ROOM * gains.edge_error_counts, LEAST_ROOM)
         self.doubt = doubt_samples(axis)
         self._derive_table(axis, gains)
+        self.bursts = bursts.limits(axis, TOLERATED * float(self.memories_s.min()))
         self._derive_motion(axis)
         self._derive_words()
 
@@ -320,6 +327,7 @@ class Design(EstimatorDesign):
             bound=math.floor(2 * self._apart * self._per_sample * 2.0**v.f),
             bound_max=2 * self.velocity.max << GUARD_BITS,
             doubt=self.doubt,
+            bursts=self.bursts,
             row_bits=self.row_bits,
             table=self.table,
             scale=scale_map.nothing(),
@@ -335,6 +343,7 @@ class Design(EstimatorDesign):
             per_sample=self._per_sample,
             bound=2 * self._apart * self._per_sample,
             doubt=self.doubt,
+            bursts=self.bursts,
             steepest=steepest,
             row_bits=self.row_bits,
             table=self.rates,

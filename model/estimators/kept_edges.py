@@ -38,12 +38,15 @@ from ..checks import FieldError
 from ..compiled import compiled
 from ..quadrature import Seen, stamp_of
 from ..requirements import AxisRequirements
-from .bursts import doubt_samples
+from . import bursts
+from .bursts import Limits, Watch, doubt_samples, watch
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 from .period import check_stamps, velocity_format
 
 WINDOW_LIMIT = 1 / 4
 """Part of the stamp's range that a window may last, beside AGE_LIMIT of it for the age of an edge."""
+TOLERATED = 1 / 8
+"""The silence between bursts that is tolerated, in windows."""
 DIVIDEND_BITS = 62
 """Bits of the largest dividend, which int64 holds with its sign."""
 LATENCY = 6
@@ -81,6 +84,7 @@ class Params(NamedTuple):
     half: int
     edges_max: int
     doubt: int
+    bursts: Limits
     fraction: int
     quotient_width: int
     velocity_max: int
@@ -93,6 +97,7 @@ class FloatParams(NamedTuple):
     half: int
     edges_max: int
     doubt: int
+    bursts: Limits
 
 
 class Edges(NamedTuple):
@@ -118,6 +123,13 @@ class Edges(NamedTuple):
     doubt: int
 
 
+class State(NamedTuple):
+    """The state of an estimator: of its edges, and of the watch over bursts."""
+
+    edges: Edges
+    watch: Watch
+
+
 NOTHING = Edges(*(int(name == "time") for name in Edges._fields))
 
 
@@ -134,7 +146,8 @@ class KeptDesign(EstimatorDesign):
     """
 
     gains_class = Gains
-    inputs = tuple(name for name in Seen._fields if name != "run")
+    inputs = Seen._fields
+    flags = ("velocity_saturated", "edges_in_bursts")
 
     def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
@@ -149,6 +162,7 @@ class KeptDesign(EstimatorDesign):
                 "window_s", f"must be more than 0 and at most {longest:g} at these rates, not {gains.window_s!r}"
             )
         self.edges_max = self.clocks * (2 * self.half + 1)
+        self.bursts = bursts.limits(axis, TOLERATED * 2 * self.half / axis.sample_hz)
 
     def params(self, words: Mapping[str, int]) -> Params:
         return Params(
@@ -158,6 +172,7 @@ class KeptDesign(EstimatorDesign):
             half=self.half,
             edges_max=self.edges_max,
             doubt=self.doubt,
+            bursts=self.bursts,
             fraction=self.velocity.f + 1,
             quotient_width=self.velocity.width,
             velocity_max=self.velocity.max,
@@ -165,10 +180,11 @@ class KeptDesign(EstimatorDesign):
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
         """Return the float64 kernel's parameters: the same whole samples."""
-        return FloatParams(self.count_width, self.stamp_width, self.clocks, self.half, self.edges_max, self.doubt)
+        held = self.half, self.edges_max, self.doubt, self.bursts
+        return FloatParams(self.count_width, self.stamp_width, self.clocks, *held)
 
-    def start(self, floating: bool = False) -> Edges:
-        return NOTHING
+    def start(self, floating: bool = False) -> State:
+        return State(NOTHING, bursts.NOTHING)
 
 
 @compiled
@@ -224,21 +240,23 @@ def observe(params, edges, seen, restart):
 
 @estimate.register(Params)
 @compiled
-def step(params, edges, seen, restart):
-    edges, age = observe(params, edges, seen, restart)
+def step(params, state, seen, restart):
+    edges, age = observe(params, state.edges, seen, restart)
+    watched, clumped = watch(params.bursts, state.watch, seen, restart)
     speed = divide(params.clocks * edges.moved << params.fraction, edges.time, params.quotient_width)
     limit = divide(3 * params.clocks << (params.fraction - 1), age, params.quotient_width)
     far = ((speed if edges.doubt else min(speed, limit)) + 1) >> 1
     magnitude = min(far, params.velocity_max)
-    return edges, -magnitude if edges.down else magnitude, int(far != magnitude)
+    return State(edges, watched), -magnitude if edges.down else magnitude, int(far != magnitude) | clumped << 1
 
 
 @estimate.register(FloatParams)
 @compiled
-def float_step(params, edges, seen, restart):
+def float_step(params, state, seen, restart):
     """Take one sample in float64, unsaturated: the same algorithm."""
-    edges, age = observe(params, edges, seen, restart)
+    edges, age = observe(params, state.edges, seen, restart)
+    watched, clumped = watch(params.bursts, state.watch, seen, restart)
     speed = 1.0 * params.clocks * edges.moved / edges.time
     limit = 1.5 * params.clocks / age if age else 0.0
     magnitude = speed if edges.doubt else min(speed, limit)
-    return edges, -magnitude if edges.down else magnitude, 0
+    return State(edges, watched), -magnitude if edges.down else magnitude, clumped << 1

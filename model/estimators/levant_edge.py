@@ -99,6 +99,7 @@ from ..arithmetic.fixed import length_of, saturate, shift_floor, shift_round_hal
 from ..arithmetic.sqrt import isqrt
 from ..compiled import compiled
 from ..quadrature import RUN_MAX
+from .bursts import watch
 from .estimate import estimate
 from .levant import sign_of
 from .levant_edge_anchor import (
@@ -201,6 +202,7 @@ def _correct(params, state, seen, interval, passed):
 @estimate.register(Params)
 @compiled
 def step(params, state, seen, restart):
+    watched, clumped = watch(params.bursts, state.watch, seen, restart)
     if restart or not state.running:
         state = started(params, seen, 0)
     met, interval, passed = meet(params, state, seen)
@@ -211,8 +213,8 @@ def step(params, state, seen, restart):
         known, doubt, velocity, acceleration = 1, 0, 0, 0
     elif met == TIMED:
         velocity, acceleration, places, flags = _correct(params, state, seen, interval, passed)
-        if refuted(state.bound, state.velocity, velocity):
-            doubt = params.doubt
+        doubt = params.doubt if refuted(state.bound, state.velocity, velocity) else doubt
+    doubt = params.doubt if watched.jolt else doubt
     number, stamp, kind, age = anchored(params, state, seen, met)
 
     young = met == LOOSE and not age >> (params.shortest + 1)
@@ -229,7 +231,8 @@ def step(params, state, seen, restart):
     if rests:
         velocity, acceleration, line = 0, 0, 0
         known = int(known and not gone)
-    return State(1, known, number, stamp, kind, bound, doubt, velocity, acceleration, places), line, flags
+    after = State(1, known, number, stamp, kind, bound, doubt, velocity, acceleration, places, watched)
+    return after, line, flags | clumped << 2
 
 
 @compiled
@@ -260,6 +263,7 @@ def _float_correct(params, state, seen, interval, passed):
 @compiled
 def float_step(params, state, seen, restart):
     """Take one sample in float64, unsaturated: the same algorithm, as a reference for the cost of fixed point."""
+    watched, clumped = watch(params.bursts, state.watch, seen, restart)
     if restart or not state.running:
         state = started(params, seen, 0.0)
     met, interval, passed = meet(params, state, seen)
@@ -269,8 +273,8 @@ def float_step(params, state, seen, restart):
         known, doubt, velocity, acceleration = 1, 0, 0.0, 0.0
     elif met == TIMED:
         velocity, acceleration, places = _float_correct(params, state, seen, interval, passed)
-        if refuted(state.bound, state.velocity, velocity):
-            doubt = params.doubt
+        doubt = params.doubt if refuted(state.bound, state.velocity, velocity) else doubt
+    doubt = params.doubt if watched.jolt else doubt
     number, stamp, kind, age = anchored(params, state, seen, met)
 
     line, bound = velocity + acceleration * age, state.bound
@@ -283,4 +287,5 @@ def float_step(params, state, seen, restart):
         if rests:
             velocity, acceleration, line = 0.0, 0.0, 0.0
             known = int(known and not gone)
-    return State(1, known, number, stamp, kind, bound, doubt, velocity, acceleration, places), line, 0
+    after = State(1, known, number, stamp, kind, bound, doubt, velocity, acceleration, places, watched)
+    return after, line, clumped << 2

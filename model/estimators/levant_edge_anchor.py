@@ -9,6 +9,7 @@ An edge too close to the anchor stays unused: the next edge is taken with the in
 from ..arithmetic.fixed import wrap
 from ..compiled import compiled
 from ..quadrature import stamp_of
+from .bursts import NOTHING
 from .levant_edge_design import State
 
 ANCHOR, FIRST, TIMED, LOOSE = range(4)
@@ -31,7 +32,7 @@ def kind_of(seen):
 def started(params, seen, zero):
     """Return the state at a first sample: time and position count from its last edge, whose arrival was not seen."""
     number, stamp, kind = number_of(params, seen), stamp_of(seen, seen.edge), kind_of(seen)
-    return State(1, 0, number, stamp, kind, zero, 0, zero, zero, (zero, zero, zero, zero))
+    return State(1, 0, number, stamp, kind, zero, 0, zero, zero, (zero, zero, zero, zero), NOTHING)
 
 
 @compiled

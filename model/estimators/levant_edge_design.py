@@ -30,7 +30,8 @@ from ..checks import FieldError
 from ..quadrature import Seen
 from ..requirements import AxisRequirements
 from ..words import GAIN_BITS, Word
-from .bursts import doubt_samples
+from . import bursts
+from .bursts import Limits, Watch, doubt_samples
 from .estimate import EstimatorDesign, EstimatorGains
 
 HEADROOM_BITS = 2
@@ -96,6 +97,7 @@ class Params(NamedTuple):
     bound: int
     bound_max: int
     doubt: int
+    bursts: Limits
     velocity_max: int
     acceleration_max: int
 
@@ -109,6 +111,7 @@ class FloatParams(NamedTuple):
     shortest: int
     mantissa: int
     doubt: int
+    bursts: Limits
     steepest: float
     learn_max: float
     place_max: float
@@ -131,10 +134,11 @@ class State(NamedTuple):
     velocity: float
     acceleration: float
     places: tuple
+    watch: Watch
 
 
-START = State(0, 0, 0, 0, 0, 0, 0, 0, 0, (0, 0, 0, 0))
-FLOAT_START = State(0, 0, 0, 0, 0, 0.0, 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0))
+START = State(0, 0, 0, 0, 0, 0, 0, 0, 0, (0, 0, 0, 0), bursts.NOTHING)
+FLOAT_START = State(0, 0, 0, 0, 0, 0.0, 0, 0.0, 0.0, (0.0, 0.0, 0.0, 0.0), bursts.NOTHING)
 
 
 class Design(EstimatorDesign):
@@ -156,7 +160,7 @@ class Design(EstimatorDesign):
     name = "levant-edge"
     gains_class = Gains
     inputs = Seen._fields
-    flags = ("error_saturated", "velocity_saturated")
+    flags = ("error_saturated", "velocity_saturated", "edges_in_bursts")
 
     def __init__(self, axis: AxisRequirements, gains: Gains):
         super().__init__(axis, gains)
@@ -164,6 +168,8 @@ class Design(EstimatorDesign):
         if 4 * self.clocks > 1 << axis.stamp_width:
             raise FieldError("sample_hz", f"must be 4 or more for stamps that last a second, not {axis.sample_hz!r}")
         self._derive_times(axis)
+        # Bursts are read as long as an interval in use has several.
+        self.bursts = bursts.limits(axis, 2.0 ** (self.shortest - 2) / axis.clock_hz)
         self._derive_motion(axis)
         self._derive_places(axis)
         self._derive_gains(axis, gains)
@@ -266,6 +272,7 @@ class Design(EstimatorDesign):
             bound=shift_floor(5 * self.clocks, 1 - f),
             bound_max=2 * self.velocity.max + 1,
             doubt=self.doubt,
+            bursts=self.bursts,
             velocity_max=self.velocity.max,
             acceleration_max=self.acceleration.max,
         )
@@ -282,6 +289,7 @@ class Design(EstimatorDesign):
             self.shortest,
             self.mantissa,
             self.doubt,
+            self.bursts,
             2.0 ** (self.acceleration.i - 1),
             2.0 ** bits_for(self.clocks / 4),
             2.0 ** (self.place.i - 1),

@@ -56,7 +56,7 @@ from ..compiled import compiled
 from ..quadrature import Seen
 from ..requirements import AxisRequirements
 from . import bursts, cycle_times
-from .bursts import Watch, doubt_samples, watch
+from .bursts import Limits, Watch, watch
 from .cycle_times import AGE_LIMIT, NOTHING, Memory, observe
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 
@@ -85,7 +85,7 @@ class Params(NamedTuple):
     stamp_width: int
     clocks: int
     cycles_max: int
-    doubt: int
+    bursts: Limits
     fraction: int
     quotient_width: int
     velocity_max: int
@@ -96,7 +96,7 @@ class FloatParams(NamedTuple):
     stamp_width: int
     clocks: int
     cycles_max: int
-    doubt: int
+    bursts: Limits
 
 
 class State(NamedTuple):
@@ -156,19 +156,19 @@ class Design(EstimatorDesign):
         check_stamps(axis)
         self.clocks = axis.clocks_per_sample
         self.velocity = velocity_format(axis)
-        self.cycles_max, self.doubt = (self.clocks + 3) // 4, doubt_samples(axis)
+        self.cycles_max, self.bursts = (self.clocks + 3) // 4, bursts.limits(axis)
 
     @property
     def latency(self) -> int:
         return STEPS + divide_latency(self.velocity.width)
 
     def params(self, words: Mapping[str, int]) -> Params:
-        limits = self.cycles_max, self.doubt
+        limits = self.cycles_max, self.bursts
         quotient = self.velocity.f + 1, self.velocity.width
         return Params(self.count_width, self.stamp_width, self.clocks, *limits, *quotient, self.velocity.max)
 
     def float_params(self, gains: Gains, output: str, si: Mapping[str, float]) -> FloatParams:
-        return FloatParams(self.count_width, self.stamp_width, self.clocks, self.cycles_max, self.doubt)
+        return FloatParams(self.count_width, self.stamp_width, self.clocks, self.cycles_max, self.bursts)
 
     def start(self, floating: bool = False) -> State:
         return FLOAT_START if floating else START
@@ -185,7 +185,7 @@ def bound(times):
 @compiled
 def step(params, state, seen, restart):
     memory, times = observe(params, state.memory, seen, restart)
-    watched, clumped = watch(params, state.watch, times)
+    watched, clumped = watch(params.bursts, state.watch, seen, restart)
     speed = state.speed
     if times.age == 0:
         speed = 0
@@ -208,7 +208,7 @@ def step(params, state, seen, restart):
 def float_step(params, state, seen, restart):
     """Take one sample in float64, unsaturated: the same algorithm."""
     memory, times = observe(params, state.memory, seen, restart)
-    watched, clumped = watch(params, state.watch, times)
+    watched, clumped = watch(params.bursts, state.watch, seen, restart)
     speed = state.speed
     if times.age == 0:
         return State(memory, watched, 0.0), 0.0, 0

@@ -31,9 +31,9 @@ Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992: fix
 Formats. `velocity` is derived as in `period`, with at least k fraction bits, so that n / w is exact. A window may be no
 longer than half the counter's range at twice the largest speed, so that n does not alias. D, B and ages are as in
 `period`: v = 0, exactly, when B is AGE_LIMIT of the stamp's range. Count and stamps may wrap; the largest step makes a
-fast window, and no cycle. While edges come in bursts (`bursts`) a cycle's speed has the flag `edges_in_bursts`; a
-window's is right. Both speeds saturate at the format, with the flag `velocity_saturated`. After the first
-sample or a restart, v = 0 until there are five edges in one direction, or a fast window.
+fast window, and no cycle. While edges come in bursts the flag `edges_in_bursts` is up, see `bursts`. Both speeds
+saturate at the format, with the flag `velocity_saturated`. After the first sample or a restart, v = 0 until there are
+five edges in one direction, or a fast window.
 """
 
 import math
@@ -50,7 +50,7 @@ from ..quadrature import Seen
 from ..requirements import AxisRequirements
 from ..words import Word
 from . import bursts, cycle_times
-from .bursts import Watch, doubt_samples, watch
+from .bursts import Limits, Watch, watch
 from .cycle_times import NOTHING, Memory, observe
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 from .period import check_stamps, velocity_format
@@ -86,8 +86,7 @@ class Params(NamedTuple):
     stamp_width: int
     window: int
     switch: int
-    cycles_max: int
-    doubt: int
+    bursts: Limits
     dividend: int
     quotient_width: int
     shift: int  # left shift from a window's counts to the velocity's format
@@ -99,8 +98,7 @@ class FloatParams(NamedTuple):
     stamp_width: int
     window: int
     switch: int
-    cycles_max: int
-    doubt: int
+    bursts: Limits
     clocks: int
 
 
@@ -149,7 +147,7 @@ class Design(EstimatorDesign):
         self.window_bits = round(math.log2(gains.window_s / tau))
         if not 0 <= self.window_bits <= most:
             raise FieldError("window_s", f"must be {tau:g} to {tau * 2**most:g} at these rates, not {gains.window_s!r}")
-        self.clocks, self.doubt = axis.clocks_per_sample, doubt_samples(axis)
+        self.clocks, self.bursts = axis.clocks_per_sample, bursts.limits(axis)
         self.velocity = velocity_format(axis, self.window_bits)
         # Above a cycle a sample no cycle is timed: the largest word switches at just that speed.
         fmt = UQ(min(self.window_bits + 2, axis.count_width - 1), 0)
@@ -184,8 +182,7 @@ class Design(EstimatorDesign):
             stamp_width=self.stamp_width,
             window=1 << self.window_bits,
             switch=words["period_count_switch"],
-            cycles_max=self.cycles_max,
-            doubt=self.doubt,
+            bursts=self.bursts,
             dividend=self.dividend,
             quotient_width=self.velocity.width,
             shift=self.velocity.f - self.window_bits,
@@ -197,8 +194,7 @@ class Design(EstimatorDesign):
         word = self.switch
         switch = word.from_si(si["period_count_switch"]) if "period_count_switch" in si else word.reset
         window = 1 << self.window_bits
-        watched = self.cycles_max, self.doubt
-        return FloatParams(self.count_width, self.stamp_width, window, switch, *watched, self.clocks)
+        return FloatParams(self.count_width, self.stamp_width, window, switch, self.bursts, self.clocks)
 
     def start(self, floating: bool = False) -> State:
         return START
@@ -225,9 +221,9 @@ def _sample(params, state, seen, restart):
     cycle = state.cycle if times.age and (not times.news or times.cycles > 1) else 0
     if times.age and times.news and times.cycles == 1:
         cycle = times.cycle
-    watched, clumped = watch(params, state.watch, times)
+    watched, clumped = watch(params.bursts, state.watch, seen, restart)
     state = State(memory, watched, cycle, samples, first, moved, counting)
-    return state, max(cycle, times.cycle_age) if cycle and times.cycle_age else 0, int(clumped and not counting)
+    return state, max(cycle, times.cycle_age) if cycle and times.cycle_age else 0, clumped
 
 
 @estimate.register(Params)
@@ -249,6 +245,6 @@ def float_step(params, state, seen, restart):
     """Take one sample in float64, unsaturated: the same algorithm."""
     state, clocks, clumped = _sample(params, state, seen, restart)
     if state.counting:
-        return state, state.moved / params.window, 0
+        return state, state.moved / params.window, clumped << 1
     speed = 4.0 * params.clocks / clocks if clocks else 0.0
     return state, -speed if seen.down else speed, clumped << 1

@@ -56,7 +56,7 @@ def rows(d: edge_kalman.Design, samples: int):
             for edge in range(fast if k % slow == 0 else 0):
                 scale.pass_edge(up, scale.now - 1 - int(random.random() * d.clocks / (edge + 1)))
             row = scale.row()
-            yield *row[:8], int(random.random() < 0.01)
+            yield *row, int(random.random() < 0.01)
             samples -= 1
 
 

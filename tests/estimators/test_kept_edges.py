@@ -6,7 +6,7 @@ from fractions import Fraction
 import cocotb
 import numpy as np
 import pytest
-from mts import RUN, design, stimulus, without_run
+from mts import design, stimulus
 
 from hardwall.hdl.estimators.kept_edges import KeptEdges
 from hardwall.model.checks import FieldError
@@ -22,7 +22,6 @@ from stimuli.seeded import seeded
 from stimuli.specs import PAPER, spec
 
 NAME = "mt"
-FIELDS = [name for name in Seen._fields if name != "run"]
 OUTPUTS = ("moved", "down", "time", "quiet", "news", "age")
 
 
@@ -35,7 +34,7 @@ def observed(d: KeptDesign, inputs) -> dict[str, np.ndarray]:
     edges, out = NOTHING, []
     for row in inputs:
         before = edges
-        edges, age = observe(d.params({}), edges, Seen(*row[:RUN], 0), row[-1])
+        edges, age = observe(d.params({}), edges, Seen(*row[:-1]), row[-1])
         news = edges.known and (edges.stamp, edges.number) != (before.stamp, before.number)
         out.append((edges.moved, edges.down, edges.time, before.quiet, news, age))
     return dict(zip(OUTPUTS, np.array(out, np.int64).T, strict=True))
@@ -44,7 +43,7 @@ def observed(d: KeptDesign, inputs) -> dict[str, np.ndarray]:
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     component = make(**parameters())
-    bench, names = Bench(dut, component), (*(f"seen__{name}" for name in FIELDS), "restart")
+    bench, names = Bench(dut, component), (*(f"seen__{name}" for name in Seen._fields), "restart")
     await bench.reset()
     at_next_strobe = bench.monitor("strobe", *OUTPUTS)
     few = stimulus(component.design, SAMPLES // 10)
@@ -100,12 +99,12 @@ def speeds(d: KeptDesign, strobes, edges: list[Edge]):
 def test_model_is_the_exact_mean_velocity_within_its_bound(name, half):
     d = design(NAME, name, half)
     strobes, edges = turn(d, seeded(), 6_000)
-    seen = model(d, without_run(rows(d, strobes, edges)), NOTHING)
+    seen = model(d, rows(d, strobes, edges), d.start())
     moving = 0
     for k, (velocity, bound) in enumerate(speeds(d, strobes, edges)):
         word = math.floor(min(abs(velocity), bound) * d.clocks * 2**d.velocity.f + Fraction(1, 2))
         expected = min(word, d.velocity.max) * (-1 if velocity < 0 else 1), int(word > d.velocity.max)
-        assert (seen["velocity"][k], seen["saturated"][k]) == expected, f"sample {k}: {strobes[k]}"
+        assert (seen["velocity"][k], seen["saturated"][k] & 1) == expected, f"sample {k}: {strobes[k]}"
         moving += word > 0
     assert moving > 1_500
 
@@ -113,7 +112,7 @@ def test_model_is_the_exact_mean_velocity_within_its_bound(name, half):
 def test_a_turn_within_a_count_reads_the_mean_and_not_the_edges_that_passed():
     """The same edge passed both ways is the same place: between them the axis has not moved on the mean."""
     d = design(NAME, "mhz", 50)
-    params, state = d.params({}), NOTHING
+    params, state = d.params({}), d.start()
     there = [(0, 0, 100, {}), (1, 0, 200, {"stamp_a_rise": 150}), (2, 0, 300, {"stamp_b_rise": 250})]
     back = [(1, 1, 400, {"stamp_b_rise": 350}), (0, 1, 500, {"stamp_a_rise": 450})]
     seen, stamps = [], {}
@@ -151,9 +150,10 @@ def test_int64_holds_every_intermediate_at_the_longest_window(name):
     for count, time, age in ((-half_count, 1, 1), (half_count - 1, top, 1), (half_count - 1, 1, top // 2)):
         stamp = (top - age) & top
         kept = NOTHING._replace(running=1, known=1, older_stamp=(stamp - time) & top, number=1)
+        before = d.start()._replace(edges=kept)
         sight = Seen(count, top, stamp, 0, 0, 0, 0, 0, 0)
-        given = estimate(d.params({}), kept, sight, 0)
-        assert given == kept_edges.step.py_func(d.params({}), kept, sight, 0)
+        given = estimate(d.params({}), before, sight, 0)
+        assert given == kept_edges.step.py_func(d.params({}), before, sight, 0)
         assert abs(given[1]) <= d.velocity.max
 
 
