@@ -98,6 +98,11 @@ class Knob:
     way: Way
     whole: bool
 
+    @property
+    def spoken(self) -> str:
+        """What it is called where it cannot be seen beside its unit."""
+        return f"{self.label}, {self.unit}" if self.unit else self.label
+
     def to_slider(self, value: float) -> float:
         """Return the slider's position, 0 to 1, of an SI value."""
         if self.way is Way.DECADES:
@@ -121,6 +126,11 @@ class Knob:
         """Return an SI value in the unit that is shown, with no more digits than the word has."""
         digits = 1 - math.floor(math.log10(self.step * self.scale))
         return round(value * self.scale, max(digits, 0))
+
+    @staticmethod
+    def is_wish(typed: object, shown: float | None) -> bool:
+        """Return whether what stands in a field asks for something: it is not empty, nor left as it was shown."""
+        return typed is not None and typed != shown
 
     def in_si(self, value: float) -> float:
         """Return the SI value of what is shown."""

@@ -33,12 +33,13 @@ def add_page(driver: Driver, bench: Bench | None, title: str) -> None:
         title: what the board is called.
     """
 
-    @ui.page("/")
+    @ui.page("/", language="en-US")
     def _() -> None:
         tab = ui.context.client.id
         ui.add_head_html('<link rel="stylesheet" href="static/panel.css">')
         ui.add_head_html(f'<script>window.hardwallTab = "{tab}"</script>')
         ui.add_body_html('<script type="module" src="static/panel.js"></script>')
+        ui.colors(primary="#1f5f8b")
         ui.html(HEAD, sanitize=False).classes("head")
         with ui.element("div").classes("body"):
             with ui.element("div").classes("drawings"):
@@ -50,7 +51,7 @@ def add_page(driver: Driver, bench: Bench | None, title: str) -> None:
                 if bench and bench.estimates:
                     _estimates(*bench.estimates.names, bench.estimates.sample_hz)
                 capture = CaptureCard(driver, tab) if driver.view.span_s[1] else None
-            with ui.element("aside"):
+            with ui.element("aside").props('aria-label="Words of the board"'):
                 knobs = _knobs(driver, tab)
                 home = HomeCard(driver, tab)
         ui.timer(REFRESH_S, _refresher(driver, knobs))
@@ -64,7 +65,11 @@ def _hand() -> None:
         f'<button class="fault" data-fault="{name}" data-mending="{fault.mending}">{fault.breaking}</button>'
         for name, fault in FAULTS.items()
     )
-    _drawing("hand", "The hand", "Drag the handle into the wall, with mouse or finger.", faults)
+    about = (
+        "Drag the handle into the wall, with mouse or finger. With keys: the arrows move it by 0.5 mm, Page Up and "
+        "Page Down by 5 mm, and Enter lets go."
+    )
+    _drawing("hand", "The hand", about, faults)
 
 
 def _estimates(own: str, plain: str, sample_hz: int) -> None:
@@ -82,7 +87,9 @@ def _estimates(own: str, plain: str, sample_hz: int) -> None:
 def _drawing(name: str, heading: str, about: str, more: str = "", own: str = "", sample_hz: int = 0) -> None:
     data = f'data-own="{own}" data-rate="{sample_hz}"' if own else ""
     title = f'<div class="title"><h2>{heading}</h2><div class="more">{more}</div><p>{about}</p></div>'
-    ui.html(f'{title}<canvas id="{name}" {data}></canvas>', sanitize=False).classes("card")
+    of = 'role="slider" tabindex="0" aria-valuenow="0"' if name == "hand" else 'role="img"'
+    canvas = f'<canvas id="{name}" {of} aria-label="{heading}" {data}></canvas>'
+    ui.html(f"{title}{canvas}", sanitize=False).classes(f"card of-{name}")
 
 
 class _Row:
@@ -97,17 +104,19 @@ class _Row:
     def __init__(self, knob: Knob, give: Callable[[float, float], None], refuse: Callable[[str], None]):
         self.knob, self._give, self._refuse, self._touched_s = knob, give, refuse, 0.0
         self._slider = self._number = self._switch = None
+        self._shown: float | None = None
+        named = f'aria-label="{knob.spoken}"'
         with ui.element("div").classes("knob").props(f'data-word="{knob.name}"'):
             ui.label(knob.label).classes("name")
             if knob.way is Way.SWITCH:
-                self._switch = ui.switch().props("dense")
+                self._switch = ui.switch().props("dense").props(named)
                 self._switch.on("update:model-value", self._switched, js_handler=VALUED)
             else:
-                self._slider = ui.slider(min=0, max=STEPS, step=1).props("dense")
+                self._slider = ui.slider(min=0, max=STEPS, step=1).props("dense").props(named)
                 self._slider.on("update:model-value", self._slid, throttle=0.05, js_handler=VALUED)
                 least, most = knob.shown(knob.least), knob.shown(knob.most)
                 self._number = ui.number(min=least, max=most, suffix=knob.unit, format="%.7g")
-                self._number.props("dense outlined hide-bottom-space")
+                self._number.props("dense outlined hide-bottom-space").props(named)
                 for event in ("blur", "keydown.enter"):
                     self._number.on(event, self._typed, js_handler=TIMED)
             self._used = ui.label().classes("used")
@@ -125,7 +134,8 @@ class _Row:
             self._used.set_text("on" if value > 0 else "off")
         elif self._slider and self._number:
             self._slider.set_value(round(STEPS * knob.to_slider(value)))
-            self._number.set_value(knob.shown(value))
+            self._shown = knob.shown(value)
+            self._number.set_value(self._shown)
             self._used.set_text(f"{knob.shown(value):.7g} {knob.unit}")
 
     def _take(self, value_of: Callable[[], float], at: object) -> None:
@@ -145,7 +155,7 @@ class _Row:
         self._take(lambda: self.knob.from_slider(number_of(self.knob.name, place, 0, STEPS) / STEPS), at)
 
     def _typed(self, event: events.GenericEventArguments) -> None:
-        if self._number and (shown := self._number.value) is not None:
+        if self._number and self.knob.is_wish(shown := self._number.value, self._shown):
             self._take(lambda: self.knob.in_si(number_of(self.knob.name, shown)), event.args)
 
 
@@ -155,7 +165,8 @@ def _knobs(driver: Driver, tab: str) -> list[_Row]:
     knobs = knobs_of(device) if device else ()
     rows = []
     for group in Group:
-        with ui.expansion(group.value, value=group is not Group.WIRING).classes("card group").props("dense"):
+        with ui.expansion(group.value, value=group is not Group.WIRING) as card:
+            card.classes(f"card group of-{group.name.lower()}").props("dense")
             for knob in knobs:
                 if knob.group is group:
                     rows.append(_Row(knob, partial(driver.set, tab, knob.name), driver.refuse))

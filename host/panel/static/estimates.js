@@ -8,8 +8,8 @@ const ROWS = [
   { name: "velocity, mm/s", unit: "mm/s", scale: 1e3, least: 4, decimals: 2 },
   { name: "force of the wall, N", unit: "N", scale: 1, least: 0.2, decimals: 3 },
 ];
-const COLOURS = [RED, GREY];
-let rings = null, head = 0, filled = 0, rate = 0;
+const COLOURS = [RED, GREY], NARROW = 480;
+let rings = null, head = 0, filled = 0, rate = 0, ripples = [];
 
 hear("records", (record) => {
   if (!rings) return;
@@ -54,8 +54,12 @@ function columns(row, count) {
 export function drawEstimates(canvas) {
   const { context, width, height } = cleared(canvas);
   const names = [canvas.dataset.own, "plain difference"];
-  const across = Math.floor((width - LEFT - MIDDLE) / 2), tall = (height - HEAD - 6) / 2 - NAME;
+  // Where there is no room beside each other, one estimator is below the other.
+  const narrow = width < NARROW, lanes = narrow ? 2 : 1;
+  const across = Math.floor(narrow ? width - LEFT - 8 : (width - LEFT - MIDDLE) / 2);
+  const part = height / lanes, tall = (part - HEAD - 6) / 2 - NAME;
   if (across < 1) return;
+  ripples = [];
   ROWS.forEach((kind, line) => {
     const both = [0, 1].map((lane) => columns(2 * line + lane, across));
     let low = Infinity, high = -Infinity;
@@ -69,7 +73,8 @@ export function drawEstimates(canvas) {
     const spare = Math.max((high - low) * 0.12, (kind.least / kind.scale - (high - low)) / 2);
     [low, high] = [(low - spare) * kind.scale, (high + spare) * kind.scale];
     both.forEach((each, lane) => {
-      const left = lane ? LEFT + across + MIDDLE : LEFT, top = HEAD + NAME + line * (tall + NAME);
+      const left = lane && !narrow ? LEFT + across + MIDDLE : LEFT, begin = narrow ? lane * part : 0;
+      const top = begin + HEAD + NAME + line * (tall + NAME);
       const at = strip(context, { left, top, width: across, height: tall }, low, high, kind.name);
       context.fillStyle = COLOURS[lane];
       for (let k = 0; k < across; k++) {
@@ -78,18 +83,25 @@ export function drawEstimates(canvas) {
         context.fillRect(left + k, from, 1.4, Math.max(1.4, at(each.low[k] * kind.scale) - from));
       }
       context.textAlign = "right";
-      context.fillText(`ripple ${number(each.ripple * kind.scale, kind.decimals)} ${kind.unit}`, left + across, top - 9);
+      const ripple = `ripple ${number(each.ripple * kind.scale, kind.decimals)} ${kind.unit}`;
+      context.fillText(ripple, left + across, top - 9);
+      ripples.push(`${names[lane]}, ${kind.name.split(",")[0]}: ${ripple}`);
       if (line === 0) {
         context.textAlign = "left";
         context.font = "600 14px Roboto, sans-serif";
-        context.fillText(names[lane], left, 8);
+        context.fillText(names[lane], left, begin + 8);
         context.textAlign = "right";
         context.font = "11px Roboto, sans-serif";
         context.fillStyle = PALE;
-        context.fillText(`the last ${SHOWN_S} s of the board`, left + across, 8);
+        context.fillText(`the last ${SHOWN_S} s of the board`, left + across, begin + 8);
       }
     });
   });
+}
+
+// What the drawing shows, in words.
+export function sayEstimates(canvas) {
+  canvas.setAttribute("aria-label", `Two estimators of the last ${SHOWN_S} s: ${ripples.join("; ")}`);
 }
 
 // ---- sound ----------------------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ import { BLUE, GRID, INK, PALE, RED, cleared, number, ticks } from "./canvas.js"
 import { latest } from "./traces.js";
 
 const SHOWN_MM = 50, SHOULDER_MM = 18, FLOOR = 34, HANDLE = 30;
+const STEPS_MM = { ArrowLeft: -0.5, ArrowDown: -0.5, ArrowRight: 0.5, ArrowUp: 0.5, PageDown: -5, PageUp: 5 }; // by keys
 export const view = { from: null };
 let dragged = null;
 
@@ -33,9 +34,37 @@ export function listen(canvas) {
   canvas.addEventListener("pointermove", (event) => {
     if (dragged !== null) dragged = place(event);
   });
-  for (const end of ["pointerup", "pointercancel"]) {
+  for (const end of ["pointerup", "pointercancel", "blur"]) {
     canvas.addEventListener(end, release);
   }
+  canvas.addEventListener("keydown", (event) => {
+    const step = STEPS_MM[event.key], sample = latest();
+    if (event.key === "Enter" || event.key === " ") release();
+    else if (step !== undefined && sample) {
+      if (dragged === null) [dragged, view.before] = [sample[1] * 1e3, view.from];
+      dragged += step;
+      // What is moved by keys stays in view.
+      view.before = Math.min(Math.max(view.before, dragged + 4 - SHOWN_MM), dragged - 4);
+    } else return;
+    event.preventDefault();
+  });
+}
+
+// What the drawing shows, in words, and where the handle is.
+export function sayHand(canvas) {
+  const told = board.told, sample = latest();
+  if (!sample || !told || !told.wall) return;
+  const at = sample[1] * 1e3, wall = told.wall.position * 1e3;
+  const parts = [`handle at ${number(at, 1)} mm`];
+  if (told.wall.stiffness > 0) {
+    const inside = told.wall.left > 0 ? wall - at : at - wall;
+    parts.push(`${number(Math.abs(inside), 1)} mm ${inside > 0 ? "inside" : "in front of"} the wall`);
+  }
+  parts.push(`force ${number(sample[4], 1)} N`, dragged === null ? "free" : `held at ${number(dragged, 1)} mm`);
+  canvas.setAttribute("aria-valuenow", at.toFixed(1));
+  canvas.setAttribute("aria-valuemin", (view.from ?? 0).toFixed(0));
+  canvas.setAttribute("aria-valuemax", ((view.from ?? 0) + SHOWN_MM).toFixed(0));
+  canvas.setAttribute("aria-valuetext", parts.join(", "));
 }
 
 function hatch(context, x, width, height) {

@@ -1,15 +1,17 @@
 // The page: its head, its buttons, and the loop that draws and shows that the tab lives.
 
 import { ALIVE_MS, LIVE, board, hear, look, open, send } from "./live.js";
-import { drawTraces, takeFresh } from "./traces.js";
-import { drawHand, listen, release } from "./hand.js";
-import { begin, drawEstimates, keepPace, listenTo } from "./estimates.js";
+import { drawTraces, sayTraces, takeFresh } from "./traces.js";
+import { drawHand, listen, release, sayHand } from "./hand.js";
+import { begin, drawEstimates, keepPace, listenTo, sayEstimates } from "./estimates.js";
 
 const find = (id) => document.getElementById(id);
 const ACTS = ["arm", "disarm", "acknowledge", "connect"];
 const DRAWINGS = { traces: drawTraces, hand: drawHand, estimates: drawEstimates };
+const TEXTS = { traces: sayTraces, hand: sayHand, estimates: sayEstimates };
+const SAY_MS = 500; // the time between two texts of a drawing
 const drawn = []; // the times of the frames that had something new
-let identity = "", pinged = 0;
+let identity = "", pinged = 0, said = 0;
 
 function act(name) {
   if (name === "acknowledge") send({ do: name, latched: board.told.latched });
@@ -75,9 +77,13 @@ function frame(now) {
     isolated("look", look);
   }
   if (takeFresh()) drawn.push(now);
+  const say = now - said >= SAY_MS;
+  if (say) said = now;
   for (const [name, draw] of Object.entries(DRAWINGS)) {
     const canvas = find(name);
-    if (canvas) isolated(name, () => draw(canvas));
+    if (!canvas) continue;
+    isolated(name, () => draw(canvas));
+    if (say) isolated(`${name} in words`, () => TEXTS[name](canvas));
   }
 }
 

@@ -29,6 +29,15 @@ export function latest() {
   return samples[samples.length - 1];
 }
 
+// What the drawing shows last, in words.
+export function sayTraces(canvas) {
+  const values = TRACES.map(({ name, column, scale, decimals }) => {
+    const [what, unit] = name.split(", ");
+    return samples.length ? `${what} ${number(latest()[column] * scale, decimals)} ${unit}` : `no ${what} yet`;
+  });
+  canvas.setAttribute("aria-label", `What the board shows: ${values.join(", ")}; and the last ${SHOWN_S} s of each`);
+}
+
 function range(trace, first) {
   let low = Infinity, high = -Infinity;
   for (let k = first; k < samples.length; k++) {

@@ -63,3 +63,17 @@ def test_an_estimator_of_any_kind_has_its_knobs():
     spec: AxisSpec = load("seed-2011", {"controller.estimator": "kalman"}).spec
     knobs = [knob_of(word) for word in RegisterMap(spec).words]
     assert any(knob.group is Group.ESTIMATOR and knob.name.startswith("kalman") for knob in knobs)
+
+
+def test_a_field_that_is_left_as_it_was_shown_wishes_nothing():
+    """A gain is shown with few digits: writing them back would change its word."""
+    assert not Knob.is_wish(3.4998, 3.4998)
+    assert not Knob.is_wish(None, 3.4998)
+    assert Knob.is_wish(3.4999, 3.4998)
+    assert Knob.is_wish(0.0, None)
+
+
+def test_a_knob_is_called_by_its_label_and_its_unit():
+    assert NAMES["wall_stiffness"].spoken == "Stiffness K, N/m"
+    assert NAMES["wall_forbid_pull"].spoken == "Never pull"
+    assert len({knob.spoken for knob in KNOBS}) == len(KNOBS)

@@ -21,6 +21,7 @@ if "HARDWALL_BROWSER" not in os.environ:
         "a browser and a board in simulation want the machine for themselves: make browser", allow_module_level=True
     )
 browsers = pytest.importorskip("stimuli.browsers", reason="playwright is not installed")
+Axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe
 if not browsers.CHROMIUM.exists():
     pytest.skip(browsers.ABSENT, allow_module_level=True)
 
@@ -302,6 +303,69 @@ def test_the_index_becomes_the_origin_and_the_first_one_again(tab):
     # What the hand holds is in the board's positions, which have moved.
     with tab.dragged(-3):
         wait_until(lambda: abs(tab.sample[1] - 2e-3) < 0.5e-3)
+
+
+SIZES = {"desk": (1280, 1100), "phone": (390, 844)}
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_a_page_has_names_contrast_and_landmarks(panel, chromium, tab, size):
+    """Axe, at rest and while the axis is armed and tripped."""
+    sized = browsers.Tab(chromium, panel.url, *SIZES[size])
+    found = []
+    for fault in ("", "stop"):
+        if fault:
+            sized.arm()
+            sized.fault(fault)
+            wait_until(lambda: sized.state == "TRIPPED")
+        found += [(v["id"], [n["html"] for n in v["nodes"]]) for v in Axe().run(sized.page).response["violations"]]
+    sized.page.context.close()
+    rests(tab)
+    assert found == []
+
+
+def test_controls_are_called_by_what_they_set_and_drawings_by_what_they_show(tab):
+    for name in ("Stiffness K, N/m", "Damping B, N s/m", "Wall begins at, mm", "Force limit, N"):
+        for role in ("slider", "spinbutton"):
+            assert tab.page.get_by_role(role, name=name, exact=True).count() == 1
+    assert tab.page.get_by_role("switch", name="Never pull", exact=True).count() == 1
+    assert tab.page.locator("html").get_attribute("lang") == "en-US"
+    said = tab.page.get_by_role("status")
+    assert said.count() == 1
+    assert "DISARMED" in said.inner_text()
+    wait_until(
+        lambda: re.search(r"position -?\S+ mm, velocity", tab.page.locator("#traces").get_attribute("aria-label"))
+    )
+    wait_until(lambda: "plain difference" in tab.page.locator("#estimates").get_attribute("aria-label"))
+
+
+def test_a_phone_has_the_sliders_of_the_wall_within_reach_of_the_hand(panel, chromium, tab):
+    phone = browsers.Tab(chromium, panel.url, *SIZES["phone"])
+    phone.arm()
+    phone.fault("stop")
+    wait_until(lambda: phone.state == "TRIPPED")
+    # The longest texts are those of a trip.
+    assert phone.page.locator("#head").bounding_box()["height"] <= 120
+    assert phone.page.evaluate("document.documentElement.scrollWidth") <= 390
+    hand = phone.page.locator("#hand").bounding_box()
+    slider = phone.page.locator("[data-word=wall_stiffness] .q-slider").bounding_box()
+    assert 0 < slider["y"] - (hand["y"] + hand["height"]) < 150
+    phone.page.context.close()
+    rests(tab)
+
+
+def test_a_hand_moves_by_keys_and_lets_go(tab):
+    hand = tab.page.locator("#hand")
+    hand.focus()
+    before = tab.sample[1]
+    hand.press("ArrowRight")
+    hand.press("ArrowRight")
+    wait_until(lambda: "held at" in hand.get_attribute("aria-valuetext"))
+    wait_until(lambda: tab.sample[1] == pytest.approx(before + 1e-3, abs=0.4e-3))
+    hand.press("PageUp")
+    wait_until(lambda: "inside the wall" in hand.get_attribute("aria-valuetext"))
+    hand.press("Enter")
+    wait_until(lambda: "free" in hand.get_attribute("aria-valuetext"))
 
 
 def test_a_board_at_a_port_is_armed_and_has_no_hand(chromium):
