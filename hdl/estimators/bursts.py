@@ -71,15 +71,21 @@ class Bursts(Block):
         limits, seen, longest = self._design, self.seen, model.longest(self._design)
         stamps = Array([seen.stamp_a_rise, seen.stamp_b_rise, seen.stamp_a_fall, seen.stamp_b_fall])
         stamp, age, span = (Signal(limits.stamp_width, name=name) for name in ("stamp", "age", "span"))
-        count, last, base, moved = (
-            Signal(min(model.MOVED_BITS, limits.count_width), name=name) for name in ("count", "last", "base", "moved")
+        low, last, base, went, above = (
+            Signal(min(model.MOVED_BITS, limits.count_width), name=name)
+            for name in ("low", "last", "base", "went", "above")
         )
         quiet, silence = Signal(range(longest + 1)), Signal(range(longest + 1))
         edge, running, fresh, news, together = Signal(2), Signal(), Signal(), Signal(), Signal()
         window, left = Signal(range(limits.window + 1)), Signal(range(limits.memory + 1))
         events = Signal(range(model.EVENTS + 1))
-        near = (moved + model.EDGES - 1)[: len(moved)] <= 2 * (model.EDGES - 1)
-        m.d.comb += [self.found.eq(events == model.EVENTS), moved.eq(count - base)]
+        # Fewer than EDGES counts either way are from 0 to twice as many above the least of them, modulo their width.
+        near = above <= 2 * (model.EDGES - 1)
+        m.d.comb += [
+            self.found.eq(events == model.EVENTS),
+            went.eq(low - base),
+            above.eq(went + (model.EDGES - 1)),
+        ]
         with m.FSM():
             with m.State("SAMPLE"), m.If(self.strobe):
                 newest = stamps[seen.edge]
@@ -93,8 +99,8 @@ class Bursts(Block):
                     # The edge two before the last one of a run is of the opposite kind.
                     span.eq(stamps[seen.edge ^ 2]),
                     age.eq(seen.stamp),
-                    count.eq(seen.count),
-                    last.eq(count),
+                    low.eq(seen.count),
+                    last.eq(low),
                     window.eq(window - (window != 0)),
                     left.eq(left - (left != 0)),
                 ]

@@ -173,6 +173,7 @@ def test_sources_that_changed_since_the_program_began_are_none_of_a_store(monkey
     """The digest is of the sources as they are, and the program runs what they were: its results have no place."""
     Store("some").put({"a": 1}, 1)
     monkeypatch.setattr(sim, "BEGAN_NS", 0)
+    monkeypatch.setattr(store, "LOOK_S", 0.0)
     kept = Store("some")
     assert {"a": 1} not in kept
     kept.put({"a": 2}, 2)
@@ -187,6 +188,7 @@ def test_sources_that_changed_since_the_program_began_are_none_of_a_store(monkey
 def test_a_time_in_the_future_is_that_of_another_clock(monkeypatch, caplog, unsaid):
     monkeypatch.setattr(store.time, "time_ns", lambda: 1)
     monkeypatch.setattr(sim, "BEGAN_NS", 0)
+    monkeypatch.setattr(store, "LOOK_S", 0.0)
     Store("some").put({"a": 1}, 1)
     assert Store("some").get({"a": 1}) == 1
     assert caplog.messages == []

@@ -19,7 +19,7 @@ from hardwall.sim.scene.load import load
 from hardwall.sim.walls import hit, repetition
 from hardwall.sim.world.encoder import level
 from hardwall.testing import rng
-from stimuli.lengths import LONG
+from stimuli.lengths import LONG, long_form
 from stimuli.scenes import COUPLING, ONE_SECOND
 
 NEAR = {"protocol.start_m": -2e-3} | ONE_SECOND
@@ -110,7 +110,7 @@ def test_the_surface_moves_as_many_samples_late_as_it_is_said(backend):
     assert changed.tolist() == [3, 13]
 
 
-@pytest.mark.parametrize("scene", ["seed-2011", "mhz"])
+@pytest.mark.parametrize("scene", ["seed-2011", "mhz"] if LONG else ["mhz"])
 @pytest.mark.parametrize("delay_s", [0.0, 4e-4])
 def test_rtl_gives_the_models_force_words_with_a_tool(scene, delay_s):
     changes = COUPLING | {"coupling.delay_s": delay_s, "wall.stiffness_n_per_m": 200e3}
@@ -120,7 +120,8 @@ def test_rtl_gives_the_models_force_words_with_a_tool(scene, delay_s):
     assert result.max_force_n > 0.3
 
 
-@pytest.mark.parametrize("estimator", ["levant-edge", "kalman"] if LONG else ["levant-edge"])
+@long_form
+@pytest.mark.parametrize("estimator", ["levant-edge", "kalman"])
 def test_rtl_gives_the_models_force_words_with_an_observer_and_a_tool_of_no_mass(estimator):
     changes = COUPLING | {"coupling.mass_kg": 0.0, "passivity.damping_n_s_per_m": 50.0, "wall.damping_n_s_per_m": 0.0}
     result = same_words("mhz", changes | A_FIFTH | {"controller.estimator": estimator, "controller.output": None})

@@ -14,7 +14,7 @@ from hardwall.sim.scene.load import load
 from hardwall.sim.studies.bench import under_cocotb
 from hardwall.sim.walls import hit
 from stimuli.bristles import DAHL_KEYS, LUGRE_KEYS
-from stimuli.lengths import LONG
+from stimuli.lengths import LONG, long_form
 from stimuli.outputs import EVERY_OUTPUT
 from stimuli.scenes import AMPLIFIER, CABLE, DRIVE, HAND, ONE_SECOND, SHUNT, TWO_SECONDS
 
@@ -70,7 +70,7 @@ def test_rtl_gives_the_models_force_words_in_an_unstable_wall(estimator):
     assert not (result.stable and estimator in CORE)
 
 
-@pytest.mark.parametrize("scene", ["seed-2011", "mhz"])
+@pytest.mark.parametrize("scene", ["seed-2011", "mhz"] if LONG else ["mhz"])
 def test_rtl_gives_the_models_force_words_with_a_passivity_controller(scene):
     """In a wall without a damper, which chatters, and where the controller halves its own again and again."""
     changes = {"wall.stiffness_n_per_m": 100e3, "wall.damping_n_s_per_m": 0.0, "passivity.damping_n_s_per_m": 50.0}
@@ -87,9 +87,8 @@ def test_rtl_gives_the_models_force_words_with_an_imperfect_encoder(estimator):
     assert result.max_force_n > 1
 
 
-@pytest.mark.parametrize(
-    "keys", [LUGRE_KEYS, DAHL_KEYS][: None if LONG else 1], ids=lambda keys: keys["presliding.model"]
-)
+@long_form
+@pytest.mark.parametrize("keys", [LUGRE_KEYS, DAHL_KEYS], ids=lambda keys: keys["presliding.model"])
 def test_rtl_gives_the_models_force_words_on_bristles(keys):
     result = same_words("seed-2011", keys | STABLE | ONE_SECOND | SLOW)
     assert result.samples == 10_000
@@ -106,7 +105,8 @@ def test_rtl_gives_the_models_force_words_on_a_device_of_every_part(output):
     assert same_words("seed-2011", STABLE | ONE_SECOND | parts).max_force_n > 1
 
 
-@pytest.mark.parametrize("keys", [SHUNT, {"motor.damping_resistance_ohm": 3.0}][: None if LONG else 1], ids=len)
+@long_form
+@pytest.mark.parametrize("keys", [SHUNT, {"motor.damping_resistance_ohm": 3.0}], ids=len)
 def test_rtl_gives_the_models_force_words_with_a_damping_circuit(keys):
     changes = STABLE | ONE_SECOND | SLOW | {"protocol.start_m": -0.01}
     found = same_words("drive-2011", changes | keys)

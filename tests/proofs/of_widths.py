@@ -25,6 +25,7 @@ from hardwall.hdl.estimators import (
     mt_divisionless,
     tracking_loop,
 )
+from hardwall.hdl.estimators.bursts import Bursts
 from hardwall.hdl.estimators.cycle_times import CycleTimes
 from hardwall.hdl.estimators.estimate import EstimatorBlock
 from hardwall.hdl.estimators.history import History
@@ -34,6 +35,7 @@ from hardwall.hdl.passivity import Passivity
 from hardwall.hdl.quadrature import Quadrature
 from hardwall.hdl.scale_map import ScaleMap
 from hardwall.hdl.wall import Wall
+from hardwall.model.estimators.bursts import limits
 from hardwall.model.scale_map import Design as Bins
 from stimuli.specs import spec
 
@@ -76,12 +78,13 @@ class Case(NamedTuple):
 # The difference of two counts or stamps, and a memory's address, are modulo their width. The registers of a division
 # shift bits out, and their exact result is proven; a counter that its next assignment clears may pass its end.
 MOVED = ("moved",)
+BURSTS = ("age", "span", "low", "went", "above")
 DIGITS = ("digits", "remainder", "quotient")
 ROOTED = (*MOVED, "digits")
 HISTORY = (*MOVED, "head", "read__addr", "write__data", "data", "position", "change")
-CYCLES = (*DIGITS, *MOVED, "age", "change", "gap", "cycles", "kind", "behind", "samples")
-EDGES = ("number", "age", "between", "passed")
-STAMPED = (*DIGITS, "to", "passed", "waited", "interval", "measure", "age")
+CYCLES = (*DIGITS, *MOVED, *BURSTS, "change", "gap", "cycles", "kind", "behind", "samples")
+EDGES = (*BURSTS, "number", "between", "passed")
+STAMPED = (*DIGITS, *BURSTS, "to", "passed", "waited", "interval", "measure")
 # What a state that uses a time or a length finds is promised; else they may be cut too short.
 TIMES = ("time", "kept", "more", "few", "halves")
 # Both are what a weight between 0 and 1 makes of an error, which a free product does not know.
@@ -195,6 +198,11 @@ CASES = {
         FAST,
         ranges.fit,
         promise="no arithmetic wraps but where it is meant to; the sum of the fit is not looked at",
+    ),
+    "bursts": Case(
+        lambda axis: Bursts(limits(spec(axis, "mt"))),
+        BURSTS,
+        Bug(Bursts.elaborate, "Mux(age > longest, longest, age)", "age"),
     ),
     "period": Case(partial(estimator, "period"), CYCLES, FORWARD),
     "period-count": Case(partial(estimator, "period-count"), CYCLES, FORWARD),
