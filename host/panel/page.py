@@ -17,6 +17,8 @@ from .numbers import TIMED, VALUED, number_of, time_from
 
 STEPS = 1000
 """Places of a slider."""
+DIGITS = "%.7g"
+"""How a number is written in a field, and beside it."""
 TOUCH_S = 0.4
 """The time after which a knob that was touched is at rest."""
 REFRESH_S = 0.15
@@ -115,7 +117,7 @@ class _Row:
                 self._slider = ui.slider(min=0, max=STEPS, step=1).props("dense").props(named)
                 self._slider.on("update:model-value", self._slid, throttle=0.05, js_handler=VALUED)
                 least, most = knob.shown(knob.least), knob.shown(knob.most)
-                self._number = ui.number(min=least, max=most, suffix=knob.unit, format="%.7g")
+                self._number = ui.number(min=least, max=most, suffix=knob.unit, format=DIGITS)
                 self._number.props("dense outlined hide-bottom-space").props(named)
                 for event in ("blur", "keydown.enter"):
                     self._number.on(event, self._typed, js_handler=TIMED)
@@ -134,9 +136,10 @@ class _Row:
             self._used.set_text("on" if value > 0 else "off")
         elif self._slider and self._number:
             self._slider.set_value(round(STEPS * knob.to_slider(value)))
-            self._shown = knob.shown(value)
+            # The field itself keeps as many digits when it is left.
+            self._shown = float(DIGITS % knob.shown(value))
             self._number.set_value(self._shown)
-            self._used.set_text(f"{knob.shown(value):.7g} {knob.unit}")
+            self._used.set_text(f"{DIGITS % knob.shown(value)} {knob.unit}")
 
     def _take(self, value_of: Callable[[], float], at: object) -> None:
         """Give a value of a browser, and refuse what is none."""
@@ -157,6 +160,7 @@ class _Row:
     def _typed(self, event: events.GenericEventArguments) -> None:
         if self._number and self.knob.is_wish(shown := self._number.value, self._shown):
             self._take(lambda: self.knob.in_si(number_of(self.knob.name, shown)), event.args)
+            self._shown = shown
 
 
 def _knobs(driver: Driver, tab: str) -> list[_Row]:

@@ -104,11 +104,12 @@ def of_cycles(axis, speed: Fraction, period_s: Fraction) -> tuple[float, float]:
     A cycle, or the cycles of a sample, then last longer or shorter by a wait; so does a window; and the age of an edge,
     which bounds the speed, is at most that of the next edge in its place, and a wait.
     """
-    edge = 1 / (speed * COUNTS_A_METRE)
+    edge, burst = 1 / (speed * COUNTS_A_METRE), Fraction(CLOCK_HZ, APART * COUNTS_A_METRE)
     wait = period_s + math.ceil(period_s / edge) * Fraction(APART + 1, CLOCK_HZ)
     time = max(4 * edge, Fraction(1, axis.sample_hz) - 4 * edge)
     low = min(time / (time + wait), Fraction(3, 2) * edge / (wait + edge))
-    high = time / (time - wait) if time > wait else math.inf
+    # Nothing is read faster than a burst.
+    high = min(time / (time - wait), burst / speed) if time > wait else burst / speed
     if axis.estimator == "period-count":
         late = (wait + edge) * axis.sample_hz / (1 << axis.design.estimator.window_bits)
         low, high = min(low, 1 - late), max(high, 1 + late)

@@ -32,17 +32,20 @@ export function listen(canvas) {
     dragged = place(event);
   });
   canvas.addEventListener("pointermove", (event) => {
-    if (dragged !== null) dragged = place(event);
+    if (dragged !== null && canvas.hasPointerCapture(event.pointerId)) dragged = place(event);
   });
   for (const end of ["pointerup", "pointercancel", "blur"]) {
     canvas.addEventListener(end, release);
   }
   canvas.addEventListener("keydown", (event) => {
     const step = STEPS_MM[event.key], sample = latest();
+    if (event.altKey || event.ctrlKey || event.metaKey) return;
     if (event.key === "Enter" || event.key === " ") release();
     else if (step !== undefined && sample) {
       if (dragged === null) [dragged, view.before] = [sample[1] * 1e3, view.from];
-      dragged += step;
+      // A wish stays near the hand, which may be slower than keys, or at the end of its reach.
+      const hand = board.told && board.told.hand_m ? board.told.hand_m * 1e3 : sample[1] * 1e3;
+      dragged = Math.min(Math.max(dragged + step, hand - SHOWN_MM / 2), hand + SHOWN_MM / 2);
       // What is moved by keys stays in view.
       view.before = Math.min(Math.max(view.before, dragged + 4 - SHOWN_MM), dragged - 4);
     } else return;

@@ -20,7 +20,10 @@ function act(name) {
 
 hear("told", (told) => {
   find("head").dataset.state = told.state;
-  for (const name of ["state", "why", "do", "said"]) find(name).textContent = told[name];
+  for (const name of ["state", "why", "do", "said"]) {
+    // What is written again may be read out again.
+    if (find(name).textContent !== told[name]) find(name).textContent = told[name];
+  }
   for (const name of ACTS) find(name).disabled = !told.may.includes(name);
   find("connect").hidden = !told.may.includes("connect");
   const old = !LIVE.includes(told.state), locked = Boolean(told.locked);

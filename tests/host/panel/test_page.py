@@ -13,6 +13,7 @@ import numpy as np
 import psutil
 import pytest
 
+from hardwall.host.panel.view import ADVICE
 from stimuli.processes import HARDWALL, ended, line, started, wait_until
 from stimuli.virtual_boards import SCENE, running
 
@@ -344,8 +345,20 @@ def test_a_phone_has_the_sliders_of_the_wall_within_reach_of_the_hand(panel, chr
     phone.arm()
     phone.fault("stop")
     wait_until(lambda: phone.state == "TRIPPED")
-    # The longest texts are those of a trip.
-    assert phone.page.locator("#head").bounding_box()["height"] <= 120
+    # The longest texts, whole, with a refusal and without one.
+    longest = max(ADVICE.values(), key=len)
+    for said in ("", "The wish is older than 2 s, and was dropped"):
+        height, cut = phone.page.evaluate(
+            """([advice, said]) => {
+              const parts = ["head", "why", "do", "said"].map((id) => document.getElementById(id));
+              parts[2].textContent = `${advice}. Then acknowledge, and arm again.`;
+              parts[3].textContent = said;
+              return [parts[0].clientHeight, parts.some((part) => part.scrollHeight > part.clientHeight + 1)];
+            }""",
+            [longest, said],
+        )
+        assert height <= 120
+        assert not cut
     assert phone.page.evaluate("document.documentElement.scrollWidth") <= 390
     hand = phone.page.locator("#hand").bounding_box()
     slider = phone.page.locator("[data-word=wall_stiffness] .q-slider").bounding_box()
@@ -362,6 +375,11 @@ def test_a_hand_moves_by_keys_and_lets_go(tab):
     hand.press("ArrowRight")
     wait_until(lambda: "held at" in hand.get_attribute("aria-valuetext"))
     wait_until(lambda: tab.sample[1] == pytest.approx(before + 1e-3, abs=0.4e-3))
+    # A mouse that only goes over it is no hand.
+    box, held = hand.bounding_box(), hand.get_attribute("aria-valuetext").rpartition("held at")[2]
+    tab.page.mouse.move(box["x"] + 20, box["y"] + 90, steps=5)
+    tab.page.wait_for_timeout(1000)
+    assert hand.get_attribute("aria-valuetext").rpartition("held at")[2] == held
     hand.press("PageUp")
     wait_until(lambda: "inside the wall" in hand.get_attribute("aria-valuetext"))
     hand.press("Enter")
