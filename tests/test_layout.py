@@ -75,6 +75,7 @@ BROAD = {
     "link/test_mbpoll": "the link, spoken to by a program",
     "pictures/test_draw": "every picture",
     "rtl/test_simulators": "the written Verilog, in another simulator",
+    "test_axis_bursts": "an axis whose encoder emits its edges in bursts",
     "test_board_stages": "the board with each of its drive stages",
     "test_cover": "the means of the coverage",
     "test_cutting": "netlists of mutants in pieces",

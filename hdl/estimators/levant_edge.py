@@ -51,8 +51,7 @@ class Estimator(EstimatorBlock):
     def elaborate(self, platform):
         m = Module()
         s = Signals(self._design)
-        bursts = self._bursts(m)
-        m.d.comb += [s.bursts.eq(bursts.found), s.jolt.eq(bursts.jolt)]
+        m.d.comb += s.bursts.eq(self._bursts(m).found)
         self._measure(m, s)
         self._solve(m, s)
         self._learn(m, s)
@@ -281,7 +280,7 @@ class Estimator(EstimatorBlock):
             m.next = "LINE TURN"
         with m.State("LINE TURN"):
             m.d.sync += s.turn.eq(Mux(s.gone, 0, s.turned))
-            with m.If(s.refuted | s.jolt):
+            with m.If(s.refuted):
                 m.d.sync += s.doubt.eq(d.doubt)
             m.next = "LINE"
         with m.State("LINE"):

@@ -28,7 +28,7 @@ class Signals:
         self.now, self.at, self.waited = Signal(clocks), Signal(clocks), Signal()
         self.to, self.to_kind, self.passed = Signal(count), Signal(2), Signal(count)
         self.flags = Signal(2)
-        self.bursts, self.jolt = Signal(), Signal()
+        self.bursts = Signal()
 
         # A time and its length, its bits for the multiplier, and the change of velocity by an acceleration in it.
         self.measure, self.size = Signal(clocks), Signal(range(d.stamp_width + 1))

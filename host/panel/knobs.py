@@ -17,6 +17,8 @@ UNITS = {
     **{"m/s^2": ("m/s\u00b2", 1.0), "m^(1/2)/s": ("\u221am/s", 1.0)},
 }
 """The unit that is shown, and how many of it the SI unit has."""
+DIGITS = "%.7g"
+"""How a number is written in a field, and beside it."""
 DECADES = 4
 """The decades of a logarithmic slider, whose lower end is the least value."""
 BY_RATIO = ("wall_stiffness", "wall_damping", "supervisor_ramp", "output_slew_limit")
@@ -127,14 +129,28 @@ class Knob:
         digits = 1 - math.floor(math.log10(self.step * self.scale))
         return round(value * self.scale, max(digits, 0))
 
-    @staticmethod
-    def is_wish(typed: object, shown: float | None) -> bool:
-        """Return whether what stands in a field asks for something: it is not empty, nor left as it was shown."""
-        return typed is not None and typed != shown
-
     def in_si(self, value: float) -> float:
         """Return the SI value of what is shown."""
         return value / self.scale
+
+
+class Field:
+    """What stands in a field of a knob, so that what was only looked at is told from a wish."""
+
+    def __init__(self, knob: Knob):
+        self._knob, self._stands = knob, math.nan
+
+    def show(self, value: float) -> float:
+        """Return what an SI value is in the field, with the digits that the field itself keeps when it is left."""
+        self._stands = float(DIGITS % self._knob.shown(value))
+        return self._stands
+
+    def takes(self, typed: float | None) -> bool:
+        """Take what was typed: return whether it is a wish, neither nothing nor what stood there."""
+        if typed is None or typed == self._stands:
+            return False
+        self._stands = typed
+        return True
 
 
 def knob_of(word: Register) -> Knob:

@@ -11,14 +11,12 @@ from .captures import CaptureCard
 from .driver import Driver
 from .hand import FAULTS
 from .home import HomeCard
-from .knobs import Group, Knob, Way, knobs_of
+from .knobs import DIGITS, Field, Group, Knob, Way, knobs_of
 from .live import Bench
 from .numbers import TIMED, VALUED, number_of, time_from
 
 STEPS = 1000
 """Places of a slider."""
-DIGITS = "%.7g"
-"""How a number is written in a field, and beside it."""
 TOUCH_S = 0.4
 """The time after which a knob that was touched is at rest."""
 REFRESH_S = 0.15
@@ -106,7 +104,7 @@ class _Row:
     def __init__(self, knob: Knob, give: Callable[[float, float], None], refuse: Callable[[str], None]):
         self.knob, self._give, self._refuse, self._touched_s = knob, give, refuse, 0.0
         self._slider = self._number = self._switch = None
-        self._shown: float | None = None
+        self._field = Field(knob)
         named = f'aria-label="{knob.spoken}"'
         with ui.element("div").classes("knob").props(f'data-word="{knob.name}"'):
             ui.label(knob.label).classes("name")
@@ -136,9 +134,7 @@ class _Row:
             self._used.set_text("on" if value > 0 else "off")
         elif self._slider and self._number:
             self._slider.set_value(round(STEPS * knob.to_slider(value)))
-            # The field itself keeps as many digits when it is left.
-            self._shown = float(DIGITS % knob.shown(value))
-            self._number.set_value(self._shown)
+            self._number.set_value(self._field.show(value))
             self._used.set_text(f"{DIGITS % knob.shown(value)} {knob.unit}")
 
     def _take(self, value_of: Callable[[], float], at: object) -> None:
@@ -158,9 +154,8 @@ class _Row:
         self._take(lambda: self.knob.from_slider(number_of(self.knob.name, place, 0, STEPS) / STEPS), at)
 
     def _typed(self, event: events.GenericEventArguments) -> None:
-        if self._number and self.knob.is_wish(shown := self._number.value, self._shown):
+        if self._number and self._field.takes(shown := self._number.value):
             self._take(lambda: self.knob.in_si(number_of(self.knob.name, shown)), event.args)
-            self._shown = shown
 
 
 def _knobs(driver: Driver, tab: str) -> list[_Row]:

@@ -23,8 +23,7 @@ An encoder whose bursts have two edges or none is not told from one with edges o
 counts from their place. An estimator with a memory or a window reads the mean of bursts that are short against it, and
 tolerates their silence: that bursts are found is to say that the estimate is none.
 
-Every estimator that bounds the speed by silence takes `doubt_samples` for the time in which silence is no evidence; one
-that would be at rest by it takes a jolt for such an evidence, too.
+Every estimator that bounds the speed by silence takes `doubt_samples` for the time in which silence is no evidence.
 A restart, and the first sample, forget everything.
 """
 

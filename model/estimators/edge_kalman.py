@@ -33,7 +33,8 @@ exactly 0.
 
 Bursts. Some encoders emit their edges several at once, after a silence that is no sign of a slower axis. An edge that
 finds the axis faster than the last bound allows, and faster than half of its speed before, shows such an encoder: see
-`levant_edge.refuted`. For `bursts.doubt_samples` from then on the line is not held, and there is no rest by silence.
+`levant_edge.refuted`. So does a jolt, see `bursts`: else an axis at rest would begin anew with every burst. For
+`bursts.doubt_samples` from then on the line is not held, and there is no rest by silence.
 
 A turn needs no care: an edge has one place, whichever way it is crossed.
 
@@ -179,8 +180,10 @@ def step(params, state, seen, restart):
         known, doubt, level, place, mean, velocity, acceleration = 1, 0, TOP, 0, 0, 0, 0
     elif met == TIMED:
         level, place, mean, velocity, acceleration, flags = _correct(params, state, interval, passed, here)
-        doubt = params.doubt if refuted(state.bound, state.velocity, velocity) else doubt
-    doubt = params.doubt if watched.jolt else doubt
+        if refuted(state.bound, state.velocity, velocity):
+            doubt = params.doubt
+    if watched.jolt:
+        doubt = params.doubt
     number, stamp = state.number, state.stamp
     if met != ANCHOR:
         number, stamp = here, _time_of(params, stamp_of(seen, seen.edge))
@@ -235,8 +238,10 @@ def float_step(params, state, seen, restart):
         known, doubt, level, place, mean, velocity, acceleration = 1, 0, float(AGILE_LEVEL), 0.0, 0.0, 0.0, 0.0
     elif met == TIMED:
         level, place, mean, velocity, acceleration = _float_correct(params, state, interval, passed, here)
-        doubt = params.doubt if refuted(state.bound, state.velocity, velocity) else doubt
-    doubt = params.doubt if watched.jolt else doubt
+        if refuted(state.bound, state.velocity, velocity):
+            doubt = params.doubt
+    if watched.jolt:
+        doubt = params.doubt
     number, stamp = state.number, state.stamp
     if met != ANCHOR:
         number, stamp = here, _time_of(params, stamp_of(seen, seen.edge))

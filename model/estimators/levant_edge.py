@@ -213,8 +213,8 @@ def step(params, state, seen, restart):
         known, doubt, velocity, acceleration = 1, 0, 0, 0
     elif met == TIMED:
         velocity, acceleration, places, flags = _correct(params, state, seen, interval, passed)
-        doubt = params.doubt if refuted(state.bound, state.velocity, velocity) else doubt
-    doubt = params.doubt if watched.jolt else doubt
+        if refuted(state.bound, state.velocity, velocity):
+            doubt = params.doubt
     number, stamp, kind, age = anchored(params, state, seen, met)
 
     young = met == LOOSE and not age >> (params.shortest + 1)
@@ -273,8 +273,8 @@ def float_step(params, state, seen, restart):
         known, doubt, velocity, acceleration = 1, 0, 0.0, 0.0
     elif met == TIMED:
         velocity, acceleration, places = _float_correct(params, state, seen, interval, passed)
-        doubt = params.doubt if refuted(state.bound, state.velocity, velocity) else doubt
-    doubt = params.doubt if watched.jolt else doubt
+        if refuted(state.bound, state.velocity, velocity):
+            doubt = params.doubt
     number, stamp, kind, age = anchored(params, state, seen, met)
 
     line, bound = velocity + acceleration * age, state.bound

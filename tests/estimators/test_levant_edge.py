@@ -192,7 +192,6 @@ class Oracle:
                 loose = True
             if not loose:
                 self.anchor, age = (number, at, kind), (now - at) % wide
-        self.doubt = d.doubt if self.watched.jolt else self.doubt
         young = loose and age < 2 << d.shortest
         straight = self.v + (self.turn(age) if young or age < wide // 2 else 0)
         line = self.fit(straight, v.i, v.f)

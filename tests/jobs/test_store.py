@@ -185,6 +185,23 @@ def test_sources_that_changed_since_the_program_began_are_none_of_a_store(monkey
     assert ({"a": 1} in Store("some"), {"a": 2} in Store("some")) == (True, False)
 
 
+def test_the_sources_are_looked_at_once_in_a_while(monkeypatch):
+    looks, now = [], [0.0]
+
+    def names():
+        looks.append(now[0])
+        return ()
+
+    monkeypatch.setattr(store, "_names", names)
+    monkeypatch.setattr(store, "LOOK_S", 1.0)
+    monkeypatch.setattr(store.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(store, "_looked", store._Look())
+    for number in range(100):
+        now[0] = number / 32
+        assert store.are_as_they_were()
+    assert looks == [0.0, 1.0, 2.0, 3.0]
+
+
 def test_a_time_in_the_future_is_that_of_another_clock(monkeypatch, caplog, unsaid):
     monkeypatch.setattr(store.time, "time_ns", lambda: 1)
     monkeypatch.setattr(sim, "BEGAN_NS", 0)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hardwall.host.panel.knobs import Group, Knob, Way, knob_of, knobs_of
+from hardwall.host.panel.knobs import Field, Group, Knob, Way, knob_of, knobs_of
 from hardwall.model.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.sim.scene.load import load
@@ -65,12 +65,19 @@ def test_an_estimator_of_any_kind_has_its_knobs():
     assert any(knob.group is Group.ESTIMATOR and knob.name.startswith("kalman") for knob in knobs)
 
 
-def test_a_field_that_is_left_as_it_was_shown_wishes_nothing():
-    """A gain is shown with few digits: writing them back would change its word."""
-    assert not Knob.is_wish(3.4998, 3.4998)
-    assert not Knob.is_wish(None, 3.4998)
-    assert Knob.is_wish(3.4999, 3.4998)
-    assert Knob.is_wish(0.0, None)
+@pytest.mark.parametrize("knob", KNOBS, ids=[knob.name for knob in KNOBS])
+def test_a_field_that_is_left_as_it_was_shown_wishes_nothing(knob: Knob):
+    """The field keeps seven digits when it is left, which is fewer than some words have."""
+    word, field = REGISTERS[knob.name], Field(knob)
+    for part in (0.0, 0.1, 1 / 3, 0.7123, 1.0):
+        value = (word.low + round(part * (word.high - word.low))) * word.lsb
+        shown = field.show(value)
+        assert not field.takes(float(f"{shown:.7g}"))
+        assert not field.takes(None)
+    assert field.takes(shown + knob.step * knob.scale)
+    # Back at once, before the board has said what it uses, is a wish again.
+    assert field.takes(shown)
+    assert not field.takes(shown)
 
 
 def test_a_knob_is_called_by_its_label_and_its_unit():
