@@ -69,7 +69,7 @@ test: $(VENV)/.test | tools ## every regression: the model against exact arithme
 
 prove faults gate coverage mutate: export HARDWALL_AGAIN := $(AGAIN)
 
-prove: $(VENV)/.prove | tools ## every promise about safety and every width, proven; every proof is seen to fail with a bug
+prove: $(VENV)/.test | tools ## every promise about safety and every width, proven; every proof is seen to fail with a bug
 	@$(VENV)/bin/python tests/prove.py $(ONLY)
 
 faults: $(VENV)/.test | tools ## faults injected into the board and its plant: what trips, how soon, and the force meanwhile
@@ -97,7 +97,7 @@ synth: $(VENV)/.synth $(VENV)/.test | tools ## size and fmax on three devices, m
 boards: $(VENV)/.synth | tools ## bitstreams for three boards, with their wiring, in build/boards/ (some minutes)
 	@for board in $(BOARDS); do $(HARDWALL) board $$board -o build/boards/$$board; done
 
-constraints: $(VENV)/.sim | tools ## write the files of constraints/ anew from the descriptions of the boards
+constraints: $(VENV)/.test | tools ## write the files of constraints/ anew from the descriptions of the boards
 	@$(VENV)/bin/python tests/own_flow.py
 
 choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy, and cost on three devices (hours)
@@ -175,7 +175,7 @@ build/hit-%.json build/hit-%.png: $(SOURCES) $(VENV)/.sim | tools
 build/mhz-%.json build/mhz-%.png: $(SOURCES) $(VENV)/.sim | tools
 	$(call hit,mhz,fixed,its bit-accurate model)
 
-# ---- the tools: .sim for the loop, .test for the regressions, .prove, .synth for place and route, .docs for the pages
+# ---- the tools: .sim for the loop, .test for the regressions, .synth for place and route, .docs for the pages
 
 # .venv is made anew for another PYTHON, when its interpreter is gone, and in a tree that was moved or copied.
 MADE_IN := $(file <$(VENV)/.made)
@@ -215,9 +215,6 @@ $(VENV)/.test: pyproject.toml $(VENV)/.sim | tools
 
 $(VENV)/.panel: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)host$(comma)panel,the page)
-
-$(VENV)/.prove: pyproject.toml $(VENV)/.sim | tools
-	$(call install,sim$(comma)prove,the solver,yosys)
 
 $(VENV)/.synth: pyproject.toml $(VENV)/.sim | tools
 	$(call install,sim$(comma)synth,place and route,yosys nextpnr-ecp5 nextpnr-ice40 nextpnr-himbaechel-gowin)

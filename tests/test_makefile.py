@@ -45,6 +45,13 @@ def test_help_lists_every_task(tree):
     assert done.stderr == ""
 
 
+def test_what_runs_from_the_tests_folder_has_the_tests_tools():
+    rules = re.findall(r"^(\w+): (.*)\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.M)
+    runs = {task: needs for task, needs, recipe in rules if re.search(r"tests/|\$\(PYTEST\)", recipe)}
+    assert {"test", "prove", "faults", "gate", "coverage", "mutate", "digests"} <= set(runs)
+    assert [task for task, needs in runs.items() if "$(VENV)/.test" not in needs.split()] == []
+
+
 @pytest.mark.parametrize("lacks", [(), ("c++",), ("perl",), ("python3",), ("python3", "c++", "perl")])
 @pytest.mark.parametrize("tasks", [["all"], ["test"], ["-j2", "all", "synth", "lint"]], ids=" ".join)
 def test_what_is_missing_is_named_with_its_package(tree, tmp_path, lacks, tasks):

@@ -86,7 +86,7 @@ class Outcome:
     @property
     def line(self) -> str:
         """One line for the progress."""
-        return f"{self.case.name}: {'equal' if self.ok else 'not equal'} in {self.clocks} clocks"
+        return f"{self.case.name}: {'different' if self.different else 'equal'} in {self.clocks} clocks"
 
     @property
     def explanation(self) -> str:

@@ -21,6 +21,7 @@ from hardwall.hdl.supervised import LOOPS
 from hardwall.testing import parameters, rng
 from stimuli import handle
 from stimuli.axes import random_words
+from stimuli.places import place
 
 PERIOD_NS = 10
 RESETS = 16
@@ -78,7 +79,6 @@ async def moves(driven: Driven, habits: handle.Habits) -> None:
 async def axis(driven: Driven) -> None:
     """Move the encoder, and act on every other input about once in a few samples."""
     random, design = driven.random, driven.component.spec.design
-    half = 1 << (driven.component.spec.count_width - 1)
     cocotb.start_soon(moves(driven, handle.Habits(too_fast=0.1, index=0.1)))
     driven.drive(drive_enable=1)
     while not driven.ended:
@@ -87,13 +87,13 @@ async def axis(driven: Driven) -> None:
         if act < 0.4:
             driven.drive(**random_words(design, random))
             await driven.pulse("commit")
-        elif act < 0.5:
-            driven.drive(preload_count=int(random.integers(-half, half)))
-            await driven.pulse("preload")
+        elif act < 0.6:
+            driven.drive(preload_count=place(random, driven.component.spec.count_width))
+            await driven.pulse("preload" if act < 0.5 else "origin_shift")
         elif act < 0.7:
             await driven.pulse("clear_flags")
         elif act < 0.8:
-            await driven.pulse("index_arm")
+            await driven.pulse("index_arm" if act < 0.78 else "slip")
         else:
             driven.drive(drive_enable=int(random.random() < 0.8))
 

@@ -124,7 +124,7 @@ def _command() -> list[str]:
     """
     for tool in NEEDED:
         if shutil.which(tool, path=_path()) is None:
-            raise SolverError(f"{tool} is not installed: it comes with pip install 'hardwall[prove]'")
+            raise SolverError(f"{tool} is not installed: it comes with pip install 'hardwall[test]'")
     return [shutil.which(NEEDED[0], path=_path())]
 
 
