@@ -164,8 +164,13 @@ class Hit(Summary):
         return Values(said).tables()
 
     def notes(self) -> list[str]:
-        """Return what keeps the velocity's error from being known."""
-        return [] if self.detail else ["estimate_rms_mm_per_s: known with --plot or --trace, which keep every sample"]
+        """Return what keeps the verdict, and the velocity's error, from being known."""
+        notes = []
+        if self.judged == UNDECIDED:
+            notes.append("undecided: it still fell, or had swung too seldom to tell: try a longer protocol.longest_s")
+        if self.detail is None:
+            notes.append("estimate_rms_mm_per_s: known with --plot or --trace, which keep every sample")
+        return notes
 
     def report(self) -> dict:
         """Return the summary that the command line prints, with units in the keys."""

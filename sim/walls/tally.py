@@ -8,6 +8,11 @@ The wall is judged over windows of `measure_s`, the first of which begins at the
   wall does not hold the handle: where the line goes on for `longest_s`, it leaves the device's travel;
 - else it still falls: the run goes on with another window, and is *undecided* if no other ends within `longest_s`.
 
+A heavy handle bounces so slowly that a window has few swings. Their RMS says nothing: it depends on where in a swing
+the window begins, by 1 / (pi n) of itself for n swings. So the last windows that together hold `ENOUGH` swings are
+taken for one, and so are those before them, back to the first that begins behind a swing. For most handles these are
+the last window and the one before. Where there are not enough, the run goes on as well.
+
 The first window has one before it too, which ends at the settling mark. A handle that creeps or has come to rest in
 another place is not unstable for that: the *offset*, from the mean over `mean_s` before the mark to the mean of the
 window that was judged, and the *drift* are said beside the verdict.
@@ -22,10 +27,13 @@ import math
 import numpy as np
 
 from ..scene.schema import Scene
+from .swings import Swings, swung
 from .window import Room, Window
 
 FALLING = 0.9
 """An RMS that is less than this part of the one before is falling."""
+ENOUGH = 8
+"""Fewest swings that are compared with others. A swing is as long as the threshold at least."""
 STABLE, UNSTABLE, UNDECIDED = "stable", "unstable", "undecided"
 
 
@@ -58,7 +66,9 @@ class Tally:
         self._position_m = math.nan
         self._window_from = max(self._settled - self._measured, 0)
         self._room = Room()
-        self._window, self._before = Window(self._settled - self._window_from, self._room), None
+        self._window = Window(self._settled - self._window_from, self._room)
+        self._swings, self._turns_before = Swings(), 0
+        self._swung: list[tuple[Window, int]] = []
         self._judged: Window | None = None
         self.largest_drive, self.farthest_m, self.still_from = 0, -math.inf, 0
         self.verdict: str | None = None
@@ -119,10 +129,21 @@ class Tally:
         self.farthest_m = max(self.farthest_m, float(positions.max()))
         if self._digest:
             self._digest.update(drives[-first % self._decimation :: self._decimation].astype("<i4").tobytes())
+        self._swing(part(first, self._window_from))
         while self.window_end <= end:
-            self._window.add(part(max(first, self._window_from), self.window_end))
+            self._take(part(max(first, self._window_from), self.window_end))
             self._judge(self.window_end)
-        self._window.add(part(max(first, self._window_from), end))
+        self._take(part(max(first, self._window_from), end))
+
+    def _swing(self, positions: np.ndarray) -> None:
+        self._swings = swung(self._swings, positions, self._threshold_m)
+
+    def _take(self, positions: np.ndarray) -> None:
+        """Add the next positions of the window that is under way."""
+        if not self._window.added:
+            self._turns_before = self._swings.turns
+        self._window.add(positions)
+        self._swing(positions)
 
     def _note_rest(self, first: int, positions: np.ndarray) -> None:
         """Note since when the position has not changed, with samples from number `first` on."""
@@ -141,6 +162,8 @@ class Tally:
         """Judge the window that ends at a sample, and begin the next one."""
         window = self._window
         self._window, self._window_from = Window(self._measured, self._room), end
+        if self._turns_before:
+            self._swung.append((window, self._swings.turns - self._turns_before))
         if end > self._settled:
             self._judged = window
             if self._literal:
@@ -149,11 +172,16 @@ class Tally:
             self.rms_m = window.rms_m
             if self.rms_m < self._threshold_m:
                 self.verdict = self._verdict_of(window)
-            elif self.rms_m >= FALLING * self._before:
+            elif self._goes_on():
                 self.verdict = UNSTABLE
             elif end + self._measured > self._most:
                 self.verdict = UNDECIDED
-        self._before = window.rms_m
+
+    def _goes_on(self) -> bool:
+        """Return whether the handle swings on as it did before."""
+        windows = list(self._swung)
+        last, before = _of_enough(windows), _of_enough(windows)
+        return last is not None and before is not None and last.rms_m >= FALLING * before.rms_m
 
     def _verdict_of(self, still: Window) -> str:
         """Return what is said of a wall whose handle does not oscillate: stable if the wall holds it.
@@ -168,3 +196,14 @@ class Tally:
         self._judged.add(np.array([self._position_m]))
         self._sum = self._position_m * (self._settled - self._mean_from)
         self.rms_m, self.verdict = 0.0, self._verdict_of(self._judged)
+
+
+def _of_enough(windows: list[tuple[Window, int]]) -> Window | None:
+    """Take the last windows that hold enough swings, and return them as one; None if there are too few."""
+    if not windows:
+        return None
+    whole, swings = windows.pop()
+    while swings < ENOUGH and windows:
+        before, more = windows.pop()
+        whole, swings = before.joined(whole), swings + more
+    return whole if swings >= ENOUGH else None

@@ -51,6 +51,15 @@ class Window:
         self._squares += float(np.square(off, out=off).sum())
         self.added += len(off)
 
+    def joined(self, after: "Window") -> "Window":
+        """Return one window of the samples of this one and those of the window behind it."""
+        both, way = Window(self.samples + after.samples, self._room), after._first_m - self._first_m
+        moved = after._sum + after.samples * way
+        both.added, both._first_m, both._sum = both.samples, self._first_m, self._sum + moved
+        both._moment = self._moment + after._moment + (self.samples * moved - after.samples * self._sum) / 2
+        both._squares = self._squares + after._squares + way * (after._sum + moved)
+        return both
+
     @property
     def mean_m(self) -> float:
         """The mean position of the whole window, m."""

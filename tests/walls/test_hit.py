@@ -152,6 +152,8 @@ def test_a_contact_lasts_at_most_as_long_as_its_trace(run):
     assert plain.estimate_rms_m_per_s is None
     assert "--plot" in " ".join(plain.notes())
     assert run.notes() == []
+    (note,) = replace(run, judged="undecided").notes()
+    assert "protocol.longest_s" in note
 
 
 def test_the_overview_has_the_extremes_between_its_samples(run, monkeypatch):
@@ -233,6 +235,18 @@ def test_a_wall_that_settles_late_is_not_ended_early():
     result = hit.run(load("mhz", changes), "float", until_sure=True)
     assert result.stable
     assert result.samples == result.scene.samples
+
+
+@pytest.mark.parametrize("mass_kg", [1e-3, 0.1, 1.0, 3.0, 10.0, 30.0, 100.0])
+def test_a_heavy_handle_in_a_stable_wall_is_never_unstable(mass_kg):
+    """It bounces for a while, so slowly that the windows of 2 s have a swing or two; the lightest one never rests."""
+    changes = {"controller.estimator": "fdm", "handle.mass_kg": mass_kg}
+    verdicts = (
+        hit.run(load("seed-2011", changes | longest), "fixed", until_sure=True).verdict
+        for longest in ({}, {"protocol.longest_s": 400.0})
+    )
+    truth = "stable" if mass_kg > 0.01 else "unstable"
+    assert tuple(verdicts) == ("undecided" if mass_kg > 20 else truth, truth)
 
 
 @pytest.mark.parametrize("part", ["state", "delay", "force"])

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from hardwall.sim.scene.load import load
-from hardwall.sim.walls.tally import Tally
+from hardwall.sim.walls.tally import ENOUGH, Tally
 
 # A window has 50 samples: the first one is from 100 to 150, and the one before it from 50 on.
 PROTOCOL = {
@@ -54,6 +56,43 @@ def test_what_falls_and_then_goes_on_is_unstable():
     tally, end = judged(positions)
     assert (tally.verdict, end) == ("unstable", 250)
     assert tally.rms_m == pytest.approx(np.sqrt(np.mean(positions[200:250] ** 2)), rel=1e-2)
+
+
+def bouncing(flight: float, keeps: float, wait: int = 0) -> np.ndarray:
+    """Return the positions (m) of a handle that comes to a wall in a straight line and bounces, every ms.
+
+    Args:
+        flight: samples of the first flight.
+        keeps: the part of a flight that the next one lasts.
+        wait: samples before the wall is met.
+    """
+    flights = flight * keeps ** np.arange(700)
+    ends, time = np.cumsum(flights), np.arange(12_000.0) - wait
+    number = np.minimum(np.searchsorted(ends, time, "right"), len(flights) - 1)
+    left = np.clip(ends[number] - time, 0, flights[number])
+    return np.where(time < 0, 1e-7 * time, -2e-6 * left * (flights[number] - left))
+
+
+LONG_LOOK = PROTOCOL | {"protocol.longest_s": 11.9}
+
+
+@given(st.floats(4, 300), st.floats(0.3, 0.97), st.integers(0, 300))
+def test_a_handle_whose_bounces_get_lower_is_never_unstable(flight, keeps, wait):
+    """However few of them a window has, and also where one is on its way to the wall."""
+    positions = bouncing(flight, keeps, wait)
+    assert judged(positions, LONG_LOOK)[0].verdict == "stable"
+    assert judged(positions)[0].verdict in ("stable", "undecided")
+
+
+@given(st.floats(4, 300), st.integers(0, 99))
+def test_bounces_that_stay_as_high_are_unstable_once_there_are_enough(flight, wait):
+    positions = bouncing(flight, 1.0, wait)
+    tally, end = judged(positions, LONG_LOOK)
+    assert tally.verdict == "unstable"
+    swings = 2 * (end - wait) / flight
+    assert swings >= 2 * ENOUGH
+    # Beyond these there are the part of a swing and of a window at each end, and the window before the mark.
+    assert end <= max(wait + flight, 100) + (ENOUGH + 2) * flight + 5 * WINDOW
 
 
 def test_a_handle_that_has_moved_away_or_creeps_is_stable_and_that_is_said():

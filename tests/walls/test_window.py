@@ -30,6 +30,17 @@ def test_mean_drift_and_rms_are_those_of_a_fitted_line(cuts):
     assert window.rms_m == pytest.approx(np.sqrt(np.mean((positions - fitted(at)) ** 2)), rel=1e-9)
 
 
+@pytest.mark.parametrize("cuts", [(1,), (250,), (499,), (100, 130, 400)])
+def test_joined_windows_are_one(cuts):
+    positions = -2e-3 + 3e-9 * np.arange(500) + RNG.normal(0, 1e-6, 500)
+    whole, (joined, *others) = of(positions), map(of, np.split(positions, cuts))
+    for other in others:
+        joined = joined.joined(other)
+    assert (joined.samples, joined.added) == (500, 500)
+    for name in ("mean_m", "drift_m", "rms_m"):
+        assert getattr(joined, name) == pytest.approx(getattr(whole, name), rel=1e-9)
+
+
 def test_a_handle_at_rest_or_in_steady_motion_is_on_its_line():
     rest = of(np.full(1000, 1.23456789e-3), 300)
     assert (rest.rms_m, rest.drift_m, rest.mean_m) == (0.0, 0.0, 1.23456789e-3)
