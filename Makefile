@@ -149,7 +149,7 @@ fuzz: $(VENV)/.test | tools ## 20 000 hostile calls of the command line, and 200
 
 clean: ## remove what was built and cached
 	rm -rf build .hypothesis .pytest_cache .ruff_cache
-	find hdl host model sim tests -name __pycache__ -prune -exec rm -rf {} +
+	find cli hdl host model sim tests -name __pycache__ -prune -exec rm -rf {} +
 
 distclean: clean ## remove the tools in .venv too
 	rm -rf $(VENV) hardwall.egg-info

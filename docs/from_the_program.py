@@ -16,7 +16,7 @@ from sphinx.application import Sphinx
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 
-from hardwall.sim.commands.group import app
+from hardwall.cli.group import app
 from hardwall.sim.scene.hand_section import HANDS, OF_A_HAND
 from hardwall.sim.scene.schema import Scene
 from hardwall.sim.scene.sentences import accepted, sections_of

@@ -34,7 +34,7 @@ from reasons import reasons_for
 from targets import conclude
 
 from hardwall.model.build_folder import build_dir
-from hardwall.sim.jobs.result import Table
+from hardwall.model.runtime.result import Table
 from hardwall.sim.rtl import cocotb_runner
 from hardwall.sim.rtl.cocotb_runner import COVERAGE
 from hardwall.testing import SAMPLES

@@ -60,7 +60,7 @@ def program(*arguments: str) -> str:
             contextlib.redirect_stdout(io.StringIO()) as out,
             contextlib.redirect_stderr(io.StringIO()) as err,
             mock.patch("sys.argv", ["hardwall", *arguments]),
-            mock.patch("hardwall.sim.jobs.ending.hear_signals"),  # the signals are those of the process
+            mock.patch("hardwall.model.runtime.termination.hear_signals"),  # the signals are those of the process
         ):
             main()
     except SystemExit:

@@ -12,7 +12,7 @@ import sys
 from kept import findings_of
 from targets import conclude
 
-from hardwall.sim.jobs.result import Table
+from hardwall.model.runtime.result import Table
 from injection.every import FAULTS
 from injection.run import run_all
 

@@ -16,7 +16,7 @@ from targets import conclude
 
 from gates.run import Case, Outcome, run
 from gates.tops import TOPS
-from hardwall.sim.jobs.result import Table
+from hardwall.model.runtime.result import Table
 from hardwall.sim.rtl.families import FAMILIES
 
 SAMPLES = int(os.environ.get("HARDWALL_SAMPLES", "20000"))

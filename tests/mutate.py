@@ -16,7 +16,7 @@ from covering.blocks import BLOCKS
 from kept import findings_of
 from targets import conclude
 
-from hardwall.sim.jobs.result import Table
+from hardwall.model.runtime.result import Table
 from hardwall.testing import SEED
 from mutation.fates import Result
 from mutation.run import run

@@ -7,9 +7,9 @@ The board of `mhz` with a clock of 12 MHz, simulated clock by clock, with serial
 
 from virtual.virtual_host import SerialHost
 
+from hardwall.cli.terminal import show
 from hardwall.model.registers import CONSTANTS, TELEMETRY, WRITTEN, RegisterMap
-from hardwall.sim.commands.terminal import show
-from hardwall.sim.jobs.result import Table
+from hardwall.model.runtime.result import Table
 from hardwall.sim.scene.load import load
 from hardwall.sim.virtual import virtual_board
 from stimuli import frames

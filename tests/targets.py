@@ -2,8 +2,8 @@
 
 from collections.abc import Iterable
 
-from hardwall.sim.commands.terminal import show
-from hardwall.sim.jobs.result import Table
+from hardwall.cli.terminal import show
+from hardwall.model.runtime.result import Table
 
 
 def conclude(table: Table, explanations: Iterable[str], line: str, every: int, good: int) -> int:

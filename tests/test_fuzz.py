@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, find, given, settings
 from hypothesis import strategies as st
 
-from hardwall.sim.commands.group import COMMANDS
+from hardwall.cli.group import COMMANDS
 from stimuli import forked
 from stimuli.forked import BEGAN, Ended, run
 from stimuli.hostile import ENVIRONS, Call, calls

@@ -16,13 +16,13 @@ from typing import Any
 import pytest
 
 from hardwall.model.build_folder import build_dir
-from hardwall.sim.jobs import ending
+from hardwall.model.runtime import termination
 from hardwall.testing import rng
 from stimuli.processes import HARDWALL, ended, session, started, stored, wait_until
 
 KILLS = int(os.environ.get("HARDWALL_KILLS", "0"))
 """The number of runs that are ended; 0 for one run of every quick command."""
-CODES = {signal.SIGKILL: -9} | {number: code for number, (code, _) in ending.CODES.items()}
+CODES = {signal.SIGKILL: -9} | {number: code for number, (code, _) in termination.CODES.items()}
 SHORT = {
     "protocol.start_m": -0.001, "protocol.settle_s": 0.3, "protocol.mean_s": 0.05, "protocol.measure_s": 0.1,
     "zwidth.stiffness_step_n_per_m": 5e3, "zwidth.stiffness_to_n_per_m": 60e3,
@@ -67,7 +67,7 @@ def environment(folder: Path) -> dict[str, str]:
 
 
 def hears(process: subprocess.Popen) -> bool:
-    """Return whether a process handles SIGTERM, and so every signal of `ending`."""
+    """Return whether a process handles SIGTERM, and so every signal of `termination`."""
     status = Path(f"/proc/{process.pid}/status").read_text()
     caught = int(re.search(r"^SigCgt:\s*(\w+)", status, re.MULTILINE)[1], 16)
     return bool(caught >> (signal.SIGTERM - 1) & 1)

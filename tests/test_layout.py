@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).absolute().parent.parent
-ROOMS = ("hdl", "host", "model", "sim")
+ROOMS = ("cli", "hdl", "host", "model", "sim")
 SOURCES = sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.py"))
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
-# The folders of sim/: every folder imports only from those before it, and only `rtl` imports hdl.
+# The folders of sim/: every folder imports only from those before it, and only `rtl` imports hdl. Nothing imports cli/.
 FLOORS = (
     "world",
     "jobs",
@@ -29,7 +29,6 @@ FLOORS = (
     "estimates",
     "studies",
     "pictures",
-    "commands",
 )
 # Modules of hdl that are no blocks of the data path and have no arithmetic of their own to model.
 NOT_TWINNED = {
@@ -61,9 +60,9 @@ NOT_TWINNED = {
 }
 # Tests of more than one source, and what they cover.
 BROAD = {
-    "commands/test_cli": "every command, as it is called",
-    "commands/test_cli_estimators": "the commands on estimators, as they are called",
-    "commands/test_reports": "every report in JSON",
+    "cli/test_cli": "every command, as it is called",
+    "cli/test_cli_estimators": "the commands on estimators, as they are called",
+    "cli/test_reports": "every report in JSON",
     "estimates/test_stamped_estimators": "estimators that time edges, on known motions",
     "estimators/test_edge_kalman_map": "edge_kalman with a scale_map",
     "estimators/test_levant_edge_bound": "levant_edge in motions beyond its gains",
@@ -106,7 +105,7 @@ BROAD = {
 }
 # Modules of studies/ without a test of their own name, and the test that covers them.
 COVERED = {
-    "accuracy": "commands/test_cli_estimators",
+    "accuracy": "cli/test_cli_estimators",
     "cocotb_loop": "studies/test_bench",
     "costs": "rtl/test_synthesis",
     "drop_result": "studies/test_drop",
@@ -173,15 +172,19 @@ def test_imports_are_seen():
 def test_imports_go_one_way(path):
     room, *inner = path.relative_to(ROOT).parts
     barred = {"tests", "hardwall.testing", *(test.stem for test in TESTS if test.stem.startswith("test_"))}
+    if room != "cli":
+        barred |= {"hardwall.cli"}
     if room == "hdl":
         barred |= {"hardwall.host", "hardwall.sim"}
     elif room in ("host", "model"):
         barred |= {"hardwall.hdl", "hardwall.sim", "amaranth"} | ({"hardwall.host"} if room == "model" else set())
+    elif room == "cli":
+        barred |= {"hardwall.hdl", "amaranth"}
     elif len(inner) > 1:
         barred |= {f"hardwall.sim.{above}" for above in FLOORS[FLOORS.index(inner[0]) + 1 :]}
         if inner[0] != "rtl":
             barred |= {"hardwall.hdl", "amaranth"}
-        if inner[0] not in ("pictures", "commands"):
+        if inner[0] != "pictures":
             barred |= {"hardwall.host"}
     assert of(set(imports(path)), *barred) == set()
 
@@ -225,7 +228,7 @@ def test_a_picture_is_of_a_module_of_its_name():
 
 def test_a_test_has_the_path_of_its_source():
     sources = set().union(*(paths_below(ROOT / room) for room in ROOMS))
-    for folder, path in (("testing", "tests/benches"), ("host", "host")):
+    for folder, path in (("testing", "tests/benches"), ("host", "host"), ("cli", "cli")):
         sources |= {f"{folder}/{name}" for name in paths_below(ROOT / path)}
     tested = {str(path.relative_to(ROOT / "tests").with_suffix("")) for path in TESTS if path.stem.startswith("test_")}
     assert {name for name in tested if name.replace("test_", "", 1) not in sources} == set(BROAD)
@@ -249,7 +252,7 @@ def size(function: ast.FunctionDef | ast.AsyncFunctionDef) -> tuple[int, int]:
 @pytest.mark.parametrize("path", SOURCES, ids=identity)
 def test_functions_are_short_and_take_few_arguments(path):
     """A command of the command line has as many options as it offers; hardware is described in one piece."""
-    a_command = path.is_relative_to(ROOT / "sim/commands")
+    a_command = path.is_relative_to(ROOT / "cli")
     long = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
@@ -283,9 +286,8 @@ def test_versions_are_pinned():
 def test_what_is_imported_is_what_its_extra_installs(path):
     for_tests = path in TESTS or path.stem.startswith("cocotb_")
     room = path.relative_to(ROOT).parts[0]
-    extras = {"model": [], "host": ["host", "panel"]}.get(
-        room, ["sim", "host", "panel", "test"] if for_tests else ["sim"]
-    )
+    of_room = {"model": [], "host": ["host", "panel"], "cli": ["sim", "host"]}
+    extras = of_room.get(room, ["sim", "host", "panel", "test"] if for_tests else ["sim"])
     pinned = [CONFIG["project"]["dependencies"], *(EXTRAS[extra] for extra in extras)]
     installed = {plain(requirement.partition("==")[0]) for one in pinned for requirement in one}
     installed.add("llvmlite")  # a dependency of Numba

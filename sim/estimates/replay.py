@@ -22,9 +22,9 @@ import numpy as np
 from ...model.checks import NUMBERS, shown
 from ...model.estimators import registry
 from ...model.quadrature_speed import max_edge_rate
+from ...model.runtime.result import Summary
 from ...model.spec import AxisSpec
 from ...model.whole_file import whole_file
-from ..jobs.result import Summary
 from ..loop.backends import BACKENDS, is_exact
 from .recording import Recording
 from .reference import REFERENCE_HZ, SETTLE_S, acceleration_bound, judged_from, zero_phase_velocity

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from .ending import undone
+from ...model.runtime.termination import undone
 from .whole_folder import LIST, is_as_listed, listed_in, seal
 
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TextIO
 
-from .ending import undone
+from ...model.runtime.termination import undone
 
 PREFIX = "building-"
 

@@ -16,7 +16,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from ...model.build_folder import not_kept
-from .ending import undone
+from ...model.runtime.termination import undone
 from .scratch import scratch
 
 LIST = "SHA256SUMS"

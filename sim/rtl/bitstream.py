@@ -10,12 +10,12 @@ from pathlib import Path
 
 from ...model import register_texts
 from ...model.axes import AxesSpec
+from ...model.runtime.result import text_of
 from ...model.spec import AxisSpec
 from ..boards.description import Description
 from ..boards.picture import picture
 from ..boards.wiring import wiring, wiring_of_axes
 from ..jobs.named_folder import write_folder
-from ..jobs.result import text_of
 from . import flow, tools
 from .flow import Design, Files
 from .readback import check

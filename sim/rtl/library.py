@@ -12,8 +12,8 @@ from amaranth.lib.wiring import In
 from ...hdl.axis import Axis
 from ...hdl.export import to_netlist, to_verilog
 from ...model import quadrature
+from ...model.runtime.stages import logger
 from ...model.spec import AxisSpec
-from ..jobs.stages import logger
 from . import resting, shared_library
 from .resting import Resting, RestsNotError
 from .shared_library import FAST_TO_BUILD, FAST_TO_RUN, Recipe

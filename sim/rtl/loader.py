@@ -4,8 +4,8 @@ import hashlib
 import tempfile
 from pathlib import Path
 
+from ...model.runtime.termination import undone
 from ..boards.description import Description, Memory
-from ..jobs.ending import undone
 from . import tools
 from .tools import SynthesisError
 

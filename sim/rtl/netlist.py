@@ -9,7 +9,7 @@ from amaranth.lib import wiring
 
 from ...hdl.export import to_verilog
 from ...model.build_folder import build_dir
-from ..jobs.stages import stage
+from ...model.runtime.stages import stage
 from ..jobs.whole_folder import whole_folder
 from . import tools
 from .families import Family

@@ -9,8 +9,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from ...model.build_folder import build_dir, shown_path
+from ...model.runtime.stages import stage
 from ..jobs import children
-from ..jobs.stages import stage
 from ..jobs.whole_folder import keep_log, whole_folder
 from .verilator import LINT_OPTIONS, BuildError, check_paths, environment
 

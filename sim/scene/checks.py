@@ -4,6 +4,7 @@ import math
 
 from ...model.checks import FieldError, shown
 from ...model.quadrature_speed import max_edge_rate
+from ...model.runtime.accepted import plain
 from ...model.words import Word
 from ..world import device
 from ..world.euler import longest_s
@@ -11,7 +12,6 @@ from ..world.presliding import fastest_per_s
 from .build import bristled_of, device_of
 from .quantities import MARGIN, rounded_down, rounded_up
 from .schema import Scene
-from .sentences import plain
 from .several import GAIN_WORDS
 
 SAMPLES_MAX = 10**9

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+from ...model.runtime.result import Table, table_of
 from ..estimates.accuracy import encoder_of, said_of
-from ..jobs.result import Table, table_of
 from ..walls.methods import Curve
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...model.axes import AxesSpec
-from ..jobs.result import Table, table_of
+from ...model.runtime.result import Table, table_of
 from ..rtl.pipeline import synthesise_axes
 from ..scene.load import load
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from ...model.build_folder import build_dir
 from ...model.estimators.registry import ESTIMATORS
-from ..jobs.result import Table, table_of, text_of
+from ...model.runtime.result import Table, table_of, text_of
 from ..jobs.rounds import medians
 from ..jobs.scratch import scratch
 from ..rtl.cocotb_runner import Job, simulate_axis

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Any
 
+from ...model.runtime.result import Table, table_of
 from ..estimates import signals
 from ..estimates.accuracy import axis_spec, measure
-from ..jobs.result import Table, table_of
 from ..rtl.synthesis import estimator_cells
 from ..walls.methods import Curve
 

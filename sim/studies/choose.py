@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...model.estimators import registry
+from ...model.runtime.result import Table, table_of
 from ..estimates import signals
 from ..estimates.accuracy import said_of
-from ..jobs.result import Table, table_of
 
 PHASE_ERROR_COUNTS = 0.25
 EDGE_ERROR_COUNTS = 0.05

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from ...model.runtime.result import Table, table_of
 from ..boards.description import board_of
-from ..jobs.result import Table, table_of
 from ..rtl.flow import DoesNotFitError
 from ..rtl.synthesis import estimator_cells, synthesise
 from ..scene.load import load

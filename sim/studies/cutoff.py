@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 
 from ...model.estimators.butterworth import CUTOFF_MAX
-from ..jobs.result import Table, table_of
+from ...model.runtime.result import Table, table_of
 from ..scene.case import Case, accepted
 from ..scene.schema import Scene
 from ..walls.grid import wider_grid

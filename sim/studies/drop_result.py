@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..jobs.result import Table, table_of
+from ...model.runtime.result import Table, table_of
 from ..scene.schema import Scene
 from ..walls.chatter import Chatter
 from ..walls.zwidth import Effort, Map

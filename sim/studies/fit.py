@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from ..jobs.result import Table, table_of
+from ...model.runtime.result import Table, table_of
 from ..scene.case import Case
 from ..scene.errors import SceneError
 from ..scene.schema import Scene

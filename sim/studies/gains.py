@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ...model.estimators.levant import Design, Gains
-from ..jobs.result import Table, table_of
+from ...model.runtime.result import Table, table_of
 from ..scene.case import Case, accepted
 from ..scene.schema import Scene
 from ..walls.boundary import Grid

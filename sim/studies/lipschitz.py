@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ..jobs.result import Summary
+from ...model.runtime.result import Summary
 from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls import hit

@@ -7,7 +7,7 @@ loop without them, with either, and with both shows which of them ends the gain.
 from dataclasses import dataclass
 from typing import Any
 
-from ..jobs.result import Table, table_of
+from ...model.runtime.result import Table, table_of
 from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls import theory

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from ...model.runtime.result import Table, table_of
 from ..estimates import hardness
-from ..jobs.result import Table, table_of
 from ..scene.schema import Scene
 from .rendered_setting import WITHIN, Setting, Spread, slow_hz, spread
 

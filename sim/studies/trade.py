@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from ..jobs.result import Table, table_of
+from ...model.runtime.result import Table, table_of
 from ..scene.schema import Scene
 from ..walls.moves import Move
 from .shortcuts import Shortcut

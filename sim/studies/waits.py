@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from ...model.build_folder import build_dir
+from ...model.runtime.result import Table, table_of
 from ..jobs import children
-from ..jobs.result import Table, table_of
 from ..jobs.scratch import scratch
 
-PROGRAM = "import sys; sys.argv[0] = 'hardwall'; from hardwall.sim.commands.app import main; main()"
+PROGRAM = "import sys; sys.argv[0] = 'hardwall'; from hardwall.cli.app import main; main()"
 SPEED = "samples_per_s"
 BUILD = "HARDWALL_BUILD"
 PLACES = (".venv/bin/hardwall", "bin/hardwall")

@@ -7,8 +7,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from ...model.runtime.result import Table, table_of
 from ...model.whole_file import whole_file
-from ..jobs.result import Table, table_of
 from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls import theory, worst

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from ...model.runtime.result import Table, table_of
+from ...model.runtime.stages import stage
 from ...model.whole_file import whole_file
-from ..jobs.result import Table, table_of
-from ..jobs.stages import stage
 from ..loop.turns import turns
 from ..loop.values import EDGE_CAPACITY
 from ..scene.several import AxesScene

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from ..jobs.result import text_of
+from ...model.runtime.result import text_of
 
 REST_MM = 1e-6
 """The RMS of position (mm) below which a handle is called at rest: one nanometre."""

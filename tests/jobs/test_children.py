@@ -13,9 +13,10 @@ from stimuli.processes import ended_by, line, session, started, wait_until
 # Where this runs under nohup, the programs that it starts would not hear SIGHUP.
 PROGRAM = """
 import signal, sys, threading
-from hardwall.sim.jobs import children, ending
+from hardwall.model.runtime import termination
+from hardwall.sim.jobs import children
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
-ending.hear_signals()
+termination.hear_signals()
 tool = ["sh", "-c", "sleep 600 & echo begun; sleep 600"]
 if {in_a_thread}:
     threading.Thread(target=children.run, args=[tool]).start()

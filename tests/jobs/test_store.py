@@ -7,7 +7,8 @@ import pytest
 
 from hardwall import sim
 from hardwall.model import build_folder
-from hardwall.sim.jobs import ending, parallel, store
+from hardwall.model.runtime import termination
+from hardwall.sim.jobs import parallel, store
 from hardwall.sim.jobs.store import Store
 
 
@@ -116,21 +117,21 @@ def unsaid(monkeypatch):
 
 
 def test_results_that_are_kept_are_counted():
-    ending.begin()
+    termination.begin()
     Store("some").put({"a": 1}, 1)
     Store("some").put({"a": 2}, 2)
-    assert ending.remark().startswith("; 2 new results are kept")
+    assert termination.remark().startswith("; 2 new results are kept")
 
 
 def test_without_a_place_to_keep_them_results_are_used_and_one_line_says_so(tmp_path, monkeypatch, caplog, unsaid):
-    ending.begin()
+    termination.begin()
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("HARDWALL_BUILD", str(tmp_path / "file"))
     kept = Store("squares")
     jobs = [{"number": number} for number in (1, 2, 3)]
     assert parallel.run(square, jobs, kept, 1) == [{"square": 1}, {"square": 4}, {"square": 9}]
     assert caplog.messages == [f"{kept.path} cannot be written (Not a directory): what this run makes is not kept"]
-    assert ending.remark() == "", "nothing is kept"
+    assert termination.remark() == "", "nothing is kept"
 
 
 @pytest.mark.skipif(not os.access("/dev/full", os.W_OK), reason="this system has no /dev/full")

@@ -130,8 +130,9 @@ def test_without_a_place_to_keep_it_there_is_one_for_the_process(tmp_path, monke
 OWN = """
 import time
 from pathlib import Path
-from hardwall.sim.jobs import ending, whole_folder
-ending.hear_signals()
+from hardwall.model.runtime import termination
+from hardwall.sim.jobs import whole_folder
+termination.hear_signals()
 print(whole_folder.whole_folder(Path("/dev/null/rtl/0123"), lambda folder: (folder / "file").touch()), flush=True)
 time.sleep({seconds})
 """

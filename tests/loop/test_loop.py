@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
+from hardwall.cli import app
 from hardwall.model.design import Design, overlap_of
-from hardwall.sim.commands import app
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load
 from hardwall.sim.studies.bench import under_cocotb

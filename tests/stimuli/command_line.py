@@ -1,6 +1,6 @@
 """The command line, called in this process."""
 
-from hardwall.sim.commands import app
+from hardwall.cli import app
 
 from .reports import check_text
 
@@ -11,7 +11,7 @@ WIDTH = 80
 def call(monkeypatch, capsys, *arguments: object) -> tuple[int, str, str]:
     """Return exit code, stdout and stderr of `hardwall ARGUMENTS`; a report on stdout is held to its schema."""
     monkeypatch.setattr("sys.argv", ["hardwall", *map(str, arguments)])
-    monkeypatch.setattr("hardwall.sim.jobs.ending.hear_signals", lambda: None)  # the signals are pytest's
+    monkeypatch.setattr("hardwall.model.runtime.termination.hear_signals", lambda: None)  # the signals are pytest's
     try:
         app.main()
         code = 0

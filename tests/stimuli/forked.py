@@ -19,9 +19,9 @@ from typing import Any, NamedTuple, NoReturn
 
 import scipy
 
+from hardwall.cli import app, board, panel, synth
+from hardwall.cli.group import COMMANDS
 from hardwall.sim import pictures
-from hardwall.sim.commands import app, board, panel, synth
-from hardwall.sim.commands.group import COMMANDS
 from hardwall.sim.estimates.accuracy import measure
 from hardwall.sim.jobs import cluster, parallel, store
 from hardwall.sim.rtl import shared_library
@@ -31,7 +31,7 @@ from hardwall.sim.walls import zwidth
 
 LOADED = (
     *(scipy.linalg, scipy.optimize, scipy.signal),
-    *(import_module(f"hardwall.sim.commands.{name}") for name in COMMANDS),
+    *(import_module(f"hardwall.cli.{name}") for name in COMMANDS),
     *(import_module(f"hardwall.sim.pictures.{name}") for _, name, _ in pkgutil.iter_modules(pictures.__path__)),
 )
 """What is otherwise loaded when it is used: here once, and not in every child."""

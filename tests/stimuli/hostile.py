@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 from pydantic import BaseModel
 
+from hardwall.cli import group
 from hardwall.model.estimators import registry
 from hardwall.sim.boards.description import BOARDS
-from hardwall.sim.commands import group
 from hardwall.sim.scene.load import names, read
 from hardwall.sim.scene.schema import Scene
 

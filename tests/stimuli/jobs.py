@@ -3,7 +3,8 @@
 import subprocess
 from pathlib import Path
 
-from hardwall.sim.jobs import children, ending, parallel
+from hardwall.model.runtime import termination
+from hardwall.sim.jobs import children, parallel
 from hardwall.sim.jobs.store import Store
 
 
@@ -26,7 +27,7 @@ def fail_beside_a_long_job(number: int) -> int:
 
 def run_for_ever() -> None:
     """Run jobs on two threads, of which all but the first wait."""
-    ending.hear_signals()
+    termination.hear_signals()
     parallel.run(wait_with_a_tool, [{"number": number} for number in range(3)], Store("waits"), 2)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import typer.main
 
-from hardwall.sim.commands.group import app
+from hardwall.cli.group import app
 
 ROOT = Path(__file__).absolute().parents[2]
 PAGES = sorted(

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from hardwall.sim.jobs.ending import CODES
+from hardwall.model.runtime.termination import CODES
 
 HARDWALL = Path(sys.executable).with_name("hardwall")
 PATIENCE_S = 300.0

@@ -6,7 +6,7 @@ from typing import Any, NoReturn
 
 from jsonschema import Draft202012Validator
 
-SCHEMA = json.loads(files("hardwall.sim.commands").joinpath("reports.schema.json").read_text(encoding="utf-8"))
+SCHEMA = json.loads(files("hardwall.cli").joinpath("reports.schema.json").read_text(encoding="utf-8"))
 
 
 def check(command: str, report: Any) -> None:

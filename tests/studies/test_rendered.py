@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from hardwall.sim.commands import rendered as command
+from hardwall.cli import rendered as command
 from hardwall.sim.estimates import hardness, impedance
 from hardwall.sim.scene.case import Case
 from hardwall.sim.studies import rendered

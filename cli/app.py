@@ -1,0 +1,63 @@
+"""The command line. Results go to stdout, everything else to stderr.
+
+The exit codes are 0, 1 for a failed run, 2 for bad input, 130 after SIGINT, 143 after SIGTERM, and 141 if stdout was
+closed early. This module imports nothing that comes with an extra, so that it can name an extra that is not installed,
+and nothing that takes long: until `main` hears signals, an interrupt is a traceback of Python.
+"""
+
+import gc
+import sys
+from importlib import import_module
+
+from ..model.build_folder import BuildFolderError
+from ..model.runtime import termination
+from ..model.runtime.input_error import InputError
+from . import streams
+from .errors import BadInput, one_line
+
+COLLECTED = 100_000, 100, 100
+"""How seldom Python looks for garbage. Imports and the compiler make objects that stay: to go through all of them again
+and again, by Python's own numbers, is an eighth of the time in which a loop is compiled."""
+
+
+def main() -> None:
+    """Run the command line; report every failure as one line on stderr and an exit code."""
+    termination.hear_signals()
+    gc.set_threshold(*COLLECTED)
+    termination.begin()
+    streams.prepare()
+    code, message = _run()
+    try:
+        sys.stdout.flush()
+    except streams.StdoutError as error:
+        if not message:
+            code, message = error.code, str(error)
+    if message:
+        print(f"hardwall: error: {one_line(message)}", file=sys.stderr)
+    if code:
+        sys.exit(code)
+
+
+def _run() -> tuple[int, str]:
+    """Run the command that is called; return the exit code and the message of its failure."""
+    try:
+        import_module(".group", __package__).run()
+    except (BadInput, ValueError) as error:
+        # A scene may be valid and its axis have no board, which is an error of the model; its import is slow.
+        of_board = hasattr(error, "field")
+        if not of_board and not isinstance(error, BadInput | InputError | BuildFolderError):
+            raise
+        return 2, f"the scene's {error}" if of_board else str(error)
+    except ModuleNotFoundError as error:
+        extra = import_module(".extras", __package__).extra_of(error.name)
+        if extra is None:
+            raise
+        return 1, f"{error.name} is not installed: it comes with pip install 'hardwall[{extra}]'"
+    except streams.StdoutError as error:
+        return error.code, str(error)
+    except (RuntimeError, OSError, MemoryError) as error:
+        what = "this run needs more memory than there is" if isinstance(error, MemoryError) else error
+        return 1, f"{what}{termination.remark()}"
+    except SystemExit as exit_:
+        return exit_.code or 0, ""
+    return 0, ""

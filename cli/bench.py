@@ -1,0 +1,29 @@
+"""The command `bench`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..sim.scene.case import Case
+from ..sim.studies import bench, waits
+from .errors import BadInput
+from .scenes import SceneArgument
+from .study import StudyOptions, study
+from .terminal import log
+
+
+@study()
+def command(
+    options: StudyOptions,
+    scene: SceneArgument = "mhz",
+    against: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="another checkout, set up, or environment: its commands are timed in turns"),
+    ] = None,
+) -> None:
+    try:
+        program = against and waits.program_of(against)
+    except ValueError as error:
+        raise BadInput(f"--against {error}") from None
+    options.finish(bench.study(Case.of(scene), log.print, program))

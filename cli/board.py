@@ -1,0 +1,98 @@
+"""The command `board`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..model.axes import AxesSpec
+from ..model.checks import shown
+from ..model.runtime.result import Values
+from ..model.spec import AxisSpec
+from ..sim.boards.description import BOARDS, Description, Memory
+from ..sim.jobs.named_folder import foreign
+from ..sim.rtl.bitstream import Order, build
+from ..sim.rtl.loader import load as load_into
+from ..sim.scene.load import load
+from ..sim.scene.schema import Scene
+from .errors import BadInput, one_line
+from .options import AxesOption, EstimatorOption
+from .scenes import SceneOfBoardArgument
+from .study import StudyOptions, study
+from .terminal import log
+
+
+def _boards(incomplete: str) -> list[str]:
+    """Return the boards whose names begin so, for the completion of a shell."""
+    return [name for name in BOARDS if name.startswith(incomplete)]
+
+
+@study("set_")
+def command(
+    options: StudyOptions,
+    board: Annotated[str, typer.Argument(metavar="BOARD", help=", ".join(BOARDS), autocompletion=_boards)],
+    folder: Annotated[
+        str, typer.Option("-o", "--output-folder", metavar="DIR", help="folder for the files, new or written before")
+    ],
+    scene: SceneOfBoardArgument = None,
+    estimator: EstimatorOption = None,
+    axes: AxesOption = None,
+    seeds: Annotated[int, typer.Option(min=1, max=99, help="most placements until one reaches the clock")] = 5,
+    program: Annotated[Memory | None, typer.Option(help="put the bitstream into the board that is connected")] = None,
+) -> None:
+    if board not in BOARDS:
+        raise BadInput(f"board must be one of {', '.join(BOARDS)}, not {shown(board)}")
+    on = BOARDS[board]
+    if program and program not in on.loads:
+        raise BadInput(f"--program must be one of {', '.join(on.loads)} for {on.name}, not {program!r}")
+    of = scene_on(on, options, scene, estimator)
+    path = _free(folder)
+    order = Order(on, of.name, spec_on(of, axes), of.glitch_clocks, seeds)
+    with log.status(f"{on.name}: Yosys, then nextpnr until a seed reaches {of.spec.clock_hz / 1e6:g} MHz"):
+        report = build(order, path)
+    options.finish(Values(report))
+    said = f"{report['fmax_mhz']:.2f} MHz for a clock of {report['clock_mhz']:g} MHz"
+    log.print(one_line(f"bitstream: {path / report['bitstream']}, {said}"), soft_wrap=True)
+    if program:
+        with log.status(f"loading {on.name}"):
+            load_into(on, path / report["bitstream"], program, report["sha256"])
+
+
+def scene_on(board: Description, options: StudyOptions, scene: str | None, estimator: str | None) -> Scene:
+    """Return the scene that a board is to run: its own, at a clock that it makes, if none is given."""
+    changes = options.changes(controller__estimator=estimator)
+    return load(scene, changes) if scene is not None else load(board.scene, board.changes | changes)
+
+
+def spec_on(scene: Scene, axes: int | None) -> AxisSpec | AxesSpec:
+    """Return the axis of a scene, or several with its requirements, each with the pulses that a board gives it.
+
+    Raises:
+        BadInput: if the scene has a drive stage of its own, which no axis of several has.
+        FieldError: if the axes cannot be.
+    """
+    if axes is None:
+        return scene.spec
+    if scene.drive is not None:
+        raise BadInput(f"--axes must be absent for a scene with a drive stage, not {axes}")
+    return AxesSpec(axes=axes, **scene.requirements)
+
+
+def _free(folder: str) -> Path:
+    """Return the path of the folder for the files; raise BadInput if it may not be written."""
+    if not folder:
+        raise BadInput("-o must be a folder, not ''")
+    path = Path(folder)
+    try:
+        if path.resolve() in (Path.cwd(), *Path.cwd().parents):
+            raise BadInput(f"-o must be another folder than the current one and those above it, not {shown(folder)}")
+        found = foreign(path)
+        above = next(each for each in path.absolute().parents if each.exists())
+        if not above.is_dir():
+            raise NotADirectoryError(20, "Not a directory")
+    except OSError as error:
+        raise BadInput(f"-o {shown(folder)} cannot be written: {error.strerror}") from None
+    if found is not None:
+        accepted = "a folder that is new, empty, or as this command wrote it"
+        raise BadInput(f"-o must be {accepted}, and {shown(folder)} has {shown(found)}")
+    return path

@@ -1,0 +1,105 @@
+"""The command `capture`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ..host import Axis
+from ..host.capture import Captured
+from ..host.port import BAUD
+from ..model.capture import DECIMATION_BITS, RECORDS_MAX, SOURCES
+from ..model.checks import shown
+from ..model.runtime.result import Summary
+from .errors import BadInput
+from .options import output_file, within
+from .port import BaudOption, IdentityOption, PaceOption, PortArgument, axis_at
+from .report import ReportOptions, reports
+from .set import values_of
+from .terminal import log, progress
+
+DECIMATION_MAX = (1 << DECIMATION_BITS) - 1
+HAND = "hand"
+"""The trigger that a person gives: as soon as enough records are there before it."""
+
+
+@dataclass(frozen=True)
+class Captures(Summary):
+    """A capture, and its report.
+
+    Attributes:
+        captured: the capture.
+    """
+
+    captured: Captured
+
+    def report(self) -> dict[str, Any]:
+        found = self.captured
+        return {
+            "identity": found.identity,
+            "records": len(found.time_s),
+            "before": found.place,
+            "from_s": float(found.time_s[0]),
+            "to_s": float(found.time_s[-1]),
+            "position_least_m": float(found.position_m.min()),
+            "position_most_m": float(found.position_m.max()),
+            "speed_most_m_per_s": float(abs(found.velocity_m_per_s).max()),
+            "force_most_n": float(abs(found.force_n).max()),
+            "flags": [name for name in found.flag_names if found.flag(name).any()],
+        }
+
+
+@reports("plot")
+def command(
+    options: ReportOptions,
+    port: PortArgument,
+    words: Annotated[
+        list[str] | None, typer.Argument(metavar="WORD=VALUE...", help="words in SI units, written before")
+    ] = None,
+    trigger: Annotated[
+        str, typer.Option(metavar="NAME,...", help=f"what triggers: {', '.join((*SOURCES, HAND))}")
+    ] = "contact",
+    before: Annotated[
+        int | None,
+        typer.Option(min=0, max=RECORDS_MAX, help="records wanted before the trigger", show_default="a quarter of all"),
+    ] = None,
+    decimation: Annotated[int, typer.Option(min=1, max=DECIMATION_MAX, help="samples from a record to the next")] = 1,
+    level: Annotated[float, typer.Option(metavar="M", help="the position of the triggers rise and fall, m")] = 0.0,
+    arm: Annotated[bool, typer.Option("--arm", help="arm the axis first, and disarm it at the end")] = False,
+    seconds: Annotated[float, typer.Option(metavar="S", help="the longest wait")] = 60.0,
+    baud: BaudOption = BAUD,
+    identity: IdentityOption = None,
+    pace: PaceOption = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", metavar="FILE.npz", help="file for the records")] = None,
+) -> None:
+    within(seconds, "--seconds", 0.0, 1e6, "s")
+    out = output_file(out, "--out", (".npz",))
+    values, sources = values_of(words or []), _sources(trigger)
+    with axis_at(port, baud, identity, pace) as axis:
+        if values:
+            axis.set(**values)
+        if arm:
+            axis.arm()
+        axis.capture.start([source for source in sources if source != HAND], before, decimation, level)
+        captured = _wait(axis, HAND in sources, seconds)
+    options.finish(Captures(captured), {"records": (out, captured.save)} if out else {})
+
+
+def _sources(text: str) -> list[str]:
+    sources = text.split(",")
+    for source in sources:
+        if source not in (*SOURCES, HAND):
+            raise BadInput(f"--trigger must be of {', '.join((*SOURCES, HAND))}, not {shown(source)}")
+    return sources
+
+
+def _wait(axis: Axis, by_hand: bool, seconds: float) -> Captured:
+    """Return a capture when it is done; by hand it is triggered as soon as it waits for that."""
+    log.print(f"the capture of {axis.capture.records} records waits for its trigger")
+    if by_hand:
+        axis.capture.until("WAITING", seconds)
+        axis.capture.trigger()
+    axis.capture.until("DONE", seconds)
+    with progress("reading the capture", axis.capture.records) as advance:
+        return axis.capture.read(advance)

@@ -1,0 +1,18 @@
+"""What is wrong with the value of an option, in the words in which a scene says it of a key."""
+
+import typer
+from pydantic import Field, ValidationError
+from typer.core import TyperOption
+
+from ..model.checks import shown
+from ..model.runtime.accepted import accepted
+
+
+def refusal(error: typer.TyperException) -> str:
+    """Return what is wrong with a call; with the value of an option, as 'OPTION must be ..., not VALUE'."""
+    option, cause = getattr(error, "param", None), error.__cause__
+    if not isinstance(cause, ValidationError) or not isinstance(option, TyperOption):
+        return " ".join(error.format_message().split())
+    limits = Field(ge=option.min, le=option.max).metadata
+    value = shown(cause.errors()[0]["input"])
+    return f"{option.opts[0]} must be {accepted(option.type_descriptor.annotation, limits)}, not {value}"

@@ -1,0 +1,42 @@
+"""The command `set`."""
+
+from typing import Annotated
+
+import typer
+
+from ..host.port import BAUD
+from ..model.checks import shown
+from ..model.runtime.result import Values
+from .errors import BadInput
+from .port import BaudOption, IdentityOption, PaceOption, PortArgument, axis_at
+from .report import ReportOptions, reports
+
+
+@reports()
+def command(
+    options: ReportOptions,
+    port: PortArgument,
+    words: Annotated[list[str], typer.Argument(metavar="WORD=VALUE...", help="words in SI units")],
+    baud: BaudOption = BAUD,
+    identity: IdentityOption = None,
+    pace: PaceOption = None,
+) -> None:
+    values = values_of(words)
+    with axis_at(port, baud, identity, pace) as axis:
+        axis.set(**values)
+        used = {name: axis.get(name) for name in values}
+    options.finish(Values(used))
+
+
+def values_of(words: list[str]) -> dict[str, float]:
+    """Return the values of words as they are given on the command line."""
+    values: dict[str, float] = {}
+    for word in words:
+        name, equals, text = word.partition("=")
+        try:
+            if not equals or name in values:
+                raise ValueError
+            values[name] = float(text)
+        except ValueError:
+            raise BadInput(f"a word must be NAME=NUMBER, each once, not {shown(word)}") from None
+    return values

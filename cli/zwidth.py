@@ -1,0 +1,56 @@
+"""The command `zwidth`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..sim.scene.case import Case
+from ..sim.studies import zwidth
+from ..sim.walls.methods import methods
+from ..sim.walls.worst import HELD_BY
+from ..sim.walls.zwidth import STARTS
+from .maps import Maps
+from .options import BackendOption, StartsOption, output_file
+from .scenes import SceneArgument, curves_of, hands_of, refuse, refuse_for_maps
+from .study import StudyOptions, study
+
+
+@study("workers", "scheduler", "resume", "set_", "plot")
+def command(
+    options: StudyOptions,
+    scene: SceneArgument = "seed-2011",
+    wanted: Annotated[
+        str | None,
+        typer.Option(
+            "--estimators",
+            metavar="NAME[:OUTPUT],...",
+            help="`all`, some of all, or fdm-30, fdm-100, fdm-500, fdm-1000, proposed, adjusted",
+            show_default="these six",
+        ),
+    ] = None,
+    starts: StartsOption = STARTS,
+    hands: Annotated[
+        str | None,
+        typer.Option(
+            "--hands",
+            metavar="NAME,...",
+            help=f"hands on the handle, and the worst of them: all, or some of {', '.join(HELD_BY)}",
+            show_default="the scene's",
+        ),
+    ] = None,
+    backend: BackendOption = "fixed",
+    hits: Annotated[
+        Path | None, typer.Option("--csv", metavar="FILE", help="write every start's verdict: .csv")
+    ] = None,
+) -> None:
+    changes = options.changes()
+    hits = output_file(hits, "--csv", (".csv",))
+    refuse_for_maps(changes, "see --estimators")
+    holding = None if hands is None else hands_of(hands)
+    if holding is not None:
+        refuse(changes, ("hand.",), "see --hands")
+    case = Case.of(scene, changes)
+    curves = None if wanted is None else curves_of(wanted, methods(case.scene))
+    found = zwidth.study(case, curves, holding, Maps(options, backend, starts))
+    options.finish(found, {"hits": (hits, found.save)} if hits else {})
