@@ -23,7 +23,7 @@ PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python -m
 HARDWALL := $(VENV)/bin/hardwall
-SOURCES := $(wildcard $(addsuffix .py,hdl/* hdl/*/* model/* model/*/* sim/* sim/*/*) sim/rtl/library.* sim/scene/builtin/*.toml sim/scene/hands.toml)
+SOURCES := $(wildcard $(addsuffix .py,cli/* hdl/* hdl/*/* model/* model/*/* sim/* sim/*/*) sim/rtl/library.* sim/scene/builtin/*.toml sim/scene/hands.toml)
 
 # The main job: the paper's device with the generated hardware in the loop, and for comparison the same axis at 1 MHz on
 # the bit-accurate model, which gives the hardware's words in a hundredth of the time.

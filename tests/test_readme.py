@@ -1,4 +1,4 @@
-"""The README stays short, and it and every page name only existing files, tasks of make, commands and pages."""
+"""The README stays short, as that of the tests, and it and every page name only existing files, tasks of make, commands and pages."""
 
 import re
 
@@ -18,6 +18,16 @@ def test_the_readme_is_one_screen_and_a_bit():
 def test_the_readme_leads_to_every_page():
     pages = {name for name in PAGES if name.startswith("docs/")} - {"docs/index.md"}
     assert pages - set(re.findall(r"\]\((docs/[\w-]+\.md)\)", text_of("README.md"))) == set()
+
+
+def test_the_tests_say_in_one_screen_where_what_is():
+    text = text_of("tests/README.md")
+    assert len(text.splitlines()) <= 50
+    folders = {path.name for path in (ROOT / "tests").iterdir() if path.is_dir() and any(path.glob("*.*"))}
+    assert set(re.findall(r"`(\w+)/`", text)) >= folders
+    named = re.findall(r"`(test_\w+\.py)`", text)
+    assert named
+    assert [name for name in named if not (ROOT / "tests" / name).exists()] == []
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -43,7 +53,7 @@ def test_every_variable_of_make_that_a_page_names_exists(name):
 
 @pytest.mark.parametrize("name", PAGES)
 def test_every_file_that_a_page_names_exists(name):
-    named = re.findall(r"`((?:hdl|model|sim|tests|constraints|docs)/[\w./-]*)`", text_of(name))
+    named = re.findall(r"`((?:cli|hdl|host|model|sim|tests|constraints|docs)/[\w./-]*)`", text_of(name))
     places = [ROOT, *(ROOT / "docs/examples").iterdir()]
     missing = [each for each in named if not any((place / each).exists() for place in places)]
     assert [each for each in missing if not PLACEHOLDER.search(each) and "..." not in each] == []
