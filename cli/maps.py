@@ -72,7 +72,7 @@ class MapsOfOneCrew(Maps):
 
     def __init__(self, options: StudyOptions, backend: str, starts: int, cases: int):
         super().__init__(options, backend, starts)
-        self._known, self._context = Store(options.study, options.resume), self._crew(cases * starts)
+        self._known, self._context = Store(options.command, options.resume), self._crew(cases * starts)
 
     def __enter__(self) -> Self:
         self._joined = self._context.__enter__()
