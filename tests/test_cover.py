@@ -41,6 +41,7 @@ OF_THE_BENCH = {
     for name in (
         "test_typing",
         "test_board_stages",
+        "test_axis_bursts",
         "test_supervised_axes_faults",
         "testing/test_campaign",
         "link/test_mbpoll",

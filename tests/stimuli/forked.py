@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import scipy
 
-from hardwall.cli import app, board, panel, synth
+from hardwall.cli import app, board, synth, virtual_bench
 from hardwall.cli.group import COMMANDS
 from hardwall.sim import pictures
 from hardwall.sim.estimates.accuracy import measure
@@ -77,7 +77,7 @@ def _shorten(folder: Path) -> None:
     checks.SAMPLES_MAX, checks.STEPS_MAX, cluster.TIMEOUT_S = SAMPLES_MAX, STEPS_MAX, TIMEOUT_S
     parallel.run = _short(parallel.run)
     bench.study = zwidth.run = shared_library.build = synth.synthesise = board.build = board.load_into = _begin
-    panel.VirtualBench.connect = _begin
+    virtual_bench.VirtualBench.connect = _begin
     store.build_dir = lambda: folder / "build"
 
 
