@@ -1,4 +1,4 @@
-"""The README stays short, as that of the tests, and it and every page name only existing files, tasks of make, commands and pages."""
+"""The README stays short, as that of the tests; both and every page name only what exists."""
 
 import re
 
