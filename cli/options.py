@@ -18,7 +18,6 @@ from .errors import BadInput
 Estimator = Literal[tuple(registry.ESTIMATORS)]
 Backend = Literal["float", "fixed", "rtl"]
 
-
 EstimatorOption = Annotated[
     Estimator | None,
     typer.Option(

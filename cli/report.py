@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from functools import partial
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -34,9 +35,11 @@ class ReportOptions:
     as_json: JsonOption = False
 
     def __post_init__(self):
-        # A picture that cannot be written is reported before anything long begins.
+        # A picture that cannot be written, or drawn, is reported before anything long begins.
         if self.plot:
             output_file(self.plot, "--plot", _pictures("").SUFFIXES)
+            if find_spec("matplotlib") is None:
+                raise ModuleNotFoundError("nothing draws", name="matplotlib")
 
     def finish(self, result: Result, files: dict[str, tuple[Path, Callable[[Path], object]]] | None = None) -> None:
         """Print a result, write files of it, and draw it; whichever of these fails, the others are done.

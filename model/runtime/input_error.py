@@ -1,4 +1,4 @@
-"""The error for what a user gave and cannot be: of a scene, a file, a setting of the environment."""
+"""The error for input that cannot be."""
 
 
 class InputError(ValueError):

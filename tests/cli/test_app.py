@@ -102,6 +102,12 @@ def test_a_command_that_speaks_to_a_board_needs_the_extra_host_alone(name):
     assert (bad.returncode, bad.stderr.count("\n")) == (2, 1), bad.stderr
 
 
+def test_what_cannot_be_drawn_is_said_before_a_board_is_asked():
+    done = without({"matplotlib"}, "capture", "nowhere", "--plot", "capture.png")
+    message = "hardwall: error: matplotlib is not installed: it comes with pip install 'hardwall[sim]'\n"
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", message)
+
+
 def test_signals_are_heard_before_anything_long_is_imported():
     program = "import sys, hardwall.cli.app; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
