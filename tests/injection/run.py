@@ -16,7 +16,7 @@ from kept import Findings, digest_of
 
 from hardwall.hdl.export import to_verilog
 from hardwall.model.build_folder import build_dir
-from hardwall.sim.rtl import cocotb_runner
+from hardwall.sim.rtl import cocotb_build, cocotb_runner
 from hardwall.sim.rtl.board_library import AMPLIFIERS
 from hardwall.testing import SEED
 from proofs.bugs import Bug
@@ -64,7 +64,7 @@ def run(stage: str, faults: Sequence[Fault], bug: Bug | None = None) -> list[Out
 
 def origin_digest(stage: str) -> str:
     """Return a digest of all that the outcomes of a stage come from: the board, its amplifier and the faults."""
-    injected_by = means(__file__, cocotb_runner.__file__, AMPLIFIERS)
+    injected_by = means(__file__, cocotb_build.__file__, cocotb_runner.__file__, AMPLIFIERS)
     return digest_of(stage, to_verilog(_damaged(stage), "damaged"), code_of_all(IN_SIMULATOR), injected_by, SEED)
 
 
