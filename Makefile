@@ -4,7 +4,7 @@
 #   ARGS="-k levant"          more options for pytest (test, soak, fuzz)
 #   ONLY=hit/mhz              the beginning of the names of the cases to record anew (digests), or of what is checked
 #                             (prove, faults, gate, coverage, mutate)
-#   AGAIN=1                   find anew what is kept in tests/findings/ (the same five)
+#   AGAIN=1                   find anew what is kept in tests/signoff/findings/ (the same five)
 #   SEEDS="1 2" SAMPLES=10000 ENDURANCE=1000000
 #                             the seeds, the samples for every seed, and the samples of endurance (soak)
 #   CALLS=1000 KILLS=16       the hostile calls, and the runs that are ended (fuzz)
@@ -22,6 +22,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PYTHON ?= python3
 VENV := .venv
 RUN := $(VENV)/bin/python -m
+IN_TESTS := PYTHONPATH=tests $(RUN)
 HARDWALL := $(VENV)/bin/hardwall
 SOURCES := $(wildcard $(addsuffix .py,cli/* hdl/* hdl/*/* model/* model/*/* sim/* sim/*/*) sim/rtl/library.* sim/scene/builtin/*.toml sim/scene/hands.toml)
 
@@ -70,19 +71,19 @@ test: $(VENV)/.test | tools ## every regression: the model against exact arithme
 prove faults gate coverage mutate: export HARDWALL_AGAIN := $(AGAIN)
 
 prove: $(VENV)/.test | tools ## every promise about safety and every width, proven; every proof is seen to fail with a bug
-	@$(VENV)/bin/python tests/prove.py $(ONLY)
+	@$(IN_TESTS) signoff.prove $(ONLY)
 
 faults: $(VENV)/.test | tools ## faults injected into the board and its plant: what trips, how soon, and the force meanwhile
-	@$(VENV)/bin/python tests/faults.py $(ONLY)
+	@$(IN_TESTS) signoff.faults $(ONLY)
 
 gate: $(VENV)/.test | tools ## netlists of three families of FPGAs beside the RTL, from power-up on: all outputs, every clock
-	@$(VENV)/bin/python tests/gate.py $(ONLY)
+	@$(IN_TESTS) signoff.gate $(ONLY)
 
 coverage: $(VENV)/.test | tools ## lines, branches and toggles of every block that its tests reach (half an hour)
-	@$(VENV)/bin/python tests/cover.py $(ONLY)
+	@$(IN_TESTS) signoff.cover $(ONLY)
 
 mutate: $(VENV)/.test | tools ## mutants of every block's netlist, which its own tests must kill (an hour and a half)
-	@$(VENV)/bin/python tests/mutate.py $(ONLY)
+	@$(IN_TESTS) signoff.mutate $(ONLY)
 
 lint: $(VENV)/.test | tools ## style and common mistakes
 	@failed=0; $(RUN) ruff check . || failed=1; $(RUN) ruff format --check . || failed=1; exit $$failed
@@ -98,7 +99,7 @@ boards: $(VENV)/.synth | tools ## bitstreams for three boards, with their wiring
 	@for board in $(BOARDS); do $(HARDWALL) board $$board -o build/boards/$$board; done
 
 constraints: $(VENV)/.test | tools ## write the files of constraints/ anew from the descriptions of the boards
-	@$(VENV)/bin/python tests/own_flow.py
+	@$(IN_TESTS) support.own_flow
 
 choose: $(VENV)/.synth | tools ## the table to choose an estimator by: accuracy, and cost on three devices (hours)
 	@$(HARDWALL) costs
@@ -121,7 +122,7 @@ browser: $(VENV)/.test | tools ## the panel's page in a real browser, beside a b
 	@HARDWALL_BROWSER=1 $(RUN) pytest -n 0 tests/host/panel/test_page.py $(ARGS)
 
 screenshots: $(VENV)/.test | tools ## the pictures of the panel's page, anew, by a browser
-	@$(VENV)/bin/python tests/screenshots.py
+	@$(IN_TESTS) support.screenshots
 
 verilog: $(VENV)/.sim | tools ## the axis of the scene as Verilog, in build/verilog/
 	@$(HARDWALL) verilog $(SCENE) --output-folder build/verilog
@@ -131,7 +132,7 @@ docs: $(VENV)/.docs | tools ## the pages as a site in build/docs, every link ins
 	@echo build/docs/index.html
 
 digests: $(VENV)/.test | tools ## record anew what the program computes, and show what changed (after a change on purpose)
-	@$(VENV)/bin/python tests/digests.py $(ONLY)
+	@$(IN_TESTS) support.digests $(ONLY)
 
 soak fuzz: PYTEST += -o faulthandler_timeout=0
 

@@ -9,8 +9,8 @@ import gc
 import sys
 from importlib import import_module
 
-from ..model.build_folder import BuildFolderError
 from ..model.runtime import termination
+from ..model.runtime.build_folder import BuildFolderError
 from ..model.runtime.input_error import InputError
 from . import streams
 from .errors import BadInput, one_line

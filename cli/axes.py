@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..model.axes import AXES_MAX, PIPELINES
+from ..model.axes.axis import AXES_MAX, PIPELINES
 from ..model.checks import shown
 from ..sim.jobs.store import Store
 from ..sim.studies import axes

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..model.axes import AxesSpec
+from ..model.axes.axis import AxesSpec
 from ..model.checks import shown
 from ..model.runtime.result import Values
 from ..model.spec import AxisSpec

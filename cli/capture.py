@@ -9,7 +9,7 @@ import typer
 from ..host import Axis
 from ..host.capture import Captured
 from ..host.port import BAUD
-from ..model.capture import DECIMATION_BITS, RECORDS_MAX, SOURCES
+from ..model.axis.capture import DECIMATION_BITS, RECORDS_MAX, SOURCES
 from ..model.checks import shown
 from ..model.runtime.result import Summary
 from .errors import BadInput

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from ..model.axes import AXES_MAX
+from ..model.axes.axis import AXES_MAX
 from ..model.checks import shown
 from ..model.estimators import registry
 from .errors import BadInput

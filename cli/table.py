@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 import typer
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from ..model.axes import AXES_MAX
+from ..model.axes.axis import AXES_MAX
 from ..model.checks import shown
 from ..model.runtime.result import table_of
 from ..sim.jobs.regular_file import content_of

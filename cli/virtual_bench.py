@@ -12,7 +12,7 @@ from ..host import Axis, PortError, connect
 from ..host.panel.estimates import Estimates
 from ..host.panel.hand import Hand
 from ..host.panel.live import Bench
-from ..model import supervisor
+from ..model.axis import supervisor
 from ..model.runtime import termination
 from ..sim.scene.load import parse, read
 from ..sim.scene.schema import Scene

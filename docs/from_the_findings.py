@@ -1,4 +1,4 @@
-"""What pages take from `tests/findings/`, which the tasks that sign the hardware off write.
+"""What pages take from `tests/signoff/findings/`, which the tasks that sign the hardware off write.
 
 A line `%findings mutate%` in a page becomes the table of what that task has kept. A task that has kept nothing is a
 warning, and so fails the build.
@@ -16,7 +16,7 @@ from sphinx.application import Sphinx
 from sphinx.util import logging
 
 log = logging.getLogger(__name__)
-FINDINGS = Path(__file__).parent.parent / "tests" / "findings"
+FINDINGS = Path(__file__).parent.parent / "tests" / "signoff" / "findings"
 KINDS = ("line", "branch", "toggle")
 CELLS = ("lut4", "ff", "dsp", "bram")
 

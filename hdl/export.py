@@ -13,16 +13,16 @@ from amaranth.lib import wiring
 from amaranth.lib.cdc import FFSynchronizer
 
 from hardwall.model import register_texts
-from hardwall.model.axes import AxesSpec
-from hardwall.model.registers import RegisterMap
+from hardwall.model.axes.axis import AxesSpec
+from hardwall.model.axis.registers import RegisterMap
+from hardwall.model.runtime.whole_file import whole_file
 from hardwall.model.spec import AxisSpec
-from hardwall.model.whole_file import whole_file
 
-from .axes import Axes
-from .axes_board import AxesBoard
-from .axis import Axis
-from .board import Board
-from .capture import NO_FIRST_CONTENTS
+from .axes.axis import Axes
+from .axes.board import AxesBoard
+from .axis.axis import Axis
+from .axis.board import Board
+from .axis.capture import NO_FIRST_CONTENTS
 from .link.axi_link import AxiLink
 from .ports import Described, port_table
 

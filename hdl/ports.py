@@ -8,14 +8,14 @@ from amaranth.lib import wiring
 from amaranth.lib.data import ArrayLayout
 
 from hardwall.model.arithmetic.fixed import SQ, UQ, Format
-from hardwall.model.axes import AxesSpec
-from hardwall.model.design import ILLEGAL_WIDTH
+from hardwall.model.axes.axis import AxesSpec
+from hardwall.model.axis.design import ILLEGAL_WIDTH
 from hardwall.model.spec import AxisSpec
 
-from .axes import Axes
-from .axes_board import AxesBoard
-from .axis import Axis
-from .board import Board
+from .axes.axis import Axes
+from .axes.board import AxesBoard
+from .axis.axis import Axis
+from .axis.board import Board
 
 COLUMNS = ("port", "direction", "width", "format", "one LSB", "range", "reset", "what it is")
 MEANINGS = {

@@ -6,8 +6,8 @@ from collections.abc import Generator, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 
+from ..model.axis.registers import TELEMETRY
 from ..model.register import Kind
-from ..model.registers import TELEMETRY
 from .capture import Capture
 from .device import Device, read_identity
 from .errors import ChangedError, HostError, LateError, NotReadyError, RefusedError, TrippedError

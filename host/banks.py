@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Iterator
 
-from ..model.axes_registers import BANK, is_shared
-from ..model.registers import COUNTERS, END, PULSES, TELEMETRY
+from ..model.axes.registers import BANK, is_shared
+from ..model.axis.registers import COUNTERS, END, PULSES, TELEMETRY
 from .axis import Axis
 from .device import Device
 from .heartbeat import Beat

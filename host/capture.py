@@ -9,10 +9,10 @@ from typing import Protocol
 
 import numpy as np
 
-from ..model.capture import DONE, IDLE, RECORD_REGISTERS, SOURCES, STATE_FLAGS, STATES
+from ..model.axis.capture import DONE, IDLE, RECORD_REGISTERS, SOURCES, STATE_FLAGS, STATES
+from ..model.axis.registers import CAPTURE
 from ..model.checks import FieldError, check_int
-from ..model.registers import CAPTURE
-from ..model.whole_file import whole_file
+from ..model.runtime.whole_file import whole_file
 from .device import Device
 from .errors import ForeignError, NotReadyError, RefusedError
 from .seconds import check_seconds

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from ..model.arithmetic.fixed import SQ, UQ
-from ..model.axes import AXES_MAX
+from ..model.axes.axis import AXES_MAX
+from ..model.axis.registers import CONSTANTS, LAYOUT, MAP, SPACE, TELEMETRY
 from ..model.register import Kind, Register
-from ..model.registers import CONSTANTS, LAYOUT, MAP, SPACE, TELEMETRY
 from .errors import ForeignError
 from .port import Port
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from enum import IntEnum
 
-from ..model import output, supervisor
-from ..model.design import ENCODER_FLAGS
-from ..model.supervisor import CAUSES, COUNT_BITS
+from ..model.axis import output, supervisor
+from ..model.axis.design import ENCODER_FLAGS
+from ..model.axis.supervisor import CAUSES, COUNT_BITS
 
 
 class State(IntEnum):

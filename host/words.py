@@ -4,10 +4,10 @@ import difflib
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..model.axes_registers import is_shared
+from ..model.axes.registers import is_shared
+from ..model.axis.registers import ACTIVE, PULSES, WRITTEN
 from ..model.checks import FieldError, shown
 from ..model.register import Kind, Register
-from ..model.registers import ACTIVE, PULSES, WRITTEN
 from .bounds import check_within
 from .device import Device
 from .errors import ChangedError, RefusedError

@@ -3,12 +3,12 @@
 import json
 from collections.abc import Iterator
 
-from .axes_capture import Design as OfAxes
-from .axes_registers import BANK, AxesMap
-from .capture import DONE, RECORD_REGISTERS, SOURCES, STATES, Design
+from .axes.capture import Design as OfAxes
+from .axes.registers import BANK, AxesMap
+from .axis.capture import DONE, RECORD_REGISTERS, SOURCES, STATES, Design
+from .axis.registers import ACTIVE, CAPTURE, EVENTS, LAYOUT, MAP, WRITTEN, RegisterMap
+from .axis.supervisor import ARMED, CAUSES, DISARMED, TRIPPED
 from .register import Register
-from .registers import ACTIVE, CAPTURE, EVENTS, LAYOUT, MAP, WRITTEN, RegisterMap
-from .supervisor import ARMED, CAUSES, DISARMED, TRIPPED
 
 COLUMNS = ("address", "register", "kind", "access", "format", "one LSB", "range", "reset", "meaning")
 

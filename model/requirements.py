@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 from .arithmetic.fixed import SQ, bits_for
 from .checks import NUMBERS, FieldError, check_int, check_number, check_range, shown
-from .quadrature_speed import GLITCH_CLOCKS_MAX, glitch_clocks_for
+from .encoder.quadrature_speed import GLITCH_CLOCKS_MAX, glitch_clocks_for
 
 CLOCK_HZ_MAX = 1 << 48
 """The largest clock, far beyond any: stamps, of as many bits, are computed in 64."""

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from .axis.designed import DesignedAxis
 from .checks import FieldError, shown
-from .designed import DesignedAxis
 from .drive import registry
 from .drive.pdm import USUAL
 from .drive.stage import Stage, StageDesign

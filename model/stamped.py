@@ -12,9 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import checks, design, quadrature
-from .axis import Axis, Record, step
-from .compiled import compiled, inlined
+from . import checks
+from .axis import design
+from .axis.axis import Axis, Record, step
+from .encoder import quadrature
+from .runtime.compiled import compiled, inlined
 
 SAMPLES_MAX = 10**9
 """The most samples of a record: its arrays then take 32 GB."""

@@ -7,10 +7,9 @@ import os
 import re
 from pathlib import Path
 
-import digest_driver
-import digests
-import netlists
 import pytest
+
+from support import digest_driver, digests, netlists
 
 CASES = {case.name: case for case in digests.cases()}
 EVERY = os.environ.get("HARDWALL_DIGESTS") == "all"

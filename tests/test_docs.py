@@ -15,12 +15,12 @@ from pathlib import Path
 
 import pytest
 
-from hardwall.model.build_folder import build_dir
 from hardwall.model.estimators.registry import ESTIMATORS
+from hardwall.model.runtime.build_folder import build_dir
 from hardwall.sim.pictures.style import DPI, PAGE_IN
-from stimuli.command_line import call
 from stimuli.lengths import LONG
-from stimuli.pages import PAGES, ROOT, blocks, command_line, commands, text_of
+from support.command_line import call
+from support.pages import PAGES, ROOT, blocks, command_line, commands, text_of
 
 TOOLS = {"cd", "cp", "dask", "git", "pip", "pytest", "python", "source"}
 """First words of commands that are not run, besides `hardwall` and `make`."""

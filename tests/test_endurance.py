@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from hardwall.model import quadrature
 from hardwall.model.arithmetic.fixed import wrap
-from hardwall.model.axis import Axis
-from hardwall.model.compiled import compiled
+from hardwall.model.axis.axis import Axis
+from hardwall.model.encoder import quadrature
+from hardwall.model.encoder.quadrature import RUN_MAX, Seen
 from hardwall.model.estimators import registry
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.quadrature import RUN_MAX, Seen
+from hardwall.model.runtime.compiled import compiled
 from stimuli.specs import spec
 
 SAMPLES = int(os.environ.get("HARDWALL_ENDURANCE", "1000000"))

@@ -16,10 +16,10 @@ from hypothesis import HealthCheck, Phase, find, given, settings
 from hypothesis import strategies as st
 
 from hardwall.cli.group import COMMANDS
-from stimuli import forked
-from stimuli.forked import BEGAN, Ended, run
 from stimuli.hostile import ENVIRONS, Call, calls
-from stimuli.reports import check_text
+from support import forked
+from support.forked import BEGAN, Ended, run
+from support.reports import check_text
 
 CALLS = int(os.environ.get("HARDWALL_FUZZ", "54"))
 LINE_MAX = 1500

@@ -15,10 +15,10 @@ from typing import Any
 
 import pytest
 
-from hardwall.model.build_folder import build_dir
 from hardwall.model.runtime import termination
+from hardwall.model.runtime.build_folder import build_dir
 from hardwall.testing import rng
-from stimuli.processes import HARDWALL, ended, session, started, stored, wait_until
+from support.processes import HARDWALL, ended, session, started, stored, wait_until
 
 KILLS = int(os.environ.get("HARDWALL_KILLS", "0"))
 """The number of runs that are ended; 0 for one run of every quick command."""

@@ -30,90 +30,36 @@ FLOORS = (
     "studies",
     "pictures",
 )
-# Modules of hdl that are no blocks of the data path and have no arithmetic of their own to model.
-NOT_TWINNED = {
-    "axes_board": "supervised axes behind a link, with stages; its pins are in tests/oracles/axes_board.py",
-    "block": "the base class of blocks",
-    "board": "the supervised axis behind a link; its twin, clock by clock, is in tests/oracles/board.py",
-    "board_clocks": "clock domains, and the clock's monitor, which has its twin",
-    "estimators/edge_kalman_signals": "the registers of edge_kalman by name; that block's twin has their values",
-    "estimators/levant_edge_signals": "the registers of levant_edge by name; that block's twin has their values",
-    "export": "text of the hardware",
-    "lead_out": "wires",
-    "link/axis_status": "what a snapshot holds; the twin of link/banked_file has it",
-    "link/axi_link": "the subordinate of a bus and the register file, joined; each of them has its twin",
-    "link/link": "the blocks of the link, joined; each of them has its twin",
-    "link/requests": "wires",
-    "pipelines/doors": "registers that are zeroed; their twin, clock by clock, is in tests/oracles/supervised_axes.py",
-    "pipelines/gathered": "pulses that wait; their twin, clock by clock, is in tests/oracles/supervised_axes.py",
-    "pipelines/estimator": "what goes into and comes out of a pipeline",
-    "pipelines/finite_difference": "the block of its name in estimators, an axis a clock; its twin is that block's",
-    "pipelines/levant": "the block of its name in estimators, an axis a clock; its twin is that block's",
-    "pipelines/live_words": "memories",
-    "pipelines/monitors": "the monitors of samples, an axis a clock; their twin is model/sampled_monitors.py",
-    "pipelines/output": "the output stage, an axis a clock; its twin is that block's",
-    "pipelines/pipe": "registers, delays and memories",
-    "pipelines/supervisor": "the supervisor, an axis a clock; its twin is that block's",
-    "pipelines/wall": "the wall, an axis a clock; its twin is that block's",
-    "pipelines/window": "the block of its name in estimators, an axis a clock; its twin is that block's",
-    "ports": "text about the hardware",
+# Components that join blocks, each of which has its twin.
+JOINED = {
+    "axes/board": "supervised axes behind a link, with stages; its pins are in tests/oracles/axes_board.py",
+    "axis/board": "the supervised axis behind a link; its twin, clock by clock, is in tests/oracles/board.py",
+    "link/axi_link": "the subordinate of a bus and the register file",
+    "link/link": "the line, the server and the registers",
 }
-# Tests of more than one source, and what they cover.
+# Tests of no source of their own, and what they cover.
 BROAD = {
     "cli/test_cli": "every command, as it is called",
     "cli/test_cli_estimators": "the commands on estimators, as they are called",
-    "cli/test_reports": "every report in JSON",
     "estimates/test_stamped_estimators": "estimators that time edges, on known motions",
-    "estimators/test_edge_kalman_map": "edge_kalman with a scale_map",
-    "estimators/test_levant_edge_bound": "levant_edge in motions beyond its gains",
     "estimators/test_stamped_speeds": "estimators by clock stamps at steady speeds, and on edges in bursts",
     "estimators/test_start_in_motion": "how long a start in motion lasts, by a formula",
     "estimators/test_steady_speeds": "every estimator, at every steady speed and with every word",
-    "estimators/test_levants": "what several of Levant's differentiators promise alike",
     "host/test_unwanted": "what axis, heartbeat and words together must not let happen",
     "link/test_mbpoll": "the link, spoken to by a program",
     "pictures/test_draw": "every picture",
     "rtl/test_simulators": "the written Verilog, in another simulator",
-    "test_axis_bursts": "an axis whose encoder emits its edges in bursts",
-    "test_board_stages": "the board with each of its drive stages",
-    "test_cover": "the means of the coverage",
-    "test_cutting": "netlists of mutants in pieces",
-    "test_digests": "whatever the program computes",
-    "test_docs": "the pages",
-    "test_endurance": "every estimator",
-    "test_export_axes": "the written Verilog of several axes and their board",
-    "test_faults": "faults injected into the board in the closed loop, and the means",
-    "test_fuzz": "every command, called as no one would",
-    "test_gates": "netlists beside their RTL, and the means",
-    "test_killed": "every command that stores results",
-    "test_index": "where the decoder finds the index, and what takes the reference",
-    "test_kept": "what the tasks that sign the hardware off keep",
-    "test_layout": "the tree",
-    "test_makefile": "the tasks",
-    "test_monitors_scenes": "the monitors in the hits of scenes",
-    "test_mutate": "mutants of hardware, and the means",
-    "test_mutation_sources": "what the fates of mutants come from",
-    "test_proofs": "what is proven of the hardware, and the means",
-    "test_readme": "the README",
-    "test_supervised_axes_faults": "every cause of supervised axes, injected alone",
-    "test_typing": "the model's types",
-    "test_wheel": "the package that a user installs",
     "testing/test_examples": "the bench as others use it",
-    "world/test_shunt": "a device whose motor has a damping circuit",
-    "walls/test_rounding": "which rounding decides a wall at the edge of Levant's region",
     "walls/test_contact_energy": "the energy that passivity sees in a hit",
+    "walls/test_rounding": "which rounding decides a wall at the edge of Levant's region",
 }
-# Modules of studies/ without a test of their own name, and the test that covers them.
+# Modules of studies/ whose test has another name.
 COVERED = {
     "accuracy": "cli/test_cli_estimators",
     "cocotb_loop": "studies/test_bench",
     "costs": "rtl/test_synthesis",
-    "drop_result": "studies/test_drop",
     "published": "pictures/test_draw",
-    "rendered_result": "studies/test_rendered",
-    "rendered_setting": "studies/test_rendered",
     "shortcuts": "studies/test_trade",
-    "trade_runs": "studies/test_trade",
     "zwidth": "walls/test_zwidth",
 }
 MOST_ARGUMENTS, MOST_LINES = 9, 60
@@ -165,7 +111,7 @@ def of_the_project(path: Path) -> set[str]:
 
 
 def test_imports_are_seen():
-    assert {"hardwall.hdl.axis", "hardwall.model.spec", "numpy"} <= set(imports(ROOT / "sim/rtl/library.py"))
+    assert {"hardwall.hdl.axis.axis", "hardwall.model.spec", "numpy"} <= set(imports(ROOT / "sim/rtl/library.py"))
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=identity)
@@ -203,7 +149,7 @@ def test_imports_make_no_circle():
 
 
 def test_the_simulation_opens_axes_of_the_model_in_one_place():
-    openers = {identity(path) for path in SOURCES if "hardwall.model.axis.Axis" in imports(path)}
+    openers = {identity(path) for path in SOURCES if "hardwall.model.axis.axis.Axis" in imports(path)}
     assert {name for name in openers if name.startswith("sim/")} == {"sim/loop/backends"}
 
 
@@ -212,11 +158,23 @@ def paths_below(folder: Path) -> set[str]:
     return {str(path.relative_to(folder).with_suffix("")) for path in folder.rglob("*.py") if path.stem != "__init__"}
 
 
-@pytest.mark.parametrize("name", sorted(paths_below(ROOT / "hdl") - set(NOT_TWINNED)))
-def test_a_block_is_three_files_of_one_path(name):
+def components() -> set[str]:
+    """Return the paths of the sources of hdl/ that define a component."""
+    program = (
+        "import importlib, sys; from amaranth.lib.wiring import Component\n"
+        "for name in sys.argv[1:]:\n"
+        "    its = [each for each in vars(importlib.import_module(name)).values() if isinstance(each, type)]\n"
+        "    if any(issubclass(each, Component) and each.__module__ == name for each in its): print(name)"
+    )
+    names = [name for name in MODULES if name.startswith("hardwall.hdl.")]
+    done = subprocess.run([sys.executable, "-c", program, *names], capture_output=True, text=True, check=True)
+    return {name.removeprefix("hardwall.hdl.").replace(".", "/") for name in done.stdout.split()}
+
+
+def its_test(name: str) -> str:
+    """Return the path of the test of a source, both below their rooms and without suffix."""
     folder, _, stem = name.rpartition("/")
-    expected = [ROOT / "hdl" / f"{name}.py", ROOT / "model" / f"{name}.py", ROOT / "tests" / folder / f"test_{stem}.py"]
-    assert [path for path in expected if not path.exists()] == []
+    return f"{folder}/test_{stem}".lstrip("/")
 
 
 def test_a_picture_is_of_a_module_of_its_name():
@@ -226,19 +184,36 @@ def test_a_picture_is_of_a_module_of_its_name():
     assert drawn - shown == set()
 
 
+def test_a_block_is_three_files_of_one_path():
+    blocks = components() - {"block"}
+    assert blocks > set(JOINED)
+    lacking = {
+        name
+        for name in blocks - set(JOINED)
+        if not (ROOT / f"model/{name}.py").exists() or not (ROOT / "tests" / f"{its_test(name)}.py").exists()
+    }
+    assert lacking == set()
+
+
+def begins(name: str, names: set[str]) -> bool:
+    """Return whether a name is among some, or one of them with more words behind."""
+    parts = name.split("_")
+    return any("_".join(parts[:length]) in names for length in range(1, len(parts) + 1))
+
+
 def test_a_test_has_the_path_of_its_source():
-    sources = set().union(*(paths_below(ROOT / room) for room in ROOMS))
-    for folder, path in (("testing", "tests/benches"), ("host", "host"), ("cli", "cli")):
+    """Tests of the whole project are in `tests/` itself; a test of a part of what a source does has a longer name."""
+    sources = set().union(*(paths_below(ROOT / room) for room in ROOMS), paths_below(ROOT / "tests"))
+    for folder, path in (*((room, room) for room in ("cli", "hdl", "host", "model")), ("testing", "tests/benches")):
         sources |= {f"{folder}/{name}" for name in paths_below(ROOT / path)}
-    tested = {str(path.relative_to(ROOT / "tests").with_suffix("")) for path in TESTS if path.stem.startswith("test_")}
-    assert {name for name in tested if name.replace("test_", "", 1) not in sources} == set(BROAD)
+    tests = (str(path.relative_to(ROOT / "tests").with_suffix("")) for path in TESTS if path.stem.startswith("test_"))
+    of_a_part = {name for name in tests if "/" in name}
+    assert {name for name in of_a_part if not begins(name.replace("test_", "", 1), sources)} == set(BROAD)
 
 
 def test_a_study_has_its_test():
-    without = {
-        name for name in paths_below(ROOT / "sim/studies") if not (ROOT / f"tests/studies/test_{name}.py").exists()
-    }
-    assert without == set(COVERED)
+    tested = {path.stem.removeprefix("test_") for path in (ROOT / "tests/studies").glob("test_*.py")}
+    assert {name for name in paths_below(ROOT / "sim/studies") if not begins(name, tested)} == set(COVERED)
     assert [name for name in COVERED.values() if not (ROOT / f"tests/{name}.py").exists()] == []
 
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from stimuli.pages import PAGES, ROOT, command_line, slugs, text_of
+from support.pages import PAGES, ROOT, command_line, slugs, text_of
 
 README_LINES = 150
 # NAME and PATH in a page stand for names that the reader fills in.

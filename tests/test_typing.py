@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hardwall.model.build_folder import build_dir
+from hardwall.model.runtime.build_folder import build_dir
 
 ROOT = Path(__file__).absolute().parent.parent
 

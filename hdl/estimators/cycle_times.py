@@ -5,10 +5,10 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
 from hardwall.model.checks import check_int
+from hardwall.model.encoder.quadrature import RUN_MAX
 from hardwall.model.estimators import cycle_times as model
-from hardwall.model.quadrature import RUN_MAX
 
-from ..quadrature import Seen
+from ..encoder.quadrature import Seen
 
 
 class CycleTimes(wiring.Component):

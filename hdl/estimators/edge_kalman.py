@@ -18,7 +18,7 @@ from hardwall.model.estimators.edge_kalman_design import (
 )
 
 from ..arithmetic.fixed import fitted, length_of, saturate, shift_floor, shift_round_half_up
-from ..scale_map import ScaleMap
+from ..encoder.scale_map import ScaleMap
 from .edge_kalman_signals import LIMB_BITS, Signals
 from .estimate import EstimatorBlock
 
@@ -58,7 +58,7 @@ class Estimator(EstimatorBlock):
     Members, with a map of the scale, beside those of every estimator
     -----------------------------------------------------------------
     map_enabled, map_shift, map_shift_count, map_write, map_bin, map_written : In
-        Those of `hardwall.hdl.scale_map.ScaleMap`. They change only before a sample with `restart`.
+        Those of `hardwall.hdl.encoder.scale_map.ScaleMap`. They change only before a sample with `restart`.
     map_outside : Out(1)
         From `valid` until the next `strobe`: the last edge is beyond the map's bins.
 

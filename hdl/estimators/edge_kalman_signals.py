@@ -2,9 +2,9 @@
 
 from amaranth.hdl import Cat, Signal, signed, unsigned
 
+from hardwall.model.encoder.scale_map import FRACTION_BITS
 from hardwall.model.estimators.edge_kalman import TOP
 from hardwall.model.estimators.edge_kalman_design import Design
-from hardwall.model.scale_map import FRACTION_BITS
 
 from ..arithmetic.fixed import fitted, shape, shift_floor
 

@@ -9,7 +9,7 @@ from hardwall.model.estimators.estimate import EstimatorDesign
 
 from ..arithmetic.fixed import shape
 from ..block import Block
-from ..quadrature import Seen
+from ..encoder.quadrature import Seen
 from .bursts import Bursts
 
 

@@ -6,7 +6,7 @@ from amaranth.lib.wiring import In, Member, Out
 from hardwall.model.estimators import kept_edges as model
 
 from ..block import Block
-from ..quadrature import Seen
+from ..encoder.quadrature import Seen
 
 
 class KeptEdges(Block):

@@ -3,9 +3,9 @@
 from amaranth.hdl import Array, Cat, Const, Module, Mux, Signal, signed
 
 from hardwall.model.arithmetic.sqrt import latency as sqrt_latency
+from hardwall.model.encoder.quadrature import RUN_MAX
 from hardwall.model.estimators.levant_edge import Design
 from hardwall.model.estimators.levant_edge_design import QUOTIENT_BITS
-from hardwall.model.quadrature import RUN_MAX
 
 from ..arithmetic.divide import Divide
 from ..arithmetic.fixed import at_most, fitted, length_of, shift_floor, shift_round_half_up

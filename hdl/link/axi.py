@@ -6,9 +6,9 @@ from amaranth.hdl import Cat, Module, Mux, Signal
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
+from hardwall.model.axis.register_file import CELL_BITS, Operation
+from hardwall.model.axis.registers import COUNTERS, TELEMETRY
 from hardwall.model.link.axi import ADDRESS_BITS, STROBES, Response
-from hardwall.model.link.register_file import CELL_BITS, Operation
-from hardwall.model.registers import COUNTERS, TELEMETRY
 
 from .requests import Requests
 

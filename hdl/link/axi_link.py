@@ -4,12 +4,12 @@ from amaranth.hdl import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import connect
 
-from hardwall.model.link import register_file
-from hardwall.model.registers import RegisterMap
+from hardwall.model.axis import register_file
+from hardwall.model.axis.registers import RegisterMap
 
-from ..lead_out import lead_out
+from ..axis.register_file import RegisterFile
+from ..board.lead_out import lead_out
 from .axi import Subordinate
-from .register_file import RegisterFile
 
 
 class AxiLink(wiring.Component):
@@ -19,7 +19,7 @@ class AxiLink(wiring.Component):
 
     Parameters
     ----------
-    registers : hardwall.model.registers.RegisterMap
+    registers : hardwall.model.axis.registers.RegisterMap
         The registers.
 
     Members

@@ -6,11 +6,11 @@ from amaranth.hdl import Cat, Const, Module, Mux, ShapeLike, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.data import ArrayLayout
 
-from hardwall.model.link.banked_file import Design
-from hardwall.model.link.register_file import CELL_BITS
+from hardwall.model.axes.register_file import Design
+from hardwall.model.axis.register_file import CELL_BITS
+from hardwall.model.axis.registers import COUNTERS, EDGE_STAMPS
+from hardwall.model.axis.supervisor import COUNT, COUNT_BITS
 from hardwall.model.register import VALUE_BITS
-from hardwall.model.registers import COUNTERS, EDGE_STAMPS
-from hardwall.model.supervisor import COUNT, COUNT_BITS
 
 from ..arithmetic.fixed import shape
 

@@ -6,15 +6,17 @@ from amaranth.hdl import Module
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out, connect
 
-from hardwall.model.axes_registers import AxesMap
-from hardwall.model.link import banked_file, register_file, uart
+from hardwall.model.axes import register_file as banked_file
+from hardwall.model.axes.registers import AxesMap
+from hardwall.model.axis import register_file
+from hardwall.model.axis.registers import RegisterMap
+from hardwall.model.link import uart
 from hardwall.model.link.line import GAP_S
-from hardwall.model.registers import RegisterMap
 
-from ..lead_out import lead_out
-from .banked_file import BankedFile
+from ..axes.register_file import BankedFile
+from ..axis.register_file import RegisterFile
+from ..board.lead_out import lead_out
 from .line import Line
-from .register_file import RegisterFile
 from .server import Server
 from .uart import Receiver, Transmitter
 
@@ -23,8 +25,8 @@ class Link(wiring.Component):
     """The registers of an axis, or of several, behind the two pins of a serial line.
 
     Unit 1 answers the functions 3, 4, 6, 16 and 23 (registers), 8 (counters) and 43/14 (identification) in frames of at
-    most 256 bytes; `hardwall.model.registers` has the addresses, and `hardwall.model.axes_registers`. The line's idle
-    level is high.
+    most 256 bytes; `hardwall.model.axis.registers` has the addresses, and `hardwall.model.axes.registers`. The line's
+    idle level is high.
 
     Latency: an answer begins when the request has been carried out: less than 6000 clocks after its last byte, and for
     a commit up to a sample period more; of several axes, what a `BankedFile` waits for. A pulse is at its port before
@@ -34,7 +36,7 @@ class Link(wiring.Component):
 
     Parameters
     ----------
-    registers : hardwall.model.registers.RegisterMap
+    registers : hardwall.model.axis.registers.RegisterMap
         The registers, of several axes an AxesMap; its spec has the clock.
     baud : int
         Rate of the line, bits a second.

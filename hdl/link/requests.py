@@ -3,8 +3,8 @@
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 
-from hardwall.model.link.register_file import CELL_BITS, Operation
-from hardwall.model.registers import SPACE
+from hardwall.model.axis.register_file import CELL_BITS, Operation
+from hardwall.model.axis.registers import SPACE
 
 ADDRESS_BITS = SPACE.bit_length()
 

@@ -5,10 +5,10 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out
 from amaranth.utils import exact_log2
 
+from hardwall.model.axis.register_file import ANSWER, ANSWERS, CELL_BITS, Design, Operation
+from hardwall.model.axis.registers import COUNTERS
 from hardwall.model.link import server as model
 from hardwall.model.link.line import Verdict
-from hardwall.model.link.register_file import ANSWER, ANSWERS, CELL_BITS, Design, Operation
-from hardwall.model.registers import COUNTERS
 
 from ..arithmetic.fixed import less
 from .line import BYTE, Frames
@@ -36,7 +36,7 @@ class Server(wiring.Component):
 
     Parameters
     ----------
-    design : hardwall.model.link.register_file.Design
+    design : hardwall.model.axis.register_file.Design
         The registers.
 
     Members

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...model import axis as model
+from ...model.axis import axis as model
 from ...model.spec import AxisSpec
 
 PLAIN = "fdm"

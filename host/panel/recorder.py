@@ -6,7 +6,7 @@ from collections.abc import Generator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ...model.capture import DONE, SOURCES, STATES
+from ...model.axis.capture import DONE, SOURCES, STATES
 from ...model.checks import FieldError, check_range
 from ..axis import Axis
 from ..capture import Captured

@@ -1,6 +1,6 @@
 """Unsigned integer division, rounded down, with a quotient width that does not depend on the dividend's."""
 
-from ..compiled import compiled
+from ..runtime.compiled import compiled
 
 
 @compiled

@@ -23,7 +23,7 @@ Source: Newton's method for a reciprocal, and digits of a quotient by a reciproc
 textbook arithmetic.
 """
 
-from ..compiled import compiled
+from ..runtime.compiled import compiled
 
 INDEX = 5
 """Bits of the divisor by which the table is read, those after its first 1."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ..checks import check_number
-from ..compiled import compiled
+from ..runtime.compiled import compiled
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Division of a signed by an unsigned integer with fraction bits, rounded toward zero."""
 
-from ..compiled import compiled
+from ..runtime.compiled import compiled
 from .divide import latency as unsigned_latency
 
 BITS_PER_CLOCK = 2

@@ -2,7 +2,7 @@
 
 import math
 
-from ..compiled import compiled
+from ..runtime.compiled import compiled
 
 
 @compiled

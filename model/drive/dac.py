@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, NamedTuple, get_args
 
 from ..checks import FieldError, check_int, shown
-from ..compiled import compiled
 from ..requirements import AxisRequirements
+from ..runtime.compiled import compiled
 from . import scale, stage
 from .stage import Amplifier, StageDesign
 

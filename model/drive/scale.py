@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from ..arithmetic.fixed import UQ
 from ..checks import FieldError, check_int, check_number, check_range
-from ..compiled import compiled
+from ..runtime.compiled import compiled
 
 LATENCY = 2
 """Clocks from a drive to its steps: product, then rounding."""

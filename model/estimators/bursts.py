@@ -31,9 +31,9 @@ import math
 from typing import NamedTuple
 
 from ..arithmetic.fixed import wrap
-from ..compiled import compiled
-from ..quadrature import stamp_of
+from ..encoder.quadrature import stamp_of
 from ..requirements import AxisRequirements
+from ..runtime.compiled import compiled
 
 STEEPER = 100
 """The acceleration that no axis has, in its own bound."""

@@ -18,8 +18,8 @@ Source: Brown, Schneider, Mulligan, IEEE Trans. Industrial Electronics 1992, fix
 from typing import NamedTuple
 
 from ..arithmetic.fixed import wrap
-from ..compiled import compiled
-from ..quadrature import RUN_MAX, stamp_of
+from ..encoder.quadrature import RUN_MAX, stamp_of
+from ..runtime.compiled import compiled
 
 AGE_LIMIT = 0.75
 """Part of the stamp's range after which an edge is forgotten: the two top bits of its age are set."""

@@ -60,9 +60,9 @@ the time between them, is this project's.
 """
 
 from ..arithmetic.fixed import length_of, saturate, shift_floor, shift_round_half_up, wrap
-from ..compiled import compiled
-from ..quadrature import stamp_of
-from ..scale_map import FRACTION_BITS, place_of
+from ..encoder.quadrature import stamp_of
+from ..encoder.scale_map import FRACTION_BITS, place_of
+from ..runtime.compiled import compiled
 from .bursts import NOTHING, watch
 from .edge_kalman_design import (
     ALARM_AT,

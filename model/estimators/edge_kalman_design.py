@@ -49,10 +49,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import scale_map
 from ..arithmetic.fixed import SQ, UQ, bits_for
 from ..checks import FieldError
-from ..quadrature import Seen
+from ..encoder import scale_map
+from ..encoder.quadrature import Seen
 from ..requirements import AxisRequirements
 from . import bursts
 from .bursts import Limits, Watch, doubt_samples

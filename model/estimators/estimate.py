@@ -13,8 +13,8 @@ from typing import Any, ClassVar, Self
 
 from ..arithmetic.fixed import SQ, bits_for
 from ..checks import NUMBERS, check_number, check_range
-from ..compiled import by_type
 from ..requirements import AxisRequirements
+from ..runtime.compiled import by_type
 from ..words import Word
 
 

@@ -30,8 +30,8 @@ import numpy as np
 
 from ..arithmetic.fixed import saturate, wrap
 from ..checks import FieldError
-from ..compiled import compiled
 from ..requirements import AxisRequirements
+from ..runtime.compiled import compiled
 from .estimate import whole_counts
 
 MEMORY_BITS = 1 << 16

@@ -35,9 +35,9 @@ from typing import NamedTuple
 from ..arithmetic.divide import divide
 from ..arithmetic.fixed import wrap
 from ..checks import FieldError
-from ..compiled import compiled
-from ..quadrature import Seen, stamp_of
+from ..encoder.quadrature import Seen, stamp_of
 from ..requirements import AxisRequirements
+from ..runtime.compiled import compiled
 from . import bursts
 from .bursts import Limits, Watch, doubt_samples, watch
 from .estimate import EstimatorDesign, EstimatorGains, estimate

@@ -64,8 +64,8 @@ from ..arithmetic.fixed import SQ, bits_for
 from ..arithmetic.signed_divide import divide
 from ..arithmetic.signed_divide import latency as divide_latency
 from ..checks import NUMBERS, FieldError, check_number, check_range, shown
-from ..compiled import compiled
 from ..requirements import AxisRequirements
+from ..runtime.compiled import compiled
 from . import history
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 from .history import Held, change_over, take

@@ -61,8 +61,8 @@ from ..arithmetic.fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_ro
 from ..arithmetic.sqrt import isqrt
 from ..arithmetic.sqrt import latency as sqrt_latency
 from ..checks import FieldError
-from ..compiled import compiled
 from ..requirements import AxisRequirements
+from ..runtime.compiled import compiled
 from ..words import GAIN_BITS, Word
 from .estimate import EstimatorDesign, EstimatorGains, estimate
 

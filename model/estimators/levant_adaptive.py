@@ -87,8 +87,8 @@ from typing import NamedTuple
 from ..arithmetic.fixed import bits_for, saturate, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import isqrt
 from ..checks import FieldError
-from ..compiled import compiled
 from ..requirements import AxisRequirements
+from ..runtime.compiled import compiled
 from . import levant, levant_semi_implicit
 from .estimate import estimate
 from .levant import HEADROOM_BITS, POSITION_BUDGET, Gains, arrive, sign_of

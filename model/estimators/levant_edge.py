@@ -97,8 +97,8 @@ import math
 from ..arithmetic.divide import divide
 from ..arithmetic.fixed import length_of, saturate, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import isqrt
-from ..compiled import compiled
-from ..quadrature import RUN_MAX
+from ..encoder.quadrature import RUN_MAX
+from ..runtime.compiled import compiled
 from .bursts import watch
 from .estimate import estimate
 from .levant import sign_of

@@ -7,8 +7,8 @@ An edge too close to the anchor stays unused: the next edge is taken with the in
 """
 
 from ..arithmetic.fixed import wrap
-from ..compiled import compiled
-from ..quadrature import stamp_of
+from ..encoder.quadrature import stamp_of
+from ..runtime.compiled import compiled
 from .bursts import NOTHING
 from .levant_edge_design import State
 

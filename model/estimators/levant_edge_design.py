@@ -27,7 +27,7 @@ from ..arithmetic.divide import latency as divide_latency
 from ..arithmetic.fixed import SQ, UQ, bits_for, shift_floor
 from ..arithmetic.sqrt import latency as sqrt_latency
 from ..checks import FieldError
-from ..quadrature import Seen
+from ..encoder.quadrature import Seen
 from ..requirements import AxisRequirements
 from ..words import GAIN_BITS, Word
 from . import bursts

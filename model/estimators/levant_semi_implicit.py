@@ -57,7 +57,7 @@ from typing import NamedTuple
 
 from ..arithmetic.fixed import saturate, shift_floor, shift_round_half_up
 from ..arithmetic.sqrt import isqrt
-from ..compiled import compiled
+from ..runtime.compiled import compiled
 from . import levant
 from .estimate import estimate
 from .levant import State, arrive, sign_of

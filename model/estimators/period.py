@@ -52,9 +52,9 @@ from ..arithmetic.divide import divide
 from ..arithmetic.divide import latency as divide_latency
 from ..arithmetic.fixed import SQ, bits_for
 from ..checks import FieldError
-from ..compiled import compiled
-from ..quadrature import Seen
+from ..encoder.quadrature import Seen
 from ..requirements import AxisRequirements
+from ..runtime.compiled import compiled
 from . import bursts, cycle_times
 from .bursts import Limits, Watch, watch
 from .cycle_times import AGE_LIMIT, NOTHING, Memory, observe

@@ -45,9 +45,9 @@ from ..arithmetic.divide import divide
 from ..arithmetic.divide import latency as divide_latency
 from ..arithmetic.fixed import UQ, bits_for, saturate, wrap
 from ..checks import FieldError
-from ..compiled import compiled
-from ..quadrature import Seen
+from ..encoder.quadrature import Seen
 from ..requirements import AxisRequirements
+from ..runtime.compiled import compiled
 from ..words import Word
 from . import bursts, cycle_times
 from .bursts import Limits, Watch, watch

@@ -65,8 +65,8 @@ from typing import NamedTuple
 
 from ..arithmetic.fixed import SQ, UQ, bits_for, saturate, shift_floor, shift_round_half_up, wrap
 from ..checks import FieldError
-from ..compiled import compiled
 from ..requirements import AxisRequirements
+from ..runtime.compiled import compiled
 from ..words import GAIN_BITS, Word, gain_format
 from .estimate import EstimatorDesign, EstimatorGains, estimate, fraction_bits, largest_step
 

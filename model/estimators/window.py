@@ -41,8 +41,8 @@ from typing import NamedTuple
 from ..arithmetic.fixed import SQ, UQ
 from ..arithmetic.signed_divide import divide
 from ..arithmetic.signed_divide import latency as divide_latency
-from ..compiled import compiled
 from ..requirements import AxisRequirements
+from ..runtime.compiled import compiled
 from ..words import Word
 from . import history
 from .estimate import EstimatorDesign, EstimatorGains, estimate

@@ -11,8 +11,8 @@ addresses are of one snapshot.
 
 from enum import IntEnum
 
-from ..registers import COUNTERS, TELEMETRY
-from .register_file import CELL, CELL_BITS, Design, RegisterFile
+from ..axis.register_file import CELL, CELL_BITS, Design, RegisterFile
+from ..axis.registers import COUNTERS, TELEMETRY
 
 ADDRESS_BITS = 17
 """Bits of a byte address: two bytes a register."""

@@ -12,9 +12,9 @@ done, in the order of the specification:
 Function 23 writes before it reads. Functions 3 and 4 read the same registers.
 """
 
-from ..registers import COUNTERS
+from ..axis.register_file import Design, RegisterFile
+from ..axis.registers import COUNTERS
 from .line import UNIT, Verdict
-from .register_file import Design, RegisterFile
 
 READ_MAX, WRITE_MAX, WRITE_AND_READ_MAX = 125, 123, 121
 """Registers that a frame of 256 bytes can read, write, and write beside reading."""

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import cast
 
-from ...model.axes import AxesSpec
+from ...model.axes.axis import AxesSpec
 from ...model.drive import dac, pwm
 from ...model.drive.stage import Amplifier, StageDesign
 from ...model.spec import AxisSpec

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from ...model.axes import AxesSpec
+from ...model.axes.axis import AxesSpec
 from ...model.spec import AxisSpec
 from .description import Description
 from .drive import drive

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ...model.compiled import compiled
 from ...model.estimators import registry
+from ...model.runtime.compiled import compiled
 from ...model.spec import AxisSpec
 from ..scene.load import load
 from ..world.encoder import Errors, offsets

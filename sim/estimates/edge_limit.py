@@ -12,7 +12,7 @@ import math
 import numpy as np
 import scipy
 
-from ...model.compiled import compiled
+from ...model.runtime.compiled import compiled
 from ...model.spec import AxisSpec
 from . import signals
 from .playback import encoded_signal

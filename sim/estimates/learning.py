@@ -7,8 +7,8 @@ axis decodes, with their stamps; the count is referenced at the start, as by hom
 
 from typing import NamedTuple
 
-from ...model import scale_map
-from ...model.scale_fit import Fit
+from ...model.encoder import scale_map
+from ...model.encoder.scale_fit import Fit
 from ...model.spec import AxisSpec
 from ..world.chance import uniform
 from ..world.encoder import Errors

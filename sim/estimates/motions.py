@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...model.compiled import by_type, compiled
+from ...model.runtime.compiled import by_type, compiled
 from ...model.stamped import Edges
 from ..world.encoder import Encoder, level, locate, next_cell
 from ..world.lines import carried, jittered_s

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...model.compiled import compiled
-from ...model.design import change_of
+from ...model.axis.design import change_of
+from ...model.runtime.compiled import compiled
 from ..loop.backends import number_of, opened
 from ..scene.build import world_of
 from ..scene.schema import Scene

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...model import scale_map
-from ...model.compiled import compiled, inlined
-from ...model.design import change_of, strobe_of
+from ...model.axis.design import change_of, strobe_of
+from ...model.encoder import scale_map
+from ...model.runtime.compiled import compiled, inlined
 from ...model.spec import AxisSpec
 from ...model.stamped import Edges
 from ..loop.backends import is_exact, number_of, opened

@@ -20,11 +20,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...model.checks import NUMBERS, shown
+from ...model.encoder.quadrature_speed import max_edge_rate
 from ...model.estimators import registry
-from ...model.quadrature_speed import max_edge_rate
 from ...model.runtime.result import Summary
+from ...model.runtime.whole_file import whole_file
 from ...model.spec import AxisSpec
-from ...model.whole_file import whole_file
 from ..loop.backends import BACKENDS, is_exact
 from .recording import Recording
 from .reference import REFERENCE_HZ, SETTLE_S, acceleration_bound, judged_from, zero_phase_velocity

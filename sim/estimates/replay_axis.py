@@ -22,8 +22,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...model.arithmetic.fixed import bits_for
+from ...model.encoder.quadrature_speed import max_edge_rate
 from ...model.estimators import registry
-from ...model.quadrature_speed import max_edge_rate
 from ...model.spec import AxisSpec
 from ..loop.backends import opened, whole
 from ..world.encoder import level

@@ -9,9 +9,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...model import quadrature
-from ...model.compiled import compiled
-from ...model.design import Timing, strobe_of
+from ...model.axis.design import Timing, strobe_of
+from ...model.encoder import quadrature
+from ...model.runtime.compiled import compiled
 from ...model.stamped import room_for
 from ..loop.controllers import sample, sample_quietly, taken_off
 from ..world.encoder import level

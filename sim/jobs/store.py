@@ -24,7 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import sim
-from ...model.build_folder import build_dir, not_kept, shown_path, warn_once
+from ...model.runtime.build_folder import build_dir, not_kept, shown_path, warn_once
 from ...model.runtime.stages import logger
 from ...model.runtime.termination import count_kept
 from .regular_file import content_of

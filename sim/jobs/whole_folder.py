@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from ...model.build_folder import not_kept
+from ...model.runtime.build_folder import not_kept
 from ...model.runtime.termination import undone
 from .scratch import scratch
 

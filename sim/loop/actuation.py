@@ -1,6 +1,6 @@
 """The end of a sample: the drive on its way to the plant, and what is kept of the sample."""
 
-from ...model.compiled import compiled, inlined
+from ...model.runtime.compiled import compiled, inlined
 from ..world.converter import converted
 from .record import keep
 

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...model import scale_map, stamped
-from ...model.axis import Axis
+from ...model import stamped
+from ...model.axis.axis import Axis
+from ...model.encoder import scale_map
 from ...model.spec import AxisSpec
 from ..rtl.verilated import Rtl, RtlState
 

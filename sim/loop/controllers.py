@@ -7,7 +7,7 @@ the fields `drive`, `velocity` and `flags`.
 """
 
 from ...model import stamped
-from ...model.compiled import by_type, compiled
+from ...model.runtime.compiled import by_type, compiled
 from ..rtl.c_function import call
 from ..rtl.verilated import Rtl, RtlState
 

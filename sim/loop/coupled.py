@@ -16,8 +16,9 @@ one. Source: Colgate, Stanley and Brown, Issues in the haptic display of tool us
 import math
 from typing import NamedTuple
 
-from ...model import design, stamped, wall
-from ...model.compiled import by_type, compiled, inlined
+from ...model import stamped
+from ...model.axis import design, wall
+from ...model.runtime.compiled import by_type, compiled, inlined
 from ..rtl.c_function import call
 from ..rtl.verilated import Rtl, RtlState
 from .backends import Opened

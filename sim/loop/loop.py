@@ -8,8 +8,8 @@ Where samples overlap, the next strobe comes before that, or several: the plant 
 sample whose drive changes, and a model leaves the edges in between to the next samples.
 """
 
-from ...model.compiled import compiled
-from ...model.design import change_of, overlap_of, strobe_of
+from ...model.axis.design import change_of, overlap_of, strobe_of
+from ...model.runtime.compiled import compiled
 from ..world.advance import Interval, Moment, advance, advance_quietly
 from .actuation import actuated
 from .controllers import sample, sample_quietly, taken_off

@@ -1,6 +1,6 @@
 """The pins of an encoder in the loop: its edges, or what its lines make of them."""
 
-from ...model.compiled import inlined
+from ...model.runtime.compiled import inlined
 from ..world.advance import Moment
 from ..world.lines import carry
 

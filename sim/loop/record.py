@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...model.compiled import compiled
+from ...model.runtime.compiled import compiled
 from ...model.spec import AxisSpec
 
 

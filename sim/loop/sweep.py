@@ -20,10 +20,11 @@ as the edges leave it: those of the last swept sample are found after all, and d
 
 from typing import NamedTuple
 
-from ...model import quadrature, stamped
-from ...model.axis import step
-from ...model.compiled import compiled, inlined
-from ...model.design import change_of, strobe_of
+from ...model import stamped
+from ...model.axis.axis import step
+from ...model.axis.design import change_of, strobe_of
+from ...model.encoder import quadrature
+from ...model.runtime.compiled import compiled, inlined
 from ..world.advance import Interval, Moment, advance
 from ..world.encoder import level, locate
 from ..world.rigid import Motion, glide, net_force

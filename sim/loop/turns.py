@@ -7,8 +7,8 @@ until those of the others are: in the order of the rota, the hardware is never a
     for done in zip(*(turns(...) for each axis)): ...
 """
 
-from ...model.compiled import compiled, inlined
-from ...model.design import change_of, overlap_of, strobe_of
+from ...model.axis.design import change_of, overlap_of, strobe_of
+from ...model.runtime.compiled import compiled, inlined
 from ..rtl.c_function import call
 from ..rtl.verilated import RtlState
 from ..world.advance import Interval, Moment, advance, advance_quietly

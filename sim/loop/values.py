@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...model.design import Timing
+from ...model.axis.design import Timing
 from ...model.stamped import Edges
 from ..world.advance import Moment
 from ..world.bristles import Bent, Bristled

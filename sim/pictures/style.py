@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from ...model.whole_file import whole_file
+from ...model.runtime.whole_file import whole_file
 from . import SUFFIXES
 
 PAGE_IN = 7.0

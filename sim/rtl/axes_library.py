@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...hdl.axes import Axes
+from ...hdl.axes.axis import Axes
 from ...hdl.export import to_verilog
-from ...model.axes import FRONT_LATENCY, AxesSpec
+from ...model.axes.axis import FRONT_LATENCY, AxesSpec
 from . import shared_library
 from .shared_library import Recipe
 from .verilated import RtlAxis

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from ...model import register_texts
-from ...model.axes import AxesSpec
+from ...model.axes.axis import AxesSpec
 from ...model.runtime.result import text_of
 from ...model.spec import AxisSpec
 from ..boards.description import Description

@@ -12,11 +12,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ...hdl.board import Board
+from ...hdl.axis.board import Board
 from ...hdl.export import to_verilog
 from ...hdl.link.link import Link
+from ...model.axis.registers import RegisterMap
 from ...model.drive import dac
-from ...model.registers import RegisterMap
 from ...model.spec import AxisSpec
 from . import netlist, shared_library
 from .families import FAMILIES

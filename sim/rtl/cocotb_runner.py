@@ -14,9 +14,9 @@ from xml.etree import ElementTree
 
 from amaranth.lib import wiring
 
-from ...hdl.axis import Axis
+from ...hdl.axis.axis import Axis
 from ...hdl.export import to_verilog
-from ...model.build_folder import build_dir
+from ...model.runtime.build_folder import build_dir
 from ...model.spec import AxisSpec
 from ..jobs.scratch import scratch
 from .cocotb_build import Build, digest

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from ...hdl.axes_board import AxesBoard
-from ...hdl.board import Board
+from ...hdl.axes.board import AxesBoard
+from ...hdl.axis.board import Board
 from ...hdl.export import to_verilog
-from ...model.axes import AxesSpec
-from ...model.build_folder import build_dir
+from ...model.axes.axis import AxesSpec
+from ...model.runtime.build_folder import build_dir
 from ...model.spec import AxisSpec
 from ..boards.constraints import constraints, constraints_of
 from ..boards.description import Description

@@ -9,9 +9,9 @@ import numpy as np
 from amaranth.hdl import Shape
 from amaranth.lib.wiring import In
 
-from ...hdl.axis import Axis
+from ...hdl.axis.axis import Axis
 from ...hdl.export import to_netlist, to_verilog
-from ...model import quadrature
+from ...model.encoder import quadrature
 from ...model.runtime.stages import logger
 from ...model.spec import AxisSpec
 from . import resting, shared_library

@@ -8,7 +8,7 @@ from pathlib import Path
 from amaranth.lib import wiring
 
 from ...hdl.export import to_verilog
-from ...model.build_folder import build_dir
+from ...model.runtime.build_folder import build_dir
 from ...model.runtime.stages import stage
 from ..jobs.whole_folder import whole_folder
 from . import tools

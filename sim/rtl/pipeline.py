@@ -13,11 +13,11 @@ from typing import Any
 from amaranth.hdl import Module
 from amaranth.lib import wiring
 
-from ...hdl.axes import Axes
+from ...hdl.axes.axis import Axes
+from ...hdl.axes.supervised import SupervisedAxes
+from ...hdl.board.lead_out import lead_out
 from ...hdl.export import to_verilog
-from ...hdl.lead_out import lead_out
-from ...hdl.supervised_axes import SupervisedAxes
-from ...model.axes import AxesSpec
+from ...model.axes.axis import AxesSpec
 from ..boards.parts import PARTS
 from ..boards.top import MODULE
 from ..jobs.whole_folder import whole_folder

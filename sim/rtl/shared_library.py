@@ -8,7 +8,7 @@ from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
-from ...model.build_folder import build_dir, shown_path
+from ...model.runtime.build_folder import build_dir, shown_path
 from ...model.runtime.stages import stage
 from ..jobs import children
 from ..jobs.whole_folder import keep_log, whole_folder

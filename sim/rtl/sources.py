@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ...hdl import export
-from ...model.axes import AxesSpec
+from ...model.axes.axis import AxesSpec
 from ...model.spec import AxisSpec
 
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from ...hdl.estimators.registry import block_of
 from ...hdl.export import to_verilog
-from ...model import quadrature
-from ...model.axes import AxesSpec
+from ...model.axes.axis import AxesSpec
+from ...model.encoder import quadrature
 from ...model.spec import AxisSpec
 from ..boards.description import board_of
 from ..boards.parts import PARTS

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from ...model.build_folder import build_dir, shown_path
+from ...model.runtime.build_folder import build_dir, shown_path
 from ..jobs import children
 from ..jobs.whole_folder import keep_log
 

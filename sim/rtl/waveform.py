@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pylibfst
 
-from ...model.whole_file import whole_file
+from ...model.runtime.whole_file import whole_file
 
 _LIB, _FFI = pylibfst.lib, pylibfst.ffi
 _EXPONENTS = {"1s": 0, "1ms": -3, "1us": -6, "1ns": -9, "1ps": -12, "1fs": -15}

@@ -2,8 +2,8 @@
 
 import math
 
-from ...model import quadrature
-from ...model.design import overlap_of
+from ...model.axis.design import overlap_of
+from ...model.encoder import quadrature
 from ...model.stamped import Controller, room_for
 from ..loop.backends import is_exact
 from ..loop.coupled import Tool

@@ -3,7 +3,7 @@
 import math
 
 from ...model.checks import FieldError, shown
-from ...model.quadrature_speed import max_edge_rate
+from ...model.encoder.quadrature_speed import max_edge_rate
 from ...model.runtime.accepted import plain
 from ...model.words import Word
 from ..world import device

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ...model.quadrature_speed import GLITCH_CLOCKS_MAX
+from ...model.encoder.quadrature_speed import GLITCH_CLOCKS_MAX
 from ..world.encoder import Errors, offsets
 from ..world.lines import Lines
 from ..world.scale import CUT_SIGMAS, MOST_COUNTS, WAVES, Scale, Wave, cut_of, spread

@@ -9,11 +9,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, create_model
 
-from ...model.design import Timing
-from ...model.designed import DesignedAxis
+from ...model.axis.design import Timing
+from ...model.axis.designed import DesignedAxis
 from ...model.drive import pdm
+from ...model.encoder.quadrature_speed import GLITCH_CLOCKS_MAX, SPEED_MARGIN, glitch_clocks_for
 from ...model.estimators import registry
-from ...model.quadrature_speed import GLITCH_CLOCKS_MAX, SPEED_MARGIN, glitch_clocks_for
 from ...model.requirements import EDGE_ERROR_COUNTS
 from ...model.spec import AxisSpec
 from .coupling_section import CouplingSection
@@ -102,7 +102,7 @@ class WallSection(Section):
 
 class PassivitySection(Section):
     """An observer of the energy that the drive gives, and a controller that damps by this much at most while it has
-    given more than it has taken: see `hardwall.model.passivity`."""
+    given more than it has taken: see `hardwall.model.axis.passivity`."""
 
     damping_n_s_per_m: or_none(Damping)
 

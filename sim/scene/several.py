@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from ...model.axes import AxesSpec
-from ...model.design import Timing
+from ...model.axes.axis import AxesSpec
+from ...model.axis.design import Timing
 from .schema import ControllerSection, Scene
 
 ABSENT = {

@@ -14,7 +14,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from ...model.axes import AXES_MAX
+from ...model.axes.axis import AXES_MAX
 from ...model.checks import shown
 from .errors import SceneError
 from .load import AXIS, content_of_scene, made, parse, put, read

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from ...model.axes import AxesSpec
+from ...model.axes.axis import AxesSpec
 from ...model.runtime.result import Table, table_of
 from ..rtl.pipeline import synthesise_axes
 from ..scene.load import load

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...model.build_folder import build_dir
 from ...model.estimators.registry import ESTIMATORS
+from ...model.runtime.build_folder import build_dir
 from ...model.runtime.result import Table, table_of, text_of
 from ..jobs.rounds import medians
 from ..jobs.scratch import scratch

@@ -16,7 +16,7 @@ import numpy as np
 from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles, ReadOnly, Timer
 
-from ...model.design import change_of, overlap_of, strobe_of
+from ...model.axis.design import change_of, overlap_of, strobe_of
 from ...model.stamped import room_for
 from ..loop.controllers import taken_off
 from ..loop.pins import shown

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...model.build_folder import build_dir
+from ...model.runtime.build_folder import build_dir
 from ...model.runtime.result import Table, table_of
 from ..jobs import children
 from ..jobs.scratch import scratch

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...model.runtime.result import Table, table_of
-from ...model.whole_file import whole_file
+from ...model.runtime.whole_file import whole_file
 from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls import theory, worst

@@ -14,7 +14,7 @@ import numpy as np
 from ...model import stamped
 from ...model.runtime.result import Summary, Table, Values
 from ...model.runtime.stages import stage
-from ...model.whole_file import whole_file
+from ...model.runtime.whole_file import whole_file
 from ..loop import loop, record
 from ..loop.backends import Opened, is_exact, number_of, opened
 from ..loop.coupled import coupled

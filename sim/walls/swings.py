@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...model.compiled import compiled
+from ...model.runtime.compiled import compiled
 
 
 class Swings(NamedTuple):

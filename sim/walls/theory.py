@@ -18,7 +18,7 @@ import math
 import numpy as np
 import scipy
 
-from ...model.quadrature import latency
+from ...model.encoder.quadrature import latency
 from ..scene.build import device_of
 from ..scene.schema import Scene
 from ..world.device import Device, equations

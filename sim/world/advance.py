@@ -6,7 +6,7 @@ Which of them runs is decided by the class of the plant: `rigid` (closed form), 
 
 from typing import NamedTuple
 
-from ...model.compiled import by_type
+from ...model.runtime.compiled import by_type
 from .encoder import Cell
 
 

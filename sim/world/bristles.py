@@ -34,7 +34,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...model.compiled import compiled
+from ...model.runtime.compiled import compiled
 from .polynomials import FIRST, measure
 from .rigid import Handle
 

@@ -7,7 +7,7 @@ plain Python agree.
 
 import math
 
-from ...model.compiled import compiled, inlined
+from ...model.runtime.compiled import compiled, inlined
 
 WORD = 0xFFFFFFFF
 FIRST, SECOND = 0x7FEB352D, 0x846CA68B

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from ...model.compiled import compiled
+from ...model.runtime.compiled import compiled
 
 
 class Converter(NamedTuple):

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...model.compiled import compiled, inlined
+from ...model.runtime.compiled import compiled, inlined
 from .lines import Lines, shown_s
 from .scale import Scale, displacement, near
 

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...model.compiled import compiled
+from ...model.runtime.compiled import compiled
 from .advance import Moment, advance, advance_quietly
 from .converter import Pulse
 from .device import Device, equations

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...model.compiled import by_type, compiled
+from ...model.runtime.compiled import by_type, compiled
 from .advance import Moment
 from .converter import width_of
 

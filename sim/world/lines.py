@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...model.compiled import compiled, inlined
+from ...model.runtime.compiled import compiled, inlined
 from ...model.stamped import Edges, room_for
 from .chance import normal, uniform
 from .scale import CUT_SIGMAS

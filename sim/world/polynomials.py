@@ -3,7 +3,7 @@
 An array holds one polynomial in each column: three sums, then the coefficients. The expansion of a motion fills it.
 """
 
-from ...model.compiled import compiled
+from ...model.runtime.compiled import compiled
 
 END, BEND, STEEPENING, FIRST = 0, 1, 2, 3
 """The rows of a polynomial: its value at the end; two sums of its coefficients' sizes; and its first coefficient."""

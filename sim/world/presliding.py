@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from ...model.compiled import compiled, inlined
+from ...model.runtime.compiled import compiled, inlined
 from .advance import Moment, advance, advance_quietly
 from .bristles import MOST, POSITION, ROWS, SIGN, UNIT, VELOCITY, WATCHED, Bent, Bristled, Stribeck, expand
 from .polynomials import END, FIRST, NEVER, UNSURE, leaves, shorten

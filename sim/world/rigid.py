@@ -20,7 +20,7 @@ and a handle that sticks keeps its `Motion` bit for bit.
 import math
 from typing import NamedTuple
 
-from ...model.compiled import compiled, inlined
+from ...model.runtime.compiled import compiled, inlined
 from .advance import Moment, advance, advance_quietly
 from .encoder import level, next_cell, stamp
 

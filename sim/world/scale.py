@@ -11,7 +11,7 @@ whole of it before the pins change again.
 import math
 from typing import NamedTuple
 
-from ...model.compiled import compiled
+from ...model.runtime.compiled import compiled
 from .chance import normal
 
 WAVES = 5

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...model.compiled import compiled
+from ...model.runtime.compiled import compiled
 from .advance import Moment, advance, advance_quietly
 from .converter import Pulse
 from .encoder import level, next_cell, stamp

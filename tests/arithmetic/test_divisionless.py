@@ -98,7 +98,7 @@ def test_the_steps_end_in_the_exact_quotient_of_all_small_operands():
 
 
 def test_bit_12_of_what_the_only_digit_leaves_decides_nothing():
-    """What `tests/mutation/reasons.toml` says of a mutant: with that bit set every quotient that fits is the same."""
+    """What `tests/signoff/mutation/reasons.toml` says of a mutant: with that bit set the quotient is the same."""
     dividends, bits, fraction, width = SIZES[1][:4]
     (number, digit), tried = digits(width + 1), 0
     assert number == 1

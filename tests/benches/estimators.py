@@ -7,9 +7,9 @@ import numpy as np
 from cocotb.handle import HierarchyObject
 
 from hardwall.hdl.estimators.estimate import EstimatorBlock
-from hardwall.model.compiled import compiled
+from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators.estimate import EstimatorDesign, estimate
-from hardwall.model.quadrature import Seen
+from hardwall.model.runtime.compiled import compiled
 from hardwall.testing import Bench, check
 
 

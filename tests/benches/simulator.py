@@ -15,7 +15,7 @@ from typing import Any, Literal, TypedDict
 import numpy as np
 from amaranth.lib import wiring
 
-from hardwall.model.build_folder import build_dir
+from hardwall.model.runtime.build_folder import build_dir
 from hardwall.sim.rtl import cocotb_runner
 
 from .harness import SEQUENCER, Harness

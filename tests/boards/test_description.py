@@ -8,9 +8,9 @@ from amaranth_boards.icebreaker import ICEBreakerPlatform
 from amaranth_boards.tang_nano_9k import TangNano9kPlatform
 from amaranth_boards.ulx3s import ULX3S_12F_Platform, ULX3S_25F_Platform, ULX3S_45F_Platform, ULX3S_85F_Platform
 
-from hardwall.hdl.axes_board import AxesBoard
-from hardwall.hdl.board import Board
-from hardwall.model.axes import AxesSpec
+from hardwall.hdl.axes.board import AxesBoard
+from hardwall.hdl.axis.board import Board
+from hardwall.model.axes.axis import AxesSpec
 from hardwall.sim.boards import description
 from hardwall.sim.boards.description import BOARDS, board_of
 from hardwall.sim.boards.parts import PARTS

@@ -7,11 +7,11 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
-from own_flow import CLOCKS_HZ
 
 from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.boards.generated import CORE
 from hardwall.sim.boards.generated import files as generated
+from support.own_flow import CLOCKS_HZ
 
 FOLDER = Path(str(files("hardwall.constraints")))
 

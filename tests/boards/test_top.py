@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from hardwall.hdl.axes_board import AxesBoard
-from hardwall.hdl.board import Board
+from hardwall.hdl.axes.board import AxesBoard
+from hardwall.hdl.axis.board import Board
 from hardwall.hdl.export import to_verilog
-from hardwall.model.axes import AxesSpec
+from hardwall.model.axes.axis import AxesSpec
 from hardwall.model.spec import AxisSpec
 from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.boards.pll import ClockError

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hardwall.hdl.board import Board
+from hardwall.hdl.axis.board import Board
 from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.boards.signals import signals_of
 from hardwall.sim.boards.top import INSIDE

@@ -16,8 +16,8 @@ from hardwall.cli.group import COMMANDS
 from hardwall.cli.terminal import show
 from hardwall.model.estimators import registry
 from hardwall.model.runtime.result import Table, Values, table_of
-from stimuli.command_line import call
-from stimuli.processes import HARDWALL
+from support.command_line import call
+from support.processes import HARDWALL
 
 HEAVY = {"numba", "numpy", "scipy", "matplotlib", "distributed", "pydantic", "amaranth"}
 LATER = {"scipy.optimize", "scipy.signal", "scipy.stats", "matplotlib", "distributed", "amaranth"}

@@ -7,9 +7,9 @@ import pytest
 
 from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.rtl.loader import LOADER
-from stimuli.command_line import call
-from stimuli.reports import check_text
-from stimuli.tools import stand_in
+from support.command_line import call
+from support.reports import check_text
+from support.tools import stand_in
 
 
 @pytest.fixture

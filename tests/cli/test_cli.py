@@ -11,8 +11,8 @@ import pytest
 from hardwall.cli.terminal import show
 from hardwall.model.runtime.result import Table
 from hardwall.sim.scene import load
-from stimuli.command_line import call
 from stimuli.scenes import SHORT_OF_AXES
+from support.command_line import call
 
 SEED = (load.FOLDER / "seed-2011.toml").read_text()
 STIFFNESS = "0, or 1.95313 (half of its word's LSB) to 200000 (what the controller is for)"

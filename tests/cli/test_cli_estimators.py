@@ -8,10 +8,10 @@ import signal
 import pytest
 
 from hardwall.cli import accuracy as commands
-from hardwall.model.build_folder import build_dir
-from stimuli.command_line import call
+from hardwall.model.runtime.build_folder import build_dir
 from stimuli.lengths import LONG
-from stimuli.processes import HARDWALL, ended_by, session, started, stored, wait_until
+from support.command_line import call
+from support.processes import HARDWALL, ended_by, session, started, stored, wait_until
 
 KEYS = {
     "estimator", "output", "backend", "sample_hz", "signal", "rms_mm_s", "max_mm_s", "delay_s", "chatter_mm_s",

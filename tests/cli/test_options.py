@@ -10,7 +10,7 @@ import pytest
 from hardwall.cli import options, scenes
 from hardwall.cli.errors import BadInput, one_line
 from hardwall.sim.boards.parts import PARTS
-from stimuli.command_line import call
+from support.command_line import call
 
 LONG = "x" * 5000
 DIGITS = "9" * 5000

@@ -9,9 +9,9 @@ import pytest
 from hardwall.cli.errors import BadInput
 from hardwall.sim.scene.load import read
 from hardwall.sim.scene.schema import Scene
-from stimuli.command_line import call
-from stimuli.processes import HARDWALL, ended, line, started, wait_until
-from stimuli.virtual_boards import SCENE
+from support.command_line import call
+from support.processes import HARDWALL, ended, line, started, wait_until
+from support.virtual_boards import SCENE
 
 
 def changes(*assignments: str) -> list[str]:

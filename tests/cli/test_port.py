@@ -12,12 +12,12 @@ import pytest
 from hardwall.host.connect import connect
 from hardwall.host.errors import HostError
 from hardwall.host.status import State
-from hardwall.model.registers import RegisterMap
+from hardwall.model.axis.registers import RegisterMap
 from hardwall.sim.scene.load import load
-from stimuli.command_line import call
-from stimuli.processes import HARDWALL, ended, started, wait_until
-from stimuli.reports import check_text
-from stimuli.virtual_boards import PACE, SCENE, VirtualBoard, running
+from support.command_line import call
+from support.processes import HARDWALL, ended, started, wait_until
+from support.reports import check_text
+from support.virtual_boards import PACE, SCENE, VirtualBoard, running
 
 AT = "--pace", PACE
 """What every command is told of the board."""

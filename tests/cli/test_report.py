@@ -13,14 +13,14 @@ import pytest
 
 from hardwall.cli import terminal
 from hardwall.cli.report import ReportOptions, _do_all, _write
-from hardwall.model.build_folder import build_dir
+from hardwall.model.runtime.build_folder import build_dir
 from hardwall.model.runtime.result import Values
 from hardwall.model.runtime.stages import logger
 from hardwall.sim.jobs.store import Store
 from hardwall.sim.rtl.waveform import vcd_to_fst
 from stimuli import results
-from stimuli.command_line import call
-from stimuli.processes import HARDWALL, ended, started, wait_until
+from support.command_line import call
+from support.processes import HARDWALL, ended, started, wait_until
 
 DRAWING = """
 import sys, time

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from hardwall.cli.streams import StdoutError
-from stimuli.command_line import call
-from stimuli.processes import HARDWALL
+from support.command_line import call
+from support.processes import HARDWALL
 
 FULL = Path("/dev/full")
 PRINTING = [["--help"], ["--version"]]

@@ -6,8 +6,8 @@ import pytest
 
 from hardwall.sim.scene.tables import load_any
 from hardwall.sim.walls import hit_axes
-from stimuli.command_line import call
 from stimuli.scenes import SHORT_OF_AXES
+from support.command_line import call
 
 
 @pytest.fixture(scope="module")

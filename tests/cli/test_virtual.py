@@ -14,15 +14,15 @@ from pymodbus import FramerType
 from pymodbus.client import ModbusTcpClient
 
 from hardwall.host.connect import connect
+from hardwall.model.axis.registers import RegisterMap
+from hardwall.model.axis.supervisor import TRIPPED, names
 from hardwall.model.link.line import framed
-from hardwall.model.registers import RegisterMap
-from hardwall.model.supervisor import TRIPPED, names
 from hardwall.sim.scene.load import load
 from stimuli import frames
-from stimuli.command_line import call
 from stimuli.lengths import LONG
-from stimuli.processes import wait_until
-from stimuli.virtual_boards import command, running
+from support.command_line import call
+from support.processes import wait_until
+from support.virtual_boards import command, running
 
 CLOCK = {"controller.clock_hz": 4_000_000}
 REGISTERS = RegisterMap(load("seed-2011", CLOCK).spec)

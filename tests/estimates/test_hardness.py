@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hardwall.model.quadrature import latency
+from hardwall.model.encoder.quadrature import latency
 from hardwall.sim.estimates import hardness, moved
 from hardwall.sim.estimates.motions import Steady, position
 from hardwall.sim.estimates.moved import Answer, MotionError

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from hardwall.model.quadrature import latency
+from hardwall.model.encoder.quadrature import latency
 from hardwall.sim.estimates import impedance
 from hardwall.sim.estimates.motions import Sine
 from hardwall.sim.estimates.moved import Answer, MotionError

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hardwall.model.scale_fit import Fit
+from hardwall.model.encoder.scale_fit import Fit
 from hardwall.sim.estimates import learning
 from hardwall.sim.estimates.accuracy import LEARNED, axis_spec, encoder_of, errors_of, measure
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hardwall.model.quadrature import latency
+from hardwall.model.encoder.quadrature import latency
 from hardwall.sim.estimates import moved
 from hardwall.sim.estimates.motions import Sine, Steady
 from hardwall.sim.scene.case import Case

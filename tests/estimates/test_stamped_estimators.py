@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators.cycle_times import AGE_LIMIT
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.period_count import START
-from hardwall.model.quadrature import seen_count
 from hardwall.sim.estimates import accuracy, motions, playback, signals
 from hardwall.sim.world.encoder import offsets
 from hardwall.testing.estimators import reset_words

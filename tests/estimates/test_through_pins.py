@@ -6,8 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hardwall.model import quadrature, stamped
-from hardwall.model.design import Timing
+from hardwall.model import stamped
+from hardwall.model.axis.design import Timing
+from hardwall.model.encoder import quadrature
 from hardwall.sim.estimates.replay import replay
 from hardwall.sim.estimates.replay_axis import run
 from hardwall.sim.estimates.through_pins import through_pins

@@ -1,8 +1,8 @@
 """Rows that lead the Kalman filter's acceleration, by the model, to a sum an LSB beyond its lowest."""
 
+from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.kalman import START, Design, State
-from hardwall.model.quadrature import seen_count
 
 BRINKS = {"mhz": (3, 47911, 8782)}
 """For how many rows the lead waits, and the gains of velocity and then of position: those that end it where it must."""

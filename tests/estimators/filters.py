@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from hardwall.model.compiled import compiled
+from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.quadrature import seen_count
+from hardwall.model.runtime.compiled import compiled
 from hardwall.testing import Bench
 from hardwall.testing.estimators import model
 

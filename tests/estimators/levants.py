@@ -8,11 +8,11 @@ from random import Random
 import cocotb
 import numpy as np
 
-from hardwall.model.axis import Axis
-from hardwall.model.compiled import compiled
+from hardwall.model.axis.axis import Axis
+from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators import levant
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.quadrature import seen_count
+from hardwall.model.runtime.compiled import compiled
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng
 from hardwall.testing.estimators import follow, reset_words

@@ -3,9 +3,9 @@
 from cocotb.triggers import ClockCycles, RisingEdge
 
 from hardwall.hdl.estimators.estimate import EstimatorBlock
+from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators.kept_edges import Gains, KeptDesign
 from hardwall.model.estimators.registry import design_of
-from hardwall.model.quadrature import Seen
 from hardwall.testing import SAMPLES, Bench
 from hardwall.testing.estimators import follow, model
 from stimuli.edges import anything, rows, turn

@@ -12,8 +12,8 @@ import pytest
 from cocotb.triggers import ClockCycles, RisingEdge
 
 from hardwall.hdl.estimators.bursts import Bursts
+from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators.bursts import EVENTS, NOTHING, STEEPER, Limits, limits, watch
-from hardwall.model.quadrature import Seen
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from stimuli.edges import Edge, Strobe, anything, rows
 from stimuli.emissions import Emission

@@ -10,7 +10,7 @@ from filters import SECONDS, equals, impulse, norms, rms, run, starts_afresh
 from scipy.signal import butter, sosfilt
 
 from hardwall.hdl.estimators.butterworth import Estimator
-from hardwall.model.axis import Axis
+from hardwall.model.axis.axis import Axis
 from hardwall.model.estimators import butterworth
 from hardwall.model.estimators.butterworth import CUTOFF_MAX, FLOAT_START, START, Design, Gains, State, coefficients
 from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate

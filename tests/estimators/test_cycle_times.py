@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hardwall.hdl.estimators.cycle_times import CycleTimes
+from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators.cycle_times import NOTHING, Times, observe
-from hardwall.model.quadrature import Seen
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, simulate
 from stimuli.edges import anything, rows, turn
 from stimuli.lengths import some_of

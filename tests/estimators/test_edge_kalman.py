@@ -11,10 +11,10 @@ import pytest
 from cocotb.triggers import ClockCycles, ReadOnly, RisingEdge
 
 from hardwall.hdl.estimators.edge_kalman import Estimator
+from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators import edge_kalman
 from hardwall.model.estimators.bursts import NOTHING, watch
 from hardwall.model.estimators.edge_kalman_design import LEVELS, START
-from hardwall.model.quadrature import Seen
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model, names
 from stimuli.lengths import some_of

@@ -6,7 +6,7 @@ import pytest
 from cocotb.triggers import RisingEdge
 
 from hardwall.hdl.estimators.edge_kalman import Estimator
-from hardwall.model import scale_map
+from hardwall.model.encoder import scale_map
 from hardwall.model.estimators import edge_kalman
 from hardwall.model.estimators.edge_kalman_design import START
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, simulate

@@ -7,14 +7,14 @@ import pytest
 from amaranth.hdl import Shape
 from amaranth.lib.wiring import In, Out
 
+from hardwall.hdl.encoder.quadrature import Seen as Bus
 from hardwall.hdl.estimators import registry as hardware
 from hardwall.hdl.estimators.estimate import EstimatorBlock
-from hardwall.hdl.quadrature import Seen as Bus
 from hardwall.model.arithmetic.fixed import SQ
-from hardwall.model.axis import Axis
+from hardwall.model.axis.axis import Axis
+from hardwall.model.encoder.quadrature import Seen, seen_count
 from hardwall.model.estimators import registry
 from hardwall.model.estimators.estimate import EstimatorDesign, EstimatorGains, estimate
-from hardwall.model.quadrature import Seen, seen_count
 from hardwall.model.words import Word
 from stimuli.specs import spec
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hardwall.hdl.estimators.foaw import Estimator
-from hardwall.model.axis import Axis
+from hardwall.model.axis.axis import Axis
 from hardwall.model.estimators import foaw
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from hardwall.hdl.estimators.history import History
-from hardwall.model.compiled import compiled
 from hardwall.model.estimators import history
 from hardwall.model.estimators.history import change_over, take
+from hardwall.model.runtime.compiled import compiled
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, simulate
 from stimuli.lengths import some_of
 from stimuli.seeded import seeded

@@ -11,7 +11,7 @@ from filters import SECONDS, equals, impulse, norms, rms, run, starts_afresh
 from scipy.linalg import solve_discrete_are
 
 from hardwall.hdl.estimators.kalman import Estimator
-from hardwall.model.axis import Axis
+from hardwall.model.axis.axis import Axis
 from hardwall.model.estimators import kalman
 from hardwall.model.estimators.kalman import FLOAT_START, START, Design, Gains, State, steady_state
 from hardwall.model.estimators.riccati import INDEX_MAX

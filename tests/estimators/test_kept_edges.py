@@ -10,10 +10,10 @@ from mts import design, stimulus
 
 from hardwall.hdl.estimators.kept_edges import KeptEdges
 from hardwall.model.checks import FieldError
+from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators import kept_edges, mt
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.kept_edges import NOTHING, Gains, KeptDesign, observe
-from hardwall.model.quadrature import Seen
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, simulate
 from hardwall.testing.estimators import model

@@ -10,7 +10,7 @@ import pytest
 from filters import equals, rms
 
 from hardwall.hdl.estimators.least_squares import Estimator
-from hardwall.model.axis import Axis
+from hardwall.model.axis.axis import Axis
 from hardwall.model.estimators import least_squares, window
 from hardwall.model.estimators.least_squares import Gains, minimax_window_s, numbers, weights
 from hardwall.model.spec import AxisSpec

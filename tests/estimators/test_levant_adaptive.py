@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from hardwall.hdl.estimators.levant_adaptive import Estimator
-from hardwall.model.compiled import compiled
+from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators import levant_adaptive
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.levant_adaptive import LOST, RAISED, START
-from hardwall.model.quadrature import seen_count
+from hardwall.model.runtime.compiled import compiled
 from hardwall.testing import rng, simulate
 from hardwall.testing.estimators import model, reset_words
 from stimuli.lengths import some_of

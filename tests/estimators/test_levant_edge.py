@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from hardwall.hdl.estimators.levant_edge import Estimator
+from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators import levant_edge
 from hardwall.model.estimators.bursts import NOTHING, watch
 from hardwall.model.estimators.levant_edge_design import LEARN_SHIFT, START
-from hardwall.model.quadrature import Seen
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model, names, reset_words
 from stimuli.lengths import some_of

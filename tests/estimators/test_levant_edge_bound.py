@@ -10,10 +10,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from hardwall.model.axis import Axis
-from hardwall.model.compiled import compiled
+from hardwall.model.axis.axis import Axis
+from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.quadrature import Seen
+from hardwall.model.runtime.compiled import compiled
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import rng
 from stimuli.specs import spec

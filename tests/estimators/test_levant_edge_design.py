@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from hardwall.model.compiled import compiled
+from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.levant_edge_design import FLOAT_START, START
-from hardwall.model.quadrature import Seen
+from hardwall.model.runtime.compiled import compiled
 from hardwall.sim.estimates import accuracy, signals
 from hardwall.sim.estimates.playback import DECODER_CLOCKS, encoded_signal
 from hardwall.sim.world.encoder import offsets

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from hardwall.hdl.estimators.levant_implicit import Estimator
+from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators import levant, levant_implicit
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.levant import FLOAT_START, POSITION_BUDGET, START
-from hardwall.model.quadrature import seen_count
 from hardwall.testing import rng, simulate
 from hardwall.testing.estimators import model
 from stimuli.lengths import some_of

@@ -5,10 +5,10 @@ import pytest
 from filters import rms
 
 from hardwall.hdl.estimators.registry import ESTIMATORS
-from hardwall.model.axis import Axis
+from hardwall.model.axis.axis import Axis
+from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators import registry
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.quadrature import seen_count
 from hardwall.testing import rng
 from stimuli.papers_signal import BOUND, RATES, axis_at, swing
 from stimuli.specs import spec

@@ -12,11 +12,11 @@ import pytest
 
 from hardwall.hdl.estimators.period import Estimator
 from hardwall.model import stamped
-from hardwall.model.axis import Axis
+from hardwall.model.axis.axis import Axis
+from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators import period
 from hardwall.model.estimators.estimate import estimate
 from hardwall.model.estimators.period import FLOAT_START, START
-from hardwall.model.quadrature import Seen
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model
 from stimuli.edges import (

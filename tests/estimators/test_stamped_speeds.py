@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from hardwall.model import stamped
-from hardwall.model.axis import Axis
+from hardwall.model.axis.axis import Axis
+from hardwall.model.axis.monitors import Design as Monitors
 from hardwall.model.estimators import registry
 from hardwall.model.estimators.bursts import doubt_samples
-from hardwall.model.monitors import Design as Monitors
 from stimuli.emissions import Emission
 from stimuli.specs import spec
 

@@ -15,13 +15,14 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from hardwall.model import monitors, quadrature
-from hardwall.model.axis import Axis
-from hardwall.model.compiled import compiled
+from hardwall.model.axis import monitors
+from hardwall.model.axis.axis import Axis
+from hardwall.model.axis.monitors import POSITION_WRAP, VELOCITY_LIMIT
+from hardwall.model.encoder import quadrature
+from hardwall.model.encoder.quadrature import Seen
 from hardwall.model.estimators import registry
 from hardwall.model.estimators.estimate import EstimatorDesign
-from hardwall.model.monitors import POSITION_WRAP, VELOCITY_LIMIT
-from hardwall.model.quadrature import Seen
+from hardwall.model.runtime.compiled import compiled
 from hardwall.testing.estimators import run
 from oracles.steady import Steady, ladder, polynomial, stable
 from stimuli.lengths import WHOLE

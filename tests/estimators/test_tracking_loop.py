@@ -10,10 +10,10 @@ import pytest
 from filters import SECONDS, equals, impulse, norms, rms, run, starts_afresh
 
 from hardwall.hdl.estimators.tracking_loop import Estimator
-from hardwall.model.axis import Axis
+from hardwall.model.axis.axis import Axis
+from hardwall.model.encoder.quadrature import seen_count
 from hardwall.model.estimators import tracking_loop
 from hardwall.model.estimators.tracking_loop import FLOAT_START, INDEX_MAX, START, Design, Gains, State
-from hardwall.model.quadrature import seen_count
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, parameters, rng, simulate
 from hardwall.testing.estimators import follow, model, reset_words

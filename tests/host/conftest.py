@@ -6,7 +6,7 @@ import pytest
 
 from hardwall.host.axis import Axis
 from hardwall.host.connect import connect
-from hardwall.model.registers import RegisterMap
+from hardwall.model.axis.registers import RegisterMap
 from hardwall.sim.scene.load import load
 from host.twin_board import PATIENT, TwinBoard
 

@@ -13,8 +13,8 @@ from hardwall.host.heartbeat import LEASE_S
 from hardwall.host.status import State, Status
 from hardwall.sim.rtl.families import FAMILIES
 from stimuli.lengths import long_form
-from stimuli.processes import wait_until
-from stimuli.virtual_boards import PACE, SCENE, SMALL, VirtualBoard, running
+from support.processes import wait_until
+from support.virtual_boards import PACE, SCENE, SMALL, VirtualBoard, running
 
 WALL_M, STIFFNESS_N_PER_M = 1e-3, 2000.0
 REST_S = 0.1

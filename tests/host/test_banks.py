@@ -17,13 +17,13 @@ from hardwall.host import (
     connect_axes,
 )
 from hardwall.host.device import AXES_AT
-from hardwall.model.axes import AxesSpec
-from hardwall.model.axes_registers import BANK, AxesMap
-from hardwall.model.capture import DONE, TRIGGERED, WAITING
-from hardwall.model.link import banked_file
-from hardwall.model.registers import RegisterMap
+from hardwall.model.axes import register_file as banked_file
+from hardwall.model.axes.axis import AxesSpec
+from hardwall.model.axes.registers import BANK, AxesMap
+from hardwall.model.axis.capture import DONE, TRIGGERED, WAITING
+from hardwall.model.axis.registers import RegisterMap
+from hardwall.model.axis.supervisor import ARMED, CAUSES, DISARMED, TRIPPED
 from hardwall.model.spec import AxisSpec
-from hardwall.model.supervisor import ARMED, CAUSES, DISARMED, TRIPPED
 from host.twin_board import PATIENT, TwinBoard
 from oracles.banked_server import BankedServer
 from stimuli.captures import records, window

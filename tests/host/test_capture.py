@@ -6,9 +6,9 @@ import pytest
 from hardwall.host.capture import PART_RECORDS
 from hardwall.host.connect import connect
 from hardwall.host.errors import ForeignError, NotReadyError
-from hardwall.model.capture import DONE, STATE_FLAGS, WAITING
+from hardwall.model.axis.capture import DONE, STATE_FLAGS, WAITING
+from hardwall.model.axis.registers import RegisterMap
 from hardwall.model.checks import FieldError
-from hardwall.model.registers import RegisterMap
 from host.twin_board import TwinBoard
 from stimuli.captures import records, window
 

@@ -6,8 +6,8 @@ import pytest
 
 from hardwall.host.connect import connect
 from hardwall.host.errors import ChangedError, ForeignError
+from hardwall.model.axis.registers import MAP
 from hardwall.model.register import Kind
-from hardwall.model.registers import MAP
 
 
 def carry(board, compressed: bytes) -> None:

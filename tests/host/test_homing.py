@@ -8,8 +8,8 @@ import pytest
 from hardwall.host.errors import NotReadyError
 from hardwall.host.homing import INDEX, homing
 from hardwall.host.status import State
-from hardwall.model import quadrature
-from hardwall.model.quadrature import NO_STROBES, START, Inputs, Params, Strobes
+from hardwall.model.encoder import quadrature
+from hardwall.model.encoder.quadrature import NO_STROBES, START, Inputs, Params, Strobes
 from hardwall.testing import rng
 from stimuli.supervised import supervised
 

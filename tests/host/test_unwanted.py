@@ -12,8 +12,8 @@ from hardwall.host.axis import Axis
 from hardwall.host.connect import connect
 from hardwall.host.errors import ChangedError, HostError, NotReadyError, SilentError, TrippedError
 from hardwall.host.status import State
+from hardwall.model.axis.supervisor import CAUSES
 from hardwall.model.checks import FieldError
-from hardwall.model.supervisor import CAUSES
 from host.twin_board import PATIENT, TwinBoard
 
 PATIENCE_S = 60.0

@@ -6,9 +6,9 @@ import pytest
 
 from hardwall.host.connect import connect
 from hardwall.host.errors import ChangedError, RefusedError, SilentError
+from hardwall.model.axis.register_file import Area
+from hardwall.model.axis.registers import END
 from hardwall.model.checks import FieldError
-from hardwall.model.link.register_file import Area
-from hardwall.model.registers import END
 
 FOR_GOOD = 1 << 30
 """More answers than a host waits for."""

@@ -5,10 +5,10 @@ import threading
 import time
 from contextlib import suppress
 
-from hardwall.model.link import register_file
+from hardwall.model.axis import register_file
+from hardwall.model.axis.registers import RegisterMap
 from hardwall.model.link.line import Verdict, framed
 from hardwall.model.link.server import Server
-from hardwall.model.registers import RegisterMap
 
 SILENCE_S = 0.02
 """The silence that ends a request which was cut short."""

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from hardwall.sim.jobs import children
-from stimuli.processes import ended_by, line, session, started, wait_until
+from support.processes import ended_by, line, session, started, wait_until
 
 # The tool has a child of its own, as a build of make and compilers has.
 # Where this runs under nohup, the programs that it starts would not hear SIGHUP.

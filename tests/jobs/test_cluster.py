@@ -14,8 +14,8 @@ from distributed import Client, LocalCluster
 from distributed.scheduler import KilledWorker
 
 from hardwall.sim.jobs import cluster
-from stimuli.command_line import call
-from stimuli.processes import line, started
+from support.command_line import call
+from support.processes import line, started
 
 LOCAL = {"threads_per_worker": 1, "dashboard_address": ":0"}
 

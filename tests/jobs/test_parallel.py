@@ -10,14 +10,14 @@ import pytest
 
 from hardwall.sim.jobs import children, parallel
 from hardwall.sim.jobs.store import Store
-from stimuli import jobs
-from stimuli.processes import ended_by, session, started, wait_until
+from support import jobs
+from support.processes import ended_by, session, started, wait_until
 
 
 @pytest.mark.parametrize("number", ["SIGINT", "SIGTERM", "SIGKILL"])
 def test_no_tool_of_a_job_is_left(tmp_path, monkeypatch, number):
     monkeypatch.chdir(tmp_path)
-    with started(sys.executable, "-m", "stimuli.jobs", HARDWALL_BUILD=str(tmp_path)) as process:
+    with started(sys.executable, "-m", "support.jobs", HARDWALL_BUILD=str(tmp_path)) as process:
         wait_until(lambda: all(Path(f"begun-{job}").exists() for job in (1, 2)))
         wait_until(lambda: len(session(process)) >= 9)
         process.send_signal(signal.Signals[number])

@@ -5,7 +5,7 @@ import sys
 import threading
 
 from hardwall.sim.jobs.scratch import scratch
-from stimuli.processes import line, started
+from support.processes import line, started
 
 PROGRAM = """
 import sys, time

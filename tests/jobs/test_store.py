@@ -6,8 +6,7 @@ import os
 import pytest
 
 from hardwall import sim
-from hardwall.model import build_folder
-from hardwall.model.runtime import termination
+from hardwall.model.runtime import build_folder, termination
 from hardwall.sim.jobs import parallel, store
 from hardwall.sim.jobs.store import Store
 

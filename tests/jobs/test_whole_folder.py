@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from hardwall.model import build_folder
+from hardwall.model.runtime import build_folder
 from hardwall.sim.jobs import whole_folder as module
 from hardwall.sim.jobs.whole_folder import LIST, keep_log, whole_folder
-from stimuli.processes import line, started
+from support.processes import line, started
 
 TEXTS = {"library.so": "machine code" * 1000, "axis.v": "module axis; endmodule"}
 

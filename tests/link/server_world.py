@@ -6,11 +6,12 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Out, connect
 from cocotb.triggers import ClockCycles, First, RisingEdge, Timer
 
-from hardwall.hdl.lead_out import lead_out
+from hardwall.hdl.axis.register_file import RegisterFile
+from hardwall.hdl.board.lead_out import lead_out
 from hardwall.hdl.link.line import Line as HdlLine
-from hardwall.hdl.link.register_file import RegisterFile
 from hardwall.hdl.link.server import Server
-from hardwall.model.link import register_file, server
+from hardwall.model.axis import register_file
+from hardwall.model.link import server
 from hardwall.model.link.line import Line, Verdict, framed
 from hardwall.testing import Bench, parameters, rng
 from stimuli.status import show

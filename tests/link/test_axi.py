@@ -12,11 +12,23 @@ from cocotb.triggers import ClockCycles, RisingEdge
 from cocotbext.axi import AxiLiteBus, AxiLiteMaster
 from cocotbext.axi.axil_channels import AxiLiteAWTransaction, AxiLiteWTransaction
 
-from hardwall.hdl.lead_out import lead_out
+from hardwall.hdl.board.lead_out import lead_out
 from hardwall.hdl.link.axi_link import AxiLink
-from hardwall.model.link import axi, register_file
+from hardwall.model.axis import register_file
+from hardwall.model.axis.registers import (
+    ACTIVE,
+    CAPTURE,
+    COUNTERS,
+    LIVE,
+    MAP,
+    PULSES,
+    SPACE,
+    SUPERVISOR,
+    TELEMETRY,
+    WRITTEN,
+)
+from hardwall.model.link import axi
 from hardwall.model.link.axi import Response
-from hardwall.model.registers import ACTIVE, CAPTURE, COUNTERS, LIVE, MAP, PULSES, SPACE, SUPERVISOR, TELEMETRY, WRITTEN
 from hardwall.testing import SAMPLES, Bench, parameters, rng, simulate
 from stimuli.restless import Restless
 from stimuli.status import show

@@ -8,11 +8,11 @@ from cocotb.clock import Clock
 from cocotb.triggers import ClockCycles
 from cocotbext.axi import AxiLiteBus, AxiLiteMaster
 
-from hardwall.hdl.board import Board
+from hardwall.hdl.axis.board import Board
+from hardwall.hdl.axis.supervised import LOOPS
 from hardwall.hdl.link.axi_link import AxiLink
-from hardwall.hdl.supervised import LOOPS
-from hardwall.model.registers import RegisterMap
-from hardwall.model.supervisor import ARMED, DISARMED, TRIPPED, names
+from hardwall.model.axis.registers import RegisterMap
+from hardwall.model.axis.supervisor import ARMED, DISARMED, TRIPPED, names
 from hardwall.testing import Bench, parameters, simulate
 from stimuli.specs import spec
 

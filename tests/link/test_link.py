@@ -15,13 +15,13 @@ from pymodbus import FramerType, ModbusException
 from pymodbus.client.base import ModbusBaseSyncClient
 from pymodbus.transport import CommParams, CommType
 
-from hardwall.hdl.lead_out import lead_out
+from hardwall.hdl.board.lead_out import lead_out
 from hardwall.hdl.link.link import Link
+from hardwall.model.axis.register_file import EXCLUSIVE
+from hardwall.model.axis.registers import CAPTURE, COUNTERS, MAP, SUPERVISOR, TELEMETRY
 from hardwall.model.link import server
 from hardwall.model.link.line import framed
-from hardwall.model.link.register_file import EXCLUSIVE
 from hardwall.model.register import Kind
-from hardwall.model.registers import CAPTURE, COUNTERS, MAP, SUPERVISOR, TELEMETRY
 from hardwall.testing import Bench, parameters, rng, simulate
 from stimuli import frames
 from stimuli.restless import Restless

@@ -5,11 +5,12 @@ import pytest
 from cocotb.triggers import ClockCycles, RisingEdge
 from server_world import Stack, World
 
-from hardwall.hdl.link.register_file import RegisterFile
+from hardwall.hdl.axis.register_file import RegisterFile
 from hardwall.hdl.link.server import Server
-from hardwall.model.link import register_file, server
+from hardwall.model.axis import register_file
+from hardwall.model.axis.registers import CAPTURE, COUNTERS, WRITTEN
+from hardwall.model.link import server
 from hardwall.model.link.line import Line, Verdict, framed
-from hardwall.model.registers import CAPTURE, COUNTERS, WRITTEN
 from hardwall.testing import simulate
 from stimuli import frames
 from stimuli.random_requests import random_request

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_loop import A_FIFTH, SLOW, same_words
 
-from hardwall.model.design import strobe_of
+from hardwall.model.axis.design import strobe_of
 from hardwall.model.stamped import Edges
 from hardwall.sim.loop.backends import opened
 from hardwall.sim.loop.controllers import sample, sample_quietly

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hardwall.cli import app
-from hardwall.model.design import Design, overlap_of
+from hardwall.model.axis.design import Design, overlap_of
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import load
 from hardwall.sim.studies.bench import under_cocotb

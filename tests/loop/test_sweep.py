@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from hardwall.model import quadrature
-from hardwall.model.design import change_of
+from hardwall.model.axis.design import change_of
+from hardwall.model.encoder import quadrature
 from hardwall.model.stamped import room_for
 from hardwall.sim.loop import loop
 from hardwall.sim.loop.backends import number_of, opened

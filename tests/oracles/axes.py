@@ -5,10 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hardwall.model import clocked, clocked_axes, stamped
-from hardwall.model.axes import FRONT_LATENCY, AxesSpec
-from hardwall.model.clocked_axes import Outputs, Samples
-from hardwall.model.design import ENCODER_FLAGS
+from hardwall.model import stamped
+from hardwall.model.axes import clocked as clocked_axes
+from hardwall.model.axes.axis import FRONT_LATENCY, AxesSpec
+from hardwall.model.axes.clocked import Outputs, Samples
+from hardwall.model.axis import clocked
+from hardwall.model.axis.design import ENCODER_FLAGS
 from hardwall.testing.packing import Packing
 
 RECORD = "count", "velocity", "wall_force", "drive", "flags"

@@ -7,18 +7,18 @@ from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 from cocotb.triggers import RisingEdge
 
-from hardwall.hdl.axes_board import AxesBoard
-from hardwall.hdl.lead_out import lead_out
-from hardwall.hdl.supervised import LOOPS
-from hardwall.model.axes import AxesSpec
-from hardwall.model.axes_capture import SAMPLED
-from hardwall.model.axes_registers import BANK
-from hardwall.model.capture import RECORD_REGISTERS, TAKEN_AT
+from hardwall.hdl.axes.board import AxesBoard
+from hardwall.hdl.axis.supervised import LOOPS
+from hardwall.hdl.board.lead_out import lead_out
+from hardwall.model.axes import register_file as banked_file
+from hardwall.model.axes.axis import AxesSpec
+from hardwall.model.axes.capture import SAMPLED
+from hardwall.model.axes.registers import BANK
+from hardwall.model.axis.capture import RECORD_REGISTERS, TAKEN_AT
+from hardwall.model.axis.registers import EDGE_STAMPS
+from hardwall.model.axis.supervisor import ARMED
 from hardwall.model.drive import pdm
-from hardwall.model.link import banked_file
 from hardwall.model.link.line import Verdict, framed
-from hardwall.model.registers import EDGE_STAMPS
-from hardwall.model.supervisor import ARMED
 from hardwall.testing import Bench
 from hardwall.testing.packing import Packing
 from stimuli import frames

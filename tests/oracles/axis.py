@@ -4,9 +4,10 @@ from collections import defaultdict
 from collections.abc import Callable
 from operator import attrgetter
 
-from hardwall.model import output, passivity, quadrature, wall
+from hardwall.model.axis import output, passivity, wall
+from hardwall.model.axis.supervised import FIXED, Design
+from hardwall.model.encoder import quadrature
 from hardwall.model.estimators.estimate import estimate
-from hardwall.model.supervised import FIXED, Design
 
 PULSES = ("preload", "preload_count", "index_arm", "clear_flags", "origin_shift", "slip")
 DECODED = (

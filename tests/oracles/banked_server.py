@@ -1,6 +1,7 @@
 """The server's twin over the register file of several axes."""
 
-from hardwall.model.link import banked_file, server
+from hardwall.model.axes import register_file as banked_file
+from hardwall.model.link import server
 
 
 class BankedServer(server.Server):

@@ -7,17 +7,17 @@ from amaranth.hdl import Cat, Module, Shape
 from amaranth.lib import wiring
 from amaranth.lib.wiring import Out
 
-from hardwall.hdl.board import Board
-from hardwall.hdl.lead_out import lead_out
+from hardwall.hdl.axis.board import Board
+from hardwall.hdl.axis.supervised import LOOPS, SHOWN
+from hardwall.hdl.board.lead_out import lead_out
 from hardwall.hdl.link.link import Link
-from hardwall.hdl.supervised import LOOPS, SHOWN
-from hardwall.model import capture
-from hardwall.model.capture import RECORD_REGISTERS
+from hardwall.model.axis import capture
+from hardwall.model.axis.capture import RECORD_REGISTERS
+from hardwall.model.axis.registers import RegisterMap
+from hardwall.model.axis.supervisor import ARMED
 from hardwall.model.drive import dac, pdm, pwm
 from hardwall.model.drive.stage import Amplifier, Stage
 from hardwall.model.register import VALUE_BITS
-from hardwall.model.registers import RegisterMap
-from hardwall.model.supervisor import ARMED
 from hardwall.testing.packing import Packing
 from stimuli.specs import spec
 

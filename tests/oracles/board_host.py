@@ -4,11 +4,12 @@ from collections import deque
 
 from cocotb.triggers import RisingEdge
 
-from hardwall.hdl.board import ENCODER
-from hardwall.hdl.link.register_file import RegisterFile
-from hardwall.hdl.supervised import LOOPS
-from hardwall.model.capture import DONE
-from hardwall.model.link import register_file, server
+from hardwall.hdl.axis.board import ENCODER
+from hardwall.hdl.axis.register_file import RegisterFile
+from hardwall.hdl.axis.supervised import LOOPS
+from hardwall.model.axis import register_file
+from hardwall.model.axis.capture import DONE
+from hardwall.model.link import server
 from hardwall.model.link.line import Verdict, framed
 from hardwall.model.register import Kind
 from hardwall.testing import Bench, rng

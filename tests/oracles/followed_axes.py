@@ -2,9 +2,9 @@
 
 from cocotb.triggers import RisingEdge
 
-from hardwall.hdl.supervised import COMPLEMENTS, LOOPS
-from hardwall.hdl.supervised_axes import SupervisedAxes
-from hardwall.model.supervisor import ARMED
+from hardwall.hdl.axes.supervised import SupervisedAxes
+from hardwall.hdl.axis.supervised import COMPLEMENTS, LOOPS
+from hardwall.model.axis.supervisor import ARMED
 from hardwall.testing import Bench, Recorded, parameters
 from stimuli.supervised_axes_world import slow
 from stimuli.supervised_world import QUARTERS

@@ -4,7 +4,7 @@ import math
 
 from cocotb.triggers import ClockCycles, RisingEdge
 
-from hardwall.model.clock_monitor import SYNCHRONISER, Design
+from hardwall.model.board.clock_monitor import SYNCHRONISER, Design
 
 from .on_a_line import CLOCK_HZ, OSCILLATOR_NS, OnALine
 

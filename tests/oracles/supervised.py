@@ -2,10 +2,10 @@
 
 from operator import attrgetter, itemgetter
 
-from hardwall.hdl.supervised import COMPLEMENTS, LOOPS, SHOWN
-from hardwall.model import monitors, supervisor
-from hardwall.model.supervised import FROM_AXIS, FROM_OUTSIDE, Design
-from hardwall.model.supervisor import CAUSES
+from hardwall.hdl.axis.supervised import COMPLEMENTS, LOOPS, SHOWN
+from hardwall.model.axis import monitors, supervisor
+from hardwall.model.axis.supervised import FROM_AXIS, FROM_OUTSIDE, Design
+from hardwall.model.axis.supervisor import CAUSES
 
 SYNCHRONISER = 2
 """Clock edges from a change of a pin to the last edge that does not act on it."""

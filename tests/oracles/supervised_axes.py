@@ -2,15 +2,16 @@
 
 from collections import defaultdict
 
-from hardwall.hdl.supervised import COMPLEMENTS, LOOPS
-from hardwall.model import supervised_axes, watchdog
+from hardwall.hdl.axis.supervised import COMPLEMENTS, LOOPS
 from hardwall.model.arithmetic.fixed import wrap
-from hardwall.model.axes import FRONT_LATENCY
-from hardwall.model.monitors import BITS
-from hardwall.model.sampled_monitors import Inputs
-from hardwall.model.supervised import FIXED, SLIPS
-from hardwall.model.supervised_axes import LOOK, SAMPLE_WORDS, Design, Turn
-from hardwall.model.supervisor import ARMED
+from hardwall.model.axes import supervised as supervised_axes
+from hardwall.model.axes.axis import FRONT_LATENCY
+from hardwall.model.axes.monitors import Inputs
+from hardwall.model.axes.supervised import LOOK, SAMPLE_WORDS, Design, Turn
+from hardwall.model.axis import watchdog
+from hardwall.model.axis.monitors import BITS
+from hardwall.model.axis.supervised import FIXED, SLIPS
+from hardwall.model.axis.supervisor import ARMED
 
 from .supervised import SYNCHRONISER
 

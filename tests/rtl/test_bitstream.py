@@ -8,17 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from hardwall.hdl.board import Board
-from hardwall.model.axes import AxesSpec
-from hardwall.model.axes_registers import AxesMap
+from hardwall.hdl.axis.board import Board
+from hardwall.model.axes.axis import AxesSpec
+from hardwall.model.axes.registers import AxesMap
 from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.jobs.whole_folder import LIST
 from hardwall.sim.rtl import bitstream, flow
 from hardwall.sim.rtl.bitstream import Order, TimingError, build
 from hardwall.sim.rtl.tools import SynthesisError
 from hardwall.sim.scene.load import load
-from stimuli.reports import check
-from stimuli.tools import ROUTED, stand_in
+from support.reports import check
+from support.tools import ROUTED, stand_in
 
 FILES = [
     *("WIRING.md", "board.v", "registers.h", "registers.json", "registers.md", "report.json", "report.txt"),

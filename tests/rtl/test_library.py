@@ -8,12 +8,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from hardwall.model.build_folder import build_dir
+from hardwall.model.runtime.build_folder import build_dir
 from hardwall.sim.rtl import library, shared_library
 from hardwall.sim.rtl.shared_library import LIBRARY, Recipe
 from hardwall.sim.rtl.verilator import BuildError
-from stimuli.processes import HARDWALL, ended, session, started, wait_until
 from stimuli.specs import spec
+from support.processes import HARDWALL, ended, session, started, wait_until
 
 CODE = b"machine code" * 1000
 

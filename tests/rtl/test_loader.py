@@ -10,7 +10,7 @@ import pytest
 from hardwall.sim.boards.description import BOARDS
 from hardwall.sim.rtl.loader import LOADER, load
 from hardwall.sim.rtl.tools import SynthesisError
-from stimuli.tools import stand_in
+from support.tools import stand_in
 
 CONTENT = b"no bitstream"
 DIGEST = hashlib.sha256(CONTENT).hexdigest()

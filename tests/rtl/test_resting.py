@@ -10,11 +10,11 @@ from amaranth.lib import wiring
 from amaranth.lib.memory import Memory
 from amaranth.lib.wiring import In, Out
 
-from hardwall.hdl.axis import Axis
+from hardwall.hdl.axis.axis import Axis
 from hardwall.hdl.export import to_netlist
-from hardwall.model.axis import Axis as Model
+from hardwall.model.axis.axis import Axis as Model
+from hardwall.model.encoder.quadrature import latency
 from hardwall.model.estimators import registry
-from hardwall.model.quadrature import latency
 from hardwall.sim.rtl import library
 from hardwall.sim.rtl.c_function import call
 from hardwall.sim.rtl.library import Hardware

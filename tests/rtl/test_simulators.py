@@ -14,14 +14,14 @@ from amaranth.hdl import Shape
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In
 
-from hardwall.hdl.axis import Axis
-from hardwall.hdl.board import Board
+from hardwall.hdl.axis.axis import Axis
+from hardwall.hdl.axis.board import Board
+from hardwall.hdl.axis.supervised import LOOPS
 from hardwall.hdl.export import to_verilog
 from hardwall.hdl.link.link import Link
-from hardwall.hdl.supervised import LOOPS
+from hardwall.model.axis.registers import RegisterMap
+from hardwall.model.axis.supervisor import REQUIRED
 from hardwall.model.link.line import framed
-from hardwall.model.registers import RegisterMap
-from hardwall.model.supervisor import REQUIRED
 from hardwall.sim.rtl.verilator import LINT_OPTIONS, environment
 from hardwall.testing import rng
 from stimuli import frames

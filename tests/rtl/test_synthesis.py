@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from hardwall.hdl.axes_board import AxesBoard
-from hardwall.hdl.board import Board
-from hardwall.model import quadrature
-from hardwall.model.axes import AxesSpec
+from hardwall.hdl.axes.board import AxesBoard
+from hardwall.hdl.axis.board import Board
+from hardwall.model.axes.axis import AxesSpec
+from hardwall.model.encoder import quadrature
 from hardwall.sim.boards.description import board_of
 from hardwall.sim.boards.parts import PARTS
 from hardwall.sim.boards.pll import ClockError
@@ -18,8 +18,8 @@ from hardwall.sim.rtl.synthesis import synthesise
 from hardwall.sim.rtl.tools import SynthesisError
 from hardwall.sim.scene.load import load
 from hardwall.sim.studies import costs
-from stimuli.reports import check
-from stimuli.tools import stand_in
+from support.reports import check
+from support.tools import stand_in
 
 ICE40, GOWIN = (load("mhz", {"controller.clock_hz": clock_hz}) for clock_hz in (48_000_000, 54_000_000))
 """The scene at clocks that boards of these parts make."""

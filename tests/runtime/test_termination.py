@@ -7,7 +7,7 @@ import time
 import pytest
 
 from hardwall.model.runtime import termination
-from stimuli.processes import ended, ended_by, line, session, started, wait_until
+from support.processes import ended, ended_by, line, session, started, wait_until
 
 PROGRAM = """
 import sys, time

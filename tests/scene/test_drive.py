@@ -2,9 +2,9 @@
 
 import pytest
 
+from hardwall.model.axis.registers import RegisterMap
+from hardwall.model.axis.supervised import Design
 from hardwall.model.drive import dac, pdm, pwm
-from hardwall.model.registers import RegisterMap
-from hardwall.model.supervised import Design
 from hardwall.sim.scene.build import output_step_n, world_of
 from hardwall.sim.scene.drive import AMPLIFIER, NEEDED, DriveSection
 from hardwall.sim.scene.errors import SceneError

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hardwall.model.quadrature_speed import max_edge_rate
+from hardwall.model.encoder.quadrature_speed import max_edge_rate
 from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load
 from hardwall.sim.scene.tables import load_any

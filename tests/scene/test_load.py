@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from hardwall.model.quadrature_speed import max_edge_rate
+from hardwall.model.encoder.quadrature_speed import max_edge_rate
 from hardwall.sim.scene import checks
 from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import BYTES_MAX, load, parse, read

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hardwall.model.axes import AxesSpec
+from hardwall.model.axes.axis import AxesSpec
 from hardwall.sim.scene.load import load
 from hardwall.sim.scene.schema import Scene
 from hardwall.sim.scene.several import ABSENT, GAIN_WORDS, SHARED

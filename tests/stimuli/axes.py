@@ -6,9 +6,9 @@ from itertools import count
 
 import numpy as np
 
-from hardwall.model.axes import AxesSpec
+from hardwall.model.axes.axis import AxesSpec
+from hardwall.model.axis.design import Design
 from hardwall.model.checks import FieldError
-from hardwall.model.design import Design
 from hardwall.model.estimators import levant, window
 from hardwall.model.spec import AxisSpec
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hardwall.model.registers import RegisterMap
+from hardwall.model.axis.registers import RegisterMap
 
 
 def records(registers: RegisterMap, decimation: int) -> dict[str, np.ndarray]:

@@ -2,8 +2,8 @@
 
 import random as plain
 
-from hardwall.model import supervisor
-from hardwall.model.supervisor import ALL, CAUSES, DISARMED, LINK, START, TRIPPED, Inputs
+from hardwall.model.axis import supervisor
+from hardwall.model.axis.supervisor import ALL, CAUSES, DISARMED, LINK, START, TRIPPED, Inputs
 from hardwall.testing import SEED
 
 

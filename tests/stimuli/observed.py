@@ -3,8 +3,8 @@
 from amaranth.hdl import Cat, Module, Mux, Signal, Value
 from amaranth.lib import wiring
 
-from hardwall.hdl.passivity import Passivity
-from hardwall.model.passivity import Design
+from hardwall.hdl.axis.passivity import Passivity
+from hardwall.model.axis.passivity import Design
 
 AT_THE_STROBE = "velocity", "drive", "passivity_damping"
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hardwall.model.quadrature import Inputs, Strobes
+from hardwall.model.encoder.quadrature import Inputs, Strobes
 
 INPUTS = (*Inputs._fields, *Strobes._fields)
 STROBES = {"preload": 0.004, "origin_shift": 0.02, "arm": 0.02, "clear": 0.02, "slip": 0.002}

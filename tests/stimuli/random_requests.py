@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from hardwall.model.link.register_file import Design
-from hardwall.model.registers import MAP, RegisterMap
+from hardwall.model.axis.register_file import Design
+from hardwall.model.axis.registers import MAP, RegisterMap
 
 from . import frames
 

@@ -4,7 +4,7 @@ from typing import Any
 
 from cocotb.triggers import RisingEdge
 
-from hardwall.model.registers import EDGE_STAMPS, RegisterMap
+from hardwall.model.axis.registers import EDGE_STAMPS, RegisterMap
 from hardwall.testing import Bench
 
 

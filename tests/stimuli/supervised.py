@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from hardwall.model.registers import RegisterMap
+from hardwall.model.axis.registers import RegisterMap
 
 from .specs import spec
 

@@ -2,11 +2,11 @@
 
 import random as plain
 
-from hardwall.hdl.supervised import COMPLEMENTS, LOOPS
-from hardwall.model.axes import AxesSpec
+from hardwall.hdl.axis.supervised import COMPLEMENTS, LOOPS
+from hardwall.model.axes.axis import AxesSpec
+from hardwall.model.axes.supervised import Design
+from hardwall.model.axis.supervisor import TRIPPED, WATCHDOG_MS
 from hardwall.model.estimators import levant
-from hardwall.model.supervised_axes import Design
-from hardwall.model.supervisor import TRIPPED, WATCHDOG_MS
 
 from .specs import NARROW
 from .supervised_world import STROBES, World

@@ -5,9 +5,9 @@ Every word comes to all of its values, every cause is there again and again, and
 
 import random as plain
 
-from hardwall.hdl.supervised import LOOPS
-from hardwall.model.supervised import FIXED, Design
-from hardwall.model.supervisor import ALL, ARMED, DISARMED, TRIPPED, WATCHDOG_MS
+from hardwall.hdl.axis.supervised import LOOPS
+from hardwall.model.axis.supervised import FIXED, Design
+from hardwall.model.axis.supervisor import ALL, ARMED, DISARMED, TRIPPED, WATCHDOG_MS
 
 STROBES = (
     "commit", "arm", "disarm", "acknowledge", "index_arm", "preload", "origin_shift", "clear_flags", "slip",

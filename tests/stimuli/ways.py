@@ -1,6 +1,6 @@
 """Ways of a handle under a drive, and the energy that a passivity controller's observer sees on them."""
 
-from hardwall.model import passivity
+from hardwall.model.axis import passivity
 
 
 def energies(params: passivity.Params, counts: list[int], drives: list[int]) -> list[int]:

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from hardwall.hdl.supervised_axes import SupervisedAxes
+from hardwall.hdl.axes.supervised import SupervisedAxes
 from hardwall.sim.pictures import axes as picture
 from hardwall.sim.rtl import pipeline
 from hardwall.sim.studies import axes
 from stimuli import results
-from stimuli.reports import check
-from stimuli.tools import stand_in
+from support.reports import check
+from support.tools import stand_in
 
 
 @pytest.fixture

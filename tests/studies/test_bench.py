@@ -4,14 +4,14 @@ import shutil
 
 import pytest
 
-from hardwall.model.build_folder import build_dir
 from hardwall.model.estimators.registry import ESTIMATORS
+from hardwall.model.runtime.build_folder import build_dir
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import FOLDER
 from hardwall.sim.studies import bench, waits
 from hardwall.sim.studies.waits import SCENE, Command
 from stimuli.lengths import LONG
-from stimuli.reports import check
+from support.reports import check
 
 HIT = ("hit", SCENE, "--set", "protocol.start_m=-1e-5", *waits.SHORT, "--json")
 COMMANDS = {"fixed (samples/s)": Command(HIT, 1, speed=True), "a hit, nothing compiled (s)": Command(HIT, 1, cold=True)}

@@ -1,7 +1,7 @@
 """The table for the choice of an estimator, from made-up results."""
 
 from hardwall.sim.studies import choose
-from stimuli.reports import check
+from support.reports import check
 
 COST = {"device": "some", "lut4": 10, "ff": 20, "dsp": 1, "bram": 0, "latency_clocks": 7, "board": {"max_sample_hz": 5}}
 

@@ -11,8 +11,8 @@ from hardwall.sim.studies import cutoff
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.zwidth import Map
 from stimuli import results
-from stimuli.command_line import call
 from stimuli.maps import Known
+from support.command_line import call
 
 
 def map_of(case: Case, area: float, leaves: bool = False) -> Map:

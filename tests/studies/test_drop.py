@@ -15,8 +15,8 @@ from hardwall.sim.walls.chatter import Chatter
 from hardwall.sim.walls.methods import methods
 from hardwall.sim.walls.zwidth import Effort, Map
 from stimuli import results
-from stimuli.command_line import call
 from stimuli.scenes import ODD
+from support.command_line import call
 
 NOTHING = Effort("fixed", 0, 0.0)
 

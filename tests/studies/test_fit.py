@@ -14,9 +14,9 @@ from hardwall.sim.walls.figure_5 import Fact
 from hardwall.sim.walls.grid import grid_of
 from hardwall.sim.walls.zwidth import Map, NeverReached
 from stimuli import results
-from stimuli.command_line import call
 from stimuli.figure_5 import PAPER
 from stimuli.maps import Known
+from support.command_line import call
 
 MASS_KG, DELAY_S = 0.2, 1.4e-3
 NAMES = {curve.label: name for name, curve in methods.methods().items()}

@@ -11,8 +11,8 @@ from hardwall.sim.scene.case import Case
 from hardwall.sim.studies import gains
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.zwidth import Map
-from stimuli.command_line import call
 from stimuli.maps import Known
+from support.command_line import call
 
 BOUND = 12.0
 BRIEF = {

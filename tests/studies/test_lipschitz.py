@@ -6,7 +6,7 @@ import math
 import pytest
 
 from hardwall.sim.studies.lipschitz import least_alpha_m_per_s2
-from stimuli.command_line import call
+from support.command_line import call
 
 
 def test_report_and_picture(monkeypatch, capsys, tmp_path):

@@ -10,8 +10,8 @@ from hardwall.sim.studies import rates
 from hardwall.sim.walls import methods, theory
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.zwidth import Map
-from stimuli.command_line import call
 from stimuli.maps import Known
+from support.command_line import call
 
 CURVES = [methods.Curve("kalman", "kalman", "u"), methods.Curve("fdm", "fdm", "u")]
 FEW = {

@@ -15,7 +15,7 @@ from hardwall.sim.studies.rendered_setting import slow_hz
 from hardwall.sim.walls import theory
 from hardwall.sim.walls.methods import methods
 from stimuli import results
-from stimuli.command_line import call
+from support.command_line import call
 
 MOVING = Moving([5, 50, 600], 1e-4, [0.05, 0.2], 2e-3)
 FEW = [

@@ -16,7 +16,7 @@ from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.grid import grid_of
 from hardwall.sim.walls.moves import Move
 from hardwall.sim.walls.zwidth import Map
-from stimuli.command_line import call
+from support.command_line import call
 
 EDGE = 22e3
 

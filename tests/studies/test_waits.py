@@ -9,7 +9,7 @@ import pytest
 from hardwall.sim.scene.load import read
 from hardwall.sim.studies import waits
 from hardwall.sim.studies.waits import SCENE, Command, Wait
-from stimuli.command_line import call
+from support.command_line import call
 
 AT_THE_WALL = ("--set", "protocol.start_m=-1e-5")
 HIT = ("hit", SCENE, *AT_THE_WALL, *waits.SHORT, "--json")

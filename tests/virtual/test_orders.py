@@ -8,7 +8,7 @@ import pytest
 from hardwall.sim.rtl.board_library import SWITCHES, WIRES
 from hardwall.sim.virtual.orders import ORDERS, OrderError, obey
 from hardwall.sim.virtual.virtual_board import Hand
-from stimuli.pages import text_of
+from support.pages import text_of
 
 
 class Told:

@@ -3,9 +3,9 @@
 import pytest
 from virtual_host import SerialHost
 
+from hardwall.model.axis.supervisor import ARMED, DISARMED, TRIPPED, names
 from hardwall.model.link.line import framed
 from hardwall.model.link.uart import FRAME_BITS
-from hardwall.model.supervisor import ARMED, DISARMED, TRIPPED, names
 from hardwall.sim.rtl.families import FAMILIES
 from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.load import load
@@ -13,7 +13,7 @@ from hardwall.sim.virtual import virtual_board
 from hardwall.sim.virtual.virtual_board import Hand, VirtualBoard
 from stimuli import frames
 from stimuli.lengths import LONG, long_form
-from stimuli.virtual_boards import SCENE, SMALL
+from support.virtual_boards import SCENE, SMALL
 
 STIFFNESS_N_PER_M, DAMPING_N_S_PER_M = 2000.0, 5.0
 BAUD = 230_400

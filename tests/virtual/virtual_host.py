@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from hardwall.model.axis.registers import RegisterMap
 from hardwall.model.link.line import framed
-from hardwall.model.registers import RegisterMap
 from hardwall.sim.virtual.virtual_board import VirtualBoard
 from stimuli import frames
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hardwall.model.axis import Axis
+from hardwall.model.axis.axis import Axis
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls import methods
 from hardwall.sim.walls.chatter import Chatter, at_rest, motions

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hardwall.model import passivity
+from hardwall.model.axis import passivity
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls import hit
 from stimuli.ways import energies

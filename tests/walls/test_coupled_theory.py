@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import scipy
 
-from hardwall.model.quadrature import latency
+from hardwall.model.encoder.quadrature import latency
 from hardwall.sim.loop.coupled import ToolState, advanced
 from hardwall.sim.scene.build import tool_of
 from hardwall.sim.scene.case import Case

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import pytest
 
-from hardwall.model.design import Timing, overlap_of
+from hardwall.model.axis.design import Timing, overlap_of
 from hardwall.sim.scene.load import load
 from hardwall.sim.scene.schema import Scene
 from hardwall.sim.scene.several import AxesScene

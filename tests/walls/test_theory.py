@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy
 
-from hardwall.model.quadrature import latency
+from hardwall.model.encoder.quadrature import latency
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls import hit, theory
 from stimuli.lengths import LONG

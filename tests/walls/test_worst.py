@@ -19,10 +19,10 @@ from hardwall.sim.walls.boundary import STABLE, BoundaryPoint
 from hardwall.sim.walls.grid import grid_of
 from hardwall.sim.walls.likelihood import Wall
 from stimuli import results
-from stimuli.command_line import call
 from stimuli.lengths import long_form
-from stimuli.reports import check
 from stimuli.scenes import HAND
+from support.command_line import call
+from support.reports import check
 
 STEP = 1e3
 GRID = {

@@ -10,7 +10,7 @@ from dataclasses import replace
 import pytest
 from distributed import LocalCluster
 
-from hardwall.model.build_folder import build_dir
+from hardwall.model.runtime.build_folder import build_dir
 from hardwall.sim.jobs import cluster
 from hardwall.sim.jobs.crew import Threads
 from hardwall.sim.jobs.store import Store
@@ -19,9 +19,9 @@ from hardwall.sim.scene.load import read
 from hardwall.sim.walls import methods, zwidth
 from hardwall.sim.walls.boundary import BoundaryPoint
 from stimuli import results
-from stimuli.command_line import call
 from stimuli.lengths import long_form
-from stimuli.processes import HARDWALL, ended_by, session, started, stored, wait_until
+from support.command_line import call
+from support.processes import HARDWALL, ended_by, session, started, stored, wait_until
 
 SMALL = {
     "zwidth.stiffness_step_n_per_m": 4e3,

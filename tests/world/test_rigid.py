@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from hardwall.model.compiled import compiled
+from hardwall.model.runtime.compiled import compiled
 from hardwall.sim.world.advance import Interval, Moment, advance_quietly
 from hardwall.sim.world.rigid import Coulomb, Handle, Motion, Rigid, glide, reach, span, turn, turned
 from stimuli.moves import ANYWHERE, after

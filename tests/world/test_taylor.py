@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import matrix_balance
 
-from hardwall.model.compiled import compiled
+from hardwall.model.runtime.compiled import compiled
 from hardwall.model.stamped import Edges, room_for
 from hardwall.sim.world import rigid
 from hardwall.sim.world.advance import Interval, Moment, advance

@@ -7,7 +7,7 @@ from host.twin_board import TwinBoard
 
 from hardwall.host.connect import connect
 from hardwall.host.panel.driver import Driver
-from hardwall.model.supervisor import ARMED, DISARMED
+from hardwall.model.axis.supervisor import ARMED, DISARMED
 
 
 class ArmingBoard(TwinBoard):

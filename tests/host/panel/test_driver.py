@@ -12,8 +12,8 @@ from hardwall.host.panel.recorder import Wish
 from hardwall.host.panel.view import View
 from hardwall.host.panel.wishes import STALE_S
 from hardwall.host.status import State
-from hardwall.model.supervisor import TRIPPED
-from stimuli.processes import wait_until
+from hardwall.model.axis.supervisor import TRIPPED
+from support.processes import wait_until
 
 TAB, OTHER = "tab", "other"
 STOP = 1 << 13

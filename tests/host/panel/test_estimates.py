@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hardwall.host.panel.estimates import KEPT, Estimates
-from hardwall.model.axis import Axis
+from hardwall.model.axis.axis import Axis
 from hardwall.sim.scene.load import load
 
 SPEC = load("seed-2011", {"controller.clock_hz": 4_000_000}).spec

@@ -4,7 +4,7 @@ import pytest
 
 from hardwall.host.homing import INDEX
 from hardwall.host.status import State
-from stimuli.processes import wait_until
+from support.processes import wait_until
 
 TAB = "tab"
 

@@ -3,7 +3,7 @@
 import pytest
 
 from hardwall.host.panel.knobs import Field, Group, Knob, Way, knob_of, knobs_of
-from hardwall.model.registers import RegisterMap
+from hardwall.model.axis.registers import RegisterMap
 from hardwall.model.spec import AxisSpec
 from hardwall.sim.scene.load import load
 

@@ -15,7 +15,7 @@ from hardwall.host.panel.hand import Hand
 from hardwall.host.panel.live import Bench, Live
 from hardwall.host.panel.wishes import STALE_S
 from hardwall.sim.scene.load import load
-from stimuli.processes import wait_until
+from support.processes import wait_until
 
 TAB, OTHER = "tab", "other"
 NUMBERLESS = [json.loads(text) for text in ("NaN", "-Infinity", "1e999", f"1{'0' * 400}")]

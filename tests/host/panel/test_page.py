@@ -14,14 +14,14 @@ import psutil
 import pytest
 
 from hardwall.host.panel.view import ADVICE
-from stimuli.processes import HARDWALL, ended, line, started, wait_until
-from stimuli.virtual_boards import SCENE, running
+from support.processes import HARDWALL, ended, line, started, wait_until
+from support.virtual_boards import SCENE, running
 
 if "HARDWALL_BROWSER" not in os.environ:
     pytest.skip(
         "a browser and a board in simulation want the machine for themselves: make browser", allow_module_level=True
     )
-browsers = pytest.importorskip("stimuli.browsers", reason="playwright is not installed")
+browsers = pytest.importorskip("support.browsers", reason="playwright is not installed")
 Axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe
 if not browsers.CHROMIUM.exists():
     pytest.skip(browsers.ABSENT, allow_module_level=True)

@@ -9,10 +9,10 @@ from host.twin_board import TwinBoard
 from hardwall.host.connect import connect
 from hardwall.host.panel.driver import Driver
 from hardwall.host.panel.recorder import IDLE, NOW, READING, Wish
-from hardwall.model.capture import DONE, RECORD_REGISTERS, STATES, WAITING
+from hardwall.model.axis.capture import DONE, RECORD_REGISTERS, STATES, WAITING
+from hardwall.model.axis.registers import RegisterMap
 from hardwall.model.checks import FieldError
-from hardwall.model.registers import RegisterMap
-from stimuli.processes import wait_until
+from support.processes import wait_until
 
 TAB, OTHER = "tab", "other"
 

@@ -4,7 +4,7 @@ import cocotb
 import pytest
 
 from hardwall.hdl.layered import Layered
-from hardwall.model import wall
+from hardwall.model.axis import wall
 from hardwall.model.layered import Design
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
 from stimuli.sampled import Sampled

@@ -1,0 +1,1 @@
+"""Several axes: what they share, and what differs from an axis alone."""

@@ -1,0 +1,54 @@
+"""The requirements of an axis with the choice of its estimator: all that its formats, words and flags follow from."""
+
+import dataclasses
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from ..checks import shown
+from ..estimators.estimate import EstimatorGains
+from ..requirements import EDGE_ERROR_COUNTS, AxisRequirements
+from .design import Design
+
+USUAL = {"jerk_max_m_per_s3": None, "edge_error_max_counts": EDGE_ERROR_COUNTS, "passivity": False, "coupling": False}
+"""What is no fact of an axis unless it is another than this."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignedAxis(AxisRequirements):
+    """The requirements of one axis, alone (`spec.AxisSpec`) or one of several (`axes.AxesSpec`), and its estimator.
+
+    Attributes:
+        estimator: name of the velocity estimator.
+        gains: that estimator's `Gains`, or None for its default ones.
+        passivity: whether a passivity observer and controller follow the wall: see `passivity`.
+        coupling: whether the wall can be a virtual coupling, whose surface moves and holds on both sides: see `wall`.
+
+    The other attributes, and the errors, are those of `requirements.AxisRequirements`.
+    """
+
+    estimator: str = "levant"
+    gains: EstimatorGains | None = None
+    passivity: bool = False
+    coupling: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("passivity", "coupling"):
+            value = getattr(self, name)
+            if not isinstance(value, bool):
+                raise TypeError(f"{name} must be a bool, not {shown(value)}")
+
+    @cached_property
+    def design(self) -> Design:
+        """Every derived format, word and flag, and the latency of an axis that is alone."""
+        return Design(self, self.estimator, self.gains, self.passivity, self.coupling)
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Every field by name, with the gains that are in use; without those that are the usual ones."""
+        facts = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        for name, usual in USUAL.items():
+            if facts[name] == usual:
+                del facts[name]
+        return facts | {"gains": self.design.gains}

@@ -1,0 +1,1 @@
+"""What a board has around its axes."""
