@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..sim.scene.case import Case
-from ..sim.studies import bench, waits
+from ..sim.studies import bench, waiting_time
 from .errors import BadInput
 from .scenes import SceneArgument
 from .study import StudyOptions, study
@@ -23,7 +23,7 @@ def command(
     ] = None,
 ) -> None:
     try:
-        program = against and waits.program_of(against)
+        program = against and waiting_time.program_of(against)
     except ValueError as error:
         raise BadInput(f"--against {error}") from None
     options.finish(bench.study(Case.of(scene), log.print, program))

@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager
 from importlib import import_module
 from typing import Any, Self
 
-from ..sim.jobs.crew import Crew, Threads
+from ..sim.jobs.job_pool import JobPool, Threads
 from ..sim.jobs.store import Store
 from ..sim.scene.case import Case
 from ..sim.walls import zwidth
@@ -49,15 +49,15 @@ class Maps:
         self._hits += sum(a_map.hits for a_map in maps)
         return maps
 
-    def _crew(self, jobs: int) -> AbstractContextManager[Crew]:
+    def _pool(self, jobs: int) -> AbstractContextManager[JobPool]:
         """Return a context with who does so many jobs at a time."""
         options = self._options
         return _cluster().connected(options.scheduler) if options.scheduler else Threads(jobs, options.workers)
 
     def _made(self, title: str, cases: list[Case]) -> list[Map]:
         known = Store("zwidth", self._options.resume)
-        with self._crew(len(cases) * self._starts) as crew, progress(title, len(cases)) as advance:
-            return zwidth.run(cases, self._backend, known, crew, advance, self._starts)
+        with self._pool(len(cases) * self._starts) as pool, progress(title, len(cases)) as advance:
+            return zwidth.run(cases, self._backend, known, pool, advance, self._starts)
 
     def effort(self) -> Effort:
         """Return the effort of the maps so far."""
@@ -65,14 +65,14 @@ class Maps:
 
 
 class MapsOfOneCrew(Maps):
-    """A context in which all maps, of so many cases at a time, are made by one crew: for very many maps.
+    """A context in which all maps, of so many cases at a time, are made by one pool: for very many maps.
 
     They have no progress bar of their own.
     """
 
     def __init__(self, options: StudyOptions, backend: str, starts: int, cases: int):
         super().__init__(options, backend, starts)
-        self._known, self._context = Store(options.command, options.resume), self._crew(cases * starts)
+        self._known, self._context = Store(options.command, options.resume), self._pool(cases * starts)
 
     def __enter__(self) -> Self:
         self._joined = self._context.__enter__()

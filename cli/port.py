@@ -9,7 +9,7 @@ import typer
 from ..host import Axis, Status, connect
 from ..host.port import BAUD_MAX
 from ..model.checks import FieldError
-from ..model.link.told_pace import PACE_LEAST
+from ..model.link.board_pace import PACE_LEAST
 from ..model.runtime import termination
 from .errors import BadInput
 from .options import within

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..sim.estimates.moved import MotionError
+from ..sim.estimates.moved_handle import MotionError
 from ..sim.jobs.store import Store
 from ..sim.scene.case import Case
 from ..sim.studies import rendered

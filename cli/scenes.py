@@ -12,7 +12,7 @@ from ..sim.estimates.accuracy import FASTEST, LEARNED, RATES_HZ, SCENE, outputs
 from ..sim.scene.errors import SceneError
 from ..sim.scene.load import load, names, toml_of
 from ..sim.walls.methods import Curve, label
-from ..sim.walls.worst import HELD_BY
+from ..sim.walls.worst_variant import HELD_BY
 from .errors import BadInput
 from .options import numbers_of
 

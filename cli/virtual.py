@@ -11,12 +11,12 @@ from typing import Annotated
 import typer
 
 from ..model.checks import shown
-from ..model.link.told_pace import Teller
+from ..model.link.board_pace import Teller
 from ..model.link.uart import BAUD_MAX, BAUD_MIN
 from ..sim.rtl.families import FAMILIES
 from ..sim.scene.load import load
-from ..sim.virtual.keeping import Keeping
 from ..sim.virtual.orders import ORDERS, OrderError, obey
+from ..sim.virtual.real_time import Keeping
 from ..sim.virtual.serial_port import Line
 from ..sim.virtual.virtual_board import GRASP_S, VirtualBoard
 from .errors import BadInput, one_line

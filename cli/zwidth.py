@@ -8,7 +8,7 @@ import typer
 from ..sim.scene.case import Case
 from ..sim.studies import zwidth
 from ..sim.walls.methods import methods
-from ..sim.walls.worst import HELD_BY
+from ..sim.walls.worst_variant import HELD_BY
 from ..sim.walls.zwidth import STARTS
 from .maps import Maps
 from .options import BackendOption, StartsOption, output_file

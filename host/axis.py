@@ -10,12 +10,12 @@ from ..model.axis.registers import TELEMETRY
 from ..model.register import Kind
 from .capture import Capture
 from .device import Device, read_identity
+from .durations import check_seconds
 from .errors import ChangedError, HostError, LateError, NotReadyError, RefusedError, TrippedError
 from .groups import Named, Supervisor, Wall
 from .heartbeat import LEASE_S, Beat, Heartbeat
 from .homing import Homed, homing
 from .port import Port
-from .seconds import check_seconds
 from .shared import Shared
 from .status import State, Status, Trip, status_of
 from .words import Words

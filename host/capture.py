@@ -14,8 +14,8 @@ from ..model.axis.registers import CAPTURE
 from ..model.checks import FieldError, check_int
 from ..model.runtime.whole_file import whole_file
 from .device import Device
+from .durations import check_seconds
 from .errors import ForeignError, NotReadyError, RefusedError
-from .seconds import check_seconds
 from .status import flag_names
 
 PART_RECORDS = 15

@@ -15,7 +15,7 @@ from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from pymodbus.exceptions import ConnectionException
 
-from ..model.link.told_pace import NETWORK
+from ..model.link.board_pace import NETWORK
 from .errors import PortError
 
 # Every failure is an exception here: what the library says of it besides is said twice.

@@ -11,9 +11,9 @@ from pymodbus.exceptions import ConnectionException, ModbusException
 from pymodbus.pdu import ModbusPDU
 
 from ..model.checks import check_int, check_range
+from ..model.link.board_pace import PACE_LEAST, Told
 from ..model.link.line import FRAME_MAX
 from ..model.link.server import FAILURE, READ_MAX, VALUE, WRITE_MAX
-from ..model.link.told_pace import PACE_LEAST, Told
 from .clients import client_of, reason
 from .errors import ForeignError, PortError, RefusedError, SilentError
 

@@ -18,10 +18,10 @@ import math
 from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls.starts import Start, start
-from . import moved
+from . import moved_handle
 from .impedance import EDGES_MAX, SAMPLES_MAX, in_order
 from .motions import Steady
-from .moved import Answer
+from .moved_handle import Answer
 
 LEAD_S = 0.1
 """The time for which the handle moves before the contact, if the travel is long enough: the estimators settle."""
@@ -62,7 +62,7 @@ def check(scene: Scene, speed_m_per_s: float, window_s: float) -> None:
     """Raise MotionError if a handle cannot be moved so."""
     controller, samples = scene.controller, samples_of(scene, speed_m_per_s, window_s)
     edges = samples / controller.sample_hz * speed_m_per_s / scene.encoder.count_m
-    moved.check(
+    moved_handle.check(
         f"a speed of {speed_m_per_s * 1e3:g} mm/s until {window_s * 1e3:g} ms after the contact",
         ("a speed", speed_m_per_s, 0, controller.speed_max_m_per_s, "m/s"),
         ("a depth", speed_m_per_s * (1 + MEAN) * window_s, 0, controller.travel_m / 4, "m"),
@@ -111,7 +111,7 @@ def measure(
     hardness, firsts, flags = [], [], set()
     for number in range(starts):
         motion, contact_s = path(known, speed_m_per_s, start(number))
-        push = moved.answer(known, motion, samples + known.delay_samples, STEP_S, backend)
+        push = moved_handle.answer(known, motion, samples + known.delay_samples, STEP_S, backend)
         hardness.append(rate_hardness_n_per_m(push, contact_s, speed_m_per_s, window_s))
         firsts.append(first_force(push, contact_s, window_s))
         flags |= set(push.flags)

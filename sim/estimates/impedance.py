@@ -21,9 +21,9 @@ import numpy as np
 from ..scene.case import Case
 from ..scene.schema import Scene
 from ..walls.starts import Start, start
-from . import moved
+from . import moved_handle
 from .motions import Sine
-from .moved import Answer
+from .moved_handle import Answer
 
 SETTLE_S = 0.1
 """The time in which the estimators settle."""
@@ -51,7 +51,7 @@ def check(scene: Scene, frequency_hz: int, amplitude_m: float) -> None:
     controller = scene.controller
     samples = samples_of(scene, frequency_hz)[1]
     edges = 4 * amplitude_m / scene.encoder.count_m * frequency_hz * samples / controller.sample_hz
-    moved.check(
+    moved_handle.check(
         f"an amplitude of {amplitude_m * 1e3:g} mm at {frequency_hz} Hz",
         ("a way", amplitude_m, scene.encoder.count_m, controller.travel_m / 4, "m"),
         ("a speed", math.tau * frequency_hz * amplitude_m, 0, controller.speed_max_m_per_s, "m/s"),
@@ -103,7 +103,7 @@ def measure(
     impedances, rests, flags = [], [], set()
     for number in range(starts):
         motion = path(known, frequency_hz, amplitude_m, start(number))
-        push = moved.answer(known, motion, window[1], min(STEP_S, 0.25 / frequency_hz), backend)
+        push = moved_handle.answer(known, motion, window[1], min(STEP_S, 0.25 / frequency_hz), backend)
         impedance, rest_n = projected(push, motion, window)
         impedances.append(impedance)
         rests.append(rest_n)

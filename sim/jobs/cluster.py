@@ -71,14 +71,14 @@ def result_of(future: Future) -> dict:
 
 
 class Cluster:
-    """A `crew.Crew` of the workers of a Dask cluster, which need this project."""
+    """A `job_pool.JobPool` of the workers of a Dask cluster, which need this project."""
 
     def __init__(self, client: Client):
         self._client, self._queue = client, as_completed()
         self._tags: dict[str, Hashable] = {}
 
     def give(self, tag: Hashable, function: Callable[..., Any], job: dict) -> None:
-        """Have `function(**job)` called: see `crew.Crew`."""
+        """Have `function(**job)` called: see `job_pool.JobPool`."""
         # Every job is a call of its own, even if another one is equal.
         try:
             future = self._client.submit(function, **job, pure=False)
@@ -90,7 +90,7 @@ class Cluster:
         self._queue.add(future)
 
     def take(self) -> tuple[Any, Any]:
-        """Return the tag and the result of a job that is done: see `crew.Crew`."""
+        """Return the tag and the result of a job that is done: see `job_pool.JobPool`."""
         future = next(self._queue)
         return self._tags.pop(future.key), result_of(future)
 

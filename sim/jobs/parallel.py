@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from .crew import Threads
+from .job_pool import Threads
 from .store import Store
 
 
@@ -28,11 +28,11 @@ def run(
     """
     jobs = list(jobs)
     missing = [job for index, job in enumerate(jobs) if job not in store and job not in jobs[:index]]
-    with Threads(len(missing), workers) as crew:
+    with Threads(len(missing), workers) as pool:
         for number, job in enumerate(missing):
-            crew.give(number, function, job)
+            pool.give(number, function, job)
         for done in range(len(jobs) - len(missing) + 1, len(jobs) + 1):
-            number, result = crew.take()
+            number, result = pool.take()
             store.put(missing[number], result)
             if progress:
                 progress(done)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from ..scene.schema import Scene
 from ..studies.zwidth import ZWidth
-from ..walls import theory, worst
+from ..walls import theory, worst_variant
 from ..walls.boundary import Grid
 from ..walls.grid import grid_of
 from ..walls.zwidth import Map
@@ -63,7 +63,9 @@ def draw(found: ZWidth) -> Figure:
     notes += [f"no limit of the linear loop: {', '.join(endless)}"] if endless else []
     if any(each.leaves for each in maps):
         notes.append("a region whose line meets the right or the upper border of the map (grey) goes on beyond it")
-    notes += [f"{each.case.label}: {worst.told(each.variants, each.boundary)} N s/m" for each in maps if each.variants]
+    notes += [
+        f"{each.case.label}: {worst_variant.told(each.variants, each.boundary)} N s/m" for each in maps if each.variants
+    ]
     if scene.coupling is None:
         notes += _passive(axes, scene, grid.dampings)
     picture.supxlabel("\n".join(notes), x=0.01, ha="left", fontsize=LABEL_PT, color=THEORY)

@@ -146,7 +146,9 @@ LONGEST_S = 20.0
 
 
 class ProtocolSection(Section):
-    """A hit from rest at `start_m`, pushed towards the wall, and what is said of it: see `hardwall.sim.walls.tally`.
+    """A hit from rest at `start_m`, pushed towards the wall, and what is said of it.
+
+    `hardwall.sim.walls.hit_statistics` has what is said.
 
     The place in the count of `start_m` and the phase of the push in a period of the force are those of one start among
     many that differ by chance alone: see `hardwall.sim.walls.starts`.

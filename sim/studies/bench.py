@@ -18,7 +18,7 @@ from ..rtl.cocotb_runner import Job, simulate_axis
 from ..scene.case import Case, accepted
 from ..scene.schema import Scene
 from ..walls import hit
-from .waits import Wait, measure, table
+from .waiting_time import Wait, measure, table
 
 OUTPUT = "controller.output"
 ROUNDS = 5

@@ -12,7 +12,7 @@ B* = K T / g below which the wall renders a negative one.
 from collections.abc import Callable
 from typing import Any
 
-from ..estimates import hardness, impedance, moved
+from ..estimates import hardness, impedance, moved_handle
 from ..scene.case import Case
 from ..walls.methods import Curve
 from .rates import at_rate
@@ -89,7 +89,7 @@ def _jobs(places: list[Case], moving: Moving, common: dict[str, Any]) -> tuple[d
     """
     fastest_hz = max(place.scene.controller.actuation_hz for place in places)
     highest_hz = moving.frequencies_hz[-1]
-    moved.check("the fastest motion", ("a frequency", highest_hz, 1, (fastest_hz - 1) // 2, "Hz"))
+    moved_handle.check("the fastest motion", ("a frequency", highest_hz, 1, (fastest_hz - 1) // 2, "Hz"))
     wave, contact = common | {"amplitude_m": moving.amplitude_m}, common | {"window_s": moving.window_s}
     waves, contacts = {}, {}
     for number, place in enumerate(places):

@@ -7,7 +7,7 @@ from typing import Any
 
 from ...model.runtime.result import Table, table_of
 from ..scene.schema import Scene
-from ..walls.moves import Move
+from ..walls.edge_shift import Move
 from .shortcuts import Shortcut
 
 

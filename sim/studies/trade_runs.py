@@ -21,9 +21,9 @@ from typing import Protocol
 from ..scene.case import Case
 from ..scene.errors import SceneError
 from ..walls import hit
+from ..walls.edge_shift import move
 from ..walls.grid import grid_of
 from ..walls.methods import Curve, methods
-from ..walls.moves import move
 from ..walls.zwidth import Map
 from .shortcuts import REFERENCE, Shortcut, shortcuts
 from .trade import Point, Trade

@@ -11,7 +11,7 @@ from ...model.runtime.result import Table, table_of
 from ...model.runtime.whole_file import whole_file
 from ..scene.case import Case
 from ..scene.schema import Scene
-from ..walls import theory, worst
+from ..walls import theory, worst_variant
 from ..walls.boundary import UNDECIDED
 from ..walls.coupled_theory import loop_of
 from ..walls.figure_5 import Fact, with_shares
@@ -57,7 +57,7 @@ class ZWidth:
         words = ("method", WORST) if any(each.variants for each in self.maps) else ("method",)
         rows = [
             [
-                *(each.case.label, worst.told(each.variants, each.boundary))[: len(words)],
+                *(each.case.label, worst_variant.told(each.variants, each.boundary))[: len(words)],
                 area_text(each),
                 interval_text(each),
                 "" if each.area_held is None else f"{each.area_held / 1e3:.0f}",
@@ -141,7 +141,7 @@ def study(case: Case, curves: list[Curve] | None, hands: list[str] | None, mappe
     papers = methods(scene)
     cases = [case.changed(curve.changes, curve.label) for curve in (papers.values() if curves is None else curves)]
     if hands is not None:
-        cases = [held for each in cases for held in worst.cases_of(each, hands)]
+        cases = [held for each in cases for held in worst_variant.cases_of(each, hands)]
     maps = mapper(f"{scene.name} Z-width", cases)
     shown = with_shares(dict(zip(papers, maps, strict=True))) if curves is None and hands is None else []
     return ZWidth(scene, maps, shown, mapper.effort())

@@ -7,7 +7,7 @@ import socket
 import tty
 from contextlib import suppress
 
-from ...model.link.told_pace import LOOPBACK, NETWORK
+from ...model.link.board_pace import LOOPBACK, NETWORK
 
 CHUNK = 4096
 

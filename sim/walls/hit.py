@@ -25,7 +25,7 @@ from ..world.encoder import level
 from ..world.lines import waiting
 from . import repetition
 from .hit_rows import NEVER
-from .tally import STABLE, UNDECIDED, UNSTABLE, Tally
+from .hit_statistics import STABLE, UNDECIDED, UNSTABLE, Tally
 
 VERDICTS = STABLE, UNSTABLE, UNDECIDED
 CHUNK = 1 << 16

@@ -17,7 +17,7 @@ import numpy as np
 from ...model.runtime.result import Table, table_of
 from ...model.runtime.stages import stage
 from ...model.runtime.whole_file import whole_file
-from ..loop.turns import turns
+from ..loop.interleaved import turns
 from ..loop.values import EDGE_CAPACITY
 from ..scene.several import AxesScene
 from . import hit

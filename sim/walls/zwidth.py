@@ -2,7 +2,7 @@
 
 A map asks for one wall at a time, and all starts of a wall are hit side by side, as are walls of different maps; every
 verdict is kept as it comes. A verdict depends on the scene, the wall and the start alone, so the map is the same for
-any crew, and an interrupted map continues where it was, also with more starts.
+any pool, and an interrupted map continues where it was, also with more starts.
 """
 
 import platform
@@ -15,9 +15,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ..jobs import store
-from ..jobs.crew import Crew
+from ..jobs.job_pool import JobPool
 from ..scene.case import Case
-from . import hit, worst
+from . import hit, worst_variant
 from .boundary import BoundaryPoint, area, walls
 from .grid import grid_of
 from .likelihood import ENDS, Column, Wall, draws, held, islands
@@ -41,8 +41,8 @@ class Map:
         walls: the walls that were hit, by B and K.
         drawn: the K of every point in every bootstrap, shape (2, points, draws): with undecided hits taken for
             unstable, and for stable; None without walls. See `likelihood`.
-        variants: the walls that were hit in each variant of a `worst.WorstCase`, in the order of `walls`, by name; none
-            for other cases.
+        variants: the walls that were hit in each variant of a `worst_variant.WorstCase`, in the order of `walls`, by
+            name; none for other cases.
     """
 
     case: Case
@@ -146,7 +146,7 @@ class Map:
 
         The boundary is a list of [B (N s/m), K (N/m), low, high]: the K at which a hit is as likely stable as not, and
         the ends of its interval; the true K is larger where the boundary leaves the map. `p_stable` is a list of [B, K,
-        stable, unstable, undecided], the numbers of hits. A worst case also has what `worst.report` says.
+        stable, unstable, undecided], the numbers of hits. A worst case also has what `worst_variant.report` says.
         """
         low, high = self.area_interval
         return {
@@ -172,7 +172,7 @@ class Map:
             "largest_stiffness_n_per_m": self.largest_n_per_m,
             "hits": self.hits,
             "seconds": self.seconds,
-            **(worst.report(self.variants, self.boundary) if self.variants else {}),
+            **(worst_variant.report(self.variants, self.boundary) if self.variants else {}),
         }
 
 
@@ -274,7 +274,7 @@ class _Mapping:
             hits = self._hits.setdefault(self._wall, {name: {} for name in self._jobs})
             for name, start in self.wanted:
                 hits[name][start] = self._results[name, start]
-            verdicts = hits[worst.of(self._walls(self._wall))[0]]
+            verdicts = hits[worst_variant.of(self._walls(self._wall))[0]]
             self._send([verdicts[start]["verdict"] for start in dict.fromkeys(start for _, start in self.wanted)])
 
     def _walls(self, place: tuple[float, float]) -> dict[str, Wall]:
@@ -299,7 +299,7 @@ class _Mapping:
     def _made(self) -> Map:
         """Return the map of all hits."""
         every = [self._walls(place) for place in sorted(self._hits, key=lambda place: place[::-1])]
-        found = [walls_of[worst.of(walls_of)[0]] for walls_of in every]
+        found = [walls_of[worst_variant.of(walls_of)[0]] for walls_of in every]
         variants = {name: tuple(walls_of[name] for walls_of in every) for name in self._jobs if self.of_variants}
         drawn, dampings = draws(self._starts), self._grid.dampings
         points, in_place, bounds = [], [], []
@@ -337,7 +337,7 @@ def run(
     cases: list[Case],
     backend: str,
     known: store.Store,
-    crew: Crew,
+    pool: JobPool,
     progress: Callable[[float], None] | None = None,
     starts: int = STARTS,
 ) -> list[Map]:
@@ -347,7 +347,7 @@ def run(
         cases: the cases to map, each on its scene's grid.
         backend: one of `backends.BACKENDS`.
         known: the store of verdicts.
-        crew: who hits the walls.
+        pool: who hits the walls.
         progress: called after every verdict with the number of maps done, unfinished maps counted in part.
         starts: number of starts.
 
@@ -367,7 +367,7 @@ def run(
                 mapping.answer(place, known.get(wanted[place]))
             if missing:
                 for place, job in missing.items():
-                    crew.give((mapping, place, job), verdict, job)
+                    pool.give((mapping, place, job), verdict, job)
                 break
         if progress:
             progress(sum(running.done for running in maps))
@@ -377,7 +377,7 @@ def run(
     for of_variants in (False, True):
         under_way = sum(forward(mapping) for mapping in maps if mapping.of_variants == of_variants)
         while under_way:
-            (mapping, place, job), result = crew.take()
+            (mapping, place, job), result = pool.take()
             known.put(job, result)
             under_way -= 1
             asked = mapping.wanted

@@ -15,11 +15,11 @@ from hardwall.model.axes.axis import AxesSpec
 from hardwall.model.axis import passivity, wall
 from hardwall.model.spec import AxisSpec
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, rng, simulate
+from stimuli.handle_paths import energies
 from stimuli.lengths import some_of
 from stimuli.magnitudes import magnitudes
 from stimuli.observed import Observed
 from stimuli.specs import NARROW, spec
-from stimuli.ways import energies
 
 NAMES = "count", "restart", "velocity", "drive", "passivity_damping", "force"
 

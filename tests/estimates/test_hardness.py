@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hardwall.model.encoder.quadrature import latency
-from hardwall.sim.estimates import hardness, moved
+from hardwall.sim.estimates import hardness, moved_handle
 from hardwall.sim.estimates.motions import Steady, position
-from hardwall.sim.estimates.moved import Answer, MotionError
+from hardwall.sim.estimates.moved_handle import Answer, MotionError
 from hardwall.sim.scene.case import Case
 from hardwall.sim.studies.rates import at_rate
 from hardwall.sim.walls.starts import Start, start
@@ -28,7 +28,7 @@ def test_a_contact_by_hand():
     """
     scene = Case.of("seed-2011", SLOW).scene
     assert (latency(scene.glitch_clocks), scene.spec.design.latency_to_drive) == (6, 6)
-    push = moved.answer(scene, Steady(0.05, -5.0005e-3), 150, 1e-3, "float")
+    push = moved_handle.answer(scene, Steady(0.05, -5.0005e-3), 150, 1e-3, "float")
     assert push.push_n[99:103].tolist() == pytest.approx([0, 1.49, 1.99, 2.49], rel=1e-12)
     found = hardness.rate_hardness_n_per_m(push, 0.10001, 0.05, 2e-3)
     assert found == pytest.approx(17_462.5, rel=1e-9)

@@ -9,7 +9,7 @@ import pytest
 from hardwall.model.encoder.quadrature import latency
 from hardwall.sim.estimates import impedance
 from hardwall.sim.estimates.motions import Sine
-from hardwall.sim.estimates.moved import Answer, MotionError
+from hardwall.sim.estimates.moved_handle import Answer, MotionError
 from hardwall.sim.scene.case import Case
 from hardwall.sim.studies.rates import at_rate
 from hardwall.sim.walls import theory

@@ -17,8 +17,8 @@ from hardwall.model.estimators.bursts import NOTHING, watch
 from hardwall.model.estimators.edge_kalman_design import LEVELS, START
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model, names
+from stimuli.decoder_outputs import Scale
 from stimuli.lengths import some_of
-from stimuli.passing import Scale
 from stimuli.seeded import seeded
 from stimuli.specs import spec
 

@@ -11,8 +11,8 @@ from hardwall.model.estimators import edge_kalman
 from hardwall.model.estimators.edge_kalman_design import START
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, check, parameters, simulate
 from hardwall.testing.estimators import model, momentary, names
+from stimuli.decoder_outputs import Scale
 from stimuli.lengths import some_of
-from stimuli.passing import Scale
 from stimuli.seeded import seeded
 from stimuli.specs import spec
 

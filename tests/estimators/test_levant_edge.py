@@ -15,8 +15,8 @@ from hardwall.model.estimators.bursts import NOTHING, watch
 from hardwall.model.estimators.levant_edge_design import LEARN_SHIFT, START
 from hardwall.testing import CAMPAIGN, SAMPLES, Bench, parameters, simulate
 from hardwall.testing.estimators import follow, model, names, reset_words
+from stimuli.decoder_outputs import Scale
 from stimuli.lengths import some_of
-from stimuli.passing import Scale
 from stimuli.seeded import seeded
 from stimuli.specs import spec
 

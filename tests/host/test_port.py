@@ -15,8 +15,8 @@ import pytest
 from hardwall.host.errors import ForeignError, PortError, RefusedError, SilentError
 from hardwall.host.port import BAUD, BRIDGE_S, DEVICE_BITS, MACHINE_S, Port
 from hardwall.model.checks import FieldError
+from hardwall.model.link.board_pace import Teller
 from hardwall.model.link.server import WRITE_MAX
-from hardwall.model.link.told_pace import Teller
 from host.twin_board import PATIENT
 
 

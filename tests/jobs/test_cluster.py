@@ -122,13 +122,13 @@ def test_a_scheduler_that_is_not_there_is_a_failure(monkeypatch, capsys):
 
 def wait_for_nobody(address: str, monkeypatch, happens: Callable[[], object]) -> None:
     """Wait for a job that no worker takes, while something happens to the cluster."""
-    with cluster.connected(address) as crew:
-        crew.give("taken", json.dumps, {"obj": 7})
-        assert crew.take() == ("taken", "7")
+    with cluster.connected(address) as pool:
+        pool.give("taken", json.dumps, {"obj": 7})
+        assert pool.take() == ("taken", "7")
         monkeypatch.setattr(Client, "submit", partialmethod(Client.submit, workers=["nowhere"]))
-        crew.give("not taken", json.dumps, {"obj": 8})
+        pool.give("not taken", json.dumps, {"obj": 8})
         happens()
-        crew.take()
+        pool.take()
 
 
 def test_a_cluster_that_loses_its_workers_is_left(monkeypatch):
@@ -166,13 +166,13 @@ def test_a_job_for_a_scheduler_that_was_killed_fails_in_a_line_too(monkeypatch, 
     monkeypatch.setattr(cluster, "POLL_S", 0.1)
 
     def give_late() -> None:
-        with cluster.connected(address) as crew:
-            crew.give("taken", json.dumps, {"obj": 7})
-            assert crew.take() == ("taken", "7")
+        with cluster.connected(address) as pool:
+            pool.give("taken", json.dumps, {"obj": 7})
+            assert pool.take() == ("taken", "7")
             scheduler.kill()
             scheduler.wait()
-            crew.give("late", json.dumps, {"obj": 8})
-            crew.take()
+            pool.give("late", json.dumps, {"obj": 8})
+            pool.take()
 
     with started(sys.executable, "-c", SCHEDULER) as scheduler:
         address = line(scheduler)

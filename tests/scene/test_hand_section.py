@@ -9,7 +9,7 @@ from hardwall.sim.scene.errors import SceneError
 from hardwall.sim.scene.hand_section import HANDS, OF_A_HAND
 from hardwall.sim.scene.load import load
 from hardwall.sim.world.linear import State
-from stimuli.moves import moved
+from stimuli.device_motion import moved
 from stimuli.scenes import HAND
 
 FREE = {"handle.coulomb_n": None}

@@ -10,7 +10,7 @@ exits with 1 if any fault does not come to what is promised of it.
 import sys
 
 from hardwall.model.runtime.result import Table
-from signoff.injection.every import FAULTS
+from signoff.injection.all_faults import FAULTS
 from signoff.injection.run import run_all
 from signoff.kept import findings_of
 from signoff.targets import conclude

@@ -16,7 +16,7 @@ from hardwall.model.runtime.result import Table
 from hardwall.testing import SEED
 from signoff.covering.blocks import BLOCKS
 from signoff.kept import findings_of
-from signoff.mutation.fates import Result
+from signoff.mutation.outcomes import Result
 from signoff.mutation.run import run
 from signoff.targets import conclude
 

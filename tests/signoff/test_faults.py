@@ -11,7 +11,7 @@ from hardwall.model.axis.supervisor import CAUSES
 from oracles.supervised import BITS
 from signoff import faults
 from signoff.injection import run as running
-from signoff.injection.every import FAULTS
+from signoff.injection.all_faults import FAULTS
 from signoff.injection.fault import Outcome
 from signoff.injection.run import run
 from signoff.injection.staged import DEVICES, SEVERAL, STAGED

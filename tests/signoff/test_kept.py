@@ -8,7 +8,7 @@ import pytest
 from hardwall.model.runtime.build_folder import build_dir
 from signoff.covering.blocks import BLOCKS
 from signoff.gate import CASES
-from signoff.injection.every import FAULTS
+from signoff.injection.all_faults import FAULTS
 from signoff.kept import OURS, USUAL, Findings, digest_of, findings_of
 from signoff.proofs.properties import PROPERTIES
 

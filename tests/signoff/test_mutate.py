@@ -19,10 +19,10 @@ from signoff import mutate
 from signoff.covering.blocks import BLOCKS, TESTS, Block
 from signoff.covering.sizes import Size, sizes_of
 from signoff.kept import Findings
-from signoff.mutation import asking, by_state, equivalent, run
+from signoff.mutation import by_state, equivalent, run, solver
 from signoff.mutation.equivalent import EQUIVALENT, known_of
-from signoff.mutation.fates import REASONS, Fate, Result
 from signoff.mutation.netlist import BLOCK, Mutant, Netlist, mutated
+from signoff.mutation.outcomes import REASONS, Fate, Result
 from signoff.mutation.run import fates_of, modules_of
 from signoff.reasons import Reason, reasons_for
 from stimuli.lengths import some_of
@@ -314,15 +314,15 @@ def test_a_block_is_mutated_in_its_own_modules():
 @pytest.mark.parametrize(("printed", "code"), [("wasm trap: call stack exhausted", 1), ("", -9)])
 def test_a_question_that_is_too_large_for_the_solver_has_no_answer(printed, code, monkeypatch, tmp_path):
     done = subprocess.CompletedProcess([], code, stdout=printed)
-    monkeypatch.setattr(asking, "_run", lambda *given: done)
-    assert asking.answer(tmp_path, {}, [], "miter", "-prove trigger 0") == ""
+    monkeypatch.setattr(solver, "_run", lambda *given: done)
+    assert solver.answer(tmp_path, {}, [], "miter", "-prove trigger 0") == ""
 
 
 def test_a_question_that_is_wrong_ends_the_run(monkeypatch, tmp_path):
     done = subprocess.CompletedProcess([], 1, stdout="read\nERROR: No such command: sut\n")
-    monkeypatch.setattr(asking, "_run", lambda *given: done)
+    monkeypatch.setattr(solver, "_run", lambda *given: done)
     with pytest.raises(SynthesisError, match=r"^Yosys cannot compare a mutant: No such command: sut$"):
-        asking.answer(tmp_path, {}, [], "miter", "-prove trigger 0")
+        solver.answer(tmp_path, {}, [], "miter", "-prove trigger 0")
 
 
 KILLED = [Fate(f"killed {number}", "a test") for number in range(19)]

@@ -20,10 +20,10 @@ from hardwall.sim.studies.zwidth import ZWidth
 from hardwall.sim.walls import theory
 from hardwall.sim.walls.boundary import BoundaryPoint
 from hardwall.sim.walls.chatter import Chatter
+from hardwall.sim.walls.edge_shift import Move
 from hardwall.sim.walls.hit import Hit
 from hardwall.sim.walls.hit_axes import AxesHit
 from hardwall.sim.walls.methods import methods
-from hardwall.sim.walls.moves import Move
 from hardwall.sim.walls.zwidth import Effort, Map
 
 NOTHING = Effort("fixed", 0, 0.0)

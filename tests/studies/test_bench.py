@@ -8,12 +8,12 @@ from hardwall.model.estimators.registry import ESTIMATORS
 from hardwall.model.runtime.build_folder import build_dir
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import FOLDER
-from hardwall.sim.studies import bench, waits
-from hardwall.sim.studies.waits import SCENE, Command
+from hardwall.sim.studies import bench, waiting_time
+from hardwall.sim.studies.waiting_time import SCENE, Command
 from stimuli.lengths import LONG
 from support.reports import check
 
-HIT = ("hit", SCENE, "--set", "protocol.start_m=-1e-5", *waits.SHORT, "--json")
+HIT = ("hit", SCENE, "--set", "protocol.start_m=-1e-5", *waiting_time.SHORT, "--json")
 COMMANDS = {"fixed (samples/s)": Command(HIT, 1, speed=True), "a hit, nothing compiled (s)": Command(HIT, 1, cold=True)}
 
 PARTS = (
@@ -27,7 +27,7 @@ def measured_uncompiled(*given):
     """Measure commands that do not compile, for that would take longer than all else."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("NUMBA_DISABLE_JIT", "1")
-        return waits.measure(*given)
+        return waiting_time.measure(*given)
 
 
 @pytest.mark.rtl
@@ -40,7 +40,7 @@ def test_the_benchmark_runs_on_a_scene_of_ones_own(tmp_path, monkeypatch):
     case, said, folders, simulated = Case.of("mine.toml"), [], [], bench.simulate_axis
     (tmp_path / "mine.toml").unlink()  # it was read once
     monkeypatch.setattr(bench, "simulate_axis", lambda spec, job: (folders.append(job.folder), simulated(spec, job)))
-    monkeypatch.setattr(waits, "COMMANDS", COMMANDS)
+    monkeypatch.setattr(waiting_time, "COMMANDS", COMMANDS)
     monkeypatch.setattr(bench, "measure", measured_uncompiled)
     every = bench._parts
     monkeypatch.setattr(bench, "_parts", lambda sample_s: {part: every(sample_s)[part] for part in PARTS})

@@ -13,8 +13,8 @@ from hardwall.sim.studies.shortcuts import LACKED, REFERENCE, Shortcut, shortcut
 from hardwall.sim.studies.trade import Point, Trade, best
 from hardwall.sim.studies.trade_runs import GRID, METHODS, study
 from hardwall.sim.walls.boundary import BoundaryPoint
+from hardwall.sim.walls.edge_shift import Move
 from hardwall.sim.walls.grid import grid_of
-from hardwall.sim.walls.moves import Move
 from hardwall.sim.walls.zwidth import Map
 from support.command_line import call
 

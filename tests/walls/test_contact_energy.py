@@ -6,7 +6,7 @@ import pytest
 from hardwall.model.axis import passivity
 from hardwall.sim.scene.load import load
 from hardwall.sim.walls import hit
-from stimuli.ways import energies
+from stimuli.handle_paths import energies
 
 
 def contact(scene: str, stiffness: float, damping: float) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""Maps of stable walls: early ends, any crew, interrupts, what is printed and what is refused."""
+"""Maps of stable walls: early ends, any pool, interrupts, what is printed and what is refused."""
 
 import csv
 import json
@@ -12,7 +12,7 @@ from distributed import LocalCluster
 
 from hardwall.model.runtime.build_folder import build_dir
 from hardwall.sim.jobs import cluster
-from hardwall.sim.jobs.crew import Threads
+from hardwall.sim.jobs.job_pool import Threads
 from hardwall.sim.jobs.store import Store
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.load import read
@@ -47,8 +47,8 @@ STARTS = 4
 
 def mapped(cases: list[Case], starts: int = STARTS) -> list[zwidth.Map]:
     """Return the maps of cases by one thread."""
-    with Threads(1) as crew:
-        return zwidth.run(cases, "fixed", Store("zwidth"), crew, starts=starts)
+    with Threads(1) as pool:
+        return zwidth.run(cases, "fixed", Store("zwidth"), pool, starts=starts)
 
 
 @pytest.fixture(scope="module")
@@ -65,10 +65,10 @@ def test_a_worker_with_other_sources_is_refused():
 
 def test_two_workers_and_two_threads_give_the_map_of_one(map_of_one_thread):
     options = {"threads_per_worker": 1, "dashboard_address": ":0"}
-    with LocalCluster(n_workers=2, **options) as local, cluster.connected(local.scheduler_address) as crew:
-        assert zwidth.run(CASES, "fixed", Store("zwidth"), crew, starts=STARTS) == map_of_one_thread
-    with Threads(2) as crew:
-        assert zwidth.run(CASES, "fixed", Store("zwidth"), crew, starts=STARTS) == map_of_one_thread
+    with LocalCluster(n_workers=2, **options) as local, cluster.connected(local.scheduler_address) as pool:
+        assert zwidth.run(CASES, "fixed", Store("zwidth"), pool, starts=STARTS) == map_of_one_thread
+    with Threads(2) as pool:
+        assert zwidth.run(CASES, "fixed", Store("zwidth"), pool, starts=STARTS) == map_of_one_thread
 
 
 def test_a_map_goes_on_from_what_is_known(map_of_one_thread, monkeypatch):

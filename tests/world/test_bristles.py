@@ -11,7 +11,7 @@ from hardwall.sim.world.bristles import BEND, MOST, UNIT, VELOCITY, Bent, expand
 from hardwall.sim.world.presliding import bristled
 from hardwall.sim.world.rigid import Coulomb, Handle, Motion, Rigid, span
 from stimuli.bristles import COULOMB_N, DAHL, HANDLE, LUGRE, STATIC_N, STRIBECK
-from stimuli.moves import after
+from stimuli.device_motion import after
 
 PLANTS = {"dahl": DAHL, "lugre": LUGRE}
 FREE = Handle(0.35, 0.0)

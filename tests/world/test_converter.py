@@ -7,7 +7,7 @@ from hardwall.sim.world.converter import Converter, Pulse, converted, width_of
 from hardwall.sim.world.device import Device, equations, train
 from hardwall.sim.world.linear import State
 from oracles.device import exponential
-from stimuli.moves import COARSE, after
+from stimuli.device_motion import COARSE, after
 
 
 def test_a_converter_takes_the_nearest_code_and_saturates():

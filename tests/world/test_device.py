@@ -7,7 +7,7 @@ import pytest
 
 from hardwall.sim.world.device import Device, Hand, Motor, Transmission, fastest_per_s
 from hardwall.sim.world.linear import State
-from stimuli.moves import moved
+from stimuli.device_motion import moved
 
 MOTOR = Motor(2.0, 1e-3, 0.04, 24.0, 0.01)  # kf = 4 N/A, stall 48 N, L/R = 0.5 ms, shorted 8 N s/m
 REST = State(0.0, 0.0, (0.0, 0.0, 0.0), 0)

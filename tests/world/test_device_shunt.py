@@ -11,7 +11,7 @@ from hardwall.sim.world.device import Device, Hand, Motor, Shunt, Transmission, 
 from hardwall.sim.world.euler import stepped
 from hardwall.sim.world.linear import State
 from oracles.device import between, random_cable
-from stimuli.moves import after, moved
+from stimuli.device_motion import after, moved
 
 MOTOR = Motor(2.0, 3e-4, 0.04, 24.0, 0.01)  # kf = 4 N/A: 8 N s/m with its terminals shorted
 SHUNTS = {"resistor": Shunt(3.0), "resistor and capacitor": Shunt(3.0, 2e-3)}

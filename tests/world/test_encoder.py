@@ -12,7 +12,7 @@ from hardwall.model.stamped import Edges
 from hardwall.sim.world.advance import Interval, Moment, advance, advance_quietly
 from hardwall.sim.world.encoder import MARGIN, Cell, Encoder, edge, level, locate, number_at, offsets
 from hardwall.sim.world.rigid import Coulomb, Handle, Motion, Rigid, span
-from stimuli.moves import after
+from stimuli.device_motion import after
 
 U = 2.0**-53
 CLOCK_HZ = 100.0

@@ -17,7 +17,7 @@ from hardwall.sim.world.encoder import Encoder, level, locate, offsets
 from hardwall.sim.world.euler import Stepped, longest_s, stepped
 from hardwall.sim.world.linear import State
 from oracles.device import between, ours, random_cable, random_motor
-from stimuli.moves import COARSE, after, moved
+from stimuli.device_motion import COARSE, after, moved
 from stimuli.scenes import PULSES
 
 REST = State(0.0, 0.0, (0.0, 0.0, 0.0), 0)

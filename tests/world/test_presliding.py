@@ -15,7 +15,7 @@ from hardwall.sim.world.encoder import Encoder, locate
 from hardwall.sim.world.presliding import FULL, bristled, fastest_per_s
 from hardwall.sim.world.rigid import Coulomb, Handle, Motion, Rigid, span
 from stimuli.bristles import COULOMB_N, DAHL, HANDLE, LUGRE, STATIC_N
-from stimuli.moves import ANYWHERE, after
+from stimuli.device_motion import ANYWHERE, after
 
 PLANTS = {"dahl": DAHL, "lugre": LUGRE}
 FINE, COARSE = Encoder(1e-8, 1e8), Encoder(2e-5, 1e8)

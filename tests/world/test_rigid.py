@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from hardwall.model.runtime.compiled import compiled
 from hardwall.sim.world.advance import Interval, Moment, advance_quietly
 from hardwall.sim.world.rigid import Coulomb, Handle, Motion, Rigid, glide, reach, span, turn, turned
-from stimuli.moves import ANYWHERE, after
+from stimuli.device_motion import ANYWHERE, after
 
 U = 2.0**-53  # half a unit in the last place of 1
 UNIT = Handle(mass_kg=1.0, viscous_n_s_per_m=0.0)

@@ -24,8 +24,8 @@ from oracles.device import (
     random_motor,
     rates,
 )
+from stimuli.device_motion import ANYWHERE, COARSE, NO_EDGES, after, moved
 from stimuli.lengths import LONG
-from stimuli.moves import ANYWHERE, COARSE, NO_EDGES, after, moved
 
 U = 2.0**-53
 

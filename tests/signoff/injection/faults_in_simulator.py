@@ -7,13 +7,13 @@ from pathlib import Path
 import cocotb
 
 from hardwall.testing import parameters
+from signoff.injection.all_faults import FAULTS
 from signoff.injection.damaged_axes import DamagedAxes, OfAxis
-from signoff.injection.every import FAULTS
 from signoff.injection.fault import Fault
-from signoff.injection.judged import judged
 from signoff.injection.rig import Rig
 from signoff.injection.scene import WRONG
 from signoff.injection.staged import DEVICES, StagedAxes
+from signoff.injection.verdict import judged
 
 
 def rigs_of(dut, stage: str) -> list[Rig]:

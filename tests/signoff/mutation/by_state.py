@@ -22,9 +22,9 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .asking import answer, copies
 from .cutting import cut, first_values, registers
 from .netlist import BLOCK, SELECTOR
+from .solver import answer, copies
 
 CONTROL = ("fsm_state", "running")
 """The registers by which states are told apart. A block with more bits of them than `MOST_BITS` is not tried."""

@@ -33,10 +33,10 @@ from pathlib import Path
 from hardwall.model.runtime.build_folder import build_dir
 from hardwall.sim.jobs.scratch import scratch
 
-from .asking import answer, copies, never
 from .by_state import equal_by_state
 from .cutting import Bit, cut, joined, part_from_memories, registers, start_alike
 from .netlist import BLOCK, Netlist, run_yosys
+from .solver import answer, copies, never
 
 EQUIVALENT = "equivalent"
 ROUNDS, STEPS, STEPS_IN_COMMON = 8, 20, 16

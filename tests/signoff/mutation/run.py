@@ -16,13 +16,13 @@ from signoff.kept import Findings, digest_of
 from signoff.reasons import reasons_for
 
 from .equivalent import known_of
-from .fates import REASONS, Fate, Result
 from .killing import killed
 from .netlist import BLOCK, Netlist, mutated
+from .outcomes import REASONS, Fate, Result
 
 SAMPLES = 1000
 """The samples of the first campaign, which kills most mutants; what it leaves goes through a whole one."""
-PROVING = ("asking.py", "by_state.py", "cutting.py", "equivalent.py")
+PROVING = ("solver.py", "by_state.py", "cutting.py", "equivalent.py")
 """The sources here that only what has survived comes to."""
 
 

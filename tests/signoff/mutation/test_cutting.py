@@ -2,9 +2,9 @@
 
 import pytest
 
-from signoff.mutation.asking import answer
 from signoff.mutation.cutting import OWN, TO_MEMORY, cut, joined, part_from_memories, registers
 from signoff.mutation.netlist import BLOCK
+from signoff.mutation.solver import answer
 
 
 def test_registers_become_ports_or_any_value_or_stay():

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hardwall.sim.virtual.keeping import WINDOW_S, WINDOWS, Keeping
+from hardwall.sim.virtual.real_time import WINDOW_S, WINDOWS, Keeping
 
 
 def test_it_is_that_of_the_slowest_of_the_last_windows():

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hardwall.sim.scene.load import load
-from hardwall.sim.walls.tally import ENOUGH, Tally
+from hardwall.sim.walls.hit_statistics import ENOUGH, Tally
 
 # A window has 50 samples: the first one is from 100 to 150, and the one before it from 50 on.
 PROTOCOL = {

@@ -14,7 +14,7 @@ POLL_S = 0.05
 """The time between two looks whether the jobs that are to end have ended."""
 
 
-class Crew(Protocol):
+class JobPool(Protocol):
     """Who does jobs: the threads of this process, or the workers of a cluster."""
 
     def give(self, tag: Hashable, function: Callable[..., Any], job: dict) -> None:
@@ -49,11 +49,11 @@ class Threads:
         self._identities.add(threading.get_ident())
 
     def give(self, tag: Hashable, function: Callable[..., Any], job: dict) -> None:
-        """Have `function(**job)` called: see `Crew`."""
+        """Have `function(**job)` called: see `JobPool`."""
         self._pool.submit(function, **job).add_done_callback(lambda future: self._done.put((tag, future)))
 
     def take(self) -> tuple[Any, Any]:
-        """Return the tag and the result of a job that is done: see `Crew`."""
+        """Return the tag and the result of a job that is done: see `JobPool`."""
         tag, future = self._done.get()
         return tag, future.result()
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hardwall.model.encoder.quadrature import latency
-from hardwall.sim.estimates import moved
+from hardwall.sim.estimates import moved_handle
 from hardwall.sim.estimates.motions import Sine, Steady
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.schema import Scene
@@ -47,7 +47,7 @@ def pushes(known: Scene, motion: Steady, samples: int) -> list[Fraction]:
 )
 def test_every_force_is_that_of_the_place_that_was_counted(changes, samples):
     known, motion = scene(**changes), Steady(0.0317, -3.17e-4)
-    found = moved.answer(known, motion, samples, 1e-3, "float")
+    found = moved_handle.answer(known, motion, samples, 1e-3, "float")
     expected, late = pushes(known, motion, samples), known.delay_samples
     assert len(found.push_n) == samples
     assert found.push_n[:late].tolist() == [0.0] * late
@@ -61,7 +61,7 @@ def test_every_force_is_that_of_the_place_that_was_counted(changes, samples):
 
 def test_the_rtl_answers_with_the_words_of_fixed():
     known = scene()
-    fixed, rtl = (moved.answer(known, SINE, 500, 1e-3, backend) for backend in ("fixed", "rtl"))
+    fixed, rtl = (moved_handle.answer(known, SINE, 500, 1e-3, backend) for backend in ("fixed", "rtl"))
     assert fixed.drives.tolist() == rtl.drives.tolist()
     assert fixed.flags == rtl.flags == []
     assert len(set(fixed.drives.tolist())) > 30
@@ -69,7 +69,7 @@ def test_the_rtl_answers_with_the_words_of_fixed():
 
 def test_words_differ_from_float64_by_their_rounding():
     known = scene()
-    floating, fixed = (moved.answer(known, SINE, 500, 1e-3, backend) for backend in ("float", "fixed"))
+    floating, fixed = (moved_handle.answer(known, SINE, 500, 1e-3, backend) for backend in ("float", "fixed"))
     words = {word.name: word for word in known.spec.design.words}
     relative = max(
         abs(words[name].to_si(known.words[name]) / value - 1)
@@ -89,14 +89,14 @@ def test_words_differ_from_float64_by_their_rounding():
 
 def test_what_is_put_out_has_the_steps_of_the_converter():
     known = scene(output={"full_scale_n": 40.0, "dac_bits": 9})
-    found = moved.answer(known, SINE, 500, 1e-3, "fixed")
+    found = moved_handle.answer(known, SINE, 500, 1e-3, "fixed")
     step_n = 80 / 512
     commands_n = found.drives * known.controller.force_resolution_n
     assert (found.push_n / step_n).tolist() == (-np.floor(commands_n / step_n + 0.5)).tolist()
 
 
 def test_an_impulse_is_of_the_force_as_it_is_held():
-    found = moved.Answer(np.zeros(3), np.array([1.0, 4.0, -2.0]), 0.5, 0.25, [])
+    found = moved_handle.Answer(np.zeros(3), np.array([1.0, 4.0, -2.0]), 0.5, 0.25, [])
     assert found.impulse_n_s(0.0, 0.5) == 0
     assert found.impulse_n_s(0.25, 0.75) == pytest.approx(0.25)
     assert found.impulse_n_s(0.625, 1.125) == pytest.approx(0.125 + 1.0 - 0.25)
@@ -105,4 +105,4 @@ def test_an_impulse_is_of_the_force_as_it_is_held():
 
 def test_flags_are_named():
     known = scene(wall__stiffness_n_per_m=200e3)
-    assert moved.answer(known, SINE, 500, 1e-3, "fixed").flags == ["force_limited"]
+    assert moved_handle.answer(known, SINE, 500, 1e-3, "fixed").flags == ["force_limited"]

@@ -7,8 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from hardwall.model.link import told_pace
-from hardwall.model.link.told_pace import CHANGE, FIRST_S, HOSTS, MARGIN, PACE_LEAST, Teller, Told, place_of
+from hardwall.model.link import board_pace
+from hardwall.model.link.board_pace import CHANGE, FIRST_S, HOSTS, MARGIN, PACE_LEAST, Teller, Told, place_of
 
 PORT = f"tcp://127.0.0.1:{os.getpid()}"
 """A name that no other process has."""
@@ -136,7 +136,7 @@ def test_a_word_that_is_no_pace_is_not_taken(word):
 
 
 def test_what_another_user_tells_is_not_heard(teller, monkeypatch):
-    monkeypatch.setattr(told_pace, "_owner", lambda line: os.getuid() + 1)
+    monkeypatch.setattr(board_pace, "_owner", lambda line: os.getuid() + 1)
     host = heard(teller, 0.3)
     teller.tell(0.1)
     assert host.pace == 1.0

@@ -8,7 +8,7 @@ import pytest
 
 from hardwall.sim.scene.case import Case
 from hardwall.sim.walls.boundary import BoundaryPoint
-from hardwall.sim.walls.moves import move
+from hardwall.sim.walls.edge_shift import move
 from hardwall.sim.walls.zwidth import Map
 
 CASE = Case.of("seed-2011", {"zwidth.damping_from_n_s_per_m": 10.0, "zwidth.damping_to_n_s_per_m": 30.0})

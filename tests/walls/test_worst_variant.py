@@ -9,12 +9,12 @@ from itertools import product
 
 import pytest
 
-from hardwall.sim.jobs.crew import Threads
+from hardwall.sim.jobs.job_pool import Threads
 from hardwall.sim.jobs.store import Store
 from hardwall.sim.scene.case import Case
 from hardwall.sim.scene.hand_section import HANDS, HandSection
 from hardwall.sim.studies import zwidth as study
-from hardwall.sim.walls import worst, zwidth
+from hardwall.sim.walls import worst_variant, zwidth
 from hardwall.sim.walls.boundary import STABLE, BoundaryPoint
 from hardwall.sim.walls.grid import grid_of
 from hardwall.sim.walls.likelihood import Wall
@@ -65,8 +65,8 @@ def asked(monkeypatch):
 
 
 def mapped(case: Case, hands: tuple[str, ...]) -> list[zwidth.Map]:
-    with Threads(1) as crew:
-        return zwidth.run(worst.cases_of(case, hands), "fixed", Store("zwidth"), crew, starts=STARTS)
+    with Threads(1) as pool:
+        return zwidth.run(worst_variant.cases_of(case, hands), "fixed", Store("zwidth"), pool, starts=STARTS)
 
 
 @pytest.fixture
@@ -75,10 +75,10 @@ def case():
 
 
 def test_every_wall_has_the_least_share_of_the_hands(case, asked):
-    *_, found = mapped(case, worst.HELD_BY)
+    *_, found = mapped(case, worst_variant.HELD_BY)
     assert found.case.label == "u, worst hand"
     report = found.report()
-    assert report["hands"] == list(EDGES) == list(worst.HELD_BY)
+    assert report["hands"] == list(EDGES) == list(worst_variant.HELD_BY)
     walls = zip(found.walls, report["p_stable"], report["worst_of_p_stable"], strict=True)
     for wall, (damping, stiffness, good, bad, open_), names in walls:
         starts = list(wall.hits)
@@ -92,7 +92,7 @@ def test_every_wall_has_the_least_share_of_the_hands(case, asked):
 
 def test_the_edge_is_where_the_least_share_of_a_whole_grid_passes_one_half(case, asked):
     """The edges are 20 kN/m without a hand and 30, 18 and 6 with the stiff arm, at the three values of B."""
-    *_, found = mapped(case, worst.HELD_BY)
+    *_, found = mapped(case, worst_variant.HELD_BY)
     grid = grid_of(case.scene)
     for point in found.boundary:
         below = 0.0
@@ -103,11 +103,11 @@ def test_the_edge_is_where_the_least_share_of_a_whole_grid_passes_one_half(case,
         assert below <= point.stable_n_per_m <= below + STEP
         assert point.marginal_n_per_m > point.stable_n_per_m
     assert found.report()["worst_of_boundary"] == [["none"], ["hogan-1989"], ["hogan-1989"]]
-    assert worst.told(found.variants, found.boundary) == "no hand at 10, hogan-1989 at 30 to 50"
+    assert worst_variant.told(found.variants, found.boundary) == "no hand at 10, hogan-1989 at 30 to 50"
 
 
 def test_no_hit_is_made_twice_and_all_hands_have_the_same_starts(case, asked):
-    *alone, found = mapped(case, worst.HELD_BY)
+    *alone, found = mapped(case, worst_variant.HELD_BY)
     assert len(asked) == len(set(asked)) < sum(each.hits for each in (*alone, found))
     for walls in zip(*found.variants.values(), strict=True):
         assert len({tuple(wall.hits) for wall in walls}) == 1
@@ -117,16 +117,16 @@ def test_no_hit_is_made_twice_and_all_hands_have_the_same_starts(case, asked):
 def test_the_map_of_a_hand_is_that_of_its_scene_alone(case, asked):
     """The worst of a hand with itself is no map: a list of one has the hand's own map only."""
     (alone,) = mapped(case, ("hogan-1989",))
-    with Threads(1) as crew:
+    with Threads(1) as pool:
         held = [case.changed({"hand.model": "hogan-1989"})]
-        (again,) = zwidth.run(held, "fixed", Store("zwidth"), crew, starts=STARTS)
+        (again,) = zwidth.run(held, "fixed", Store("zwidth"), pool, starts=STARTS)
     assert alone.boundary == again.boundary
     assert alone.report().keys() == again.report().keys()
     assert "hands" not in alone.report()
 
 
 def test_a_hand_takes_the_place_of_the_scene_s_own_and_rests_where_that_does():
-    no_hand, arm, least = worst.cases_of(Case.of("seed-2011", GRID | HAND), TWO)
+    no_hand, arm, least = worst_variant.cases_of(Case.of("seed-2011", GRID | HAND), TWO)
     assert no_hand.scene.hand is None
     assert arm.scene.hand == HandSection(model="hogan-1989", rest_m=HAND["hand.rest_m"])
     assert [each.scene for each in least.variants.values()] == [no_hand.scene, arm.scene]
@@ -134,7 +134,7 @@ def test_a_hand_takes_the_place_of_the_scene_s_own_and_rests_where_that_does():
 
 def test_hands_of_one_edge_are_all_the_worst(case, asked):
     *_, found = mapped(case, ("yokokohji-1994", "van-beek-2015"))
-    assert worst.told(found.variants, found.boundary) == "yokokohji-1994 or van-beek-2015 at 10 to 50"
+    assert worst_variant.told(found.variants, found.boundary) == "yokokohji-1994 or van-beek-2015 at 10 to 50"
 
 
 def test_report_lines_table_and_picture(monkeypatch, capsys, tmp_path, asked):
@@ -182,7 +182,7 @@ def test_the_worst_at_an_edge_is_that_of_its_two_walls(edge, one, other, names):
         )
         for name, numbers in (("one", one), ("other", other))
     }
-    assert worst.at_edge(variants, BoundaryPoint(10.0, edge, None)) == names
+    assert worst_variant.at_edge(variants, BoundaryPoint(10.0, edge, None)) == names
 
 
 def test_the_table_says_which_hand_is_the_worst(case, asked):
