@@ -4,7 +4,7 @@ import math
 import os
 import select
 import time
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -13,6 +13,7 @@ import typer
 from ..model.checks import shown
 from ..model.link.board_pace import Teller
 from ..model.link.uart import BAUD_MAX, BAUD_MIN
+from ..model.runtime.termination import undone
 from ..sim.rtl.families import FAMILIES
 from ..sim.scene.load import load
 from ..sim.virtual.orders import ORDERS, OrderError, obey
@@ -68,8 +69,11 @@ def command(
     if netlist is not None and netlist not in FAMILIES:
         raise BadInput(f"--netlist must be one of {', '.join(FAMILIES)}, not {shown(netlist)}")
     of = load(scene, changes_of(set_, controller__estimator=estimator))
+    counted = _Counts() if counts else None
+    # What is entered first is left last: a terminal that takes no counts any more holds up nothing else.
+    counting = undone(counted.end) if counted else nullcontext()
     # A host that knows a port asks at once who tells its pace.
-    with Line(tcp) as line, Teller(line.names) as teller, VirtualBoard(of, baud, netlist) as board:
+    with counting, Line(tcp) as line, Teller(line.names) as teller, VirtualBoard(of, baud, netlist) as board:
         # The first call compiles, for which no host would wait.
         board.run()
         print(f"serial port: {line.path}")
@@ -77,12 +81,9 @@ def command(
             print(f"tcp port: 127.0.0.1:{line.tcp_port}")
         print(f"orders: {', '.join(f'{name} {order.operand}' for name, order in ORDERS.items())}", flush=True)
         pace = _Pace(speed, math.inf if seconds is None else seconds)
-        counted = _Counts() if counts else None
-        try:
-            simulated_s, real_s = _run(board, line, teller, pace, counted)
-        finally:
-            if counted:
-                counted.end()
+        simulated_s, real_s = _run(board, line, teller, pace, counted)
+        if counted:
+            counted.end()
         print(f"{simulated_s:g} s in {real_s:.3g} s: {simulated_s / real_s:.2f} of real time")
 
 

@@ -21,7 +21,7 @@ from hardwall.sim.scene.load import load
 from stimuli import frames
 from stimuli.lengths import LONG
 from support.command_line import call
-from support.processes import wait_until
+from support.processes import ended, line, started, wait_until
 from support.virtual_boards import command, running
 
 CLOCK = {"controller.clock_hz": 4_000_000}
@@ -107,6 +107,20 @@ def test_the_last_counts_are_printed_too():
     assert done.returncode == 0, done.stderr
     (line,) = [line.split() for line in done.stdout.splitlines() if line.startswith("counts:")]
     assert len(line) - 1 == 30
+
+
+def test_an_interrupt_loses_no_counts():
+    """At a run in 0.2 s a line of counts would take 4 s."""
+    with started(*command(CLOCK, "--counts", "--speed", "0.005")) as process:
+        while not line(process).startswith("orders:"):
+            pass
+        time.sleep(1.0)
+        process.send_signal(signal.SIGINT)
+        code, out, err = ended(process)
+    assert (code, err.splitlines()[-1]) == (130, "hardwall: error: interrupted")
+    (counts,) = out.splitlines()
+    assert counts.startswith("counts: ")
+    assert len(counts.split()) > 10
 
 
 @pytest.mark.parametrize(
