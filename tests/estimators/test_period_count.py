@@ -13,7 +13,7 @@ from hardwall.model.estimators import period_count
 from hardwall.model.estimators.period_count import START
 from hardwall.testing import CAMPAIGN, SAMPLES, parameters, simulate
 from hardwall.testing.estimators import follow, model, reset_words
-from stimuli.edges import anything, rows, sights, turn
+from stimuli.edges import Edge, Strobe, anything, rows, sights, turn
 from stimuli.lengths import some_of
 from stimuli.seeded import seeded
 from stimuli.specs import spec
@@ -50,11 +50,37 @@ def at_the_switch(d: period_count.Design):
                 yield (count + half) % (2 * half) - half, *[0] * 8, int(k == 0), switch
 
 
+def of_one_bit(d: period_count.Design):
+    """Yield rows whose cycles give speeds of a single bit, in both directions, while no window is counted."""
+    strobes, edges, now = [], [], 0
+    for bit in range(d.velocity.f + 1):
+        cycle = d.dividend >> (bit + 1)
+        if not 24 < cycle < 64 * d.clocks:
+            continue
+        for down in (0, 1):
+            numbers = range(1, 13) if not down else range(12, 0, -1)
+            edges += [Edge(now + 1 + k * cycle // 4, number, down) for k, number in enumerate(numbers)]
+            end = edges[-1].at + 2 * d.clocks
+            while now < end:
+                now += d.clocks
+                strobes.append(Strobe(now, 0, sum(edge.at < now for edge in edges)))
+    yield from ((*row, d.switch.format.max) for row in rows(d, strobes, edges))
+
+
+def at_an_edge(d: period_count.Design):
+    """Yield rows of which one is at the very clock of an edge: an age of 0 is taken for no known edge."""
+    edges = [Edge(1 + 2 * d.clocks * k, k + 1, 0) for k in range(9)]
+    ends = [*(d.clocks * k for k in range(1, 17)), edges[-1].at]
+    ends += [ends[-1] + d.clocks * k for k in range(1, 4)]
+    strobes = [Strobe(end, 0, sum(edge.at <= end for edge in edges)) for end in ends]
+    yield from ((*row, d.switch.format.max) for row in rows(d, strobes, edges))
+
+
 @cocotb.test(**CAMPAIGN)
 async def follows_model(dut):
     name = parameters()["name"]
     d, random = design(name), seeded()
-    decided = list(at_the_switch(d))
+    decided = [*at_the_switch(d), *of_one_bit(d), *at_an_edge(d)]
     samples = SAMPLES // (10 if name == "narrow" else 1)
     samples = max(samples - len(decided), samples // 2)
     turns = [rows(d, *turn(d, random, samples // 3), invert) for invert in (False, True)]
