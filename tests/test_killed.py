@@ -34,8 +34,9 @@ STABLE_WALLS = FEW_WALLS | {"zwidth.stiffness_step_n_per_m": 10e3}
 SET, FEW, STABLE = (
     [f"--set={key}={value}" for key, value in keys.items()] for keys in (SHORT, SHORT | FEW_WALLS, SHORT | STABLE_WALLS)
 )
+WALLS = SET if KILLS else FEW
 RUNS: dict[str, tuple[str, ...]] = {
-    "zwidth": ("zwidth", "seed-2011", "--estimators", "adjusted,fdm-500", "--workers", "2", "--resume", *SET),
+    "zwidth": ("zwidth", "seed-2011", "--estimators", "adjusted,fdm-500", "--workers", "2", "--resume", *WALLS),
     "accuracy": ("accuracy", "--estimators", "levant,fdm,kalman", "--rates", "1e3,2e3,5e3", "--workers", "2"),
     "zwidth alone": ("zwidth", "seed-2011", "--estimators", "adjusted", "--workers", "1", "--resume", *SET),
     "cutoff": ("cutoff", "seed-2011", "--workers", "2", "--resume", *FEW),
