@@ -215,8 +215,8 @@ class BankedFile(wiring.Component):
             text = cells.taking["text"]
             bounds.add_states(m, host, [cells.area.eq(Area.MOST), text.eq(1)], [text.eq(1)])
             self._write(m, at, axes, cells)
-            self._walk(m, walk, cells, to)
-            self._give_pulses(m, pulses, walk, to)
+            self._walk(m, axes, walk, cells)
+            self._give_pulses(m, axes, pulses, walk)
             self._snapshot(m, axes, walk, cells)
             with m.State("DONE"):
                 m.d.comb += host.done.eq(1)
@@ -356,35 +356,36 @@ class BankedFile(wiring.Component):
             m.d.comb += [cells.write.data.eq(cells.shift + 1), cells.write.en.eq(1)]
             m.next = "DONE"
 
-    def _walk(self, m: Module, walk: CommitWalk, cells: Cells, to: Signal) -> None:
+    def _walk(self, m: Module, axes: Axes, walk: CommitWalk, cells: Cells) -> None:
         """Add the states of a walk. The high half of a value comes first, and then both are there."""
         shift, upper, words = cells.shift, cells.upper, self._design.registers.words
         with m.State("WALK"):
-            m.d.comb += cells.cell.addr.eq(Cat(walk.place, to))
+            m.d.comb += cells.cell.addr.eq(Cat(walk.place, axes.to))
             m.next = "WALKED"
         with m.State("WALKED"):
             m.d.comb += cells.taking["cell"].eq(1)
             m.next = "WALK_STORE"
         with m.State("WALK_STORE"):
-            m.d.comb += [cells.write.addr.eq(Cat(walk.place ^ (ACTIVE ^ WRITTEN), to)), cells.write.en.eq(walk.copies)]
+            m.d.comb += [cells.write.addr.eq(Cat(walk.place ^ (ACTIVE ^ WRITTEN), axes.to))]
+            m.d.comb += cells.write.en.eq(walk.copies)
             m.d.sync += [walk.low.eq(~walk.low), walk.step.eq(walk.step + walk.low)]
             m.next = "WALK"
             with m.If(walk.low), m.Switch(walk.step):
                 for number, word in enumerate(words):
                     with m.Case(number):
-                        self._give(m, word, to, Cat(shift, upper))
+                        self._give(m, word, axes.to, Cat(shift, upper))
                 with m.Case(len(words)):
                     m.d.sync += self.preload_count.eq(Cat(shift, upper))
                 with m.Case(len(words) + 1):
                     m.d.sync += [self.acknowledged.eq(Cat(shift, upper)), walk.step.eq(0)]
                     m.next = "PULSE"
 
-    def _give_pulses(self, m: Module, pulses: Pulses, walk: CommitWalk, to: Signal) -> None:
+    def _give_pulses(self, m: Module, axes: Axes, pulses: Pulses, walk: CommitWalk) -> None:
         """Add the states that give the pulses, and wait until they have acted."""
         with m.State("PULSE"):
             # One of all axes has a single bit, which is that of the only bank that it is written to in.
             for bit, name in enumerate(pulses.names):
-                m.d.sync += port(self, name).eq(Mux(pulses.marks[bit], Const(1) << to, 0))
+                m.d.sync += port(self, name).eq(Mux(pulses.marks[bit], Const(1) << axes.to, 0))
             m.d.sync += [pulses.marks.eq(0), walk.settling.eq(self._design.settle_clocks)]
             m.next = "SETTLE"
         with m.State("SETTLE"):

@@ -232,8 +232,7 @@ class RegisterFile(wiring.Component):
         ]
         return Bounds(top, tied, difference)
 
-    @staticmethod
-    def _boot(m: Module, cells: Cells) -> None:
+    def _boot(self, m: Module, cells: Cells) -> None:
         """Add the states that write every cell after a reset."""
         step = cells.step
         with m.State("BOOT"):
