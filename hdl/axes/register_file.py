@@ -1,7 +1,5 @@
 """The registers of several axes: a bank of cells an axis, words that go out by number, and a snapshot of one axis."""
 
-from typing import NamedTuple
-
 from amaranth.hdl import Cat, Const, Module, Mux, Shape, ShapeLike, Signal, Value
 from amaranth.lib import wiring
 from amaranth.lib.wiring import In, Member, Out
@@ -9,26 +7,15 @@ from amaranth.lib.wiring import In, Member, Out
 from hardwall.model.axes.register_file import Design
 from hardwall.model.axes.registers import BANK, is_shared
 from hardwall.model.axis.register_file import CELL_BITS, Area, Operation
-from hardwall.model.axis.registers import (
-    ACTIVE,
-    CAPTURE,
-    COUNTERS,
-    END,
-    LIVE,
-    MAP,
-    PULSES,
-    SUPERVISOR,
-    TELEMETRY,
-    WRITTEN,
-)
-from hardwall.model.axis.supervisor import ARMED
+from hardwall.model.axis.registers import ACTIVE, END, LIVE, TELEMETRY, WRITTEN
 from hardwall.model.register import Kind, Register
 
 from ..arithmetic.fixed import less, shape
-from ..link.axis_status import shown, word_of
+from ..link.axis_status import shown
 from ..link.checks import Bounds, Pulses, check_read
 from ..link.requests import Requests
-from ..wires import given, names_of, port
+from ..wires import given, port
+from .at_address import At, Axes, at_address, refused
 from .cells import Cells
 from .commit_walk import CommitWalk
 
@@ -46,42 +33,6 @@ def _given(design: Design) -> dict[str, ShapeLike]:
         **{pulse.name: 1 if is_shared(pulse) else design.banks for pulse in registers.pulses},
         **({"capture_address": 15} if registers.capture else {}),
     }
-
-
-class At(NamedTuple):
-    """What there is at the host's address.
-
-    Attributes:
-        place, bank: its lowest bits, and the bank, which may be none.
-        in_banks, in_map, in_capture: whether it is a register of a bank, of the window, of the capture memory.
-        is_pulse, is_status: it is that of a pulse, or a status.
-        wide: it is one of two of a value.
-        half: a frame begins or ends with it, and has half of a value.
-    """
-
-    place: Value
-    bank: Value
-    in_banks: Value
-    in_map: Value
-    in_capture: Value
-    is_pulse: Value
-    is_status: Value
-    wide: Value
-    half: Value
-
-
-class Axes(NamedTuple):
-    """The axes of an operation: at the address, the one that a frame writes to, and the one whose status it reads.
-
-    Attributes:
-        here, to, asked: their numbers.
-        asks: the frame reads a status.
-    """
-
-    here: Signal
-    to: Signal
-    asked: Signal
-    asks: Signal
 
 
 class BankedFile(wiring.Component):
@@ -174,29 +125,17 @@ class BankedFile(wiring.Component):
         walked = {True: len(self._design.registers.words) + 2, False: 2}
         return {commits: 2 * 3 * words + 3 + self._design.settle_clocks for commits, words in walked.items()}
 
-    def _refused(self, m: Module, wanted: Value, asking: Value) -> Value:
-        """Return whether a pulse that is wanted of an axis is refused, after what its last turn has shown."""
-        banks = self._design.banks
-        ready, armed = Signal(banks), Signal(banks)
-        for axis in range(banks):
-            with m.If(self.turn_valid & (self.turn_axis == axis)):
-                m.d.sync += [ready[axis].eq(self.turn_ready), armed[axis].eq(self.turn_state == ARMED)]
-        moving = word_of(armed, asking, banks)
-        refusing = {"arm": ~word_of(ready, asking, banks), "preload": moving, "origin_shift": moving}
-        names = names_of(self._design.registers.pulses)
-        return Cat(wanted[bit] & refusing[name] for bit, name in enumerate(names) if name in refusing).any()
-
     def elaborate(self, platform):
         m = Module()
         design, host = self._design, self.host
         cells = Cells(m, design)
-        at = self._at(m, cells)
+        at = at_address(m, self, cells.depth)
         pulses = Pulses(m, host, design.registers, at.is_pulse, at.place)
         here, to, asked = (Signal(range(max(design.banks, 2)), name=name) for name in ("here", "to", "asked"))
         asks = Signal()
         m.d.comb += here.eq(at.bank)
         axes = Axes(here, to, asked, asks)
-        refused = self._refused(m, pulses.wanted, here) | pulses.several
+        refuses = refused(m, self, pulses.wanted, here) | pulses.several
         pulses.begin(m, host, asks.eq(0))
         cells.take(m, self, asked)
         bounds = self._bounds(m, at, cells.shift)
@@ -209,7 +148,7 @@ class BankedFile(wiring.Component):
                 m.d.comb += cells.window.eq(host.address[14])
                 m.d.sync += walk.low.eq(0)
                 with m.If(host.start), m.Switch(host.operation):
-                    self._check(m, at, axes, pulses, refused, cells)
+                    self._check(m, at, axes, pulses, refuses, cells)
                     self._begin(m, pulses, axes, walk)
             self._read(m, at, cells)
             text = cells.taking["text"]
@@ -222,27 +161,6 @@ class BankedFile(wiring.Component):
                 m.d.comb += host.done.eq(1)
                 m.next = "IDLE"
         return m
-
-    def _at(self, m: Module, cells: Cells) -> At:
-        """Return what there is at the host's address."""
-        host, registers = self.host, self._design.registers
-        address, bits = host.address, (END - 1).bit_length()
-        place, bank = address[:bits], address[bits : (cells.depth - 1).bit_length()]
-        in_map, in_capture = (address[14:] == MAP >> 14) & less(address[:14], len(self._design.map_cells)), Const(0)
-        if registers.capture:
-            in_capture = (address[15:] == CAPTURE >> 15) & less(address[:15], registers.capture_registers)
-        # Each is a signal of its own: an expression would be written out wherever it is asked for.
-        in_banks, wide, is_pulse, is_status = Signal(), Signal(), Signal(), Signal()
-        status_places = Cat(place[5:] == block >> 5 for block in (TELEMETRY, SUPERVISOR)).any()
-        m.d.comb += [
-            in_banks.eq(less(address, BANK * self._design.banks)),
-            # Counters and pulses have one register.
-            wide.eq(in_banks & (place[5:] != COUNTERS >> 5)),
-            is_pulse.eq(in_banks & (place[4:] == PULSES >> 4)),
-            is_status.eq(in_banks & status_places),
-        ]
-        half = wide & ((host.first & place[0]) | (host.last & ~place[0]))
-        return At(place, bank, in_banks, in_map, in_capture, is_pulse, is_status, wide, half)
 
     def _bounds(self, m: Module, at: At, shift: Signal) -> Bounds:
         """Return the comparison of a bound, which is fetched, with the host's value."""
